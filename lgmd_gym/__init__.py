@@ -1,0 +1,44 @@
+"""Gymnasium environments where a highway-env car brakes on the spike frequency of a locust looming neuron.
+
+Importing this package registers the `LGMD/…` ids and loads nothing heavy; names load on first use.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from lgmd_gym._version import __version__
+from lgmd_gym.envs.registration import register_envs
+
+if TYPE_CHECKING:
+    from lgmd_gym.camera import BirdsEye, CameraParams, EgoCamera
+    from lgmd_gym.neuron import LGMD, LGMDParams, Response
+    from lgmd_gym.wrappers import LGMDObservation
+
+__all__ = [
+    "LGMD",
+    "BirdsEye",
+    "CameraParams",
+    "EgoCamera",
+    "LGMDObservation",
+    "LGMDParams",
+    "Response",
+    "__version__",
+]
+
+_HOMES = {
+    "LGMD": "neuron",
+    "LGMDParams": "neuron",
+    "Response": "neuron",
+    "BirdsEye": "camera",
+    "CameraParams": "camera",
+    "EgoCamera": "camera",
+    "LGMDObservation": "wrappers",
+}
+
+register_envs()
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
