@@ -1,0 +1,58 @@
+"""Exact longitudinal motion: acceleration that ramps at a bounded jerk, and a car that stops at zero.
+
+highway-env integrates with explicit Euler (position with the old speed), which is off by 0.9 m at 50 km/h
+and 15 Hz, and brakes through zero into reverse. Within one step our acceleration is piecewise linear in
+time, so speed and distance have a closed form and no step size is visible in a stopping distance.
+"""
+
+from math import copysign, inf, sqrt
+
+
+def advance(
+    speed: float, acceleration: float, target: float, jerk: float, dt: float
+) -> tuple[float, float, float]:
+    """Move for `dt` while the acceleration ramps towards `target`; never reverse.
+
+    Args:
+        speed: Speed at the start, >= 0 [m/s].
+        acceleration: Acceleration at the start [m/s²].
+        target: Acceleration the ramp leads to [m/s²].
+        jerk: Slope of the ramp, > 0; `math.inf` for a jump [m/s³].
+        dt: Time to advance, >= 0 [s].
+
+    Returns:
+        Distance travelled [m], speed [m/s] and acceleration [m/s²] at the end. A car that reaches zero
+        speed while not accelerating stays there, with acceleration 0.
+    """
+    if jerk == inf:
+        acceleration = target
+    change = target - acceleration
+    ramp = min(abs(change) / jerk, dt)
+    distance = 0.0
+    for duration, slope in ((ramp, copysign(jerk, change)), (dt - ramp, 0.0)):
+        if duration <= 0.0:
+            continue
+        stop = time_to_stop(speed, acceleration, slope)
+        if stop <= duration:
+            distance += stop * (speed + stop * (acceleration / 2 + stop * slope / 6))
+            return distance, 0.0, 0.0
+        distance += duration * (speed + duration * (acceleration / 2 + duration * slope / 6))
+        speed += duration * (acceleration + duration * slope / 2)
+        acceleration = target if slope and ramp < dt else acceleration + duration * slope
+    return distance, max(speed, 0.0), acceleration
+
+
+def time_to_stop(speed: float, acceleration: float, jerk: float) -> float:
+    """Return the first time at which v + a·t + j·t²/2 falls to zero [s]; `math.inf` if it never does."""
+    if speed <= 0.0 and (acceleration < 0.0 or (acceleration == 0.0 and jerk <= 0.0)):
+        return 0.0
+    if jerk == 0.0:
+        return -speed / acceleration if acceleration < 0.0 else inf
+    under_root = acceleration * acceleration - 2.0 * jerk * speed
+    if under_root < 0.0 or (acceleration >= 0.0 and jerk > 0.0):
+        return inf
+    root = sqrt(under_root)
+    # Of the two forms of the first root, the one in which nothing cancels.
+    if acceleration >= 0.0:
+        return (acceleration + root) / -jerk
+    return 2.0 * speed / (root - acceleration)

@@ -1,0 +1,66 @@
+"""The ids `LGMD/<family>-v0`, each registered to a factory that returns the environment already wrapped."""
+
+from typing import Any
+
+import gymnasium as gym
+
+FACTORY = "lgmd_gym.envs.registration:make_observed"
+# Named here so that registering imports neither highway-env nor its pandas; a test holds it against FAMILIES.
+IDS = ("CCRs", "CCRm", "CCRb", "AdjacentPass", "Following", "EmptyRoad")
+
+
+def env_id(family: str) -> str:
+    """Return the Gymnasium id of a scenario family."""
+    return f"LGMD/{family}-v0"
+
+
+def register_envs() -> None:
+    """Register every id with Gymnasium; calling it again changes nothing."""
+    for family in IDS:
+        if env_id(family) not in gym.registry:
+            gym.register(env_id(family), entry_point=FACTORY, kwargs={"family": family})
+
+
+def make_observed(
+    family: str,
+    camera: Any = "fovea",
+    params: Any = None,
+    fps: float | None = None,
+    include_frame: bool = False,
+    include_base: bool = False,
+    trace: bool = False,
+    config: dict[str, Any] | None = None,
+    render_mode: str | None = None,
+    **arguments: Any,
+) -> gym.Env:
+    """Return `BrakingEnv` on a family's scenario inside `LGMDObservation`.
+
+    Args:
+        family: A name in `FAMILIES`.
+        camera: See `LGMDObservation`; plain values, so that an `EnvSpec` survives JSON.
+        params: See `LGMDObservation`.
+        fps: See `LGMDObservation`.
+        include_frame: See `LGMDObservation`.
+        include_base: See `LGMDObservation`.
+        trace: See `LGMDObservation`.
+        config: Configuration of `BrakingEnv`.
+        render_mode: None, "rgb_array" or "human".
+        **arguments: The family's own arguments, in SI units.
+
+    Raises:
+        ValueError: For an unknown argument, key or name (the nearest is named), or a value out of its range.
+    """
+    from lgmd_gym.envs.braking import BrakingEnv
+    from lgmd_gym.envs.families import make_scenario
+    from lgmd_gym.wrappers import LGMDObservation
+
+    env = BrakingEnv(make_scenario(family, **arguments), config=config, render_mode=render_mode)
+    return LGMDObservation(
+        env,
+        camera=camera,
+        params=params,
+        fps=fps,
+        include_frame=include_frame,
+        include_base=include_base,
+        trace=trace,
+    )
