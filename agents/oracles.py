@@ -1,0 +1,36 @@
+"""Agents that are told the truth: bounds of what any eye could reach."""
+
+from typing import Any
+
+from lgmd_gym.agents.base import BRAKE, HOLD, Agent
+from lgmd_gym.agents.options import positive
+
+
+class TTCOracle(Agent):
+    """Brakes fully once the true time to contact falls to a threshold, and keeps braking.
+
+    Args:
+        ttc: Threshold, > 0 [s]. The default stops from 80 km/h at 9 m/s² after the default brake delay.
+    """
+
+    name = "ttc-oracle"
+
+    def __init__(self, ttc: float = 1.6) -> None:
+        super().__init__()
+        self.ttc = positive("ttc", ttc)
+        self.reset()
+
+    @property
+    def alert(self) -> bool:
+        """Whether it has begun to brake."""
+        return self._latched
+
+    def reset(self, seed: int | None = None) -> None:
+        """Release the brake."""
+        super().reset(seed)
+        self._latched = False
+
+    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+        """Brake fully if latched; NaN (no contact ahead) never latches."""
+        self._latched = self._latched or info["ttc"] <= self.ttc
+        return BRAKE if self._latched else HOLD
