@@ -1,0 +1,7 @@
+"""Grey frames out of a highway-env road: the driver's view and the view from above."""
+
+from lgmd_gym.camera.birdseye import BirdsEye
+from lgmd_gym.camera.ego import EgoCamera
+from lgmd_gym.camera.params import CONDITIONS, PRESETS, CameraParams
+
+__all__ = ["CONDITIONS", "PRESETS", "BirdsEye", "CameraParams", "EgoCamera"]
