@@ -10,12 +10,13 @@ class TTCOracle(Agent):
     """Brakes fully once the true time to contact falls to a threshold, and keeps braking.
 
     Args:
-        ttc: Threshold, > 0 [s]. The default stops from 80 km/h at 9 m/s² after the default brake delay.
+        ttc: Threshold, > 0 [s]. The default holds for all the protocol suites with the default brake; the
+            hardest is a lead car that brakes at 0.5 g from 80 km/h 40 m ahead (1.8 s is too late there).
     """
 
     name = "ttc-oracle"
 
-    def __init__(self, ttc: float = 1.6) -> None:
+    def __init__(self, ttc: float = 2.0) -> None:
         super().__init__()
         self.ttc = positive("ttc", ttc)
         self.reset()

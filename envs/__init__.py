@@ -8,15 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from lgmd_gym.envs.braking import BrakingEnv
-    from lgmd_gym.envs.families import FAMILIES, make_scenario
+    from lgmd_gym.envs.catalogue import FAMILIES, make_scenario
+    from lgmd_gym.envs.path import Bend
     from lgmd_gym.envs.registration import env_id, register_envs
-    from lgmd_gym.envs.scenario import Actor, Phase, Scenario
+    from lgmd_gym.envs.scenario import Actor, RoadPlan, Scenario
+    from lgmd_gym.envs.script import Phase
 
 __all__ = [
     "FAMILIES",
     "Actor",
+    "Bend",
     "BrakingEnv",
     "Phase",
+    "RoadPlan",
     "Scenario",
     "env_id",
     "make_scenario",
@@ -25,12 +29,14 @@ __all__ = [
 
 _HOMES = {
     "BrakingEnv": "braking",
-    "FAMILIES": "families",
-    "make_scenario": "families",
+    "FAMILIES": "catalogue",
+    "make_scenario": "catalogue",
     "env_id": "registration",
     "register_envs": "registration",
     "Actor": "scenario",
-    "Phase": "scenario",
+    "Bend": "path",
+    "Phase": "script",
+    "RoadPlan": "scenario",
     "Scenario": "scenario",
 }
 

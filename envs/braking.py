@@ -1,19 +1,24 @@
 """`BrakingEnv`: one highway-env environment for every braking scenario."""
 
 from dataclasses import asdict, fields
+from math import cos, sin
 from typing import Any, ClassVar, cast
 
 import numpy as np
 from highway_env.envs.common.abstract import AbstractEnv
+from highway_env.road.road import RoadNetwork
 
 from lgmd_gym.envs import measures
 from lgmd_gym.envs.brake import BrakeParams
 from lgmd_gym.envs.interface import EgoState, make_action
+from lgmd_gym.envs.network import build_network
+from lgmd_gym.envs.path import Path, Pose
 from lgmd_gym.envs.reward import RewardParams, step_reward
-from lgmd_gym.envs.road import BrakingRoad, straight_network
-from lgmd_gym.envs.scenario import EGO_LENGTH, LANE_WIDTH, Scenario
+from lgmd_gym.envs.road import BrakingRoad
+from lgmd_gym.envs.scenario import EGO_LENGTH, LANE_WIDTH, RoadPlan, Scenario
+from lgmd_gym.envs.script import SpeedScript
 from lgmd_gym.envs.undefined import UNDEFINED
-from lgmd_gym.envs.vehicles import EgoCar, ScriptedCar
+from lgmd_gym.envs.vehicles import KINDS, EgoCar
 from lgmd_gym.errors import check_keys
 
 SHADES = (30, 220)  # range from which a target's body grey is drawn
@@ -47,7 +52,7 @@ class BrakingEnv(AbstractEnv):
     ) -> None:
         self.scenario = scenario
         self.metadata = {**type(self).metadata}  # type: ignore[misc]
-        self._network = straight_network(scenario.lanes)
+        self._network: tuple[RoadPlan, RoadNetwork] | None = None
         self._closed_in = False
         super().__init__(config=config, render_mode=render_mode)  # type: ignore[arg-type]
 
@@ -108,18 +113,25 @@ class BrakingEnv(AbstractEnv):
         return super().step(action)
 
     def _reset(self) -> None:
-        """Build the scene: the network stays, the road and its cars are new."""
+        """Build the scene from the environment's own random numbers."""
+        self._build(self.np_random)
+
+    def _build(self, rng: np.random.Generator) -> None:
+        """Build the scene: the road and its cars are new, a straight network stays."""
         scenario = self.scenario
-        road = BrakingRoad(self._network, self.np_random)
-        x = float(self.np_random.uniform(0.0, START_SPREAD))
-        y = scenario.ego_lane * LANE_WIDTH
-        ego = EgoCar(road, (x, y), scenario.ego_speed, self._brake, self.config["throttle"])
+        start = Pose(float(rng.uniform(0.0, START_SPREAD)), scenario.road.ego_lane * LANE_WIDTH, 0.0)
+        if self._network is None or self._network[0] != scenario.road or scenario.road.placed:
+            self._network = scenario.road, build_network(scenario.road, start)
+        road = BrakingRoad(self._network[1], rng)
+        script = SpeedScript(scenario.ego_speed, scenario.ego_profile)
+        ego = EgoCar(road, Path(start, scenario.ego_path), script, self._brake, self.config["throttle"])
         road.vehicles.append(ego)
         for actor in scenario.actors:
-            drawn = int(self.np_random.integers(*SHADES, endpoint=True))
+            drawn = int(rng.integers(*SHADES, endpoint=True))
             shade = drawn if actor.shade is None else int(actor.shade)
-            centre = x + EGO_LENGTH / 2 + actor.gap + actor.length / 2
-            road.vehicles.append(ScriptedCar(road, (centre, y - actor.lateral_offset), actor, shade))
+            centre = start.x + EGO_LENGTH / 2 + actor.gap + actor.length / 2
+            pose = Pose(centre, start.y - actor.lateral_offset, -actor.heading)
+            road.add(KINDS[actor.kind](road, Path(pose, actor.path), actor, shade))
         road.ego = ego
         self.road, self.controlled_vehicles = road, [ego]
         self._before = ego.speed, ego.acceleration
@@ -136,20 +148,24 @@ class BrakingEnv(AbstractEnv):
         target's script has nothing left to change.
         """
         ego = self.ego
-        if self.road.contact is not None or ego.speed == 0.0:
+        if self.road.contact is not None:
             return True
-        cars = measures.others(ego, self.road.vehicles)
-        if not cars:
+        if ego.speed == 0.0:
+            return ego.script.speed > 0.0
+        obstacles = self.road.obstacles
+        if not obstacles:
             return False
-        ahead = [car for car in cars if not self._is_passed(car)]
-        self._closed_in = self._closed_in or any(ego.speed > car.speed for car in ahead)
-        slower = all(isinstance(car, ScriptedCar) and car.settled and ego.speed < car.speed for car in ahead)
-        return not ahead or (self._closed_in and slower)
+        before_us = [item for item in obstacles if not self._is_passed(item)]
+        self._closed_in = self._closed_in or any(ego.speed > item.speed for item in before_us)
+        slower = all(item.settled and item.path.straight and ego.speed < item.speed for item in before_us)
+        return not before_us or (self._closed_in and slower)
 
-    def _is_passed(self, car: Any) -> bool:
+    def _is_passed(self, item: Any) -> bool:
+        """Whether something lies behind the ego's rear, and cannot catch up."""
         ego = self.ego
-        behind = (ego.position[0] - ego.LENGTH / 2) - (car.position[0] + car.LENGTH / 2)
-        return behind > PASSED and car.speed <= ego.speed
+        dx, dy = item.position[0] - ego.position[0], item.position[1] - ego.position[1]
+        behind = -(dx * cos(ego.heading) + dy * sin(ego.heading)) - (ego.LENGTH + item.LENGTH) / 2
+        return behind > PASSED and item.speed <= ego.speed
 
     def _is_truncated(self) -> bool:
         return self.time >= self.scenario.duration - 1e-9
@@ -157,16 +173,20 @@ class BrakingEnv(AbstractEnv):
     def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
         """Return the ground truth; the draw from the unseeded action space at reset is left out."""
         ego, road = self.ego, self.road
-        contact = road.contact
+        contact, obstacles = road.contact, road.obstacles
+        front = measures.ahead(ego, obstacles)
         return {
             "speed": float(ego.speed),
             "crashed": bool(ego.crashed),
             "ego_speed": float(ego.speed),
-            "gap": measures.gap(ego, road.vehicles),
-            "ttc": measures.time_to_contact(ego, road.vehicles),
+            "gap": front.gap if front else UNDEFINED,
+            "ttc": measures.time_to_contact(ego, obstacles),
+            "thw": measures.headway(ego, front),
+            "drac": measures.deceleration_to_avoid_crash(ego, front),
+            "required_deceleration": measures.required_deceleration(ego, front),
             "collision": contact is not None,
             "impact_speed": contact.impact_speed if contact else UNDEFINED,
             "relative_impact_speed": contact.relative_impact_speed if contact else UNDEFINED,
             "deceleration": ego.braking,
-            "target_speed": float(road.vehicles[1].speed) if len(road.vehicles) > 1 else UNDEFINED,
+            "target_speed": float(obstacles[0].speed) if obstacles else UNDEFINED,
         }

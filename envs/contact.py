@@ -4,7 +4,7 @@ highway-env tests the polygons after the step (and looks one step ahead), so it 
 one step late and flags cars that stop a millimetre short. Here the first touch is found inside the step.
 """
 
-from math import cos, inf, sin
+from math import cos, hypot, inf, sin
 from typing import NamedTuple
 
 
@@ -16,6 +16,11 @@ class Rectangle(NamedTuple):
     heading: float  # [rad]
     length: float  # [m]
     width: float  # [m]
+
+    @property
+    def reach(self) -> float:
+        """From the centre to a corner [m]."""
+        return hypot(self.length, self.width) / 2
 
 
 def first_touch(moving: Rectangle, standing: Rectangle, dx: float, dy: float) -> float | None:
@@ -31,6 +36,8 @@ def first_touch(moving: Rectangle, standing: Rectangle, dx: float, dy: float) ->
         A fraction in [0, 1], 0 if they overlap from the start, or None if they do not touch on the way.
     """
     apart_x, apart_y = standing.x - moving.x, standing.y - moving.y
+    if hypot(apart_x, apart_y) > moving.reach + standing.reach + hypot(dx, dy):
+        return None
     cos_a, sin_a = cos(moving.heading), sin(moving.heading)
     cos_b, sin_b = cos(standing.heading), sin(standing.heading)
     enter, leave = 0.0, 1.0

@@ -70,7 +70,7 @@ class DiscreteDemand(ActionType):
 
 
 class EgoState(ObservationType):
-    """The ego's own speed [m/s], acceleration [m/s²] and yaw rate [rad/s]: what a car's own sensors tell."""
+    """What a car's own sensors tell: speed [m/s], acceleration [m/s²], yaw rate [rad/s, + right]."""
 
     def space(self) -> spaces.Box:
         """Return a Box of shape (3,), float32, with the true bounds."""
@@ -83,7 +83,7 @@ class EgoState(ObservationType):
         if self.env.vehicle is None:
             return np.zeros(3, dtype=np.float32)
         ego = cast(EgoCar, self.env.vehicle)
-        return np.array([ego.speed, ego.acceleration, 0.0], dtype=np.float32)
+        return np.array([ego.speed, ego.acceleration, ego.yaw_rate], dtype=np.float32)
 
 
 ACTIONS = {"ContinuousDemand": ContinuousDemand, "DiscreteDemand": DiscreteDemand}

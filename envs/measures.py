@@ -1,44 +1,138 @@
-"""Ground truth about the ego and what is ahead of it: gap and time to contact."""
+"""Ground truth about the ego and what is ahead of it."""
 
-from math import cos, sin
+from collections.abc import Sequence
+from math import cos, hypot, sin
+from typing import Any, NamedTuple
 
-from highway_env.vehicle.kinematics import Vehicle
-
-from lgmd_gym.envs.contact import first_touch
+from lgmd_gym.envs.contact import Rectangle, first_touch
 from lgmd_gym.envs.undefined import UNDEFINED
-from lgmd_gym.envs.vehicles import EgoCar, StraightCar
+from lgmd_gym.envs.vehicles import EgoCar
 
-TTC_HORIZON = 10.0  # [s]
-GAP_HORIZON = 300.0  # [m]
-
-
-def others(ego: EgoCar, vehicles: list[Vehicle]) -> list[StraightCar]:
-    """Return everybody but the ego."""
-    return [vehicle for vehicle in vehicles if vehicle is not ego and isinstance(vehicle, StraightCar)]
+TTC_HORIZON, TTC_STEP = 10.0, 0.1  # [s]
+GAP_HORIZON, GAP_STEP = 300.0, 1.0  # [m]
 
 
-def gap(ego: EgoCar, vehicles: list[Vehicle]) -> float:
-    """Return the free distance along the ego's path, from its front bumper [m].
+class Ahead(NamedTuple):
+    """What the ego would touch first if all else stood still.
 
-    The path is the ego's own width swept along its heading, against everybody where they are now. NaN if
-    nothing is in it within 300 m.
+    Attributes:
+        gap: Free distance along the ego's path, from its front bumper [m].
+        other: Who or what it is.
     """
-    dx, dy = GAP_HORIZON * cos(ego.heading), GAP_HORIZON * sin(ego.heading)
-    touches = [first_touch(ego.rectangle, other.rectangle, dx, dy) for other in others(ego, vehicles)]
-    return min((touch * GAP_HORIZON for touch in touches if touch is not None), default=UNDEFINED)
+
+    gap: float
+    other: Any
 
 
-def time_to_contact(ego: EgoCar, vehicles: list[Vehicle]) -> float:
-    """Return the first time the ego touches anybody if all keep speed and heading [s].
+def ahead(ego: EgoCar, obstacles: Sequence[Any]) -> Ahead | None:
+    """Return what is first in the ego's way within 300 m, or None.
+
+    The way is the ego's own outline swept along its path, against everybody where they are now.
+    """
+    found = None
+    if ego.path.straight:
+        dx, dy = GAP_HORIZON * cos(ego.heading), GAP_HORIZON * sin(ego.heading)
+        for other in obstacles:
+            touch = first_touch(ego.rectangle, other.rectangle, dx, dy)
+            if touch is not None and (found is None or touch * GAP_HORIZON < found.gap):
+                found = Ahead(touch * GAP_HORIZON, other)
+        return found
+    gaps = ((_gap_on_path(ego, other.rectangle), other) for other in obstacles)
+    return min((Ahead(gap, other) for gap, other in gaps if gap is not None), key=_by_gap, default=None)
+
+
+def _by_gap(front: Ahead) -> float:
+    return front.gap
+
+
+def _gap_on_path(ego: EgoCar, outline: Rectangle) -> float | None:
+    """Return how far the ego can go along a bent path before it touches an outline [m]."""
+    gone = 0.0
+    while gone < GAP_HORIZON:
+        here = _outline(ego, gone)
+        free = _distance(here, outline)
+        if free > GAP_STEP:  # nothing can be touched before that way is gone
+            gone += free
+            continue
+        there = _outline(ego, gone + GAP_STEP)
+        touch = first_touch(here, outline, there.x - here.x, there.y - here.y)
+        if touch is not None:
+            return gone + touch * GAP_STEP
+        gone += GAP_STEP
+    return None
+
+
+def time_to_contact(ego: EgoCar, obstacles: Sequence[Any]) -> float:
+    """Return the first time the ego touches anybody if all keep their speed and path [s].
 
     Euro NCAP AEB C2C v4.3.1, 2.1. NaN if there is no touch within 10 s.
     """
-    ego_x, ego_y = ego.speed * cos(ego.heading), ego.speed * sin(ego.heading)
     times = []
-    for other in others(ego, vehicles):
-        dx = TTC_HORIZON * (ego_x - other.speed * cos(other.heading))
-        dy = TTC_HORIZON * (ego_y - other.speed * sin(other.heading))
-        touch = first_touch(ego.rectangle, other.rectangle, dx, dy)
+    for other in obstacles:
+        if ego.path.straight and other.path.straight:
+            dx = TTC_HORIZON * (ego.speed * cos(ego.heading) - other.speed * cos(other.heading))
+            dy = TTC_HORIZON * (ego.speed * sin(ego.heading) - other.speed * sin(other.heading))
+            touch = first_touch(ego.rectangle, other.rectangle, dx, dy)
+            times.append(None if touch is None else touch * TTC_HORIZON)
+        else:
+            times.append(_time_on_paths(ego, other))
+    return min((time for time in times if time is not None), default=UNDEFINED)
+
+
+def _time_on_paths(ego: EgoCar, other: Any) -> float | None:
+    """Return the time to contact of two on their paths, at least one of them bent [s]."""
+    fastest = ego.speed + other.speed
+    time = 0.0
+    while time < TTC_HORIZON and fastest > 0.0:
+        here, outline = _outline(ego, ego.speed * time), _outline(other, other.speed * time)
+        free = _distance(here, outline) / fastest
+        if free > TTC_STEP:  # even head-on they cannot touch before that time is over
+            time += free
+            continue
+        later = time + TTC_STEP
+        there, moved = _outline(ego, ego.speed * later), _outline(other, other.speed * later)
+        dx, dy = (there.x - here.x) - (moved.x - outline.x), (there.y - here.y) - (moved.y - outline.y)
+        touch = first_touch(here, outline, dx, dy)
         if touch is not None:
-            times.append(touch * TTC_HORIZON)
-    return min(times, default=UNDEFINED)
+            return time + touch * TTC_STEP
+        time = later
+    return None
+
+
+def _outline(item: Any, further: float) -> Rectangle:
+    """Return the outline `further` metres on."""
+    x, y, heading = item.path.pose(item.along + further)
+    return Rectangle(x, y, heading, item.LENGTH, item.WIDTH)
+
+
+def _distance(one: Rectangle, other: Rectangle) -> float:
+    """Return the distance of the circles around two outlines, negative if they overlap [m]."""
+    return hypot(other.x - one.x, other.y - one.y) - one.reach - other.reach
+
+
+def headway(ego: EgoCar, front: Ahead | None) -> float:
+    """Return the time headway THW = gap / v of what is ahead [s]; NaN for nothing, or standing."""
+    return UNDEFINED if front is None or ego.speed == 0.0 else front.gap / ego.speed
+
+
+def closing_speed(ego: EgoCar, front: Ahead) -> float:
+    """Return by how much the ego is faster along its heading than what is ahead [m/s]."""
+    return float(ego.speed - front.other.speed * cos(front.other.heading - ego.heading))
+
+
+def deceleration_to_avoid_crash(ego: EgoCar, front: Ahead | None) -> float:
+    """Return DRAC = Δv² / (2·gap) [m/s²]: 0 if not closing, NaN with nothing ahead or at contact."""
+    if front is None or front.gap <= 0.0:
+        return UNDEFINED
+    return max(closing_speed(ego, front), 0.0) ** 2 / (2.0 * front.gap)
+
+
+def required_deceleration(ego: EgoCar, front: Ahead | None) -> float:
+    """Return the deceleration that just avoids contact if what is ahead keeps its own [m/s²].
+
+    Jansson (2005), 5.3.5: max(0, Δv² / (2·gap) − a_lead), Δv taken at 0 if not closing.
+    """
+    drac = deceleration_to_avoid_crash(ego, front)
+    if front is None or not drac >= 0.0:
+        return UNDEFINED
+    return max(drac - front.other.acceleration, 0.0)

@@ -6,7 +6,31 @@ import gymnasium as gym
 
 FACTORY = "lgmd_gym.envs.registration:make_observed"
 # Named here so that registering imports neither highway-env nor its pandas; a test holds it against FAMILIES.
-IDS = ("CCRs", "CCRm", "CCRb", "AdjacentPass", "Following", "EmptyRoad")
+IDS = (
+    "CCRs",
+    "CCRm",
+    "CCRb",
+    "CCCscp",
+    "Following",
+    "BrakeRelease",
+    "AdjacentPass",
+    "PassBetween",
+    "Overtaken",
+    "Oncoming",
+    "CutIn",
+    "CutOut",
+    "EmptyRoad",
+    "SteelPlate",
+    "BridgeShadow",
+    "PedestrianPass",
+    "CurveGuardRail",
+    "CrossingClears",
+    "TurnBeforeOncoming",
+    "LeadTurnsOff",
+    "CurveObjectOutside",
+    "LaneClosure",
+)
+RANDOM = "RandomBraking"
 
 
 def env_id(family: str) -> str:
@@ -16,7 +40,7 @@ def env_id(family: str) -> str:
 
 def register_envs() -> None:
     """Register every id with Gymnasium; calling it again changes nothing."""
-    for family in IDS:
+    for family in (*IDS, RANDOM):
         if env_id(family) not in gym.registry:
             gym.register(env_id(family), entry_point=FACTORY, kwargs={"family": family})
 
@@ -33,11 +57,12 @@ def make_observed(
     render_mode: str | None = None,
     **arguments: Any,
 ) -> gym.Env:
-    """Return `BrakingEnv` on a family's scenario inside `LGMDObservation`.
+    """Return a braking environment inside `LGMDObservation`, or bare for `camera=None`.
 
     Args:
-        family: A name in `FAMILIES`.
-        camera: See `LGMDObservation`; plain values, so that an `EnvSpec` survives JSON.
+        family: A name in `FAMILIES` for `BrakingEnv`, or "RandomBraking" for `RandomBrakingEnv`.
+        camera: See `LGMDObservation`; plain values, so that an `EnvSpec` survives JSON. None for no eye,
+            as for `lgmd_gym.vector.LGMDObservation`, which brings one for the whole batch.
         params: See `LGMDObservation`.
         fps: See `LGMDObservation`.
         include_frame: See `LGMDObservation`.
@@ -45,16 +70,25 @@ def make_observed(
         trace: See `LGMDObservation`.
         config: Configuration of `BrakingEnv`.
         render_mode: None, "rgb_array" or "human".
-        **arguments: The family's own arguments, in SI units.
+        **arguments: The family's own arguments, in SI units; those of `RandomBrakingEnv`.
 
     Raises:
         ValueError: For an unknown argument, key or name (the nearest is named), or a value out of its range.
     """
     from lgmd_gym.envs.braking import BrakingEnv
-    from lgmd_gym.envs.families import make_scenario
+    from lgmd_gym.envs.catalogue import make_scenario
+    from lgmd_gym.envs.random_braking import RandomBrakingEnv
+    from lgmd_gym.errors import check_keys
+
+    if family == RANDOM:
+        check_keys(f"argument of {RANDOM}", arguments, ("split", "start_level", "num_levels"))
+        env = RandomBrakingEnv(**arguments, config=config, render_mode=render_mode)
+    else:
+        env = BrakingEnv(make_scenario(family, **arguments), config=config, render_mode=render_mode)
+    if camera is None:
+        return env
     from lgmd_gym.wrappers import LGMDObservation
 
-    env = BrakingEnv(make_scenario(family, **arguments), config=config, render_mode=render_mode)
     return LGMDObservation(
         env,
         camera=camera,

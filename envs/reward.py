@@ -46,14 +46,14 @@ def step_reward(env: "BrakingEnv", params: RewardParams, speed: float, accelerat
         acceleration: The ego's acceleration before the step [m/s²].
     """
     ego, contact = env.ego, env.road.contact
-    scripted = env.scenario.ego_speed
+    scripted = env.scenario.top_speed
     dt = 1.0 / env.config["policy_frequency"]
     reward = params.progress * dt * min((speed + ego.speed) / (2.0 * scripted), 1.0)
     reward -= params.jerk * abs(ego.acceleration - acceleration) / ego.brake.max_deceleration
     if contact is not None:
         return reward - params.contact - params.impact * (contact.relative_impact_speed / scripted) ** 2
     if ego.braking > 0.0:
-        ttc = measures.time_to_contact(ego, env.road.vehicles)
+        ttc = measures.time_to_contact(ego, env.road.obstacles)
         if not ttc < params.need_ttc:
             reward -= params.brake * dt * ego.braking / ego.brake.max_deceleration
     return reward

@@ -1,21 +1,18 @@
-"""The road of a braking scenario: straight lanes, and contact with the ego found inside the step."""
+"""The road of a braking scenario: contact with the ego is found inside the step."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from math import cos
+from typing import Any, NamedTuple
 
 import numpy as np
-from highway_env.road.lane import LineType, StraightLane
 from highway_env.road.road import Road, RoadNetwork
-from highway_env.vehicle.kinematics import Vehicle
 
 from lgmd_gym.envs.contact import first_touch
-from lgmd_gym.envs.scenario import LANE_WIDTH
-from lgmd_gym.envs.vehicles import EgoCar, StraightCar
-
-ROAD_START, ROAD_END = -300.0, 6000.0  # [m], beyond what any scenario drives or sees
+from lgmd_gym.envs.vehicles import Box, EgoCar, Follower, Mark, ScriptedCar
 
 
 class Contact(NamedTuple):
-    """The ego's first touch of another vehicle.
+    """The ego's first touch of somebody or something.
 
     Attributes:
         other: What was hit.
@@ -23,7 +20,7 @@ class Contact(NamedTuple):
         relative_impact_speed: The ego's speed less the other's along the ego's heading [m/s].
     """
 
-    other: Vehicle
+    other: Any
     impact_speed: float
     relative_impact_speed: float
 
@@ -42,58 +39,52 @@ class BrakingRoad(Road):
         self.ego: EgoCar | None = None
         self.contact: Contact | None = None
 
+    def add(self, item: ScriptedCar | Box | Mark) -> None:
+        """Put somebody or something on the road."""
+        (self.vehicles if isinstance(item, ScriptedCar) else self.objects).append(item)  # type: ignore[arg-type]
+
+    @property
+    def obstacles(self) -> list[Any]:
+        """Everybody and everything that the ego can touch."""
+        everything: Sequence[Any] = [*self.vehicles, *self.objects]
+        return [
+            item
+            for item in everything
+            if isinstance(item, Follower) and item is not self.ego and not isinstance(item, Mark)
+        ]
+
     def step(self, dt: float) -> None:
-        """Advance all cars by `dt` [s], or up to the first contact of the ego within it."""
-        if self.contact is not None:
-            return
+        """Advance everybody by `dt` [s], or up to the first contact of the ego within it."""
         ego = self.ego
-        before = [(np.array(vehicle.position), vehicle.speed) for vehicle in self.vehicles]
+        if self.contact is not None or ego is None:
+            return
+        others = self.obstacles
+        before = [(item.along, item.speed, item.rectangle) for item in (ego, *others)]
         super().step(dt)
-        hit = None if ego is None else self._first_hit(ego, before)
-        if ego is None or hit is None:
+        for item in self.objects:
+            if isinstance(item, Box | Mark):
+                item.step(dt)
+        hit = _first_hit([ego, *others], before)
+        if hit is None:
             return
         fraction, other = hit
-        for vehicle, (position, speed) in zip(self.vehicles, before, strict=True):
-            vehicle.position = position + fraction * (np.asarray(vehicle.position) - position)
-            vehicle.speed = speed + fraction * (vehicle.speed - speed)
-        along = other.speed * float(np.cos(other.heading - ego.heading))
-        self.contact = Contact(other, ego.speed, ego.speed - along)
+        for item, (along, speed, _) in zip((ego, *others), before, strict=True):
+            item.move((1.0 - fraction) * (along - item.along))
+            item.speed = (1.0 - fraction) * speed + fraction * item.speed
+        across = other.speed * cos(float(other.heading) - float(ego.heading))
+        self.contact = Contact(other, float(ego.speed), float(ego.speed) - across)
         ego.crashed = other.crashed = True
 
-    def _first_hit(
-        self, ego: EgoCar, before: list[tuple[np.ndarray, float]]
-    ) -> tuple[float, StraightCar] | None:
-        """Return the fraction of the step at which the ego first touches a car, and the car."""
-        ego_from = before[self.vehicles.index(ego)][0]
-        ego_dx, ego_dy = (float(way) for way in np.asarray(ego.position) - ego_from)
-        start = ego.rectangle._replace(x=float(ego_from[0]), y=float(ego_from[1]))
-        found: tuple[float, StraightCar] | None = None
-        for other, (position, _) in zip(self.vehicles, before, strict=True):
-            if other is ego or not isinstance(other, StraightCar):
-                continue
-            dx, dy = (float(way) for way in np.asarray(other.position) - position)
-            standing = other.rectangle._replace(x=float(position[0]), y=float(position[1]))
-            fraction = first_touch(start, standing, ego_dx - dx, ego_dy - dy)
-            if fraction is not None and (found is None or fraction < found[0]):
-                found = fraction, other
-        return found
 
-
-def straight_network(lanes: int) -> RoadNetwork:
-    """Return `lanes` parallel lanes along x; lane 0 is the leftmost and lies at y = 0."""
-    network = RoadNetwork()
-    for index in range(lanes):
-        y = index * LANE_WIDTH
-        lines = [
-            LineType.CONTINUOUS_LINE if index == 0 else LineType.STRIPED,
-            LineType.CONTINUOUS_LINE if index == lanes - 1 else LineType.NONE,
-        ]
-        lane = StraightLane(
-            [ROAD_START, y],
-            [ROAD_END, y],
-            width=LANE_WIDTH,
-            line_types=lines,  # type: ignore[arg-type]
-            speed_limit=40,
-        )
-        network.add_lane("start", "end", lane)
-    return network
+def _first_hit(items: list[Any], before: list[Any]) -> tuple[float, Any] | None:
+    """Return the fraction of the step at which the first of `items` touches another, and that one."""
+    start, end = before[0][2], items[0].rectangle
+    ego_dx, ego_dy = end.x - start.x, end.y - start.y
+    found: tuple[float, Any] | None = None
+    for other, (_, _, outline) in zip(items[1:], before[1:], strict=True):
+        now = other.rectangle
+        dx, dy = ego_dx - (now.x - outline.x), ego_dy - (now.y - outline.y)
+        fraction = first_touch(start, outline, dx, dy)
+        if fraction is not None and (found is None or fraction < found[0]):
+            found = fraction, other
+    return found

@@ -1,64 +1,95 @@
 """The cars of a braking scenario: highway-env vehicles that move exactly and never reverse."""
 
-from math import copysign, cos, inf, sin
+from math import asin, atan, tan
 
 from highway_env.road.road import Road
 from highway_env.vehicle.kinematics import Vehicle
+from highway_env.vehicle.objects import Landmark, Obstacle
 
 from lgmd_gym.envs.brake import BrakeParams, DelayLine
 from lgmd_gym.envs.contact import Rectangle
 from lgmd_gym.envs.dynamics import advance
+from lgmd_gym.envs.path import Path
 from lgmd_gym.envs.scenario import EGO_LENGTH, EGO_WIDTH, Actor
+from lgmd_gym.envs.script import SpeedScript
 from lgmd_gym.envs.units import MAX_SPEED
 
 
-class StraightCar(Vehicle):
-    """A car that keeps its heading and moves exactly under piecewise linear acceleration.
-
-    Contact is found by the road's sweep, so highway-env's own collision check is off (`collidable`).
+class Follower:
+    """What keeps to a path: its place is the distance it has covered.
 
     Attributes:
-        acceleration: Acceleration at the present time [m/s²].
+        path: Where it goes.
+        along: Distance covered on it [m].
+        acceleration: At the present time [m/s²].
+    """
+
+    path: Path
+    along: float
+    acceleration: float = 0.0
+
+    @property
+    def rectangle(self) -> Rectangle:
+        """The outline seen from above."""
+        x, y = self.position  # type: ignore[attr-defined]
+        return Rectangle(float(x), float(y), self.heading, self.LENGTH, self.WIDTH)  # type: ignore[attr-defined]
+
+    def move(self, distance: float) -> None:
+        """Go on along the path [m]."""
+        self.along += distance
+        pose = self.path.pose(self.along)
+        self.position[0], self.position[1], self.heading = pose  # type: ignore[attr-defined]
+
+
+class PathCar(Follower, Vehicle):
+    """A car on a path. The road's sweep finds its contacts, so highway-env's check is off (`collidable`).
+
+    Attributes:
         HEIGHT: Of the body [m], read by the camera.
     """
 
     HEIGHT = 1.5
 
-    def __init__(
-        self, road: Road, position: tuple[float, float], speed: float, length: float, width: float
-    ) -> None:
+    def __init__(self, road: Road, path: Path, speed: float, length: float, width: float) -> None:
         self.LENGTH, self.WIDTH = length, width
-        super().__init__(road, position, 0.0, speed)
+        self.path, self.along = path, 0.0
+        start = path.pose(0.0)
+        super().__init__(road, (start.x, start.y), start.heading, speed)
         self.collidable = False
-        self.acceleration = 0.0
-
-    @property
-    def rectangle(self) -> Rectangle:
-        """The outline seen from above."""
-        x, y = self.position
-        return Rectangle(float(x), float(y), self.heading, self.LENGTH, self.WIDTH)
 
     def move(self, distance: float) -> None:
-        """Shift the car along its heading [m]."""
-        self.position[0] += distance * cos(self.heading)
-        self.position[1] += distance * sin(self.heading)
-        # What highway-env's drawing and the camera's brake light read.
-        self.action = {"steering": 0.0, "acceleration": self.acceleration}
+        """Go on along the path [m]."""
+        before = self.heading
+        super().move(distance)
+        steering = 0.0
+        if not self.path.straight and distance > 0.0:
+            # The angle at which highway-env's bicycle would turn as much on the way.
+            slip = asin(max(-0.7, min(0.7, (self.heading - before) / distance * self.LENGTH / 2)))
+            steering = atan(2.0 * tan(slip))
+        # What highway-env's drawing, the camera's brake light and its gaze along the path read.
+        self.action = {"steering": steering, "acceleration": self.acceleration}
 
 
-class EgoCar(StraightCar):
-    """The car under test: holds its scripted speed unless a demand says otherwise."""
+class EgoCar(PathCar):
+    """The car under test: keeps to its scripted path and speed unless a demand says otherwise.
+
+    Attributes:
+        script: The speed it would have without the agent.
+        yaw_rate: Over the last step, + to the right [rad/s].
+    """
 
     color = (50, 200, 0)  # in highway-env's view from above
 
     def __init__(
-        self, road: Road, position: tuple[float, float], speed: float, brake: BrakeParams, throttle: bool
+        self, road: Road, path: Path, script: SpeedScript, brake: BrakeParams, throttle: bool
     ) -> None:
-        super().__init__(road, position, speed, EGO_LENGTH, EGO_WIDTH)
-        self.script_speed = speed
+        super().__init__(road, path, script.speed, EGO_LENGTH, EGO_WIDTH)
+        self.script = script
         self.brake = brake
         self.throttle = throttle
+        self.yaw_rate = 0.0
         self._delayed = DelayLine(brake.delay)
+        self._on_script = True
 
     def demand(self, value: float) -> None:
         """Take a longitudinal demand: −1 full brake, 0 hold the scripted speed, +1 full throttle."""
@@ -67,70 +98,102 @@ class EgoCar(StraightCar):
     @property
     def braking(self) -> float:
         """Deceleration beyond the script, >= 0 [m/s²]."""
-        return max(0.0, -self.acceleration)
+        return 0.0 if self._on_script else max(0.0, self.script.acceleration - self.acceleration)
 
     def step(self, dt: float) -> None:
         """Advance by `dt` [s] under the demands that have become due."""
-        travelled = 0.0
-        for duration, demand in self._delayed.pieces(dt):
-            distance, self.speed, self.acceleration = advance(
-                self.speed, self.acceleration, self._target(demand), self.brake.jerk, duration
-            )
-            travelled += distance
-        self.move(travelled)
+        before = self.heading
+        self.move(sum(self._advance(duration, demand) for duration, demand in self._delayed.pieces(dt)))
+        self.yaw_rate = (self.heading - before) / dt
+
+    def _advance(self, duration: float, demand: float) -> float:
+        """Advance the speed under one demand and return the distance [m]."""
+        scripted = self.script.step(duration)
+        self._on_script = self._on_script and demand == 0.0
+        if self._on_script:
+            self.speed, self.acceleration = self.script.speed, self.script.acceleration
+            return scripted
+        distance, self.speed, self.acceleration = advance(
+            self.speed, self.acceleration, self._target(demand), self.brake.jerk, duration
+        )
+        return distance
 
     def _target(self, demand: float) -> float:
         """Return the acceleration [m/s²] that a demand in force leads to."""
         if demand < 0.0:
-            return demand * self.brake.max_deceleration
+            # The script may itself be slowing down; a weaker demand does not release its brake.
+            return min(demand * self.brake.max_deceleration, self.script.acceleration)
         if demand > 0.0:
             return demand * self.brake.max_acceleration if self.speed < MAX_SPEED else 0.0
         # The driver closes what is missing to the scripted speed within half a second, at most this hard.
-        missing = self.script_speed - self.speed
-        return min(max(missing / 0.5, -self.brake.regain_acceleration), self.brake.regain_acceleration)
+        missing = self.script.speed - self.speed
+        limit = self.brake.regain_acceleration
+        return self.script.acceleration + min(max(missing / 0.5, -limit), limit)
 
 
-class ScriptedCar(StraightCar):
-    """Another road user that follows the speed profile of its `Actor`."""
+class ScriptedCar(PathCar):
+    """Another car, on the path and with the speeds of its `Actor`."""
 
     color = (100, 200, 255)  # in highway-env's view from above
 
-    def __init__(self, road: Road, position: tuple[float, float], actor: Actor, shade: int) -> None:
-        super().__init__(road, position, actor.speed, actor.length, actor.width)
+    def __init__(self, road: Road, path: Path, actor: Actor, shade: int) -> None:
+        super().__init__(road, path, actor.speed, actor.length, actor.width)
         self.HEIGHT = actor.height
         self.shade = shade
-        self._phases = list(actor.profile)
-        self._time = 0.0
+        self.script = SpeedScript(actor.speed, actor.profile)
 
     @property
     def settled(self) -> bool:
         """Whether the script has nothing left to change."""
-        return not self._phases
+        return self.script.settled
 
     def step(self, dt: float) -> None:
         """Advance by `dt` [s] along the script."""
-        end = self._time + dt
-        travelled = 0.0
-        while self._phases and self._phases[0].start < end:
-            phase = self._phases[0]
-            before = max(phase.start - self._time, 0.0)
-            travelled += self._advance(0.0, inf, before)
-            jerk = abs(phase.acceleration) / phase.build_up if phase.build_up > 0.0 else inf
-            travelled += self._advance(phase.acceleration, jerk, end - self._time)
-            left = (phase.final_speed - self.speed) * copysign(1.0, phase.acceleration)
-            if left > 0.0:
-                break
-            self._phases.pop(0)
-            self.speed, self.acceleration = phase.final_speed, 0.0
-        travelled += self._advance(0.0, inf, end - self._time)
+        travelled = self.script.step(dt)
+        self.speed, self.acceleration = self.script.speed, self.script.acceleration
         self.move(travelled)
 
-    def _advance(self, target: float, jerk: float, duration: float) -> float:
-        """Advance the speed and the script's clock, and return the distance [m]."""
-        if duration <= 0.0:
-            return 0.0
-        distance, self.speed, self.acceleration = advance(
-            self.speed, self.acceleration, target, jerk, duration
-        )
-        self._time += duration
-        return distance
+
+class _Prop(Follower):
+    """Something on the road that is no car: a box, or a mark on the ground."""
+
+    def _place(self, path: Path, actor: Actor, shade: int) -> None:
+        self.LENGTH, self.WIDTH, self.HEIGHT = actor.length, actor.width, actor.height
+        self.path, self.along = path, 0.0
+        self.shade = shade
+        self.script = SpeedScript(actor.speed, actor.profile)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the script has nothing left to change."""
+        return self.script.settled
+
+    def step(self, dt: float) -> None:
+        """Advance by `dt` [s] along the script."""
+        travelled = self.script.step(dt)
+        self.speed, self.acceleration = self.script.speed, self.script.acceleration
+        if travelled:
+            self.move(travelled)
+
+
+class Box(_Prop, Obstacle):
+    """A solid box: a pedestrian, a sign, a rail, a post."""
+
+    def __init__(self, road: Road, path: Path, actor: Actor, shade: int) -> None:
+        self._place(path, actor, shade)
+        start = path.pose(0.0)
+        super().__init__(road, (start.x, start.y), start.heading, actor.speed)
+        self.collidable = False
+
+
+class Mark(_Prop, Landmark):
+    """Something flat that one drives over: a steel plate, a shadow."""
+
+    def __init__(self, road: Road, path: Path, actor: Actor, shade: int) -> None:
+        self._place(path, actor, shade)
+        start = path.pose(0.0)
+        super().__init__(road, (start.x, start.y), start.heading, actor.speed)
+        self.collidable = False
+
+
+KINDS = {"car": ScriptedCar, "box": Box, "mark": Mark}

@@ -1,0 +1,55 @@
+"""`RandomBrakingEnv`: a new scenario at every reset, out of a split of numbered levels."""
+
+from typing import Any
+
+from lgmd_gym.envs.braking import BrakingEnv
+from lgmd_gym.envs.levels import LEVELS, check_levels, draw_scenario, level_generator
+
+
+class RandomBrakingEnv(BrakingEnv):
+    """A braking environment whose scenario is drawn at every reset.
+
+    ## Description
+
+    Half of the levels are threats (CCRs, CCRm, CCRb, CCCscp), the others driving in which braking is the
+    fault (all other families); speed, gap, offset, side and shade are drawn with them. A level number fixes
+    everything, in any process. Resets without a seed draw levels of the split only, so that training never
+    sees a level of validation or test; `info["level"]` tells which one it was.
+
+    ## Arguments
+
+    Args:
+        split: "train", "validation" or "test": a million levels each.
+        start_level: First level in use.
+        num_levels: How many from there on; 0 for all that are left.
+        config: See `BrakingEnv`.
+        render_mode: See `BrakingEnv`.
+
+    Raises:
+        ValueError: For an unknown split, or levels beyond it.
+    """
+
+    def __init__(
+        self,
+        split: str = "train",
+        start_level: int = 0,
+        num_levels: int = 0,
+        config: dict[str, Any] | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        check_levels(split, start_level, num_levels)
+        self.split, self.start_level = split, start_level
+        self.num_levels = num_levels or LEVELS - start_level
+        self.level = start_level
+        first = draw_scenario(level_generator(split, start_level))
+        super().__init__(first, config=config, render_mode=render_mode)
+
+    def _reset(self) -> None:
+        """Draw a level and build its scene."""
+        self.level = self.start_level + int(self.np_random.integers(self.num_levels))
+        rng = level_generator(self.split, self.level)
+        self.scenario = draw_scenario(rng)
+        self._build(rng)
+
+    def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
+        return super()._info(obs, action) | {"level": self.level}
