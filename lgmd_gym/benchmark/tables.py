@@ -1,0 +1,65 @@
+"""A run's scores as tables on the terminal."""
+
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from lgmd_gym.benchmark.summary import Rate, Score, case_order, scores
+from lgmd_gym.envs.units import KMH
+
+Row = dict[str, Any]
+RATE_NOTE = "k/n [Wilson 95 % interval in %]; premature: more than 4 s before contact, no success"
+
+
+def score_table(rows: list[Row], agents: list[str], title: str) -> Table:
+    """Return one line per agent over all episodes."""
+    table = Table(title=title, caption=RATE_NOTE, box=SIMPLE_HEAD)
+    table.add_column("agent", overflow="fold", min_width=15)
+    for heading in ("avoided", "speed\ncut km/h", "TTC at\nbraking s", "premature", "false braking"):
+        table.add_column(heading, justify="right")
+    for item in _by_agent(scores(rows, lambda row: ""), agents):
+        table.add_row(
+            item.agent + (f" ({item.errors} errors)" if item.errors else ""),
+            _rate(item.avoided),
+            "–" if item.speed_reduction is None else f"{item.speed_reduction / KMH:.1f}",
+            "–" if item.ttc_at_brake is None else f"{item.ttc_at_brake:.2f}",
+            _rate(item.premature),
+            _rate(item.false_brakes),
+        )
+    return table
+
+
+def case_table(rows: list[Row], agents: list[str]) -> Table:
+    """Return one line per case: threats avoided, or quiet episodes without false braking, of n."""
+    title = "per case: avoided, or not braked where nothing threatened, of n"
+    table = Table(title=title, box=SIMPLE_HEAD)
+    table.add_column("case", overflow="fold")
+    shown = [agent for agent in agents if any(row["agent"] == agent for row in rows)]
+    for agent in shown:
+        table.add_column(agent.replace("-", "-\n", 1), justify="right", overflow="fold")
+    cells = {(item.agent, item.group): item for item in scores(rows, lambda row: row["case"])}
+    for case in sorted({row["case"] for row in rows}, key=case_order):
+        values = [_good(cells.get((agent, case))) for agent in shown]
+        table.add_row(case.split("/", 1)[1], *values)
+    return table
+
+
+def _rate(rate: Rate) -> str:
+    if rate.n == 0:
+        return "–"
+    return f"{rate.k}/{rate.n} [{100 * rate.low:.0f}–{100 * rate.high:.0f}]"
+
+
+def _good(item: Score | None) -> str:
+    """Return how many episodes went as they should."""
+    if item is None:
+        return ""
+    good = item.avoided.k + item.false_brakes.n - item.false_brakes.k
+    return f"{good}/{item.avoided.n + item.false_brakes.n}"
+
+
+def _by_agent(items: list[Score], agents: list[str]) -> list[Score]:
+    """Return the scores in the order the agents were given in."""
+    order = {agent: index for index, agent in enumerate(agents)}
+    return sorted(items, key=lambda item: order.get(item.agent, len(order)))

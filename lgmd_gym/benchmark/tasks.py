@@ -1,0 +1,74 @@
+"""One task: one agent in one case with one seed, played in whatever process picks it up."""
+
+import traceback
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.cases import Case
+from lgmd_gym.benchmark.driver import WarnedDriver
+from lgmd_gym.benchmark.episode import Episode, Eyesight, make_env, play
+from lgmd_gym.benchmark.rows import Counterfactual, error_row, make_row
+
+NO_BRAKE = "no-brake"
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What to play.
+
+    Attributes:
+        agent: The agent's string.
+        case: The case.
+        seed: Of the environment and the agent.
+        eyesight: Camera and neuron parameters.
+        truth: What `no-brake` met; None for `no-brake` itself.
+    """
+
+    agent: str
+    case: Case
+    seed: int
+    eyesight: Eyesight
+    truth: Counterfactual | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What came of a task.
+
+    Attributes:
+        task: The task.
+        row: The row of `episodes.jsonl`.
+        series: The episode's time series; None after an error.
+        truth: The counterfactual, if the task was `no-brake`'s.
+    """
+
+    task: Task
+    row: dict[str, Any]
+    series: dict[str, np.ndarray] | None = None
+    truth: Counterfactual | None = None
+
+
+def run_task(task: Task) -> Result:
+    """Play a task; whatever an agent or environment raises becomes an error row."""
+    try:
+        episode = _play(task)
+    except Exception:
+        return Result(task, error_row(task.agent, task.case, task.seed, traceback.format_exc()))
+    truth = task.truth or Counterfactual.of(episode)
+    row = make_row(task.agent, task.case, task.seed, episode, truth)
+    return Result(task, row, episode.series, truth)
+
+
+def _play(task: Task) -> Episode:
+    env = make_env(task.case, task.eyesight)
+    try:
+        agent: Any = make_agent(task.agent)
+        if task.case.warned_driver and task.agent != NO_BRAKE:
+            config = env.unwrapped.config  # type: ignore[attr-defined]
+            agent = WarnedDriver(agent, config["max_deceleration"], config["policy_frequency"])
+        return play(env, agent, task.seed)
+    finally:
+        env.close()

@@ -1,0 +1,144 @@
+"""The `lgmd-gym` command: bench, drive, list."""
+
+import contextlib
+import io
+import re
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args
+
+import tyro
+from tyro.conf import Positional, subcommand
+
+DESCRIPTION = """A highway-env car brakes on the spike frequency of a locust looming neuron (LGMD).
+
+  lgmd-gym bench                                    try all agents on the quick suite; about a minute
+  lgmd-gym drive LGMD/CCRs-v0 --video out.mp4       watch one approach through the eye
+  lgmd-gym list                                     suites, agents, environments, cameras
+
+Speeds are in m/s, case names carry km/h. Each command has its own --help."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    """Play a suite with every agent and seed, print the scores, and write a run folder.
+
+    The folder gets episodes.jsonl (one row per episode, as it finishes), summary.csv, run.json, the time
+    series of seed 0 and one PNG per case. Ctrl-C keeps what is finished.
+    """
+
+    suite: str = "quick"
+    """Name of a suite; `lgmd-gym list suites` shows them."""
+    agents: tuple[str, ...] = ("no-brake", "always-brake", "random-brake", "spike-threshold", "ttc-oracle")
+    """Agents with options, as in spike-threshold:threshold=45,frames=2."""
+    seeds: int = 3
+    """Seeds per case, from 0 on; a seed draws the place on the road and the target's grey."""
+    jobs: int = 2
+    """Processes."""
+    out: Path | None = None
+    """Run folder; must not exist. Default: runs/SUITE-DATE-TIME."""
+    camera: str = "fovea"
+    """Camera preset: wide, standard, tele, fovea, paper or birdseye."""
+    params: Path | None = None
+    """TOML file of LGMD parameters."""
+    plots: bool = True
+    """Draw one PNG per case."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """Play one episode, print how it ended, and write a video of the eye's view."""
+
+    target: Positional[str]
+    """An environment id such as LGMD/CCRs-v0, or a case such as quick/CCRs/v30."""
+    agent: str = "spike-threshold"
+    """Who brakes, with options as in spike-threshold:threshold=45."""
+    video: Path | None = None
+    """Video file to write (.mp4, .gif, …); must not exist."""
+    seed: int = 0
+    """Draws the place on the road and the target's grey."""
+    camera: str = "fovea"
+    """Camera preset: wide, standard, tele, fovea, paper or birdseye."""
+    params: Path | None = None
+    """TOML file of LGMD parameters."""
+    set: tuple[str, ...] = ()
+    """Scenario arguments in SI units, as in --set ego_speed=8.3 shade=40."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class List:
+    """List what there is to name: suites with their cases, agents, environments, cameras."""
+
+    what: Positional[Literal["all", "suites", "agents", "envs", "cameras"]] = "all"
+    """Which list."""
+
+
+Command = Union[  # noqa: UP007  (tyro reads the annotations)
+    Annotated[Bench, subcommand(name="bench")],
+    Annotated[Drive, subcommand(name="drive")],
+    Annotated[List, subcommand(name="list")],
+]
+
+
+def main(argv: list[str] | None = None) -> None:
+    """Run the command line; exits with 2 and one line on stderr for bad input."""
+    sys.exit(run(argv))
+
+
+def run(argv: list[str] | None = None) -> int:
+    """Run one command and return its exit code."""
+    try:
+        command = _parse(argv)
+        from lgmd_gym import commands
+
+        plays: dict[type, Callable[[Any], int]] = {
+            Bench: commands.bench,
+            Drive: commands.drive,
+            List: commands.show_list,
+        }
+        return plays[type(command)](command)
+    except (ValueError, TypeError) as error:
+        print(f"lgmd-gym: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("lgmd-gym: interrupted", file=sys.stderr)
+        return 130
+
+
+def _parse(argv: list[str] | None) -> Any:
+    """Parse the arguments; what the parser complains of becomes a one-line ValueError."""
+    given = sys.argv[1:] if argv is None else argv
+    names = [get_args(item)[1].name for item in get_args(Command)]
+    if not given:
+        raise ValueError(f"which command? One of {', '.join(names)}; see lgmd-gym --help")
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return tyro.cli(
+                Command,  # type: ignore[arg-type]
+                prog="lgmd-gym",
+                description=DESCRIPTION,
+                args=given,
+                config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes),
+            )
+    except SystemExit as stop:
+        if not stop.code:
+            raise
+        raise ValueError(_one_line(complaint.getvalue())) from None
+
+
+def _one_line(box: str) -> str:
+    """Return what the parser's boxed message says is wrong, and the nearest option if it names one."""
+    text = re.sub(r"\x1b\[[0-9;]*m", "", box)
+    wrong = []
+    for line in text.splitlines():
+        words = line.strip("│╭╰╮╯ ")
+        if words and not words.strip("─") and wrong:
+            break  # a rule inside the box: what follows repeats the help
+        if words and not line.startswith(("╭", "╰")) and words.strip("─"):
+            wrong.append(words)
+    nearest = re.search(r"Perhaps you meant:[^-]*(--[a-z][a-z-]*)", text)
+    mend = f"; did you mean {nearest[1]}?" if nearest else "; see lgmd-gym --help"
+    return re.sub(r" \(applied to [^)]*\)", "", " ".join(wrong)) + mend

@@ -1,0 +1,148 @@
+"""What each command does with its parsed options."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+
+if TYPE_CHECKING:
+    from lgmd_gym import cli
+    from lgmd_gym.benchmark.runner import Run
+
+
+def bench(options: "cli.Bench") -> int:
+    """Play a suite and report; 0 if all was played, 1 if an episode failed, 130 after Ctrl-C."""
+    from lgmd_gym.benchmark.episode import Eyesight
+    from lgmd_gym.benchmark.runner import Run
+
+    out = options.out or Path("runs") / f"{options.suite}-{time.strftime('%Y%m%d-%H%M%S')}"
+    eyesight = Eyesight(options.camera, _read_params(options.params))
+    run = Run(options.suite, options.agents, options.seeds, options.jobs, out, eyesight)
+    console = _console()
+    with _progress(run) as tick:
+        complete = run.play(tick)
+    failed = _report(run, console, options)
+    if not complete:
+        console.print(f"interrupted: {len(run.rows)} of {run.total} episodes kept", style="yellow")
+    if failed:
+        console.print(f"{failed} episodes failed; their tracebacks are in episodes.jsonl", style="red")
+    console.print(f"run folder: {out}", soft_wrap=True)
+    return 130 if not complete else int(bool(failed))
+
+
+def drive(options: "cli.Drive") -> int:
+    """Play one episode and say how it ended."""
+    from lgmd_gym.agents import make_agent
+    from lgmd_gym.drive import drive as play
+
+    agent = make_agent(options.agent)
+    end = play(
+        options.target,
+        agent,
+        options.video,
+        options.seed,
+        _parse_arguments(options.set),
+        camera=options.camera,
+        params=_read_params(options.params),
+    )
+    if end.collision:
+        print(f"contact at {3.6 * end.impact_speed:.1f} km/h relative speed after {end.duration:.2f} s")
+    else:
+        gap = f"{end.gap:.2f} m ahead free" if end.gap == end.gap else "nothing ahead"
+        print(f"no contact: {3.6 * end.ego_speed:.1f} km/h after {end.duration:.2f} s, {gap}")
+    if options.video is not None:
+        print(f"video: {options.video}")
+    return 0
+
+
+def show_list(options: "cli.List") -> int:
+    """Print what there is to name."""
+    from lgmd_gym import listing
+
+    listing.show(options.what, _console())
+    return 0
+
+
+def _report(run: "Run", console: Console, options: "cli.Bench") -> int:
+    """Print the tables, write summary and plots, and return the number of failed episodes."""
+    from lgmd_gym.benchmark import tables
+    from lgmd_gym.benchmark.summary import write_summary
+    from lgmd_gym.neuron import LGMDParams
+
+    rows = run.rows
+    if rows:
+        level = LGMDParams.from_dict(run.eyesight.params or {}).t_sf
+        fps = next((f"{row['fps']:g} Hz" for row in rows if row["fps"]), "?")
+        title = f"{run.suite}: camera {options.camera} at {fps}, T_sf = {level:g} spikes/s, {run.seeds} seeds"
+        agents = list(dict.fromkeys(["no-brake", *run.agents]))
+        console.print(tables.score_table(rows, agents, title))
+        console.print(tables.case_table(rows, agents))
+        write_summary(rows, run.folder.path / "summary.csv")
+        if options.plots:
+            _draw_cases(run, level)
+    return sum(row["error"] is not None for row in rows)
+
+
+def _draw_cases(run: "Run", alert_level: float) -> None:
+    """Draw every case's seed 0, all agents in one figure."""
+    import numpy as np
+
+    from lgmd_gym import plots
+    from lgmd_gym.benchmark.runner import trace_name
+
+    folder = run.folder.path / "plots"
+    folder.mkdir(exist_ok=True)
+    for case in run.cases:
+        episodes: dict[str, dict[str, Any]] = {}
+        for agent in run.agents:
+            file = run.folder.path / "traces" / f"{trace_name(case.name, agent)}.npz"
+            if file.exists():
+                with np.load(file) as series:
+                    episodes[agent] = dict(series)
+        if episodes:
+            name = case.name.replace("/", "_")
+            plots.episode_figure(folder / f"{name}.png", f"{case.name}, seed 0", episodes, alert_level)
+
+
+def _console() -> Console:
+    """Return the terminal, or for a file or pipe a page wide enough for the tables."""
+    console = Console()
+    return console if console.is_terminal else Console(width=110)
+
+
+@contextmanager
+def _progress(run: "Run") -> Iterator[Any]:
+    """Show a progress bar on stderr and yield the function that moves it."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        shown = bar.add_task(run.suite, total=run.total)
+        yield lambda row: bar.advance(shown)
+
+
+def _read_params(path: Path | None) -> dict[str, Any] | None:
+    """Return the LGMD parameters of a TOML file as plain values."""
+    if path is None:
+        return None
+    from lgmd_gym.neuron import LGMDParams
+
+    try:
+        return LGMDParams.from_toml(path).to_dict()
+    except OSError as error:
+        raise ValueError(f"params file {str(path)!r} cannot be read: {error.strerror}") from None
+
+
+def _parse_arguments(pairs: tuple[str, ...]) -> dict[str, Any]:
+    """Return name=value pairs as numbers by name."""
+    arguments: dict[str, Any] = {}
+    for pair in pairs:
+        name, _, value = pair.partition("=")
+        try:
+            arguments[name] = int(value) if name == "shade" else float(value)
+        except ValueError:
+            raise ValueError(f"--set {pair!r} must be NAME=NUMBER, as in ego_speed=8.3") from None
+    return arguments

@@ -1,0 +1,78 @@
+"""Every figure of the package, in one matplotlib style; matplotlib is loaded on first use."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+# Okabe & Ito's palette, told apart by colour-blind readers, darkest first.
+COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+STYLE = {
+    "axes.grid": True,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "figure.dpi": 110,
+    "font.size": 9,
+    "grid.alpha": 0.3,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+}
+
+
+def episode_figure(
+    path: Path, title: str, episodes: dict[str, dict[str, np.ndarray]], alert_level: float
+) -> None:
+    """Draw spike frequency, speed and gap over time, one line per agent, and save it.
+
+    Args:
+        path: Where the PNG goes.
+        title: The case's name.
+        episodes: Agent to its time series (`lgmd_gym.benchmark.episode.SERIES`).
+        alert_level: The neuron's T_sf, drawn as a line [spikes/s].
+    """
+    plt = _pyplot()
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(3, 1, sharex=True, figsize=(7.5, 6.0), layout="constrained")
+        figure.suptitle(title)
+        colours = _colours(list(episodes))
+        for agent, series in episodes.items():
+            look: dict[str, Any] = {"color": colours[agent], "label": agent}
+            axes[0].plot(series["time"], series["spike_frequency"], **look)
+            axes[1].plot(series["time"], 3.6 * series["ego_speed"], **look)
+            axes[2].plot(series["time"], series["gap"], **look)
+            _mark_end(axes, series, colours[agent])
+        axes[0].axhline(alert_level, color="0.5", linestyle="--", linewidth=1.0)
+        axes[0].annotate(f"T_sf = {alert_level:g}", (0.01, alert_level), xycoords=("axes fraction", "data"),
+                         va="bottom", color="0.4", fontsize=8)  # fmt: skip
+        axes[0].set_ylabel("spike frequency\n[spikes/s]")
+        axes[1].set_ylabel("ego speed [km/h]")
+        axes[2].set_ylabel("gap [m]")
+        axes[2].set_xlabel("time [s]   (× contact, ● stopped or resolved)")
+        for axis in axes:
+            axis.set_ylim(bottom=0)
+        if not any(np.isfinite(series["gap"]).any() for series in episodes.values()):
+            axes[2].text(0.5, 0.5, "nothing in the ego's path", transform=axes[2].transAxes, ha="center")
+        axes[1].legend(loc="best", ncols=2, fontsize=8)
+        figure.savefig(path)
+        plt.close(figure)
+
+
+def _mark_end(axes: Any, series: dict[str, np.ndarray], colour: str) -> None:
+    """Mark how an episode ended on the speed and gap axes."""
+    contact = series["gap"][-1] <= 1e-6
+    marker = {"marker": "x" if contact else "o", "color": colour, "markersize": 6 if contact else 4}
+    axes[1].plot(series["time"][-1], 3.6 * series["ego_speed"][-1], **marker)
+    axes[2].plot(series["time"][-1], series["gap"][-1], **marker)
+
+
+def _colours(agents: list[str]) -> dict[str, str]:
+    return {agent: COLOURS[index % len(COLOURS)] for index, agent in enumerate(agents)}
+
+
+def _pyplot() -> Any:
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot
+
+    return pyplot
