@@ -1,9 +1,12 @@
 """Every figure of the package, in one matplotlib style; matplotlib is loaded on first use."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from lgmd_gym.neuron import LGMD
 
 # Okabe & Ito's palette, told apart by colour-blind readers, darkest first.
 COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -53,6 +56,44 @@ def episode_figure(
         if not any(np.isfinite(series["gap"]).any() for series in episodes.values()):
             axes[2].text(0.5, 0.5, "nothing in the ego's path", transform=axes[2].transAxes, ha="center")
         axes[1].legend(loc="best", ncols=2, fontsize=8)
+        figure.savefig(path)
+        plt.close(figure)
+
+
+def layers(path: Path, neuron: "LGMD", frame: np.ndarray | None = None) -> None:
+    """Draw the maps of a neuron's last frame and save them.
+
+    Args:
+        path: Where the PNG goes.
+        neuron: A single neuron (`num=None`) that has seen at least one frame.
+        frame: The frame itself, shape (height, width), drawn first if given.
+
+    Raises:
+        ValueError: For a batch of neurons.
+    """
+    if neuron.num is not None:
+        raise ValueError(f"layers draws a single neuron, got a batch of {neuron.num}; pass LGMD(shape) alone")
+    maps = neuron.layers
+    titles = {
+        "P": "P: change, with persistence",
+        "E": "E: excitation",
+        "I": "I: delayed inhibition",
+        "S": "S: excitation left",
+        "G": "G: grouped",
+    }
+    plt = _pyplot()
+    pictures = {} if frame is None else {"L: luminance": (frame, 0.0, 255.0)}
+    for name, title in titles.items():
+        top = max(float(np.abs(maps[name]).max()), 1.0)
+        pictures[title] = maps[name], -top if name == "P" else 0.0, top
+    with plt.rc_context({**STYLE, "axes.grid": False}):
+        figure, axes = plt.subplots(2, 3, figsize=(10.0, 4.4), layout="constrained")
+        for axis in axes.flat:
+            axis.axis("off")
+        for axis, (title, (values, low, high)) in zip(axes.flat, pictures.items(), strict=False):
+            image = axis.imshow(values, cmap="gray", vmin=low, vmax=high, interpolation="nearest")
+            axis.set_title(title, fontsize=9)
+            figure.colorbar(image, ax=axis, shrink=0.7)
         figure.savefig(path)
         plt.close(figure)
 
