@@ -24,14 +24,50 @@ from lgmd_gym.errors import check_keys
 SHADES = (30, 220)  # range from which a target's body grey is drawn
 START_SPREAD = 500.0  # [m] of road over which the start is drawn, so that the asphalt differs by seed
 PASSED = 2.0  # [m] behind the ego's rear at which an actor counts as passed
-FREE = ("observation", "action", "screen_width", "screen_height", "scaling", "centering_position")
 
 
 class BrakingEnv(AbstractEnv):
     """A car drives its script; the agent may add braking (and throttle, if the config allows).
 
-    The scene is fixed by the scenario; the seed draws where on the road it starts (so which asphalt is seen)
-    and the body grey of every actor whose `shade` is None.
+    ## Description
+
+    The ego follows a scripted path and speed; so do all others. Cars move exactly under piecewise linear
+    acceleration and never reverse, and contact is found inside the step, with the speeds of that moment. The
+    scene is fixed by the scenario; the seed draws where on the road it starts (so which asphalt is seen) and
+    the body grey of every actor whose `shade` is None. Physics runs at 60 Hz, decisions at 30 Hz.
+
+    ## Action Space
+
+    `Box(-1, 1, (1,), float32)`, a longitudinal demand: −1 full brake, 0 hold the scripted speed, +1 full
+    throttle (counts only with `config={"throttle": True}`). With
+    `config={"action": {"type": "DiscreteDemand", "levels": [0.0, -1.0]}}` an index into the levels. A demand
+    waits out one camera frame of latency and the brake's dead time, then the deceleration builds up.
+
+    ## Observation Space
+
+    `Box((3,), float32)`: own speed [m/s], acceleration [m/s²], yaw rate [rad/s, + right]. The registered ids
+    put `LGMDObservation` around it.
+
+    ## Rewards
+
+    Per decision of dt: progress dt · v / v_script; less jerk 0.05 · |Δa| / a_max; less needless braking
+    2 · dt · a / a_max while no contact is within 4 s; at contact less 10 and 10 · (v_rel / v_script)². So
+    contact weighs with the impact energy and costs more than any braking, and standing still earns nothing.
+    Weights are in `config["reward"]` (`RewardParams`).
+
+    ## Episode End
+
+    Terminated: contact; the ego at a standstill the script did not want; the ego slower than what it was
+    closing on, whose script has ended (Euro NCAP AEB C2C v4.3.1, 8.4.3); everybody passed. Truncated: the
+    scenario's duration.
+
+    ## Info
+
+    `ego_speed`, `gap`, `ttc`, `thw`, `drac`, `required_deceleration`, `collision`, `impact_speed`,
+    `relative_impact_speed`, `deceleration` (beyond the script), `target_speed`, and highway-env's `speed`
+    and `crashed`; SI units, NaN where undefined, definitions in `lgmd_gym.envs.measures`.
+
+    ## Arguments
 
     Args:
         scenario: What happens.
@@ -41,6 +77,14 @@ class BrakingEnv(AbstractEnv):
 
     Raises:
         ValueError: For an unknown key or a value out of its range.
+
+    ## Version History
+
+    v0: may change until 0.1.0 is tagged, never after.
+
+    ## References
+
+    Euro NCAP AEB Car-to-Car v4.3.1; UN R152 Rev.2; 49 CFR 571.127; GB 39901-2025.
     """
 
     road: BrakingRoad

@@ -1,7 +1,10 @@
 """Approaches from behind: Euro NCAP's CCRs, CCRm and CCRb, and following that needs no brake."""
 
+from dataclasses import replace
+from math import pi
+
 from lgmd_gym.envs.families import AFTERMATH, START_TTC, family
-from lgmd_gym.envs.scenario import EGO_WIDTH, TARGET_WIDTH, Actor, Scenario
+from lgmd_gym.envs.scenario import EGO_WIDTH, LANE_WIDTH, TARGET_WIDTH, Actor, Scenario
 from lgmd_gym.envs.script import Phase
 from lgmd_gym.envs.units import KMH, check_speed, check_within, offset_from_overlap
 
@@ -14,6 +17,9 @@ def approach_standing(
     ego_speed: float = 50 * KMH,
     lateral_offset: float | None = None,
     overlap: float | None = None,
+    impact_location: float | None = None,
+    target_heading: float = 0.0,
+    beside: bool = False,
     shade: int | None = None,
 ) -> Scenario:
     """Approach a standing car (Car-to-Car Rear stationary).
@@ -21,13 +27,22 @@ def approach_standing(
     Args:
         ego_speed: In (0, 40] [m/s].
         lateral_offset: The target's centreline minus the ego's, + left [m].
-        overlap: Instead of `lateral_offset`: share of the ego's width in [-1, 1].
+        overlap: Instead of it: share of the ego's width in [-1, 1], the sign says the side (2023).
+        impact_location: Instead of both: where on the ego's width the target's centre strikes, in
+            [-0.25, 1.25], 0.5 is aligned, more is to the left (2026).
+        target_heading: Of the target against the ego's, in [-π/2, π/2], + left [rad].
+        beside: Whether another car stands beside the target, in the lane to the left.
         shade: Body grey of the target in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
-    offset = _offset(lateral_offset, overlap)
-    target = Actor(gap=START_TTC * speed, lateral_offset=offset, shade=shade)
-    return Scenario(family="CCRs", ego_speed=speed, duration=START_TTC + AFTERMATH, actors=(target,))
+    target = Actor(
+        gap=START_TTC * speed,
+        lateral_offset=_offset(lateral_offset, overlap, impact_location),
+        heading=check_within("target_heading", target_heading, -pi / 2, pi / 2, "rad"),
+        shade=shade,
+    )
+    duration = START_TTC + AFTERMATH
+    return Scenario(family="CCRs", ego_speed=speed, duration=duration, actors=_with_clutter(target, beside))
 
 
 @family("CCRm")
@@ -36,6 +51,8 @@ def approach_slower(
     target_speed: float = 20 * KMH,
     lateral_offset: float | None = None,
     overlap: float | None = None,
+    impact_location: float | None = None,
+    beside: bool = False,
     shade: int | None = None,
 ) -> Scenario:
     """Approach a slower car (Car-to-Car Rear moving).
@@ -44,16 +61,23 @@ def approach_slower(
         ego_speed: In (0, 40] [m/s].
         target_speed: In (0, ego_speed) [m/s]; the protocols use 20 km/h.
         lateral_offset: The target's centreline minus the ego's, + left [m].
-        overlap: Instead of `lateral_offset`: share of the ego's width in [-1, 1].
+        overlap: Instead of it, see CCRs.
+        impact_location: Instead of both, see CCRs.
+        beside: Whether another car drives beside the target, in the lane to the left.
         shade: Body grey of the target in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     lead = check_speed("target_speed", target_speed)
     if lead >= speed:
         raise ValueError(f"target_speed must be below ego_speed {speed:g} m/s in CCRm, got {lead:g}")
-    offset = _offset(lateral_offset, overlap)
-    target = Actor(gap=START_TTC * (speed - lead), lateral_offset=offset, speed=lead, shade=shade)
-    return Scenario(family="CCRm", ego_speed=speed, duration=START_TTC + AFTERMATH, actors=(target,))
+    target = Actor(
+        gap=START_TTC * (speed - lead),
+        lateral_offset=_offset(lateral_offset, overlap, impact_location),
+        speed=lead,
+        shade=shade,
+    )
+    duration = START_TTC + AFTERMATH
+    return Scenario(family="CCRm", ego_speed=speed, duration=duration, actors=_with_clutter(target, beside))
 
 
 @family("CCRb")
@@ -65,6 +89,8 @@ def follow_braking(
     build_up: float = 1.0,
     lateral_offset: float | None = None,
     overlap: float | None = None,
+    impact_location: float | None = None,
+    beside: bool = False,
     shade: int | None = None,
 ) -> Scenario:
     """Follow a car that brakes to a standstill (Car-to-Car Rear braking).
@@ -76,7 +102,9 @@ def follow_braking(
         deceleration: Of the target, in [0.5, 10] [m/s²].
         build_up: From its onset to the full deceleration, in [0, 5] [s].
         lateral_offset: The target's centreline minus the ego's, + left [m].
-        overlap: Instead of `lateral_offset`: share of the ego's width in [-1, 1].
+        overlap: Instead of it, see CCRs.
+        impact_location: Instead of both, see CCRs.
+        beside: Whether another car brakes beside the target, in the lane to the left.
         shade: Body grey of the target in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
@@ -87,14 +115,19 @@ def follow_braking(
     distance = _gap(speed, gap, headway)
     target = Actor(
         gap=distance,
-        lateral_offset=_offset(lateral_offset, overlap),
+        lateral_offset=_offset(lateral_offset, overlap, impact_location),
         speed=speed,
         profile=(braking,),
         shade=shade,
     )
     # The ego covers the gap and the lead car's way to standstill at its scripted speed.
     contact = LEAD_IN + build_up / 2 + speed / (2 * strength) + distance / speed
-    return Scenario(family="CCRb", ego_speed=speed, duration=contact + AFTERMATH, actors=(target,))
+    return Scenario(
+        family="CCRb",
+        ego_speed=speed,
+        duration=contact + AFTERMATH,
+        actors=_with_clutter(target, beside),
+    )
 
 
 @family("Following")
@@ -147,13 +180,27 @@ def _gap(speed: float, gap: float | None, headway: float | None) -> float:
     return speed * check_within("headway", headway, 0.3, 10.0, "s")
 
 
-def _offset(lateral_offset: float | None, overlap: float | None) -> float:
-    """Return the lateral offset from the one of the two arguments that was given; 0 for neither."""
-    if overlap is None:
-        offset = 0.0 if lateral_offset is None else lateral_offset
-        return check_within("lateral_offset", offset, -20.0, 20.0, "m")
-    if lateral_offset is not None:
-        raise ValueError(
-            f"lateral_offset={lateral_offset!r} and overlap={overlap!r} say the same thing twice; pass one"
-        )
-    return offset_from_overlap(overlap, EGO_WIDTH, TARGET_WIDTH)
+def _with_clutter(target: Actor, beside: bool) -> tuple[Actor, ...]:
+    """Return the target, and its twin in the lane to the left if asked for."""
+    if not beside:
+        return (target,)
+    return target, replace(target, lateral_offset=LANE_WIDTH, heading=0.0, shade=None)
+
+
+def _offset(lateral_offset: float | None, overlap: float | None, impact_location: float | None) -> float:
+    """Return the lateral offset [m] from the one of the three arguments that was given; 0 for none."""
+    names = ("lateral_offset", "overlap", "impact_location")
+    given = {
+        name: value
+        for name, value in zip(names, (lateral_offset, overlap, impact_location), strict=True)
+        if value is not None
+    }
+    if len(given) > 1:
+        said = " and ".join(f"{name}={value!r}" for name, value in given.items())
+        raise ValueError(f"{said} say the same thing twice; pass one")
+    if overlap is not None:
+        return offset_from_overlap(overlap, EGO_WIDTH, TARGET_WIDTH)
+    if impact_location is not None:
+        # As in the OpenSCENARIO files for Euro NCAP 2026: the share of the ego's width, 0.5 in its middle.
+        return (check_within("impact_location", impact_location, -0.25, 1.25) - 0.5) * EGO_WIDTH
+    return check_within("lateral_offset", lateral_offset or 0.0, -20.0, 20.0, "m")

@@ -1,8 +1,11 @@
 """The command line, by running it."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -123,3 +126,39 @@ def test_a_failing_episode_makes_exit_code_one(tmp_path, monkeypatch, capsys):
     assert cli.run(arguments) == 1
     assert "19 episodes failed" in capsys.readouterr().out
     assert "no road today" in (tmp_path / "run" / "episodes.jsonl").read_text()
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_what_is_finished(tmp_path):
+    """A real interrupt of the command and its worker processes, as a terminal sends it."""
+    out = tmp_path / "run"
+    command = [
+        sys.executable,
+        "-m",
+        "lgmd_gym",
+        "bench",
+        "--suite",
+        "ncap2023",
+        "--seeds",
+        "5",
+        "--out",
+        str(out),
+    ]
+    process = subprocess.Popen(
+        [*command, "--no-plots"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    while not (out / "episodes.jsonl").exists() or (out / "episodes.jsonl").read_text().count("\n") < 20:
+        time.sleep(0.2)
+        assert process.poll() is None
+    os.killpg(process.pid, signal.SIGINT)
+    said, complaint = process.communicate(timeout=60)
+    assert process.returncode == 130
+    rows = [json.loads(line) for line in (out / "episodes.jsonl").read_text().splitlines()]
+    assert 20 <= len(rows) < 4000
+    assert f"interrupted: {len(rows)} of" in said
+    assert "Traceback" not in complaint
+    assert (out / "summary.csv").exists()

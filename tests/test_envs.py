@@ -194,6 +194,11 @@ def test_metadata_is_not_shared():
         ),
         (lambda: make_scenario("CCRs", overlap=1.5), r"overlap must be in \[-1, 1\], got 1.5"),
         (lambda: make_scenario("CCRs", overlap=0.5, lateral_offset=0.0), "pass one"),
+        (
+            lambda: make_scenario("CCRs", impact_location=2.0),
+            r"impact_location must be in \[-0.25, 1.25\], got 2",
+        ),
+        (lambda: make_scenario("CCRb", gap=20.0, headway=1.0), "pass one"),
         (lambda: make_scenario("CCRm", ego_speed=5.0), "target_speed must be below ego_speed 5"),
         (lambda: make_scenario("AdjacentPass", lateral_offset=1.0), "for a car in the way use CCRs"),
         (lambda: make_scenario("CCRs", shade=300), r"shade must be in \[0, 255\], got 300"),

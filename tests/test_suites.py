@@ -10,7 +10,7 @@ from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.envs.units import KMH
 
-THREATS = ("quick", "speeds", "ncap2023", "r152", "fmvss127")
+THREATS = ("quick", "speeds", "ncap2023", "ncap2026", "r152", "fmvss127")
 APPROACH = ("CCRs", "CCRm", "CCRb", "CCCscp")
 CASES = [case for suite in SUITES.values() for case in suite.cases]
 
@@ -60,6 +60,10 @@ def test_counts_are_the_documents():
     assert count("ncap2023", "CCRm") == 55
     assert count("ncap2023", "CCRb") == 4
     assert count("ncap2023", "CCCscp") == 30
+    assert count("ncap2026", "CCRs") == 5 * 5 + 8 + 2
+    assert count("ncap2026", "CCRs", warned=True) == 3 * 5
+    assert count("ncap2026", "CCRm") == 6 * 5 + 2
+    assert count("ncap2026", "CCRb") == 6 * 5 + 2
     assert count("r152", "CCRs") == 4
     assert count("r152", "CCRm") == 2
     assert find_case("ncap2023/CCRs/v30/overlap-50").arguments == (("ego_speed", 8.333333), ("overlap", -0.5))
@@ -107,6 +111,23 @@ def test_overlap_of_the_cells(per_cent):
     assert offset == pytest.approx(0.0 if per_cent == 100 else np.sign(per_cent) * edge)
 
 
+@pytest.mark.parametrize("per_cent", [0, 25, 50, 75, 100])
+def test_impact_locations_of_2026(per_cent):
+    env = BrakingEnv(find_case(f"ncap2026/CCRs/v30/location{per_cent}").scenario)
+    env.reset(seed=0)
+    ego, target = env.road.vehicles
+    assert ego.position[1] - target.position[1] == pytest.approx((per_cent / 100 - 0.5) * ego.WIDTH)
+
+
+def test_braking_lead_of_2026_keeps_a_second():
+    env = BrakingEnv(find_case("ncap2026/CCRb/v60/location50").scenario)
+    _, info = env.reset(seed=0)
+    assert info["thw"] == pytest.approx(1.0)
+    while not env.step([0.0])[2]:
+        pass
+    assert env.road.vehicles[1].acceleration in (0.0, pytest.approx(-4.0))
+
+
 @pytest.mark.parametrize("target", [20, 40, 60])
 @pytest.mark.parametrize("ego", ["from-stop", "v20", "v50"])
 def test_crossing_strikes_a_quarter_behind_the_front(ego, target):
@@ -119,8 +140,8 @@ def test_crossing_strikes_a_quarter_behind_the_front(ego, target):
     assert info["collision"]
     front = car.position[0] + car.LENGTH / 2
     assert front == pytest.approx(other.position[0] - other.WIDTH / 2, abs=1e-6)
-    # It comes from the right, so its front is at smaller y.
-    behind_front = car.position[1] - (other.position[1] - other.LENGTH / 2)
+    # It comes from the left, so its front is at larger y.
+    behind_front = (other.position[1] + other.LENGTH / 2) - car.position[1]
     assert behind_front / other.LENGTH == pytest.approx(0.25, abs=0.01)
 
 

@@ -73,7 +73,9 @@ def provenance() -> dict[str, Any]:
 
 
 def _commit() -> str | None:
-    """Return the commit of the source tree this package is imported from; None if it is not one."""
+    """Return the commit of the source tree this package is imported from; None if it is installed."""
+    if not (Path(__file__).parents[2] / "pyproject.toml").is_file():
+        return None
     try:
         answer = subprocess.run(
             ["git", "describe", "--always", "--dirty"],

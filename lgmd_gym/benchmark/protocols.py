@@ -4,10 +4,12 @@ N1 is Euro NCAP's test protocol AEB Car-to-Car v4.3.1 (February 2024, implementa
 """
 
 from dataclasses import replace
+from math import radians
 
 from lgmd_gym.benchmark.cases import Case, cases, metres, one
 
 OVERLAPS = (-50, -75, 100, 75, 50)  # N1 8.2.2: per cent of the ego's width; the sign is the side
+LOCATIONS_2026 = (100, 75, 50, 25, 0)  # per cent of the ego's width; 125 and -25 are the extended range
 R152_TARGET = 20  # km/h, UN R152 6.5
 
 
@@ -33,6 +35,40 @@ def ncap2023() -> tuple[Case, ...]:
     return (*rows, *braking_lead(suite), *_crossing(suite))
 
 
+def ncap2026() -> tuple[Case, ...]:
+    """Euro NCAP Crash Avoidance - Frontal Collisions v1.1, 3.1: the rear scenarios' standard range.
+
+    An impact location of p per cent puts the target's centre at (p - 50) per cent of the ego's width
+    from its centreline, + left, as the OpenSCENARIO files for that protocol do; the official calculator names
+    locations and leaves their geometry open. CCRb: headway 1.0 s, 4 m/s² within 1.0 s. The robustness layer
+    (5.2.1.3) adds a turned target and a car beside it, aligned; night is a matter of the camera.
+    """
+    suite = "ncap2026"
+    rows: list[Case] = []
+    for per_cent in LOCATIONS_2026:
+        tail, where = f"/location{per_cent}", per_cent / 100
+        rows += cases(suite, "CCRs", list(range(10, 60, 10)), tail, impact_location=where)
+        rows += cases(suite, "CCRm", list(range(30, 90, 10)), tail, impact_location=where)
+        rows += cases(
+            suite, "CCRb", list(range(30, 90, 10)), tail, headway=1.0, deceleration=4.0, impact_location=where
+        )
+        warned = cases(suite, "CCRs", list(range(60, 90, 10)), f"-warned{tail}", impact_location=where)
+        rows += [replace(cell, warned_driver=True) for cell in warned]
+    for degrees_left in (-20, -10, 10, 20):
+        turned = round(radians(degrees_left), 6)
+        rows += cases(
+            suite,
+            "CCRs",
+            [30, 50],
+            f"/robust-heading{degrees_left}",
+            impact_location=0.5,
+            target_heading=turned,
+        )
+    for family, more in (("CCRs", {}), ("CCRm", {}), ("CCRb", {"headway": 1.0, "deceleration": 4.0})):
+        rows += cases(suite, family, [30, 50], "/robust-beside", impact_location=0.5, beside=True, **more)
+    return tuple(rows)
+
+
 def braking_lead(suite: str) -> tuple[Case, ...]:
     """N1 8.2.2.3: CCRb, both at 50 km/h, 2 and 6 m/s² at 12 and 40 m; the deceleration stands after 1 s."""
     return tuple(
@@ -51,7 +87,10 @@ def braking_lead(suite: str) -> tuple[Case, ...]:
 
 
 def _crossing(suite: str) -> tuple[Case, ...]:
-    """N1 8.2.5: CCCscp, from a stop 2.9 m off and at 20 to 60 km/h, target at 20 to 60 km/h."""
+    """N1 8.2.5: CCCscp, from a stop 2.9 m off and at 20 to 60 km/h, target at 20 to 60 km/h.
+
+    The target comes from the far side, the left, which the OpenSCENARIO file for 2026 has as its default.
+    """
     targets = range(20, 70, 10)
     started = [
         one(
@@ -60,12 +99,20 @@ def _crossing(suite: str) -> tuple[Case, ...]:
             f"from-stop/target{target}",
             ego_speed=metres(20),
             target_speed=metres(target),
+            side="left",
             from_stop=True,
         )
         for target in targets
     ]
     moving = [
-        one(suite, "CCCscp", f"v{speed}/target{target}", ego_speed=metres(speed), target_speed=metres(target))
+        one(
+            suite,
+            "CCCscp",
+            f"v{speed}/target{target}",
+            ego_speed=metres(speed),
+            target_speed=metres(target),
+            side="left",
+        )
         for speed in range(20, 70, 10)
         for target in targets
     ]

@@ -91,6 +91,11 @@ _ALL = (
         "Euro NCAP AEB Car-to-Car 2023: CCRs, CCRm, CCRb, CCCscp; CCFtap, CCFhos and CCFhol are not built",
     ),
     Suite(
+        "ncap2026",
+        protocols.ncap2026(),
+        "Euro NCAP Frontal Collisions 2026: rear scenarios, standard range, and part of the robustness layer",
+    ),
+    Suite(
         "r152",
         protocols.r152(),
         "UN R152 car-to-car tests; for the impact-speed limits of 5.2.1.4 in simulation, nothing else of it",
