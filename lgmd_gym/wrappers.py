@@ -103,6 +103,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self._fps_wish = fps
         self._response: Response | None = None
         self._seen: list[TraceFrame] = []
+        self._substeps, self._heading = 0, 0.0
         self._set_rate()
 
     def reset(

@@ -298,3 +298,9 @@ def test_camera_params_objects_are_taken():
     _, info = env.reset(seed=0)
     assert "lgmd/mine/ffi" in info
     assert lgmd_gym.__version__
+
+
+def test_step_before_reset_says_so():
+    env = LGMDObservation(gym.make("highway-v0", config=SMALL).unwrapped)
+    with pytest.raises(RuntimeError, match="call reset first"):
+        env.step(1)
