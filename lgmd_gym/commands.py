@@ -79,7 +79,7 @@ def _report(run: "Run", console: Console, options: "cli.Bench") -> int:
         title = f"{run.suite}: camera {options.camera} at {fps}, T_sf = {level:g} spikes/s, {run.seeds} seeds"
         agents = list(dict.fromkeys(["no-brake", *run.agents]))
         console.print(tables.score_table(rows, agents, title))
-        console.print(tables.case_table(rows, agents))
+        console.print(tables.verdict_table(rows, agents, run.suite) or tables.case_table(rows, agents))
         write_summary(rows, run.folder.path / "summary.csv")
         if options.plots:
             _draw_cases(run, level)

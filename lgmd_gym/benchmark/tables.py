@@ -5,6 +5,7 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from lgmd_gym.benchmark.scores import JUDGES, Verdict, meets_r152, verdicts
 from lgmd_gym.benchmark.summary import Rate, Score, case_order, scores
 from lgmd_gym.envs.units import KMH
 
@@ -43,6 +44,36 @@ def case_table(rows: list[Row], agents: list[str]) -> Table:
         values = [_good(cells.get((agent, case))) for agent in shown]
         table.add_row(case.split("/", 1)[1], *values)
     return table
+
+
+def verdict_table(rows: list[Row], agents: list[str], suite: str) -> Table | None:
+    """Return what a protocol would make of each case, runs that meet it of n; None for other suites."""
+    if suite not in JUDGES:
+        return None
+    by_agent = {agent: {item.case: item for item in verdicts(rows, agent, JUDGES[suite])} for agent in agents}
+    shown = [agent for agent in agents if by_agent[agent]]
+    demands = {case: item.demand for cells in by_agent.values() for case, item in cells.items()}
+    caption = "runs that meet it of n, (highest relative impact speed in km/h); protocol-derived, no rating"
+    if suite == "r152":
+        met = [agent for agent in shown if meets_r152(rows, agent)]
+        caption += (
+            f"\nmeets the impact-speed limits of UN R152 5.2.1.4 in simulation: {', '.join(met) or 'none'}"
+        )
+    table = Table(title=f"{suite}: what the protocol asks", caption=caption, box=SIMPLE_HEAD)
+    table.add_column("case", overflow="fold")
+    table.add_column("asked")
+    for agent in shown:
+        table.add_column(agent.replace("-", "-\n", 1), justify="right", overflow="fold")
+    for case in sorted(demands, key=case_order):
+        cells = [_verdict(by_agent[agent].get(case)) for agent in shown]
+        table.add_row(case.split("/", 1)[1], demands[case], *cells)
+    return table
+
+
+def _verdict(item: Verdict | None) -> str:
+    if item is None:
+        return ""
+    return f"{item.met.k}/{item.met.n}" + (f" ({item.worst / KMH:.0f})" if item.worst else "")
 
 
 def _rate(rate: Rate) -> str:
