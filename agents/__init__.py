@@ -4,6 +4,7 @@ from typing import Any
 
 from lgmd_gym.agents.base import BRAKE, HOLD, Agent, demand
 from lgmd_gym.agents.baselines import AlwaysBrake, NoBrake, RandomBrake
+from lgmd_gym.agents.foreign import ForeignAgent, import_agent
 from lgmd_gym.agents.options import check_options, parse
 from lgmd_gym.agents.oracles import TTCOracle
 from lgmd_gym.agents.rules import SpikeThreshold
@@ -29,14 +30,26 @@ AGENTS: dict[str, type[Agent]] = {
 
 
 def make_agent(text: str) -> Agent:
-    """Return the agent that a string such as "spike-threshold:threshold=45,frames=2" names.
+    """Return the agent that a string names.
+
+    Args:
+        text: "name", or "name:option=value,…" as in "spike-threshold:threshold=45,frames=2"; a user's own
+            agent is "module:Class" or "module:Class:option=value,…", any class with `act`.
 
     Raises:
         ValueError: For an unknown agent or option (the nearest is named), or a value out of its range.
     """
+    head, _, rest = text.partition(":")
+    class_name, _, options_text = rest.partition(":")
+    if head not in AGENTS and class_name.isidentifier():
+        name = f"{head}:{class_name}"
+        foreign: Any = import_agent(name)
+        options = parse(f"agent:{options_text}")[1]
+        check_options(name, foreign, options)
+        return ForeignAgent(name, foreign(**options))
     name, options = parse(text)
     if name not in AGENTS:
         raise unknown_name("agent", name, AGENTS)
-    cls: Any = AGENTS[name]
-    check_options(name, cls, options)
-    return cls(**options)
+    known: Any = AGENTS[name]
+    check_options(name, known, options)
+    return known(**options)

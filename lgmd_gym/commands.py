@@ -18,10 +18,15 @@ def bench(options: "cli.Bench") -> int:
     from lgmd_gym.benchmark.episode import Eyesight
     from lgmd_gym.benchmark.runner import Run
 
-    out = options.out or Path("runs") / f"{options.suite}-{time.strftime('%Y%m%d-%H%M%S')}"
-    eyesight = Eyesight(options.camera, _read_params(options.params))
-    run = Run(options.suite, options.agents, options.seeds, options.jobs, out, eyesight)
     console = _console()
+    if options.resume is not None:
+        run = Run.resume(options.resume, options.jobs)
+        cut = " after a cut-off last line was taken away" if run.folder.mended else ""
+        console.print(f"resuming with {len(run.rows)} of {run.total} episodes{cut}")
+    else:
+        out = options.out or Path("runs") / f"{options.suite}-{time.strftime('%Y%m%d-%H%M%S')}"
+        eyesight = Eyesight(options.camera, _read_params(options.params))
+        run = Run(options.suite, options.agents, options.seeds, options.jobs, out, eyesight)
     with _progress(run) as tick:
         complete = run.play(tick)
     failed = _report(run, console, options)
@@ -29,7 +34,7 @@ def bench(options: "cli.Bench") -> int:
         console.print(f"interrupted: {len(run.rows)} of {run.total} episodes kept", style="yellow")
     if failed:
         console.print(f"{failed} episodes failed; their tracebacks are in episodes.jsonl", style="red")
-    console.print(f"run folder: {out}", soft_wrap=True)
+    console.print(f"run folder: {run.folder.path}", soft_wrap=True)
     return 130 if not complete else int(bool(failed))
 
 
@@ -76,7 +81,7 @@ def _report(run: "Run", console: Console, options: "cli.Bench") -> int:
     if rows:
         level = LGMDParams.from_dict(run.eyesight.params or {}).t_sf
         fps = next((f"{row['fps']:g} Hz" for row in rows if row["fps"]), "?")
-        title = f"{run.suite}: camera {options.camera} at {fps}, T_sf = {level:g} spikes/s, {run.seeds} seeds"
+        title = f"{run.suite}: camera {run.eyesight.camera} at {fps}, T_sf = {level:g} spikes/s, {run.seeds} seeds"
         agents = list(dict.fromkeys(["no-brake", *run.agents]))
         console.print(tables.score_table(rows, agents, title))
         console.print(tables.verdict_table(rows, agents, run.suite) or tables.case_table(rows, agents))
@@ -120,7 +125,7 @@ def _progress(run: "Run") -> Iterator[Any]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True)) as bar:
-        shown = bar.add_task(run.suite, total=run.total)
+        shown = bar.add_task(run.suite, total=run.total, completed=len(run.rows))
         yield lambda row: bar.advance(shown)
 
 

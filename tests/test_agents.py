@@ -129,3 +129,44 @@ def test_no_truth_reaches_an_agent_that_is_no_oracle(text):
                 break
         actions.append(taken)
     assert actions[0] == actions[1]
+
+
+class Mine:
+    """A user's agent with nothing but `act`."""
+
+    def __init__(self, level=20.0):
+        self.level = level
+
+    def act(self, observation, info):
+        return -0.5 if observation["spike_frequency"].max() > self.level else 0.0
+
+
+def test_a_users_own_agent():
+    agent = make_agent(f"{__name__}:Mine:level=35")
+    agent.reset(0)
+    assert agent.name == f"{__name__}:Mine"
+    assert agent.act(*seen(30.0)) == np.float32([0.0])
+    assert agent.alert  # the neuron's
+    assert agent.act(*seen(40.0)) == np.float32([-0.5])
+
+
+@pytest.mark.parametrize("answer", [float("nan"), [0.0, 1.0], []])
+def test_a_users_agent_that_answers_nonsense_is_told(answer):
+    agent = make_agent(f"{__name__}:Mine")
+    agent.agent.act = lambda observation, info: answer
+    with pytest.raises(ValueError, match="must act with one finite number"):
+        agent.act(*seen(0.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("nowhere.at_all:Agent", "cannot be imported"),
+        ("math:Agent", "cannot be imported"),
+        ("collections:OrderedDict", "has no method act"),
+        (f"{__name__}:Mine:levle=3", "did you mean 'level'"),
+    ],
+)
+def test_bad_users_agents_are_refused(text, words):
+    with pytest.raises(ValueError, match=words):
+        make_agent(text)

@@ -230,6 +230,53 @@ def test_interrupted_run_keeps_its_rows(tmp_path):
     assert json.loads((tmp_path / "run" / "run.json").read_text())["complete"] is False
 
 
+@pytest.mark.parametrize("cut", [0.3, 0.6, 0.9])
+def test_a_broken_off_run_resumes_to_the_same_rows(quick_run, tmp_path, cut):
+    """As after kill -9: part of the rows, the last one cut off in the middle, run.json from the start."""
+    folder = tmp_path / "run"
+    Run("quick", quick_run.agents, 1, 1, folder).play()
+    whole = (folder / "episodes.jsonl").read_bytes()
+    (folder / "episodes.jsonl").write_bytes(whole[: int(cut * len(whole))])
+    run = Run.resume(folder, 1)
+    assert run.folder.mended
+    kept = len(run.rows)
+    assert 0 < kept < run.total
+    played = []
+    assert run.play(played.append)
+    assert len(played) == run.total - kept
+    rows = [json.loads(line) for line in (folder / "episodes.jsonl").read_text().splitlines()]
+
+    def key(row):
+        return row["agent"], row["case"]
+
+    assert sorted(rows, key=key) == sorted(quick_run.rows, key=key) == sorted(run.rows, key=key)
+
+
+def test_what_cannot_be_resumed_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="holds no run to resume"):
+        Run.resume(tmp_path, 1)
+    Run("quick", ["no-brake"], 1, 1, tmp_path / "run").play(
+        lambda row: (_ for _ in ()).throw(KeyboardInterrupt)
+    )
+    settings = json.loads((tmp_path / "run" / "run.json").read_text())
+    (tmp_path / "run" / "run.json").write_text(json.dumps(settings | {"lgmd_gym": "0.0.1"}))
+    with pytest.raises(ValueError, match=r"made by lgmd-gym 0.0.1, this is .*; start a new run"):
+        Run.resume(tmp_path / "run", 1)
+    (tmp_path / "run" / "episodes.jsonl").write_text("{}\nnonsense\n{}\n")
+    with pytest.raises(ValueError, match="damaged in line 2"):
+        Run.resume(tmp_path / "run", 1)
+
+
+def test_the_python_function_returns_a_table(quick_run):
+    from lgmd_gym.benchmark import run
+
+    table = run("quick", ["ttc-oracle"], seeds=1)
+    assert list(table.columns) == list(KEYS)
+    assert len(table) == 2 * len(SUITES["quick"].cases)
+    oracle = table[(table.agent == "ttc-oracle") & table.threat]
+    assert oracle.avoided.all()
+
+
 def test_bad_runs_are_refused_before_anything_is_played(tmp_path):
     (tmp_path / "there").mkdir()
     for arguments, words in [

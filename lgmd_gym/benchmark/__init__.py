@@ -1,1 +1,47 @@
 """Suites of cases, episodes played in parallel, rows, and what they sum up to."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def run(
+    suite: str,
+    agents: Iterable[str],
+    seeds: int = 3,
+    jobs: int = 1,
+    out: Path | str | None = None,
+    camera: Any = "fovea",
+    params: Any = None,
+) -> "pd.DataFrame":
+    """Play a suite and return its rows.
+
+    Args:
+        suite: Name of a suite.
+        agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
+        seeds: Number of seeds, played from 0 on.
+        jobs: Processes; 1 plays in this one.
+        out: Run folder to keep, which must not exist; None keeps none.
+        camera: See `LGMDObservation`.
+        params: See `LGMDObservation`.
+
+    Returns:
+        One line per episode with the columns of `lgmd_gym.benchmark.rows.KEYS`, `no-brake` included.
+
+    Raises:
+        ValueError: For an unknown name, a count below 1, or a folder that exists or cannot be made.
+    """
+    from tempfile import TemporaryDirectory
+
+    import pandas as pd
+
+    from lgmd_gym.benchmark.episode import Eyesight
+    from lgmd_gym.benchmark.runner import Run
+
+    with TemporaryDirectory() as spare:
+        played = Run(suite, agents, seeds, jobs, Path(out or Path(spare) / "run"), Eyesight(camera, params))
+        played.play()
+        return pd.DataFrame(played.rows)

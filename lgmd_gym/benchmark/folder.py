@@ -19,14 +19,25 @@ PACKAGES = ("numpy", "numba", "gymnasium", "highway-env", "joblib")
 class RunFolder:
     """The files of one run: `episodes.jsonl`, `run.json`, `traces/`, and what reports add.
 
-    Args:
-        path: A folder that does not exist yet.
+    Use `create` for a new one and `reopen` for one that was broken off.
 
-    Raises:
-        ValueError: If it exists or cannot be made.
+    Attributes:
+        path: Where it is.
+        rows: The rows it held when it was opened.
+        mended: Whether a last line that had been cut off was taken away.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, rows: list[dict[str, Any]], mended: bool = False) -> None:
+        self.path, self.rows, self.mended = path, rows, mended
+        self._rows = (path / "episodes.jsonl").open("a", encoding="utf-8")
+
+    @classmethod
+    def create(cls, path: Path) -> "RunFolder":
+        """Make a new folder.
+
+        Raises:
+            ValueError: If it exists or cannot be made.
+        """
         try:
             path.mkdir(parents=True, exist_ok=False)
         except FileExistsError:
@@ -35,8 +46,54 @@ class RunFolder:
             raise ValueError(
                 f"run folder {str(path)!r} cannot be made ({error.strerror}); choose another --out"
             ) from None
-        self.path = path
-        self._rows = (path / "episodes.jsonl").open("a", encoding="utf-8")
+        return cls(path, [])
+
+    @classmethod
+    def reopen(cls, path: Path) -> "RunFolder":
+        """Open the folder of a broken-off run; a cut-off last line goes, all others stay.
+
+        Raises:
+            ValueError: If it holds no run, or a damaged one.
+        """
+        file = path / "episodes.jsonl"
+        if not file.is_file():
+            raise ValueError(
+                f"{str(path)!r} holds no run to resume (no episodes.jsonl); start one with --out"
+            )
+        rows, good = [], 0
+        lines = file.read_bytes().splitlines(keepends=True)
+        for number, line in enumerate(lines):
+            try:
+                if not line.endswith(b"\n"):
+                    raise ValueError
+                rows.append(json.loads(line))
+            except ValueError:
+                if number < len(lines) - 1:
+                    raise ValueError(
+                        f"{str(file)!r} is damaged in line {number + 1}; start a new run"
+                    ) from None
+                break
+            good += len(line)
+        mended = good < file.stat().st_size
+        if mended:
+            os.truncate(file, good)
+        return cls(path, rows, mended)
+
+    def settings(self) -> dict[str, Any]:
+        """Return what `run.json` says.
+
+        Raises:
+            ValueError: If it is missing, damaged, or from another version of this package.
+        """
+        file = self.path / "run.json"
+        try:
+            settings = json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            raise ValueError(f"{str(file)!r} is missing or damaged; start a new run") from None
+        if settings.get("lgmd_gym") != __version__:
+            made = settings.get("lgmd_gym")
+            raise ValueError(f"the run was made by lgmd-gym {made}, this is {__version__}; start a new run")
+        return settings
 
     def add(self, row: dict[str, Any]) -> None:
         """Append one row and have it on disk before the next."""

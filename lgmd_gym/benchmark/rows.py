@@ -62,6 +62,13 @@ class Counterfactual:
         contact = float(episode.series["time"][-1]) if episode.collision else nan
         return cls(episode.collision, contact, episode.relative_impact_speed)
 
+    @classmethod
+    def of_row(cls, row: dict[str, Any]) -> "Counterfactual":
+        """Return the counterfactual that a `no-brake` row tells."""
+        if not row["collision"]:
+            return cls(False, nan, nan)
+        return cls(True, row["duration"], row["relative_impact_speed"])
+
 
 def make_row(
     agent: str,

@@ -12,6 +12,7 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.cases import Case
 from lgmd_gym.benchmark.episode import Eyesight, make_env
 from lgmd_gym.benchmark.folder import RunFolder
+from lgmd_gym.benchmark.rows import Counterfactual
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.tasks import NO_BRAKE, Result, Task, run_task
 
@@ -30,7 +31,7 @@ class Run:
         agents: Agent strings.
         seeds: Number of seeds, played from 0 on.
         jobs: Processes; 1 plays in this one.
-        out: The run folder, which must not exist.
+        out: The run folder, which must not exist; or an open one, whose episodes are not played again.
         eyesight: Camera and neuron parameters.
 
     Raises:
@@ -44,7 +45,7 @@ class Run:
         agents: Iterable[str],
         seeds: int,
         jobs: int,
-        out: Path,
+        out: Path | RunFolder,
         eyesight: Eyesight | None = None,
     ) -> None:
         self.cases: tuple[Case, ...] = find_suite(suite).cases
@@ -60,8 +61,21 @@ class Run:
         self.eyesight = eyesight or Eyesight()
         # Refuses an unusable camera or parameter here rather than once per episode.
         make_env(self.cases[0], self.eyesight).close()
-        self.folder = RunFolder(out)
-        self.rows: list[dict[str, Any]] = []
+        self.folder = out if isinstance(out, RunFolder) else RunFolder.create(out)
+        # What failed is played again.
+        self.rows: list[dict[str, Any]] = [row for row in self.folder.rows if row["error"] is None]
+
+    @classmethod
+    def resume(cls, path: Path, jobs: int) -> "Run":
+        """Return the run of a folder that was broken off, to be played to its end.
+
+        Raises:
+            ValueError: If the folder holds no run, a damaged one, or one of another version.
+        """
+        folder = RunFolder.reopen(path)
+        settings = folder.settings()
+        eyesight = Eyesight(settings["camera"], settings["params"])
+        return cls(settings["suite"], settings["agents"], settings["seeds"], jobs, folder, eyesight)
 
     @property
     def total(self) -> int:
@@ -80,6 +94,7 @@ class Run:
         """
         started = time.perf_counter()
         complete = True
+        self.folder.describe(self._settings(False, 0.0))
         try:
             self._play(progress or (lambda row: None))
         except KeyboardInterrupt:
@@ -94,17 +109,19 @@ class Run:
             first = [
                 Task(NO_BRAKE, case, seed, self.eyesight) for case in self.cases for seed in range(self.seeds)
             ]
-            truths = {}
-            for result in self._results(parallel, first, progress):
-                truths[result.task.case.name, result.task.seed] = result.truth
+            done = {(row["agent"], row["case"], row["seed"]): row for row in self.rows}
+            truths = {key[1:]: Counterfactual.of_row(row) for key, row in done.items() if key[0] == NO_BRAKE}
+            for result in self._results(parallel, _without(first, done), progress):
+                if result.truth is not None:
+                    truths[result.task.case.name, result.task.seed] = result.truth
             rest = [
                 replace(task, agent=agent, truth=truths[task.case.name, task.seed])
                 for agent in self.agents
                 if agent != NO_BRAKE
                 for task in first
-                if truths.get((task.case.name, task.seed)) is not None
+                if (task.case.name, task.seed) in truths
             ]
-            for _ in self._results(parallel, rest, progress):
+            for _ in self._results(parallel, _without(rest, done), progress):
                 pass
 
     def _results(
@@ -132,6 +149,11 @@ class Run:
             "episodes": len(self.rows),
             "wall_time": round(wall_time, 3),
         }
+
+
+def _without(tasks: list[Task], done: dict[tuple[str, str, int], Any]) -> list[Task]:
+    """Return the tasks that are not among the finished (agent, case, seed)."""
+    return [task for task in tasks if (task.agent, task.case.name, task.seed) not in done]
 
 
 def trace_name(case: str, agent: str) -> str:
