@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, Protocol
 import gymnasium as gym
 import numpy as np
 
-from lgmd_gym.camera import BirdsEye, CameraParams, EgoCamera
+from lgmd_gym.camera import BirdsEye, CameraParams, CameraRig, EgoCamera
 from lgmd_gym.neuron import LGMD, LGMDParams, Response
 
 BIRDSEYE = "birdseye"
@@ -81,6 +81,7 @@ class Eyes:
         self, camera: Any, fps: float, params: LGMDParams, count: int = 1, threads: int | None = None
     ) -> None:
         self.sets = [make_cameras(camera) for _ in range(count)]
+        self._rigs = [CameraRig(list(one.values())) for one in self.sets]
         self.names = list(self.sets[0])
         self.shapes = [one.shape for one in self.sets[0].values()]
         self.count = count
@@ -100,10 +101,8 @@ class Eyes:
 
     def render(self, env: gym.Env, frames: list[np.ndarray], index: int = 0) -> None:
         """Render every camera of environment number `index` into its place in `frames`."""
-        cameras = list(self.sets[index].values())
-        for (_, members), batch in zip(self.groups, frames, strict=True):
-            for row, member in enumerate(members):
-                cameras[member].render(env, out=batch[index, row])
+        outs = [self.of_camera(frames, camera, index) for camera in range(len(self.names))]
+        self._rigs[index].render(env, outs)
 
     def step(self, frames: list[np.ndarray], active: np.ndarray | None = None) -> Response:
         """Show the neurons their frames.

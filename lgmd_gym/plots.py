@@ -117,3 +117,37 @@ def _pyplot() -> Any:
     from matplotlib import pyplot
 
     return pyplot
+
+
+def contact_sheet(path: Path, frames: dict[str, dict[str, np.ndarray]]) -> None:
+    """Draw grey frames in a table, with a label at each row and column, and save it.
+
+    Args:
+        path: Where the PNG goes.
+        frames: Row label to column label to frame, uint8, shape (height, width); rows may lack columns.
+
+    Raises:
+        ValueError: If there is no frame at all.
+    """
+    columns = list(dict.fromkeys(column for row in frames.values() for column in row))
+    if not columns:
+        raise ValueError("contact_sheet needs at least one frame, got none")
+    aspect = max(frame.shape[0] / frame.shape[1] for row in frames.values() for frame in row.values())
+    plt = _pyplot()
+    with plt.rc_context({**STYLE, "axes.grid": False}):
+        size = (0.3 + 2.0 * len(columns), 0.25 + 2.0 * aspect * len(frames))
+        figure, axes = plt.subplots(
+            len(frames), len(columns), figsize=size, squeeze=False, layout="constrained"
+        )
+        figure.get_layout_engine().set(w_pad=0.01, h_pad=0.01, wspace=0.01, hspace=0.01)
+        for row, label in zip(axes, frames, strict=True):
+            for axis, column in zip(row, columns, strict=True):
+                axis.set(xticks=[], yticks=[], frame_on=False)
+                if column in frames[label]:
+                    frame = frames[label][column]
+                    axis.imshow(frame, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
+            row[0].set_ylabel(label, fontsize=8)
+        for axis, column in zip(axes[0], columns, strict=True):
+            axis.set_title(column, fontsize=8)
+        figure.savefig(path, pil_kwargs={"optimize": True})
+        plt.close(figure)

@@ -114,7 +114,7 @@ def test_looming_is_smooth():
     for k in range(60):
         car.position[0] = lens_x(env) + 42.0 - 0.1 * k
         camera.render(env)
-        sums.append(camera._image.sum(dtype=np.float64))  # before it is rounded to bytes
+        sums.append(camera.light.sum(dtype=np.float64))  # before it is rounded to bytes
     steps = np.diff(sums)
     # 0.1 m is a twentieth of a pixel a side here; the steps grow with 1/distance². What is left is the
     # line where box meets shadow: two coverages that share a pixel there are blended as if independent.

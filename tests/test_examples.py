@@ -43,6 +43,13 @@ def test_rl_training(capsys):
     assert "2000 steps:" in capsys.readouterr().out
 
 
+def test_contact_sheet(tmp_path):
+    sheet = load("contact_sheet").main(tmp_path / "sheet.png", quick=True)
+    assert [list(row) for row in sheet.values()] == [["clear", "night"]] * 2
+    assert all(row["night"].mean() < 0.5 * row["clear"].mean() for row in sheet.values())
+    assert 10_000 < (tmp_path / "sheet.png").stat().st_size < 200_000
+
+
 def test_every_example_is_run_here():
     tested = Path(__file__).read_text()
     assert all(f'load("{path.stem}")' in tested for path in EXAMPLES.glob("*.py"))

@@ -16,7 +16,8 @@ from lgmd_gym.camera.pinhole import CAM_CU, CAM_FOCAL
 # Layout of the vector of grey levels and conditions.
 LOOK_GROUND, LOOK_SKY, LOOK_HAZE = 0, 5, 10
 LOOK_EXTINCTION, LOOK_NIGHT, LOOK_PAVED, LOOK_SHOT, LOOK_READ = 11, 12, 13, 14, 15
-LOOK_SIZE = 16
+LOOK_SHUTTER = 16
+LOOK_SIZE = 17
 ASPHALT_GREY, PAINT_GREY = 104.0, 208.0  # by day
 
 _BEAM_REACH = 26.0  # the low beam falls to 1/e over this distance [m]
@@ -27,7 +28,7 @@ _BODY_HZ = (1.1, 1.9, 3.4)  # bounce, pitch and wheel-hop side of a sprung body
 
 
 def look_of(p: CameraParams) -> np.ndarray:
-    """Grey levels and conditions for the kernels; float64, shape (16,)."""
+    """Grey levels and conditions for the kernels; float64, shape (17,)."""
     look = np.zeros(LOOK_SIZE)
     one_std = 1.0 / 36.0  # textures hold 36 per standard deviation
     look[0:5] = ASPHALT_GREY, 9.0 * p.texture * one_std, 76.0, 16.0 * p.texture * one_std, PAINT_GREY
@@ -39,11 +40,18 @@ def look_of(p: CameraParams) -> np.ndarray:
     if p.visibility_m > 0.0:
         # Koschmieder: 5 % of the contrast is left at the visibility. Sky and skyline drown.
         look[LOOK_EXTINCTION] = math.log(20.0) / p.visibility_m
-        left = math.exp(-500.0 * look[LOOK_EXTINCTION])
+        _, left = far_veil(p)
         look[5:9] = look[LOOK_HAZE] + left * (look[5:9] - look[LOOK_HAZE])
         look[9] *= left
     look[LOOK_SHOT], look[LOOK_READ] = p.shot_noise, p.read_noise
+    look[LOOK_SHUTTER] = p.shutter_s
     return look
+
+
+def far_veil(p: CameraParams) -> tuple[float, float]:
+    """Grey of the haze, and the share of sky and skyline that is left behind 500 m of it."""
+    haze = 18.0 if p.light == "night" else 200.0
+    return haze, math.exp(-500.0 * math.log(20.0) / p.visibility_m)
 
 
 @kernel
@@ -127,11 +135,25 @@ def body_pitch(p: CameraParams, ego: Any, time_s: float) -> float:
     """Pitch of the car's body from an uneven road and from braking, upwards [rad]."""
     pitch = 0.0
     if p.vibration_deg > 0.0:
-        rms = p.vibration_deg * math.sqrt(min(abs(float(ego.speed)), 60.0) / 14.0)
-        phase = 0.1 * (p.seed % 10)
-        turns = (hz * time_s + 0.37 * k + phase for k, hz in enumerate(_BODY_HZ))
-        pitch += rms * math.sqrt(2.0 / 3.0) * sum(math.sin(2.0 * math.pi * turn) for turn in turns)
+        pitch += _ride(p.vibration_deg, p.seed, ego, time_s, 0.37)
     if p.dive_deg > 0.0:
         demand = (getattr(ego, "action", None) or {}).get("acceleration", 0.0)
         pitch += p.dive_deg * max(-12.0, min(6.0, float(demand)))
     return math.radians(pitch)
+
+
+def body_heave(p: CameraParams, ego: Any, time_s: float) -> float:
+    """Rise of the car's body on an uneven road [m]."""
+    return _ride(p.heave_m, p.seed, ego, time_s, 0.61) if p.heave_m > 0.0 else 0.0
+
+
+def _ride(rms: float, seed: int, ego: Any, time_s: float, shift: float) -> float:
+    """Sum of the body's own vibrations; `rms` is that at 14 m/s, and `shift` sets their phases apart.
+
+    The height of a road has a spectrum that falls with the square of the spatial frequency (ISO 8608),
+    so its variance above the body's frequency grows with the speed, and the RMS with its root.
+    """
+    rms = rms * math.sqrt(min(abs(float(ego.speed)), 60.0) / 14.0)
+    phase = 0.1 * (seed % 10)
+    turns = (hz * time_s + shift * k + phase for k, hz in enumerate(_BODY_HZ))
+    return rms * math.sqrt(2.0 / 3.0) * sum(math.sin(2.0 * math.pi * turn) for turn in turns)

@@ -111,8 +111,8 @@ def add_edge(acc, k, x0, y0, x1, y1, w, w2):  # noqa: C901  (six ways to leave a
         x0, x1 = x1, x0
         y0, y1 = y1, y0
         w, w2 = -w, -w2
-    # Right of the frame an edge covers nothing; written so that NaN leaves too.
-    if not (y1 > 0.0 and y0 < height and y1 > y0 and min(x0, x1) < width):
+    # Right of the frame an edge covers nothing; written so that NaN and infinity leave too.
+    if not (y1 > 0.0 and y0 < height and y1 > y0 and min(x0, x1) < width and abs(x1 - x0) < 1e30):
         return
     slope = (x1 - x0) / (y1 - y0)
     if y0 < 0.0:
@@ -132,11 +132,11 @@ def add_edge(acc, k, x0, y0, x1, y1, w, w2):  # noqa: C901  (six ways to leave a
         y0 = min(y0 + (width - x0) / slope, y1)
         x0 = float(width)
     if x1 < 0.0:
-        cut = max(y0 - x0 / slope, y0)
+        cut = min(max(y0 - x0 / slope, y0), y1)
         _add_column(acc, k, cut, y1, w, w2)
         x1, y1 = 0.0, cut
     elif x1 > width:
-        y1 = max(y0 + (width - x0) / slope, y0)
+        y1 = min(max(y0 + (width - x0) / slope, y0), y1)
         x1 = float(width)
     if not y1 > y0:
         return

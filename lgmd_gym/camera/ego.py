@@ -2,48 +2,29 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from lgmd_gym.camera.conditions import (
-    LOOK_PAVED,
-    beam_of,
-    body_pitch,
-    clock_of,
-    look_of,
-    noise_offset,
-    noise_table,
-)
-from lgmd_gym.camera.models import all_models
 from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.camera.pinhole import Pose, camera_vector, mounted_pose, project
-from lgmd_gym.camera.raster import draw_frame
-from lgmd_gym.camera.scene import (
-    MAX_DRAWN,
-    OBJ_SIZE,
-    ego_of,
-    objects_into,
-    road_geometry,
-)
-from lgmd_gym.camera.sky import skyline
-from lgmd_gym.camera.texture import ground_texture
-
-_PATH_S = 1.0  # how far ahead in time the gaze "path" looks [s]
-_PATH_MAX = math.radians(40.0)
+from lgmd_gym.camera.pinhole import project
+from lgmd_gym.camera.stage import Stage, object_buffer, read_objects, scene_of
 
 
 class EgoCamera:
     """A camera on the ego car of any highway-env environment.
 
     Frames are grey, uint8, shape (height, width), row 0 at the top. The same seed and the same road
-    state give the same frame, in any process. The ego's own body is not drawn.
+    state give the same frame, in any process. The ego's own body is not drawn. Several cameras on one
+    car are drawn faster by a `CameraRig`.
 
     Args:
         params: A preset's name, `CameraParams`, a dict of its fields, or None for `wide`.
         fields: Fields of `CameraParams` to change.
+
+    Attributes:
+        stage: Buffers and tables of this camera alone.
 
     Example:
         >>> EgoCamera("fovea", mount_height=1.4).params.hfov_deg
@@ -52,33 +33,8 @@ class EgoCamera:
 
     def __init__(self, params: Any = None, **fields: Any) -> None:
         self._params = CameraParams.make(params, **fields)
-        height, width = self._params.shape
-        centre = camera_vector(Pose(0.0, 0.0, 0.0, 0.0, 0.0), self._params.focal_px, self._params.shape)
-        self._image = np.zeros((height, width), dtype=np.float32)
-        self._sky = np.zeros((height, width), dtype=np.float32)
-        self._objects = np.zeros((MAX_DRAWN, OBJ_SIZE))
-        self._model = all_models()
-        self._scratch = (
-            np.zeros((height, width + 2, 3), dtype=np.float32),  # ground accumulator
-            np.zeros((6, width + 2), dtype=np.float32),  # rows of the ground
-            np.zeros((16, 3)),  # corners in camera axes
-            np.zeros((5, 3)),  # axes of an object
-            np.zeros((20, 2)),  # projected corners
-            np.zeros((len(self._model.corners_used), 2)),  # grey and light of polygons
-            np.zeros(8),  # a quad on the ground
-            beam_of(centre, width),  # low beam over the columns
-            np.zeros(MAX_DRAWN, dtype=np.int64),  # order
-            np.zeros(MAX_DRAWN),  # distances
-            np.zeros((height, width + 2, 2), dtype=np.float32),  # accumulator of the solids
-        )
-        self._textures = (
-            *ground_texture("asphalt", self._params.seed),
-            *ground_texture("verge", self._params.seed),
-        )
-        self._noise = noise_table(self._params.seed)
-        self._line = skyline(self._params.seed)
-        self._look = look_of(self._params)
-        self._sky_of: tuple[float, ...] = ()
+        self.stage = Stage([self._params])
+        self._objects = object_buffer()
         self._cam: np.ndarray | None = None
 
     @property
@@ -90,6 +46,11 @@ class EgoCamera:
     def shape(self) -> tuple[int, int]:
         """`(height, width)` of the frames [px]."""
         return self._params.shape
+
+    @property
+    def light(self) -> np.ndarray:
+        """Light of `render`'s last frame before the sensor, float32, shape (height, width) [grey levels]."""
+        return self.stage.image
 
     def render(
         self, env: Any, out: np.ndarray | None = None, gaze: tuple[float, float] | None = None
@@ -105,36 +66,15 @@ class EgoCamera:
         Raises:
             ValueError: If there is no road or ego yet, or a pose is not finite.
         """
-        out = self._checked_out(out)
-        p = self._params
-        road, ego = ego_of(env)
-        ticks, time_s = clock_of(env)
-        pose = self._pose(ego, gaze, time_s)
-        cam = camera_vector(pose, p.focal_px, p.shape)
-        geometry = road_geometry(road, p.roadside, p.seed)
-        look = (math.cos(pose.yaw), math.sin(pose.yaw))
-        boxes = p.vehicles == "box"
-        count = objects_into(self._objects, road, ego, pose.x, pose.y, look, p.seed, boxes)
-        turned = self._sky_of != pose[3:]
-        self._sky_of = pose[3:]
-        self._look[LOOK_PAVED] = float(geometry.paved)
-        draw_frame(
-            out,
-            self._image,
-            self._sky,
-            turned,
-            cam,
-            self._look,
-            (geometry.surface, geometry.lines, geometry.roadside),
-            self._textures,
-            self._line,
-            self._model,
-            self._objects,
-            count,
-            (self._noise, noise_offset(p.seed, ticks, pose.x, pose.y, pose.yaw)),
-            self._scratch,
-        )
-        self._cam = cam
+        if out is None:
+            out = np.empty(self._params.shape, dtype=np.uint8)
+        else:
+            check_frame(out, self._params.shape)
+        scene = scene_of(env)
+        poses = self.stage.aim(scene, gaze)
+        count = read_objects(self._objects, scene, self._params, poses)
+        self.stage.draw(out[None], scene, self._objects, count)
+        self._cam = self.stage.cams[0, 0]
         return out
 
     def render_batch(self, scenes: Sequence[Any], out: np.ndarray | None = None) -> np.ndarray:
@@ -170,31 +110,12 @@ class EgoCamera:
             raise ValueError("no frame yet: call render() before project()")
         return project(self._cam, np.asarray(points_m, dtype=np.float64))
 
-    def _pose(self, ego: Any, gaze: tuple[float, float] | None, time_s: float) -> Pose:
-        p = self._params
-        px, py = float(ego.position[0]), float(ego.position[1])
-        heading = float(ego.heading)
-        if not math.isfinite(px + py + heading):
-            raise ValueError(f"the ego vehicle has position ({px}, {py}) and heading {heading}")
-        x, y, z = mounted_pose(px, py, heading, ego.LENGTH, p.mount_height, p.mount_setback, p.mount_left)
-        yaw, pitch = p.yaw_deg, p.pitch_deg
-        if gaze is not None:
-            yaw, pitch = yaw + gaze[0], pitch + gaze[1]
-        elif p.gaze == "path":
-            yaw += math.degrees(_path_yaw(ego))
-        return Pose(x, y, z, heading + math.radians(yaw), math.radians(pitch) + body_pitch(p, ego, time_s))
-
-    def _checked_out(self, out: np.ndarray | None) -> np.ndarray:
-        if out is None:
-            return np.empty(self._params.shape, dtype=np.uint8)
-        if out.shape != self._params.shape or out.dtype != np.uint8:
-            raise ValueError(f"out must be uint8 of shape {self._params.shape}, got {out.dtype} {out.shape}")
-        return out
+    def seen_from(self, cam: np.ndarray) -> None:
+        """Take over the pose of a frame that a `CameraRig` has drawn, for `project`."""
+        self._cam = cam
 
 
-def _path_yaw(ego: Any) -> float:
-    """Direction, from the car's heading, of where it will be in a second on its present circle [rad]."""
-    steering = (getattr(ego, "action", None) or {}).get("steering", 0.0)
-    slip = math.atan(0.5 * math.tan(steering))
-    turn = ego.speed * math.sin(slip) / (0.5 * ego.LENGTH) * _PATH_S
-    return max(-_PATH_MAX, min(_PATH_MAX, slip + 0.5 * turn))
+def check_frame(out: np.ndarray, shape: tuple[int, int]) -> None:
+    """Refuse a frame of another shape or type."""
+    if out.shape != shape or out.dtype != np.uint8:
+        raise ValueError(f"out must be uint8 of shape {shape}, got {out.dtype} {out.shape}")

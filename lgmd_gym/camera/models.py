@@ -267,6 +267,21 @@ def _barrier(b: _Builder) -> None:
         b.rect(face, (0.0, 1.0), (0.0, 0.12), 25.0)
 
 
+def _rail(b: _Builder) -> None:
+    """Add a piece of guard rail, 8 m long: two posts, and a beam of two waves."""
+    b.model()
+    for x in (-0.25, 0.25):
+        b.solid()
+        for y, way in ((-0.2, -1.0), (0.2, 1.0)):
+            a, e = x + 0.007 * way, x - 0.007 * way
+            b.face([(a, y, 0.6), (a, y, 0.0), (e, y, 0.0), (e, y, 0.6)], 1.05)
+    b.solid()
+    for y, way in ((-0.5, 0.5), (0.5, -0.5)):
+        face = b.face([(way, y, 1.0), (way, y, 0.57), (-way, y, 0.57), (-way, y, 1.0)])
+        for low, value in ((0.02, 0.7), (0.42, 0.62), (0.85, 1.2)):
+            b.rect(face, (0.0, 1.0), (low, low + 0.13), value, BODY)
+
+
 def _post(b: _Builder) -> None:
     b.model()
     b.solid()
@@ -307,6 +322,7 @@ def all_models() -> Model:
     _plain(b)
     _plain(b)  # a mark on the ground has no body; its row keeps the numbering
     _barrier(b)
+    _rail(b)
     _post(b)
     _tree(b)
     count = np.array([len(points) for points in b.corners], dtype=np.int64)

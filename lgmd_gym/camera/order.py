@@ -9,10 +9,12 @@ from lgmd_gym.camera.pinhole import CAM_COS_YAW, CAM_CU, CAM_FOCAL, CAM_SIN_YAW,
 from lgmd_gym.camera.scene import (
     MODEL_MARK,
     MODEL_POST,
+    MODEL_RAIL,
     OBJ_COS,
     OBJ_HEIGHT,
     OBJ_LENGTH,
     OBJ_MODEL,
+    OBJ_RANGE,
     OBJ_SIN,
     OBJ_WIDTH,
     OBJ_X,
@@ -31,6 +33,8 @@ def distance(cam, obj):
 def visible(cam, obj):
     """Whether any of an object may be in the frame, and the lens is outside it."""
     dx, dy = obj[OBJ_X] - cam[CAM_X], obj[OBJ_Y] - cam[CAM_Y]
+    if dx * dx + dy * dy > obj[OBJ_RANGE] ** 2:
+        return False
     radius = 0.5 * math.sqrt(obj[OBJ_LENGTH] ** 2 + obj[OBJ_WIDTH] ** 2)
     ahead = dx * cam[CAM_COS_YAW] + dy * cam[CAM_SIN_YAW]
     across = dy * cam[CAM_COS_YAW] - dx * cam[CAM_SIN_YAW]
@@ -77,7 +81,8 @@ def _separated(a, b, px, py):
 @kernel
 def _hides(a, b, px, py, near_a, near_b):
     """Whether box a must be drawn after box b."""
-    if a[OBJ_MODEL] >= MODEL_POST or b[OBJ_MODEL] >= MODEL_POST:
+    long = a[OBJ_MODEL] == MODEL_RAIL or b[OBJ_MODEL] == MODEL_RAIL
+    if not long and (a[OBJ_MODEL] >= MODEL_POST or b[OBJ_MODEL] >= MODEL_POST):
         return near_a < near_b  # thin things, apart from all else
     verdict = _separated(a, b, px, py)
     if verdict == 0:
@@ -93,7 +98,7 @@ def order_objects(cam, objects, count, order, nearness):
 
     Args:
         cam: `camera_vector(...)`.
-        objects: float64, shape (>= count, 10).
+        objects: float64, shape (>= count, 12).
         count: How many.
         order: Gets the indices, int64.
         nearness: Scratch, float64: distance of the centres.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from numbers import Integral, Real
@@ -26,6 +27,8 @@ _BOUNDS: dict[str, tuple[float, float, bool, bool, str]] = {
     "read_noise": (0.0, 50.0, True, True, "grey levels"),
     "vibration_deg": (0.0, 5.0, True, True, "degrees"),
     "dive_deg": (0.0, 2.0, True, True, "degrees per m/s²"),
+    "heave_m": (0.0, 0.1, True, True, "m"),
+    "shutter_s": (0.0, 0.1, True, True, "s"),
 }
 _CHOICES = {"gaze": ("fixed", "path"), "vehicles": ("car", "box"), "light": ("day", "night")}
 
@@ -52,6 +55,10 @@ class CameraParams:
         texture: Contrast of asphalt and verge, as a multiple of the natural one.
         roadside: Density of posts and trees beside the road, as a multiple of the natural one.
         vehicles: `"car"`: bodies with windows, lights, wheels; `"box"`: plain shaded boxes.
+        panorama: What is all round, far away: `"skyline"` (hills and trees under an even sky), `"natural"`
+            (1/f noise with the statistics of natural scenes), or the path of an image that is wrapped
+            round 360°, its middle row at the horizon, its left edge in the direction +x, in grey.
+        guard_rail: Steel rails, 0.75 m high on posts, along the outer edges of the road.
         seed: Seed of textures, skyline and of the grey of vehicles that bring no `shade`.
         light: `"day"` or `"night"` (own headlights, others' lights shine).
         visibility_m: Meteorological visibility in fog (5 % contrast, Koschmieder); 0 is clear air [m].
@@ -59,6 +66,11 @@ class CameraParams:
         read_noise: Standard deviation of the sensor's own noise [grey levels].
         vibration_deg: RMS pitch of the body on an uneven road at 14 m/s, growing with √speed [degrees].
         dive_deg: Nose-down pitch per braking deceleration [degrees per m/s²]; sprung cars have 0.05 to 0.15.
+        heave_m: RMS rise and fall of the body on an uneven road at 14 m/s, growing with √speed [m]; roads
+            of ISO 8608 class A to C leave 0.0015 to 0.006 above 1 Hz.
+        shutter_s: Exposure time, over which everything that moves is smeared; 0 freezes [s]. The exposure
+            ends at the time of the frame. Automotive cameras that must not miss a pulsed light (90 Hz)
+            expose 0.011 or more by day.
     """
 
     name: str = "custom"
@@ -73,6 +85,8 @@ class CameraParams:
     texture: float = 1.0
     roadside: float = 1.0
     vehicles: str = "car"
+    panorama: str = "skyline"
+    guard_rail: bool = False
     seed: int = 0
     light: str = "day"
     visibility_m: float = 0.0
@@ -80,6 +94,8 @@ class CameraParams:
     read_noise: float = 0.0
     vibration_deg: float = 0.0
     dive_deg: float = 0.0
+    heave_m: float = 0.0
+    shutter_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Check every field; the message names field, value and bound."""
@@ -88,6 +104,7 @@ class CameraParams:
         object.__setattr__(self, "shape", _checked_shape(self.shape))
         for name, bound in _BOUNDS.items():
             object.__setattr__(self, name, _checked_number(name, getattr(self, name), bound))
+        _check_world(self)
         for name, known in _CHOICES.items():
             if getattr(self, name) not in known:
                 raise unknown_name(f"camera {name}", getattr(self, name), known)
@@ -157,6 +174,17 @@ class CameraParams:
         return replace(self, **CONDITIONS[condition])
 
 
+def _check_world(p: CameraParams) -> None:
+    if isinstance(p.panorama, os.PathLike):
+        object.__setattr__(p, "panorama", os.fspath(p.panorama))
+    if not isinstance(p.panorama, str) or not p.panorama:
+        raise ValueError(
+            f"camera panorama must be 'skyline', 'natural' or an image's path, got {p.panorama!r}"
+        )
+    if not isinstance(p.guard_rail, bool):
+        raise ValueError(f"camera guard_rail must be true or false, got {p.guard_rail!r}")
+
+
 def _field_names() -> list[str]:
     return [field.name for field in fields(CameraParams)]
 
@@ -197,6 +225,13 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "clear": {},
     "night": {"light": "night", "read_noise": 2.0, "shot_noise": 3.0},
     "fog": {"visibility_m": 120.0},
-    "robust": {"read_noise": 1.5, "shot_noise": 2.0, "vibration_deg": 0.1, "dive_deg": 0.1},
+    "robust": {
+        "read_noise": 1.5,
+        "shot_noise": 2.0,
+        "vibration_deg": 0.1,
+        "dive_deg": 0.1,
+        "heave_m": 0.005,
+        "shutter_s": 0.011,
+    },
 }
 """Named conditions: fields laid over a camera by `CameraParams.with_condition`."""

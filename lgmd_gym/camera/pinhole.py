@@ -46,13 +46,9 @@ def mounted_pose(
 
 def camera_vector(pose: Pose, focal_px: float, shape: tuple[int, int]) -> np.ndarray:
     """Pack pose and optics for the kernels; float64, shape (12,)."""
-    cam = np.empty(CAM_SIZE)
-    cam[:3] = pose[:3]
-    cam[CAM_COS_YAW], cam[CAM_SIN_YAW] = math.cos(pose.yaw), math.sin(pose.yaw)
-    cam[CAM_COS_PITCH], cam[CAM_SIN_PITCH] = math.cos(pose.pitch), math.sin(pose.pitch)
-    cam[CAM_FOCAL], cam[CAM_CU], cam[CAM_CV] = focal_px, 0.5 * shape[1], 0.5 * shape[0]
-    cam[CAM_YAW], cam[CAM_PITCH] = pose.yaw, pose.pitch
-    return cam
+    x, y, z, yaw, pitch = pose
+    turned = (math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch))
+    return np.array((x, y, z, *turned, focal_px, 0.5 * shape[1], 0.5 * shape[0], yaw, pitch))
 
 
 def project(cam: np.ndarray, points_m: np.ndarray) -> np.ndarray:

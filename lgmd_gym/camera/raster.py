@@ -6,30 +6,36 @@ import math
 
 import numba as nb
 
+from lgmd_gym.camera.blur import add_share, blur_steps, lens_at, move_objects
 from lgmd_gym.camera.conditions import (
     LOOK_EXTINCTION,
     LOOK_GROUND,
     LOOK_HAZE,
     LOOK_NIGHT,
     LOOK_PAVED,
+    LOOK_SHUTTER,
     LOOK_SKY,
     develop,
     lamp_light,
     weather_row,
 )
+from lgmd_gym.camera.glare import BUDGET_PX, add_glare
 from lgmd_gym.camera.ground import ROAD, add_ground_quad, distance_ahead, shade_row
 from lgmd_gym.camera.jit import kernel
 from lgmd_gym.camera.markings import add_lines
 from lgmd_gym.camera.order import order_objects, visible
+from lgmd_gym.camera.panorama import draw_panorama
 from lgmd_gym.camera.pinhole import (
     CAM_COS_PITCH,
     CAM_COS_YAW,
     CAM_CV,
     CAM_FOCAL,
+    CAM_PITCH,
     CAM_SIN_PITCH,
     CAM_SIN_YAW,
     CAM_X,
     CAM_Y,
+    CAM_YAW,
 )
 from lgmd_gym.camera.scene import MODEL_MARK, OBJ_MODEL, OBJ_RANGE, OBJ_X, OBJ_Y, PLANT_RANGE
 from lgmd_gym.camera.sky import draw_sky
@@ -54,9 +60,9 @@ def add_flats(cam, geometry, objects, order, n, scratch):
 
 
 @kernel
-def draw_ground(image, cam, look, textures, scratch):
+def draw_ground(image, cam, look, beam, textures, scratch):
     """Draw what `add_flats` has added, over asphalt and verge, below the horizon."""
-    acc, rows, beam = scratch[0], scratch[1], scratch[7]
+    acc, rows = scratch[0], scratch[1]
     height, width = image.shape
     horizon = horizon_of(cam)
     start = int(min(max(math.floor(horizon), 0.0), float(height)))
@@ -100,39 +106,25 @@ def gather_roadside(cam, roadside, objects, count):
 
 
 @kernel
-def draw_frame(
-    out, image, sky, fresh, cam, look, geometry, textures, line, model, objects, count, noise, scratch
-):
-    """Draw one frame.
-
-    Args:
-        out: uint8, shape (height, width).
-        image: Scratch, float32, shape (height, width).
-        sky: float32, shape (height, width): the sky of the last frame.
-        fresh: Whether the lens has turned since, so that the sky must be drawn.
-        cam: `camera_vector(...)`.
-        look: Grey levels and conditions, float64, shape (16,).
-        geometry: (surface, lines, roadside) of `RoadGeometry`.
-        textures: (asphalt, its offsets, verge, its offsets).
-        line: `skyline(seed)`.
-        model: `models.Model`.
-        objects: float64, shape (>= count, 11).
-        count: Number of objects.
-        noise: (`noise_table(seed)`, where this frame's noise starts).
-        scratch: see `EgoCamera.__init__`.
-    """
-    height = out.shape[0]
-    order, nearness, solid_acc = scratch[8], scratch[9], scratch[10]
+def draw_light(image, sky, sky_of, cam, look, beam, geometry, tables, model, objects, count, scratch):
+    """Draw the light that falls on the sensor; see `draw_frames` for the arguments."""
+    height = image.shape[0]
+    order, nearness, solid_acc = scratch[7], scratch[8], scratch[9]
     pts, frame, uv, greys = scratch[2], scratch[3], scratch[4], scratch[5]
     count = gather_roadside(cam, geometry[2], objects, count)
     n = order_objects(cam, objects, count, order, nearness)
     horizon = horizon_of(cam)
-    if fresh:
-        draw_sky(sky, cam, line, look[LOOK_SKY:], horizon)
+    if sky_of[0] != cam[CAM_YAW] or sky_of[1] != cam[CAM_PITCH]:
+        sky_of[0], sky_of[1] = cam[CAM_YAW], cam[CAM_PITCH]
+        if tables[3].shape[0] > 0:
+            draw_panorama(sky, cam, tables[3], horizon)
+        else:
+            draw_sky(sky, cam, tables[1], look[LOOK_SKY:], horizon)
     for i in range(int(min(max(math.ceil(horizon), 0.0), height))):
         image[i] = sky[i]
     add_flats(cam, geometry, objects, order, n, scratch)
-    draw_ground(image, cam, look, textures, scratch)
+    draw_ground(image, cam, look, beam, tables[0], scratch)
+    budget = BUDGET_PX
     for i in range(n):
         obj = objects[order[i]]
         if obj[OBJ_MODEL] == MODEL_MARK:
@@ -144,5 +136,61 @@ def draw_frame(
         fade = min(1.0, 6.0 * (1.0 - away / obj[OBJ_RANGE]))
         clear = math.exp(-away * look[LOOK_EXTINCTION]) if look[LOOK_EXTINCTION] > 0.0 else 1.0
         air = (light, clear, look[LOOK_HAZE], look[LOOK_NIGHT], fade)
-        draw_object(image, solid_acc, cam, obj, model, air, frame, pts, uv, greys)
-    develop(out, image, look, noise[0], noise[1])
+        draw_object(image, solid_acc, scratch[1], cam, obj, model, air, frame, pts, uv, greys)
+        if look[LOOK_NIGHT] > 0.0:
+            budget = add_glare(image, cam, obj, clear * fade, budget)
+
+
+@kernel
+def draw_frames(out, image, cams, views, geometry, tables, model, objects, count, scratch):
+    """Draw one frame of each of several cameras on one car.
+
+    Args:
+        out: uint8, shape (cameras, height, width).
+        image: Scratch, float32, shape (height, width).
+        cams: `camera_vector(...)` at the end and at the start of the exposure, shape (cameras, 2, 12).
+        views: Per camera: grey levels and conditions (17,), low beam (width,), sky (height, width),
+            yaw and pitch that the sky was drawn for (2,), where the frame's noise starts.
+        geometry: (surface, lines, roadside) of `RoadGeometry`.
+        tables: (asphalt, its offsets, verge, its offsets), `skyline(seed)`, `noise_table(seed)`,
+            `panorama_table(...)`.
+        model: `models.Model`.
+        objects: float64, shape (>= count, 12).
+        count: Number of objects.
+        scratch: see `lgmd_gym.camera.stage`.
+    """
+    looks, beams, skies, sky_of, starts = views
+    for k in range(out.shape[0]):
+        look, beam, sky = looks[k], beams[k], skies[k]
+        steps = 1
+        if look[LOOK_SHUTTER] > 0.0:
+            steps = blur_steps(cams[k], look[LOOK_SHUTTER], objects, count)
+        if steps == 1:
+            draw_light(
+                image,
+                sky,
+                sky_of[k],
+                cams[k, 0],
+                look,
+                beam,
+                geometry,
+                tables,
+                model,
+                objects,
+                count,
+                scratch,
+            )
+        else:
+            cam, total = scratch[11], scratch[10]
+            total[:] = nb.float32(0.0)
+            for step in range(steps):
+                ago = (step + 0.5) / steps
+                lens_at(cams[k], ago, cam)
+                move_objects(objects, count, -ago * look[LOOK_SHUTTER])
+                draw_light(
+                    image, sky, sky_of[k], cam, look, beam, geometry, tables, model, objects, count, scratch
+                )
+                move_objects(objects, count, ago * look[LOOK_SHUTTER])
+                add_share(total, image, nb.float32(1.0 / steps))
+            image[:] = total
+        develop(out[k], image, look, tables[2], starts[k])

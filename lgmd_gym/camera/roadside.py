@@ -1,4 +1,4 @@
-"""Posts, bushes and trees beside the road: they carry much of the flow that a driver sees."""
+"""Posts, bushes, trees and guard rails beside the road: they carry much of the flow that a driver sees."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 _CLEAR = 2.5  # nothing but posts stands nearer to a lane's edge than this [m]
 _POST_STEP, _POST_OFFSET = 50.0, 1.2
 _PLANT_STEP = 40.0
+_RAIL_STEP, _RAIL_OFFSET = 8.0, 0.75  # two posts a piece, as with the usual 4 m between them
 
 
 def plant(segments: np.ndarray, density: float, seed: int, codes: tuple[int, int, int]) -> np.ndarray:
@@ -39,6 +40,51 @@ def plant(segments: np.ndarray, density: float, seed: int, codes: tuple[int, int
     posts = posts[_clear_of(posts[:, :2], segments, np.full(len(posts), 0.6))]
     both = np.concatenate((posts, plants))
     return np.ascontiguousarray(both[np.argsort(both[:, 0], kind="stable")])
+
+
+def rails(segments: np.ndarray, columns: int, model: int) -> np.ndarray:
+    """Place guard rails along the outer edges of the lanes, in straight pieces of at most 8 m.
+
+    Args:
+        segments: As for `plant`.
+        columns: Number of columns of an object.
+        model: Model of a rail.
+
+    Returns:
+        Objects, float64, shape (n, columns).
+    """
+    starts = np.flatnonzero(segments[:, 4] == 0.0)
+    pieces = [np.zeros((0, 4))]
+    for lane in np.split(segments, starts[1:]):
+        ends = _nodes(lane)
+        for side in (-1.0, 1.0):
+            line = ends[:, 0:2] + side * (0.5 * ends[:, 4:5] + _RAIL_OFFSET) * ends[:, 2:4]
+            middle = 0.5 * (line[:-1] + line[1:])
+            free = _clear_of(line, segments, np.full(len(line), 0.4 * _RAIL_OFFSET))
+            free = (
+                free[:-1] & free[1:] & _clear_of(middle, segments, np.full(len(middle), 0.4 * _RAIL_OFFSET))
+            )
+            pieces.append(np.concatenate((line[:-1], line[1:]), axis=1)[free])
+    ends = np.concatenate(pieces)
+    delta = ends[:, 2:4] - ends[:, 0:2]
+    length = np.maximum(np.hypot(delta[:, 0], delta[:, 1]), 1e-9)
+    out = _row(0.5 * (ends[:, 0:2] + ends[:, 2:4]), columns, model)
+    out[:, 2:4] = delta / length[:, None]
+    out[:, 4] = length
+    out[:, 5:8] = 0.12, 0.75, 165.0  # width, height (EN 1317 systems have 0.7 to 0.8), galvanised steel
+    return out
+
+
+def _nodes(lane: np.ndarray) -> np.ndarray:
+    """Points every 8 m along one lane's segments: x, y, unit normal to the right, width; shape (n, 5)."""
+    delta = lane[:, 2:4] - lane[:, 0:2]
+    length = np.maximum(np.hypot(delta[:, 0], delta[:, 1]), 1e-9)
+    total = lane[-1, 4] + length[-1]
+    along = np.linspace(0.0, total, int(np.ceil(total / _RAIL_STEP)) + 1)
+    owner = np.clip(np.searchsorted(lane[:, 4], along, side="right") - 1, 0, len(lane) - 1)
+    unit = delta[owner] / length[owner, None]
+    base = lane[owner, 0:2] + unit * (along - lane[owner, 4])[:, None]
+    return np.column_stack((base, -unit[:, 1], unit[:, 0], lane[owner, 5]))
 
 
 def _row(places: np.ndarray, columns: int, model: int) -> np.ndarray:

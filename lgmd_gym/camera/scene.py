@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.camera.roadside import plant
+from lgmd_gym.camera.roadside import plant, rails
 
 STRIPED, CONTINUOUS, CONTINUOUS_LINE = 1, 2, 3  # highway_env.road.lane.LineType
 SHOULDER = 0.5
@@ -28,9 +28,10 @@ MAX_DRAWN = 512
 
 # Columns of the array of objects.
 OBJ_X, OBJ_Y, OBJ_COS, OBJ_SIN, OBJ_LENGTH, OBJ_WIDTH, OBJ_HEIGHT = 0, 1, 2, 3, 4, 5, 6
-OBJ_SHADE, OBJ_BRAKE, OBJ_MODEL, OBJ_RANGE = 7, 8, 9, 10
-OBJ_SIZE = 11
-MODEL_CAR, MODEL_TRUCK, MODEL_BOX, MODEL_MARK, MODEL_BARRIER, MODEL_POST, MODEL_TREE = 0, 1, 2, 3, 4, 5, 6
+OBJ_SHADE, OBJ_BRAKE, OBJ_MODEL, OBJ_RANGE, OBJ_SPEED = 7, 8, 9, 10, 11
+OBJ_SIZE = 12
+MODEL_CAR, MODEL_TRUCK, MODEL_BOX, MODEL_MARK, MODEL_BARRIER, MODEL_RAIL = 0, 1, 2, 3, 4, 5
+MODEL_POST, MODEL_TREE = 6, 7  # flat pictures that turn to the lens, as all from MODEL_POST on
 
 OUTLINE = -1.0
 """Shade of a mark that is an outline in paint; other shades fill it."""
@@ -48,7 +49,7 @@ class RoadGeometry(NamedTuple):
         surface: Asphalt as quads, float64, shape (n, 8): x, y of the corners in turn [m].
         lines: Straight pieces of markings, float64, shape (n, 7): x0, y0, x1, y1, distance of both
             ends along their lane, 1.0 if striped else 0.0 [m].
-        roadside: Posts and trees as objects (columns `OBJ_…`), float64, shape (n, 11).
+        roadside: Posts, trees and guard rails as objects (columns `OBJ_…`), float64, shape (n, 12).
         paved: Everything is asphalt: a road without lanes.
     """
 
@@ -58,21 +59,24 @@ class RoadGeometry(NamedTuple):
     paved: bool
 
 
-_CACHE: weakref.WeakKeyDictionary[Any, dict[tuple[float, int], RoadGeometry]] = weakref.WeakKeyDictionary()
+_CACHE: weakref.WeakKeyDictionary[Any, dict[tuple[float, int, bool], RoadGeometry]] = (
+    weakref.WeakKeyDictionary()
+)
 
 
-def road_geometry(road: Any, roadside: float = 0.0, seed: int = 0) -> RoadGeometry:
+def road_geometry(road: Any, roadside: float = 0.0, seed: int = 0, rail: bool = False) -> RoadGeometry:
     """Return the geometry of `road`'s network, read on first sight and kept as long as the network lives.
 
     Args:
         road: The Road.
         roadside: Density of posts and trees.
         seed: Seed of their places.
+        rail: Put guard rails along the outer edges.
     """
     network = getattr(road, "network", None)
     if network is None:
-        return _extract([], roadside, seed)
-    key = (roadside, seed)
+        return _extract([], roadside, seed, rail)
+    key = (roadside, seed, rail)
     try:
         known = _CACHE.setdefault(network, {})
     except TypeError:  # not hashable or not weakly referable: read it anew
@@ -87,7 +91,7 @@ def _lanes(network: Any) -> list[Any]:
     return [lane for lane in lanes if math.isfinite(lane.length) and lane.length > 0.0]
 
 
-def _extract(lanes: list[Any], roadside: float, seed: int) -> RoadGeometry:
+def _extract(lanes: list[Any], roadside: float, seed: int, rail: bool) -> RoadGeometry:
     surface: list[np.ndarray] = []
     lines: list[np.ndarray] = []
     segments: list[np.ndarray] = []
@@ -105,20 +109,23 @@ def _extract(lanes: list[Any], roadside: float, seed: int) -> RoadGeometry:
     return RoadGeometry(
         surface=np.concatenate(surface) if surface else np.zeros((0, 8)),
         lines=_without_doubles(np.concatenate(lines)) if lines else np.zeros((0, 7)),
-        roadside=_planted(np.zeros((0, 6)) if bare else np.concatenate(segments), roadside, seed),
+        roadside=_planted(np.zeros((0, 6)) if bare else np.concatenate(segments), roadside, seed, rail),
         paved=not lanes,
     )
 
 
-def _planted(segments: np.ndarray, roadside: float, seed: int) -> np.ndarray:
-    return _planted_once(segments.tobytes(), roadside, seed)
+def _planted(segments: np.ndarray, roadside: float, seed: int, rail: bool) -> np.ndarray:
+    return _planted_once(segments.tobytes(), roadside, seed, rail)
 
 
 @lru_cache(maxsize=16)
-def _planted_once(segments: bytes, roadside: float, seed: int) -> np.ndarray:
+def _planted_once(segments: bytes, roadside: float, seed: int, rail: bool) -> np.ndarray:
     """Plant once for all networks of the same shape: environments build theirs anew at each reset."""
     pieces = np.frombuffer(segments).reshape(-1, 6)
     out = plant(pieces, roadside, seed, (OBJ_SIZE, MODEL_POST, MODEL_TREE))
+    if rail:
+        out = np.concatenate((out, rails(pieces, OBJ_SIZE, MODEL_RAIL)))
+        out = np.ascontiguousarray(out[np.argsort(out[:, OBJ_X], kind="stable")])
     out[:, OBJ_RANGE] = PLANT_RANGE
     return out
 
@@ -211,18 +218,20 @@ def objects_into(
     look: tuple[float, float],
     seed: int,
     boxes: bool,
+    reach: float = MAX_RANGE,
 ) -> int:
     """Write the poses of all that may be seen into `out`.
 
     Args:
-        out: Gets one row per object (columns `OBJ_…`), float64, shape (MAX_DRAWN, 11).
+        out: Gets one row per object (columns `OBJ_…`), float64, shape (MAX_DRAWN, 12).
         road: The Road.
         ego: The vehicle that is not drawn.
         x: Position of the lens [m].
         y: Position of the lens [m].
-        look: Cosine and sine of the viewing direction.
+        look: Cosine and sine of the viewing direction; zeros keep what is behind, too.
         seed: Seed of the grey of vehicles without `shade`.
         boxes: Draw plain boxes instead of cars.
+        reach: What is farther than this is left out [m].
 
     Returns:
         How many rows were written.
@@ -237,11 +246,13 @@ def objects_into(
         for index, item in enumerate(group):
             if item is ego:
                 continue
-            px, py = item.position
+            place = item.position
+            # Python's own floats: arithmetic on NumPy's scalars takes several times as long.
+            px, py = place.tolist() if place.__class__ is np.ndarray else place
             dx, dy = px - x, py - y
             length = item.LENGTH
             ahead = dx * look_x + dy * look_y
-            if not -length - item.WIDTH < ahead < MAX_RANGE or dx * dx + dy * dy > MAX_RANGE * MAX_RANGE:
+            if not -length - item.WIDTH < ahead < reach or dx * dx + dy * dy > reach * reach:
                 if not math.isfinite(ahead):
                     raise ValueError(f"{type(item).__name__} {index} of the road has position ({px}, {py})")
                 continue
@@ -288,6 +299,7 @@ def _write(
         brake,
         model,
         MAX_RANGE,
+        getattr(item, "speed", 0.0),
     )
 
 

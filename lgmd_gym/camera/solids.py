@@ -25,6 +25,7 @@ from lgmd_gym.camera.pinhole import (
 from lgmd_gym.camera.scene import (
     MODEL_MARK,
     MODEL_POST,
+    MODEL_RAIL,
     MODEL_TREE,
     OBJ_BRAKE,
     OBJ_COS,
@@ -74,7 +75,7 @@ def add_shadow(acc, cam, obj, pts, uv, quad):
         inset = -min(0.2, 0.25 * min(obj[OBJ_LENGTH], obj[OBJ_WIDTH]))
         _add_footprint(acc, PAINT, cam, obj, x, y, inset, -0.5, pts, uv, quad)
         return
-    if obj[OBJ_MODEL] == MODEL_POST:
+    if obj[OBJ_MODEL] == MODEL_POST or obj[OBJ_MODEL] == MODEL_RAIL:
         return
     lean = -0.12 * obj[OBJ_HEIGHT] / _SUN_Z
     x, y = x + lean * _SUN_X, y + lean * _SUN_Y
@@ -163,12 +164,13 @@ def _apparent_height(cam, obj):
 
 
 @kernel
-def draw_object(image, acc, cam, obj, model, air, frame, pts, uv, greys):
+def draw_object(image, acc, sums, cam, obj, model, air, frame, pts, uv, greys):
     """Draw one object over the image.
 
     Args:
         image: float32, shape (height, width).
         acc: Accumulator of coverage and of grey times coverage, float32, shape (height, width + 2, 2).
+        sums: Scratch, float32, shape (>= 2, >= width).
         cam: `camera_vector(...)`.
         obj: Row of the array of objects.
         model: `models.Model`.
@@ -184,10 +186,11 @@ def draw_object(image, acc, cam, obj, model, air, frame, pts, uv, greys):
     for solid in range(model.models[kind, 0], model.models[kind, 1]):
         u0, v0, u1, v1 = add_solid(acc, cam, obj, model, solid, size, air, frame, pts, uv, greys)
         height, width = image.shape
-        if v1 > 0.0 and v0 < height and u1 > 0.0 and u0 < width:
+        # Also what lies left of the frame: its edges are summed in column 0, and cancel but for rounding.
+        if v1 > 0.0 and v0 < height and u0 < width:
             r0, r1 = int(max(v0, 0.0)), int(min(math.ceil(v1), height))
-            c0, c1 = int(max(u0, 0.0)), int(min(math.ceil(u1) + 1.0, width))
-            _compose(image, acc, r0, r1, c0, c1, air[1], air[2])
+            c0, c1 = int(max(u0, 0.0)), int(max(min(math.ceil(u1) + 1.0, width), 0.0))
+            _compose(image, acc, sums, r0, r1, c0, c1, air[1], air[2])
 
 
 @kernel
@@ -228,18 +231,24 @@ def add_solid(acc, cam, obj, model, solid, size, air, frame, pts, uv, greys):
 
 
 @kernel
-def _compose(image, acc, r0, r1, c0, c1, clear, haze):
+def _compose(image, acc, sums, r0, r1, c0, c1, clear, haze):
     """Lay accumulated coverage and grey over a part of the image, and clear them."""
     one, zero = nb.float32(1.0), nb.float32(0.0)
     clear, murk = nb.float32(clear), nb.float32((1.0 - clear) * haze)
     last = nb.uint64(min(c1 + 2, acc.shape[1]))
+    first, end = nb.uint64(c0), nb.uint64(c1)
+    covers, greys = sums[0], sums[1]
     for i in range(nb.uint64(r0), nb.uint64(r1)):
+        # Three loops, for only the first has to go step by step.
         cover, grey = zero, zero
-        for j in range(nb.uint64(c0), nb.uint64(c1)):
+        for j in range(first, end):
             cover += acc[i, j, 0]
             grey += acc[i, j, 1]
-            a = one if cover > one else zero if cover < zero else cover
-            image[i, j] = image[i, j] * (one - a) + grey * clear + a * murk
-        for j in range(nb.uint64(c0), last):
+            covers[j], greys[j] = cover, grey
+        for j in range(first, end):
+            a = covers[j]
+            a = one if a > one else zero if a < zero else a
+            image[i, j] = image[i, j] * (one - a) + greys[j] * clear + a * murk
+        for j in range(first, last):
             acc[i, j, 0] = zero
             acc[i, j, 1] = zero

@@ -9,7 +9,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from test_camera_support import add_car, straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera import CameraParams, CameraRig, EgoCamera
 
 pytestmark = pytest.mark.bench
 
@@ -46,3 +46,42 @@ def test_condition_adds_at_most_a_third(benchmark, condition):
     base = np.median(timeit.repeat(lambda: clear.render(env, out), number=200, repeat=9)) / 200
     benchmark(camera.render, env, out)
     assert benchmark.stats.stats.median < 1.4 * base
+
+
+# What an option may add to a clear `wide` frame with 5 vehicles, as a factor.
+EXTRAS = {
+    "guard_rail": ({"guard_rail": True}, 2.0),
+    "shutter": ({"shutter_s": 0.011}, 2.6),  # two sharp pictures
+    "panorama": ({"panorama": "natural"}, 1.1),  # drawn anew when the lens turns, else kept
+}
+
+
+@pytest.mark.parametrize("name", EXTRAS)
+def test_extra(benchmark, name):
+    import timeit
+
+    fields, factor = EXTRAS[name]
+    env = scene(5)
+    clear, camera = EgoCamera("wide"), EgoCamera("wide", **fields)
+    out = camera.render(env)
+    clear.render(env, out)
+    base = np.median(timeit.repeat(lambda: clear.render(env, out), number=200, repeat=9)) / 200
+    benchmark(camera.render, env, out)
+    assert benchmark.stats.stats.median < 1.3 * factor * base
+
+
+def test_a_rig_is_no_slower_than_its_cameras(benchmark):
+    import timeit
+
+    env = scene(5)
+    cameras = [EgoCamera(CameraParams(name=str(fov), hfov_deg=fov)) for fov in (5, 10, 20, 40)]
+    rig = CameraRig(cameras)
+    outs = rig.render(env)
+
+    def apart():
+        for camera, out in zip(cameras, outs, strict=True):
+            camera.render(env, out)
+
+    base = np.median(timeit.repeat(apart, number=50, repeat=9)) / 50
+    benchmark(rig.render, env, outs)
+    assert benchmark.stats.stats.median < 1.1 * base
