@@ -1,4 +1,4 @@
-"""The `lgmd-gym` command: bench, drive, list."""
+"""The `lgmd-gym` command: bench, drive, video, paper, list."""
 
 import contextlib
 import io
@@ -16,6 +16,8 @@ DESCRIPTION = """A highway-env car brakes on the spike frequency of a locust loo
 
   lgmd-gym bench                                    try all agents on the quick suite; about a minute
   lgmd-gym drive LGMD/CCRs-v0 --video out.mp4       watch one approach through the eye
+  lgmd-gym video CLIP.mp4                           the spike trace of a dash-camera clip
+  lgmd-gym paper                                    the paper's experiments, a verdict on each claim
   lgmd-gym list                                     suites, agents, environments, cameras
 
 Speeds are in m/s, case names carry km/h. Each command has its own --help."""
@@ -39,6 +41,8 @@ class Bench:
     """Processes."""
     out: Path | None = None
     """Run folder; must not exist. Default: runs/SUITE-DATE-TIME."""
+    resume: Path | None = None
+    """Run folder of a broken-off run: plays what is missing, with that run's own settings."""
     camera: str = "fovea"
     """Camera preset: wide, standard, tele, fovea, paper or birdseye."""
     params: Path | None = None
@@ -68,6 +72,59 @@ class Drive:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Video:
+    """Watch video clips with the neuron: spike traces, figures, overlay videos, a detection table.
+
+    For each clip the run folder gets trace.csv (one row per frame), trace.png and, if asked, overlay.mp4.
+    """
+
+    clips: Positional[tuple[str, ...]]
+    """Video files, or folders of them; any file that ffmpeg reads."""
+    choices: tuple[str, ...] = ("paper",)
+    """Named ways to watch, compared in one table if several: paper, calm, paper-18hz, t_sf-60, t_sp-0.78,
+    released, off-only, fixed-inhibition, yue-rind-2006; or all."""
+    crashes: Path | None = None
+    """CSV with the columns clip,crash_frame (empty for no crash): prints the detection table."""
+    crash_frame: int | None = None
+    """Crash frame of a single clip, 0-based: marked in the figure."""
+    out: Path | None = None
+    """Run folder; must not exist. Default: runs/video-DATE-TIME."""
+    params: Path | None = None
+    """TOML file of LGMD parameters, in place of the choice's."""
+    threshold: float | None = None
+    """Alarm level T_sf [spikes/s]; read it together with the frame rate."""
+    fps: float | None = None
+    """Resample to this rate [Hz]; the neuron's answer depends on it."""
+    drop_duplicates: float | None = None
+    """Hide frames that change by less than this fraction of the typical change, as 0.25; 0 shows all."""
+    size: tuple[int, int] | None = None
+    """Scale to this width and height [px]."""
+    roi: tuple[int, int, int, int] | None = None
+    """The neuron sees only this region: top left height width [px]."""
+    overlay: bool = False
+    """Write the overlay video: picture, excitation, spikes, alert lamp."""
+    plots: bool = True
+    """Draw the figures."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paper:
+    """Run every experiment of the paper; write the figures and a table of which claims hold.
+
+    The crash and near-miss clips of the paper are not part of the package: give a folder of your own.
+    """
+
+    out: Path | None = None
+    """Run folder; must not exist. Default: runs/paper-DATE-TIME."""
+    clips: Path | None = None
+    """Folder of driving clips; needs --crashes."""
+    crashes: Path | None = None
+    """CSV with the columns clip,crash_frame (empty for no crash)."""
+    picture: Path | None = None
+    """Picture for the shifting panorama; default: a random one with a natural spectrum."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class List:
     """List what there is to name: suites with their cases, agents, environments, cameras."""
 
@@ -79,6 +136,8 @@ Command = Union[  # noqa: UP007  (tyro reads the annotations)
     Annotated[Bench, subcommand(name="bench")],
     Annotated[Drive, subcommand(name="drive")],
     Annotated[List, subcommand(name="list")],
+    Annotated[Video, subcommand(name="video")],
+    Annotated[Paper, subcommand(name="paper")],
 ]
 
 
@@ -91,11 +150,13 @@ def run(argv: list[str] | None = None) -> int:
     """Run one command and return its exit code."""
     try:
         command = _parse(argv)
-        from lgmd_gym import commands
+        from lgmd_gym import commands, commands_paper
 
         plays: dict[type, Callable[[Any], int]] = {
             Bench: commands.bench,
             Drive: commands.drive,
+            Video: commands_paper.video,
+            Paper: commands_paper.paper,
             List: commands.show_list,
         }
         return plays[type(command)](command)

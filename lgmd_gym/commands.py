@@ -81,7 +81,8 @@ def _report(run: "Run", console: Console, options: "cli.Bench") -> int:
     if rows:
         level = LGMDParams.from_dict(run.eyesight.params or {}).t_sf
         fps = next((f"{row['fps']:g} Hz" for row in rows if row["fps"]), "?")
-        title = f"{run.suite}: camera {run.eyesight.camera} at {fps}, T_sf = {level:g} spikes/s, {run.seeds} seeds"
+        eye = f"camera {run.eyesight.camera} at {fps}, T_sf = {level:g} spikes/s"
+        title = f"{run.suite}: {eye}, {run.seeds} seeds"
         agents = list(dict.fromkeys(["no-brake", *run.agents]))
         console.print(tables.score_table(rows, agents, title))
         console.print(tables.verdict_table(rows, agents, run.suite) or tables.case_table(rows, agents))

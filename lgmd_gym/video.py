@@ -1,10 +1,14 @@
-"""Write video files with the ffmpeg that imageio-ffmpeg carries."""
+"""Read and write video files with the ffmpeg that imageio-ffmpeg carries."""
 
 from pathlib import Path
 from types import TracebackType
 from typing import Any, cast
 
 import numpy as np
+
+from lgmd_gym.video_reader import Reading, TruncatedVideoError, VideoReader, find_clips, luma
+
+__all__ = ["Reading", "TruncatedVideoError", "VideoReader", "VideoWriter", "find_clips", "luma"]
 
 SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif")
 
