@@ -11,25 +11,26 @@ from rich.console import Console
 if TYPE_CHECKING:
     from lgmd_gym import cli
     from lgmd_gym.benchmark.runner import Run
+    from lgmd_gym.benchmark.traffic import TrafficRun
 
 
 def bench(options: "cli.Bench") -> int:
     """Play a suite and report; 0 if all was played, 1 if an episode failed, 130 after Ctrl-C."""
     from lgmd_gym.benchmark.episode import Eyesight
-    from lgmd_gym.benchmark.runner import Run
+    from lgmd_gym.benchmark.runs import resume_run, start_run
 
     console = _console()
     if options.resume is not None:
-        run = Run.resume(options.resume, options.jobs)
+        run = resume_run(options.resume, options.jobs)
         cut = " after a cut-off last line was taken away" if run.folder.mended else ""
         console.print(f"resuming with {len(run.rows)} of {run.total} episodes{cut}")
     else:
         out = options.out or Path("runs") / f"{options.suite}-{time.strftime('%Y%m%d-%H%M%S')}"
         eyesight = Eyesight(options.camera, _read_params(options.params))
-        run = Run(options.suite, options.agents, options.seeds, options.jobs, out, eyesight)
+        run = start_run(options.suite, options.agents, options.seeds, options.jobs, out, eyesight)
     with _progress(run) as tick:
         complete = run.play(tick)
-    failed = _report(run, console, options)
+    failed = _report(run, console, options.plots)
     if not complete:
         console.print(f"interrupted: {len(run.rows)} of {run.total} episodes kept", style="yellow")
     if failed:
@@ -71,10 +72,9 @@ def show_list(options: "cli.List") -> int:
     return 0
 
 
-def _report(run: "Run", console: Console, options: "cli.Bench") -> int:
+def _report(run: "Run | TrafficRun", console: Console, plots: bool) -> int:
     """Print the tables, write summary and plots, and return the number of failed episodes."""
-    from lgmd_gym.benchmark import tables
-    from lgmd_gym.benchmark.summary import write_summary
+    from lgmd_gym.benchmark.traffic import TrafficRun
     from lgmd_gym.neuron import LGMDParams
 
     rows = run.rows
@@ -83,13 +83,31 @@ def _report(run: "Run", console: Console, options: "cli.Bench") -> int:
         fps = next((f"{row['fps']:g} Hz" for row in rows if row["fps"]), "?")
         eye = f"camera {run.eyesight.camera} at {fps}, T_sf = {level:g} spikes/s"
         title = f"{run.suite}: {eye}, {run.seeds} seeds"
-        agents = list(dict.fromkeys(["no-brake", *run.agents]))
-        console.print(tables.score_table(rows, agents, title))
-        console.print(tables.verdict_table(rows, agents, run.suite) or tables.case_table(rows, agents))
-        write_summary(rows, run.folder.path / "summary.csv")
-        if options.plots:
-            _draw_cases(run, level)
+        if isinstance(run, TrafficRun):
+            _report_traffic(run, console, f"{title} of {len(run.kinds)} kinds of traffic")
+        else:
+            _report_cases(run, console, title)
+            if plots:
+                _draw_cases(run, level)
     return sum(row["error"] is not None for row in rows)
+
+
+def _report_cases(run: "Run", console: Console, title: str) -> None:
+    from lgmd_gym.benchmark import tables
+    from lgmd_gym.benchmark.summary import write_summary
+
+    agents = list(dict.fromkeys(["no-brake", *run.agents]))
+    console.print(tables.score_table(run.rows, agents, title))
+    console.print(tables.verdict_table(run.rows, agents, run.suite) or tables.case_table(run.rows, agents))
+    write_summary(run.rows, run.folder.path / "summary.csv")
+
+
+def _report_traffic(run: "TrafficRun", console: Console, title: str) -> None:
+    from lgmd_gym.benchmark.traffic_tables import traffic_table, write_traffic_summary
+
+    console.print(traffic_table(run.rows, run.agents, title))
+    console.print(traffic_table(run.rows, run.agents, "by kind of traffic", by_kind=True))
+    write_traffic_summary(run.rows, run.folder.path / "summary.csv")
 
 
 def _draw_cases(run: "Run", alert_level: float) -> None:
@@ -120,7 +138,7 @@ def _console() -> Console:
 
 
 @contextmanager
-def _progress(run: "Run") -> Iterator[Any]:
+def _progress(run: "Run | TrafficRun") -> Iterator[Any]:
     """Show a progress bar on stderr and yield the function that moves it."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 

@@ -17,6 +17,8 @@ def show(what: str, console: Console) -> None:
 def suites() -> Table:
     """Return the suites with their numbers of cases per family."""
     from lgmd_gym.benchmark.suites import SUITES
+    from lgmd_gym.benchmark.traffic_rows import SUITE as TRAFFIC
+    from lgmd_gym.envs.traffic import KINDS
 
     table = Table("suite", "cases", "families", "what it is", title="suites")
     for name, suite in SUITES.items():
@@ -26,6 +28,8 @@ def suites() -> Table:
             counts[kind] = counts.get(kind, 0) + 1
         families = ", ".join(f"{family} {count}" for family, count in counts.items())
         table.add_row(name, str(len(suite.cases)), families, suite.about)
+    about = "an IDM driver among highway-env's cars, the agent may only brake; false brakes per 100 km"
+    table.add_row(TRAFFIC, "any", ", ".join(KINDS), about)
     return table
 
 

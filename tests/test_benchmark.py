@@ -11,6 +11,7 @@ from lgmd_gym.benchmark.cases import Case
 from lgmd_gym.benchmark.episode import SERIES, Episode, Eyesight, make_env, play
 from lgmd_gym.benchmark.rows import KEYS, Counterfactual, brake_onset, make_row
 from lgmd_gym.benchmark.runner import Run
+from lgmd_gym.benchmark.runs import resume_run
 from lgmd_gym.benchmark.suites import SUITES, find_case, find_suite
 from lgmd_gym.benchmark.summary import Rate, score, scores, wilson, write_summary
 from lgmd_gym.benchmark.tasks import Task, run_task
@@ -237,7 +238,7 @@ def test_a_broken_off_run_resumes_to_the_same_rows(quick_run, tmp_path, cut):
     Run("quick", quick_run.agents, 1, 1, folder).play()
     whole = (folder / "episodes.jsonl").read_bytes()
     (folder / "episodes.jsonl").write_bytes(whole[: int(cut * len(whole))])
-    run = Run.resume(folder, 1)
+    run = resume_run(folder, 1)
     assert run.folder.mended
     kept = len(run.rows)
     assert 0 < kept < run.total
@@ -254,17 +255,17 @@ def test_a_broken_off_run_resumes_to_the_same_rows(quick_run, tmp_path, cut):
 
 def test_what_cannot_be_resumed_is_refused(tmp_path):
     with pytest.raises(ValueError, match="holds no run to resume"):
-        Run.resume(tmp_path, 1)
+        resume_run(tmp_path, 1)
     Run("quick", ["no-brake"], 1, 1, tmp_path / "run").play(
         lambda row: (_ for _ in ()).throw(KeyboardInterrupt)
     )
     settings = json.loads((tmp_path / "run" / "run.json").read_text())
     (tmp_path / "run" / "run.json").write_text(json.dumps(settings | {"lgmd_gym": "0.0.1"}))
     with pytest.raises(ValueError, match=r"made by lgmd-gym 0.0.1, this is .*; start a new run"):
-        Run.resume(tmp_path / "run", 1)
+        resume_run(tmp_path / "run", 1)
     (tmp_path / "run" / "episodes.jsonl").write_text("{}\nnonsense\n{}\n")
     with pytest.raises(ValueError, match="damaged in line 2"):
-        Run.resume(tmp_path / "run", 1)
+        resume_run(tmp_path / "run", 1)
 
 
 def test_the_python_function_returns_a_table(quick_run):

@@ -79,6 +79,8 @@ def test_lists_and_helps(capsys):
         (["bench", "--seeds", "x"], "--seeds"),
         (["bench", "--seeds", "0"], "seeds must be >= 1, got 0"),
         (["bench", "--suite", "quik"], "did you mean 'quick'?"),
+        (["bench", "--suite", "trafic"], "did you mean 'traffic'?"),
+        (["bench", "--suite", "traffic", "--seeds", "0"], "seeds must be >= 1, got 0"),
         (["bench", "--agents", "spike-treshold"], "did you mean 'spike-threshold'?"),
         (["bench", "--camera", "fova"], "did you mean 'fovea'?"),
         (["bench", "--params", "nowhere.toml"], "params file 'nowhere.toml' cannot be read"),
@@ -103,6 +105,19 @@ def test_bad_input_is_one_line_and_exit_code_two(arguments, words, capsys, monke
     assert said.err.count("\n") == 1
     assert words in said.err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_traffic_from_start_to_end(tmp_path):
+    out = tmp_path / "run"
+    arguments = ["--suite", "traffic", "--agents", "spike-threshold", "--seeds", "1", "--out", str(out)]
+    done = run("bench", *arguments)
+    assert done.returncode == 0, done.stderr
+    assert "false brakes" in done.stdout
+    rows = [json.loads(line) for line in (out / "episodes.jsonl").read_text().splitlines()]
+    kinds = ["highway", "intersection", "merge", "roundabout", "two-way"]
+    assert sorted(row["case"] for row in rows) == [f"traffic/{kind}/s0" for kind in kinds]
+    assert len((out / "summary.csv").read_text().splitlines()) == 1 + 1 + len(kinds)
 
 
 def test_a_failing_episode_makes_exit_code_one(tmp_path, monkeypatch, capsys):

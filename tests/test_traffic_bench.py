@@ -13,6 +13,7 @@ from test_traffic_env import NearWall, Wall
 import lgmd_gym.agents as agents_room
 from lgmd_gym.agents import BRAKE, HOLD, Agent, demand, make_agent
 from lgmd_gym.benchmark.episode import Eyesight
+from lgmd_gym.benchmark.runs import resume_run
 from lgmd_gym.benchmark.traffic import TrafficRun, run_traffic
 from lgmd_gym.benchmark.traffic_drive import RESEED, Ride
 from lgmd_gym.benchmark.traffic_rows import KEYS, Braking, make_row
@@ -294,7 +295,7 @@ def test_a_run_that_was_broken_off_is_played_to_its_end(tmp_path):
     broken = TrafficRun(["no-brake"], ["merge", "intersection"], 1, 1, tmp_path / "run", EYES)
     assert not broken.play(stop)
     assert [item["case"] for item in broken.rows] == ["traffic/merge/s0"]
-    run = TrafficRun.resume(tmp_path / "run", 1)
+    run = resume_run(tmp_path / "run", 1)
     told = []
     assert run.play(told.append)
     assert [item["case"] for item in told] == ["traffic/intersection/s0"]

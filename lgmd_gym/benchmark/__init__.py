@@ -20,7 +20,7 @@ def run(
     """Play a suite and return its rows.
 
     Args:
-        suite: Name of a suite.
+        suite: Name of a suite, or "traffic".
         agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
         seeds: Number of seeds, played from 0 on.
         jobs: Processes; 1 plays in this one.
@@ -29,7 +29,8 @@ def run(
         params: See `LGMDObservation`.
 
     Returns:
-        One line per episode with the columns of `lgmd_gym.benchmark.rows.KEYS`, `no-brake` included.
+        One line per episode with the columns of `lgmd_gym.benchmark.rows.KEYS`, `no-brake` included; for
+        "traffic", those of `traffic_rows.KEYS`.
 
     Raises:
         ValueError: For an unknown name, a count below 1, or a folder that exists or cannot be made.
@@ -39,9 +40,10 @@ def run(
     import pandas as pd
 
     from lgmd_gym.benchmark.episode import Eyesight
-    from lgmd_gym.benchmark.runner import Run
+    from lgmd_gym.benchmark.runs import start_run
 
     with TemporaryDirectory() as spare:
-        played = Run(suite, agents, seeds, jobs, Path(out or Path(spare) / "run"), Eyesight(camera, params))
+        folder = Path(out or Path(spare) / "run")
+        played = start_run(suite, agents, seeds, jobs, folder, Eyesight(camera, params))
         played.play()
         return pd.DataFrame(played.rows)

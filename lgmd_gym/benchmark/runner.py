@@ -65,18 +65,6 @@ class Run:
         # What failed is played again.
         self.rows: list[dict[str, Any]] = [row for row in self.folder.rows if row["error"] is None]
 
-    @classmethod
-    def resume(cls, path: Path, jobs: int) -> "Run":
-        """Return the run of a folder that was broken off, to be played to its end.
-
-        Raises:
-            ValueError: If the folder holds no run, a damaged one, or one of another version.
-        """
-        folder = RunFolder.reopen(path)
-        settings = folder.settings()
-        eyesight = Eyesight(settings["camera"], settings["params"])
-        return cls(settings["suite"], settings["agents"], settings["seeds"], jobs, folder, eyesight)
-
     @property
     def total(self) -> int:
         """Number of episodes that will be played."""

@@ -146,18 +146,6 @@ class TrafficRun:
         self._coming = run_traffic(self.agents, self.kinds, seeds, jobs, self.eyesight, done)
         self.folder = out if isinstance(out, RunFolder) else RunFolder.create(out)
 
-    @classmethod
-    def resume(cls, path: Path, jobs: int) -> "TrafficRun":
-        """Return the run of a folder that was broken off, to be played to its end.
-
-        Raises:
-            ValueError: If the folder holds no run, a damaged one, or one of another version.
-        """
-        folder = RunFolder.reopen(path)
-        settings = folder.settings()
-        eyesight = Eyesight(settings["camera"], settings["params"])
-        return cls(settings["agents"], settings["kinds"], settings["seeds"], jobs, folder, eyesight)
-
     @property
     def total(self) -> int:
         """Number of drives that will be played."""
