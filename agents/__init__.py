@@ -4,10 +4,13 @@ from typing import Any
 
 from lgmd_gym.agents.base import BRAKE, HOLD, Agent, demand
 from lgmd_gym.agents.baselines import AlwaysBrake, NoBrake, RandomBrake
+from lgmd_gym.agents.fields import DangerZone, Fovea
 from lgmd_gym.agents.foreign import ForeignAgent, import_agent
 from lgmd_gym.agents.options import check_options, parse
 from lgmd_gym.agents.oracles import TTCOracle
-from lgmd_gym.agents.rules import SpikeThreshold
+from lgmd_gym.agents.rule import Rule
+from lgmd_gym.agents.rules import AdaptiveThreshold, Graded, SpeedGated, SpikeThreshold
+from lgmd_gym.agents.stopping_zone import StoppingZone
 from lgmd_gym.errors import unknown_name
 
 __all__ = [
@@ -18,14 +21,29 @@ __all__ = [
     "AlwaysBrake",
     "NoBrake",
     "RandomBrake",
+    "Rule",
     "SpikeThreshold",
+    "StoppingZone",
     "TTCOracle",
     "demand",
     "make_agent",
 ]
 
 AGENTS: dict[str, type[Agent]] = {
-    agent.name: agent for agent in (NoBrake, AlwaysBrake, RandomBrake, SpikeThreshold, TTCOracle)
+    agent.name: agent
+    for agent in (
+        NoBrake,
+        AlwaysBrake,
+        RandomBrake,
+        SpikeThreshold,
+        AdaptiveThreshold,
+        Graded,
+        SpeedGated,
+        Fovea,
+        DangerZone,
+        StoppingZone,
+        TTCOracle,
+    )
 }
 
 
@@ -33,8 +51,9 @@ def make_agent(text: str) -> Agent:
     """Return the agent that a string names.
 
     Args:
-        text: "name", or "name:option=value,…" as in "spike-threshold:threshold=45,frames=2"; a user's own
-            agent is "module:Class" or "module:Class:option=value,…", any class with `act`.
+        text: "name", or "name:option=value,…" as in "spike-threshold:threshold=45,frames=2"; a rule's option
+            `toml` names a file of options, as in "stopping-zone:toml=mine.toml". A user's own agent is
+            "module:Class" or "module:Class:option=value,…", any class with `act`.
 
     Raises:
         ValueError: For an unknown agent or option (the nearest is named), or a value out of its range.
@@ -51,5 +70,6 @@ def make_agent(text: str) -> Agent:
     if name not in AGENTS:
         raise unknown_name("agent", name, AGENTS)
     known: Any = AGENTS[name]
-    check_options(name, known, options)
+    if not issubclass(known, Rule):  # a rule's parameters check themselves
+        check_options(name, known, options)
     return known(**options)

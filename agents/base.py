@@ -1,5 +1,6 @@
 """What an agent is: it sees observations and the `lgmd/` keys of `info`, and answers with a demand."""
 
+import inspect
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,25 @@ class Agent:
     """
 
     name = "agent"
+    include_frame = False  # whether it needs the frames themselves in the observation
 
     def __init__(self) -> None:
         self._alert = False
+
+    @property
+    def camera(self) -> Any:
+        """The eye it wants where the user names none, as `LGMDObservation` takes it; None for no wish."""
+        return None
+
+    @property
+    def neuron(self) -> dict[str, Any] | None:
+        """The `params` of `LGMDObservation` that it wants behind its own eye; None for the paper's."""
+        return None
+
+    @classmethod
+    def options(cls) -> dict[str, Any]:
+        """Return what its string may set, with the defaults."""
+        return {item.name: item.default for item in inspect.signature(cls).parameters.values()}
 
     @property
     def alert(self) -> bool:

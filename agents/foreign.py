@@ -22,6 +22,17 @@ class ForeignAgent(Agent):
         super().__init__()
         self.name = name
         self.agent = agent
+        self.include_frame = bool(getattr(agent, "include_frame", False))
+
+    @property
+    def camera(self) -> Any:
+        """The eye it wants, if it says so."""
+        return getattr(self.agent, "camera", None)
+
+    @property
+    def neuron(self) -> dict[str, Any] | None:
+        """The neurons' parameters it wants behind its own eye, if it says so."""
+        return getattr(self.agent, "neuron", None)
 
     @property
     def alert(self) -> bool:

@@ -43,8 +43,10 @@ class Bench:
     """Run folder; must not exist. Default: runs/SUITE-DATE-TIME."""
     resume: Path | None = None
     """Run folder of a broken-off run: plays what is missing, with that run's own settings."""
-    camera: str = "fovea"
-    """Camera preset: wide, standard, tele, fovea, paper or birdseye."""
+    camera: str | None = None
+    """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
+    condition: Literal["clear", "night", "fog", "robust"] = "clear"
+    """What the cameras meet: robust is sensor noise, vibration, brake dive, heave and exposure time."""
     params: Path | None = None
     """TOML file of LGMD parameters."""
     plots: bool = True
@@ -63,8 +65,8 @@ class Drive:
     """Video file to write (.mp4, .gif, …); must not exist."""
     seed: int = 0
     """Draws the place on the road and the target's grey."""
-    camera: str = "fovea"
-    """Camera preset: wide, standard, tele, fovea, paper or birdseye."""
+    camera: str | None = None
+    """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
     params: Path | None = None
     """TOML file of LGMD parameters."""
     set: tuple[str, ...] = ()

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def bench(options: "cli.Bench") -> int:
     """Play a suite and report; 0 if all was played, 1 if an episode failed, 130 after Ctrl-C."""
-    from lgmd_gym.benchmark.episode import Eyesight
+    from lgmd_gym.benchmark.eyesight import Eyesight
     from lgmd_gym.benchmark.runs import resume_run, start_run
 
     console = _console()
@@ -26,7 +26,7 @@ def bench(options: "cli.Bench") -> int:
         console.print(f"resuming with {len(run.rows)} of {run.total} episodes{cut}")
     else:
         out = options.out or Path("runs") / f"{options.suite}-{time.strftime('%Y%m%d-%H%M%S')}"
-        eyesight = Eyesight(options.camera, _read_params(options.params))
+        eyesight = Eyesight(options.camera, _read_params(options.params), options.condition)
         run = start_run(options.suite, options.agents, options.seeds, options.jobs, out, eyesight)
     with _progress(run) as tick:
         complete = run.play(tick)
@@ -42,6 +42,7 @@ def bench(options: "cli.Bench") -> int:
 def drive(options: "cli.Drive") -> int:
     """Play one episode and say how it ended."""
     from lgmd_gym.agents import make_agent
+    from lgmd_gym.benchmark.eyesight import Eyesight
     from lgmd_gym.drive import drive as play
 
     agent = make_agent(options.agent)
@@ -51,8 +52,7 @@ def drive(options: "cli.Drive") -> int:
         options.video,
         options.seed,
         _parse_arguments(options.set),
-        camera=options.camera,
-        params=_read_params(options.params),
+        **Eyesight(options.camera, _read_params(options.params)).of(agent).arguments,
     )
     if end.collision:
         print(f"contact at {3.6 * end.impact_speed:.1f} km/h relative speed after {end.duration:.2f} s")
@@ -81,7 +81,7 @@ def _report(run: "Run | TrafficRun", console: Console, plots: bool) -> int:
     if rows:
         level = LGMDParams.from_dict(run.eyesight.params or {}).t_sf
         fps = next((f"{row['fps']:g} Hz" for row in rows if row["fps"]), "?")
-        eye = f"camera {run.eyesight.camera} at {fps}, T_sf = {level:g} spikes/s"
+        eye = f"camera {run.eyesight.label} at {fps}, T_sf = {level:g} spikes/s"
         title = f"{run.suite}: {eye}, {run.seeds} seeds"
         if isinstance(run, TrafficRun):
             _report_traffic(run, console, f"{title} of {len(run.kinds)} kinds of traffic")

@@ -39,8 +39,7 @@ def agents() -> Table:
 
     table = Table("agent", "options", "what it does", title="agents")
     for name, cls in AGENTS.items():
-        given = inspect.signature(cls).parameters.values()
-        options = ", ".join(f"{item.name}={item.default:g}" for item in given)
+        options = ", ".join(f"{option}={default:g}" for option, default in cls.options().items())
         table.add_row(name, options, _first_line(cls))
     return table
 

@@ -7,33 +7,49 @@ import numpy as np
 import pytest
 
 import lgmd_gym  # noqa: F401
-from lgmd_gym.agents import AGENTS, make_agent
+from lgmd_gym.agents import AGENTS, Rule, make_agent
 from lgmd_gym.agents.options import parse
+from lgmd_gym.benchmark.eyesight import Eyesight
 
+SIGHTED = [name for name in AGENTS if issubclass(AGENTS[name], Rule)]
 GOOD = [*AGENTS, "spike-threshold:threshold=45.5,frames=2", "random-brake:rate=1", "ttc-oracle:ttc=2.5"]
 
 
 class Frame(NamedTuple):
     response: Any
+    ego_speed: float
 
 
 class Said(NamedTuple):
     spike_frequency: Any
+    membrane_potential: Any
 
 
-def seen(*frequencies, trace=False):
-    observation = {"spike_frequency": np.array([frequencies[-1]], np.float32)}
+def seen(*frequencies, trace=False, cameras=1, potential=0.5, speed=8.0, yaw_rate=0.0):
+    observation = {
+        "spike_frequency": np.full(cameras, frequencies[-1], np.float32),
+        "membrane_potential": np.full(cameras, potential, np.float32),
+        "ego_speed": np.array([speed], np.float32),
+        "ego_yaw_rate": np.array([yaw_rate], np.float32),
+        "frame": np.zeros((90, 160, cameras), np.uint8),
+    }
     info = {"lgmd/alert": frequencies[-1] >= 30, "ttc": float("nan")}
+    info |= {name: float("nan") for name in ("gap", "target_speed", "ego_speed")}
     if trace:
-        info["lgmd/trace"] = [Frame(Said(np.array([value]))) for value in frequencies]
+        said = [Said(np.full(cameras, value), observation["membrane_potential"]) for value in frequencies]
+        info["lgmd/trace"] = [Frame(item, speed) for item in said]
     return observation, info
+
+
+def cameras_of(agent):
+    return len(agent.camera) if isinstance(agent.camera, list) else 1
 
 
 @pytest.mark.parametrize("text", GOOD)
 def test_agents_answer_with_a_demand(text):
     agent = make_agent(text)
     agent.reset(0)
-    action = agent.act(*seen(0.0))
+    action = agent.act(*seen(0.0, cameras=cameras_of(agent)))
     assert action.shape == (1,)
     assert action.dtype == np.float32
     assert -1.0 <= action[0] <= 1.0
@@ -42,7 +58,7 @@ def test_agents_answer_with_a_demand(text):
 
 def test_options_reach_the_agent():
     agent = make_agent("spike-threshold:threshold=45.5,frames=2")
-    assert (agent.threshold, agent.frames) == (45.5, 2)
+    assert (agent.params.threshold, agent.params.frames) == (45.5, 2)
     assert parse("a:b=1e2") == ("a", {"b": 100.0})
 
 
@@ -109,19 +125,20 @@ def test_random_brake_keeps_its_rate_and_seed():
 
 @pytest.mark.parametrize("text", [name for name in AGENTS if "oracle" not in name])
 def test_no_truth_reaches_an_agent_that_is_no_oracle(text):
-    """Shuffled and spoilt ground truth changes no action."""
+    """Shuffled and spoilt ground truth (all of `info` but `lgmd/`) changes no action."""
     rng = np.random.default_rng(0)
     actions = []
     for spoil in (False, True):
-        env = gym.make("LGMD/CCRs-v0", ego_speed=8.0, trace=True)
         agent = make_agent(text)
+        env = gym.make("LGMD/CCRs-v0", ego_speed=8.0, trace=True, **Eyesight().of(agent).arguments)
         observation, info = env.reset(seed=1)
         agent.reset(1)
         taken = []
         for _ in range(160):
             if spoil:
                 truth = [key for key in info if not key.startswith("lgmd/")]
-                info = info | {key: float(rng.normal()) for key in truth}
+                values = [*(info[key] for key in truth[1:]), float(rng.normal())]
+                info = info | dict(zip(truth, rng.permutation(values).tolist(), strict=True))
             action = agent.act(observation, info)
             taken.append(float(action[0]))
             observation, _, terminated, truncated, info = env.step(action)
@@ -129,6 +146,8 @@ def test_no_truth_reaches_an_agent_that_is_no_oracle(text):
                 break
         actions.append(taken)
     assert actions[0] == actions[1]
+    if text in SIGHTED:
+        assert min(actions[0]) < 0.0, "an agent that never brakes shows nothing here"
 
 
 class Mine:

@@ -14,8 +14,9 @@ def run(
     seeds: int = 3,
     jobs: int = 1,
     out: Path | str | None = None,
-    camera: Any = "fovea",
+    camera: Any = None,
     params: Any = None,
+    condition: str = "clear",
 ) -> "pd.DataFrame":
     """Play a suite and return its rows.
 
@@ -25,8 +26,9 @@ def run(
         seeds: Number of seeds, played from 0 on.
         jobs: Processes; 1 plays in this one.
         out: Run folder to keep, which must not exist; None keeps none.
-        camera: See `LGMDObservation`.
+        camera: See `LGMDObservation`; None for each agent's own, see `Agent.camera`.
         params: See `LGMDObservation`.
+        condition: A named condition over every camera: "clear", "night", "fog" or "robust".
 
     Returns:
         One line per episode with the columns of `lgmd_gym.benchmark.rows.KEYS`, `no-brake` included; for
@@ -39,11 +41,11 @@ def run(
 
     import pandas as pd
 
-    from lgmd_gym.benchmark.episode import Eyesight
+    from lgmd_gym.benchmark.eyesight import Eyesight
     from lgmd_gym.benchmark.runs import start_run
 
     with TemporaryDirectory() as spare:
         folder = Path(out or Path(spare) / "run")
-        played = start_run(suite, agents, seeds, jobs, folder, Eyesight(camera, params))
+        played = start_run(suite, agents, seeds, jobs, folder, Eyesight(camera, params, condition))
         played.play()
         return pd.DataFrame(played.rows)

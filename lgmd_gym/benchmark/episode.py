@@ -8,6 +8,7 @@ import numpy as np
 
 from lgmd_gym.agents import Agent
 from lgmd_gym.benchmark.cases import Case
+from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.envs import env_id
 
 # One value per decision each; `held` is 1 while a standing ego is kept from starting, which no deceleration
@@ -23,19 +24,6 @@ SERIES = (
     "alert",
     "held",
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Eyesight:
-    """What the agents see through.
-
-    Attributes:
-        camera: See `LGMDObservation`.
-        params: See `LGMDObservation`.
-    """
-
-    camera: Any = "fovea"
-    params: Any = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +51,7 @@ def make_env(case: Case, eyesight: Eyesight, **options: Any) -> gym.Env:
     """Return the environment of a case; `options` go to `gym.make`."""
     return gym.make(
         env_id(case.family),
-        camera=eyesight.camera,
-        params=eyesight.params,
+        **eyesight.of().arguments,
         trace=True,
         **dict(case.arguments),
         **options,

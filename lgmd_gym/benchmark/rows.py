@@ -17,6 +17,7 @@ PREMATURE = 4.0  # [s] before the counterfactual contact; the protocols' T0
 # Every key of a row in its order; null where undefined. SI units but for the two that say otherwise.
 KEYS = (
     "agent",
+    "camera",
     "suite",
     "case",
     "seed",

@@ -10,7 +10,8 @@ from joblib import Parallel, delayed
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.cases import Case
-from lgmd_gym.benchmark.episode import Eyesight, make_env
+from lgmd_gym.benchmark.episode import make_env
+from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.benchmark.folder import RunFolder
 from lgmd_gym.benchmark.rows import Counterfactual
 from lgmd_gym.benchmark.suites import find_suite
@@ -32,7 +33,7 @@ class Run:
         seeds: Number of seeds, played from 0 on.
         jobs: Processes; 1 plays in this one.
         out: The run folder, which must not exist; or an open one, whose episodes are not played again.
-        eyesight: Camera and neuron parameters.
+        eyesight: Camera, neuron parameters and condition; each agent's own eye by default.
 
     Raises:
         ValueError: For an unknown name, a count below 1, or a folder that exists or cannot be made; before
@@ -50,8 +51,7 @@ class Run:
     ) -> None:
         self.cases: tuple[Case, ...] = find_suite(suite).cases
         self.agents = list(dict.fromkeys(agents))
-        for agent in self.agents:
-            make_agent(agent)
+        made = [make_agent(agent) for agent in self.agents]
         if not self.agents:
             raise ValueError("agents needs at least one name, got none")
         for name, count in (("seeds", seeds), ("jobs", jobs)):
@@ -60,7 +60,8 @@ class Run:
         self.suite, self.seeds, self.jobs = suite, seeds, jobs
         self.eyesight = eyesight or Eyesight()
         # Refuses an unusable camera or parameter here rather than once per episode.
-        make_env(self.cases[0], self.eyesight).close()
+        for agent in made:
+            make_env(self.cases[0], self.eyesight.of(agent)).close()
         self.folder = out if isinstance(out, RunFolder) else RunFolder.create(out)
         # What failed is played again.
         self.rows: list[dict[str, Any]] = [row for row in self.folder.rows if row["error"] is None]
@@ -133,6 +134,7 @@ class Run:
             "jobs": self.jobs,
             "camera": self.eyesight.camera,
             "params": self.eyesight.params,
+            "condition": self.eyesight.condition,
             "complete": complete,
             "episodes": len(self.rows),
             "wall_time": round(wall_time, 3),

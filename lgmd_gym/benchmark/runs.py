@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from lgmd_gym.benchmark.episode import Eyesight
+from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.benchmark.folder import RunFolder
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.suites import SUITES
@@ -31,7 +31,7 @@ def start_run(
         seeds: Number of seeds, played from 0 on; for traffic, of every kind.
         jobs: Processes; 1 plays in this one.
         out: The run folder, which must not exist.
-        eyesight: Camera and neuron parameters.
+        eyesight: Camera, neuron parameters and condition; each agent's own eye by default.
 
     Raises:
         ValueError: For an unknown name, a count below 1, or a folder that exists or cannot be made; before
@@ -52,7 +52,7 @@ def resume_run(path: Path, jobs: int) -> Run | TrafficRun:
     """
     folder = RunFolder.reopen(path)
     settings = folder.settings()
-    eyesight = Eyesight(settings["camera"], settings["params"])
+    eyesight = Eyesight(settings["camera"], settings["params"], settings["condition"])
     if settings["suite"] == TRAFFIC:
         return TrafficRun(settings["agents"], settings["kinds"], settings["seeds"], jobs, folder, eyesight)
     return Run(settings["suite"], settings["agents"], settings["seeds"], jobs, folder, eyesight)

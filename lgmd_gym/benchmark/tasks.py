@@ -9,7 +9,8 @@ import numpy as np
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.cases import Case
 from lgmd_gym.benchmark.driver import WarnedDriver
-from lgmd_gym.benchmark.episode import Episode, Eyesight, make_env, play
+from lgmd_gym.benchmark.episode import Episode, make_env, play
+from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.benchmark.rows import Counterfactual, error_row, make_row
 
 NO_BRAKE = "no-brake"
@@ -23,7 +24,7 @@ class Task:
         agent: The agent's string.
         case: The case.
         seed: Of the environment and the agent.
-        eyesight: Camera and neuron parameters.
+        eyesight: Camera and neuron parameters, or the agent's own.
         truth: What `no-brake` met; None for `no-brake` itself.
     """
 
@@ -54,18 +55,19 @@ class Result:
 def run_task(task: Task) -> Result:
     """Play a task; whatever an agent or environment raises becomes an error row."""
     try:
-        episode = _play(task)
+        agent: Any = make_agent(task.agent)
+        eyesight = task.eyesight.of(agent)
+        episode = _play(task, agent, eyesight)
     except Exception:
         return Result(task, error_row(task.agent, task.case, task.seed, traceback.format_exc()))
     truth = task.truth or Counterfactual.of(episode)
-    row = make_row(task.agent, task.case, task.seed, episode, truth)
+    row = make_row(task.agent, task.case, task.seed, episode, truth) | {"camera": eyesight.label}
     return Result(task, row, episode.series, truth)
 
 
-def _play(task: Task) -> Episode:
-    env = make_env(task.case, task.eyesight)
+def _play(task: Task, agent: Any, eyesight: Eyesight) -> Episode:
+    env = make_env(task.case, eyesight)
     try:
-        agent: Any = make_agent(task.agent)
         if task.case.warned_driver and task.agent != NO_BRAKE:
             config = env.unwrapped.config  # type: ignore[attr-defined]
             agent = WarnedDriver(agent, config["max_deceleration"], config["policy_frequency"])

@@ -20,7 +20,7 @@ from typing import Any, cast
 from joblib import Parallel, delayed
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.episode import Eyesight
+from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.benchmark.folder import RunFolder
 from lgmd_gym.benchmark.traffic_drive import Ride
 from lgmd_gym.benchmark.traffic_rows import SUITE, case_name, error_row, make_row
@@ -40,7 +40,8 @@ def run_traffic(
 ) -> Iterator[dict[str, Any]]:
     """Play every agent in every kind of traffic with every seed; yield each row as it comes.
 
-    Each seed's traffic is driven once without an agent, and the recording serves all agents, in one process.
+    Each seed's traffic is driven once without an agent for every eye, and the recording serves all agents
+    that see through it, in one process.
 
     Args:
         agents: Agent strings.
@@ -77,15 +78,15 @@ def _check(agents: list[str], kinds: list[str], seeds: int, jobs: int, eyesight:
     for name, given in (("agents", agents), ("kinds", kinds)):
         if not given:
             raise ValueError(f"{name} needs at least one name, got none")
-    for agent in agents:
-        make_agent(agent)
+    made = [make_agent(agent) for agent in agents]
     for kind in kinds:
         find_kind(kind)
     for name, count in (("seeds", seeds), ("jobs", jobs)):
         if count < 1:
             raise ValueError(f"{name} must be >= 1, got {count!r}")
     # Refuses an unusable camera or parameter here rather than once per drive.
-    make_traffic(kinds[0], camera=eyesight.camera, params=eyesight.params).close()
+    for agent in made:
+        make_traffic(kinds[0], **eyesight.of(agent).arguments).close()
 
 
 def drive_all(agents: list[str], kind: str, seed: int, eyesight: Eyesight) -> list[dict[str, Any]]:
@@ -97,17 +98,34 @@ def drive_all(agents: list[str], kind: str, seed: int, eyesight: Eyesight) -> li
         seed: Of the traffic and the agents.
         eyesight: Camera and neuron parameters.
     """
-    try:
-        trace = record(kind, seed, eyesight)
-    except Exception:
-        return [error_row(agent, kind, seed, traceback.format_exc()) for agent in agents]
     rows = []
-    for agent in agents:
+    for seen, names in _by_eye(agents, eyesight):
         try:
-            rows.append(make_row(agent, trace, Ride(trace, make_agent(agent)).play()))
+            trace = record(kind, seed, seen)
         except Exception:
-            rows.append(error_row(agent, kind, seed, traceback.format_exc()))
+            rows += [error_row(agent, kind, seed, traceback.format_exc()) for agent in names]
+            continue
+        for agent in names:
+            try:
+                row = make_row(agent, trace, Ride(trace, make_agent(agent)).play())
+                rows.append(row | {"camera": seen.label})
+            except Exception:
+                rows.append(error_row(agent, kind, seed, traceback.format_exc()))
     return rows
+
+
+def _by_eye(agents: list[str], eyesight: Eyesight) -> list[tuple[Eyesight, list[str]]]:
+    """Return the agents in groups that see the same, so that one recording serves all of a group."""
+    groups: list[tuple[Eyesight, list[str]]] = []
+    for agent in agents:
+        seen = eyesight.of(make_agent(agent))
+        for known, names in groups:
+            if known == seen:
+                names.append(agent)
+                break
+        else:
+            groups.append((seen, [agent]))
+    return groups
 
 
 class TrafficRun:
@@ -184,6 +202,7 @@ class TrafficRun:
             "jobs": self.jobs,
             "camera": self.eyesight.camera,
             "params": self.eyesight.params,
+            "condition": self.eyesight.condition,
             "complete": complete,
             "episodes": len(self.rows),
             "wall_time": round(wall_time, 3),

@@ -12,6 +12,7 @@ SUITE = "traffic"
 # Every key of a row in its order; null where undefined. SI units.
 KEYS = (
     "agent",
+    "camera",
     "suite",
     "case",
     "seed",

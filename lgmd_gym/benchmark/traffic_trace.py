@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 
 from lgmd_gym.agents import HOLD, demand
-from lgmd_gym.benchmark.episode import Eyesight
+from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.envs.traffic import make_traffic
 
 EVERY = 300  # decisions between two kept states: copying one takes as long as some 20 decisions
@@ -93,7 +93,7 @@ def record(kind: str, seed: int, eyesight: Eyesight, config: dict[str, Any] | No
         eyesight: Camera and neuron parameters.
         config: Configuration of `TrafficEnv`.
     """
-    env = make_traffic(kind, camera=eyesight.camera, params=eyesight.params, trace=True, config=config)
+    env = make_traffic(kind, **eyesight.of().arguments, trace=True, config=config)
     base: Any = env.unwrapped
     policy_hz = base.config["policy_frequency"]
     seen, kept = [Seen(*env.reset(seed=seed))], []
