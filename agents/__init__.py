@@ -6,8 +6,9 @@ from lgmd_gym.agents.base import BRAKE, HOLD, Agent, demand
 from lgmd_gym.agents.baselines import AlwaysBrake, NoBrake, RandomBrake
 from lgmd_gym.agents.fields import DangerZone, Fovea
 from lgmd_gym.agents.foreign import ForeignAgent, import_agent
+from lgmd_gym.agents.images import FlowDivergence, FrameDifference
 from lgmd_gym.agents.options import check_options, parse
-from lgmd_gym.agents.oracles import TTCOracle
+from lgmd_gym.agents.oracles import EtaOracle, StoppingDistanceOracle, TauOracle, TTCOracle
 from lgmd_gym.agents.rule import Rule
 from lgmd_gym.agents.rules import AdaptiveThreshold, Graded, SpeedGated, SpikeThreshold
 from lgmd_gym.agents.stopping_zone import StoppingZone
@@ -42,7 +43,12 @@ AGENTS: dict[str, type[Agent]] = {
         Fovea,
         DangerZone,
         StoppingZone,
+        FrameDifference,
+        FlowDivergence,
         TTCOracle,
+        StoppingDistanceOracle,
+        EtaOracle,
+        TauOracle,
     )
 }
 

@@ -1,4 +1,4 @@
-"""The `lgmd-gym` command: bench, drive, video, paper, list."""
+"""The `lgmd-gym` command: bench, drive, video, paper, tune, list."""
 
 import contextlib
 import io
@@ -18,6 +18,7 @@ DESCRIPTION = """A highway-env car brakes on the spike frequency of a locust loo
   lgmd-gym drive LGMD/CCRs-v0 --video out.mp4       watch one approach through the eye
   lgmd-gym video CLIP.mp4                           the spike trace of a dash-camera clip
   lgmd-gym paper                                    the paper's experiments, a verdict on each claim
+  lgmd-gym tune --agent fovea                       search a rule's parameters on training levels
   lgmd-gym list                                     suites, agents, environments, cameras
 
 Speeds are in m/s, case names carry km/h. Each command has its own --help."""
@@ -127,6 +128,31 @@ class Paper:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Tune:
+    """Tune a rule on training levels of LGMD/RandomBraking-v0 and false-reaction cases with other seeds.
+
+    Validation levels choose among the best trials; test levels and the protocol suites stay unseen.
+    """
+
+    agent: str = "stopping-zone"
+    """Name of a rule."""
+    trials: int = 40
+    """Trials to add to the study."""
+    levels: int = 100
+    """Levels of either split, from 0 on; half of them are threats."""
+    seeds: int = 1
+    """Seeds of the false-reaction suite, from 1000 on."""
+    jobs: int = 2
+    """Processes."""
+    study: Path = Path("tune.db")
+    """SQLite file of the study; one that exists is gone on with."""
+    best: Path = Path("best.toml")
+    """TOML file for the chosen parameters; must not exist."""
+    sensitivity: bool = False
+    """Do not search: shift each parameter by 20 % both ways and print the scores."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class List:
     """List what there is to name: suites with their cases, agents, environments, cameras."""
 
@@ -140,6 +166,7 @@ Command = Union[  # noqa: UP007  (tyro reads the annotations)
     Annotated[List, subcommand(name="list")],
     Annotated[Video, subcommand(name="video")],
     Annotated[Paper, subcommand(name="paper")],
+    Annotated[Tune, subcommand(name="tune")],
 ]
 
 
@@ -152,7 +179,7 @@ def run(argv: list[str] | None = None) -> int:
     """Run one command and return its exit code."""
     try:
         command = _parse(argv)
-        from lgmd_gym import commands, commands_paper
+        from lgmd_gym import commands, commands_paper, commands_tune
 
         plays: dict[type, Callable[[Any], int]] = {
             Bench: commands.bench,
@@ -160,6 +187,7 @@ def run(argv: list[str] | None = None) -> int:
             Video: commands_paper.video,
             Paper: commands_paper.paper,
             List: commands.show_list,
+            Tune: commands_tune.tune,
         }
         return plays[type(command)](command)
     except (ValueError, TypeError) as error:

@@ -66,7 +66,7 @@ def test_options_reach_the_agent():
     ("text", "words"),
     [
         ("spike-treshold", "unknown agent 'spike-treshold'; did you mean 'spike-threshold'"),
-        ("", "unknown agent ''; known: always-brake"),
+        ("", "unknown agent ''; known: adaptive-threshold"),
         ("spike-threshold:treshold=3", "did you mean 'threshold'"),
         ("spike-threshold:threshold", "write threshold=VALUE"),
         ("spike-threshold:threshold=high", "threshold must be a number > 0, got 'high'"),

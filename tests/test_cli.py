@@ -123,7 +123,7 @@ def test_traffic_from_start_to_end(tmp_path):
 def test_a_failing_episode_makes_exit_code_one(tmp_path, monkeypatch, capsys):
     from lgmd_gym.benchmark import tasks
 
-    def fail(task):
+    def fail(task, agent, eyesight):
         raise RuntimeError("no road today")
 
     monkeypatch.setattr(tasks, "_play", fail)

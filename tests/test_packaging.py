@@ -57,6 +57,8 @@ MAY = {
     "paper_claims": ("clips_detect", "paper"),
     "plots_paper": ("paper", "paper_claims", "plots", "stimuli"),
     "commands_paper": None,  # knows all
+    "commands_tune": None,
+    "tuning": ("agents", "benchmark", "errors"),
     "view": ("wrappers",),
     "benchmark": ("agents", "envs", "errors", "_version"),
     "drive": ("agents", "benchmark", "envs", "errors", "video", "view", ""),
