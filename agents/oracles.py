@@ -73,7 +73,7 @@ class StoppingDistanceOracle(Oracle):
 
     name = "stopping-distance-oracle"
 
-    def __init__(self, deceleration: float = 9.0, reaction: float = 0.27, margin: float = 0.5) -> None:
+    def __init__(self, deceleration: float = 9.0, reaction: float = 0.4, margin: float = 1.5) -> None:
         super().__init__()
         self.deceleration = positive("deceleration", deceleration)
         self.reaction = positive("reaction", reaction)

@@ -15,6 +15,8 @@ from lgmd_gym.agents.stopping_zone import (
     zone_of,
 )
 from lgmd_gym.benchmark.eyesight import Eyesight
+from lgmd_gym.benchmark.suites import find_case
+from lgmd_gym.benchmark.tasks import NO_BRAKE, Task, run_task
 
 ZONES = len(SPEEDS_KMH)
 RULES = [name for name, cls in AGENTS.items() if issubclass(cls, Rule)]
@@ -159,3 +161,29 @@ def test_a_condition_is_laid_over_every_camera():
     assert eye.label == "fovea+x, night"
     with pytest.raises(ValueError, match="view from above"):
         _ = Eyesight("birdseye", condition="fog").arguments
+
+
+@pytest.mark.parametrize(
+    ("name", "brakes"),
+    [
+        ("r152/CCRs/v42", True),
+        ("fmvss127/CCRb/v80/brake0.5g-gap12", True),  # followed nearer than the zone
+        ("false-reaction/SteelPlate/v60", False),
+        ("false-reaction/CutOut/v50", False),
+    ],
+)
+def test_the_stopping_zone_in_closed_loop(name, brakes):
+    case = find_case(name)
+    truth = run_task(Task(NO_BRAKE, case, 0, Eyesight())).truth
+    row = run_task(Task("stopping-zone", case, 0, Eyesight(), truth)).row
+    assert row["error"] is None
+    assert row["camera"].startswith("ground10+")
+    assert row["threat"] == brakes
+    assert row["avoided"] if brakes else not row["false_brake"]
+
+
+def test_danger_zone_brakes_for_a_steel_plate():
+    """What the upright fields are for: the ground fields alone brake for what lies flat."""
+    case = find_case("false-reaction/SteelPlate/v60")
+    truth = run_task(Task(NO_BRAKE, case, 0, Eyesight())).truth
+    assert run_task(Task("danger-zone", case, 0, Eyesight(), truth)).row["false_brake"]
