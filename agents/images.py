@@ -24,7 +24,7 @@ class ImageParams(RuleParams):
     """
 
     level: float = above_zero(1.0, 0.1, 10.0)
-    frames: int = count(3, 1, 12)
+    frames: int = count(4, 1, 12)
     yaw_rate: float = above_zero(0.03, 0.01, 0.3)
     settle: int = count(15, 1, 60)
 
@@ -108,7 +108,7 @@ class FlowDivergenceParams(ImageParams):
         settle: See `ImageParams`.
     """
 
-    level: float = above_zero(0.4, 0.05, 3.0)
+    level: float = above_zero(0.3, 0.05, 3.0)
 
 
 class FlowDivergence(ImageRule):

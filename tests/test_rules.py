@@ -167,9 +167,10 @@ def test_a_condition_is_laid_over_every_camera():
     ("name", "brakes"),
     [
         ("r152/CCRs/v42", True),
-        ("fmvss127/CCRb/v80/brake0.5g-gap12", True),  # followed nearer than the zone
+        # Followed nearer than the zone.
+        pytest.param("fmvss127/CCRb/v80/brake0.5g-gap12", True, marks=pytest.mark.slow),
         ("false-reaction/SteelPlate/v60", False),
-        ("false-reaction/CutOut/v50", False),
+        pytest.param("false-reaction/CutOut/v50", False, marks=pytest.mark.slow),
     ],
 )
 def test_the_stopping_zone_in_closed_loop(name, brakes):
@@ -182,6 +183,7 @@ def test_the_stopping_zone_in_closed_loop(name, brakes):
     assert row["avoided"] if brakes else not row["false_brake"]
 
 
+@pytest.mark.slow
 def test_danger_zone_brakes_for_a_steel_plate():
     """What the upright fields are for: the ground fields alone brake for what lies flat."""
     case = find_case("false-reaction/SteelPlate/v60")
