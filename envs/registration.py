@@ -81,7 +81,7 @@ def make_observed(
     from lgmd_gym.errors import check_keys
 
     if family == RANDOM:
-        check_keys(f"argument of {RANDOM}", arguments, ("split", "start_level", "num_levels"))
+        check_keys(f"argument of {RANDOM}", arguments, ("split", "start_level", "num_levels", "conditions"))
         env = RandomBrakingEnv(**arguments, config=config, render_mode=render_mode)
     else:
         env = BrakingEnv(make_scenario(family, **arguments), config=config, render_mode=render_mode)
