@@ -25,15 +25,20 @@ def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequ
     """
     if split not in SPLITS:
         raise unknown_name("split", split, SPLITS)
+    check_conditions(conditions)
+    if not 0 <= start_level < LEVELS:
+        raise ValueError(f"start_level must be in [0, {LEVELS - 1}], got {start_level!r}")
+    if not 0 <= num_levels <= LEVELS - start_level:
+        raise ValueError(f"num_levels must be in [0, {LEVELS - start_level}] (0 for all), got {num_levels!r}")
+
+
+def check_conditions(conditions: Sequence[str]) -> None:
+    """Refuse an unknown camera condition, or none at all."""
     if not conditions:
         raise ValueError("conditions needs at least one name, got none")
     for condition in conditions:
         if condition not in CONDITIONS:
             raise unknown_name("condition", condition, CONDITIONS)
-    if not 0 <= start_level < LEVELS:
-        raise ValueError(f"start_level must be in [0, {LEVELS - 1}], got {start_level!r}")
-    if not 0 <= num_levels <= LEVELS - start_level:
-        raise ValueError(f"num_levels must be in [0, {LEVELS - start_level}] (0 for all), got {num_levels!r}")
 
 
 def level_generator(split: str, level: int, part: int = 0) -> np.random.Generator:

@@ -52,7 +52,6 @@ class RandomBrakingEnv(BrakingEnv):
         self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
         self.num_levels = num_levels or LEVELS - start_level
         self.level = start_level
-        self.camera_fields: dict[str, Any] = {}
         first = draw_scenario(level_generator(split, start_level))
         super().__init__(first, config=config, render_mode=render_mode)
 

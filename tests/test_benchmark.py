@@ -118,6 +118,17 @@ def test_cases_are_sorted_as_numbers(tmp_path):
     assert len(lines) == 4
 
 
+def test_a_case_at_night_is_seen_at_night():
+    frames = {}
+    for name in ("CCRs/v30/location50", "CCRs/v30/robust-night"):
+        env = make_env(find_case(f"ncap2026/{name}"), Eyesight("wide"))
+        env.reset(seed=0)
+        frames[name] = env.get_wrapper_attr("frames")["wide"].mean()
+        env.close()
+    day, night = frames.values()
+    assert night < 0.5 * day
+
+
 @pytest.mark.parametrize("suite", SUITES)
 def test_suites_have_distinct_cases_that_build(suite):
     cases = find_suite(suite).cases

@@ -126,6 +126,7 @@ def test_a_vector_of_levels_sees_what_each_alone_sees():
         ({"levels": 3}, "'num_levels'"),
         ({"conditions": ["clear", "foggy"]}, "unknown condition 'foggy'; did you mean 'fog'"),
         ({"conditions": []}, "conditions needs at least one name"),
+        ({"condition": "night"}, "unknown argument of RandomBraking 'condition'; did you mean 'conditions'"),
         ({"ego_speed": 3.0}, "unknown argument of RandomBraking 'ego_speed'"),
     ],
 )

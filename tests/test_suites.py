@@ -60,10 +60,10 @@ def test_counts_are_the_documents():
     assert count("ncap2023", "CCRm") == 55
     assert count("ncap2023", "CCRb") == 4
     assert count("ncap2023", "CCCscp") == 30
-    assert count("ncap2026", "CCRs") == 5 * 5 + 8 + 2
+    assert count("ncap2026", "CCRs") == 5 * 5 + 8 + 2 + 2
     assert count("ncap2026", "CCRs", warned=True) == 3 * 5
-    assert count("ncap2026", "CCRm") == 6 * 5 + 2
-    assert count("ncap2026", "CCRb") == 6 * 5 + 2
+    assert count("ncap2026", "CCRm") == 6 * 5 + 2 + 2
+    assert count("ncap2026", "CCRb") == 6 * 5 + 2 + 2 + 4
     assert count("r152", "CCRs") == 4
     assert count("r152", "CCRm") == 2
     assert find_case("ncap2023/CCRs/v30/overlap-50").arguments == (("ego_speed", 8.333333), ("overlap", -0.5))

@@ -17,7 +17,7 @@ class Case:
     Attributes:
         name: "suite/family/what", stable across versions.
         family: The scenario family, as in the id `LGMD/<family>-v0`.
-        arguments: The family's keyword arguments, in SI units.
+        arguments: The environment's keyword arguments, in SI units.
         warned_driver: Whether the car does not brake by itself: the protocol's driver brakes 1.2 s after
             the agent's alert (Euro NCAP AEB C2C v4.3.1, 8.4.6).
     """
@@ -38,6 +38,7 @@ class Case:
         arguments = dict(self.arguments)
         if self.family == RANDOM:
             return draw_scenario(level_generator(arguments["split"], arguments["start_level"]))
+        arguments.pop("condition", None)  # is the eye's affair
         return make_scenario(self.family, **arguments)
 
 
