@@ -97,7 +97,8 @@ def _report_cases(run: "Run", console: Console, title: str) -> None:
     from lgmd_gym.benchmark.summary import write_summary
 
     agents = list(dict.fromkeys(["no-brake", *run.agents]))
-    console.print(tables.score_table(run.rows, agents, title))
+    for table in tables.score_tables(run.rows, agents, title):
+        console.print(table)
     console.print(tables.verdict_table(run.rows, agents, run.suite) or tables.case_table(run.rows, agents))
     write_summary(run.rows, run.folder.path / "summary.csv")
 

@@ -20,6 +20,7 @@ KEYS = (
     "suite",
     "case",
     "seed",
+    "warned_driver",
     "threat",
     "collision",
     "avoided",
@@ -98,6 +99,7 @@ def make_row(
         "suite": case.suite,
         "case": case.name,
         "seed": seed,
+        "warned_driver": case.warned_driver,
         "threat": truth.threat,
         "collision": episode.collision,
         "avoided": (not episode.collision and not early) if truth.threat else None,
@@ -120,7 +122,7 @@ def make_row(
 def error_row(agent: str, case: Case, seed: int, error: str) -> dict[str, Any]:
     """Return the row of an episode that could not be played to its end."""
     named = {"agent": agent, "suite": case.suite, "case": case.name, "seed": seed, "error": error}
-    return dict.fromkeys(KEYS) | named
+    return dict.fromkeys(KEYS) | named | {"warned_driver": case.warned_driver}
 
 
 def brake_onset(deceleration: np.ndarray) -> int | None:

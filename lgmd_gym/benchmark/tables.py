@@ -13,7 +13,19 @@ Row = dict[str, Any]
 RATE_NOTE = "k/n [Wilson 95 % interval in %]; premature: more than 4 s before contact, no success"
 
 
-def score_table(rows: list[Row], agents: list[str], title: str) -> Table:
+def score_tables(rows: list[Row], agents: list[str], title: str) -> list[Table]:
+    """Return the agents' scores; cases in which a warned driver brakes have a table of their own.
+
+    What a driver does on a warning is no automatic braking, and no part of its totals.
+    """
+    parts = {
+        title: [row for row in rows if not row["warned_driver"]],
+        "with a driver who brakes 1.2 s after the alert": [row for row in rows if row["warned_driver"]],
+    }
+    return [_score_table(part, agents, name) for name, part in parts.items() if part]
+
+
+def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
     """Return one line per agent over all episodes."""
     table = Table(title=title, caption=RATE_NOTE, box=SIMPLE_HEAD)
     table.add_column("agent", overflow="fold", min_width=15)
