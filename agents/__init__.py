@@ -7,6 +7,7 @@ from lgmd_gym.agents.baselines import AlwaysBrake, NoBrake, RandomBrake
 from lgmd_gym.agents.foreign import ForeignAgent, import_agent
 from lgmd_gym.agents.options import check_options, parse
 from lgmd_gym.agents.oracles import TTCOracle
+from lgmd_gym.agents.policy import Policy
 from lgmd_gym.agents.rules import SpikeThreshold
 from lgmd_gym.errors import unknown_name
 
@@ -17,6 +18,7 @@ __all__ = [
     "Agent",
     "AlwaysBrake",
     "NoBrake",
+    "Policy",
     "RandomBrake",
     "SpikeThreshold",
     "TTCOracle",
@@ -34,12 +36,17 @@ def make_agent(text: str) -> Agent:
 
     Args:
         text: "name", or "name:option=value,…" as in "spike-threshold:threshold=45,frames=2"; a user's own
-            agent is "module:Class" or "module:Class:option=value,…", any class with `act`.
+            agent is "module:Class" or "module:Class:option=value,…", any class with `act`; a policy of
+            `lgmd-gym train` is "policy:FILE.zip" (loading one runs what its author pickled into it).
 
     Raises:
         ValueError: For an unknown agent or option (the nearest is named), or a value out of its range.
     """
     head, _, rest = text.partition(":")
+    if "," in head:
+        raise ValueError(f"agent {text!r} holds a comma before any option; separate agents by spaces")
+    if head == Policy.name:
+        return Policy(rest)
     class_name, _, options_text = rest.partition(":")
     if head not in AGENTS and class_name.isidentifier():
         name = f"{head}:{class_name}"

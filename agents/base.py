@@ -21,6 +21,7 @@ class Agent:
     """
 
     name = "agent"
+    camera: Any = None  # what it was made to look through, as for `LGMDObservation`; None: whatever there is
 
     def __init__(self) -> None:
         self._alert = False

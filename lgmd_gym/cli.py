@@ -1,4 +1,4 @@
-"""The `lgmd-gym` command: bench, drive, video, paper, list."""
+"""The `lgmd-gym` command: bench, drive, video, paper, train, list."""
 
 import contextlib
 import io
@@ -18,6 +18,7 @@ DESCRIPTION = """A highway-env car brakes on the spike frequency of a locust loo
   lgmd-gym drive LGMD/CCRs-v0 --video out.mp4       watch one approach through the eye
   lgmd-gym video CLIP.mp4                           the spike trace of a dash-camera clip
   lgmd-gym paper                                    the paper's experiments, a verdict on each claim
+  lgmd-gym train                                    a policy that learns to brake, with stable-baselines3
   lgmd-gym list                                     suites, agents, environments, cameras
 
 Speeds are in m/s, case names carry km/h. Each command has its own --help."""
@@ -125,6 +126,39 @@ class Paper:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Train:
+    """Train a policy with stable-baselines3; it then brakes as --agents policy:FOLDER/policy.zip.
+
+    The folder gets TensorBoard logs, checkpoints, what the looks at the validation split said, and the
+    policy that did best there. Ctrl-C keeps the checkpoints; --resume goes on from the last one.
+    """
+
+    algo: str = "ppo"
+    """ppo, sac or dqn."""
+    env: str = "LGMD/RandomBraking-v0"
+    """Environment id; RandomBraking is trained on its split train and judged on validation."""
+    camera: tuple[str, ...] = ("fovea", "tele", "wide")
+    """Camera presets, a neuron each."""
+    inputs: tuple[str, ...] = ()
+    """Observations the policy sees: spike_frequency, membrane_potential, ffi, ego_speed, ego_yaw_rate, frame;
+    default: what the hyperparameters say."""
+    steps: int | None = None
+    """Decisions of the policy; default: what the hyperparameters say."""
+    seed: int = 0
+    """Of the network and the levels drawn."""
+    hyperparams: Path | None = None
+    """YAML file in the format of rl-zoo; default: the package's own."""
+    eval_every: int = 20_000
+    """Decisions between two looks at the validation split."""
+    eval_episodes: int = 60
+    """Episodes of a look."""
+    out: Path | None = None
+    """Training folder; must not exist. Default: runs/train-ALGO-DATE-TIME."""
+    resume: Path | None = None
+    """Training folder of a broken-off training, to go on with under its own settings."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class List:
     """List what there is to name: suites with their cases, agents, environments, cameras."""
 
@@ -138,6 +172,7 @@ Command = Union[  # noqa: UP007  (tyro reads the annotations)
     Annotated[List, subcommand(name="list")],
     Annotated[Video, subcommand(name="video")],
     Annotated[Paper, subcommand(name="paper")],
+    Annotated[Train, subcommand(name="train")],
 ]
 
 
@@ -150,13 +185,14 @@ def run(argv: list[str] | None = None) -> int:
     """Run one command and return its exit code."""
     try:
         command = _parse(argv)
-        from lgmd_gym import commands, commands_paper
+        from lgmd_gym import commands, commands_paper, commands_train
 
         plays: dict[type, Callable[[Any], int]] = {
             Bench: commands.bench,
             Drive: commands.drive,
             Video: commands_paper.video,
             Paper: commands_paper.paper,
+            Train: commands_train.train,
             List: commands.show_list,
         }
         return plays[type(command)](command)
