@@ -142,6 +142,8 @@ class Train:
     inputs: tuple[str, ...] = ()
     """Observations the policy sees: spike_frequency, membrane_potential, ffi, ego_speed, ego_yaw_rate, frame;
     default: what the hyperparameters say."""
+    demands: tuple[float, ...] = (0.0, -0.4, -1.0)
+    """Demands the policy chooses among, from -1 (full braking) to 1; empty for any. SAC takes no choice."""
     steps: int | None = None
     """Decisions of the policy; default: what the hyperparameters say."""
     seed: int = 0

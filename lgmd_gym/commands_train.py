@@ -25,6 +25,7 @@ def train(options: "cli.Train") -> int:
             seed=options.seed,
             hyperparams=options.hyperparams,
             inputs=options.inputs,
+            demands=options.demands,
             eval_every=options.eval_every,
             eval_episodes=options.eval_episodes,
         )

@@ -58,7 +58,7 @@ MAY = {
     "plots_paper": ("paper", "paper_claims", "plots", "stimuli"),
     "commands_paper": None,  # knows all
     "view": ("wrappers",),
-    "training": ("agents", "errors", ""),
+    "training": ("agents", "envs", "errors", ""),
     "commands_train": None,  # knows all
     "benchmark": ("agents", "envs", "errors", "_version"),
     "drive": ("agents", "benchmark", "envs", "errors", "video", "view", ""),

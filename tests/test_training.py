@@ -14,7 +14,7 @@ from lgmd_gym.agents.features import LIMIT, Features, Memory, shrunk
 from lgmd_gym.agents.policy import read_card
 from lgmd_gym.training import PolicyView
 from lgmd_gym.training.settings import read_settings
-from lgmd_gym.training.trainer import DISCRETE, Order, Training, make_env
+from lgmd_gym.training.trainer import DEMANDS, Order, Training, make_env
 
 YAML = """
 LGMD/CCRs-v0:
@@ -130,10 +130,11 @@ def order(tmp_path, **changes):
     return Order(**given | {"eval_episodes": 1} | changes)
 
 
-def test_a_trained_policy_acts_as_the_model_does(tmp_path):
+@pytest.mark.parametrize("demands", [(), DEMANDS])
+def test_a_trained_policy_acts_as_the_model_does(tmp_path, demands):
     from stable_baselines3 import PPO
 
-    wanted = order(tmp_path)
+    wanted = order(tmp_path, demands=demands)
     path = Training.start(wanted, tmp_path / "run").run()
     assert path.stat().st_size < 1_000_000
     card = read_card(path)
@@ -150,7 +151,7 @@ def test_a_trained_policy_acts_as_the_model_does(tmp_path):
         shown, *_ = view.step(action)
         for _ in range(4):
             done = agent.act(observation, info)
-            assert done.tolist() == action.tolist()
+            assert done == np.float32(demands[action] if demands else action)
             observation, *_, info = env.step(done)
     with pytest.raises(ValueError, match="exists and is kept"):
         Training.start(wanted, tmp_path / "run")
@@ -178,7 +179,7 @@ def test_other_algorithms_train(tmp_path, algo):
     observation, info = gym.make("LGMD/CCRs-v0", camera=agent.camera).reset(seed=0)
     demand = agent.act(observation, info)
     assert demand.shape == (1,)
-    assert algo == "sac" or float(demand[0]) in np.float32(DISCRETE)
+    assert algo == "sac" or float(demand[0]) in np.float32(DEMANDS)
 
 
 @pytest.mark.parametrize(

@@ -13,11 +13,12 @@ import gymnasium as gym
 import lgmd_gym
 from lgmd_gym.agents.features import FRAME, Features
 from lgmd_gym.agents.policy import write_card
+from lgmd_gym.envs.units import check_within
 from lgmd_gym.training.settings import Settings, read_settings
 from lgmd_gym.training.view import PolicyView
 
 RANDOM_ID = "LGMD/RandomBraking-v0"
-DISCRETE = [0.0, -0.4, -1.0]  # demands that DQN chooses among
+DEMANDS = (0.0, -0.4, -1.0)
 JUDGED = 10_000  # seed of the levels that a look at the validation split plays
 CAMERAS = ("fovea", "tele", "wide")
 
@@ -34,6 +35,7 @@ class Order:
         seed: Of the network and the environments.
         hyperparams: YAML file in rl-zoo's format; None for the package's.
         inputs: Observation keys the policy sees; empty for what the hyperparameters say.
+        demands: Demands the policy chooses among, in [-1, 1]; empty for any, which DQN cannot.
         eval_every: Decisions between two looks at the validation split.
         eval_episodes: Episodes of a look.
         env_kwargs: Further arguments of `gym.make`.
@@ -46,9 +48,18 @@ class Order:
     seed: int = 0
     hyperparams: Path | None = None
     inputs: Sequence[str] = ()
+    demands: Sequence[float] = DEMANDS
     eval_every: int = 20_000
     eval_episodes: int = 60
     env_kwargs: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.algo == "dqn" and not self.demands:
+            raise ValueError("dqn chooses among demands: give some, as --demands 0 -1")
+        if self.algo == "sac" and self.demands:
+            object.__setattr__(self, "demands", ())  # knows no choice
+        for demand in self.demands:
+            check_within("demands", demand, -1.0, 1.0)
 
     def settings(self) -> Settings:
         """Return the hyperparameters, with this order's own wishes laid over them."""
@@ -74,6 +85,7 @@ class Order:
             | {
                 "camera": tuple(values["camera"]),
                 "inputs": tuple(values["inputs"]),
+                "demands": tuple(values["demands"]),
                 "hyperparams": None if file is None else Path(file),
             }
         )
@@ -84,10 +96,9 @@ def make_env(order: Order, features: dict[str, Any], split: str) -> gym.Env:
     arguments = dict(order.env_kwargs)
     if order.env_id == RANDOM_ID:
         arguments.setdefault("split", split)
-    if order.algo == "dqn":
-        config = dict(arguments.get("config") or {})
-        config.setdefault("action", {"type": "DiscreteDemand", "levels": DISCRETE})
-        arguments["config"] = config
+    if order.demands:
+        levels = {"type": "DiscreteDemand", "levels": list(order.demands)}
+        arguments["config"] = {**(arguments.get("config") or {}), "action": levels}
     if FRAME in Features.from_dict(features).inputs:
         arguments["include_frame"] = True
     camera: Any = list(order.camera) if len(order.camera) > 1 else order.camera[0]
@@ -241,7 +252,7 @@ class Training:
             "algo": self.order.algo,
             "camera": list(camera) if len(camera) > 1 else camera[0],
             "features": Features.from_dict(self.settings.features).to_dict(),
-            "levels": DISCRETE if self.order.algo == "dqn" else None,
+            "levels": list(self.order.demands) or None,
             "order": self.order.to_dict(),
             "steps": self.settings.n_timesteps,
             "wall_time": round(wall_time, 1),
