@@ -17,9 +17,15 @@ SCALES = {
     "ego_speed": (0.0, 20.0),  # [m/s]
     "ego_yaw_rate": (0.0, 0.5),  # [rad/s]
 }
+# What is made of observations over decisions: its source, how it is scaled.
+DERIVED = {
+    "speed_change": ("ego_speed", 1.0),  # since the last decision [m/s]; full braking takes 0.9 in 0.1 s
+    "spike_peak": ("spike_frequency", 100.0),  # fades by FADE a decision: silence is not clearance
+}
+FADE = 0.93
 LIMIT = 5.0  # beyond this, scaled values are clipped
 FRAME = "frame"  # passed on as it is; `shrink` pixels become one
-INPUTS = (*SCALES, FRAME)
+INPUTS = (*SCALES, *DERIVED, FRAME)
 
 
 @dataclass(frozen=True)
@@ -27,14 +33,15 @@ class Features:
     """What a policy sees.
 
     Attributes:
-        inputs: Observation keys, of `INPUTS`.
+        inputs: Observation keys, or what is derived from them over decisions: `speed_change` and
+            `spike_peak`, the highest spike frequency lately.
         history: Number of decisions remembered, the present one included, >= 1.
         repeat: Environment decisions that one decision of the policy holds for, >= 1; at 30 Hz, 3 let it
             decide at 10 Hz.
         shrink: Side of the squares of pixels whose mean a frame keeps, >= 1 [px].
     """
 
-    inputs: tuple[str, ...] = tuple(SCALES)
+    inputs: tuple[str, ...] = (*SCALES, *DERIVED)
     history: int = 6
     repeat: int = 3
     shrink: int = field(default=2)
@@ -66,7 +73,7 @@ class Features:
         """
         spaces = {}
         for name in self.inputs:
-            shape = shapes[name]
+            shape = shapes[source_of(name)]
             if name == FRAME:
                 height, width, channels = shape
                 shape = (height // self.shrink, width // self.shrink, channels * self.history)
@@ -74,6 +81,11 @@ class Features:
             else:
                 spaces[name] = (-LIMIT, LIMIT, (self.history * shape[0],), np.float32)
         return spaces
+
+
+def source_of(name: str) -> str:
+    """Return the observation that an input is made of."""
+    return DERIVED[name][0] if name in DERIVED else name
 
 
 class Memory:
@@ -86,10 +98,13 @@ class Memory:
     def __init__(self, features: Features) -> None:
         self.features = features
         self._kept: dict[str, deque[np.ndarray]] = {}
+        self.clear()
 
     def clear(self) -> None:
         """Forget everything; the next observation then fills the whole history."""
         self._kept = {}
+        self._speed: np.ndarray | None = None
+        self._peak: np.ndarray | None = None
 
     def see(self, observation: dict[str, Any]) -> dict[str, np.ndarray]:
         """Take in an observation of `LGMDObservation` and return what the policy is shown.
@@ -99,9 +114,10 @@ class Memory:
         """
         shown = {}
         for name in self.features.inputs:
-            if name not in observation:
-                raise ValueError(f"the policy needs the observation {name!r}, which this eye does not give")
-            value = self._prepared(name, np.asarray(observation[name]))
+            source = source_of(name)
+            if source not in observation:
+                raise ValueError(f"the policy needs the observation {source!r}, which this eye does not give")
+            value = self._prepared(name, np.asarray(observation[source]))
             kept = self._kept.setdefault(name, deque([value] * self.features.history, self.features.history))
             kept.append(value)
             shown[name] = np.concatenate(kept, axis=-1)
@@ -110,7 +126,11 @@ class Memory:
     def _prepared(self, name: str, value: np.ndarray) -> np.ndarray:
         if name == FRAME:
             return shrunk(value, self.features.shrink)
-        offset, scale = SCALES[name]
+        if name == "speed_change":
+            value, self._speed = value - (value if self._speed is None else self._speed), value
+        elif name == "spike_peak":
+            self._peak = value = value if self._peak is None else np.maximum(value, FADE * self._peak)
+        offset, scale = SCALES.get(name) or (0.0, DERIVED[name][1])
         return np.clip((value - offset) / scale, -LIMIT, LIMIT).astype(np.float32)
 
 

@@ -140,8 +140,8 @@ class Train:
     camera: tuple[str, ...] = ("fovea", "tele", "wide")
     """Camera presets, a neuron each."""
     inputs: tuple[str, ...] = ()
-    """Observations the policy sees: spike_frequency, membrane_potential, ffi, ego_speed, ego_yaw_rate, frame;
-    default: what the hyperparameters say."""
+    """Observations the policy sees: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed,
+    speed_change, ego_yaw_rate, frame; default: all but the last."""
     demands: tuple[float, ...] = (0.0, -0.4, -1.0)
     """Demands the policy chooses among, from -1 (full braking) to 1; empty for any. SAC takes no choice."""
     steps: int | None = None

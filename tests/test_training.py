@@ -10,7 +10,7 @@ from gymnasium.utils.env_checker import check_env
 import lgmd_gym  # noqa: F401
 from lgmd_gym import cli
 from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.features import LIMIT, Features, Memory, shrunk
+from lgmd_gym.agents.features import FADE, LIMIT, Features, Memory, shrunk
 from lgmd_gym.agents.policy import read_card
 from lgmd_gym.training import PolicyView
 from lgmd_gym.training.settings import read_settings
@@ -42,6 +42,16 @@ def test_memory_scales_and_remembers():
     assert memory.see(observed(9e9))["spike_frequency"].tolist() == [0.5, 1.0, LIMIT]
     memory.clear()
     assert memory.see(observed(0.0))["spike_frequency"].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_memory_derives_braking_and_fading_peaks():
+    memory = Memory(Features(inputs=("spike_peak", "speed_change"), history=1))
+    told = []
+    for frequency, speed in ((0, 10.0), (200, 9.5), (0, 8.6)):
+        given = {"spike_frequency": np.array([frequency], np.float32), "ego_speed": np.array([speed])}
+        told.append(memory.see(given))
+    assert [float(item["spike_peak"][0]) for item in told] == pytest.approx([0.0, 2.0, 2.0 * FADE])
+    assert [float(item["speed_change"][0]) for item in told] == pytest.approx([0.0, -0.5, -0.9])
 
 
 def test_frames_shrink_to_means():

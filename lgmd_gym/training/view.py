@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
-from lgmd_gym.agents.features import Features, Memory
+from lgmd_gym.agents.features import Features, Memory, source_of
 
 
 class PolicyView(gym.Wrapper, RecordConstructorArgs):
@@ -35,7 +35,7 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
             raise ValueError(f"PolicyView needs the Dict observation of LGMDObservation, got {given}")
         shapes = {name: space.shape or () for name, space in given.spaces.items()}
         for name in self.features.inputs:
-            if name not in shapes:
+            if source_of(name) not in shapes:
                 raise ValueError(
                     f"the policy input {name!r} is not observed; make it with include_{name}=True"
                 )
