@@ -57,8 +57,10 @@ MAY = {
     "paper_claims": ("clips_detect", "paper"),
     "plots_paper": ("paper", "paper_claims", "plots", "stimuli"),
     "commands_paper": None,  # knows all
+    "commands_bench": None,
+    "plots_bench": ("benchmark", "plots"),
     "view": ("wrappers",),
-    "benchmark": ("agents", "envs", "errors", "_version"),
+    "benchmark": ("agents", "camera", "envs", "errors", "_version"),
     "drive": ("agents", "benchmark", "envs", "errors", "video", "view", ""),
     "listing": ("agents", "benchmark", "envs", "camera"),
     "commands": None,  # knows all
