@@ -127,6 +127,11 @@ def _report(run: "Run | TrafficRun", console: Console, options: "cli.Bench") -> 
     _report_cases(run, console, title)
     if options.plots:
         _draw_cases(run, level)
+    _write_curves(run.folder.path)
+    if options.report:
+        from lgmd_gym.report import write_report
+
+        console.print(f"report: {write_report(run.folder.path)}", soft_wrap=True)
 
 
 def _report_cases(run: "Run", console: Console, title: str) -> None:
@@ -146,6 +151,15 @@ def _report_traffic(run: "TrafficRun", console: Console, title: str) -> None:
     console.print(traffic_table(run.rows, run.agents, title))
     console.print(traffic_table(run.rows, run.agents, "by kind of traffic", by_kind=True))
     write_traffic_summary(run.rows, run.folder.path / "summary.csv")
+
+
+def _write_curves(path: Path) -> None:
+    """Write the detector curves of a run folder as froc.csv, if any trace has been kept."""
+    from lgmd_gym.benchmark.detector import LEAD, curves, load_traces, write_curves
+
+    traces = load_traces(path)
+    if traces:
+        write_curves(path / "froc.csv", curves(traces), LEAD)
 
 
 def _draw_cases(run: "Run", alert_level: float) -> None:

@@ -59,6 +59,7 @@ MAY = {
     "commands_paper": None,  # knows all
     "commands_bench": None,
     "plots_bench": ("benchmark", "plots"),
+    "report": ("agents", "benchmark", "envs", "neuron", "plots_bench", ""),
     "view": ("wrappers",),
     "benchmark": ("agents", "camera", "envs", "errors", "_version"),
     "drive": ("agents", "benchmark", "envs", "errors", "video", "view", ""),

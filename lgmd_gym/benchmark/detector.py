@@ -7,6 +7,7 @@ between t_c − 4 s and t_c − lead; an alarm that begins earlier, or in an epi
 What begins after t_c − lead is too late, and neither.
 """
 
+import csv
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
@@ -96,7 +97,7 @@ def load_traces(path: Path) -> list[Trace]:
     """Return the open-loop traces of a run folder, in the order of condition, case and seed.
 
     Raises:
-        ValueError: If it holds no run, or none of `no-brake`.
+        ValueError: If it holds no run, or a damaged one.
     """
     rows = [row for row in read_rows(path)[0] if row["agent"] == NO_BRAKE and row["error"] is None]
     found = []
@@ -105,8 +106,6 @@ def load_traces(path: Path) -> list[Trace]:
         if series is not None:
             contact = row["duration"] if row["collision"] else inf
             found.append(Trace(row["condition"], row["target_shade"], contact, series))
-    if not found:
-        raise ValueError(f"{str(path)!r} holds no open-loop traces (traces/*__no-brake__*.npz)")
     return found
 
 
@@ -193,26 +192,31 @@ def _chance(traces: list[Trace], starts: list[np.ndarray], ends: list[float], le
     return hits / windows if windows else float("nan")
 
 
-def rows_of(found: dict[str, list[Curve]], lead: float) -> list[dict[str, Any]]:
-    """Return the curves as one dict per point, for a CSV file."""
-    return [
-        {
-            "condition": curve.condition,
-            "contrast": curve.group,
-            "lead": lead,
-            "threshold": point.threshold,
-            "threats": point.detected.n,
-            "detected": point.detected.k,
-            "detected_low": round(point.detected.low, 4),
-            "detected_high": round(point.detected.high, 4),
-            "false_alarms": point.false,
-            "km": round(point.distance / 1000.0, 4),
-            "false_per_km": round(point.false_per_km, 4),
-            "false_low": round(point.false_low, 4),
-            "false_high": round(point.false_high, 4),
-            "chance": round(point.chance, 4),
-        }
-        for items in found.values()
-        for curve in items
-        for point in curve.points
+def write_curves(path: Path, found: dict[str, list[Curve]], lead: float) -> None:
+    """Write the curves to a CSV file, one line per point."""
+    lines = [
+        _line(curve, point, lead) for items in found.values() for curve in items for point in curve.points
     ]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(lines[0]))
+        writer.writeheader()
+        writer.writerows(lines)
+
+
+def _line(curve: Curve, point: Point, lead: float) -> dict[str, Any]:
+    return {
+        "condition": curve.condition,
+        "contrast": curve.group,
+        "lead": lead,
+        "threshold": point.threshold,
+        "threats": point.detected.n,
+        "detected": point.detected.k,
+        "detected_low": round(point.detected.low, 4),
+        "detected_high": round(point.detected.high, 4),
+        "false_alarms": point.false,
+        "km": round(point.distance / 1000.0, 4),
+        "false_per_km": round(point.false_per_km, 4),
+        "false_low": round(point.false_low, 4),
+        "false_high": round(point.false_high, 4),
+        "chance": round(point.chance, 4),
+    }
