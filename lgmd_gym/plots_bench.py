@@ -10,6 +10,9 @@ if TYPE_CHECKING:
     from lgmd_gym.benchmark.detector import Curve
 
 
+TICKS = (0.0, 0.5, 1.0, 3.0, 10.0, 30.0, 100.0)  # false alarms per km; linear below 1
+
+
 def difference_figure(path: Path | Any, found: "list[Comparison]") -> None:
     """Draw every paired difference with its 95 % interval, one panel per quantity, and save it.
 
@@ -74,9 +77,15 @@ def froc_figure(path: Path | Any, curves: "dict[str, list[Curve]]", lead: float)
         for axis, (condition, items) in zip(axes[0], curves.items(), strict=True):
             for colour, curve in zip(COLOURS, items, strict=False):
                 _froc(axis, curve, colour)
-            axis.set_title(condition)
+            axis.set_title(
+                f"{condition}; {items[0].points[0].distance / 1000:.2f} km free of threat", fontsize=9
+            )
             axis.set_xscale("symlog", linthresh=1.0)
-            axis.set(xlim=(-0.05, None), ylim=(-0.02, 1.02), xlabel="false alarms per km (linear below 1)")
+            highest = max(point.false_per_km for item in items for point in item.points)
+            axis.set_xticks(TICKS, [f"{tick:g}" for tick in TICKS])
+            axis.set_xticks([], minor=True)
+            top = next((tick for tick in TICKS if tick >= max(highest, 1.0)), TICKS[-1])
+            axis.set(xlim=(-0.05, 1.05 * top), ylim=(-0.02, 1.02), xlabel="false alarms per km")
             axis.legend(fontsize=7, loc="lower right")
         axes[0][0].set_ylabel(f"threats alarmed 4 to {lead:g} s before contact")
         figure.savefig(path, format=_format(path))
