@@ -1,4 +1,4 @@
-"""The `lgmd-gym` command: bench, drive, video, paper, train, list."""
+"""The `lgmd-gym` command: bench, compare, drive, video, paper, train, list."""
 
 import contextlib
 import io
@@ -15,6 +15,7 @@ from tyro.conf import Positional, subcommand
 DESCRIPTION = """A highway-env car brakes on the spike frequency of a locust looming neuron (LGMD).
 
   lgmd-gym bench                                    try all agents on the quick suite; about a minute
+  lgmd-gym compare runs/A runs/B                    paired differences of two runs
   lgmd-gym drive LGMD/CCRs-v0 --video out.mp4       watch one approach through the eye
   lgmd-gym video CLIP.mp4                           the spike trace of a dash-camera clip
   lgmd-gym paper                                    the paper's experiments, a verdict on each claim
@@ -28,28 +29,57 @@ Speeds are in m/s, case names carry km/h. Each command has its own --help."""
 class Bench:
     """Play a suite with every agent and seed, print the scores, and write a run folder.
 
-    The folder gets episodes.jsonl (one row per episode, as it finishes), summary.csv, run.json, the time
-    series of seed 0 and one PNG per case. Ctrl-C keeps what is finished.
+    The folder gets episodes.jsonl (one row per episode, as it finishes), summary.csv, report.html, run.toml,
+    run.json, time series and one PNG per case. Ctrl-C keeps what is finished.
     """
 
-    suite: str = "quick"
-    """Name of a suite; `lgmd-gym list suites` shows them. 300 km of traffic: --suite traffic --seeds 110."""
-    agents: tuple[str, ...] = ("no-brake", "always-brake", "random-brake", "spike-threshold", "ttc-oracle")
-    """Agents with options, as in spike-threshold:threshold=45,frames=2."""
-    seeds: int = 3
-    """Seeds per case, from 0 on; a seed draws the place on the road and the target's grey."""
-    jobs: int = 2
-    """Processes."""
-    out: Path | None = None
-    """Run folder; must not exist. Default: runs/SUITE-DATE-TIME."""
-    resume: Path | None = None
-    """Run folder of a broken-off run: plays what is missing, with that run's own settings."""
-    camera: str = "fovea"
-    """Camera preset: wide, standard, tele, fovea, paper or birdseye."""
+    suite: str | None = None
+    """Name of a suite (`lgmd-gym list suites`), or a suite file, NAME.toml. Default: quick. 300 km of
+    traffic: --suite traffic --seeds 110."""
+    agents: tuple[str, ...] | None = None
+    """Agents with options, as in spike-threshold:threshold=45,frames=2, or your own as MODULE:CLASS. Default:
+    no-brake always-brake random-brake spike-threshold ttc-oracle."""
+    seeds: int | None = None
+    """Seeds per case, from 0 on; a seed draws the place on the road and the target's grey. Default: 3."""
+    conditions: tuple[str, ...] | None = None
+    """Camera conditions, each played: clear, night, fog, robust. Default: clear."""
+    camera: str | None = None
+    """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: fovea."""
     params: Path | None = None
     """TOML file of LGMD parameters."""
+    config: Path | None = None
+    """The run.toml of a run folder: plays the same again, in place of the options above."""
+    resume: Path | None = None
+    """Run folder of a broken-off run: plays what is missing, with that run's own settings."""
+    jobs: int = 2
+    """Processes."""
+    backend: Literal["processes", "dask"] = "processes"
+    """Where to play: on this machine, or on a Dask cluster that runs already."""
+    address: str | None = None
+    """Of the cluster's scheduler, as tcp://10.0.0.1:8786."""
+    out: Path | None = None
+    """Run folder; must not exist. Default: runs/SUITE-DATE-TIME."""
     plots: bool = True
     """Draw one PNG per case."""
+    report: bool = True
+    """Write report.html."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compare:
+    """Say how two runs differ, pair by pair: the same case, seed and condition.
+
+    Differences are B less A, with 95 % intervals from a bootstrap that draws whole cases.
+    """
+
+    run_a: Positional[Path]
+    """Run folder."""
+    run_b: Positional[Path | None] = None
+    """Another run folder; without it, agents within the first are compared."""
+    agents: tuple[str, ...] | None = None
+    """Two agents: A's and B's. Default: every agent that both runs hold, or all pairs within one."""
+    out: Path | None = None
+    """PNG of the differences to write; must not exist."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,6 +205,7 @@ Command = Union[  # noqa: UP007  (tyro reads the annotations)
     Annotated[Video, subcommand(name="video")],
     Annotated[Paper, subcommand(name="paper")],
     Annotated[Train, subcommand(name="train")],
+    Annotated[Compare, subcommand(name="compare")],
 ]
 
 
@@ -187,10 +218,11 @@ def run(argv: list[str] | None = None) -> int:
     """Run one command and return its exit code."""
     try:
         command = _parse(argv)
-        from lgmd_gym import commands, commands_paper, commands_train
+        from lgmd_gym import commands, commands_bench, commands_paper, commands_train
 
         plays: dict[type, Callable[[Any], int]] = {
-            Bench: commands.bench,
+            Bench: commands_bench.bench,
+            Compare: commands_bench.compare,
             Drive: commands.drive,
             Video: commands_paper.video,
             Paper: commands_paper.paper,

@@ -57,10 +57,13 @@ MAY = {
     "paper_claims": ("clips_detect", "paper"),
     "plots_paper": ("paper", "paper_claims", "plots", "stimuli"),
     "commands_paper": None,  # knows all
+    "commands_bench": None,
+    "plots_bench": ("benchmark", "plots"),
+    "report": ("agents", "benchmark", "envs", "neuron", "plots_bench", ""),
     "view": ("wrappers",),
     "training": ("agents", "envs", "errors", ""),
     "commands_train": None,  # knows all
-    "benchmark": ("agents", "envs", "errors", "_version"),
+    "benchmark": ("agents", "camera", "envs", "errors", "_version"),
     "drive": ("agents", "benchmark", "envs", "errors", "video", "view", ""),
     "listing": ("agents", "benchmark", "envs", "camera"),
     "commands": None,  # knows all

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.episode import SERIES, Episode
-from lgmd_gym.benchmark.rows import Counterfactual, make_row
+from lgmd_gym.benchmark.episode import SERIES, TRUTHS, Episode
+from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.rows import make_row
 from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.envs.units import KMH
@@ -26,8 +27,8 @@ def drive(case, agent_name, seed=0):
     while True:
         action = agent.act(blind, info)
         held = info["ego_speed"] == 0.0 and action[0] < 0
-        truth = [info[name] for name in ("ego_speed", "gap", "ttc", "deceleration", "target_speed")]
-        rows.append((len(rows) / 30, *truth, 0.0, 0.0, float(held)))
+        truth = [info[name] for name in TRUTHS]
+        rows.append((len(rows) / 30, *truth, 0.0, 0.5, 0.0, 0.0, float(held)))
         if done:
             break
         _, _, terminated, truncated, info = env.step(action)

@@ -1,6 +1,6 @@
 """Play one agent through one case with one seed, and keep what happened."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, is_dataclass, replace
 from typing import Any
 
 import gymnasium as gym
@@ -8,8 +8,10 @@ import numpy as np
 
 from lgmd_gym.agents import Agent
 from lgmd_gym.benchmark.cases import Case
+from lgmd_gym.camera import CameraParams
 from lgmd_gym.envs import env_id
 
+CLEAR = "clear"  # the camera as it was given
 # One value per decision each; `held` is 1 while a standing ego is kept from starting, which no deceleration
 # shows.
 SERIES = (
@@ -17,12 +19,17 @@ SERIES = (
     "ego_speed",
     "gap",
     "ttc",
+    "drac",
     "deceleration",
     "target_speed",
     "spike_frequency",
+    "membrane_potential",
+    "ffi",
     "alert",
     "held",
 )
+TRUTHS = ("ego_speed", "gap", "ttc", "drac", "deceleration", "target_speed")  # of `info`
+SIGNALS = ("spike_frequency", "membrane_potential", "ffi")  # of the observation, the highest of all cameras
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +44,33 @@ class Eyesight:
     camera: Any = "fovea"
     params: Any = None
 
+    @property
+    def plain(self) -> "Eyesight":
+        """The same as plain values, which JSON and TOML can hold."""
+        return Eyesight(_plain(self.camera), _plain(self.params))
+
+    def under(self, condition: str) -> "Eyesight":
+        """Return the same under a named camera condition, such as "robust"; "clear" leaves it as it is.
+
+        Raises:
+            ValueError: For an unknown condition, or a camera that knows none.
+        """
+        return self if condition == CLEAR else replace(self, camera=_under(self.camera, condition))
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
+    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+def _under(camera: Any, condition: str) -> Any:
+    if isinstance(camera, list | tuple):
+        return [_under(one, condition) for one in camera]
+    if camera == "birdseye":
+        raise ValueError(f"camera 'birdseye' looks from above and knows no condition {condition!r}")
+    return asdict(CameraParams.make(camera).with_condition(condition))
+
 
 @dataclass(frozen=True, slots=True)
 class Episode:
@@ -49,6 +83,7 @@ class Episode:
         relative_impact_speed: Less the other's along the ego's heading [m/s]; NaN without a touch.
         target_width: Width of the first actor [m]; NaN on an empty road.
         fps: Camera frames per second [Hz].
+        target_shade: Body grey of the first actor in [0, 255]; NaN on an empty road.
     """
 
     series: dict[str, np.ndarray]
@@ -57,6 +92,7 @@ class Episode:
     relative_impact_speed: float
     target_width: float
     fps: float
+    target_shade: float = float("nan")
 
 
 def make_env(case: Case, eyesight: Eyesight, **options: Any) -> gym.Env:
@@ -93,7 +129,8 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
             break
         observation, _, terminated, truncated, info = env.step(action)
         done = terminated or truncated
-    actors = env.unwrapped.scenario.actors  # type: ignore[attr-defined]
+    base: Any = env.unwrapped
+    actors, seen = base.scenario.actors, base.road.obstacles
     return Episode(
         series={name: np.array(column) for name, column in zip(SERIES, zip(*rows, strict=True), strict=True)},
         collision=bool(info["collision"]),
@@ -101,11 +138,10 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
         relative_impact_speed=info["relative_impact_speed"],
         target_width=actors[0].width if actors else float("nan"),
         fps=env.get_wrapper_attr("fps"),
+        target_shade=float(seen[0].shade) if seen else float("nan"),
     )
 
 
 def _moment(observation: dict[str, Any], info: dict[str, Any]) -> tuple[float, ...]:
     """Return one value for each name in `SERIES` but time, alert and held."""
-    frequency = float(np.max(observation["spike_frequency"]))
-    truth = (info[name] for name in ("ego_speed", "gap", "ttc", "deceleration", "target_speed"))
-    return (*truth, frequency)
+    return (*(info[name] for name in TRUTHS), *(float(np.max(observation[name])) for name in SIGNALS))

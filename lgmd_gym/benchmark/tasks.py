@@ -9,8 +9,9 @@ import numpy as np
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.cases import Case
 from lgmd_gym.benchmark.driver import WarnedDriver
-from lgmd_gym.benchmark.episode import Episode, Eyesight, make_env, play
-from lgmd_gym.benchmark.rows import Counterfactual, error_row, make_row
+from lgmd_gym.benchmark.episode import CLEAR, Episode, Eyesight, make_env, play
+from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.rows import RowKey, error_row, make_row
 
 NO_BRAKE = "no-brake"
 
@@ -23,8 +24,9 @@ class Task:
         agent: The agent's string.
         case: The case.
         seed: Of the environment and the agent.
-        eyesight: Camera and neuron parameters.
+        eyesight: Camera and neuron parameters, the condition included.
         truth: What `no-brake` met; None for `no-brake` itself.
+        condition: Name of the camera's condition, for the row.
     """
 
     agent: str
@@ -32,6 +34,12 @@ class Task:
     seed: int
     eyesight: Eyesight
     truth: Counterfactual | None = None
+    condition: str = CLEAR
+
+    @property
+    def key(self) -> RowKey:
+        """What tells it from all others of its run, see `rows.key_of`."""
+        return self.agent, self.case.name, self.seed, self.condition
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +63,11 @@ def run_task(task: Task) -> Result:
     """Play a task; whatever an agent or environment raises becomes an error row."""
     try:
         episode = _play(task)
-    except Exception:
-        return Result(task, error_row(task.agent, task.case, task.seed, traceback.format_exc()))
+    except (Exception, SystemExit):  # an agent that calls exit() would take the worker with it
+        error = traceback.format_exc()
+        return Result(task, error_row(task.agent, task.case, task.seed, error, task.condition))
     truth = task.truth or Counterfactual.of(episode)
-    row = make_row(task.agent, task.case, task.seed, episode, truth)
+    row = make_row(task.agent, task.case, task.seed, episode, truth, condition=task.condition)
     return Result(task, row, episode.series, truth)
 
 
