@@ -28,7 +28,7 @@ def difference_figure(path: Path | Any, found: "list[Comparison]") -> None:
         figure, axes = plt.subplots(
             rows,
             columns,
-            figsize=(10.0, rows * (1.1 + 0.3 * len(found))),
+            figsize=(10.0, rows * (1.1 + 0.42 * len(found))),
             squeeze=False,
             layout="constrained",
         )
@@ -55,9 +55,11 @@ def _differences(axis: Any, name: str, found: "list[Comparison]", labels: bool) 
     axis.set_title(name, fontsize=9)
     axis.set_xlabel(f"B − A [{unit}]", fontsize=8)
     axis.set_ylim(len(found) - 0.5, -0.5)
-    axis.set_yticks(
-        range(len(found)), [f"{item.b}\n− {item.a}" for item in found] if labels else [], fontsize=7
-    )
+    axis.set_yticks(range(len(found)), [_pair(item) for item in found] if labels else [], fontsize=7)
+
+
+def _pair(item: "Comparison") -> str:
+    return f"{item.b}\n− {item.a}" + (f"\n{item.condition}" if item.condition else "")
 
 
 def froc_figure(path: Path | Any, curves: "dict[str, list[Curve]]", lead: float) -> None:

@@ -51,6 +51,12 @@ def test_r152_rows(case, ego, target, impact, met):
     assert judge_r152(row(case, ego, target, impact))[0] is met
 
 
+def test_braking_before_the_test_begins_meets_nothing():
+    early = row("CCRs/v20", 20, 0, 0) | {"premature_brake": True}
+    assert judge_r152(early)[0] is False
+    assert not meets_r152([early], "a")
+
+
 @pytest.mark.parametrize(("failed", "met"), [(0, True), (1, True), (2, False)])
 def test_a_tenth_of_the_runs_may_fail(failed, met):
     rows = [row("CCRs/v20", 20, 0, 5 if number < failed else 0) for number in range(10)]

@@ -36,8 +36,8 @@ class Difference(NamedTuple):
         change: Mean of B less A, with its interval.
         better: Pairs in which B is higher.
         worse: Pairs in which B is lower.
-        differing_high: For equal pairs throughout: the Wilson bound of the share of pairs that differ, which
-            is all that n equal pairs can exclude; None otherwise.
+        other_high: If all pairs differ by the same: the Wilson bound of the share of pairs that might not,
+            which is all that n like pairs can exclude (a bootstrap of them has no width); None otherwise.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Difference(NamedTuple):
     change: Mean
     better: int
     worse: int
-    differing_high: float | None
+    other_high: float | None
 
 
 class Comparison(NamedTuple):
@@ -56,6 +56,7 @@ class Comparison(NamedTuple):
     Attributes:
         a: What A is called.
         b: What B is called.
+        condition: The camera's, if the run has several; else "".
         pairs: Number of common episodes.
         alone: Episodes that only one of them has, or has without an error.
         differences: One per quantity that any pair has.
@@ -63,6 +64,7 @@ class Comparison(NamedTuple):
 
     a: str
     b: str
+    condition: str
     pairs: int
     alone: int
     differences: tuple[Difference, ...]
@@ -84,20 +86,25 @@ def compare_runs(run_a: Path, run_b: Path | None, agents: tuple[str, ...] | None
     rows_b = rows_a if run_b is None else _rows(run_b)
     pairs = _pairs(rows_a, rows_b, agents, run_b is None)
     names = ("", "") if run_b is None else (f"{run_a.name}: ", f"{run_b.name}: ")
+    conditions = list(dict.fromkeys(row["condition"] for row in rows_a))
     found = [
         compare_rows(
-            [row for row in rows_a if row["agent"] == a],
-            [row for row in rows_b if row["agent"] == b],
+            [row for row in rows_a if row["agent"] == a and row["condition"] == condition],
+            [row for row in rows_b if row["agent"] == b and row["condition"] == condition],
             (names[0] + a, names[1] + b),
+            condition if len(conditions) > 1 else "",
         )
         for a, b in pairs
+        for condition in conditions  # apart: the mean over a steady and a shaken lens says nothing of either
     ]
     if not any(item.pairs for item in found):
         raise ValueError(f"{str(run_a)!r} and {str(run_b)!r} have no episode in common; nothing to compare")
     return found
 
 
-def compare_rows(rows_a: list[Row], rows_b: list[Row], names: tuple[str, str]) -> Comparison:
+def compare_rows(
+    rows_a: list[Row], rows_b: list[Row], names: tuple[str, str], condition: str = ""
+) -> Comparison:
     """Compare one agent's rows with another's: same case, seed and condition make a pair."""
     played_a, played_b = _by_key(rows_a), _by_key(rows_b)
     common = sorted(played_a.keys() & played_b.keys())
@@ -105,7 +112,7 @@ def compare_rows(rows_a: list[Row], rows_b: list[Row], names: tuple[str, str]) -
     pairs = [(a, b) for a, b in pairs if a["threat"] == b["threat"]]
     alone = len(_keys(rows_a) | _keys(rows_b)) - len(pairs)
     found = (difference(name, pairs) for name in QUANTITIES)
-    return Comparison(*names, len(pairs), alone, tuple(item for item in found if item is not None))
+    return Comparison(*names, condition, len(pairs), alone, tuple(item for item in found if item is not None))
 
 
 def difference(name: str, pairs: list[tuple[Row, Row]]) -> Difference | None:
@@ -129,7 +136,7 @@ def difference(name: str, pairs: list[tuple[Row, Row]]) -> Difference | None:
         cluster_mean(changes, [a["case"] for a, _ in wanted]),
         better,
         worse,
-        None if better or worse else wilson(0, n)[1],
+        wilson(0, n)[1] if len(set(changes)) == 1 else None,
     )
 
 

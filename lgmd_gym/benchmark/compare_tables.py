@@ -11,7 +11,7 @@ def compare_table(item: Comparison) -> Table:
     caption = "B less A; [95 %, paired bootstrap that draws cases]; pairs in which B is higher / lower, of n"
     if item.alone:
         caption += f"; {item.alone} episodes have no partner (not played, failed, or no threat to the other)"
-    title = f"A = {item.a}   B = {item.b}   {item.pairs} pairs"
+    title = f"A = {item.a}   B = {item.b}   {item.pairs} pairs {item.condition}".rstrip()
     table = Table(title=title, caption=caption, box=SIMPLE_HEAD)
     table.add_column("quantity")
     for heading in ("A", "B", "B − A", "higher / lower of n"):
@@ -24,10 +24,10 @@ def compare_table(item: Comparison) -> Table:
 
 
 def change_text(line: Difference) -> str:
-    """Return a difference with its interval; for equal pairs, how many might yet differ."""
+    """Return a difference with its interval; for pairs that are all alike, how many might yet not be."""
     change = line.change
-    if line.differing_high is not None:
-        return f"0: all equal (≤ {100 * line.differing_high:.0f} % of pairs differ)"
+    if line.other_high is not None:
+        return f"{change.value:+.2f} in all pairs (≤ {100 * line.other_high:.0f} % might differ from that)"
     if change.low is None or change.high is None:
         return f"{change.value:+.2f} (one case: no interval)"
     return f"{change.value:+.2f} [{change.low:+.2f}, {change.high:+.2f}]"

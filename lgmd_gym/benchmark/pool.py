@@ -1,6 +1,7 @@
 """Where episodes are played: in this process, in processes beside it, or on a Dask cluster; all by joblib."""
 
 import contextlib
+import logging
 import threading
 import time
 from _thread import interrupt_main
@@ -51,6 +52,9 @@ def open_pool(jobs: int, cluster: str | None = None) -> Iterator[Parallel]:
             if watch.lost:
                 raise PoolLostError(f"the cluster at {cluster} is lost: {watch.lost}") from None
             raise
+        except _lost_errors() as error:
+            why = str(error).splitlines()[0]
+            raise PoolLostError(f"the cluster at {cluster} is lost: {why}") from None
 
 
 def check_pool(jobs: int, cluster: str | None) -> None:
@@ -74,6 +78,7 @@ def _connect(address: str) -> Any:
         from distributed import Client
     except ImportError:
         raise ValueError("a Dask cluster needs dask; pip install 'lgmd-gym[cluster]'") from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its tracebacks of a lost cluster fill pages
     try:
         return Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
@@ -82,6 +87,15 @@ def _connect(address: str) -> Any:
             f"no Dask scheduler answers at {address!r} ({why}); start one with `dask scheduler` and give "
             "--address tcp://HOST:8786"
         ) from None
+
+
+def _lost_errors() -> tuple[type[BaseException], ...]:
+    """Return what Dask raises when a cluster goes; episodes themselves raise nothing, they become rows."""
+    from distributed.client import FutureCancelledError
+    from distributed.comm.core import CommClosedError
+    from distributed.scheduler import KilledWorker
+
+    return CommClosedError, FutureCancelledError, KilledWorker
 
 
 def _check_workers(client: Any, address: str) -> None:
