@@ -53,14 +53,21 @@ class Bench:
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """Play one episode, print how it ended, and write a video of the eye's view."""
+    """Play one episode and print how it ended; watch it in a window or write a video.
+
+    Each picture shows what the eye sees, the neuron's layers and spikes, and the road from above.
+    """
 
     target: Positional[str]
-    """An environment id such as LGMD/CCRs-v0, or a case such as quick/CCRs/v30."""
+    """An environment id such as LGMD/CCRs-v0, a case such as quick/CCRs/v30, or traffic/merge."""
     agent: str = "spike-threshold"
     """Who brakes, with options as in spike-threshold:threshold=45."""
     video: Path | None = None
     """Video file to write (.mp4, .gif, …); must not exist."""
+    live: bool = False
+    """Show a window, in real time; Escape closes it."""
+    overlays: tuple[str, ...] = ("zone", "targets")
+    """Over the eye's frame: zone (the lane ahead), targets (bodies ahead); --overlays alone for none."""
     seed: int = 0
     """Draws the place on the road and the target's grey."""
     camera: str = "fovea"

@@ -48,13 +48,17 @@ def drive(options: "cli.Drive") -> int:
     end = play(
         options.target,
         agent,
-        options.video,
         options.seed,
         _parse_arguments(options.set),
+        video=options.video,
+        live=options.live,
+        overlays=options.overlays,
         camera=options.camera,
         params=_read_params(options.params),
     )
-    if end.collision:
+    if end.stopped:
+        print(f"window closed after {end.duration:.2f} s")
+    elif end.collision:
         print(f"contact at {3.6 * end.impact_speed:.1f} km/h relative speed after {end.duration:.2f} s")
     else:
         gap = f"{end.gap:.2f} m ahead free" if end.gap == end.gap else "nothing ahead"

@@ -64,6 +64,8 @@ class VideoWriter:
         from imageio_ffmpeg import write_frames
 
         options: dict[str, Any] = {"quality": 7, "macro_block_size": 2, "pix_fmt_out": "yuv420p"}
+        # Drawn pictures gain little from x264's slower presets, which would hold up whoever draws.
+        options["output_params"] = ["-preset", "veryfast"]
         if self.path.suffix.lower() == ".gif":
             options = {"codec": "gif", "pix_fmt_out": "pal8"}
         self._size = size

@@ -57,9 +57,16 @@ MAY = {
     "paper_claims": ("clips_detect", "paper"),
     "plots_paper": ("paper", "paper_claims", "plots", "stimuli"),
     "commands_paper": None,  # knows all
-    "view": ("wrappers",),
+    "view": ("errors", "view_moment", "view_overlays", "view_picture", "view_window", "wrappers"),
+    "view_canvas": (),
+    "view_moment": (),
+    "view_overlays": ("errors",),
+    "view_panels": ("view_canvas", "view_moment", "view_overlays", "view_window", "wrappers"),
+    "view_picture": ("view_canvas", "view_moment", "view_overlays", "view_panels", "view_trace", "wrappers"),
+    "view_trace": ("view_canvas",),
+    "view_window": (),
     "benchmark": ("agents", "envs", "errors", "_version"),
-    "drive": ("agents", "benchmark", "envs", "errors", "video", "view", ""),
+    "drive": ("agents", "benchmark", "envs", "errors", "video", "view", "view_picture", "view_window", ""),
     "listing": ("agents", "benchmark", "envs", "camera"),
     "commands": None,  # knows all
     "cli": None,

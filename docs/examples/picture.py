@@ -9,20 +9,20 @@ from pathlib import Path
 import gymnasium as gym
 from PIL import Image
 
+from lgmd_gym import LGMDView
 from lgmd_gym.agents import make_agent
-from lgmd_gym.view import View
 
 
 def main(path: Path, ego_speed: float = 11.1, after: int = 8) -> None:
     """Save the view `after` decisions after the first alert of an approach at `ego_speed` [m/s]."""
     agent = make_agent("spike-threshold")
-    env = gym.make("LGMD/CCRs-v0", ego_speed=ego_speed, shade=60, render_mode="rgb_array")
-    view = View(env, f"LGMD/CCRs-v0, {3.6 * ego_speed:.0f} km/h   agent: {agent.name}")
+    title = f"LGMD/CCRs-v0 at {3.6 * ego_speed:.0f} km/h   {agent.name}"
+    env = LGMDView(gym.make("LGMD/CCRs-v0", ego_speed=ego_speed, shade=60), title=title)
     observation, info = env.reset(seed=0)
     since_alert = 0
     while since_alert < after:
         action = agent.act(observation, info)
-        picture = view.draw(observation, info, float(action[0]) < 0, agent.alert)
+        picture = env.render()
         since_alert += bool(since_alert or agent.alert)
         observation, _, terminated, truncated, info = env.step(action)
         if terminated or truncated:
