@@ -1,4 +1,4 @@
-"""The `lgmd-gym` command: bench, drive, video, paper, list."""
+"""The `lgmd-gym` command: bench, drive, video, paper, list, gallery, doctor."""
 
 import contextlib
 import io
@@ -19,6 +19,8 @@ DESCRIPTION = """A highway-env car brakes on the spike frequency of a locust loo
   lgmd-gym video CLIP.mp4                           the spike trace of a dash-camera clip
   lgmd-gym paper                                    the paper's experiments, a verdict on each claim
   lgmd-gym list                                     suites, agents, environments, cameras
+  lgmd-gym gallery                                  a page of every scenario, to look at
+  lgmd-gym doctor                                   is everything in place?
 
 Speeds are in m/s, case names carry km/h. Each command has its own --help."""
 
@@ -139,12 +141,39 @@ class List:
     """Which list."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Gallery:
+    """Make a page of videos of every scenario, with what each agent makes of it; a few minutes.
+
+    The page needs no network: open index.html in the folder.
+    """
+
+    out: Path = Path("gallery")
+    """Folder; must not exist."""
+    families: tuple[str, ...] = ()
+    """Scenario families or kinds of traffic, as CCRs merge; none for all."""
+    agent: str = "spike-threshold"
+    """Who brakes in the videos."""
+    seeds: int = 3
+    """Seeds per scenario that the agents are judged by."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doctor:
+    """Check versions, numba's cache, the video codec and the display, and drive for two seconds.
+
+    Exit code 1 if something is at fault; the table says what to do.
+    """
+
+
 Command = Union[  # noqa: UP007  (tyro reads the annotations)
     Annotated[Bench, subcommand(name="bench")],
     Annotated[Drive, subcommand(name="drive")],
     Annotated[List, subcommand(name="list")],
     Annotated[Video, subcommand(name="video")],
     Annotated[Paper, subcommand(name="paper")],
+    Annotated[Gallery, subcommand(name="gallery")],
+    Annotated[Doctor, subcommand(name="doctor")],
 ]
 
 
@@ -165,6 +194,8 @@ def run(argv: list[str] | None = None) -> int:
             Video: commands_paper.video,
             Paper: commands_paper.paper,
             List: commands.show_list,
+            Gallery: commands.gallery,
+            Doctor: commands.doctor,
         }
         return plays[type(command)](command)
     except (ValueError, TypeError) as error:

@@ -76,6 +76,22 @@ def show_list(options: "cli.List") -> int:
     return 0
 
 
+def gallery(options: "cli.Gallery") -> int:
+    """Make the gallery and say where it is."""
+    from lgmd_gym.gallery import make_gallery
+
+    page = make_gallery(options.out, options.families, options.agent, options.seeds, _console().print)
+    print(f"gallery: {page}")
+    return 0
+
+
+def doctor(options: "cli.Doctor") -> int:
+    """Examine this installation; 1 if something is at fault."""
+    from lgmd_gym import doctor as doctors
+
+    return int(doctors.report(list(doctors.examine()), _console()) > 0)
+
+
 def _report(run: "Run | TrafficRun", console: Console, plots: bool) -> int:
     """Print the tables, write summary and plots, and return the number of failed episodes."""
     from lgmd_gym.benchmark.traffic import TrafficRun

@@ -67,6 +67,13 @@ MAY = {
     "view_window": (),
     "benchmark": ("agents", "envs", "errors", "_version"),
     "drive": ("agents", "benchmark", "envs", "errors", "video", "view", "view_picture", "view_window", ""),
+    "doctor": ("agents", "camera", "neuron", "video", "view_window", ""),
+    "docstrings": (),
+    "gallery": ("agents", "benchmark", "camera", "gallery_page", "gallery_roads", "gallery_scenes", ""),
+    "gallery_page": ("_version", "docstrings", "gallery_scenes", "gallery_style"),
+    "gallery_style": (),
+    "gallery_roads": ("camera",),
+    "gallery_scenes": ("agents", "benchmark", "docstrings", "drive", "envs", "errors", "video", "view"),
     "listing": ("agents", "benchmark", "envs", "camera"),
     "commands": None,  # knows all
     "cli": None,
