@@ -62,7 +62,7 @@ def find_scenes(names: tuple[str, ...] = ()) -> list[Scene]:
 
 
 def film(scene: Scene, agent_name: str, stem: Path) -> None:
-    """Play a scene with seed 0; write its film to `stem`.mp4 and a still of its liveliest moment to .jpg."""
+    """Play a scene with seed 0; write its film to `stem`.mp4, a still of its liveliest moment to .jpg."""
     agent = make_agent(agent_name)
     env = LGMDView(make_target(scene.target, {}), title=f"{scene.target}   {agent.name}")
     rate = env.metadata["render_fps"]
@@ -75,8 +75,8 @@ def film(scene: Scene, agent_name: str, stem: Path) -> None:
             action = agent.act(observation, info)
             env.agent_alert = agent.alert
             if decisions % EVERY == 0:
-                picture = _smaller(env.render())
-                writer.write(picture)
+                picture = env.render()
+                writer.write(_smaller(picture))
                 life = float(observation["spike_frequency"].max()) + (decisions < rate) * -1.0
                 if life > liveliest or (liveliest <= 0.0 and decisions == 4 * rate):
                     still, liveliest = picture, life
@@ -88,7 +88,7 @@ def film(scene: Scene, agent_name: str, stem: Path) -> None:
             writer.write(_smaller(env.render()))
     env.close()
     assert still is not None
-    Image.fromarray(still).save(stem.with_suffix(".jpg"), quality=80)
+    Image.fromarray(still).save(stem.with_suffix(".jpg"), quality=82)
 
 
 def judge(scene: Scene, agents: list[str], seeds: int) -> dict[str, str]:

@@ -24,7 +24,7 @@ video { display: block; width: 100%; aspect-ratio: 16/9; background: #000 }
 table { border-collapse: collapse; width: 100%; margin: 8px 0; font-size: 14px }
 td, th { text-align: left; padding: 3px 10px 3px 0; border-bottom: 1px solid var(--line); vertical-align:
   top }
-th { color: var(--faint); font-weight: 500 }
+th { color: var(--faint); font-weight: 500; white-space: nowrap }
 details { font-size: 14px }
 summary { cursor: pointer; color: var(--sky) }
 .good { color: #56b4e9 }
@@ -45,7 +45,13 @@ footer { padding: 32px 24px; font-size: 14px }
 
 SCRIPT = """
 for (const film of document.querySelectorAll("video")) {
-  film.addEventListener("mouseenter", () => film.play());
-  film.addEventListener("mouseleave", () => film.pause());
+  film.controls = false;
+  film.tabIndex = 0;
+  const play = () => { film.controls = true; film.play(); };
+  const rest = () => { film.controls = false; film.pause(); };
+  film.addEventListener("mouseenter", play);
+  film.addEventListener("focus", play);
+  film.addEventListener("mouseleave", rest);
+  film.addEventListener("blur", rest);
 }
 """
