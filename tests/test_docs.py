@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joblib.externals.loky import get_reusable_executor
 
 from lgmd_gym import cli
 from lgmd_gym.agents import AGENTS
@@ -42,6 +43,7 @@ def test_code_blocks_run(path, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     make_clip(tmp_path / "clip.mp4")
+    get_reusable_executor().shutdown(wait=True)  # another page's workers look in another folder
     space = {"__name__": path.stem}
     for kind, block in BLOCK.findall(path.read_text()):
         assert kind in ("python", "bash", "text"), f"say here what is done with a block of {kind}"
