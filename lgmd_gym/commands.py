@@ -89,7 +89,9 @@ def doctor(options: "cli.Doctor") -> int:
     """Examine this installation; 1 if something is at fault."""
     from lgmd_gym import doctor as doctors
 
-    return int(doctors.report(list(doctors.examine()), _console()) > 0)
+    console = _console()
+    with console.status("the first drive on a machine compiles the kernels, up to a minute"):
+        return int(doctors.report(doctors.examine(), console) > 0)
 
 
 def _report(run: "Run | TrafficRun", console: Console, plots: bool) -> int:

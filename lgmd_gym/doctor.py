@@ -2,7 +2,7 @@
 
 import platform
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
@@ -14,6 +14,7 @@ import numpy as np
 PACKAGE = "lgmd-gym"
 SELF_TEST = 2.0  # [s] of wall time
 SPEED = 8.0  # [m/s] at which the self-test approaches a standing car
+REINSTALL = "in a clone of the repository and a fresh virtual environment: pip install -c constraints.txt ."
 OK, NOTE, FAULT = "ok", "note", "fault"
 
 
@@ -46,7 +47,7 @@ def examine_one(name: str) -> list[Finding]:
         return CHECKS[name]()
     except Exception as error:
         words = f"{type(error).__name__}: {' '.join(str(error).split())}"
-        return [Finding(name, FAULT, words, "reinstall: pip install --force-reinstall lgmd-gym")]
+        return [Finding(name, FAULT, words, REINSTALL)]
 
 
 def check_versions() -> list[Finding]:
@@ -71,8 +72,7 @@ def check_versions() -> list[Finding]:
     if fine:
         found.append(Finding("packages", OK, ", ".join(fine)))
     if wrong:
-        mend = "pip install -c constraints.txt . in a fresh virtual environment"
-        found.append(Finding("packages", FAULT, "; ".join(wrong), mend))
+        found.append(Finding("packages", FAULT, "; ".join(wrong), REINSTALL))
     return [*found, _training()]
 
 
@@ -82,7 +82,12 @@ def _training() -> Finding:
     try:
         return Finding("training", OK, ", ".join(f"{name} {version(name)}" for name in names))
     except PackageNotFoundError as error:
-        return Finding("training", NOTE, f"{error.name} is not installed", 'pip install "lgmd-gym[train]"')
+        return Finding(
+            "training",
+            NOTE,
+            f"{error.name} is not installed",
+            'in a clone of the repository: pip install -c constraints.txt ".[train]"',
+        )
 
 
 def check_cache() -> list[Finding]:
@@ -208,16 +213,16 @@ CHECKS: dict[str, Callable[[], list[Finding]]] = {
 }
 
 
-def report(findings: list[Finding], console: Any) -> int:
-    """Print the findings, with the mends under them, and return the number of faults."""
+def report(findings: Iterable[Finding], console: Any) -> int:
+    """Print findings as they come, with the mends under them, and return the number of faults."""
     from rich.markup import escape
-    from rich.table import Table
 
     colours = {OK: "green", NOTE: "yellow", FAULT: "red"}
-    table = Table.grid(padding=(0, 2))
+    faults = 0
     for item in findings:
-        table.add_row(f"[{colours[item.state]}]{item.state}[/]", item.check, escape(item.words))
+        head = f"[{colours[item.state]}]{item.state:5}[/] {item.check:11}"
+        console.print(f"{head} {escape(item.words)}", soft_wrap=True, highlight=False)
         if item.mend:
-            table.add_row("", "", f"[bold]→ {escape(item.mend)}[/]")
-    console.print(table)
-    return sum(item.state == FAULT for item in findings)
+            console.print(f"{'':17} [bold]→ {escape(item.mend)}[/]", soft_wrap=True, highlight=False)
+        faults += item.state == FAULT
+    return faults

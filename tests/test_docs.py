@@ -21,7 +21,14 @@ PAGES = sorted(
     path for path in DOCS.rglob("*.md") if not {"_generated", "_build"} & set(path.relative_to(DOCS).parts)
 )
 # Installing and testing are run by .ci/run, and by whoever reads this; the rest of a shell block runs here.
-ELSEWHERE = ("python3 -m venv", "pip install", ".venv/bin/", "git clone", "python docs/examples/")
+ELSEWHERE = (
+    "python3 -m venv",
+    "source .venv",
+    "pip install",
+    ".venv/bin/",
+    "git clone",
+    "python docs/examples/",
+)
 # Pages whose blocks take under a second; the others run with -m slow.
 QUICK = {"README", "neuron", "own_scenario"}
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)

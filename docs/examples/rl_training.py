@@ -1,6 +1,6 @@
 """RL training: stable-baselines3's PPO learns when to brake from spike frequency and own speed.
 
-    pip install "lgmd-gym[train]"
+    pip install -c constraints.txt ".[train]"
     python docs/examples/rl_training.py 100000 docs/tutorials/rl_training.png
 
 Two thousand steps show that everything fits together; a policy worth showing takes far more.
