@@ -64,6 +64,13 @@ class Canvas:
         alpha = mask[: room.shape[0], : room.shape[1]]
         room[...] = room + (np.array(colour, np.float32) - room) * alpha
 
+    def tag(self, at: tuple[float, float], text: str, size: int) -> None:
+        """Write one line of text on a dark plate, centred, over whatever is there."""
+        height, width = _mask(text, size).shape[:2]
+        left, top = round(at[0] - width / 2), round(at[1] - height / 2)
+        self.pill((left - 5, top, left + width + 5, top + height), GROUND)
+        self.text(at, text, size, INK, "mm")
+
     def rectangle(self, box: Box, colour: Colour) -> None:
         """Fill a rectangle."""
         left, top, right, bottom = box

@@ -69,7 +69,7 @@ class EyePanel:
             box = (right - INSET[0], EYE[3] - 8 - INSET[1], right, EYE[3] - 8)
             inset = canvas.paste(GREY[small], box)
             canvas.frame(inset, FAINT)
-            canvas.text((inset[0] + 6, inset[1] + 4), other, 15)
+            canvas.tag(((inset[0] + inset[2]) / 2, inset[3] - 14), other, 14)
             right = box[0] - 8
         canvas.text((EYE[0], EYE[3] + 5), _about(camera, name, self.observer.fps), 15, FAINT)
         self._draw_legend(canvas, hasattr(camera, "project"))
@@ -180,7 +180,7 @@ class TopPanel:
         canvas.blit(self._viewer.sim_surface, TOP[:2])
         x = TOP[0] + TOP_CENTRE[0] * (TOP[2] - TOP[0])
         y = TOP[1] + TOP_CENTRE[1] * (TOP[3] - TOP[1])
-        canvas.text((x, y - 24), "ego", 15, INK, "mm")
+        canvas.tag((x, y - 24), "ego", 14)
 
 
 def _about(camera: Any, name: str, fps: float) -> str:
