@@ -34,6 +34,7 @@ summary { cursor: pointer; color: var(--sky) }
 .sheet { overflow-x: auto }
 .sheet img { width: 240px; image-rendering: pixelated; display: block; border-radius: 4px }
 .sheet table { width: auto }
+.sheet th { border: 0; vertical-align: middle }
 .sheet td { border: 0; padding: 3px 6px 3px 0; vertical-align: middle }
 .key { display: grid; grid-template-columns: minmax(0, 3fr) minmax(0, 2fr); gap: 24px; align-items: center
   }

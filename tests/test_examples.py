@@ -62,5 +62,8 @@ def test_every_example_is_run_here():
 def test_picture(tmp_path):
     from PIL import Image
 
-    load("picture").main(tmp_path / "view.png", ego_speed=5.0, after=2)
+    load("picture").main(tmp_path / "view.png", tmp_path / "film.gif", ego_speed=5.0, after=2)
     assert Image.open(tmp_path / "view.png").size == (1280, 720)
+    film = Image.open(tmp_path / "film.gif")
+    assert film.size == (800, 450)
+    assert film.n_frames > 20
