@@ -12,11 +12,14 @@ import pytest
 
 from lgmd_gym import CameraParams, EgoCamera, LGMDObservation, LGMDView, cli
 from lgmd_gym import view_canvas as colours
+from lgmd_gym.agents import make_agent
+from lgmd_gym.drive import drive, make_target
 from lgmd_gym.neuron.danger import danger_zone
 from lgmd_gym.view_moment import Moment
 from lgmd_gym.view_overlays import danger_lines, target_boxes
 from lgmd_gym.view_panels import CAMERA_COLOURS, EYE, TOP
 from lgmd_gym.view_trace import PLOT, Trace
+from lgmd_gym.view_window import Window
 
 HOLD, BRAKE = [0.0], [-1.0]
 
@@ -264,3 +267,38 @@ def test_colours_can_be_told_apart(kind):
         for one, other in combinations(group, 2):
             apart = np.linalg.norm(lab(one, BLINDNESS[kind]) - lab(other, BLINDNESS[kind]))
             assert apart > least, f"{one} and {other} are {apart:.0f} apart"
+
+
+def test_closing_the_window_ends_a_drive(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    shown = []
+
+    def show(window, picture):
+        shown.append(picture.shape)
+        return len(shown) < 5
+
+    monkeypatch.setattr(Window, "show", show)
+    end = drive("LGMD/CCRs-v0", make_agent("no-brake"), 0, {}, live=True)
+    assert end.stopped
+    assert end.duration == pytest.approx(4 / 30)
+    assert shown == [(720, 1280, 3)] * 5
+
+
+@pytest.mark.parametrize(
+    ("target", "arguments", "words"),
+    [
+        ("traffic/merg", {}, "did you mean 'traffic/merge'"),
+        ("traffic/merge", {"ego_speed": 5.0}, "takes no scenario arguments, got ego_speed"),
+    ],
+)
+def test_targets_are_refused_with_the_nearest(target, arguments, words):
+    with pytest.raises(ValueError, match=words):
+        make_target(target, arguments)
+
+
+@pytest.mark.parametrize("target", ["traffic/merge", "LGMD/RandomBraking-v0", "quick/CCRs/v30"])
+def test_every_kind_of_target_can_be_looked_at(target):
+    env = LGMDView(make_target(target, {}), title=target)
+    env.reset(seed=0)
+    env.step(HOLD)
+    assert env.render().std() > 20

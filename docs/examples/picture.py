@@ -11,8 +11,12 @@ from PIL import Image
 
 from lgmd_gym import LGMDView
 from lgmd_gym.agents import make_agent
+from lgmd_gym.view_canvas import PINK, RED, SKY, UNLIT, YELLOW
 
 START, EVERY, WIDTH = 2.0, 3, 800  # a film begins at [s], takes every third decision, is so wide [px]
+
+# Small but telling areas, which a palette made by counting pixels forgets: signals and cars from above.
+SIGNALS = (SKY, YELLOW, RED, PINK, UNLIT, (50, 200, 0), (100, 200, 255))
 
 
 def main(path: Path, film: Path | None = None, ego_speed: float = 11.1, after: int = 8) -> None:
@@ -48,7 +52,9 @@ def main(path: Path, film: Path | None = None, ego_speed: float = 11.1, after: i
 
 def save_gif(pictures: list[Image.Image], path: Path) -> None:
     """Save pictures with one palette for all, without dithering, which would flicker and cost space."""
-    palette = pictures[-10].quantize(96)
+    common = pictures[-10].quantize(96).getpalette()[: 3 * 96]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*common, *(value for colour in SIGNALS for value in colour)])
     frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=1000 * EVERY // 30, loop=0)
 
