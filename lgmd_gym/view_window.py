@@ -75,7 +75,7 @@ def check_display() -> str:
     """Return SDL's display driver.
 
     Raises:
-        ValueError: If it shows nothing and was not asked for by SDL_VIDEODRIVER.
+        ValueError: If it shows nothing, and SDL_VIDEODRIVER does not ask for such a one.
     """
     mend = "write a file with --video"
     if sys.platform.startswith("linux"):
@@ -87,7 +87,7 @@ def check_display() -> str:
         driver = pygame.display.get_driver()
     except pygame.error as error:
         raise ValueError(f"a window needs a display and there is none ({error}); {mend}") from None
-    if driver in NO_SCREEN and os.environ.get("SDL_VIDEODRIVER") != driver:
+    if driver in NO_SCREEN and os.environ.get("SDL_VIDEODRIVER") not in NO_SCREEN:
         raise ValueError(f"a window needs a display and there is none (SDL's driver is {driver!r}); {mend}")
     return driver
 
