@@ -10,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from lgmd_gym import __version__
 
 project = "lgmd-gym"
+project_copyright = "2026, the lgmd-gym authors"
 release = __version__
 html_theme = "furo"
 html_title = f"lgmd-gym {release}"
