@@ -1,4 +1,4 @@
-"""The `lgmd-gym` command: bench, compare, drive, video, paper, train, list."""
+"""The `lgmd-gym` command: bench, compare, drive, video, paper, train, list, gallery, doctor."""
 
 import contextlib
 import io
@@ -21,6 +21,8 @@ DESCRIPTION = """A highway-env car brakes on the spike frequency of a locust loo
   lgmd-gym paper                                    the paper's experiments, a verdict on each claim
   lgmd-gym train                                    a policy that learns to brake, with stable-baselines3
   lgmd-gym list                                     suites, agents, environments, cameras
+  lgmd-gym gallery                                  a page of every scenario, to look at
+  lgmd-gym doctor                                   is everything in place?
 
 Speeds are in m/s, case names carry km/h. Each command has its own --help."""
 
@@ -84,14 +86,21 @@ class Compare:
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """Play one episode, print how it ended, and write a video of the eye's view."""
+    """Play one episode and print how it ended; watch it in a window or write a video.
+
+    Each picture shows what the eye sees, the neuron's layers and spikes, and the road from above.
+    """
 
     target: Positional[str]
-    """An environment id such as LGMD/CCRs-v0, or a case such as quick/CCRs/v30."""
+    """An environment id such as LGMD/CCRs-v0, a case such as quick/CCRs/v30, or traffic/merge."""
     agent: str = "spike-threshold"
     """Who brakes, with options as in spike-threshold:threshold=45."""
     video: Path | None = None
     """Video file to write (.mp4, .gif, …); must not exist."""
+    live: bool = False
+    """Show a window, in real time; Escape closes it."""
+    overlays: tuple[str, ...] = ("zone", "targets")
+    """Over the eye's frame: zone (the lane ahead), targets (bodies ahead); --overlays alone for none."""
     seed: int = 0
     """Draws the place on the road and the target's grey."""
     camera: str = "fovea"
@@ -198,6 +207,31 @@ class List:
     """Which list."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Gallery:
+    """Make a page of videos of every scenario, with what each agent makes of it; a few minutes.
+
+    The page needs no network: open index.html in the folder.
+    """
+
+    out: Path = Path("gallery")
+    """Folder; must not exist."""
+    families: tuple[str, ...] = ()
+    """Scenario families or kinds of traffic, as CCRs merge; none for all."""
+    agent: str = "spike-threshold"
+    """Who brakes in the videos."""
+    seeds: int = 3
+    """Seeds per scenario that the agents are judged by."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doctor:
+    """Check versions, numba's cache, the video codec and the display, and drive for two seconds.
+
+    Exit code 1 if something is at fault; the table says what to do.
+    """
+
+
 Command = Union[  # noqa: UP007  (tyro reads the annotations)
     Annotated[Bench, subcommand(name="bench")],
     Annotated[Drive, subcommand(name="drive")],
@@ -206,6 +240,8 @@ Command = Union[  # noqa: UP007  (tyro reads the annotations)
     Annotated[Paper, subcommand(name="paper")],
     Annotated[Train, subcommand(name="train")],
     Annotated[Compare, subcommand(name="compare")],
+    Annotated[Gallery, subcommand(name="gallery")],
+    Annotated[Doctor, subcommand(name="doctor")],
 ]
 
 
@@ -228,6 +264,8 @@ def run(argv: list[str] | None = None) -> int:
             Paper: commands_paper.paper,
             Train: commands_train.train,
             List: commands.show_list,
+            Gallery: commands.gallery,
+            Doctor: commands.doctor,
         }
         return plays[type(command)](command)
     except (ValueError, TypeError) as error:

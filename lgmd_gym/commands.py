@@ -18,13 +18,17 @@ def drive(options: "cli.Drive") -> int:
     end = play(
         options.target,
         agent,
-        options.video,
         options.seed,
         _parse_arguments(options.set),
+        video=options.video,
+        live=options.live,
+        overlays=options.overlays,
         camera=options.camera,
         params=_read_params(options.params),
     )
-    if end.collision:
+    if end.stopped:
+        print(f"window closed after {end.duration:.2f} s")
+    elif end.collision:
         print(f"contact at {3.6 * end.impact_speed:.1f} km/h relative speed after {end.duration:.2f} s")
     else:
         gap = f"{end.gap:.2f} m ahead free" if end.gap == end.gap else "nothing ahead"
@@ -40,6 +44,24 @@ def show_list(options: "cli.List") -> int:
 
     listing.show(options.what, _console())
     return 0
+
+
+def gallery(options: "cli.Gallery") -> int:
+    """Make the gallery and say where it is."""
+    from lgmd_gym.gallery import make_gallery
+
+    page = make_gallery(options.out, options.families, options.agent, options.seeds, _console().print)
+    print(f"gallery: {page}")
+    return 0
+
+
+def doctor(options: "cli.Doctor") -> int:
+    """Examine this installation; 1 if something is at fault."""
+    from lgmd_gym import doctor as doctors
+
+    console = _console()
+    with console.status("the first drive on a machine compiles the kernels, up to a minute"):
+        return int(doctors.report(doctors.examine(), console) > 0)
 
 
 def _console() -> Console:
