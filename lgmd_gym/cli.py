@@ -172,8 +172,8 @@ class Train:
     policy that did best there. Ctrl-C keeps the checkpoints; --resume goes on from the last one.
     """
 
-    algo: str = "ppo"
-    """ppo, sac or dqn."""
+    algo: str = "sac"
+    """sac, ppo or dqn."""
     env: str = "LGMD/RandomBraking-v0"
     """Environment id; RandomBraking is trained on its split train and judged on validation."""
     camera: tuple[str, ...] = ("fovea", "tele", "wide")

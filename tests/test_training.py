@@ -136,7 +136,13 @@ def test_bad_hyperparameters_are_refused(tmp_path, text, words):
 def order(tmp_path, **changes):
     file = tmp_path / "hyper.yml"
     file.write_text(YAML)
-    given = {"env_id": "LGMD/CCRs-v0", "camera": ("fovea",), "hyperparams": file, "eval_every": 32}
+    given = {
+        "algo": "ppo",
+        "env_id": "LGMD/CCRs-v0",
+        "camera": ("fovea",),
+        "hyperparams": file,
+        "eval_every": 32,
+    }
     return Order(**given | {"eval_episodes": 1} | changes)
 
 

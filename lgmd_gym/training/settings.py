@@ -41,7 +41,7 @@ def read_settings(algo: str, env_id: str, file: Path | None = None) -> Settings:
     """
     if algo not in ALGORITHMS:
         raise unknown_name("algorithm", algo, ALGORITHMS)
-    entries = _read(file or Path(str(files("lgmd_gym.training") / "hyperparams" / f"{algo}.yml")))
+    entries = _read(file or Path(str(files("lgmd_gym.training") / f"{algo}.yml")))
     entry = entries.get(env_id, entries.get("default"))
     if not isinstance(entry, dict):
         raise unknown_name("entry of the hyperparameters for", env_id, entries)

@@ -41,7 +41,7 @@ class Order:
         env_kwargs: Further arguments of `gym.make`.
     """
 
-    algo: str = "ppo"
+    algo: str = "sac"
     env_id: str = RANDOM_ID
     camera: Sequence[str] = CAMERAS
     steps: int | None = None
