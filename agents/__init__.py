@@ -9,6 +9,7 @@ from lgmd_gym.agents.foreign import ForeignAgent, import_agent
 from lgmd_gym.agents.images import FlowDivergence, FrameDifference
 from lgmd_gym.agents.options import check_options, parse
 from lgmd_gym.agents.oracles import EtaOracle, StoppingDistanceOracle, TauOracle, TTCOracle
+from lgmd_gym.agents.policy import Policy
 from lgmd_gym.agents.rule import Rule
 from lgmd_gym.agents.rules import AdaptiveThreshold, Graded, SpeedGated, SpikeThreshold
 from lgmd_gym.agents.stopping_zone import StoppingZone
@@ -21,6 +22,7 @@ __all__ = [
     "Agent",
     "AlwaysBrake",
     "NoBrake",
+    "Policy",
     "RandomBrake",
     "Rule",
     "SpikeThreshold",
@@ -59,12 +61,17 @@ def make_agent(text: str) -> Agent:
     Args:
         text: "name", or "name:option=value,…" as in "spike-threshold:threshold=45,frames=2"; a rule's option
             `toml` names a file of options, as in "stopping-zone:toml=mine.toml". A user's own agent is
-            "module:Class" or "module:Class:option=value,…", any class with `act`.
+            "module:Class" or "module:Class:option=value,…", any class with `act`; a policy of
+            `lgmd-gym train` is "policy:FILE.zip" (loading one runs what its author pickled into it).
 
     Raises:
         ValueError: For an unknown agent or option (the nearest is named), or a value out of its range.
     """
     head, _, rest = text.partition(":")
+    if "," in head:
+        raise ValueError(f"agent {text!r} holds a comma before any option; separate agents by spaces")
+    if head == Policy.name:
+        return Policy(rest)
     class_name, _, options_text = rest.partition(":")
     if head not in AGENTS and class_name.isidentifier():
         name = f"{head}:{class_name}"

@@ -95,6 +95,7 @@ class BrakingEnv(AbstractEnv):
         self, scenario: Scenario, config: dict[str, Any] | None = None, render_mode: str | None = None
     ) -> None:
         self.scenario = scenario
+        self.camera_fields: dict[str, Any] = {}
         self.metadata = {**type(self).metadata}  # type: ignore[misc]
         self._network: tuple[RoadPlan, RoadNetwork] | None = None
         self._closed_in = False

@@ -1,5 +1,6 @@
 """A distribution over the scenario families, cut into numbered levels for training and tuning."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,27 +12,48 @@ from lgmd_gym.errors import unknown_name
 
 SPLITS = ("train", "validation", "test")
 LEVELS = 1_000_000  # per split
+CONDITIONS = ("clear", "night", "fog", "robust")  # the camera's, by name; a test holds them together
 THREAT_SHARE = 0.5
 SPEED_KMH = (10.0, 80.0)
 
 
-def check_levels(split: str, start_level: int, num_levels: int) -> None:
-    """Refuse an unknown split or levels beyond it.
+def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> None:
+    """Refuse an unknown split or condition, or levels beyond the split.
 
     Raises:
         ValueError: Names the value and the bound.
     """
     if split not in SPLITS:
         raise unknown_name("split", split, SPLITS)
+    check_conditions(conditions)
     if not 0 <= start_level < LEVELS:
         raise ValueError(f"start_level must be in [0, {LEVELS - 1}], got {start_level!r}")
     if not 0 <= num_levels <= LEVELS - start_level:
         raise ValueError(f"num_levels must be in [0, {LEVELS - start_level}] (0 for all), got {num_levels!r}")
 
 
-def level_generator(split: str, level: int) -> np.random.Generator:
-    """Return the random numbers of a level; no two levels of any splits share them."""
-    return np.random.default_rng([SPLITS.index(split), level])
+def check_conditions(conditions: Sequence[str]) -> None:
+    """Refuse an unknown camera condition, or none at all."""
+    if not conditions:
+        raise ValueError("conditions needs at least one name, got none")
+    for condition in conditions:
+        if condition not in CONDITIONS:
+            raise unknown_name("condition", condition, CONDITIONS)
+
+
+def level_generator(split: str, level: int, part: int = 0) -> np.random.Generator:
+    """Return the random numbers of a part of a level; no two levels of any splits share them."""
+    return np.random.default_rng([SPLITS.index(split), level, *([part] if part else [])])
+
+
+def draw_view(split: str, level: int, conditions: Sequence[str]) -> dict[str, Any]:
+    """Return what a level does to cameras: one of the conditions, and how strong the ground's grain is.
+
+    They have random numbers of their own, so that the scenario is the same whatever conditions are in use.
+    """
+    rng = level_generator(split, level, part=1)
+    texture = float(rng.uniform(0.5, 1.5))
+    return {"condition": conditions[int(rng.integers(len(conditions)))], "texture": texture}
 
 
 def draw_scenario(rng: np.random.Generator) -> Scenario:

@@ -70,21 +70,26 @@ def make_observed(
         trace: See `LGMDObservation`.
         config: Configuration of `BrakingEnv`.
         render_mode: None, "rgb_array" or "human".
-        **arguments: The family's own arguments, in SI units; those of `RandomBrakingEnv`.
+        **arguments: The family's own arguments, in SI units, and `condition`, the light and weather by name,
+            laid over the camera: "clear", "night", "fog" or "robust"; or those of `RandomBrakingEnv`.
 
     Raises:
         ValueError: For an unknown argument, key or name (the nearest is named), or a value out of its range.
     """
     from lgmd_gym.envs.braking import BrakingEnv
     from lgmd_gym.envs.catalogue import make_scenario
+    from lgmd_gym.envs.levels import check_conditions
     from lgmd_gym.envs.random_braking import RandomBrakingEnv
     from lgmd_gym.errors import check_keys
 
     if family == RANDOM:
-        check_keys(f"argument of {RANDOM}", arguments, ("split", "start_level", "num_levels"))
+        check_keys(f"argument of {RANDOM}", arguments, ("split", "start_level", "num_levels", "conditions"))
         env = RandomBrakingEnv(**arguments, config=config, render_mode=render_mode)
     else:
+        condition = arguments.pop("condition", "clear")
+        check_conditions([condition])
         env = BrakingEnv(make_scenario(family, **arguments), config=config, render_mode=render_mode)
+        env.camera_fields["condition"] = condition
     if camera is None:
         return env
     from lgmd_gym.wrappers import LGMDObservation

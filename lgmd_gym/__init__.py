@@ -12,6 +12,7 @@ from lgmd_gym.envs.registration import register_envs
 if TYPE_CHECKING:
     from lgmd_gym.camera import BirdsEye, CameraParams, EgoCamera
     from lgmd_gym.neuron import LGMD, LGMDParams, Response
+    from lgmd_gym.view import LGMDView
     from lgmd_gym.wrappers import LGMDObservation
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "EgoCamera",
     "LGMDObservation",
     "LGMDParams",
+    "LGMDView",
     "Response",
     "__version__",
 ]
@@ -33,6 +35,7 @@ _HOMES = {
     "CameraParams": "camera",
     "EgoCamera": "camera",
     "LGMDObservation": "wrappers",
+    "LGMDView": "view",
 }
 
 register_envs()

@@ -1,4 +1,4 @@
-"""The `lgmd-gym` command: bench, drive, video, paper, tune, list."""
+"""The `lgmd-gym` command: bench, compare, drive, video, paper, train, tune, list, gallery, doctor."""
 
 import contextlib
 import io
@@ -15,11 +15,15 @@ from tyro.conf import Positional, subcommand
 DESCRIPTION = """A highway-env car brakes on the spike frequency of a locust looming neuron (LGMD).
 
   lgmd-gym bench                                    try all agents on the quick suite; about a minute
+  lgmd-gym compare runs/A runs/B                    paired differences of two runs
   lgmd-gym drive LGMD/CCRs-v0 --video out.mp4       watch one approach through the eye
   lgmd-gym video CLIP.mp4                           the spike trace of a dash-camera clip
   lgmd-gym paper                                    the paper's experiments, a verdict on each claim
   lgmd-gym tune --agent fovea                       search a rule's parameters on training levels
+  lgmd-gym train                                    a policy that learns to brake, with stable-baselines3
   lgmd-gym list                                     suites, agents, environments, cameras
+  lgmd-gym gallery                                  a page of every scenario, to look at
+  lgmd-gym doctor                                   is everything in place?
 
 Speeds are in m/s, case names carry km/h. Each command has its own --help."""
 
@@ -28,42 +32,76 @@ Speeds are in m/s, case names carry km/h. Each command has its own --help."""
 class Bench:
     """Play a suite with every agent and seed, print the scores, and write a run folder.
 
-    The folder gets episodes.jsonl (one row per episode, as it finishes), summary.csv, run.json, the time
-    series of seed 0 and one PNG per case. Ctrl-C keeps what is finished.
+    The folder gets episodes.jsonl (one row per episode, as it finishes), summary.csv, report.html, run.toml,
+    run.json, time series and one PNG per case. Ctrl-C keeps what is finished.
     """
 
-    suite: str = "quick"
-    """Name of a suite; `lgmd-gym list suites` shows them. 300 km of traffic: --suite traffic --seeds 110."""
-    agents: tuple[str, ...] = ("no-brake", "always-brake", "random-brake", "spike-threshold", "ttc-oracle")
-    """Agents with options, as in spike-threshold:threshold=45,frames=2."""
-    seeds: int = 3
-    """Seeds per case, from 0 on; a seed draws the place on the road and the target's grey."""
-    jobs: int = 2
-    """Processes."""
-    out: Path | None = None
-    """Run folder; must not exist. Default: runs/SUITE-DATE-TIME."""
-    resume: Path | None = None
-    """Run folder of a broken-off run: plays what is missing, with that run's own settings."""
+    suite: str | None = None
+    """Name of a suite (`lgmd-gym list suites`), or a suite file, NAME.toml. Default: quick. 300 km of
+    traffic: --suite traffic --seeds 110."""
+    agents: tuple[str, ...] | None = None
+    """Agents with options, as in spike-threshold:threshold=45,frames=2, or your own as MODULE:CLASS. Default:
+    no-brake always-brake random-brake spike-threshold ttc-oracle."""
+    seeds: int | None = None
+    """Seeds per case, from 0 on; a seed draws the place on the road and the target's grey. Default: 3."""
+    conditions: tuple[str, ...] | None = None
+    """Camera conditions, each played: clear, night, fog, robust. Default: clear."""
     camera: str | None = None
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
-    condition: Literal["clear", "night", "fog", "robust"] = "clear"
-    """What the cameras meet: robust is sensor noise, vibration, brake dive, heave and exposure time."""
     params: Path | None = None
     """TOML file of LGMD parameters."""
+    config: Path | None = None
+    """The run.toml of a run folder: plays the same again, in place of the options above."""
+    resume: Path | None = None
+    """Run folder of a broken-off run: plays what is missing, with that run's own settings."""
+    jobs: int = 2
+    """Processes."""
+    backend: Literal["processes", "dask"] = "processes"
+    """Where to play: on this machine, or on a Dask cluster that runs already."""
+    address: str | None = None
+    """Of the cluster's scheduler, as tcp://10.0.0.1:8786."""
+    out: Path | None = None
+    """Run folder; must not exist. Default: runs/SUITE-DATE-TIME."""
     plots: bool = True
     """Draw one PNG per case."""
+    report: bool = True
+    """Write report.html."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compare:
+    """Say how two runs differ, pair by pair: the same case, seed and condition.
+
+    Differences are B less A, with 95 % intervals from a bootstrap that draws whole cases.
+    """
+
+    run_a: Positional[Path]
+    """Run folder."""
+    run_b: Positional[Path | None] = None
+    """Another run folder; without it, agents within the first are compared."""
+    agents: tuple[str, ...] | None = None
+    """Two agents: A's and B's. Default: every agent that both runs hold, or all pairs within one."""
+    out: Path | None = None
+    """PNG of the differences to write; must not exist."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """Play one episode, print how it ended, and write a video of the eye's view."""
+    """Play one episode and print how it ended; watch it in a window or write a video.
+
+    Each picture shows what the eye sees, the neuron's layers and spikes, and the road from above.
+    """
 
     target: Positional[str]
-    """An environment id such as LGMD/CCRs-v0, or a case such as quick/CCRs/v30."""
+    """An environment id such as LGMD/CCRs-v0, a case such as quick/CCRs/v30, or traffic/merge."""
     agent: str = "spike-threshold"
     """Who brakes, with options as in spike-threshold:threshold=45."""
     video: Path | None = None
     """Video file to write (.mp4, .gif, …); must not exist."""
+    live: bool = False
+    """Show a window, in real time; Escape closes it."""
+    overlays: tuple[str, ...] = ("zone", "targets")
+    """Over the eye's frame: zone (the lane ahead), targets (bodies ahead); --overlays alone for none."""
     seed: int = 0
     """Draws the place on the road and the target's grey."""
     camera: str | None = None
@@ -128,6 +166,41 @@ class Paper:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Train:
+    """Train a policy with stable-baselines3; it then brakes as --agents policy:FOLDER/policy.zip.
+
+    The folder gets TensorBoard logs, checkpoints, what the looks at the validation split said, and the
+    policy that did best there. Ctrl-C keeps the checkpoints; --resume goes on from the last one.
+    """
+
+    algo: str = "sac"
+    """sac, ppo or dqn."""
+    env: str = "LGMD/RandomBraking-v0"
+    """Environment id; RandomBraking is trained on its split train and judged on validation."""
+    camera: tuple[str, ...] = ("fovea", "tele", "wide")
+    """Camera presets, a neuron each."""
+    inputs: tuple[str, ...] = ()
+    """Observations the policy sees: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed,
+    speed_change, ego_yaw_rate, frame; default: all but the last."""
+    demands: tuple[float, ...] = (0.0, -0.4, -1.0)
+    """Demands the policy chooses among, from -1 (full braking) to 1; empty for any. SAC takes no choice."""
+    steps: int | None = None
+    """Decisions of the policy; default: what the hyperparameters say."""
+    seed: int = 0
+    """Of the network and the levels drawn."""
+    hyperparams: Path | None = None
+    """YAML file in the format of rl-zoo; default: the package's own."""
+    eval_every: int = 20_000
+    """Decisions between two looks at the validation split."""
+    eval_episodes: int = 60
+    """Episodes of a look."""
+    out: Path | None = None
+    """Training folder; must not exist. Default: runs/train-ALGO-DATE-TIME."""
+    resume: Path | None = None
+    """Training folder of a broken-off training, to go on with under its own settings."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Tune:
     """Tune a rule on training levels of LGMD/RandomBraking-v0 and false-reaction cases with other seeds.
 
@@ -160,6 +233,31 @@ class List:
     """Which list."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Gallery:
+    """Make a page of videos of every scenario, with what each agent makes of it; a few minutes.
+
+    The page needs no network: open index.html in the folder.
+    """
+
+    out: Path = Path("gallery")
+    """Folder; must not exist."""
+    families: tuple[str, ...] = ()
+    """Scenario families or kinds of traffic, as CCRs merge; none for all."""
+    agent: str = "spike-threshold"
+    """Who brakes in the videos."""
+    seeds: int = 3
+    """Seeds per scenario that the agents are judged by."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doctor:
+    """Check versions, numba's cache, the video codec and the display, and drive for two seconds.
+
+    Exit code 1 if something is at fault; the table says what to do.
+    """
+
+
 Command = Union[  # noqa: UP007  (tyro reads the annotations)
     Annotated[Bench, subcommand(name="bench")],
     Annotated[Drive, subcommand(name="drive")],
@@ -167,6 +265,10 @@ Command = Union[  # noqa: UP007  (tyro reads the annotations)
     Annotated[Video, subcommand(name="video")],
     Annotated[Paper, subcommand(name="paper")],
     Annotated[Tune, subcommand(name="tune")],
+    Annotated[Train, subcommand(name="train")],
+    Annotated[Compare, subcommand(name="compare")],
+    Annotated[Gallery, subcommand(name="gallery")],
+    Annotated[Doctor, subcommand(name="doctor")],
 ]
 
 
@@ -179,15 +281,19 @@ def run(argv: list[str] | None = None) -> int:
     """Run one command and return its exit code."""
     try:
         command = _parse(argv)
-        from lgmd_gym import commands, commands_paper, commands_tune
+        from lgmd_gym import commands, commands_bench, commands_paper, commands_train, commands_tune
 
         plays: dict[type, Callable[[Any], int]] = {
-            Bench: commands.bench,
+            Bench: commands_bench.bench,
+            Compare: commands_bench.compare,
             Drive: commands.drive,
             Video: commands_paper.video,
             Paper: commands_paper.paper,
+            Train: commands_train.train,
             List: commands.show_list,
             Tune: commands_tune.tune,
+            Gallery: commands.gallery,
+            Doctor: commands.doctor,
         }
         return plays[type(command)](command)
     except (ValueError, TypeError) as error:

@@ -1,5 +1,6 @@
-"""Play one case and make a video of the eye's view."""
+"""Play one case, and show or record the composed picture of it."""
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,11 +10,17 @@ import gymnasium as gym
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import Agent
 from lgmd_gym.benchmark.suites import SUITES, find_case
+from lgmd_gym.benchmark.traffic_rows import SUITE as TRAFFIC
 from lgmd_gym.envs import env_id
-from lgmd_gym.envs.registration import IDS
+from lgmd_gym.envs.registration import IDS, RANDOM
+from lgmd_gym.envs.traffic import KINDS, make_traffic
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.video import VideoWriter
-from lgmd_gym.view import View
+from lgmd_gym.view import LGMDView
+from lgmd_gym.view_picture import SIZE
+from lgmd_gym.view_window import Window
+
+LINGER = 1.0  # [s] for which the last picture stays
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +33,7 @@ class Drive:
         ego_speed: At the end [m/s].
         gap: At the end; NaN with nothing ahead [m].
         duration: Simulated time [s].
+        stopped: Whether the window was closed before the end.
     """
 
     collision: bool
@@ -33,62 +41,106 @@ class Drive:
     ego_speed: float
     gap: float
     duration: float
+    stopped: bool = False
 
 
-def resolve(target: str, arguments: dict[str, Any]) -> tuple[str, dict[str, Any]]:
-    """Return the environment id and arguments of an id such as LGMD/CCRs-v0 or a case's name.
+def make_target(target: str, arguments: dict[str, Any], **options: Any) -> gym.Env:
+    """Return the environment of an id, a case's name, or a kind of traffic.
+
+    Args:
+        target: As "LGMD/CCRs-v0", "quick/CCRs/v30" or "traffic/merge".
+        arguments: The scenario's arguments, over those of the case; traffic takes none.
+        **options: `camera`, `params` and `render_mode`.
 
     Raises:
-        ValueError: For an unknown id or case; the nearest is named.
+        ValueError: For an unknown target (the nearest is named) or argument.
     """
-    ids = [env_id(family) for family in IDS]
+    ids = [env_id(family) for family in (*IDS, RANDOM)]
     if target in ids:
-        return target, arguments
+        return gym.make(target, **options, **arguments)
+    kinds = [f"{TRAFFIC}/{kind}" for kind in KINDS]
+    if target in kinds:
+        if arguments:
+            raise ValueError(f"{target} takes no scenario arguments, got {', '.join(arguments)}")
+        return make_traffic(target.removeprefix(f"{TRAFFIC}/"), **options)
     cases = [case.name for suite in SUITES.values() for case in suite.cases]
     if target not in cases:
-        raise unknown_name("environment or case", target, [*ids, *cases])
+        raise unknown_name("environment or case", target, [*ids, *cases, *kinds])
     case = find_case(target)
-    return env_id(case.family), {**dict(case.arguments), **arguments}
+    return gym.make(env_id(case.family), **options, **{**dict(case.arguments), **arguments})
 
 
 def drive(
-    target: str, agent: Agent, video: Path | None, seed: int, arguments: dict[str, Any], **eyesight: Any
+    target: str,
+    agent: Agent,
+    seed: int,
+    arguments: dict[str, Any],
+    video: Path | None = None,
+    live: bool = False,
+    overlays: tuple[str, ...] = (),
+    **eyesight: Any,
 ) -> Drive:
-    """Play one episode, writing the composed view if `video` is given.
+    """Play one episode, and show or write the composed picture if asked to.
 
     Args:
-        target: An environment id or the name of a case.
+        target: See `make_target`.
         agent: Who brakes.
-        video: The file to write, which must not exist; None to write none.
         seed: Of the environment and the agent.
         arguments: The scenario's arguments, over those of the case.
+        video: The file to write, which must not exist; None to write none.
+        live: Whether to show a window, in real time.
+        overlays: See `LGMDView`.
         **eyesight: `camera` and `params` of `LGMDObservation`.
+
+    Raises:
+        ValueError: For an unknown name, a video that cannot be written, or no display.
     """
-    identity, arguments = resolve(target, arguments)
-    env = gym.make(identity, render_mode="rgb_array" if video else None, **eyesight, **arguments)
-    try:
-        if video is None:
-            return _play(env, agent, seed, None, None)
-        rate = float(env.unwrapped.config["policy_frequency"])  # type: ignore[attr-defined]
-        with VideoWriter(video, rate) as writer:
-            return _play(env, agent, seed, View(env, f"{target}   agent: {agent.name}"), writer)
-    finally:
-        env.close()
+    with ExitStack() as stack:
+        env = make_target(target, arguments, **eyesight)
+        stack.callback(env.close)
+        if video is None and not live:
+            return _play(env, agent, seed, None)
+        view = LGMDView(env, title=f"{target}   {agent.name}   seed {seed}", overlays=overlays)
+        rate = float(view.metadata["render_fps"])
+        writer = stack.enter_context(VideoWriter(video, rate)) if video is not None else None
+        window = stack.enter_context(Window(target, SIZE, rate)) if live else None
+        return _play(view, agent, seed, Screen(view, writer, window))
 
 
-def _play(env: gym.Env, agent: Agent, seed: int, view: View | None, writer: VideoWriter | None) -> Drive:
+class Screen:
+    """Where the pictures of a view go: a file, a window, or both."""
+
+    def __init__(self, view: LGMDView, writer: VideoWriter | None, window: Window | None) -> None:
+        self._view, self._writer, self._window = view, writer, window
+
+    def show(self, alert: bool) -> bool:
+        """Draw the present picture and pass it on; return whether anybody still watches."""
+        self._view.agent_alert = alert
+        picture = self._view.render()
+        if self._writer is not None:
+            self._writer.write(picture)
+        return self._window is None or self._window.show(picture)
+
+
+def _play(env: gym.Env, agent: Agent, seed: int, screen: Screen | None) -> Drive:
     observation, info = env.reset(seed=seed)
     agent.reset(seed)
-    done, decisions = False, 0
+    rate = env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
+    done, watched, decisions = False, True, 0
     while True:
+        # The agent judges what it has seen before the picture is drawn, so that its alert belongs to it.
         action = agent.act(observation, info)
-        if view is not None and writer is not None:
-            writer.write(view.draw(observation, info, float(action[0]) < 0.0, agent.alert))
-        if done:
+        if screen is not None:
+            watched = screen.show(agent.alert)
+        if done or not watched:
             break
         observation, _, terminated, truncated, info = env.step(action)
         done = terminated or truncated
         decisions += 1
-    duration = decisions / env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
-    speed = info["relative_impact_speed"]
-    return Drive(bool(info["collision"]), speed, info["ego_speed"], info["gap"], duration)
+    for _ in range(round(LINGER * rate)):
+        if screen is None or not watched:
+            break
+        watched = screen.show(agent.alert)
+    impact = info["relative_impact_speed"]
+    ended = bool(info["collision"]), impact, info["ego_speed"], info["gap"], decisions / rate
+    return Drive(*ended, stopped=not done)

@@ -54,6 +54,15 @@ def _make_camera(item: Any) -> tuple[str, Camera]:
     return params.name, EgoCamera(params)
 
 
+def _under(camera: Camera, fields: dict[str, Any]) -> Camera:
+    """Return a camera with fields laid over it; one without such fields stays as it is."""
+    if not isinstance(camera, EgoCamera) or not fields:
+        return camera
+    given = dict(fields)
+    params = camera.params.with_condition(given.pop("condition", "clear"))
+    return EgoCamera(CameraParams.make(params, **given))
+
+
 class _Group(NamedTuple):
     """Cameras of one frame shape, stepped in one call.
 
@@ -81,6 +90,8 @@ class Eyes:
         self, camera: Any, fps: float, params: LGMDParams, count: int = 1, threads: int | None = None
     ) -> None:
         self.sets = [make_cameras(camera) for _ in range(count)]
+        self._bare = [dict(one) for one in self.sets]
+        self._worn: list[dict[str, Any]] = [{}] * count
         self._rigs = [CameraRig(list(one.values())) for one in self.sets]
         self.names = list(self.sets[0])
         self.shapes = [one.shape for one in self.sets[0].values()]
@@ -98,6 +109,18 @@ class Eyes:
         return [
             np.zeros((self.count, len(members), *neuron.shape), np.uint8) for neuron, members in self.groups
         ]
+
+    def fit(self, env: gym.Env, index: int = 0) -> None:
+        """Lay `env.unwrapped.camera_fields`, if there are any, over the cameras of environment `index`.
+
+        An environment whose episodes differ in light or weather says so there: fields of `CameraParams`,
+        and `condition` for a named one. To be called after each reset.
+        """
+        fields = getattr(env.unwrapped, "camera_fields", None) or {}
+        if fields != self._worn[index]:
+            self._worn[index] = dict(fields)
+            self.sets[index] = {name: _under(one, fields) for name, one in self._bare[index].items()}
+            self._rigs[index] = CameraRig(list(self.sets[index].values()))
 
     def render(self, env: gym.Env, frames: list[np.ndarray], index: int = 0) -> None:
         """Render every camera of environment number `index` into its place in `frames`."""

@@ -53,7 +53,9 @@ def envs() -> Table:
     for family, function in FAMILIES.items():
         names = ", ".join(inspect.signature(function).parameters)
         table.add_row(env_id(family), names, _first_line(function))
-    table.add_row(env_id(RANDOM), "split, start_level, num_levels", "A new one of these at every reset.")
+    table.add_row(
+        env_id(RANDOM), "split, start_level, num_levels, conditions", "A new one of these at every reset."
+    )
     return table
 
 

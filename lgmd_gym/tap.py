@@ -70,6 +70,7 @@ class Tap(gym.Wrapper):
         watch(self.env, self._on_substep)
         self.was_reset = True
         self._substeps = 0
+        self.queue.eyes.fit(self.env, self.index)
         self.queue.eyes.render(self.env.unwrapped, self.queue.first, self.index)
         vehicle = self.env.unwrapped.vehicle  # type: ignore[attr-defined]
         self.final, self.motion = self.motion, Motion(float(vehicle.speed), 0.0)

@@ -19,14 +19,15 @@ class VideoWriter:
     Args:
         path: The file, which must not exist; the suffix chooses the container.
         fps: Pictures per second [Hz].
+        quality: From 0, small, to 10, fine; a GIF has none.
 
     Raises:
         ValueError: For an unknown suffix, a file that exists, or a folder that does not.
     """
 
-    def __init__(self, path: str | Path, fps: float) -> None:
+    def __init__(self, path: str | Path, fps: float, quality: float = 7.0) -> None:
         self.path = Path(path)
-        self.fps = fps
+        self.fps, self.quality = fps, quality
         if self.path.suffix.lower() not in SUFFIXES:
             raise ValueError(f"video {str(path)!r} needs a suffix among {', '.join(SUFFIXES)}")
         if self.path.exists():
@@ -63,7 +64,9 @@ class VideoWriter:
     def _open(self, size: tuple[int, int]) -> None:
         from imageio_ffmpeg import write_frames
 
-        options: dict[str, Any] = {"quality": 7, "macro_block_size": 2, "pix_fmt_out": "yuv420p"}
+        options: dict[str, Any] = {"quality": self.quality, "macro_block_size": 2, "pix_fmt_out": "yuv420p"}
+        # Drawn pictures gain little from x264's slower presets, which would hold up whoever draws.
+        options["output_params"] = ["-preset", "veryfast"]
         if self.path.suffix.lower() == ".gif":
             options = {"codec": "gif", "pix_fmt_out": "pal8"}
         self._size = size

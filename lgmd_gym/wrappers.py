@@ -53,6 +53,9 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     `info` gains, as floats, `lgmd/<camera>/spike_frequency`, `lgmd/<camera>/membrane_potential`,
     `lgmd/<camera>/ffi`, and the bool `lgmd/alert`: whether any camera's frequency is at its alert level.
 
+    An environment may change the view at each reset through an attribute `camera_fields`: a dict of
+    `CameraParams` fields and `condition`, laid over the cameras.
+
     Args:
         env: Any highway-env environment, wrapped or not.
         camera: A preset name ("wide", "standard", "tele", "fovea", "paper"), "birdseye", a `CameraParams`,
@@ -114,6 +117,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         if self._host.config["simulation_frequency"] != self._simulation_frequency:
             self._set_rate()
         self.eyes.reset()
+        self.eyes.fit(self._host)
         watch(self.env, self._on_substep)
         self._substeps, self._seen = 0, []
         self._see()

@@ -9,7 +9,8 @@ import pytest
 from lgmd_gym.agents import AGENTS, Agent
 from lgmd_gym.benchmark.cases import Case
 from lgmd_gym.benchmark.episode import SERIES, Episode, Eyesight, make_env, play
-from lgmd_gym.benchmark.rows import KEYS, Counterfactual, brake_onset, make_row
+from lgmd_gym.benchmark.metrics import METRICS, Counterfactual, Outcome, brake_onset, metric
+from lgmd_gym.benchmark.rows import KEYS, make_row
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.runs import resume_run
 from lgmd_gym.benchmark.suites import SUITES, find_case, find_suite
@@ -83,6 +84,33 @@ def test_false_brake_is_a_quarter_g_without_a_threat(peak, false):
     assert not make_row("a", SLOW_APPROACH, 0, episode([0, peak, 0]), THREAT)["false_brake"]
 
 
+def test_metrics_of_an_avoided_threat():
+    braked = episode([0] * 20 + [2, 4, 6] + [9] * 18, alert=18)
+    braked.series["drac"][:] = np.linspace(1, 5, 41)
+    row = make_row("a", SLOW_APPROACH, 0, braked, THREAT)
+    assert row["warning_lead_time"] == pytest.approx(0.4)  # alert at 1.8 s, 5 m/s² at 2.2 s
+    assert row["distance_at_alert"] == pytest.approx(10 * row["ttc_at_alert"])
+    assert row["distance_at_brake"] == pytest.approx(10 * row["ttc_at_brake"])
+    assert (row["min_ttc"], row["stopping_margin"], row["max_drac"]) == pytest.approx((1.0, 10.0, 5.0))
+    assert row["drac_at_brake"] == pytest.approx(np.linspace(1, 5, 41)[19])
+
+
+def test_metrics_that_contact_leaves_undefined():
+    row = make_row("a", SLOW_APPROACH, 0, episode([0, 9, 9], collision=True, relative=3.0), THREAT)
+    assert (row["min_ttc"], row["max_drac"], row["stopping_margin"]) == (0.0, None, None)
+    assert row["warning_lead_time"] is None
+
+
+def test_a_metric_has_one_name():
+    with pytest.raises(ValueError, match="'distance' is defined twice"):
+
+        @metric
+        def distance(outcome: Outcome):
+            return 0.0, True
+
+    assert set(METRICS) <= set(KEYS)
+
+
 def test_wilson_interval():
     # Newcombe (1998), table I: 81 of 263, and 0 of 20.
     assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
@@ -113,9 +141,21 @@ def test_cases_are_sorted_as_numbers(tmp_path):
     ]
     write_summary(rows, tmp_path / "summary.csv")
     lines = (tmp_path / "summary.csv").read_text().splitlines()
-    assert lines[0].startswith("agent,case,threats,avoided,")
-    assert lines[1].startswith("a,t/CCRs/v5,1,1,")
-    assert len(lines) == 4
+    assert lines[0].startswith("agent,condition,case,threats,avoided,")
+    assert lines[1].startswith("a,clear,t/CCRs/v5,1,1,")
+    assert lines[4].startswith("a,clear,all,3,3,")
+    assert len(lines) == 5
+
+
+def test_a_case_at_night_is_seen_at_night():
+    frames = {}
+    for name in ("CCRs/v30/location50", "CCRs/v30/robust-night"):
+        env = make_env(find_case(f"ncap2026/{name}"), Eyesight("wide"))
+        env.reset(seed=0)
+        frames[name] = env.get_wrapper_attr("frames")["wide"].mean()
+        env.close()
+    day, night = frames.values()
+    assert night < 0.5 * day
 
 
 @pytest.mark.parametrize("suite", SUITES)
@@ -254,7 +294,7 @@ def test_a_broken_off_run_resumes_to_the_same_rows(quick_run, tmp_path, cut):
 
 
 def test_what_cannot_be_resumed_is_refused(tmp_path):
-    with pytest.raises(ValueError, match="holds no run to resume"):
+    with pytest.raises(ValueError, match="holds no run"):
         resume_run(tmp_path, 1)
     Run("quick", ["no-brake"], 1, 1, tmp_path / "run").play(
         lambda row: (_ for _ in ()).throw(KeyboardInterrupt)

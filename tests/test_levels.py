@@ -1,12 +1,16 @@
 """`RandomBraking`: levels, splits, and what is drawn."""
 
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 import pytest
 
+from lgmd_gym import CameraParams, EgoCamera, camera
 from lgmd_gym.envs import FAMILIES
-from lgmd_gym.envs.levels import LEVELS, QUIET, THREATS, draw_scenario, level_generator
+from lgmd_gym.envs.levels import CONDITIONS, LEVELS, QUIET, THREATS, draw_scenario, level_generator
 from lgmd_gym.envs.random_braking import RandomBrakingEnv
+from lgmd_gym.vector import LGMDObservation as LGMDVector
 
 HOLD = np.zeros(1, np.float32)
 
@@ -68,6 +72,51 @@ def test_the_road_follows_the_scenario():
             assert len(lanes) == 2
 
 
+def test_conditions_are_the_cameras():
+    assert tuple(CONDITIONS) == tuple(camera.CONDITIONS)
+
+
+def test_a_level_brings_its_light_and_weather_and_grain():
+    env = gym.make("LGMD/RandomBraking-v0", camera=["fovea", "birdseye"], split="validation")
+    seen = {}
+    for seed in range(40):
+        _, info = env.reset(seed=seed)
+        eye = env.get_wrapper_attr("eyes").sets[0]["fovea"]
+        bare = CameraParams.preset("fovea").with_condition(info["condition"])
+        assert eye.params == replace(bare, texture=eye.params.texture)
+        assert np.array_equal(env.get_wrapper_attr("frames")["fovea"], EgoCamera(eye.params).render(env))
+        seen.setdefault(info["condition"], []).append(eye.params.texture)
+    assert set(seen) == set(CONDITIONS)
+    grains = np.concatenate(list(seen.values()))
+    assert 0.5 <= grains.min() < 0.7 < 1.3 < grains.max() <= 1.5
+    env.close()
+
+
+def test_conditions_leave_the_scenario_alone():
+    clear = RandomBrakingEnv(conditions=["clear"])
+    mixed = RandomBrakingEnv()
+    for seed in range(20):
+        assert clear.reset(seed=seed)[1]["condition"] == "clear"
+        mixed.reset(seed=seed)
+        assert clear.scenario == mixed.scenario
+        assert clear.camera_fields["texture"] == mixed.camera_fields["texture"]
+
+
+def test_a_vector_of_levels_sees_what_each_alone_sees():
+    kind, count = "LGMD/RandomBraking-v0", 6
+    vector = LGMDVector(gym.make_vec(kind, num_envs=count, vectorization_mode="sync", camera=None))
+    vector.reset(seed=list(range(count)))
+    single = [gym.make(kind) for _ in range(count)]
+    for seed, env in enumerate(single):
+        env.reset(seed=seed)
+    for _ in range(12):
+        both, *_ = vector.step(np.zeros((count, 1), np.float32))
+        for index, env in enumerate(single):
+            one, *_ = env.step(HOLD)
+            assert np.array_equal(both["ffi"][index], one["ffi"])
+    assert len({env.unwrapped.camera_fields["condition"] for env in single}) > 1
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -75,6 +124,9 @@ def test_the_road_follows_the_scenario():
         ({"start_level": -1}, r"start_level must be in \[0, 999999\], got -1"),
         ({"start_level": LEVELS - 1, "num_levels": 2}, r"num_levels must be in \[0, 1\]"),
         ({"levels": 3}, "'num_levels'"),
+        ({"conditions": ["clear", "foggy"]}, "unknown condition 'foggy'; did you mean 'fog'"),
+        ({"conditions": []}, "conditions needs at least one name"),
+        ({"condition": "night"}, "unknown argument of RandomBraking 'condition'; did you mean 'conditions'"),
         ({"ego_speed": 3.0}, "unknown argument of RandomBraking 'ego_speed'"),
     ],
 )

@@ -158,7 +158,7 @@ def test_the_agents_eye_is_used_where_the_user_names_none():
 def test_a_condition_is_laid_over_every_camera():
     eye = Eyesight(["fovea", {"name": "x", "hfov_deg": 20.0}], condition="night")
     assert [item["condition"] for item in eye.arguments["camera"]] == ["night", "night"]
-    assert eye.label == "fovea+x, night"
+    assert eye.label == "fovea+x"
     with pytest.raises(ValueError, match="view from above"):
         _ = Eyesight("birdseye", condition="fog").arguments
 

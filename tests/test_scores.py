@@ -4,7 +4,7 @@ import pytest
 
 from lgmd_gym.benchmark.rows import KEYS
 from lgmd_gym.benchmark.scores import colour_2026, judge_r152, meets_r152, r152_limit, verdicts
-from lgmd_gym.benchmark.tables import verdict_table
+from lgmd_gym.benchmark.tables import score_tables, verdict_table
 from lgmd_gym.envs.units import KMH
 
 
@@ -51,6 +51,12 @@ def test_r152_rows(case, ego, target, impact, met):
     assert judge_r152(row(case, ego, target, impact))[0] is met
 
 
+def test_braking_before_the_test_begins_meets_nothing():
+    early = row("CCRs/v20", 20, 0, 0) | {"premature_brake": True}
+    assert judge_r152(early)[0] is False
+    assert not meets_r152([early], "a")
+
+
 @pytest.mark.parametrize(("failed", "met"), [(0, True), (1, True), (2, False)])
 def test_a_tenth_of_the_runs_may_fail(failed, met):
     rows = [row("CCRs/v20", 20, 0, 5 if number < failed else 0) for number in range(10)]
@@ -80,3 +86,17 @@ def test_colours_against_the_official_calculator():
             computed.value = impact
             official = computed._compute_color_logic()
             assert getattr(official, "value", official).lower() == colour_2026(ego, impact), (ego, impact)
+
+
+def test_a_warned_driver_is_no_part_of_the_totals():
+    def told(case, warned, avoided):
+        given = {"agent": "a", "case": case, "warned_driver": warned, "threat": True, "avoided": avoided}
+        return dict.fromkeys(KEYS) | given | {"premature_brake": False, "speed_reduction": 3.0}
+
+    rows = [told("s/CCRs/v50", False, True), told("s/CCRs/v60-warned", True, False)]
+    automatic, warned = score_tables(rows, ["a"], "all")
+    assert [list(table.columns[1].cells) for table in (automatic, warned)] == [
+        ["1/1 [21–100]"],
+        ["0/1 [0–79]"],
+    ]
+    assert len(score_tables(rows[:1], ["a"], "all")) == 1

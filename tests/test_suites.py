@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.episode import SERIES, Episode
-from lgmd_gym.benchmark.rows import Counterfactual, make_row
+from lgmd_gym.benchmark.episode import SERIES, TRUTHS, Episode
+from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.rows import make_row
 from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.envs.units import KMH
 
-THREATS = ("quick", "speeds", "ncap2023", "ncap2026", "r152", "fmvss127")
+THREATS = ("quick", "speeds", "ncap2023", "ncap2026", "r152", "fmvss127", "random")
 APPROACH = ("CCRs", "CCRm", "CCRb", "CCCscp")
 CASES = [case for suite in SUITES.values() for case in suite.cases]
 
@@ -26,8 +27,8 @@ def drive(case, agent_name, seed=0):
     while True:
         action = agent.act(blind, info)
         held = info["ego_speed"] == 0.0 and action[0] < 0
-        truth = [info[name] for name in ("ego_speed", "gap", "ttc", "deceleration", "target_speed")]
-        rows.append((len(rows) / 30, *truth, 0.0, 0.0, float(held)))
+        truth = [info[name] for name in TRUTHS]
+        rows.append((len(rows) / 30, *truth, 0.0, 0.5, 0.0, 0.0, float(held)))
         if done:
             break
         _, _, terminated, truncated, info = env.step(action)
@@ -60,10 +61,10 @@ def test_counts_are_the_documents():
     assert count("ncap2023", "CCRm") == 55
     assert count("ncap2023", "CCRb") == 4
     assert count("ncap2023", "CCCscp") == 30
-    assert count("ncap2026", "CCRs") == 5 * 5 + 8 + 2
+    assert count("ncap2026", "CCRs") == 5 * 5 + 8 + 2 + 2
     assert count("ncap2026", "CCRs", warned=True) == 3 * 5
-    assert count("ncap2026", "CCRm") == 6 * 5 + 2
-    assert count("ncap2026", "CCRb") == 6 * 5 + 2
+    assert count("ncap2026", "CCRm") == 6 * 5 + 2 + 2
+    assert count("ncap2026", "CCRb") == 6 * 5 + 2 + 2 + 4
     assert count("r152", "CCRs") == 4
     assert count("r152", "CCRm") == 2
     assert find_case("ncap2023/CCRs/v30/overlap-50").arguments == (("ego_speed", 8.333333), ("overlap", -0.5))
@@ -72,7 +73,7 @@ def test_counts_are_the_documents():
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_no_brake_meets_every_threat_and_nothing_else(case, outcomes):
     row = outcomes[case.name, "no-brake"]
-    assert row["collision"] is (case.family in APPROACH)
+    assert row["collision"] is (case.scenario.family in APPROACH)
     assert row["threat"] is row["collision"]
     if row["collision"]:
         assert case.suite in THREATS
@@ -96,7 +97,9 @@ def test_the_oracle_avoids_what_can_be_avoided_and_is_quiet_elsewhere(case, outc
         assert row["peak_deceleration"] == 0.0
 
 
-@pytest.mark.parametrize("case", [c for c in CASES if c.family in APPROACH], ids=lambda case: case.name)
+@pytest.mark.parametrize(
+    "case", [c for c in CASES if c.scenario.family in APPROACH], ids=lambda case: case.name
+)
 def test_every_approach_starts_at_least_4_s_before_contact(case, outcomes):
     assert outcomes[case.name, "no-brake"]["duration"] > 4.5
 

@@ -1,6 +1,6 @@
-"""The picture of README: the composed view of an approach, a moment after the neuron's alert.
+"""The picture and the film of README: an approach through the eye, from the first glimpse to the stop.
 
-python docs/examples/picture.py docs/picture.png
+python docs/examples/picture.py docs/picture.png docs/approach.gif
 """
 
 import sys
@@ -9,26 +9,55 @@ from pathlib import Path
 import gymnasium as gym
 from PIL import Image
 
+from lgmd_gym import LGMDView
 from lgmd_gym.agents import make_agent
-from lgmd_gym.view import View
+from lgmd_gym.view_canvas import PINK, RED, SKY, UNLIT, YELLOW
+
+START, EVERY, WIDTH = 2.0, 3, 800  # a film begins at [s], takes every third decision, is so wide [px]
+
+# Small but telling areas, which a palette made by counting pixels forgets: signals and cars from above.
+SIGNALS = (SKY, YELLOW, RED, PINK, UNLIT, (50, 200, 0), (100, 200, 255))
 
 
-def main(path: Path, ego_speed: float = 11.1, after: int = 8) -> None:
-    """Save the view `after` decisions after the first alert of an approach at `ego_speed` [m/s]."""
+def main(path: Path, film: Path | None = None, ego_speed: float = 11.1, after: int = 8) -> None:
+    """Save the view `after` decisions after the first alert of an approach at `ego_speed` [m/s].
+
+    Args:
+        path: Of the picture.
+        film: Of a GIF of the whole approach; None for none, which ends the approach at the picture.
+        ego_speed: [m/s].
+        after: Decisions from the alert to the picture.
+    """
     agent = make_agent("spike-threshold")
-    env = gym.make("LGMD/CCRs-v0", ego_speed=ego_speed, shade=60, render_mode="rgb_array")
-    view = View(env, f"LGMD/CCRs-v0, {3.6 * ego_speed:.0f} km/h   agent: {agent.name}")
+    title = f"LGMD/CCRs-v0 at {3.6 * ego_speed:.0f} km/h   {agent.name}"
+    env = LGMDView(gym.make("LGMD/CCRs-v0", ego_speed=ego_speed, shade=60), title=title)
     observation, info = env.reset(seed=0)
-    since_alert = 0
-    while since_alert < after:
+    decisions = since_alert = 0
+    done, pictures = False, []
+    while not done:
         action = agent.act(observation, info)
-        picture = view.draw(observation, info, float(action[0]) < 0, agent.alert)
+        env.agent_alert = agent.alert
         since_alert += bool(since_alert or agent.alert)
+        if since_alert == after:
+            Image.fromarray(env.render()).save(path, optimize=True)
+            if film is None:
+                return
+        if film is not None and decisions >= START * 30 and decisions % EVERY == 0:
+            pictures.append(Image.fromarray(env.render()).resize((WIDTH, WIDTH * 9 // 16)))
         observation, _, terminated, truncated, info = env.step(action)
-        if terminated or truncated:
-            break
-    Image.fromarray(picture).save(path, optimize=True)
+        done, decisions = terminated or truncated, decisions + 1
+    if film is not None:
+        save_gif([*pictures, *pictures[-1:] * 8], film)
+
+
+def save_gif(pictures: list[Image.Image], path: Path) -> None:
+    """Save pictures with one palette for all, without dithering, which would flicker and cost space."""
+    common = pictures[-10].quantize(96).getpalette()[: 3 * 96]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*common, *(value for colour in SIGNALS for value in colour)])
+    frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=1000 * EVERY // 30, loop=0)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "picture.png"))
+    main(*[Path(item) for item in sys.argv[1:3]] or [Path("picture.png")])

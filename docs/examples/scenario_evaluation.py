@@ -1,15 +1,23 @@
 """Scenario evaluation: how late may the alert come? Time to contact at the alert over speed and lens.
 
-    python docs/examples/scenario_evaluation.py
+    python docs/examples/scenario_evaluation.py docs/tutorials/scenario_evaluation.png
 
 Nothing brakes here: the neuron only watches approaches to a standing car, so that lenses can be compared
-on the same drive. Braking from 50 km/h at 9 m/s² takes about one second of time to contact.
+on the same drive. An early alert is worth nothing if an empty road raises it too, so that is played as well.
 """
+
+import sys
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
+from matplotlib.figure import Figure
 
 import lgmd_gym  # noqa: F401  (registers the environments)
+from lgmd_gym.plots import COLOURS
+
+# A demand waits for one camera frame and the dead time; the linear build-up costs half its length.
+DELAY, DECELERATION = 1 / 30 + 0.1 + 0.2 / 2, 9.0  # [s], [m/s²]
 
 
 def ttc_at_alert(camera: str, kmh: float, seed: int) -> float:
@@ -24,19 +32,72 @@ def ttc_at_alert(camera: str, kmh: float, seed: int) -> float:
     return float("nan")
 
 
+def alerts_on_empty_road(camera: str, kmh: float, seeds: int) -> int:
+    """Return with how many seeds the neuron alerts where nothing but the road is to be seen."""
+    env = gym.make("LGMD/EmptyRoad-v0", ego_speed=kmh / 3.6, camera=camera)
+    count = 0
+    for seed in range(seeds):
+        _, info = env.reset(seed=seed)
+        done = alerted = False
+        while not (done or alerted):
+            *_, terminated, truncated, info = env.step(np.zeros(1, np.float32))
+            done, alerted = terminated or truncated, bool(info["lgmd/alert"])
+        count += alerted
+    return count
+
+
+def ttc_needed(kmh: float) -> float:
+    """Return the time to contact [s] at which a demand for full braking just avoids a standing car."""
+    return DELAY + kmh / 3.6 / (2 * DECELERATION)
+
+
 def main(
+    picture: Path | None = None,
     cameras: tuple[str, ...] = ("wide", "tele", "fovea"),
-    speeds: tuple[int, ...] = (10, 30, 50),
-    seeds: int = 3,
-) -> None:
-    """Print the median over seeds for each lens and speed."""
-    print("km/h   " + "".join(f"{camera:>10}" for camera in cameras))
-    for kmh in speeds:
-        medians = [
-            np.median([ttc_at_alert(camera, kmh, seed) for seed in range(seeds)]) for camera in cameras
+    speeds: tuple[int, ...] = (10, 20, 30, 40, 50, 60),
+    seeds: int = 5,
+) -> dict[str, np.ndarray]:
+    """Print the median over seeds for each lens and speed; return all, per camera (speeds, seeds)."""
+    found = {
+        camera: np.array([[ttc_at_alert(camera, kmh, seed) for seed in range(seeds)] for kmh in speeds])
+        for camera in cameras
+    }
+    empty = {
+        camera: np.array([alerts_on_empty_road(camera, kmh, seeds) for kmh in speeds]) for camera in cameras
+    }
+    print("time to contact at the alert, median (in brackets: seeds with an alert on an empty road)")
+    print("km/h   " + "".join(f"{camera:>16}" for camera in cameras) + "    needed")
+    for row, kmh in enumerate(speeds):
+        cells = [
+            f"{np.median(found[camera][row]):8.2f} s ({empty[camera][row]}/{seeds})" for camera in cameras
         ]
-        print(f"{kmh:4}   " + "".join(f"{value:8.2f} s" for value in medians))
+        print(f"{kmh:4}   " + "".join(cells) + f"{ttc_needed(kmh):8.2f} s")
+    if picture is not None:
+        draw(found, empty, speeds, picture)
+    return found
+
+
+def draw(
+    found: dict[str, np.ndarray], empty: dict[str, np.ndarray], speeds: tuple[int, ...], picture: Path
+) -> None:
+    """Draw medians as lines, every seed as a dot, and hollow where the empty road alone alerts."""
+    figure = Figure(figsize=(7.5, 3.8), layout="constrained")
+    axis = figure.subplots()
+    for index, (camera, values) in enumerate(found.items()):
+        colour, marker = COLOURS[1 + index], "osv^"[index % 4]
+        medians = np.median(values, axis=1)
+        axis.plot(speeds, medians, color=colour, marker=marker, label=camera)
+        doubtful = np.where(empty[camera] > 0, medians, np.nan)
+        axis.plot(speeds, doubtful, color=colour, marker=marker, markerfacecolor="white", linestyle="")
+        axis.plot(speeds, values, ".", color=colour, alpha=0.4, markersize=4)
+    smooth = np.linspace(speeds[0], speeds[-1], 50)
+    axis.plot(smooth, [ttc_needed(kmh) for kmh in smooth], "--", color="0.4", label="needed to stop")
+    axis.plot([], [], "o", color="0.4", markerfacecolor="white", label="an empty road alerts, too")
+    axis.set(xlabel="ego speed [km/h]", ylabel="time to contact at the alert [s]", ylim=(0, None))
+    axis.grid(alpha=0.3)
+    axis.legend(frameon=False)
+    figure.savefig(picture, dpi=110)
 
 
 if __name__ == "__main__":
-    main()
+    main(*[Path(item) for item in sys.argv[1:2]])

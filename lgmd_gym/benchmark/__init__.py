@@ -16,26 +16,30 @@ def run(
     out: Path | str | None = None,
     camera: Any = None,
     params: Any = None,
-    condition: str = "clear",
+    conditions: Iterable[str] = ("clear",),
+    cluster: str | None = None,
 ) -> "pd.DataFrame":
     """Play a suite and return its rows.
 
     Args:
-        suite: Name of a suite, or "traffic".
+        suite: Name of a suite, the path of a suite file (".toml"), or "traffic".
         agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
         seeds: Number of seeds, played from 0 on.
         jobs: Processes; 1 plays in this one.
         out: Run folder to keep, which must not exist; None keeps none.
         camera: See `LGMDObservation`; None for each agent's own, see `Agent.camera`.
         params: See `LGMDObservation`.
-        condition: A named condition over every camera: "clear", "night", "fog" or "robust".
+        conditions: Camera conditions by name, such as "clear" and "robust"; the suite is played under each.
+        cluster: Address of a Dask scheduler to play on, in place of processes.
 
     Returns:
         One line per episode with the columns of `lgmd_gym.benchmark.rows.KEYS`, `no-brake` included; for
         "traffic", those of `traffic_rows.KEYS`.
 
     Raises:
-        ValueError: For an unknown name, a count below 1, or a folder that exists or cannot be made.
+        ValueError: For an unknown name, a count below 1, a cluster that does not answer, or a folder that
+            exists or cannot be made.
+        RuntimeError: If the run broke off: a worker was killed, or the disk is full.
     """
     from tempfile import TemporaryDirectory
 
@@ -46,6 +50,7 @@ def run(
 
     with TemporaryDirectory() as spare:
         folder = Path(out or Path(spare) / "run")
-        played = start_run(suite, agents, seeds, jobs, folder, Eyesight(camera, params, condition))
-        played.play()
+        played = start_run(suite, agents, seeds, jobs, folder, Eyesight(camera, params), conditions, cluster)
+        if not played.play():
+            raise RuntimeError(f"{played.stopped}: {len(played.rows)} of {played.total} episodes kept")
         return pd.DataFrame(played.rows)

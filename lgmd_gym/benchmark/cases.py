@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from lgmd_gym.envs.catalogue import make_scenario
+from lgmd_gym.envs.levels import draw_scenario, level_generator
+from lgmd_gym.envs.registration import RANDOM
 from lgmd_gym.envs.scenario import Scenario
 from lgmd_gym.envs.units import KMH
 
@@ -15,7 +17,7 @@ class Case:
     Attributes:
         name: "suite/family/what", stable across versions.
         family: The scenario family, as in the id `LGMD/<family>-v0`.
-        arguments: The family's keyword arguments, in SI units.
+        arguments: The environment's keyword arguments, in SI units.
         warned_driver: Whether the car does not brake by itself: the protocol's driver brakes 1.2 s after
             the agent's alert (Euro NCAP AEB C2C v4.3.1, 8.4.6).
     """
@@ -33,7 +35,21 @@ class Case:
     @property
     def scenario(self) -> Scenario:
         """What happens in it."""
-        return make_scenario(self.family, **dict(self.arguments))
+        arguments = dict(self.arguments)
+        if self.family == RANDOM:
+            return draw_scenario(level_generator(arguments["split"], arguments["start_level"]))
+        arguments.pop("condition", None)  # is the eye's affair
+        return make_scenario(self.family, **arguments)
+
+
+def level(suite: str, split: str, number: int) -> Case:
+    """Return a level of `LGMD/RandomBraking-v0` as a case."""
+    family = draw_scenario(level_generator(split, number)).family
+    return Case(
+        f"{suite}/{family}/level{number:03d}",
+        RANDOM,
+        (("split", split), ("start_level", number), ("num_levels", 1)),
+    )
 
 
 def metres(kmh: float) -> float:

@@ -11,6 +11,7 @@ from lgmd_gym.benchmark.cases import Case
 from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.envs import env_id
 
+CLEAR = "clear"  # the camera as it was given
 # One value per decision each; `held` is 1 while a standing ego is kept from starting, which no deceleration
 # shows.
 SERIES = (
@@ -18,12 +19,17 @@ SERIES = (
     "ego_speed",
     "gap",
     "ttc",
+    "drac",
     "deceleration",
     "target_speed",
     "spike_frequency",
+    "membrane_potential",
+    "ffi",
     "alert",
     "held",
 )
+TRUTHS = ("ego_speed", "gap", "ttc", "drac", "deceleration", "target_speed")  # of `info`
+SIGNALS = ("spike_frequency", "membrane_potential", "ffi")  # of the observation, the highest of all cameras
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +43,7 @@ class Episode:
         relative_impact_speed: Less the other's along the ego's heading [m/s]; NaN without a touch.
         target_width: Width of the first actor [m]; NaN on an empty road.
         fps: Camera frames per second [Hz].
+        target_shade: Body grey of the first actor in [0, 255]; NaN on an empty road.
     """
 
     series: dict[str, np.ndarray]
@@ -45,6 +52,7 @@ class Episode:
     relative_impact_speed: float
     target_width: float
     fps: float
+    target_shade: float = float("nan")
 
 
 def make_env(case: Case, eyesight: Eyesight, **options: Any) -> gym.Env:
@@ -80,7 +88,8 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
             break
         observation, _, terminated, truncated, info = env.step(action)
         done = terminated or truncated
-    actors = env.unwrapped.scenario.actors  # type: ignore[attr-defined]
+    base: Any = env.unwrapped
+    actors, seen = base.scenario.actors, base.road.obstacles
     return Episode(
         series={name: np.array(column) for name, column in zip(SERIES, zip(*rows, strict=True), strict=True)},
         collision=bool(info["collision"]),
@@ -88,11 +97,10 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
         relative_impact_speed=info["relative_impact_speed"],
         target_width=actors[0].width if actors else float("nan"),
         fps=env.get_wrapper_attr("fps"),
+        target_shade=float(seen[0].shade) if seen else float("nan"),
     )
 
 
 def _moment(observation: dict[str, Any], info: dict[str, Any]) -> tuple[float, ...]:
     """Return one value for each name in `SERIES` but time, alert and held."""
-    frequency = float(np.max(observation["spike_frequency"]))
-    truth = (info[name] for name in ("ego_speed", "gap", "ttc", "deceleration", "target_speed"))
-    return (*truth, frequency)
+    return (*(info[name] for name in TRUTHS), *(float(np.max(observation[name])) for name in SIGNALS))

@@ -1,7 +1,10 @@
 """What agents see through: the user's choice, or each agent's own eye."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, is_dataclass, replace
 from typing import Any
+
+from lgmd_gym.camera import CONDITIONS
+from lgmd_gym.errors import unknown_name
 
 DEFAULT_CAMERA = "fovea"
 CLEAR = "clear"
@@ -34,6 +37,22 @@ class Eyesight:
         return Eyesight(DEFAULT_CAMERA if camera is None else camera, params, self.condition, frame)
 
     @property
+    def plain(self) -> "Eyesight":
+        """The same as plain values, which JSON and TOML can hold."""
+        return replace(self, camera=_plain(self.camera), params=_plain(self.params))
+
+    def under(self, condition: str) -> "Eyesight":
+        """Return the same under a named camera condition, such as "robust".
+
+        Raises:
+            ValueError: For an unknown condition, or a camera that knows none.
+        """
+        if condition not in CONDITIONS:
+            raise unknown_name("camera condition", condition, CONDITIONS)
+        _under(self.camera, condition)
+        return replace(self, condition=condition)
+
+    @property
     def arguments(self) -> dict[str, Any]:
         """What `LGMDObservation` takes of it.
 
@@ -45,15 +64,16 @@ class Eyesight:
 
     @property
     def label(self) -> str:
-        """The cameras' names for rows and titles, as in "fovea" or "zone8+upright8, night"."""
-        name = _name(self.camera) if self.camera is not None else "each agent's own"
-        return name if self.condition == CLEAR else f"{name}, {self.condition}"
+        """The cameras' names for rows and titles, as in "fovea" or "zone8+upright8"."""
+        return _name(self.camera) if self.camera is not None else "each agent's own"
 
 
 def _under(camera: Any, condition: str) -> Any:
     """Return a camera argument with a condition laid over it."""
     if condition == CLEAR:
         return camera
+    if camera is None:
+        return None
     if isinstance(camera, list | tuple):
         return [_under(item, condition) for item in camera]
     if camera == "birdseye":
@@ -63,6 +83,12 @@ def _under(camera: Any, condition: str) -> Any:
     if isinstance(camera, dict):
         return {**camera, "condition": condition}
     return camera.with_condition(condition)
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
+    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 def _name(camera: Any) -> str:

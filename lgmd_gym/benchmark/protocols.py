@@ -5,6 +5,7 @@ N1 is Euro NCAP's test protocol AEB Car-to-Car v4.3.1 (February 2024, implementa
 
 from dataclasses import replace
 from math import radians
+from typing import Any
 
 from lgmd_gym.benchmark.cases import Case, cases, metres, one
 
@@ -41,7 +42,8 @@ def ncap2026() -> tuple[Case, ...]:
     An impact location of p per cent puts the target's centre at (p - 50) per cent of the ego's width
     from its centreline, + left, as the OpenSCENARIO files for that protocol do; the official calculator names
     locations and leaves their geometry open. CCRb: headway 1.0 s, 4 m/s² within 1.0 s. The robustness layer
-    (5.2.1.3) adds a turned target and a car beside it, aligned; night is a matter of the camera.
+    (5.2.1.3) adds, aligned: a turned target, a car beside it, night, and for CCRb 2 m/s² more or less and
+    0.5 s of headway more or less. Its glare is not built.
     """
     suite = "ncap2026"
     rows: list[Case] = []
@@ -64,8 +66,18 @@ def ncap2026() -> tuple[Case, ...]:
             impact_location=0.5,
             target_heading=turned,
         )
-    for family, more in (("CCRs", {}), ("CCRm", {}), ("CCRb", {"headway": 1.0, "deceleration": 4.0})):
+    lead: dict[str, Any] = {"headway": 1.0, "deceleration": 4.0}
+    for family, more in (("CCRs", {}), ("CCRm", {}), ("CCRb", lead)):
         rows += cases(suite, family, [30, 50], "/robust-beside", impact_location=0.5, beside=True, **more)
+        night = {"impact_location": 0.5, "condition": "night", **more}
+        rows += cases(suite, family, [30, 50], "/robust-night", **night)
+    for what, change in (
+        ("decel2", {"deceleration": 2.0}),
+        ("decel6", {"deceleration": 6.0}),
+        ("headway0.5", {"headway": 0.5}),
+        ("headway1.5", {"headway": 1.5}),
+    ):
+        rows += cases(suite, "CCRb", [50], f"/robust-{what}", impact_location=0.5, **(lead | change))
     return tuple(rows)
 
 

@@ -1,6 +1,5 @@
-"""Suites × agents × seeds, in parallel, each row on disk as it finishes."""
+"""Suites × agents × seeds × conditions, in parallel, each row on disk as it finishes."""
 
-import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -10,34 +9,41 @@ from joblib import Parallel, delayed
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.cases import Case
+from lgmd_gym.benchmark.config import FILE, OWN_SUITE, RunConfig
 from lgmd_gym.benchmark.episode import make_env
-from lgmd_gym.benchmark.eyesight import Eyesight
+from lgmd_gym.benchmark.eyesight import CLEAR, Eyesight
 from lgmd_gym.benchmark.folder import RunFolder
-from lgmd_gym.benchmark.rows import Counterfactual
-from lgmd_gym.benchmark.suites import find_suite
+from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.own_suites import get_suite, save_suite
+from lgmd_gym.benchmark.pool import check_pool, open_pool
+from lgmd_gym.benchmark.rows import key_of
+from lgmd_gym.benchmark.session import Session
 from lgmd_gym.benchmark.tasks import NO_BRAKE, Result, Task, run_task
 
 DEFAULT_AGENTS = (NO_BRAKE, "always-brake", "random-brake", "spike-threshold", "ttc-oracle")
-TRACED_SEED = 0  # whose time series are kept for the plots
+TRACED_SEED = 0  # whose time series are kept of every agent, for the plots
 
 
-class Run:
+class Run(Session):
     """One benchmark run.
 
     `no-brake` is always played first: it decides what is a threat (the counterfactual), and its rows are
-    kept whether or not it was asked for.
+    kept whether or not it was asked for. Its time series are the open-loop traces of the neuron, and all of
+    them are kept.
 
     Args:
-        suite: Name of a suite.
+        suite: Name of a suite, or the path of a suite file (see `own_suites`).
         agents: Agent strings.
         seeds: Number of seeds, played from 0 on.
         jobs: Processes; 1 plays in this one.
         out: The run folder, which must not exist; or an open one, whose episodes are not played again.
-        eyesight: Camera, neuron parameters and condition; each agent's own eye by default.
+        eyesight: Camera and neuron parameters; each agent's own eye by default.
+        conditions: Camera conditions by name; the suite is played once under each.
+        cluster: Address of a Dask scheduler to play on, in place of processes.
 
     Raises:
-        ValueError: For an unknown name, a count below 1, or a folder that exists or cannot be made; before
-            anything is played.
+        ValueError: For an unknown name, a count below 1, a cluster that does not answer, or a folder that
+            exists or cannot be made; before anything is played.
     """
 
     def __init__(
@@ -48,104 +54,86 @@ class Run:
         jobs: int,
         out: Path | RunFolder,
         eyesight: Eyesight | None = None,
+        conditions: Iterable[str] = (CLEAR,),
+        cluster: str | None = None,
     ) -> None:
-        self.cases: tuple[Case, ...] = find_suite(suite).cases
-        self.agents = list(dict.fromkeys(agents))
-        made = [make_agent(agent) for agent in self.agents]
-        if not self.agents:
-            raise ValueError("agents needs at least one name, got none")
-        for name, count in (("seeds", seeds), ("jobs", jobs)):
-            if count < 1:
-                raise ValueError(f"{name} must be >= 1, got {count!r}")
-        self.suite, self.seeds, self.jobs = suite, seeds, jobs
-        self.eyesight = eyesight or Eyesight()
-        # Refuses an unusable camera or parameter here rather than once per episode.
-        for agent in made:
-            make_env(self.cases[0], self.eyesight.of(agent)).close()
-        self.folder = out if isinstance(out, RunFolder) else RunFolder.create(out)
-        # What failed is played again.
-        self.rows: list[dict[str, Any]] = [row for row in self.folder.rows if row["error"] is None]
+        found = get_suite(suite)
+        self.cases: tuple[Case, ...] = found.cases
+        agents, conditions = tuple(dict.fromkeys(agents)), tuple(dict.fromkeys(conditions))
+        made = [make_agent(agent) for agent in agents]
+        for name, given in (("agents", agents), ("conditions", conditions)):
+            if not given:
+                raise ValueError(f"{name} needs at least one name, got none")
+        if seeds < 1:
+            raise ValueError(f"seeds must be >= 1, got {seeds!r}")
+        plain = (eyesight or Eyesight()).plain
+        self.conditions = {condition: plain.under(condition) for condition in conditions}
+        for under in self.conditions.values():
+            # Refuses an unusable camera or parameter here rather than once per episode.
+            for agent in made:
+                make_env(self.cases[0], under.of(agent)).close()
+        check_pool(jobs, cluster)
+        folder = out if isinstance(out, RunFolder) else RunFolder.create(out)
+        own = suite.endswith(".toml")
+        config = RunConfig(
+            suite=OWN_SUITE if own else suite,
+            agents=agents,
+            seeds=seeds,
+            conditions=conditions,
+            camera=plain.camera,
+            params=plain.params,
+        )
+        if own and not (folder.path / OWN_SUITE).exists():
+            save_suite(found, folder.path / OWN_SUITE)
+        if not (folder.path / FILE).exists():
+            config.save(folder.path / FILE)
+        super().__init__(config, folder, list(folder.rows), jobs, cluster)
+        self.suite = found.name
 
     @property
     def total(self) -> int:
         """Number of episodes that will be played."""
         others = [agent for agent in self.agents if agent != NO_BRAKE]
-        return len(self.cases) * self.seeds * (1 + len(others))
+        return len(self.cases) * self.seeds * len(self.conditions) * (1 + len(others))
 
-    def play(self, progress: Callable[[dict[str, Any]], None] | None = None) -> bool:
-        """Play everything; every finished row is on disk, also if interrupted.
-
-        Args:
-            progress: Called with each row as it finishes.
-
-        Returns:
-            Whether all was played; False after Ctrl-C.
-        """
-        started = time.perf_counter()
-        complete = True
-        self.folder.describe(self._settings(False, 0.0))
-        try:
-            self._play(progress or (lambda row: None))
-        except KeyboardInterrupt:
-            complete = False
-        finally:
-            self.folder.describe(self._settings(complete, time.perf_counter() - started))
-            self.folder.close()
-        return complete
-
-    def _play(self, progress: Callable[[dict[str, Any]], None]) -> None:
-        with Parallel(n_jobs=self.jobs, return_as="generator_unordered") as parallel:
-            first = [
-                Task(NO_BRAKE, case, seed, self.eyesight) for case in self.cases for seed in range(self.seeds)
-            ]
-            done = {(row["agent"], row["case"], row["seed"]): row for row in self.rows}
-            truths = {key[1:]: Counterfactual.of_row(row) for key, row in done.items() if key[0] == NO_BRAKE}
-            for result in self._results(parallel, _without(first, done), progress):
+    def _play(self, keep: Callable[[dict[str, Any]], None]) -> None:
+        first = [
+            Task(NO_BRAKE, case, seed, eyesight, condition=condition)
+            for condition, eyesight in self.conditions.items()
+            for case in self.cases
+            for seed in range(self.seeds)
+        ]
+        done = {key_of(row): row for row in self.rows}
+        truths = {key[1:]: Counterfactual.of_row(row) for key, row in done.items() if key[0] == NO_BRAKE}
+        with open_pool(self.jobs, self.cluster) as parallel:
+            for result in self._results(parallel, [task for task in first if task.key not in done], keep):
                 if result.truth is not None:
-                    truths[result.task.case.name, result.task.seed] = result.truth
+                    truths[result.task.key[1:]] = result.truth
             rest = [
-                replace(task, agent=agent, truth=truths[task.case.name, task.seed])
+                replace(task, agent=agent, truth=truths[task.key[1:]])
                 for agent in self.agents
                 if agent != NO_BRAKE
                 for task in first
-                if (task.case.name, task.seed) in truths
+                if task.key[1:] in truths
             ]
-            for _ in self._results(parallel, _without(rest, done), progress):
+            for _ in self._results(parallel, [task for task in rest if task.key not in done], keep):
                 pass
 
     def _results(
-        self, parallel: Parallel, tasks: list[Task], progress: Callable[[dict[str, Any]], None]
+        self, parallel: Parallel, tasks: list[Task], keep: Callable[[dict[str, Any]], None]
     ) -> Iterator[Result]:
         """Play tasks and yield their results, each kept before it is yielded."""
         results = cast(Iterator[Result], parallel(delayed(run_task)(task) for task in tasks))
         for result in results:
-            self.rows.append(result.row)
-            self.folder.add(result.row)
-            if result.task.seed == TRACED_SEED and result.series is not None:
-                self.folder.add_series(trace_name(result.task.case.name, result.task.agent), result.series)
-            progress(result.row)
+            task, traced = result.task, result.task.agent == NO_BRAKE or result.task.seed == TRACED_SEED
+            # Before the row: what has a row is never played again.
+            if traced and result.series is not None:
+                self.folder.add_series(trace_name(*task.key), result.series)
+            keep(result.row)
             yield result
 
-    def _settings(self, complete: bool, wall_time: float) -> dict[str, Any]:
-        return {
-            "suite": self.suite,
-            "agents": self.agents,
-            "seeds": self.seeds,
-            "jobs": self.jobs,
-            "camera": self.eyesight.camera,
-            "params": self.eyesight.params,
-            "condition": self.eyesight.condition,
-            "complete": complete,
-            "episodes": len(self.rows),
-            "wall_time": round(wall_time, 3),
-        }
 
-
-def _without(tasks: list[Task], done: dict[tuple[str, str, int], Any]) -> list[Task]:
-    """Return the tasks that are not among the finished (agent, case, seed)."""
-    return [task for task in tasks if (task.agent, task.case.name, task.seed) not in done]
-
-
-def trace_name(case: str, agent: str) -> str:
+def trace_name(agent: str, case: str, seed: int, condition: str = CLEAR) -> str:
     """Return the file stem under which an episode's time series are kept."""
-    return f"{case}__{agent}".replace("/", "_").replace(":", "_").replace(",", "_")
+    name = f"{case}__{agent}__seed{seed}" + ("" if condition == CLEAR else f"__{condition}")
+    return name.replace("/", "_").replace(":", "_").replace(",", "_")

@@ -1,9 +1,10 @@
-"""A run of any suite, new or broken off: suites of cases are a `Run`, traffic is a `TrafficRun`."""
+"""A run of any suite, new, broken off or repeated: suites of cases are a `Run`, traffic is a `TrafficRun`."""
 
 from collections.abc import Iterable
 from pathlib import Path
 
-from lgmd_gym.benchmark.eyesight import Eyesight
+from lgmd_gym.benchmark.config import OWN_SUITE, RunConfig
+from lgmd_gym.benchmark.eyesight import CLEAR, Eyesight
 from lgmd_gym.benchmark.folder import RunFolder
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.suites import SUITES
@@ -22,29 +23,44 @@ def start_run(
     jobs: int,
     out: Path,
     eyesight: Eyesight | None = None,
+    conditions: Iterable[str] = (CLEAR,),
+    cluster: str | None = None,
 ) -> Run | TrafficRun:
     """Return a new run, to be played.
 
     Args:
-        suite: A name in `SUITE_NAMES`.
+        suite: A name in `SUITE_NAMES`, or the path of a suite file, which ends in ".toml".
         agents: Agent strings.
         seeds: Number of seeds, played from 0 on; for traffic, of every kind.
         jobs: Processes; 1 plays in this one.
         out: The run folder, which must not exist.
-        eyesight: Camera, neuron parameters and condition; each agent's own eye by default.
+        eyesight: Camera and neuron parameters; each agent's own eye by default.
+        conditions: Camera conditions by name; traffic is played under one.
+        cluster: Address of a Dask scheduler to play on, in place of processes.
 
     Raises:
-        ValueError: For an unknown name, a count below 1, or a folder that exists or cannot be made; before
-            anything is played.
+        ValueError: For an unknown name, a count below 1, a cluster that does not answer, or a folder that
+            exists or cannot be made; before anything is played.
     """
     if suite == TRAFFIC:
-        return TrafficRun(agents, KINDS, seeds, jobs, out, eyesight)
-    if suite not in SUITES:
+        return TrafficRun(agents, KINDS, seeds, jobs, out, eyesight, conditions, cluster)
+    if suite not in SUITES and not suite.endswith(".toml"):
         raise unknown_name("suite", suite, SUITE_NAMES)
-    return Run(suite, agents, seeds, jobs, out, eyesight)
+    return Run(suite, agents, seeds, jobs, out, eyesight, conditions, cluster)
 
 
-def resume_run(path: Path, jobs: int) -> Run | TrafficRun:
+def repeat_run(config: RunConfig, jobs: int, out: Path, cluster: str | None = None) -> Run | TrafficRun:
+    """Return a new run that plays what a config says.
+
+    Raises:
+        ValueError: As `start_run`.
+    """
+    return start_run(
+        config.suite, config.agents, config.seeds, jobs, out, config.eyesight, config.conditions, cluster
+    )
+
+
+def resume_run(path: Path, jobs: int, cluster: str | None = None) -> Run | TrafficRun:
     """Return the run of a folder that was broken off, to be played to its end.
 
     Raises:
@@ -52,7 +68,9 @@ def resume_run(path: Path, jobs: int) -> Run | TrafficRun:
     """
     folder = RunFolder.reopen(path)
     settings = folder.settings()
-    eyesight = Eyesight(settings["camera"], settings["params"], settings["condition"])
+    eyesight = Eyesight(settings["camera"], settings["params"])
+    agents, seeds, conditions = settings["agents"], settings["seeds"], settings["conditions"]
     if settings["suite"] == TRAFFIC:
-        return TrafficRun(settings["agents"], settings["kinds"], settings["seeds"], jobs, folder, eyesight)
-    return Run(settings["suite"], settings["agents"], settings["seeds"], jobs, folder, eyesight)
+        return TrafficRun(agents, settings["kinds"], seeds, jobs, folder, eyesight, conditions, cluster)
+    suite = str(path / OWN_SUITE) if settings["suite"] == OWN_SUITE else settings["suite"]
+    return Run(suite, agents, seeds, jobs, folder, eyesight, conditions, cluster)

@@ -103,7 +103,9 @@ def judge_r152(row: Row) -> tuple[bool, str]:
     relative = round((row["ego_speed"] - row["target_speed"]) / KMH, 3)
     load = r152_load(row["case"])
     limit = r152_limit(relative, load)
-    return impact(row) / KMH <= limit + 1e-9, f"≤ {limit:g} km/h {load}"
+    good = impact(row) / KMH <= limit + 1e-9
+    # Who brakes before the test has begun (T0) has not been tested.
+    return good and not row["premature_brake"], f"≤ {limit:g} km/h {load}"
 
 
 def judge_contact(row: Row) -> tuple[bool, str]:

@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 
 from lgmd_gym.benchmark import protocols
-from lgmd_gym.benchmark.cases import Case, cases, one
+from lgmd_gym.benchmark.cases import Case, cases, level, one
 from lgmd_gym.errors import unknown_name
+
+RANDOM_LEVELS = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +109,11 @@ _ALL = (
     ),
     Suite("false-reaction", _false_reaction(), "driving in which braking is the fault"),
     Suite("near-miss", _near_miss(), "close calls that resolve themselves"),
+    Suite(
+        "random",
+        tuple(level("random", "test", number) for number in range(RANDOM_LEVELS)),
+        "levels of RandomBraking's test split, light and weather included; a level is fixed, take --seeds 1",
+    ),
 )
 SUITES: dict[str, Suite] = {suite.name: suite for suite in _ALL}
 

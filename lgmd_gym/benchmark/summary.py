@@ -5,18 +5,24 @@ import re
 from collections.abc import Callable, Iterable
 from math import sqrt
 from pathlib import Path
-from statistics import fmean, median
+from statistics import median
 from typing import Any, NamedTuple
+
+from lgmd_gym.benchmark.bootstrap import Mean, cluster_mean
+from lgmd_gym.benchmark.episode import CLEAR
 
 Row = dict[str, Any]
 COLUMNS = (
     "agent",
+    "condition",
     "case",
     "threats",
     "avoided",
     "avoided_low",
     "avoided_high",
     "speed_reduction",
+    "speed_reduction_low",
+    "speed_reduction_high",
     "ttc_at_brake",
     "premature",
     "quiet",
@@ -67,7 +73,7 @@ class Score(NamedTuple):
         agent: The agent's string.
         group: What the episodes share.
         avoided: Threats avoided without premature braking.
-        speed_reduction: Mean over threats [m/s]; None without a threat.
+        speed_reduction: Mean over threats, bootstrapped by case [m/s].
         ttc_at_brake: Median over threats in which it braked [s]; None without one.
         premature: Threats in which it braked too early to count.
         false_brakes: Episodes without a threat in which it braked.
@@ -77,7 +83,7 @@ class Score(NamedTuple):
     agent: str
     group: str
     avoided: Rate
-    speed_reduction: float | None
+    speed_reduction: Mean
     ttc_at_brake: float | None
     premature: Rate
     false_brakes: Rate
@@ -94,7 +100,7 @@ def score(agent: str, group: str, rows: list[Row]) -> Score:
         agent,
         group,
         Rate.of(row["avoided"] for row in threats),
-        fmean(row["speed_reduction"] for row in threats) if threats else None,
+        cluster_mean([row["speed_reduction"] for row in threats], [row["case"] for row in threats]),
         median(braked) if braked else None,
         Rate.of(row["premature_brake"] for row in threats),
         Rate.of(row["false_brake"] for row in quiet),
@@ -103,13 +109,22 @@ def score(agent: str, group: str, rows: list[Row]) -> Score:
 
 
 def scores(rows: list[Row], group: Callable[[Row], str]) -> list[Score]:
-    """Return one score per agent and group, both in the order of their first row by case name."""
-    ordered = sorted(rows, key=lambda row: case_order(row["case"]))
-    cells = dict.fromkeys((row["agent"], group(row)) for row in ordered)
-    return [
-        score(agent, name, [row for row in rows if row["agent"] == agent and group(row) == name])
-        for agent, name in cells
-    ]
+    """Return one score per agent and group, in the order of their first case's name, then of the agents'.
+
+    The order in which the episodes finished does not matter.
+    """
+    cells: dict[tuple[str, str], list[Row]] = {}
+    for row in sorted(rows, key=lambda row: (case_order(row["case"]), row["agent"])):
+        cells.setdefault((row["agent"], group(row)), []).append(row)
+    return [score(agent, name, of_cell) for (agent, name), of_cell in cells.items()]
+
+
+def by_condition(rows: list[Row]) -> dict[str, list[Row]]:
+    """Return the rows of each camera condition, in the order in which these come."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(row.get("condition", CLEAR), []).append(row)
+    return found
 
 
 def case_order(case: str) -> list[tuple[int, str]]:
@@ -119,16 +134,25 @@ def case_order(case: str) -> list[tuple[int, str]]:
 
 
 def write_summary(rows: list[Row], path: Path) -> None:
-    """Write one line per agent and case to a CSV file, in SI units."""
+    """Write one line per agent, condition and case to a CSV file, in SI units; a line "all" sums up."""
+    conditions = sorted(by_condition(rows).items())
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
-        for item in scores(rows, lambda row: row["case"]):
-            avoided, false = item.avoided, item.false_brakes
-            threats = [avoided.n, avoided.k, _bound(avoided, "low"), _bound(avoided, "high")]
-            quiet = [false.n, false.k, _bound(false, "low"), _bound(false, "high")]
-            means = [_round(item.speed_reduction), _round(item.ttc_at_brake), item.premature.k]
-            writer.writerow([item.agent, item.group, *threats, *means, *quiet, item.errors])
+        for condition, of_condition in conditions:
+            for item in scores(of_condition, lambda row: row["case"]):
+                writer.writerow(_line(item, condition))
+        for condition, of_condition in conditions:
+            for item in scores(of_condition, lambda row: "all"):
+                writer.writerow(_line(item, condition))
+
+
+def _line(item: Score, condition: str) -> list[Any]:
+    avoided, false, speed = item.avoided, item.false_brakes, item.speed_reduction
+    threats = [avoided.n, avoided.k, _bound(avoided, "low"), _bound(avoided, "high")]
+    quiet = [false.n, false.k, _bound(false, "low"), _bound(false, "high")]
+    means = [_round(value) for value in (speed.value, speed.low, speed.high, item.ttc_at_brake)]
+    return [item.agent, condition, item.group, *threats, *means, item.premature.k, *quiet, item.errors]
 
 
 def _bound(rate: Rate, bound: str) -> str:

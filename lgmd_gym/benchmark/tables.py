@@ -5,15 +5,31 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from lgmd_gym.benchmark.bootstrap import Mean
 from lgmd_gym.benchmark.scores import JUDGES, Verdict, meets_r152, verdicts
 from lgmd_gym.benchmark.summary import Rate, Score, case_order, scores
 from lgmd_gym.envs.units import KMH
 
 Row = dict[str, Any]
-RATE_NOTE = "k/n [Wilson 95 % interval in %]; premature: more than 4 s before contact, no success"
+RATE_NOTE = (
+    "k/n [Wilson 95 % interval in %]; speed cut [95 %, bootstrapped by case]; premature: more than 4 s "
+    "before contact, no success"
+)
 
 
-def score_table(rows: list[Row], agents: list[str], title: str) -> Table:
+def score_tables(rows: list[Row], agents: list[str], title: str) -> list[Table]:
+    """Return the agents' scores; cases in which a warned driver brakes have a table of their own.
+
+    What a driver does on a warning is no automatic braking, and no part of its totals.
+    """
+    parts = {
+        title: [row for row in rows if not row["warned_driver"]],
+        "with a driver who brakes 1.2 s after the alert": [row for row in rows if row["warned_driver"]],
+    }
+    return [_score_table(part, agents, name) for name, part in parts.items() if part]
+
+
+def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
     """Return one line per agent over all episodes."""
     table = Table(title=title, caption=RATE_NOTE, box=SIMPLE_HEAD)
     table.add_column("agent", overflow="fold", min_width=15)
@@ -22,11 +38,11 @@ def score_table(rows: list[Row], agents: list[str], title: str) -> Table:
     for item in _by_agent(scores(rows, lambda row: ""), agents):
         table.add_row(
             item.agent + (f" ({item.errors} errors)" if item.errors else ""),
-            _rate(item.avoided),
-            "–" if item.speed_reduction is None else f"{item.speed_reduction / KMH:.1f}",
+            rate_text(item.avoided),
+            mean_kmh(item.speed_reduction),
             "–" if item.ttc_at_brake is None else f"{item.ttc_at_brake:.2f}",
-            _rate(item.premature),
-            _rate(item.false_brakes),
+            rate_text(item.premature),
+            rate_text(item.false_brakes),
         )
     return table
 
@@ -76,7 +92,17 @@ def _verdict(item: Verdict | None) -> str:
     return f"{item.met.k}/{item.met.n}" + (f" ({item.worst / KMH:.0f})" if item.worst else "")
 
 
-def _rate(rate: Rate) -> str:
+def mean_kmh(mean: Mean) -> str:
+    """Return a mean in m/s as km/h, with its interval if it has one."""
+    if mean.value is None:
+        return "–"
+    if mean.low is None or mean.high is None:
+        return f"{mean.value / KMH:.1f}"
+    return f"{mean.value / KMH:.1f} [{mean.low / KMH:.0f}–{mean.high / KMH:.0f}]"
+
+
+def rate_text(rate: Rate) -> str:
+    """Return k/n and its interval in per cent."""
     if rate.n == 0:
         return "–"
     return f"{rate.k}/{rate.n} [{100 * rate.low:.0f}–{100 * rate.high:.0f}]"

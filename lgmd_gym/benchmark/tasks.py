@@ -10,8 +10,9 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.cases import Case
 from lgmd_gym.benchmark.driver import WarnedDriver
 from lgmd_gym.benchmark.episode import Episode, make_env, play
-from lgmd_gym.benchmark.eyesight import Eyesight
-from lgmd_gym.benchmark.rows import Counterfactual, error_row, make_row
+from lgmd_gym.benchmark.eyesight import CLEAR, Eyesight
+from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.rows import RowKey, error_row, make_row
 
 NO_BRAKE = "no-brake"
 
@@ -24,8 +25,9 @@ class Task:
         agent: The agent's string.
         case: The case.
         seed: Of the environment and the agent.
-        eyesight: Camera and neuron parameters, or the agent's own.
+        eyesight: Camera and neuron parameters, or the agent's own; the condition included.
         truth: What `no-brake` met; None for `no-brake` itself.
+        condition: Name of the camera's condition, for the row.
     """
 
     agent: str
@@ -33,6 +35,12 @@ class Task:
     seed: int
     eyesight: Eyesight
     truth: Counterfactual | None = None
+    condition: str = CLEAR
+
+    @property
+    def key(self) -> RowKey:
+        """What tells it from all others of its run, see `rows.key_of`."""
+        return self.agent, self.case.name, self.seed, self.condition
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +66,12 @@ def run_task(task: Task) -> Result:
         agent: Any = make_agent(task.agent)
         eyesight = task.eyesight.of(agent)
         episode = _play(task, agent, eyesight)
-    except Exception:
-        return Result(task, error_row(task.agent, task.case, task.seed, traceback.format_exc()))
+    except (Exception, SystemExit):  # an agent that calls exit() would take the worker with it
+        error = traceback.format_exc()
+        return Result(task, error_row(task.agent, task.case, task.seed, error, task.condition))
     truth = task.truth or Counterfactual.of(episode)
-    row = make_row(task.agent, task.case, task.seed, episode, truth) | {"camera": eyesight.label}
+    row = make_row(task.agent, task.case, task.seed, episode, truth, condition=task.condition)
+    row["camera"] = eyesight.label
     return Result(task, row, episode.series, truth)
 
 

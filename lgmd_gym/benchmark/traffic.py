@@ -11,17 +11,19 @@ What a seed's traffic is like is settled by highway-env's drivers, which are no 
 away nor drift, so that contacts are rare. A rate says how an agent does in such traffic, not on a road.
 """
 
-import time
 import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any, cast
 
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.eyesight import Eyesight
+from lgmd_gym.benchmark.config import FILE, RunConfig
+from lgmd_gym.benchmark.eyesight import CLEAR, Eyesight
 from lgmd_gym.benchmark.folder import RunFolder
+from lgmd_gym.benchmark.pool import check_pool, open_pool
+from lgmd_gym.benchmark.session import Session
 from lgmd_gym.benchmark.traffic_drive import Ride
 from lgmd_gym.benchmark.traffic_rows import SUITE, case_name, error_row, make_row
 from lgmd_gym.benchmark.traffic_trace import record
@@ -37,6 +39,7 @@ def run_traffic(
     jobs: int = 1,
     eyesight: Eyesight | None = None,
     done: Collection[tuple[str, str]] = (),
+    cluster: str | None = None,
 ) -> Iterator[dict[str, Any]]:
     """Play every agent in every kind of traffic with every seed; yield each row as it comes.
 
@@ -50,40 +53,41 @@ def run_traffic(
         jobs: Processes; 1 plays in this one.
         eyesight: Camera and neuron parameters.
         done: Pairs of agent and case that need not be played.
+        cluster: Address of a Dask scheduler to play on, in place of processes.
 
     Raises:
         ValueError: For an unknown name, none at all, or a count below 1; before anything is played.
     """
     agents, kinds, eyesight = list(dict.fromkeys(agents)), list(dict.fromkeys(kinds)), eyesight or Eyesight()
-    _check(agents, kinds, seeds, jobs, eyesight)
+    _check(agents, kinds, seeds, eyesight)
+    check_pool(jobs, cluster)
     # Seed by seed rather than kind by kind, so that what Ctrl-C leaves is a fair sample.
     wanted = [
         ([agent for agent in agents if (agent, case_name(kind, seed)) not in done], kind, seed)
         for seed in range(seeds)
         for kind in kinds
     ]
-    return _play([task for task in wanted if task[0]], jobs, eyesight)
+    return _play([task for task in wanted if task[0]], jobs, eyesight, cluster)
 
 
 def _play(
-    wanted: list[tuple[list[str], str, int]], jobs: int, eyesight: Eyesight
+    wanted: list[tuple[list[str], str, int]], jobs: int, eyesight: Eyesight, cluster: str | None
 ) -> Iterator[dict[str, Any]]:
     tasks = (delayed(drive_all)(*task, eyesight) for task in wanted)
-    with Parallel(n_jobs=jobs, return_as="generator_unordered") as parallel:
+    with open_pool(jobs, cluster) as parallel:
         for rows in cast(Iterator[list[dict[str, Any]]], parallel(tasks)):
             yield from rows
 
 
-def _check(agents: list[str], kinds: list[str], seeds: int, jobs: int, eyesight: Eyesight) -> None:
+def _check(agents: list[str], kinds: list[str], seeds: int, eyesight: Eyesight) -> None:
     for name, given in (("agents", agents), ("kinds", kinds)):
         if not given:
             raise ValueError(f"{name} needs at least one name, got none")
     made = [make_agent(agent) for agent in agents]
     for kind in kinds:
         find_kind(kind)
-    for name, count in (("seeds", seeds), ("jobs", jobs)):
-        if count < 1:
-            raise ValueError(f"{name} must be >= 1, got {count!r}")
+    if seeds < 1:
+        raise ValueError(f"seeds must be >= 1, got {seeds!r}")
     # Refuses an unusable camera or parameter here rather than once per drive.
     for agent in made:
         make_traffic(kinds[0], **eyesight.of(agent).arguments).close()
@@ -128,7 +132,7 @@ def _by_eye(agents: list[str], eyesight: Eyesight) -> list[tuple[Eyesight, list[
     return groups
 
 
-class TrafficRun:
+class TrafficRun(Session):
     """One run of the traffic suite into a run folder; the counterpart of `Run`.
 
     Args:
@@ -138,13 +142,13 @@ class TrafficRun:
         jobs: Processes; 1 plays in this one.
         out: The run folder, which must not exist; or an open one, whose drives are not played again.
         eyesight: Camera and neuron parameters.
+        conditions: One camera condition by name.
+        cluster: Address of a Dask scheduler to play on, in place of processes.
 
     Raises:
-        ValueError: As `run_traffic`, or for a folder that exists or cannot be made; before anything is
-            played.
+        ValueError: As `run_traffic`, for several conditions, or for a folder that exists or cannot be made;
+            before anything is played.
     """
-
-    suite = SUITE
 
     def __init__(
         self,
@@ -154,56 +158,41 @@ class TrafficRun:
         jobs: int,
         out: Path | RunFolder,
         eyesight: Eyesight | None = None,
+        conditions: Iterable[str] = (CLEAR,),
+        cluster: str | None = None,
     ) -> None:
-        self.agents, self.kinds = list(dict.fromkeys(agents)), list(dict.fromkeys(kinds))
-        self.seeds, self.jobs, self.eyesight = seeds, jobs, eyesight or Eyesight()
-        held = out.rows if isinstance(out, RunFolder) else []
+        conditions = tuple(conditions)
+        if len(conditions) != 1:
+            raise ValueError(f"traffic is played under one condition, got {', '.join(conditions) or 'none'}")
+        plain = (eyesight or Eyesight()).plain
+        self.kinds = list(dict.fromkeys(kinds))
         # What failed is played again.
-        self.rows: list[dict[str, Any]] = [row for row in held if row["error"] is None]
-        done = {(row["agent"], row["case"]) for row in self.rows}
-        self._coming = run_traffic(self.agents, self.kinds, seeds, jobs, self.eyesight, done)
-        self.folder = out if isinstance(out, RunFolder) else RunFolder.create(out)
+        held = out.rows if isinstance(out, RunFolder) else []
+        done = {(row["agent"], row["case"]) for row in held}
+        agents = tuple(dict.fromkeys(agents))
+        under = plain.under(conditions[0])
+        self._coming = run_traffic(agents, self.kinds, seeds, jobs, under, done, cluster)
+        folder = out if isinstance(out, RunFolder) else RunFolder.create(out)
+        config = RunConfig(
+            suite=SUITE,
+            agents=agents,
+            seeds=seeds,
+            conditions=conditions,
+            camera=plain.camera,
+            params=plain.params,
+        )
+        if not (folder.path / FILE).exists():
+            config.save(folder.path / FILE)
+        super().__init__(config, folder, list(held), jobs, cluster)
 
     @property
     def total(self) -> int:
         """Number of drives that will be played."""
         return len(self.agents) * len(self.kinds) * self.seeds
 
-    def play(self, progress: Callable[[dict[str, Any]], None] | None = None) -> bool:
-        """Play everything; every finished row is on disk, also if interrupted.
+    def _play(self, keep: Callable[[dict[str, Any]], None]) -> None:
+        for row in self._coming:
+            keep(row)
 
-        Args:
-            progress: Called with each row as it finishes.
-
-        Returns:
-            Whether all was played; False after Ctrl-C.
-        """
-        started, complete = time.perf_counter(), True
-        self.folder.describe(self._settings(False, 0.0))
-        try:
-            for row in self._coming:
-                self.rows.append(row)
-                self.folder.add(row)
-                if progress is not None:
-                    progress(row)
-        except KeyboardInterrupt:
-            complete = False
-        finally:
-            self.folder.describe(self._settings(complete, time.perf_counter() - started))
-            self.folder.close()
-        return complete
-
-    def _settings(self, complete: bool, wall_time: float) -> dict[str, Any]:
-        return {
-            "suite": self.suite,
-            "kinds": self.kinds,
-            "agents": self.agents,
-            "seeds": self.seeds,
-            "jobs": self.jobs,
-            "camera": self.eyesight.camera,
-            "params": self.eyesight.params,
-            "condition": self.eyesight.condition,
-            "complete": complete,
-            "episodes": len(self.rows),
-            "wall_time": round(wall_time, 3),
-        }
+    def _more_settings(self) -> dict[str, Any]:
+        return {"kinds": self.kinds}

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
 
-from lgmd_gym.benchmark.rows import NUISANCE, PREMATURE
+from lgmd_gym.benchmark.metrics import NUISANCE, PREMATURE
 from lgmd_gym.benchmark.traffic_trace import Seen, Trace
 
 SUITE = "traffic"

@@ -132,7 +132,7 @@ class LGMD:
     def layers(self) -> dict[str, NDArray[np.float32]]:
         """The maps of the last frame, float32, shape (H, W), or (N, H, W) from N neurons; fresh copies.
 
-        P, E (|P| by path), I (of the path that P excites: ON where P >= 0), S and G as in the
+        P, E (`|P|` by path), I (of the path that P excites: ON where P >= 0), S and G as in the
         equations of `LGMDParams`; all 0 before the first change and outside the mask.
         """
         read = layout.layers if self._fast else general.layers

@@ -1,0 +1,35 @@
+"""Sphinx's settings; pages and figures that come from code are made before the build."""
+
+import sys
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from lgmd_gym import __version__
+
+project = "lgmd-gym"
+project_copyright = "2026, the lgmd-gym authors"
+release = __version__
+html_theme = "furo"
+html_title = f"lgmd-gym {release}"
+html_static_path = ["_generated/static"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["_build", "examples"]
+source_suffix = {".md": "markdown"}
+myst_enable_extensions = ["deflist"]
+myst_heading_anchors = 3
+default_role = "code"
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # docstrings say shapes, units and types
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+
+
+def setup(app: Sphinx) -> None:
+    """Have the pages from code made first."""
+    import generate
+
+    app.connect("config-inited", lambda app, config: generate.main(Path(app.confdir) / "_generated"))

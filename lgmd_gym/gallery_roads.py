@@ -1,0 +1,66 @@
+"""What the eye sees on highway-env's own roads and under every condition: single frames."""
+
+import warnings
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera.params import CONDITIONS, PRESETS
+
+# Road: seed and simulation steps that have something to see.
+ROADS = {
+    "highway-v0": (1, 30),
+    "merge-v0": (0, 60),
+    "roundabout-v0": (0, 60),
+    "intersection-v0": (2, 40),
+    "racetrack-v0": (3, 15),
+    "exit-v0": (1, 30),
+    "two-way-v0": (0, 45),
+    "lane-keeping-v0": (0, 15),
+    "u-turn-v0": (0, 30),
+    "parking-v0": (2, 10),
+}
+LENSES = ("wide", "standard", "tele", "fovea")
+APPROACH = 90  # decisions of an approach at 8 m/s after which the target is well in sight
+
+
+def road_sheet(roads: tuple[str, ...], conditions: tuple[str, ...]) -> dict[str, dict[str, np.ndarray]]:
+    """Return frames of the wide camera: road to condition to frame, uint8, shape (height, width)."""
+    wide = CameraParams.preset("wide")
+    cameras = {name: EgoCamera(wide.with_condition(name)) for name in conditions}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # highway-env's remarks on its own spaces and versions
+        return {env_id: _road_frames(env_id, cameras) for env_id in roads}
+
+
+def lens_sheet() -> dict[str, dict[str, np.ndarray]]:
+    """Return one moment of an approach: lens to condition to frame, uint8, shape (height, width)."""
+    env: Any = gym.make("LGMD/CCRs-v0", ego_speed=8.0, shade=60, camera=None)
+    env.reset(seed=0)
+    for _ in range(APPROACH):
+        env.step([0.0])
+    return {
+        lens: {name: EgoCamera(PRESETS[lens].with_condition(name)).render(env) for name in CONDITIONS}
+        for lens in LENSES
+    }
+
+
+def _road_frames(env_id: str, cameras: dict[str, EgoCamera]) -> dict[str, np.ndarray]:
+    """Drive on for a while without steering or braking, then render one frame per camera."""
+    import highway_env  # noqa: F401  (registers the environments)
+
+    seed, steps = ROADS[env_id]
+    config = {"simulation_frequency": 30, "policy_frequency": 30}
+    if env_id in ("highway-v0", "exit-v0"):
+        config["vehicles_count"] = 8
+    env: Any = gym.make(env_id, config=config).unwrapped
+    env.reset(seed=seed)
+    for _ in range(steps):
+        env.road.act()
+        env.road.step(1 / 30)
+        env.steps += 1
+    frames = {name: camera.render(env) for name, camera in cameras.items()}
+    env.close()
+    return frames

@@ -1,0 +1,67 @@
+"""`PolicyView`: an environment as a policy sees it, scaled, with memory, at the policy's own pace."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import RecordConstructorArgs
+
+from lgmd_gym.agents.features import Features, Memory, source_of
+
+
+class PolicyView(gym.Wrapper, RecordConstructorArgs):
+    """Shows a policy what `features` say, and holds each of its actions for `repeat` decisions.
+
+    Observations become a `Dict` of float32 vectors in [-5, 5], oldest first, and frames uint8 with the
+    history in their channels; rewards of the decisions held are summed. As a plain wrapper with keyword
+    arguments it also serves as rl-zoo's `env_wrapper`.
+
+    Args:
+        env: An environment inside `LGMDObservation`, with `include_frame` if frames are wanted.
+        **features: Fields of `lgmd_gym.agents.features.Features`.
+
+    Raises:
+        ValueError: For an unknown field or input, or one that the observation lacks.
+    """
+
+    def __init__(self, env: gym.Env, **features: Any) -> None:
+        RecordConstructorArgs.__init__(self, **features)
+        gym.Wrapper.__init__(self, env)
+        self.features = Features.from_dict(features)
+        self._memory = Memory(self.features)
+        given = env.observation_space
+        if not isinstance(given, spaces.Dict):
+            raise ValueError(f"PolicyView needs the Dict observation of LGMDObservation, got {given}")
+        shapes = {name: space.shape or () for name, space in given.spaces.items()}
+        for name in self.features.inputs:
+            if source_of(name) not in shapes:
+                raise ValueError(
+                    f"the policy input {name!r} is not observed; make it with include_{name}=True"
+                )
+        self.observation_space = spaces.Dict(
+            {
+                name: spaces.Box(low, high, shape, dtype)
+                for name, (low, high, shape, dtype) in self.features.limits(shapes).items()
+            }
+        )
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """Reset the environment; the first observation fills the history."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._memory.clear()
+        return self._memory.see(observation), info
+
+    def step(self, action: Any) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
+        """Hold an action for `repeat` decisions or to the episode's end."""
+        total = 0.0
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        for _ in range(self.features.repeat - 1):
+            if terminated or truncated:
+                break
+            total += float(reward)
+            observation, reward, terminated, truncated, info = self.env.step(action)
+        total += float(reward)
+        return self._memory.see(observation), total, terminated, truncated, info

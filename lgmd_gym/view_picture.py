@@ -1,0 +1,74 @@
+"""The composed picture: what the eye sees, what the neuron says, where the cars are."""
+
+import numpy as np
+
+from lgmd_gym import view_panels as panels
+from lgmd_gym import view_trace
+from lgmd_gym.view_canvas import FAINT, Canvas
+from lgmd_gym.view_moment import Moment
+from lgmd_gym.view_overlays import check_overlays
+from lgmd_gym.wrappers import LGMDObservation, TraceFrame
+
+SIZE = (1280, 720)
+
+
+class Picture:
+    """Composes one picture per decision of an observed highway-env environment.
+
+    Args:
+        observer: The eye and its neurons, after the first reset.
+        title: Shown at the top.
+        overlays: What is drawn over the eye's frame: "zone", the danger zone, "targets", boxes around who is
+            ahead.
+        camera: Name of the camera that is shown large, with its layers; None for the first.
+
+    Raises:
+        ValueError: For an unknown overlay or camera.
+    """
+
+    def __init__(
+        self, observer: LGMDObservation, title: str, overlays: tuple[str, ...], camera: str | None
+    ) -> None:
+        names = observer.eyes.names
+        self._camera = names.index(camera) if camera is not None else 0
+        self._observer, self._title = observer, title
+        self._eye = panels.EyePanel(observer, self._camera, check_overlays(overlays))
+        shades = panels.CAMERA_COLOURS
+        colours = [shades[index % len(shades)] for index in range(len(names))]
+        self._trace = view_trace.Trace(observer.params.t_sf, names, colours)
+        self._top = panels.TopPanel(observer.unwrapped)
+        self._canvas = self._make_canvas()
+
+    def clear(self) -> None:
+        """Forget the last episode."""
+        self._trace.clear()
+
+    def take(self, frames: list[TraceFrame]) -> None:
+        """Take the neurons' answers to the camera frames of one decision."""
+        for frame in frames:
+            response = frame.response
+            self._trace.add(frame.time, response.spike_frequency.tolist(), int(response.spikes.max()))
+
+    def draw(self, moment: Moment) -> np.ndarray:
+        """Return the present picture, uint8, shape (720, 1280, 3); a fresh array."""
+        canvas = self._canvas
+        canvas.clear()
+        canvas.text((712, 29), f"{moment.time:.2f} s", 18, anchor="rm")
+        self._eye.draw(canvas)
+        panels.draw_layers(canvas, self._observer.eyes.layers(self._camera))
+        potential = self._observer.response.membrane_potential
+        self._trace.draw(canvas, float(potential[self._camera]))
+        panels.draw_bars(canvas, moment)
+        self._top.draw(canvas)
+        panels.draw_lamps(canvas, moment)
+        return canvas.pixels.copy()
+
+    def _make_canvas(self) -> Canvas:
+        canvas = Canvas(SIZE)
+        canvas.clear()
+        canvas.text((24, 29), self._title, 18, anchor="lm")
+        panels.draw_layer_names(canvas)
+        view_trace.draw_frame(canvas)
+        canvas.text((panels.TOP[0], 548), "from above, by highway-env", 15, FAINT, "lm")
+        canvas.keep()
+        return canvas

@@ -1,0 +1,230 @@
+"""What policies see, how they are trained, and that a trained one acts as it was trained to."""
+
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import lgmd_gym  # noqa: F401
+from lgmd_gym import cli
+from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.features import FADE, LIMIT, Features, Memory, shrunk
+from lgmd_gym.agents.policy import read_card
+from lgmd_gym.training import PolicyView
+from lgmd_gym.training.settings import read_settings
+from lgmd_gym.training.trainer import DEMANDS, Order, Training, make_env
+
+YAML = """
+LGMD/CCRs-v0:
+  env_wrapper:
+    - lgmd_gym.training.PolicyView: {history: 2, repeat: 4}
+  n_envs: 2
+  n_timesteps: 64
+  learning_rate: lin_0.001
+  n_steps: 16
+  batch_size: 16
+  policy_kwargs: {net_arch: [8]}
+"""
+
+
+def observed(value):
+    return {"spike_frequency": np.array([value], np.float32), "ego_speed": np.array([10.0], np.float32)}
+
+
+def test_memory_scales_and_remembers():
+    memory = Memory(Features(inputs=("spike_frequency", "ego_speed"), history=3))
+    first = memory.see(observed(50.0))
+    assert first["spike_frequency"].tolist() == [0.5, 0.5, 0.5]
+    assert first["ego_speed"].tolist() == [0.5, 0.5, 0.5]
+    memory.see(observed(100.0))
+    assert memory.see(observed(9e9))["spike_frequency"].tolist() == [0.5, 1.0, LIMIT]
+    memory.clear()
+    assert memory.see(observed(0.0))["spike_frequency"].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_memory_derives_braking_and_fading_peaks():
+    memory = Memory(Features(inputs=("spike_peak", "speed_change"), history=1))
+    told = []
+    for frequency, speed in ((0, 10.0), (200, 9.5), (0, 8.6)):
+        given = {"spike_frequency": np.array([frequency], np.float32), "ego_speed": np.array([speed])}
+        told.append(memory.see(given))
+    assert [float(item["spike_peak"][0]) for item in told] == pytest.approx([0.0, 2.0, 2.0 * FADE])
+    assert [float(item["speed_change"][0]) for item in told] == pytest.approx([0.0, -0.5, -0.9])
+
+
+def test_frames_shrink_to_means():
+    frame = np.zeros((4, 6, 1), np.uint8)
+    frame[:2, 2:4] = 100
+    small = shrunk(frame, 2)
+    assert small.shape == (2, 3, 1)
+    assert small[0, 1, 0] == 100
+    assert small.sum() == 100
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (
+            {"inputs": ["spike_frequncy"]},
+            "unknown policy input 'spike_frequncy'; did you mean 'spike_frequency'",
+        ),
+        ({"inputs": []}, "inputs needs at least one observation key"),
+        ({"histry": 3}, "unknown policy feature 'histry'; did you mean 'history'"),
+        ({"history": 0}, "history must be a whole number >= 1, got 0"),
+    ],
+)
+def test_bad_features_are_refused(values, words):
+    with pytest.raises(ValueError, match=words):
+        Features.from_dict(values)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_policy_view_is_a_sound_environment():
+    from stable_baselines3.common.env_checker import check_env as check_sb3
+
+    env = PolicyView(gym.make("LGMD/CCRs-v0", include_frame=True), inputs=["spike_frequency", "frame"])
+    assert env.observation_space["frame"].shape == (45, 80, 6)
+    check_env(env, skip_render_check=True)
+    check_sb3(env)
+    env.close()
+
+
+def test_policy_view_holds_actions_and_adds_up_rewards():
+    plain, held = gym.make("LGMD/CCRs-v0"), PolicyView(gym.make("LGMD/CCRs-v0"), repeat=5, history=1)
+    plain.reset(seed=4)
+    held.reset(seed=4)
+    for _ in range(4):
+        rewards = [plain.step(np.array([-0.3], np.float32)) for _ in range(5)]
+        shown, reward, *_ = held.step(np.array([-0.3], np.float32))
+        assert reward == pytest.approx(sum(item[1] for item in rewards))
+        assert shown["ego_speed"][0] == pytest.approx(rewards[-1][0]["ego_speed"][0] / 20.0)
+
+
+def test_a_missing_frame_is_named_with_the_mend():
+    with pytest.raises(ValueError, match="'frame' is not observed; make it with include_frame=True"):
+        PolicyView(gym.make("LGMD/CCRs-v0"), inputs=["frame"])
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac", "dqn"])
+def test_the_packages_hyperparameters_are_read(algo):
+    settings = read_settings(algo, "LGMD/RandomBraking-v0")
+    assert settings.n_timesteps >= 100_000
+    assert settings.features == {"history": 6, "repeat": 3}
+    assert settings.features == read_settings(algo, "LGMD/CCRs-v0").features
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a: [", "are no YAML"),
+        ("- 3", "need entries by environment id"),
+        ("LGMD/CCRm-v0: {}", "did you mean 'LGMD/CCRm-v0'"),
+        ("default: {normalize: true}", "normalize is not taken"),
+        ("default: {n_timesteps: many}", "n_timesteps must be a number, got 'many'"),
+        ("default: {env_wrapper: gymnasium.wrappers.FlattenObservation}", "env_wrapper must be lgmd_gym"),
+    ],
+)
+def test_bad_hyperparameters_are_refused(tmp_path, text, words):
+    file = tmp_path / "hyper.yml"
+    file.write_text(text)
+    with pytest.raises(ValueError, match=words):
+        read_settings("ppo", "LGMD/CCRs-v0", file)
+
+
+def order(tmp_path, **changes):
+    file = tmp_path / "hyper.yml"
+    file.write_text(YAML)
+    given = {
+        "algo": "ppo",
+        "env_id": "LGMD/CCRs-v0",
+        "camera": ("fovea",),
+        "hyperparams": file,
+        "eval_every": 32,
+    }
+    return Order(**given | {"eval_episodes": 1} | changes)
+
+
+@pytest.mark.parametrize("demands", [(), DEMANDS])
+def test_a_trained_policy_acts_as_the_model_does(tmp_path, demands):
+    from stable_baselines3 import PPO
+
+    wanted = order(tmp_path, demands=demands)
+    path = Training.start(wanted, tmp_path / "run").run()
+    assert path.stat().st_size < 1_000_000
+    card = read_card(path)
+    assert card["camera"] == "fovea"
+    assert card["features"]["repeat"] == 4
+    agent = make_agent(f"policy:{path}")
+    model = PPO.load(path, device="cpu")
+    view = make_env(wanted, card["features"], "train")
+    env = gym.make("LGMD/CCRs-v0", camera=agent.camera)
+    (shown, _), (observation, info) = view.reset(seed=3), env.reset(seed=3)
+    agent.reset(3)
+    for _ in range(6):
+        action, _ = model.predict(shown, deterministic=True)
+        shown, *_ = view.step(action)
+        for _ in range(4):
+            done = agent.act(observation, info)
+            assert done == np.float32(demands[action] if demands else action)
+            observation, *_, info = env.step(done)
+    with pytest.raises(ValueError, match="exists and is kept"):
+        Training.start(wanted, tmp_path / "run")
+
+
+def test_a_training_goes_on_from_its_checkpoint(tmp_path):
+    run = Training.start(order(tmp_path, steps=32), tmp_path / "run")
+    run.run()
+    told = json.loads((tmp_path / "run" / "order.json").read_text())
+    (tmp_path / "run" / "order.json").write_text(json.dumps(told | {"steps": 96}))
+    again = Training.resume(tmp_path / "run")
+    assert again._newest_checkpoint().name == "model_32_steps.zip"
+    again.run()
+    assert again._newest_checkpoint().name == "model_96_steps.zip"
+    assert read_card(again.policy)["steps"] == 96
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("algo", ["sac", "dqn"])
+def test_other_algorithms_train(tmp_path, algo):
+    text = "default: {n_envs: 2, n_timesteps: 400, learning_starts: 100, policy_kwargs: {net_arch: [8]}}"
+    (tmp_path / "off.yml").write_text(text)
+    wanted = order(tmp_path, algo=algo, hyperparams=tmp_path / "off.yml", eval_every=200)
+    agent = make_agent(f"policy:{Training.start(wanted, tmp_path / 'run').run()}")
+    observation, info = gym.make("LGMD/CCRs-v0", camera=agent.camera).reset(seed=0)
+    demand = agent.act(observation, info)
+    assert demand.shape == (1,)
+    assert algo == "sac" or float(demand[0]) in np.float32(DEMANDS)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("policy:nowhere.zip", "policy 'nowhere.zip' cannot be read: No such file"),
+        ("policy:pyproject.toml", "is no policy of lgmd-gym train"),
+        ("no-brake,ttc-oracle", "separate agents by spaces"),
+    ],
+)
+def test_bad_policies_are_named(text, words):
+    with pytest.raises(ValueError, match=words):
+        make_agent(text)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--algo", "pppo"], "unknown algorithm 'pppo'; did you mean 'ppo'?"),
+        (["--inputs", "spikes"], "unknown policy input 'spikes'"),
+        (["--camera", "fovae"], "did you mean 'fovea'?"),
+        (["--hyperparams", "nowhere.yml"], "hyperparameters 'nowhere.yml' cannot be read"),
+        (["--resume", "nowhere"], "holds no training to resume"),
+    ],
+)
+def test_bad_training_is_one_line_and_exit_code_two(arguments, words, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(["train", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert words in said
+    assert list(tmp_path.iterdir()) == []
