@@ -48,24 +48,22 @@ class EyePanel:
 
     Args:
         observer: Whose frames are shown.
-        camera: Index of the camera that is shown large.
         overlays: Of `view_overlays.OVERLAYS`.
     """
 
-    def __init__(self, observer: LGMDObservation, camera: int, overlays: tuple[str, ...]) -> None:
-        self.observer, self.camera, self.overlays = observer, camera, overlays
+    def __init__(self, observer: LGMDObservation, overlays: tuple[str, ...]) -> None:
+        self.observer, self.overlays = observer, overlays
 
-    def draw(self, canvas: Canvas) -> None:
-        """Draw the last frames."""
+    def draw(self, canvas: Canvas, cameras: list[int]) -> None:
+        """Draw the last frames of these cameras, the first one large."""
         frames = list(self.observer.frames.items())
-        name, frame = frames[self.camera]
+        name, frame = frames[cameras[0]]
         placed = canvas.paste(GREY[frame], EYE)
-        camera = list(self.observer.eyes.sets[0].values())[self.camera]
+        camera = list(self.observer.eyes.sets[0].values())[cameras[0]]
         if self.overlays and hasattr(camera, "project"):
             self._draw_overlays(canvas, camera, placed, frame.shape)
         right = EYE[2] - 8
-        others = [item for index, item in enumerate(frames) if index != self.camera]
-        for other, small in others:
+        for other, small in [frames[index] for index in cameras[1:]]:
             box = (right - INSET[0], EYE[3] - 8 - INSET[1], right, EYE[3] - 8)
             inset = canvas.paste(GREY[small], box)
             canvas.frame(inset, FAINT)

@@ -20,7 +20,8 @@ class Picture:
         title: Shown at the top.
         overlays: What is drawn over the eye's frame: "zone", the danger zone, "targets", boxes around who is
             ahead.
-        camera: Name of the camera that is shown large, with its layers; None for the first.
+        camera: Name of the camera that is shown large, with its layers; None for the first, or of more
+            than four for the one that spikes most.
 
     Raises:
         ValueError: For an unknown overlay or camera.
@@ -30,12 +31,15 @@ class Picture:
         self, observer: LGMDObservation, title: str, overlays: tuple[str, ...], camera: str | None
     ) -> None:
         names = observer.eyes.names
-        self._camera = names.index(camera) if camera is not None else 0
+        self._chosen = names.index(camera) if camera is not None else None
+        self._camera = self._chosen or 0
         self._observer, self._title = observer, title
-        self._eye = panels.EyePanel(observer, self._camera, check_overlays(overlays))
-        shades = panels.CAMERA_COLOURS
-        colours = [shades[index % len(shades)] for index in range(len(names))]
-        self._trace = view_trace.Trace(observer.params.t_sf, names, colours)
+        self._eye = panels.EyePanel(observer, check_overlays(overlays))
+        shades = list(panels.CAMERA_COLOURS)
+        # More cameras than colours: one trace, the highest of all.
+        self._many = len(names) > len(shades)
+        shown = [f"highest of {len(names)}"] if self._many else names
+        self._trace = view_trace.Trace(observer.params.t_sf, shown, shades[: len(shown)])
         self._top = panels.TopPanel(observer.unwrapped)
         self._canvas = self._make_canvas()
 
@@ -47,14 +51,19 @@ class Picture:
         """Take the neurons' answers to the camera frames of one decision."""
         for frame in frames:
             response = frame.response
-            self._trace.add(frame.time, response.spike_frequency.tolist(), int(response.spikes.max()))
+            frequencies = response.spike_frequency.tolist()
+            if self._many:
+                frequencies = [max(frequencies)]
+            self._trace.add(frame.time, frequencies, int(response.spikes.max()))
 
     def draw(self, moment: Moment) -> np.ndarray:
         """Return the present picture, uint8, shape (720, 1280, 3); a fresh array."""
         canvas = self._canvas
         canvas.clear()
         canvas.text((712, 29), f"{moment.time:.2f} s", 18, anchor="rm")
-        self._eye.draw(canvas)
+        ranked = self._ranked()
+        self._camera = ranked[0]
+        self._eye.draw(canvas, ranked)
         panels.draw_layers(canvas, self._observer.eyes.layers(self._camera))
         potential = self._observer.response.membrane_potential
         self._trace.draw(canvas, float(potential[self._camera]))
@@ -62,6 +71,21 @@ class Picture:
         self._top.draw(canvas)
         panels.draw_lamps(canvas, moment)
         return canvas.pixels.copy()
+
+    def _ranked(self) -> list[int]:
+        """Return the cameras that there is room for: the large one, then the others.
+
+        Of many cameras the one with the highest spike frequency is shown large, until another's is higher.
+        """
+        count = len(self._observer.eyes.names)
+        order = list(range(count))
+        if self._many:
+            frequencies = self._observer.response.spike_frequency
+            order.sort(key=lambda index: (-float(frequencies[index]), index != self._camera))
+        if self._chosen is not None or not self._many:
+            large = self._chosen or 0
+            order.sort(key=lambda index: index != large)
+        return order[: len(panels.CAMERA_COLOURS)]
 
     def _make_canvas(self) -> Canvas:
         canvas = Canvas(SIZE)

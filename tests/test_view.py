@@ -302,3 +302,17 @@ def test_every_kind_of_target_can_be_looked_at(target):
     env.reset(seed=0)
     env.step(HOLD)
     assert env.render().std() > 20
+
+
+def test_of_many_cameras_the_busiest_are_shown():
+    env = LGMDView(approach(camera=[{"name": f"c{k}", "hfov_deg": 3.0 + 4.0 * k} for k in range(6)]))
+    env.reset(seed=0)
+    for _ in range(60):
+        env.step(HOLD)
+    picture = env.render()
+    assert picture.shape == (720, 1280, 3)
+    ranked = env._picture._ranked()
+    frequencies = env.get_wrapper_attr("response").spike_frequency
+    assert len(ranked) == 4
+    assert frequencies[ranked[0]] == frequencies.max() > 0.0
+    env.close()
