@@ -307,7 +307,7 @@ def test_every_kind_of_target_can_be_looked_at(target):
 def test_of_many_cameras_the_busiest_are_shown():
     env = LGMDView(approach(camera=[{"name": f"c{k}", "hfov_deg": 3.0 + 4.0 * k} for k in range(6)]))
     env.reset(seed=0)
-    for _ in range(60):
+    for _ in range(140):
         env.step(HOLD)
     picture = env.render()
     assert picture.shape == (720, 1280, 3)
