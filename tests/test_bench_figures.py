@@ -205,3 +205,17 @@ def test_figures_have_a_file_format(small_run, tmp_path):
     found = compare_runs(small_run, None)
     plots_bench.difference_figure(tmp_path / "d.svg", found)
     assert (tmp_path / "d.svg").read_text().startswith("<?xml")
+
+
+def test_a_run_broken_off_at_once_still_has_its_report(tmp_path):
+    (tmp_path / "mine.toml").write_text(SUITE)
+
+    def stop(row):
+        raise KeyboardInterrupt
+
+    agents = ["spike-threshold", "ttc-oracle"]
+    broken = Run(str(tmp_path / "mine.toml"), agents, 1, 1, tmp_path / "run")
+    assert not broken.play(stop)
+    text = write_report(tmp_path / "run").read_text()
+    assert "no-brake" in text
+    assert "Agents compared" not in text

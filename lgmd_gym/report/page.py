@@ -191,7 +191,8 @@ def _froc(source: Source) -> str | None:
 
 
 def _comparisons(source: Source) -> dict[str, Any] | None:
-    if len([agent for agent in source.agents if agent != NO_BRAKE]) < 2:
+    # A run that was broken off early may hold no row of most agents.
+    if len({row["agent"] for row in source.rows} - {NO_BRAKE}) < 2:
         return None
     found = compare_runs(source.path, None)
     lines = [(item, [(line, change_text(line)) for line in item.differences]) for item in found]
