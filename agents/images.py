@@ -82,7 +82,7 @@ class FrameDifferenceParams(ImageParams):
 
 
 class FrameDifference(ImageRule):
-    """Brakes on the energy of the frame difference: mean |L(t) − L(t − 1)| over one fovea.
+    """Brakes on the energy of the frame difference: mean `|L(t) − L(t − 1)|` over one fovea.
 
     Args:
         params: `FrameDifferenceParams`; None for those of `options`.

@@ -19,6 +19,7 @@ import figures
 from lgmd_gym import cli
 from lgmd_gym.benchmark.runner import DEFAULT_AGENTS, Run
 from lgmd_gym.benchmark.summary import Rate, scores
+from lgmd_gym.benchmark.tables import mean_kmh
 from lgmd_gym.docstrings import About
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.random_braking import RandomBrakingEnv
@@ -121,7 +122,7 @@ def benchmark_table() -> str:
         "|---|---|---|---|---|",
     ]
     for item in scores(run.rows, lambda row: ""):
-        taken = f"{3.6 * (item.speed_reduction or 0.0):.1f} km/h"
+        taken = f"{mean_kmh(item.speed_reduction)} km/h"
         rates = [_rate(rate) for rate in (item.avoided, item.premature, item.false_brakes)]
         rows.append(f"| `{item.agent}` | {rates[0]} | {taken} | {rates[1]} | {rates[2]} |")
     return "\n".join(rows) + "\n"
