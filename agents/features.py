@@ -1,7 +1,7 @@
 """What a learned policy is shown of an observation: scaled, and with a memory of the last decisions."""
 
 from collections import deque
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -44,7 +44,7 @@ class Features:
     inputs: tuple[str, ...] = (*SCALES, *DERIVED)
     history: int = 6
     repeat: int = 3
-    shrink: int = field(default=2)
+    shrink: int = 2
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "inputs", tuple(self.inputs))

@@ -42,7 +42,7 @@ def show_list(options: "cli.List") -> int:
     """Print what there is to name."""
     from lgmd_gym import listing
 
-    listing.show(options.what, _console())
+    listing.show(options.what, console_of())
     return 0
 
 
@@ -50,7 +50,7 @@ def gallery(options: "cli.Gallery") -> int:
     """Make the gallery and say where it is."""
     from lgmd_gym.gallery import make_gallery
 
-    page = make_gallery(options.out, options.families, options.agent, options.seeds, _console().print)
+    page = make_gallery(options.out, options.families, options.agent, options.seeds, console_of().print)
     print(f"gallery: {page}")
     return 0
 
@@ -59,15 +59,15 @@ def doctor(options: "cli.Doctor") -> int:
     """Examine this installation; 1 if something is at fault."""
     from lgmd_gym import doctor as doctors
 
-    console = _console()
+    console = console_of()
     with console.status("the first drive on a machine compiles the kernels, up to a minute"):
         return int(doctors.report(doctors.examine(), console) > 0)
 
 
-def _console() -> Console:
+def console_of(width: int = 110) -> Console:
     """Return the terminal, or for a file or pipe a page wide enough for the tables."""
     console = Console()
-    return console if console.is_terminal else Console(width=110)
+    return console if console.is_terminal else Console(width=width)
 
 
 def _read_params(path: Path | None) -> dict[str, Any] | None:

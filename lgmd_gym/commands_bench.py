@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from lgmd_gym.commands import _console, _read_params
+from lgmd_gym.commands import _read_params, console_of
 
 if TYPE_CHECKING:
     from lgmd_gym import cli
@@ -24,7 +24,7 @@ SUITE, AGENTS, SEEDS = (
 
 def bench(options: "cli.Bench") -> int:
     """Play a suite and report; 0 if all was played, 1 if something failed, 130 after Ctrl-C."""
-    console = _console()
+    console = console_of()
     run = _resumed(options, console) if options.resume is not None else _new(options, console)
     with _progress(run) as tick:
         complete = run.play(tick)
@@ -54,7 +54,7 @@ def compare(options: "cli.Compare") -> int:
     if options.out is not None and options.out.exists():
         raise ValueError(f"{str(options.out)!r} exists and is kept; choose another --out")
     found = compare_runs(options.run_a, options.run_b, options.agents)
-    console = _console()
+    console = console_of()
     for item in found:
         console.print(compare_table(item))
     if options.out is not None:

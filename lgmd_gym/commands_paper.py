@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
+from lgmd_gym.commands import console_of
+from lgmd_gym.folders import new_folder
+
 if TYPE_CHECKING:
     from lgmd_gym import cli
     from lgmd_gym.clips import Choice
@@ -27,10 +30,10 @@ def video(options: "cli.Video") -> int:
     orders, judged = _orders(options)
     for order in orders:  # a first look at each: bad input leaves no folder behind
         next(iter(Watch(order.clip, next(iter(chosen.values())))))
-    out = _new_folder(options.out or Path("runs") / f"video-{time.strftime('%Y%m%d-%H%M%S')}")
+    out = new_folder(options.out or Path("runs") / f"video-{time.strftime('%Y%m%d-%H%M%S')}", "run folder")
     orders = [order._replace(folder=_clip_folder(out, order.clip)) for order in orders]
     _describe(out, {"clips": [order.clip for order in orders], "choices": chosen})
-    console, troubles, detections = _console(), [], {}
+    console, troubles, detections = console_of(120), [], {}
     for name, choice in chosen.items():
         suffix = f"-{name}" if len(chosen) > 1 else ""
         watched = _watch_all(orders, name, choice, suffix, options)
@@ -138,19 +141,6 @@ def _progress(name: str, total: float) -> Iterator[Any]:
         yield lambda done: bar.update(shown, completed=done)
 
 
-def _new_folder(path: Path) -> Path:
-    """Make a run folder, which must not exist."""
-    try:
-        path.mkdir(parents=True, exist_ok=False)
-    except FileExistsError:
-        raise ValueError(f"run folder {str(path)!r} exists and is kept; choose another --out") from None
-    except OSError as error:
-        raise ValueError(
-            f"run folder {str(path)!r} cannot be made ({error.strerror}); choose another --out"
-        ) from None
-    return path
-
-
 def _clip_folder(out: Path, clip: Path) -> Path:
     """Make the folder of one clip, numbered if another clip of that name came before."""
     folder, number = out / clip.stem, 1
@@ -174,12 +164,6 @@ def _note(text: str) -> None:
     print(f"lgmd-gym: {text}", file=sys.stderr)
 
 
-def _console() -> Console:
-    """Return the terminal, or for a file or pipe a page wide enough for the tables."""
-    console = Console()
-    return console if console.is_terminal else Console(width=120)
-
-
 def paper(options: "cli.Paper") -> int:
     """Run the paper's experiments, draw their figures and print what holds; 2 if a clip breaks off."""
     from lgmd_gym import paper as experiments
@@ -192,12 +176,12 @@ def paper(options: "cli.Paper") -> int:
     Panorama(picture=options.picture).paint(0.0, Screen())  # a picture that cannot be read leaves no folder
     films = None if options.clips is None else _film_options(options)
     orders, judged = ([], set()) if films is None else _orders(films)
-    out = _new_folder(options.out or Path("runs") / f"paper-{time.strftime('%Y%m%d-%H%M%S')}")
+    out = new_folder(options.out or Path("runs") / f"paper-{time.strftime('%Y%m%d-%H%M%S')}", "run folder")
     _describe(out, {"clips": [order.clip for order in orders], "picture": options.picture})
     with _progress("paper", experiments.STEPS) as move:
         done = iter(range(1, experiments.STEPS + 1))
         found = experiments.experiments(lambda: move(next(done)), options.picture)
-    console, troubles, answers = _console(), [], None
+    console, troubles, answers = console_of(120), [], None
     if films is not None:
         answers, troubles = _watch_paper(out, orders, judged, films, console)
     claims = verdicts(found, answers)

@@ -10,6 +10,7 @@ import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.runner import DEFAULT_AGENTS
 from lgmd_gym.camera.params import CONDITIONS
+from lgmd_gym.folders import new_folder
 from lgmd_gym.gallery_page import page
 from lgmd_gym.gallery_roads import ROADS, lens_sheet, road_sheet
 from lgmd_gym.gallery_scenes import film, find_scenes, judge
@@ -37,7 +38,8 @@ def make_gallery(
     make_agent(agent)
     if seeds < 1:
         raise ValueError(f"seeds must be >= 1, got {seeds}")
-    media = _make_folder(out)
+    media = new_folder(out, "gallery folder") / "media"
+    media.mkdir()
     agents = list(dict.fromkeys([*DEFAULT_AGENTS, agent]))
     verdicts = {}
     for number, scene in enumerate(scenes, 1):
@@ -53,20 +55,6 @@ def make_gallery(
     index = out / "index.html"
     index.write_text(page(scenes, verdicts, sheets, agent, seeds), encoding="utf-8")
     return index
-
-
-def _make_folder(out: Path) -> Path:
-    """Make the folder and the one for films in it."""
-    try:
-        out.mkdir(parents=True, exist_ok=False)
-        (out / "media").mkdir()
-    except FileExistsError:
-        raise ValueError(f"gallery folder {str(out)!r} exists and is kept; choose another --out") from None
-    except OSError as error:
-        raise ValueError(
-            f"gallery folder {str(out)!r} cannot be made ({error.strerror}); choose another --out"
-        ) from None
-    return out / "media"
 
 
 def _save_sheet(media: Path, stem: str, sheet: dict[str, dict[str, np.ndarray]]) -> dict[str, dict[str, str]]:

@@ -19,6 +19,7 @@ HOMES = {"lgmd_gym": ROOT / "lgmd_gym", "lgmd_gym.envs": ROOT / "envs", "lgmd_gy
 # Room -> what it may import of this package, beside itself; architecture in one table.
 MAY = {
     "errors": (),
+    "folders": (),
     "_version": (),
     "neuron": ("errors",),
     "camera": ("errors",),
@@ -62,9 +63,9 @@ MAY = {
     "commands_bench": None,
     "plots_bench": ("benchmark", "plots"),
     "report": ("agents", "benchmark", "envs", "neuron", "plots_bench", ""),
-    "training": ("agents", "envs", "errors", ""),
+    "training": ("agents", "envs", "errors", "folders", ""),
     "commands_train": None,  # knows all
-    "benchmark": ("agents", "camera", "envs", "errors", "_version"),
+    "benchmark": ("agents", "camera", "envs", "errors", "folders", "_version"),
     "view": ("errors", "view_moment", "view_overlays", "view_picture", "view_window", "wrappers"),
     "view_canvas": (),
     "view_moment": (),
@@ -76,7 +77,16 @@ MAY = {
     "drive": ("agents", "benchmark", "envs", "errors", "video", "view", "view_picture", "view_window", ""),
     "doctor": ("agents", "camera", "neuron", "video", "view_window", ""),
     "docstrings": (),
-    "gallery": ("agents", "benchmark", "camera", "gallery_page", "gallery_roads", "gallery_scenes", ""),
+    "gallery": (
+        "agents",
+        "benchmark",
+        "camera",
+        "folders",
+        "gallery_page",
+        "gallery_roads",
+        "gallery_scenes",
+        "",
+    ),
     "gallery_page": ("_version", "docstrings", "gallery_scenes", "gallery_style"),
     "gallery_style": (),
     "gallery_roads": ("camera",),

@@ -11,7 +11,6 @@ from lgmd_gym.benchmark.cases import Case
 from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.envs import env_id
 
-CLEAR = "clear"  # the camera as it was given
 # One value per decision each; `held` is 1 while a standing ego is kept from starting, which no deceleration
 # shows.
 SERIES = (

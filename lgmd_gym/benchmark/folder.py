@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym._version import __version__
+from lgmd_gym.folders import new_folder
 
 PACKAGES = ("numpy", "numba", "gymnasium", "highway-env", "joblib")
 
@@ -40,14 +41,7 @@ class RunFolder:
         Raises:
             ValueError: If it exists or cannot be made.
         """
-        try:
-            path.mkdir(parents=True, exist_ok=False)
-        except FileExistsError:
-            raise ValueError(f"run folder {str(path)!r} exists and is kept; choose another --out") from None
-        except OSError as error:
-            raise ValueError(
-                f"run folder {str(path)!r} cannot be made ({error.strerror}); choose another --out"
-            ) from None
+        new_folder(path, "run folder")
         return cls(path, [])
 
     @classmethod

@@ -3,7 +3,8 @@
 from typing import Any
 
 from lgmd_gym.benchmark.cases import Case
-from lgmd_gym.benchmark.episode import CLEAR, Episode
+from lgmd_gym.benchmark.episode import Episode
+from lgmd_gym.benchmark.eyesight import CLEAR
 from lgmd_gym.benchmark.metrics import METRICS, PREMATURE, Counterfactual, Outcome, measure
 
 NAMED = ("agent", "suite", "case", "warned_driver", "seed", "condition")

@@ -9,7 +9,7 @@ from statistics import median
 from typing import Any, NamedTuple
 
 from lgmd_gym.benchmark.bootstrap import Mean, cluster_mean
-from lgmd_gym.benchmark.episode import CLEAR
+from lgmd_gym.benchmark.eyesight import CLEAR
 
 Row = dict[str, Any]
 COLUMNS = (

@@ -14,6 +14,7 @@ import lgmd_gym
 from lgmd_gym.agents.features import FRAME, Features
 from lgmd_gym.agents.policy import write_card
 from lgmd_gym.envs.units import check_within
+from lgmd_gym.folders import new_folder
 from lgmd_gym.training.settings import Settings, read_settings
 from lgmd_gym.training.view import PolicyView
 
@@ -127,14 +128,7 @@ class Training:
         """
         training = cls(order, folder)
         make_env(order, training.settings.features, "train").close()
-        try:
-            folder.mkdir(parents=True)
-        except FileExistsError:
-            raise ValueError(
-                f"training folder {str(folder)!r} exists and is kept; choose another --out"
-            ) from None
-        except OSError as error:
-            raise ValueError(f"training folder {str(folder)!r} cannot be made ({error.strerror})") from None
+        new_folder(folder, "training folder")
         (folder / "order.json").write_text(json.dumps(order.to_dict(), indent=2) + "\n", encoding="utf-8")
         return training
 

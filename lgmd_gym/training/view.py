@@ -15,7 +15,7 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
 
     Observations become a `Dict` of float32 vectors in [-5, 5], oldest first, and frames uint8 with the
     history in their channels; rewards of the decisions held are summed. As a plain wrapper with keyword
-    arguments it also serves as rl-zoo's `env_wrapper`.
+    arguments it has the form of rl-zoo's `env_wrapper`.
 
     Args:
         env: An environment inside `LGMDObservation`, with `include_frame` if frames are wanted.
