@@ -1,9 +1,13 @@
 """Protocol-derived scores against the documents' tables, and against the official calculator if installed."""
 
+import csv
+
 import pytest
 
+from lgmd_gym.benchmark.compare import compare_rows
 from lgmd_gym.benchmark.rows import KEYS
 from lgmd_gym.benchmark.scores import colour_2026, judge_r152, meets_r152, r152_limit, verdicts
+from lgmd_gym.benchmark.summary import write_summary
 from lgmd_gym.benchmark.tables import score_tables, verdict_table
 from lgmd_gym.envs.units import KMH
 
@@ -88,7 +92,7 @@ def test_colours_against_the_official_calculator():
             assert getattr(official, "value", official).lower() == colour_2026(ego, impact), (ego, impact)
 
 
-def test_a_warned_driver_is_no_part_of_the_totals():
+def test_a_warned_driver_is_no_part_of_the_totals(tmp_path):
     def told(case, warned, avoided):
         given = {"agent": "a", "case": case, "warned_driver": warned, "threat": True, "avoided": avoided}
         return dict.fromkeys(KEYS) | given | {"premature_brake": False, "speed_reduction": 3.0}
@@ -100,3 +104,8 @@ def test_a_warned_driver_is_no_part_of_the_totals():
         ["0/1 [0–79]"],
     ]
     assert len(score_tables(rows[:1], ["a"], "all")) == 1
+    write_summary([item | {"condition": "clear"} for item in rows], tmp_path / "summary.csv")
+    lines = list(csv.DictReader((tmp_path / "summary.csv").open()))
+    assert [(line["case"], line["threats"]) for line in lines][-1] == ("all", "1")
+    paired = [item | {"agent": "b", "seed": 0, "condition": "clear"} for item in rows]
+    assert compare_rows(paired, paired, ("b", "b")).pairs == 1

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from lgmd_gym.benchmark.bootstrap import Mean, cluster_mean
 from lgmd_gym.benchmark.folder import read_rows, read_settings
 from lgmd_gym.benchmark.rows import key_of
-from lgmd_gym.benchmark.summary import wilson
+from lgmd_gym.benchmark.summary import automatic, wilson
 from lgmd_gym.benchmark.tasks import NO_BRAKE
 from lgmd_gym.benchmark.traffic_rows import SUITE as TRAFFIC
 from lgmd_gym.errors import unknown_name
@@ -105,7 +105,11 @@ def compare_runs(run_a: Path, run_b: Path | None, agents: tuple[str, ...] | None
 def compare_rows(
     rows_a: list[Row], rows_b: list[Row], names: tuple[str, str], condition: str = ""
 ) -> Comparison:
-    """Compare one agent's rows with another's: same case, seed and condition make a pair."""
+    """Compare one agent's rows with another's: same case, seed and condition make a pair.
+
+    Cases in which a warned driver brakes are left out, as they are of all totals.
+    """
+    rows_a, rows_b = automatic(rows_a), automatic(rows_b)
     played_a, played_b = _by_key(rows_a), _by_key(rows_b)
     common = sorted(played_a.keys() & played_b.keys())
     pairs = [(played_a[key], played_b[key]) for key in common]

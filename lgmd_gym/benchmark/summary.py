@@ -133,6 +133,11 @@ def case_order(case: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (0, part) for part in parts]
 
 
+def automatic(rows: list[Row]) -> list[Row]:
+    """Return the rows that totals of automatic braking count: not those in which a warned driver brakes."""
+    return [row for row in rows if not row.get("warned_driver")]
+
+
 def write_summary(rows: list[Row], path: Path) -> None:
     """Write one line per agent, condition and case to a CSV file, in SI units; a line "all" sums up."""
     conditions = sorted(by_condition(rows).items())
@@ -143,7 +148,7 @@ def write_summary(rows: list[Row], path: Path) -> None:
             for item in scores(of_condition, lambda row: row["case"]):
                 writer.writerow(_line(item, condition))
         for condition, of_condition in conditions:
-            for item in scores(of_condition, lambda row: "all"):
+            for item in scores(automatic(of_condition), lambda row: "all"):
                 writer.writerow(_line(item, condition))
 
 

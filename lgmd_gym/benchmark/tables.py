@@ -7,7 +7,7 @@ from rich.table import Table
 
 from lgmd_gym.benchmark.bootstrap import Mean
 from lgmd_gym.benchmark.scores import JUDGES, Verdict, meets_r152, verdicts
-from lgmd_gym.benchmark.summary import Rate, Score, case_order, scores
+from lgmd_gym.benchmark.summary import Rate, Score, automatic, case_order, scores
 from lgmd_gym.envs.units import KMH
 
 Row = dict[str, Any]
@@ -23,7 +23,7 @@ def score_tables(rows: list[Row], agents: list[str], title: str) -> list[Table]:
     What a driver does on a warning is no automatic braking, and no part of its totals.
     """
     parts = {
-        title: [row for row in rows if not row["warned_driver"]],
+        title: automatic(rows),
         "with a driver who brakes 1.2 s after the alert": [row for row in rows if row["warned_driver"]],
     }
     return [_score_table(part, agents, name) for name, part in parts.items() if part]

@@ -16,7 +16,7 @@ from lgmd_gym.benchmark.own_suites import get_suite
 from lgmd_gym.benchmark.points import points_2023, points_2026
 from lgmd_gym.benchmark.runner import trace_name
 from lgmd_gym.benchmark.scores import JUDGES, meets_r152, verdicts
-from lgmd_gym.benchmark.summary import by_condition, case_order, scores
+from lgmd_gym.benchmark.summary import automatic, by_condition, case_order, scores
 from lgmd_gym.benchmark.tables import mean_kmh, rate_text
 from lgmd_gym.benchmark.tasks import NO_BRAKE
 from lgmd_gym.envs.units import KMH
@@ -107,12 +107,12 @@ def _condition(source: Source, name: str, rows: list[Row]) -> dict[str, Any]:
     """Return the tables of one camera condition."""
     suite = rows[0]["suite"]
     braking = [agent for agent in source.agents if agent != NO_BRAKE]
-    # What a driver does on a warning is no automatic braking.
-    automatic = [row for row in rows if not row["warned_driver"]]
     return {
         "name": name,
         "scores": [
-            _score(item) for agent in source.agents for item in scores(_of(automatic, agent), lambda _: "")
+            _score(item)
+            for agent in source.agents
+            for item in scores(automatic(_of(rows, agent)), lambda _: "")
         ],
         "verdicts": _verdicts(rows, source.agents, suite),
         "points": [(agent, POINTS[suite](rows, agent)) for agent in braking] if suite in POINTS else [],
