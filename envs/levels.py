@@ -12,7 +12,8 @@ from lgmd_gym.errors import unknown_name
 
 SPLITS = ("train", "validation", "test")
 LEVELS = 1_000_000  # per split
-CONDITIONS = ("clear", "night", "fog", "robust")  # the camera's, by name; a test holds them together
+CLEAR = "clear"
+CONDITIONS = (CLEAR, "night", "fog", "robust")  # the camera's, by name; a test holds them together
 THREAT_SHARE = 0.5
 SPEED_KMH = (10.0, 80.0)
 

@@ -78,7 +78,7 @@ def make_observed(
     """
     from lgmd_gym.envs.braking import BrakingEnv
     from lgmd_gym.envs.catalogue import make_scenario
-    from lgmd_gym.envs.levels import check_conditions
+    from lgmd_gym.envs.levels import CLEAR, check_conditions
     from lgmd_gym.envs.random_braking import RandomBrakingEnv
     from lgmd_gym.errors import check_keys
 
@@ -89,7 +89,8 @@ def make_observed(
         condition = arguments.pop("condition", "clear")
         check_conditions([condition])
         env = BrakingEnv(make_scenario(family, **arguments), config=config, render_mode=render_mode)
-        env.camera_fields["condition"] = condition
+        if condition != CLEAR:  # which would only build the same cameras again
+            env.camera_fields["condition"] = condition
     if camera is None:
         return env
     from lgmd_gym.wrappers import LGMDObservation

@@ -104,6 +104,13 @@ class Eyes:
             for shape, members in by_shape.items()
         ]
 
+        # Camera -> where its frame lies: group and row.
+        self._places = {
+            member: (group, row)
+            for group, (_, members) in enumerate(self.groups)
+            for row, member in enumerate(members)
+        }
+
     def empty_frames(self) -> list[np.ndarray]:
         """Return room for one frame of every camera: per group uint8 (count, members, height, width)."""
         return [
@@ -124,7 +131,8 @@ class Eyes:
 
     def render(self, env: gym.Env, frames: list[np.ndarray], index: int = 0) -> None:
         """Render every camera of environment number `index` into its place in `frames`."""
-        outs = [self.of_camera(frames, camera, index) for camera in range(len(self.names))]
+        places = self._places
+        outs = [frames[group][index, row] for group, row in (places[k] for k in range(len(places)))]
         self._rigs[index].render(env, outs)
 
     def step(self, frames: list[np.ndarray], active: np.ndarray | None = None) -> Response:
@@ -151,17 +159,13 @@ class Eyes:
 
     def of_camera(self, frames: list[np.ndarray], camera: int, index: int = 0) -> np.ndarray:
         """Return one camera's frame out of `frames`, a view, uint8 (height, width)."""
-        for (_, members), batch in zip(self.groups, frames, strict=True):
-            if camera in members:
-                return batch[index, members.index(camera)]
-        raise IndexError(f"no camera {camera} among {len(self.names)}")
+        group, row = self._place(camera)
+        return frames[group][index, row]
 
     def layers(self, camera: int = 0) -> dict[str, np.ndarray]:
         """Return the layer maps of one camera's last frame, of the first environment."""
-        for neuron, members in self.groups:
-            if camera in members:
-                return {name: maps[members.index(camera)] for name, maps in neuron.layers.items()}
-        raise IndexError(f"no camera {camera} among {len(self.names)}")
+        group, row = self._place(camera)
+        return {name: maps[row] for name, maps in self.groups[group].neuron.layers.items()}
 
     def close(self) -> None:
         """Let go of what the cameras hold."""
@@ -170,6 +174,11 @@ class Eyes:
                 close = getattr(camera, "close", None)
                 if close is not None:
                     close()
+
+    def _place(self, camera: int) -> tuple[int, int]:
+        if camera not in self._places:
+            raise IndexError(f"no camera {camera} among {len(self.names)}")
+        return self._places[camera]
 
     def _in_order(self, answers: list[Response]) -> Response:
         """Put the groups' answers into one, shape (count, cameras), in the cameras' order."""
