@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.options import whole
+from lgmd_gym.agents.options import positive, whole
+from lgmd_gym.agents.stopping_zone import SPEEDS_KMH, around_the_zone, excitation
 from lgmd_gym.errors import check_keys, unknown_name
 
 # Where each observation is brought near [-1, 1] from: (value - offset) / scale.
@@ -17,15 +18,23 @@ SCALES = {
     "ego_speed": (0.0, 20.0),  # [m/s]
     "ego_yaw_rate": (0.0, 0.5),  # [rad/s]
 }
-# What is made of observations over decisions: its source, how it is scaled.
+# What is made of observations over decisions: its sources, how it is scaled.
 DERIVED = {
-    "speed_change": ("ego_speed", 1.0),  # since the last decision [m/s]; full braking takes 0.9 in 0.1 s
-    "spike_peak": ("spike_frequency", 100.0),  # fades by FADE a decision: silence is not clearance
+    "speed_change": (("ego_speed",), 1.0),  # since the last decision [m/s]; full braking takes 0.9 in 0.1 s
+    "spike_peak": (("spike_frequency",), 100.0),  # fades by FADE a decision: silence is not clearance
 }
+# What the eye of `stopping-zone` tells, sorted by own speed; see `around_the_zone`.
+ZONED = {
+    "zones": (("membrane_potential", "ego_speed"), 3.0),  # excitation k/(n σ3)
+    "zones_peak": (("membrane_potential", "ego_speed"), 3.0),  # the same, fading as spike_peak does
+    "zones_ffi": (("ffi", "ego_speed"), 20.0),  # the mean change of light in its place [grey levels]
+}
+AROUND = 5  # values that `around_the_zone` gives
 FADE = 0.93
+HARD = -0.5  # a demand of this or less is hard braking, which may latch
 LIMIT = 5.0  # beyond this, scaled values are clipped
 FRAME = "frame"  # passed on as it is; `shrink` pixels become one
-INPUTS = (*SCALES, *DERIVED, FRAME)
+INPUTS = (*SCALES, *DERIVED, *ZONED, FRAME)
 
 
 @dataclass(frozen=True)
@@ -34,17 +43,24 @@ class Features:
 
     Attributes:
         inputs: Observation keys, or what is derived from them over decisions: `speed_change` and
-            `spike_peak`, the highest spike frequency lately.
+            `spike_peak`, the highest spike frequency lately; with the eye of `stopping-zone` also `zones`,
+            `zones_peak` and `zones_ffi`, its fields sorted by own speed.
         history: Number of decisions remembered, the present one included, >= 1.
         repeat: Environment decisions that one decision of the policy holds for, >= 1; at 30 Hz, 3 let it
             decide at 10 Hz.
         shrink: Side of the squares of pixels whose mean a frame keeps, >= 1 [px].
+        latch: Whether the first hard braking (a demand of -0.5 or less) is held to the episode's end, as rules
+            hold theirs; what is learned is then when to brake.
+        reward_scale: What rewards are multiplied by in training; contacts cost up to 20, and DQN's loss is
+            no longer quadratic beyond 1.
     """
 
     inputs: tuple[str, ...] = (*SCALES, *DERIVED)
     history: int = 6
     repeat: int = 3
     shrink: int = 2
+    latch: bool = False
+    reward_scale: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "inputs", tuple(self.inputs))
@@ -55,6 +71,9 @@ class Features:
                 raise unknown_name("policy input", name, INPUTS)
         for name in ("history", "repeat", "shrink"):
             object.__setattr__(self, name, whole(name, getattr(self, name), 1))
+        if not isinstance(self.latch, bool):
+            raise ValueError(f"latch must be true or false, got {self.latch!r}")
+        object.__setattr__(self, "reward_scale", positive("reward_scale", self.reward_scale))
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "Features":
@@ -66,6 +85,10 @@ class Features:
         """Return plain values."""
         return asdict(self) | {"inputs": list(self.inputs)}
 
+    def latches(self, demand: float) -> bool:
+        """Return whether a demand in [-1, 1] is to be held to the episode's end."""
+        return self.latch and demand <= HARD
+
     def limits(self, shapes: dict[str, tuple[int, ...]]) -> dict[str, tuple[Any, Any, tuple[int, ...], Any]]:
         """Return lowest value, highest value, shape and dtype of each input, given the observation's shapes.
 
@@ -73,19 +96,20 @@ class Features:
         """
         spaces = {}
         for name in self.inputs:
-            shape = shapes[source_of(name)]
+            shape = shapes[sources_of(name)[0]]
             if name == FRAME:
                 height, width, channels = shape
                 shape = (height // self.shrink, width // self.shrink, channels * self.history)
                 spaces[name] = (0, 255, shape, np.uint8)
             else:
-                spaces[name] = (-LIMIT, LIMIT, (self.history * shape[0],), np.float32)
+                size = AROUND if name in ZONED else shape[0]
+                spaces[name] = (-LIMIT, LIMIT, (self.history * size,), np.float32)
         return spaces
 
 
-def source_of(name: str) -> str:
-    """Return the observation that an input is made of."""
-    return DERIVED[name][0] if name in DERIVED else name
+def sources_of(name: str) -> tuple[str, ...]:
+    """Return the observations that an input is made of."""
+    return (DERIVED | ZONED)[name][0] if name in DERIVED or name in ZONED else (name,)
 
 
 class Memory:
@@ -104,34 +128,55 @@ class Memory:
         """Forget everything; the next observation then fills the whole history."""
         self._kept = {}
         self._speed: np.ndarray | None = None
-        self._peak: np.ndarray | None = None
+        self._peaks: dict[str, np.ndarray] = {}
 
     def see(self, observation: dict[str, Any]) -> dict[str, np.ndarray]:
         """Take in an observation of `LGMDObservation` and return what the policy is shown.
 
         Raises:
-            ValueError: If the observation lacks an input.
+            ValueError: If the observation lacks an input, or the eye is not the one it needs.
         """
         shown = {}
         for name in self.features.inputs:
-            source = source_of(name)
-            if source not in observation:
-                raise ValueError(f"the policy needs the observation {source!r}, which this eye does not give")
-            value = self._prepared(name, np.asarray(observation[source]))
+            for source in sources_of(name):
+                if source not in observation:
+                    raise ValueError(
+                        f"the policy needs the observation {source!r}, which this eye does not give"
+                    )
+            value = self._prepared(name, observation)
             kept = self._kept.setdefault(name, deque([value] * self.features.history, self.features.history))
             kept.append(value)
             shown[name] = np.concatenate(kept, axis=-1)
         return shown
 
-    def _prepared(self, name: str, value: np.ndarray) -> np.ndarray:
+    def _prepared(self, name: str, observation: dict[str, Any]) -> np.ndarray:
+        value = np.asarray(observation[sources_of(name)[0]])
         if name == FRAME:
             return shrunk(value, self.features.shrink)
+        if name in ZONED:
+            value = zoned(name, value, float(observation["ego_speed"][0]))
         if name == "speed_change":
             value, self._speed = value - (value if self._speed is None else self._speed), value
-        elif name == "spike_peak":
-            self._peak = value = value if self._peak is None else np.maximum(value, FADE * self._peak)
-        offset, scale = SCALES.get(name) or (0.0, DERIVED[name][1])
+        elif name.endswith("_peak"):
+            before = self._peaks.get(name)
+            self._peaks[name] = value = value if before is None else np.maximum(value, FADE * before)
+        offset, scale = SCALES.get(name) or (0.0, (DERIVED | ZONED)[name][1])
         return np.clip((value - offset) / scale, -LIMIT, LIMIT).astype(np.float32)
+
+
+def zoned(name: str, value: np.ndarray, speed: float) -> np.ndarray:
+    """Return an input that is sorted by own speed [m/s], shape (5,).
+
+    Raises:
+        ValueError: If the values are not those of the eye of `stopping-zone`.
+    """
+    if value.shape != (2 * len(SPEEDS_KMH),):
+        raise ValueError(
+            f"the policy input {name!r} needs the eye of stopping-zone with {2 * len(SPEEDS_KMH)} cameras, "
+            f"got {len(value)}; train with --eye stopping-zone"
+        )
+    ground, upright = np.split(value if name == "zones_ffi" else excitation(value), 2)
+    return around_the_zone(ground, upright, speed)
 
 
 def shrunk(frame: np.ndarray, side: int) -> np.ndarray:

@@ -56,8 +56,9 @@ class Policy(Agent):
         self._demand = 0.0
 
     def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Decide anew at every `repeat`-th call, else hold."""
-        if self._decision % self._memory.features.repeat == 0:
+        """Decide anew at every `repeat`-th call, else hold; once latched, hold to the end."""
+        features = self._memory.features
+        if self._decision % features.repeat == 0 and not features.latches(self._demand):
             action, _ = self._model.predict(self._memory.see(observation), deterministic=True)
             self._demand = self._levels[int(action)] if self._levels else float(np.reshape(action, -1)[0])
         self._decision += 1

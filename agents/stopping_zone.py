@@ -32,6 +32,8 @@ class StoppingZoneParams(RuleParams):
         memory: Frames for which the upright field's answer counts.
         near_upright: Level of the upright field of a nearer zone, together with `ground`.
         near_frames: Consecutive frames in which both fields of a nearer zone must stand at these.
+        near_share: Zones made for less than this share of own speed are not judged: at such a speed what flows
+            by is enough to excite their upright fields, and a steel plate the ground ones.
         yaw_rate: Own yaw rate beyond which it does not judge [rad/s].
         settle: Frames for which it does not judge after that.
         crawl: Own speed below which it does not judge [m/s].
@@ -39,12 +41,13 @@ class StoppingZoneParams(RuleParams):
 
     deceleration: float = above_zero(9.0, 7.0, 10.0)
     reaction: float = above_zero(0.4, 0.25, 0.6)
-    ground: float = above_zero(3.5, 2.0, 7.0)
+    ground: float = above_zero(3.0, 2.0, 7.0)
     upright: float = above_zero(0.5, 0.2, 1.2)
     frames: int = count(2, 1, 8)
     memory: int = count(15, 3, 40)
     near_upright: float = above_zero(1.4, 0.8, 3.0)
-    near_frames: int = count(3, 1, 8)
+    near_frames: int = count(4, 1, 8)
+    near_share: float = above_zero(0.5, 0.3, 0.8)
     yaw_rate: float = above_zero(0.03, 0.01, 0.1)
     settle: int = count(15, 1, 60)
     crawl: float = above_zero(1.5, 0.5, 2.5)
@@ -104,8 +107,9 @@ class StoppingZone(Rule):
         near = [streak.add(held) for streak, held in zip(self._near, both, strict=True)]
         can_judge = self._gate.open(sight) and sight.speed > p.crawl
         here = zone_of(sight.speed)
+        nearest = zone_of(p.near_share * sight.speed)
         in_zone = entered[here] and bool(self._since_upright[here] < p.memory)
-        return can_judge and (in_zone or any(near[:here]))
+        return can_judge and (in_zone or any(near[nearest:here]))
 
     def _checked(self, sight: Sight) -> np.ndarray:
         potential = sight.membrane_potential
@@ -125,6 +129,18 @@ def zone_of(speed: float) -> int:
 def stopping_distance(speed: Any, deceleration: float, reaction: float) -> Any:
     """Return speed²/(2 · deceleration) + speed · reaction [m]."""
     return speed**2 / (2 * deceleration) + speed * reaction
+
+
+def around_the_zone(ground: np.ndarray, upright: np.ndarray, speed: float) -> np.ndarray:
+    """Return what the fields tell that matter at a speed [m/s], out of one value per ground and upright field.
+
+    Five values: ground and upright field of the zone of that speed, the same of the next one farther, and the
+    strongest pair of all nearer zones, as the weaker of its two (0 if there is none).
+    """
+    here = zone_of(speed)
+    ahead = min(here + 1, len(SPEEDS_KMH) - 1)
+    near = np.minimum(ground[:here], upright[:here]).max(initial=0.0)
+    return np.array([ground[here], upright[here], ground[ahead], upright[ahead], near])
 
 
 def excitation(potential: Any) -> np.ndarray:

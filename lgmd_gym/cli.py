@@ -86,6 +86,19 @@ class Compare:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Judge:
+    """Judge arms of a run: trainings of one kind taken together, or rules, over the same episodes.
+
+    Play them first: lgmd-gym bench --suite random --seeds 1 --agents policy:a0.zip policy:a1.zip ttc-oracle.
+    """
+
+    run: Positional[Path]
+    """Run folder."""
+    arms: tuple[str, ...] = ()
+    """An agent of the run, or name=pattern of agents, as in lgmd=policy:*lgmd*. Default: every agent."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Drive:
     """Play one episode and print how it ended; watch it in a window or write a video.
 
@@ -179,9 +192,12 @@ class Train:
     """Environment id; RandomBraking is trained on its split train and judged on validation."""
     camera: tuple[str, ...] = ("fovea", "tele", "wide")
     """Camera presets, a neuron each."""
+    eye: str | None = None
+    """Agent whose own eye takes the cameras' place, such as stopping-zone."""
     inputs: tuple[str, ...] = ()
     """Observations the policy sees: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed,
-    speed_change, ego_yaw_rate, frame; default: all but the last."""
+    speed_change, ego_yaw_rate; those are the default. Also frame and, with the eye of stopping-zone, zones,
+    zones_peak, zones_ffi."""
     demands: tuple[float, ...] = (0.0, -0.4, -1.0)
     """Demands the policy chooses among, from -1 (full braking) to 1; empty for any. SAC takes no choice."""
     steps: int | None = None
@@ -267,6 +283,7 @@ Command = Union[  # noqa: UP007  (tyro reads the annotations)
     Annotated[Tune, subcommand(name="tune")],
     Annotated[Train, subcommand(name="train")],
     Annotated[Compare, subcommand(name="compare")],
+    Annotated[Judge, subcommand(name="judge")],
     Annotated[Gallery, subcommand(name="gallery")],
     Annotated[Doctor, subcommand(name="doctor")],
 ]
@@ -286,6 +303,7 @@ def run(argv: list[str] | None = None) -> int:
         plays: dict[type, Callable[[Any], int]] = {
             Bench: commands_bench.bench,
             Compare: commands_bench.compare,
+            Judge: commands_bench.judge,
             Drive: commands.drive,
             Video: commands_paper.video,
             Paper: commands_paper.paper,

@@ -63,6 +63,16 @@ def compare(options: "cli.Compare") -> int:
     return 0
 
 
+def judge(options: "cli.Judge") -> int:
+    """Print the arms of a run."""
+    from lgmd_gym.benchmark.judge import judge_run
+    from lgmd_gym.benchmark.judge_tables import judge_table
+
+    arms = judge_run(options.run, options.arms)
+    console_of().print(judge_table(arms, str(options.run)))
+    return 0
+
+
 def _cluster(options: "cli.Bench") -> str | None:
     """Return the cluster's address that the options name, None for processes."""
     if options.backend == "dask" and options.address is None:

@@ -21,6 +21,7 @@ def train(options: "cli.Train") -> int:
             algo=options.algo,
             env_id=options.env,
             camera=options.camera,
+            eye=options.eye,
             steps=options.steps,
             seed=options.seed,
             hyperparams=options.hyperparams,

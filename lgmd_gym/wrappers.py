@@ -67,6 +67,10 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         include_base: Whether the wrapped environment's own observation is.
         trace: Whether `info["lgmd/trace"]` lists a `TraceFrame` for every camera frame of the step.
 
+    Attributes:
+        asleep: Set it to have no more frames drawn until the next reset, because nobody will look: the
+            neurons' values then stand still.
+
     Raises:
         ValueError: For an environment that is not highway-env's, an unknown camera or parameter, a rate that
             does not divide, or frames of different shapes with `include_frame`.
@@ -107,6 +111,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self._response: Response | None = None
         self._seen: list[TraceFrame] = []
         self._substeps, self._heading = 0, 0.0
+        self.asleep = False
         self._set_rate()
 
     def reset(
@@ -119,7 +124,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self.eyes.reset()
         self.eyes.fit(self._host)
         watch(self.env, self._on_substep)
-        self._substeps, self._seen = 0, []
+        self._substeps, self._seen, self.asleep = 0, [], False
         self._see()
         self._heading = float(self._host.vehicle.heading)
         return self._observation(base, 0.0), self._informed(info)
@@ -171,6 +176,8 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
             self._see()
 
     def _see(self) -> None:
+        if self.asleep:
+            return
         self.eyes.render(self._host, self._frames)
         self._response = self.eyes.step(self._frames)
         if self.trace:

@@ -54,6 +54,21 @@ def test_contact_sheet(tmp_path):
     assert 10_000 < (tmp_path / "sheet.png").stat().st_size < 200_000
 
 
+def test_what_breaks_first(capsys):
+    """A lens that looks up sees no ground: the rule that watches it misses what it avoids with a level lens."""
+    example = load("what_breaks_first")
+    example.SPOILT["lens to the sky"] = (example.pitched(20.0), {})
+    example.first_table("stopping-zone", 1, 1, ("clear", "lens to the sky"), every=14)
+    clear, sky = capsys.readouterr().out.splitlines()[2:]
+    assert clear.startswith("| clear | 2/2 [34–100] | 0/2 [0–66] | 0/3 ")
+    assert sky.startswith("| lens to the sky | 0/2 ")
+    example.second_table("stopping-zone", 1, 1, every=6)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "| target, texture | day | night | fog |"
+    assert len(lines) == 2 + 9
+    assert "| asphalt (104), texture 1.6 | 1/1 " in "".join(lines)
+
+
 def test_every_example_is_run_here():
     tested = Path(__file__).read_text()
     assert all(f'load("{path.stem}")' in tested for path in EXAMPLES.glob("*.py"))

@@ -54,6 +54,38 @@ def test_memory_derives_braking_and_fading_peaks():
     assert [float(item["speed_change"][0]) for item in told] == pytest.approx([0.0, -0.5, -0.9])
 
 
+def zone_eye(ground, upright, speed):
+    """An observation of the eye of `stopping-zone`, from excitations of the 10 ground and upright fields."""
+    k = np.concatenate([ground, upright])
+    return {
+        "membrane_potential": (1 / (1 + np.exp(-k))).astype(np.float64),
+        "ffi": np.arange(20.0),
+        "ego_speed": np.array([speed], np.float32),
+    }
+
+
+def test_zones_are_sorted_by_own_speed_and_their_peaks_fade():
+    ground, upright = np.zeros(10), np.zeros(10)
+    ground[4], upright[4] = 3.0, 1.5  # the zone of 40 km/h
+    ground[5], upright[2] = 6.0, 9.0  # the next one; a nearer one, of which the weaker field counts: none
+    ground[1], upright[1] = 0.9, 1.2
+    memory = Memory(Features(inputs=("zones", "zones_peak", "zones_ffi"), history=1))
+    shown = memory.see(zone_eye(ground, upright, 10.0))
+    assert shown["zones"] == pytest.approx([1.0, 0.5, 2.0, 0.0, 0.3], abs=1e-5)
+    assert shown["zones_ffi"] == pytest.approx([0.2, 0.7, 0.25, 0.75, 0.15])
+    shown = memory.see(zone_eye(np.zeros(10), np.zeros(10), 10.0))
+    assert shown["zones"] == pytest.approx([0.0] * 5, abs=1e-5)
+    assert shown["zones_peak"] == pytest.approx([FADE, FADE * 0.5, FADE * 2, 0.0, FADE * 0.3], abs=1e-5)
+    fastest = Memory(Features(inputs=("zones",), history=1)).see(zone_eye(ground, upright, 40.0))
+    assert fastest["zones"][0] == fastest["zones"][2] == 0.0  # no zone is farther than the last
+
+
+def test_zones_need_their_eye():
+    given = observed(1.0) | {"membrane_potential": np.array([0.5, 0.6])}
+    with pytest.raises(ValueError, match="needs the eye of stopping-zone with 20 cameras, got 2; train with"):
+        Memory(Features(inputs=("zones",))).see(given)
+
+
 def test_frames_shrink_to_means():
     frame = np.zeros((4, 6, 1), np.uint8)
     frame[:2, 2:4] = 100
@@ -73,6 +105,8 @@ def test_frames_shrink_to_means():
         ({"inputs": []}, "inputs needs at least one observation key"),
         ({"histry": 3}, "unknown policy feature 'histry'; did you mean 'history'"),
         ({"history": 0}, "history must be a whole number >= 1, got 0"),
+        ({"latch": 1}, "latch must be true or false, got 1"),
+        ({"reward_scale": 0.0}, "reward_scale must be"),
     ],
 )
 def test_bad_features_are_refused(values, words):
@@ -102,6 +136,38 @@ def test_policy_view_holds_actions_and_adds_up_rewards():
         assert shown["ego_speed"][0] == pytest.approx(rewards[-1][0]["ego_speed"][0] / 20.0)
 
 
+def test_a_latched_brake_is_held_to_the_end():
+    levels = {"action": {"type": "DiscreteDemand", "levels": [0.0, -0.4, -1.0]}}
+    plain, held = (gym.make("LGMD/CCRs-v0", config=levels) for _ in range(2))
+    view = PolicyView(held, inputs=["ego_speed"], latch=True, reward_scale=0.5)
+    plain.reset(seed=4)
+    view.reset(seed=4)
+    for action in (0, 1):  # light braking does not latch
+        total = sum(float(plain.step(action)[1]) for _ in range(3))
+        _, reward, *ends, _ = view.step(action)
+        assert reward == pytest.approx(0.5 * total)
+        assert ends == [False, False]
+    total, done = 0.0, False
+    while not done:
+        _, reward, terminated, truncated, _ = plain.step(2)
+        total, done = total + float(reward), terminated or truncated
+    _, reward, *ends, info = view.step(2)
+    assert reward == pytest.approx(0.5 * total)
+    assert ends == [True, False]  # nothing is left to decide
+    assert not info["collision"]
+    before = view.get_wrapper_attr("frames")["fovea"].copy()
+    view.reset(seed=4)
+    assert (view.get_wrapper_attr("frames")["fovea"] != before).any()  # awake again
+
+
+def test_a_policys_eye_is_an_agents_own_or_refused():
+    eye = Order(eye="stopping-zone").lenses()
+    assert [camera["name"] for camera in eye][:1] == ["ground10"]
+    assert Order(camera=("wide",)).lenses() == "wide"
+    with pytest.raises(ValueError, match="agent 'spike-threshold' has no eye of its own"):
+        Order(eye="spike-threshold").lenses()
+
+
 def test_a_missing_frame_is_named_with_the_mend():
     with pytest.raises(ValueError, match="'frame' is not observed; make it with include_frame=True"):
         PolicyView(gym.make("LGMD/CCRs-v0"), inputs=["frame"])
@@ -111,7 +177,8 @@ def test_a_missing_frame_is_named_with_the_mend():
 def test_the_packages_hyperparameters_are_read(algo):
     settings = read_settings(algo, "LGMD/RandomBraking-v0")
     assert settings.n_timesteps >= 100_000
-    assert settings.features == {"history": 6, "repeat": 3}
+    assert (settings.features["history"], settings.features["repeat"]) == (6, 3)
+    assert settings.features.get("latch", False) is (algo == "dqn")
     assert settings.features == read_settings(algo, "LGMD/CCRs-v0").features
 
 

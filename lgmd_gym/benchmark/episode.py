@@ -43,6 +43,7 @@ class Episode:
         target_width: Width of the first actor [m]; NaN on an empty road.
         fps: Camera frames per second [Hz].
         target_shade: Body grey of the first actor in [0, 255]; NaN on an empty road.
+        reward_sum: Sum of the environment's rewards, the return without discount.
     """
 
     series: dict[str, np.ndarray]
@@ -52,6 +53,7 @@ class Episode:
     target_width: float
     fps: float
     target_shade: float = float("nan")
+    reward_sum: float = float("nan")
 
 
 def make_env(case: Case, eyesight: Eyesight, **options: Any) -> gym.Env:
@@ -77,7 +79,7 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
     agent.reset(seed)
     policy_hz = env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
     rows: list[tuple[float, ...]] = []
-    done = False
+    done, total = False, 0.0
     while True:
         # The agent judges what it has seen before the moment is noted, so that its alert belongs to it.
         action = agent.act(observation, info)
@@ -85,7 +87,8 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
         rows.append((len(rows) / policy_hz, *_moment(observation, info), float(agent.alert), float(held)))
         if done:
             break
-        observation, _, terminated, truncated, info = env.step(action)
+        observation, reward, terminated, truncated, info = env.step(action)
+        total += float(reward)
         done = terminated or truncated
     base: Any = env.unwrapped
     actors, seen = base.scenario.actors, base.road.obstacles
@@ -97,6 +100,7 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
         target_width=actors[0].width if actors else float("nan"),
         fps=env.get_wrapper_attr("fps"),
         target_shade=float(seen[0].shade) if seen else float("nan"),
+        reward_sum=total,
     )
 
 

@@ -285,6 +285,12 @@ def premature_brake(o: Outcome) -> Value:
 
 
 @metric
+def episode_return(o: Outcome) -> Value:
+    """Sum of the environment's rewards, without discount: what policies are trained for."""
+    return number(o.episode.reward_sum)
+
+
+@metric
 def distance(o: Outcome) -> Value:
     """Distance driven."""
     return number(np.trapezoid(o.episode.series["ego_speed"], o.episode.series["time"]))

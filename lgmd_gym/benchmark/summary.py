@@ -50,7 +50,7 @@ class Rate(NamedTuple):
         return cls(k, n, low, high)
 
 
-def wilson(k: int, n: int, z: float = 1.959964) -> tuple[float, float]:
+def wilson(k: float, n: int, z: float = 1.959964) -> tuple[float, float]:
     """Return the Wilson score interval of k successes in n trials; (0, 1) for none.
 
     Example:

@@ -11,6 +11,7 @@ from typing import Any
 import gymnasium as gym
 
 import lgmd_gym
+from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.features import FRAME, Features
 from lgmd_gym.agents.policy import write_card
 from lgmd_gym.envs.units import check_within
@@ -32,6 +33,7 @@ class Order:
         algo: "ppo", "sac" or "dqn".
         env_id: The environment; those of a split are trained on "train" and judged on "validation".
         camera: See `LGMDObservation`.
+        eye: Name of an agent whose own eye takes the camera's place, such as "stopping-zone".
         steps: Decisions of the policy; None for what the hyperparameters say.
         seed: Of the network and the environments.
         hyperparams: YAML file in rl-zoo's format; None for the package's.
@@ -45,6 +47,7 @@ class Order:
     algo: str = "sac"
     env_id: str = RANDOM_ID
     camera: Sequence[str] = CAMERAS
+    eye: str | None = None
     steps: int | None = None
     seed: int = 0
     hyperparams: Path | None = None
@@ -67,6 +70,19 @@ class Order:
         found = read_settings(self.algo, self.env_id, self.hyperparams)
         features = found.features | ({"inputs": list(self.inputs)} if self.inputs else {})
         return found._replace(features=features, n_timesteps=self.steps or found.n_timesteps)
+
+    def lenses(self) -> Any:
+        """Return what the policy looks through, as `LGMDObservation` takes it.
+
+        Raises:
+            ValueError: For an agent without an eye of its own.
+        """
+        if self.eye is None:
+            return list(self.camera) if len(self.camera) > 1 else self.camera[0]
+        camera = make_agent(self.eye).camera
+        if camera is None:
+            raise ValueError(f"agent {self.eye!r} has no eye of its own; use camera, or eye 'stopping-zone'")
+        return camera
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
@@ -102,8 +118,9 @@ def make_env(order: Order, features: dict[str, Any], split: str) -> gym.Env:
         arguments["config"] = {**(arguments.get("config") or {}), "action": levels}
     if FRAME in Features.from_dict(features).inputs:
         arguments["include_frame"] = True
-    camera: Any = list(order.camera) if len(order.camera) > 1 else order.camera[0]
-    return PolicyView(gym.make(order.env_id, camera=camera, **arguments), **features)
+    if split != "train":
+        features = {**features, "reward_scale": 1.0}  # looks are told in the environment's own returns
+    return PolicyView(gym.make(order.env_id, camera=order.lenses(), **arguments), **features)
 
 
 class Training:
@@ -240,11 +257,10 @@ class Training:
         return self.policy
 
     def _card(self, wall_time: float) -> dict[str, Any]:
-        camera = self.order.camera
         return {
             "lgmd_gym": lgmd_gym.__version__,
             "algo": self.order.algo,
-            "camera": list(camera) if len(camera) > 1 else camera[0],
+            "camera": self.order.lenses(),
             "features": Features.from_dict(self.settings.features).to_dict(),
             "levels": list(self.order.demands) or None,
             "order": self.order.to_dict(),

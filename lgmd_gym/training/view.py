@@ -7,14 +7,14 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
-from lgmd_gym.agents.features import Features, Memory, source_of
+from lgmd_gym.agents.features import Features, Memory, sources_of
 
 
 class PolicyView(gym.Wrapper, RecordConstructorArgs):
     """Shows a policy what `features` say, and holds each of its actions for `repeat` decisions.
 
     Observations become a `Dict` of float32 vectors in [-5, 5], oldest first, and frames uint8 with the
-    history in their channels; rewards of the decisions held are summed. As a plain wrapper with keyword
+    history in their channels; rewards of the decisions held are summed and scaled. As a plain wrapper with keyword
     arguments it has the form of rl-zoo's `env_wrapper`.
 
     Args:
@@ -35,7 +35,7 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
             raise ValueError(f"PolicyView needs the Dict observation of LGMDObservation, got {given}")
         shapes = {name: space.shape or () for name, space in given.spaces.items()}
         for name in self.features.inputs:
-            if source_of(name) not in shapes:
+            if any(source not in shapes for source in sources_of(name)):
                 raise ValueError(
                     f"the policy input {name!r} is not observed; make it with include_{name}=True"
                 )
@@ -55,13 +55,20 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
         return self._memory.see(observation), info
 
     def step(self, action: Any) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
-        """Hold an action for `repeat` decisions or to the episode's end."""
-        total = 0.0
-        observation, reward, terminated, truncated, info = self.env.step(action)
-        for _ in range(self.features.repeat - 1):
-            if terminated or truncated:
-                break
-            total += float(reward)
+        """Hold an action for `repeat` decisions, or to the episode's end if it latches."""
+        features, total, held = self.features, 0.0, 0
+        latched = features.latches(self._demand(action))
+        if latched:
+            self.env.set_wrapper_attr("asleep", True)  # nothing depends on what is seen from here on
+        done = False
+        while not done and (latched or held < features.repeat):
             observation, reward, terminated, truncated, info = self.env.step(action)
-        total += float(reward)
-        return self._memory.see(observation), total, terminated, truncated, info
+            total, held, done = total + float(reward), held + 1, terminated or truncated
+        if latched:  # the end of what can be decided, whatever ended the episode
+            terminated, truncated = True, False
+        return self._memory.see(observation), features.reward_scale * total, terminated, truncated, info
+
+    def _demand(self, action: Any) -> float:
+        """Return the longitudinal demand that an action stands for."""
+        levels = getattr(getattr(self.env.unwrapped, "action_type", None), "levels", None)
+        return float(np.reshape(action, -1)[0]) if levels is None else levels[int(action)]
