@@ -49,8 +49,8 @@ class Features:
         repeat: Environment decisions that one decision of the policy holds for, >= 1; at 30 Hz, 3 let it
             decide at 10 Hz.
         shrink: Side of the squares of pixels whose mean a frame keeps, >= 1 [px].
-        latch: Whether the first hard braking (a demand of -0.5 or less) is held to the episode's end, as rules
-            hold theirs; what is learned is then when to brake.
+        latch: Whether the first hard braking (a demand of -0.5 or less) is held to the episode's end, as
+            rules hold theirs; what is learned is then when to brake.
         reward_scale: What rewards are multiplied by in training; contacts cost up to 20, and DQN's loss is
             no longer quadratic beyond 1.
     """

@@ -32,8 +32,8 @@ class StoppingZoneParams(RuleParams):
         memory: Frames for which the upright field's answer counts.
         near_upright: Level of the upright field of a nearer zone, together with `ground`.
         near_frames: Consecutive frames in which both fields of a nearer zone must stand at these.
-        near_share: Zones made for less than this share of own speed are not judged: at such a speed what flows
-            by is enough to excite their upright fields, and a steel plate the ground ones.
+        near_share: Zones made for less than this share of own speed are not judged: at such a speed what
+            flows by is enough to excite their upright fields, and a steel plate the ground ones.
         yaw_rate: Own yaw rate beyond which it does not judge [rad/s].
         settle: Frames for which it does not judge after that.
         crawl: Own speed below which it does not judge [m/s].
@@ -132,7 +132,7 @@ def stopping_distance(speed: Any, deceleration: float, reaction: float) -> Any:
 
 
 def around_the_zone(ground: np.ndarray, upright: np.ndarray, speed: float) -> np.ndarray:
-    """Return what the fields tell that matter at a speed [m/s], out of one value per ground and upright field.
+    """Return what the fields that matter at a speed [m/s] tell, out of one value per ground and upright field.
 
     Five values: ground and upright field of the zone of that speed, the same of the next one farther, and the
     strongest pair of all nearer zones, as the weaker of its two (0 if there is none).

@@ -55,7 +55,7 @@ def test_contact_sheet(tmp_path):
 
 
 def test_what_breaks_first(capsys):
-    """A lens that looks up sees no ground: the rule that watches it misses what it avoids with a level lens."""
+    """A lens that looks up sees no ground, and the rule that watches it misses what it else avoids."""
     example = load("what_breaks_first")
     example.SPOILT["lens to the sky"] = (example.pitched(20.0), {})
     example.first_table("stopping-zone", 1, 1, ("clear", "lens to the sky"), every=14)

@@ -14,8 +14,8 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
     """Shows a policy what `features` say, and holds each of its actions for `repeat` decisions.
 
     Observations become a `Dict` of float32 vectors in [-5, 5], oldest first, and frames uint8 with the
-    history in their channels; rewards of the decisions held are summed and scaled. As a plain wrapper with keyword
-    arguments it has the form of rl-zoo's `env_wrapper`.
+    history in their channels; rewards of the decisions held are summed and scaled. As a plain wrapper with
+    keyword arguments it has the form of rl-zoo's `env_wrapper`.
 
     Args:
         env: An environment inside `LGMDObservation`, with `include_frame` if frames are wanted.
