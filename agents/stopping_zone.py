@@ -132,7 +132,7 @@ def stopping_distance(speed: Any, deceleration: float, reaction: float) -> Any:
 
 
 def around_the_zone(ground: np.ndarray, upright: np.ndarray, speed: float) -> np.ndarray:
-    """Return what the fields that matter at a speed [m/s] tell, out of one value per ground and upright field.
+    """Return what the fields that matter at a speed [m/s] tell, from one value per ground and upright field.
 
     Five values: ground and upright field of the zone of that speed, the same of the next one farther, and the
     strongest pair of all nearer zones, as the weaker of its two (0 if there is none).
