@@ -9,8 +9,10 @@ import numpy as np
 
 from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.features import FRAME, Features, Memory
+from lgmd_gym.errors import unknown_name
 
 CARD = "lgmd_gym.json"  # beside the model, in the same zip
+SHIPPED = Path(__file__).parent / "policies"  # those that come with this package
 ALGORITHMS = ("ppo", "sac", "dqn")
 
 
@@ -21,7 +23,7 @@ class Policy(Agent):
     author pickled into it, as stable-baselines3's files do: load only files you trust.
 
     Args:
-        path: The zip file.
+        path: The zip file, or the name of a policy that comes with this package (`shipped`).
 
     Raises:
         ValueError: If it cannot be read or is no policy of this package, or stable-baselines3 is missing.
@@ -32,10 +34,11 @@ class Policy(Agent):
     def __init__(self, path: str) -> None:
         super().__init__()
         self.name = f"policy:{path}"
-        self.card = read_card(Path(path))
+        file = find_policy(path)
+        self.card = read_card(file)
         self._memory = Memory(Features.from_dict(self.card["features"]))
         self._levels = self.card["levels"]
-        self._model = _load(Path(path), self.card["algo"])
+        self._model = _load(file, self.card["algo"])
         self.reset()
 
     @property
@@ -63,6 +66,24 @@ class Policy(Agent):
             self._demand = self._levels[int(action)] if self._levels else float(np.reshape(action, -1)[0])
         self._decision += 1
         return self._demand
+
+
+def shipped() -> list[str]:
+    """Return the names of the policies that come with this package."""
+    return sorted(path.stem for path in SHIPPED.glob("*.zip"))
+
+
+def find_policy(text: str) -> Path:
+    """Return the file of a policy: of a shipped one by its name, else the path that is given.
+
+    Raises:
+        ValueError: For a bare name that none of the shipped ones has.
+    """
+    if text in shipped():
+        return SHIPPED / f"{text}.zip"
+    if not Path(text).suffix:
+        raise unknown_name("policy (neither FILE.zip nor shipped)", text, shipped())
+    return Path(text)
 
 
 def read_card(path: Path) -> dict[str, Any]:

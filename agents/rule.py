@@ -38,6 +38,7 @@ class Rule(Agent):
     """
 
     Params: ClassVar[type[RuleParams]]
+    latching: ClassVar[bool] = True  # whether it holds full braking once it has begun
 
     def __init__(self, params: Any = None, **options: Any) -> None:
         super().__init__()

@@ -128,6 +128,7 @@ class Graded(Rule):
 
     name = "graded"
     Params = GradedParams
+    latching = False
 
     @property
     def alert(self) -> bool:

@@ -220,7 +220,8 @@ class Train:
 class Tune:
     """Tune a rule on training levels of LGMD/RandomBraking-v0 and false-reaction cases with other seeds.
 
-    Validation levels choose among the best trials; test levels and the protocol suites stay unseen.
+    Validation levels choose among the best trials; test levels and the protocol suites stay unseen. What a
+    rule's eye sees is recorded once, so that a trial takes seconds.
     """
 
     agent: str = "stopping-zone"
@@ -231,6 +232,8 @@ class Tune:
     """Levels of either split, from 0 on; half of them are threats."""
     seeds: int = 1
     """Seeds of the false-reaction suite, from 1000 on."""
+    false_cost: float = 1.0
+    """What a false brake costs, in contacts at full speed."""
     jobs: int = 2
     """Processes."""
     study: Path = Path("tune.db")

@@ -6,12 +6,14 @@ from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from lgmd_gym import cli, tuning
+    from lgmd_gym import cli
+    from lgmd_gym.tuning_ground import Ground
 
 
 def tune(options: "cli.Tune") -> int:
     """Search or, with `--sensitivity`, shift a rule's parameters; print and keep what comes out."""
     from lgmd_gym import tuning
+    from lgmd_gym.tuning_ground import Ground
 
     tuning.tunable(options.agent)
     for name, value, low in (
@@ -22,23 +24,31 @@ def tune(options: "cli.Tune") -> int:
     ):
         if value < low:
             raise ValueError(f"{name} must be >= {low}, got {value!r}")
+    if not options.false_cost > 0.0:
+        raise ValueError(f"false_cost must be > 0, got {options.false_cost!r}")
     console = Console()
-    validation = tuning.Ground("validation", options.levels, options.seeds, options.jobs)
+    validation = Ground("validation", options.levels, options.seeds, options.jobs)
     if options.sensitivity:
         _sensitivity(options.agent, validation, console)
         return 0
     if options.best.exists():
         raise ValueError(f"{str(options.best)!r} exists and is kept; choose another --best")
-    train = tuning.Ground("train", options.levels, options.seeds, options.jobs)
+    train = Ground("train", options.levels, options.seeds, options.jobs)
     found = tuning.tune(
-        options.agent, options.study, options.trials, train, validation, tell=lambda line: console.print(line)
+        options.agent,
+        options.study,
+        options.trials,
+        train,
+        validation,
+        options.false_cost,
+        tell=lambda line: console.print(line, soft_wrap=True),
     )
     options.best.write_text("".join(f"{name} = {value!r}\n" for name, value in found.items()), "utf-8")
     console.print(f"chosen on validation levels: --agents {options.agent}:toml={options.best}")
     return 0
 
 
-def _sensitivity(agent: str, ground: "tuning.Ground", console: Console) -> None:
+def _sensitivity(agent: str, ground: "Ground", console: Console) -> None:
     from lgmd_gym import tuning
 
     base = ground.score(agent)

@@ -36,11 +36,16 @@ def suites() -> Table:
 def agents() -> Table:
     """Return the agents with their options and what they do."""
     from lgmd_gym.agents import AGENTS
+    from lgmd_gym.agents.policy import find_policy, read_card, shipped
 
     table = Table("agent", "options", "what it does", title="agents")
     for name, cls in AGENTS.items():
         options = ", ".join(f"{option}={default:g}" for option, default in cls.options().items())
         table.add_row(name, options, _first_line(cls))
+    for name in shipped():
+        algo = read_card(find_policy(name))["algo"].upper()
+        about = f'Learned with {algo}; needs the extra "train". Loading it runs what its author pickled.'
+        table.add_row(f"policy:{name}", "", about)
     return table
 
 

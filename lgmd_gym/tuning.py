@@ -5,89 +5,17 @@ Optuna proposes parameters within the ranges that a rule's fields state. A trial
 its own. The protocol suites and the test split are never touched.
 """
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from joblib import Parallel, delayed
-
-from lgmd_gym.agents import AGENTS, Rule, make_agent
-from lgmd_gym.benchmark.cases import Case
-from lgmd_gym.benchmark.eyesight import DEFAULT_CAMERA, Eyesight
-from lgmd_gym.benchmark.suites import find_suite
-from lgmd_gym.benchmark.tasks import NO_BRAKE, Task, run_task
+from lgmd_gym.agents import AGENTS, Rule
 from lgmd_gym.errors import unknown_name
+from lgmd_gym.tuning_ground import Ground, Score
 
-FALSE_COST = 4.0  # a false brake weighs as much as four contacts at full speed
-SEEDS_FROM = 1000  # of the false-reaction suite: reports count from 0
-TEXTURES = (0.5, 1.6)  # contrast of the asphalt, times the natural one
+FALSE_COST = 1.0  # a false brake weighs as much as a contact at full speed
 SHIFT = 0.2  # of each parameter in the sensitivity table
-
-
-@dataclass(frozen=True, slots=True)
-class Score:
-    """How well parameters do.
-
-    Attributes:
-        avoided_energy: Mean share of the impact energy that is avoided where there is a threat; none of it
-            where the brake is premature.
-        false_rate: Share of the quiet episodes with a false brake.
-        threats: Number of episodes with a threat.
-        quiet: Number of episodes without.
-    """
-
-    avoided_energy: float
-    false_rate: float
-    threats: int
-    quiet: int
-
-    @property
-    def value(self) -> float:
-        """What tuning maximises."""
-        return self.avoided_energy - FALSE_COST * self.false_rate
-
-
-class Ground:
-    """The episodes that parameters are scored on, with their counterfactuals played once.
-
-    Args:
-        split: "train" or "validation".
-        levels: Number of levels, from 0 on.
-        seeds: Number of seeds of the false-reaction suite; 0 for none.
-        jobs: Processes; 1 plays in this one.
-    """
-
-    def __init__(self, split: str, levels: int, seeds: int, jobs: int = 1) -> None:
-        self.jobs = jobs
-        places = [(_level(split, number), number) for number in range(levels)]
-        quiet = find_suite("false-reaction").cases
-        offset = SEEDS_FROM + (0 if split == "train" else SEEDS_FROM)
-        places += [(case, offset + seed) for seed in range(seeds) for case in quiet]
-        played = self._run(Task(NO_BRAKE, case, seed, Eyesight()) for case, seed in places)
-        self.truths = [(result.task.case, result.task.seed, result.truth) for result in played]
-
-    def score(self, agent: str) -> Score:
-        """Play an agent's string on all of it.
-
-        Raises:
-            RuntimeError: If an episode fails; with its traceback.
-        """
-        made = make_agent(agent)
-        tasks = (Task(agent, case, seed, _textured(made, seed), truth) for case, seed, truth in self.truths)
-        rows = [result.row for result in self._run(tasks)]
-        threats = [row for row in rows if row["threat"]]
-        quiet = [row["false_brake"] for row in rows if not row["threat"]]
-        energy = [0.0 if row["premature_brake"] else _avoided_energy(row) for row in threats]
-        return Score(_mean(energy), _mean(quiet), len(threats), len(quiet))
-
-    def _run(self, tasks: Iterable[Task]) -> list[Any]:
-        results: Any = Parallel(n_jobs=self.jobs)(delayed(run_task)(task) for task in tasks)
-        for result in results:
-            if result.row["error"] is not None:
-                raise RuntimeError(result.row["error"])
-        return list(results)
 
 
 def tune(
@@ -96,6 +24,7 @@ def tune(
     trials: int,
     train: Ground,
     validation: Ground,
+    false_cost: float = FALSE_COST,
     best_of: int = 3,
     tell: Callable[[str], None] = print,
 ) -> dict[str, float | int]:
@@ -107,6 +36,7 @@ def tune(
         trials: How many to add.
         train: What trials are scored on.
         validation: What chooses among the best.
+        false_cost: What a false brake costs, in contacts at full speed; a study has one.
         best_of: How many of the best trials, beside the defaults, go to validation.
         tell: Called with a line per result.
 
@@ -120,7 +50,7 @@ def tune(
         raise ValueError("tune needs Optuna; pip install 'lgmd-gym[train]'") from None
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     search = optuna.create_study(
-        study_name=agent,
+        study_name=f"{agent} at {false_cost:g}",
         storage=f"sqlite:///{study}",
         sampler=optuna.samplers.TPESampler(seed=len(agent)),
         direction="maximize",
@@ -131,8 +61,8 @@ def tune(
 
     def objective(trial: Any) -> float:
         score = train.score(spelled(agent, _proposed(trial, rule)))
-        tell(f"trial {trial.number}: {_told(score)}")
-        return score.value
+        tell(f"trial {trial.number}: {_told(score, false_cost)}")
+        return score.value(false_cost)
 
     search.optimize(objective, n_trials=trials)
     done = [trial for trial in search.trials if trial.value is not None]
@@ -140,8 +70,8 @@ def tune(
     found = [defaults(rule), *(dict(trial.params) for trial in ranked)]
     scored = [(validation.score(spelled(agent, item)), item) for item in found]
     for score, item in scored:
-        tell(f"validation: {_told(score)}  {spelled(agent, item)}")
-    return max(scored, key=lambda pair: pair[0].value)[1]
+        tell(f"validation: {_told(score, false_cost)}  {spelled(agent, item)}")
+    return max(scored, key=lambda pair: pair[0].value(false_cost))[1]
 
 
 def sensitivity(agent: str, ground: Ground) -> list[tuple[str, float | int, Score]]:
@@ -186,34 +116,8 @@ def _proposed(trial: Any, rule: type[Rule]) -> dict[str, Any]:
     return proposed
 
 
-def _level(split: str, number: int) -> Case:
-    arguments = (("split", split), ("start_level", number), ("num_levels", 1))
-    return Case(f"{split}/RandomBraking/{number}", "RandomBraking", arguments)
-
-
-def _textured(agent: Any, seed: int) -> Eyesight:
-    """Return an agent's own eye with the texture that belongs to a seed."""
-    eye = Eyesight().of(agent)
-    rng = np.random.default_rng([7, seed])
-    look = {"seed": 10_000 + seed, "texture": round(float(rng.uniform(*TEXTURES)), 3)}
-    cameras = eye.camera if isinstance(eye.camera, list) else [eye.camera or DEFAULT_CAMERA]
-    worn = [{**({"name": item} if isinstance(item, str) else item), **look} for item in cameras]
-    return Eyesight(worn, eye.params, eye.condition, eye.include_frame)
-
-
-def _avoided_energy(row: dict[str, Any]) -> float:
-    """Return the share of the energy of the relative impact that braking took away."""
-    left = row["relative_impact_speed"] or 0.0
-    without = row["speed_reduction"] + left
-    return 1.0 - (left / without) ** 2 if without > 0.0 else 1.0
-
-
-def _mean(values: list[Any]) -> float:
-    return float(np.mean(values)) if values else 0.0
-
-
-def _told(score: Score) -> str:
+def _told(score: Score, false_cost: float) -> str:
     return (
-        f"{score.value:.3f} = {score.avoided_energy:.3f} energy avoided (n = {score.threats}) "
-        f"- {FALSE_COST:g} * {score.false_rate:.3f} false (n = {score.quiet})"
+        f"{score.value(false_cost):.3f} = {score.avoided_energy:.3f} energy avoided (n = {score.threats}) "
+        f"- {false_cost:g} * {score.false_rate:.3f} false (n = {score.quiet})"
     )

@@ -59,7 +59,8 @@ MAY = {
     "plots_paper": ("paper", "paper_claims", "plots", "stimuli"),
     "commands_paper": None,  # knows all
     "commands_tune": None,
-    "tuning": ("agents", "benchmark", "errors"),
+    "tuning": ("agents", "errors", "tuning_ground"),
+    "tuning_ground": ("agents", "benchmark"),
     "commands_bench": None,
     "plots_bench": ("benchmark", "plots"),
     "report": ("agents", "benchmark", "envs", "neuron", "plots_bench", ""),

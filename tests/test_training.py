@@ -268,6 +268,7 @@ def test_other_algorithms_train(tmp_path, algo):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
+        ("policy:zone-dnq", "nor shipped. 'zone-dnq'; did you mean 'zone-dqn'"),
         ("policy:nowhere.zip", "policy 'nowhere.zip' cannot be read: No such file"),
         ("policy:pyproject.toml", "is no policy of lgmd-gym train"),
         ("no-brake,ttc-oracle", "separate agents by spaces"),

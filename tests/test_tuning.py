@@ -2,7 +2,7 @@
 
 import pytest
 
-from lgmd_gym import tuning
+from lgmd_gym import tuning, tuning_ground
 from lgmd_gym.agents import make_agent
 
 
@@ -15,7 +15,7 @@ class Known:
     def score(self, agent):
         self.asked.append(agent)
         threshold = make_agent(agent).params.threshold
-        return tuning.Score(1.0 - abs(threshold - 100.0) / 300.0, 0.0, 10, 10)
+        return tuning_ground.Score(1.0 - abs(threshold - 100.0) / 300.0, 0.0, 10, 10)
 
 
 def test_a_study_finds_the_top_and_goes_on(tmp_path):
@@ -47,9 +47,33 @@ def test_only_rules_are_tuned():
         tuning.tunable("fova")
 
 
+@pytest.mark.parametrize("agent", ["spike-threshold:threshold=60", "frame-difference:level=2"])
+def test_a_recorded_drive_tells_what_the_closed_loop_does(agent):
+    ground, made = tuning_ground.Ground("train", 8, 0), make_agent(agent)
+    assert tuning_ground.latches(made)
+    open_loop = ground.score(agent)
+    rows = ground._closed_loop(agent, made)
+    assert open_loop == tuning_ground.Score.of(rows)
+    assert open_loop.threats
+    assert open_loop.quiet
+    found = [tuning_ground.onset(made, drive) for drive in ground._drives]
+    assert {index is None for index in found} == {True, False}  # it brakes in some and not in all
+    for key, row in zip(enumerate(found), rows, strict=True):
+        recorded = ground._outcomes[key]
+        assert all(
+            recorded[name] == row[name]
+            for name in ("collision", "relative_impact_speed", "ttc_at_brake", "duration", "episode_return")
+        )
+
+
+def test_what_eases_off_is_played_out():
+    assert not tuning_ground.latches(make_agent("graded"))
+    assert not tuning_ground.latches(make_agent("ttc-oracle"))
+
+
 @pytest.mark.slow
 def test_a_ground_scores_the_bounds():
-    ground = tuning.Ground("train", 12, 0)
+    ground = tuning_ground.Ground("train", 12, 0)
     never, always = ground.score("no-brake"), ground.score("always-brake")
     assert never.threats + never.quiet == 12
     assert (never.avoided_energy, never.false_rate) == (0.0, 0.0)

@@ -1,7 +1,6 @@
 """One training: environments, model, callbacks, and the policy file that comes out."""
 
 import json
-import shutil
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
@@ -23,6 +22,15 @@ RANDOM_ID = "LGMD/RandomBraking-v0"
 DEMANDS = (0.0, -0.4, -1.0)
 JUDGED = 10_000  # seed of the levels that a look at the validation split plays
 CAMERAS = ("fovea", "tele", "wide")
+# Of a saved model: where it logged, and the episodes it was in.
+TRAINING_ONLY = (
+    "tensorboard_log",
+    "ep_info_buffer",
+    "ep_success_buffer",
+    "_last_obs",
+    "_last_original_obs",
+    "_last_episode_starts",
+)
 
 
 @dataclass(frozen=True)
@@ -250,9 +258,13 @@ class Training:
         ]
 
     def _finish(self, wall_time: float) -> Path:
-        """Copy the best model to `policy.zip`, with its card."""
+        """Write the best model to `policy.zip`, with its card and without what only training needs."""
+        import stable_baselines3
+
         best = self.folder / "best" / "best_model.zip"
-        shutil.copyfile(best if best.exists() else self.folder / "last.zip", self.policy)
+        algorithm = getattr(stable_baselines3, self.order.algo.upper())
+        model = algorithm.load(best if best.exists() else self.folder / "last.zip", device="cpu")
+        model.save(self.policy, exclude=TRAINING_ONLY)
         write_card(self.policy, self._card(wall_time))
         return self.policy
 

@@ -60,10 +60,11 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
         latched = features.latches(self._demand(action))
         if latched:
             self.env.set_wrapper_attr("asleep", True)  # nothing depends on what is seen from here on
-        done = False
-        while not done and (latched or held < features.repeat):
+        while True:
             observation, reward, terminated, truncated, info = self.env.step(action)
-            total, held, done = total + float(reward), held + 1, terminated or truncated
+            total, held = total + float(reward), held + 1
+            if terminated or truncated or (held >= features.repeat and not latched):
+                break
         if latched:  # the end of what can be decided, whatever ended the episode
             terminated, truncated = True, False
         return self._memory.see(observation), features.reward_scale * total, terminated, truncated, info
