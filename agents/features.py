@@ -93,6 +93,9 @@ class Features:
         """Return lowest value, highest value, shape and dtype of each input, given the observation's shapes.
 
         Signals are (history · n,), oldest first; frames (height, width, channels · history).
+
+        Raises:
+            ValueError: If the eye is not the one that an input needs.
         """
         spaces = {}
         for name in self.inputs:
@@ -102,6 +105,8 @@ class Features:
                 shape = (height // self.shrink, width // self.shrink, channels * self.history)
                 spaces[name] = (0, 255, shape, np.uint8)
             else:
+                if name in ZONED:
+                    check_zones(name, shape)
                 size = AROUND if name in ZONED else shape[0]
                 spaces[name] = (-LIMIT, LIMIT, (self.history * size,), np.float32)
         return spaces
@@ -165,18 +170,23 @@ class Memory:
 
 
 def zoned(name: str, value: np.ndarray, speed: float) -> np.ndarray:
-    """Return an input that is sorted by own speed [m/s], shape (5,).
-
-    Raises:
-        ValueError: If the values are not those of the eye of `stopping-zone`.
-    """
-    if value.shape != (2 * len(SPEEDS_KMH),):
-        raise ValueError(
-            f"the policy input {name!r} needs the eye of stopping-zone with {2 * len(SPEEDS_KMH)} cameras, "
-            f"got {len(value)}; train with --eye stopping-zone"
-        )
+    """Return an input that is sorted by own speed [m/s], shape (5,)."""
+    check_zones(name, value.shape)
     ground, upright = np.split(value if name == "zones_ffi" else excitation(value), 2)
     return around_the_zone(ground, upright, speed)
+
+
+def check_zones(name: str, shape: tuple[int, ...]) -> None:
+    """Refuse values that are not those of the eye of `stopping-zone`.
+
+    Raises:
+        ValueError: Names the input and the mend.
+    """
+    if shape != (2 * len(SPEEDS_KMH),):
+        raise ValueError(
+            f"the policy input {name!r} needs the eye of stopping-zone with {2 * len(SPEEDS_KMH)} cameras, "
+            f"got {shape[0]}; train with --eye stopping-zone"
+        )
 
 
 def shrunk(frame: np.ndarray, side: int) -> np.ndarray:

@@ -77,13 +77,16 @@ def find_policy(text: str) -> Path:
     """Return the file of a policy: of a shipped one by its name, else the path that is given.
 
     Raises:
-        ValueError: For a bare name that none of the shipped ones has.
+        ValueError: For a training's folder, or a bare name that is neither shipped nor a file.
     """
     if text in shipped():
         return SHIPPED / f"{text}.zip"
-    if not Path(text).suffix:
-        raise unknown_name("policy (neither FILE.zip nor shipped)", text, shipped())
-    return Path(text)
+    path = Path(text)
+    if (path / "policy.zip").is_file():
+        raise ValueError(f"policy {text!r} is a folder; did you mean 'policy:{path / 'policy.zip'}'?")
+    if not path.suffix and not path.is_file():
+        raise unknown_name("policy (neither a file nor shipped)", text, shipped())
+    return path
 
 
 def read_card(path: Path) -> dict[str, Any]:

@@ -190,10 +190,10 @@ class Train:
     """sac, ppo or dqn."""
     env: str = "LGMD/RandomBraking-v0"
     """Environment id; RandomBraking is trained on its split train and judged on validation."""
-    camera: tuple[str, ...] = ("fovea", "tele", "wide")
-    """Camera presets, a neuron each."""
+    camera: tuple[str, ...] = ()
+    """Camera presets, a neuron each; default: fovea, tele and wide."""
     eye: str | None = None
-    """Agent whose own eye takes the cameras' place, such as stopping-zone."""
+    """Agent whose own eye is used instead, such as stopping-zone."""
     inputs: tuple[str, ...] = ()
     """Observations the policy sees: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed,
     speed_change, ego_yaw_rate; those are the default. Also frame and, with the eye of stopping-zone, zones,

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
 
 def train(options: "cli.Train") -> int:
     """Train, and say where the policy is."""
-    from lgmd_gym.training.trainer import Order, Training
+    from lgmd_gym.training.orders import Order
+    from lgmd_gym.training.trainer import Training
 
     _check_installed()
     if options.resume is not None:

@@ -13,8 +13,9 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.features import FADE, LIMIT, Features, Memory, shrunk
 from lgmd_gym.agents.policy import read_card
 from lgmd_gym.training import PolicyView
+from lgmd_gym.training.orders import DEMANDS, Order
 from lgmd_gym.training.settings import read_settings
-from lgmd_gym.training.trainer import DEMANDS, Order, Training, make_env
+from lgmd_gym.training.trainer import Training
 
 YAML = """
 LGMD/CCRs-v0:
@@ -155,17 +156,42 @@ def test_a_latched_brake_is_held_to_the_end():
     assert reward == pytest.approx(0.5 * total)
     assert ends == [True, False]  # nothing is left to decide
     assert not info["collision"]
-    before = view.get_wrapper_attr("frames")["fovea"].copy()
-    view.reset(seed=4)
-    assert (view.get_wrapper_attr("frames")["fovea"] != before).any()  # awake again
+
+
+def test_nothing_is_drawn_that_nobody_looks_at(monkeypatch):
+    from lgmd_gym.eye import Eyes
+
+    drawn, render = [], Eyes.render
+    monkeypatch.setattr(Eyes, "render", lambda *arguments: (drawn.append(1), render(*arguments)))
+    view = PolicyView(gym.make("LGMD/CCRs-v0"), inputs=["ego_speed"], latch=True)
+    for _ in range(2):
+        drawn.clear()
+        view.reset(seed=4)
+        view.step(np.array([0.0], np.float32))
+        assert len(drawn) == 1 + 3
+        view.step(np.array([-1.0], np.float32))  # to the end
+        assert len(drawn) == 1 + 3
 
 
 def test_a_policys_eye_is_an_agents_own_or_refused():
-    eye = Order(eye="stopping-zone").lenses()
-    assert [camera["name"] for camera in eye][:1] == ["ground10"]
-    assert Order(camera=("wide",)).lenses() == "wide"
+    plan = Order(eye="stopping-zone").plan()
+    assert [camera["name"] for camera in plan.camera][:1] == ["ground10"]
+    assert Order(camera=("wide",)).plan().camera == "wide"
+    assert Order().plan().camera == ["fovea", "tele", "wide"]
     with pytest.raises(ValueError, match="agent 'spike-threshold' has no eye of its own"):
-        Order(eye="spike-threshold").lenses()
+        Order(eye="spike-threshold").plan()
+
+
+def test_looks_are_told_in_the_environments_own_returns():
+    plan = Order("dqn", "LGMD/CCRs-v0", demands=(0.0, -1.0)).plan()
+    assert plan.features["reward_scale"] == 0.05
+    told = []
+    for split in ("train", "validation"):
+        env = plan.make_env(split)
+        env.reset(seed=1)
+        told.append(env.step(1)[1])
+    assert told[0] == pytest.approx(0.05 * told[1])
+    assert abs(told[1]) > 1.0
 
 
 def test_a_missing_frame_is_named_with_the_mend():
@@ -213,11 +239,14 @@ def order(tmp_path, **changes):
     return Order(**given | {"eval_episodes": 1} | changes)
 
 
-@pytest.mark.parametrize("demands", [(), DEMANDS])
-def test_a_trained_policy_acts_as_the_model_does(tmp_path, demands):
+@pytest.mark.parametrize(("demands", "latch"), [((), False), (DEMANDS, False), ((-1.0, 0.0), True)])
+def test_a_trained_policy_acts_as_the_model_does(tmp_path, demands, latch):
+    """With a latch, the first demand is full braking, which an untrained network chooses soon enough."""
     from stable_baselines3 import PPO
 
     wanted = order(tmp_path, demands=demands)
+    if latch:
+        wanted.hyperparams.write_text(YAML.replace("repeat: 4", "repeat: 4, latch: true"))
     path = Training.start(wanted, tmp_path / "run").run()
     assert path.stat().st_size < 1_000_000
     card = read_card(path)
@@ -225,17 +254,20 @@ def test_a_trained_policy_acts_as_the_model_does(tmp_path, demands):
     assert card["features"]["repeat"] == 4
     agent = make_agent(f"policy:{path}")
     model = PPO.load(path, device="cpu")
-    view = make_env(wanted, card["features"], "train")
+    view = wanted.plan().make_env("train")
     env = gym.make("LGMD/CCRs-v0", camera=agent.camera)
     (shown, _), (observation, info) = view.reset(seed=3), env.reset(seed=3)
     agent.reset(3)
     for _ in range(6):
         action, _ = model.predict(shown, deterministic=True)
-        shown, *_ = view.step(action)
-        for _ in range(4):
+        shown, _, over, *_ = view.step(action)
+        for _ in range(40 if over else 4):
             done = agent.act(observation, info)
             assert done == np.float32(demands[action] if demands else action)
             observation, *_, info = env.step(done)
+        if over:
+            break
+    assert over is latch
     with pytest.raises(ValueError, match="exists and is kept"):
         Training.start(wanted, tmp_path / "run")
 
@@ -243,13 +275,18 @@ def test_a_trained_policy_acts_as_the_model_does(tmp_path, demands):
 def test_a_training_goes_on_from_its_checkpoint(tmp_path):
     run = Training.start(order(tmp_path, steps=32), tmp_path / "run")
     run.run()
-    told = json.loads((tmp_path / "run" / "order.json").read_text())
-    (tmp_path / "run" / "order.json").write_text(json.dumps(told | {"steps": 96}))
+    told = json.loads((tmp_path / "run" / "plan.json").read_text())
+    (tmp_path / "run" / "plan.json").write_text(json.dumps(told | {"n_timesteps": 96}))
+    best = np.load(tmp_path / "run" / "best" / "evaluations.npz")["results"].mean()
+    (tmp_path / "hyper.yml").write_text("default: {n_envs: 7}")  # a training goes by its own plan
     again = Training.resume(tmp_path / "run")
     assert again._newest_checkpoint().name == "model_32_steps.zip"
     again.run()
     assert again._newest_checkpoint().name == "model_96_steps.zip"
-    assert read_card(again.policy)["steps"] == 96
+    assert read_card(again.policy)["plan"] == told | {"n_timesteps": 96}
+    looks = np.load(tmp_path / "run" / "best" / "evaluations.npz")
+    assert looks["timesteps"].tolist() == [32, 64, 96]  # the first look has not been forgotten
+    assert looks["results"][0].mean() == best
 
 
 @pytest.mark.slow
@@ -268,7 +305,7 @@ def test_other_algorithms_train(tmp_path, algo):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("policy:zone-dnq", "nor shipped. 'zone-dnq'; did you mean 'zone-dqn'"),
+        ("policy:zone-dnq", "neither a file nor shipped. 'zone-dnq'; did you mean 'zone-dqn'"),
         ("policy:nowhere.zip", "policy 'nowhere.zip' cannot be read: No such file"),
         ("policy:pyproject.toml", "is no policy of lgmd-gym train"),
         ("no-brake,ttc-oracle", "separate agents by spaces"),
@@ -287,6 +324,8 @@ def test_bad_policies_are_named(text, words):
         (["--camera", "fovae"], "did you mean 'fovea'?"),
         (["--hyperparams", "nowhere.yml"], "hyperparameters 'nowhere.yml' cannot be read"),
         (["--resume", "nowhere"], "holds no training to resume"),
+        (["--inputs", "zones"], "needs the eye of stopping-zone with 20 cameras, got 3; train with --eye"),
+        (["--eye", "stopping-zone", "--camera", "wide"], "give either camera or eye"),
     ],
 )
 def test_bad_training_is_one_line_and_exit_code_two(arguments, words, capsys, monkeypatch, tmp_path):

@@ -18,7 +18,7 @@ class Settings(NamedTuple):
         n_timesteps: Decisions of the policy, over all environments.
         features: Keyword arguments of `PolicyView`.
         policy: stable-baselines3's name of the network.
-        model: Everything else; keyword arguments of the algorithm.
+        model: Everything else; keyword arguments of the algorithm, see `arguments_of`.
     """
 
     n_envs: int
@@ -56,7 +56,7 @@ def read_settings(algo: str, env_id: str, file: Path | None = None) -> Settings:
     policy = str(entry.pop("policy", "MultiInputPolicy"))
     if entry.pop("normalize", False):
         raise ValueError("normalize is not taken: PolicyView scales observations by fixed numbers")
-    return Settings(n_envs, n_timesteps, features, policy, {key: _value(item) for key, item in entry.items()})
+    return Settings(n_envs, n_timesteps, features, policy, entry)
 
 
 def _read(path: Path) -> dict[str, Any]:
@@ -88,10 +88,13 @@ def _features(wrappers: Any) -> dict[str, Any]:
     return dict(arguments or {})
 
 
-def _value(item: Any) -> Any:
-    """Return a hyperparameter; rl-zoo writes a linear decay from x to 0 as "lin_x"."""
-    if isinstance(item, str) and item.startswith("lin_"):
-        from stable_baselines3.common.utils import LinearSchedule
+def arguments_of(model: dict[str, Any]) -> dict[str, Any]:
+    """Return an algorithm's keyword arguments from plain values: "lin_x" is a linear decay from x to 0."""
+    from stable_baselines3.common.utils import LinearSchedule
 
-        return LinearSchedule(float(item[4:]), 0.0, 1.0)
-    return item
+    return {
+        key: LinearSchedule(float(item[4:]), 0.0, 1.0)
+        if isinstance(item, str) and item.startswith("lin_")
+        else item
+        for key, item in model.items()
+    }

@@ -2,26 +2,21 @@
 
 import json
 import time
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
+import numpy as np
 
 import lgmd_gym
-from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.features import FRAME, Features
 from lgmd_gym.agents.policy import write_card
-from lgmd_gym.envs.units import check_within
+from lgmd_gym.errors import check_keys
 from lgmd_gym.folders import new_folder
-from lgmd_gym.training.settings import Settings, read_settings
-from lgmd_gym.training.view import PolicyView
+from lgmd_gym.training.orders import Order, Plan
+from lgmd_gym.training.settings import arguments_of
 
-RANDOM_ID = "LGMD/RandomBraking-v0"
-DEMANDS = (0.0, -0.4, -1.0)
+PLAN = "plan.json"
+SEEDS_APART = 1_000_000
 JUDGED = 10_000  # seed of the levels that a look at the validation split plays
-CAMERAS = ("fovea", "tele", "wide")
 # Of a saved model: where it logged, and the episodes it was in.
 TRAINING_ONLY = (
     "tensorboard_log",
@@ -33,115 +28,16 @@ TRAINING_ONLY = (
 )
 
 
-@dataclass(frozen=True)
-class Order:
-    """What is to be trained.
-
-    Attributes:
-        algo: "ppo", "sac" or "dqn".
-        env_id: The environment; those of a split are trained on "train" and judged on "validation".
-        camera: See `LGMDObservation`.
-        eye: Name of an agent whose own eye takes the camera's place, such as "stopping-zone".
-        steps: Decisions of the policy; None for what the hyperparameters say.
-        seed: Of the network and the environments.
-        hyperparams: YAML file in rl-zoo's format; None for the package's.
-        inputs: Observation keys the policy sees; empty for what the hyperparameters say.
-        demands: Demands the policy chooses among, in [-1, 1]; empty for any, which DQN cannot.
-        eval_every: Decisions between two looks at the validation split.
-        eval_episodes: Episodes of a look.
-        env_kwargs: Further arguments of `gym.make`.
-    """
-
-    algo: str = "sac"
-    env_id: str = RANDOM_ID
-    camera: Sequence[str] = CAMERAS
-    eye: str | None = None
-    steps: int | None = None
-    seed: int = 0
-    hyperparams: Path | None = None
-    inputs: Sequence[str] = ()
-    demands: Sequence[float] = DEMANDS
-    eval_every: int = 20_000
-    eval_episodes: int = 60
-    env_kwargs: dict[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if self.algo == "dqn" and not self.demands:
-            raise ValueError("dqn chooses among demands: give some, as --demands 0 -1")
-        if self.algo == "sac" and self.demands:
-            object.__setattr__(self, "demands", ())  # knows no choice
-        for demand in self.demands:
-            check_within("demands", demand, -1.0, 1.0)
-
-    def settings(self) -> Settings:
-        """Return the hyperparameters, with this order's own wishes laid over them."""
-        found = read_settings(self.algo, self.env_id, self.hyperparams)
-        features = found.features | ({"inputs": list(self.inputs)} if self.inputs else {})
-        return found._replace(features=features, n_timesteps=self.steps or found.n_timesteps)
-
-    def lenses(self) -> Any:
-        """Return what the policy looks through, as `LGMDObservation` takes it.
-
-        Raises:
-            ValueError: For an agent without an eye of its own.
-        """
-        if self.eye is None:
-            return list(self.camera) if len(self.camera) > 1 else self.camera[0]
-        camera = make_agent(self.eye).camera
-        if camera is None:
-            raise ValueError(f"agent {self.eye!r} has no eye of its own; use camera, or eye 'stopping-zone'")
-        return camera
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values."""
-        hyperparams = None if self.hyperparams is None else str(self.hyperparams)
-        return asdict(self) | {
-            "hyperparams": hyperparams,
-            "camera": list(self.camera),
-            "inputs": list(self.inputs),
-        }
-
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> "Order":
-        """Return the order that `to_dict` was called on."""
-        file = values["hyperparams"]
-        return cls(
-            **values
-            | {
-                "camera": tuple(values["camera"]),
-                "inputs": tuple(values["inputs"]),
-                "demands": tuple(values["demands"]),
-                "hyperparams": None if file is None else Path(file),
-            }
-        )
-
-
-def make_env(order: Order, features: dict[str, Any], split: str) -> gym.Env:
-    """Return one environment as the policy sees it."""
-    arguments = dict(order.env_kwargs)
-    if order.env_id == RANDOM_ID:
-        arguments.setdefault("split", split)
-    if order.demands:
-        levels = {"type": "DiscreteDemand", "levels": list(order.demands)}
-        arguments["config"] = {**(arguments.get("config") or {}), "action": levels}
-    if FRAME in Features.from_dict(features).inputs:
-        arguments["include_frame"] = True
-    if split != "train":
-        features = {**features, "reward_scale": 1.0}  # looks are told in the environment's own returns
-    return PolicyView(gym.make(order.env_id, camera=order.lenses(), **arguments), **features)
-
-
 class Training:
-    """One training into a folder, new or resumed.
+    """One training in a folder, new or resumed.
 
     Args:
-        order: What is trained.
+        plan: What is trained.
         folder: Where; made by `start`, read by `resume`.
     """
 
-    def __init__(self, order: Order, folder: Path) -> None:
-        self.order, self.folder = order, folder
-        self.settings = order.settings()
+    def __init__(self, plan: Plan, folder: Path) -> None:
+        self.plan, self.folder = plan, folder
 
     @classmethod
     def start(cls, order: Order, folder: Path) -> "Training":
@@ -151,24 +47,25 @@ class Training:
             ValueError: For anything in the order that cannot be, or a folder that exists or cannot be made;
                 before anything is trained.
         """
-        training = cls(order, folder)
-        make_env(order, training.settings.features, "train").close()
+        plan = order.plan()
+        plan.make_env("train").close()
         new_folder(folder, "training folder")
-        (folder / "order.json").write_text(json.dumps(order.to_dict(), indent=2) + "\n", encoding="utf-8")
-        return training
+        (folder / PLAN).write_text(json.dumps(plan.to_dict(), indent=2) + "\n", encoding="utf-8")
+        return cls(plan, folder)
 
     @classmethod
     def resume(cls, folder: Path) -> "Training":
-        """Go on with one that was broken off, from its last checkpoint.
+        """Go on with one that was broken off, from its last checkpoint and by its own plan.
 
         Raises:
             ValueError: If the folder holds no training.
         """
         try:
-            order = json.loads((folder / "order.json").read_text(encoding="utf-8"))
+            plan = json.loads((folder / PLAN).read_text(encoding="utf-8"))
         except (OSError, ValueError):
-            raise ValueError(f"{str(folder)!r} holds no training to resume (no order.json)") from None
-        return cls(Order.from_dict(order), folder)
+            raise ValueError(f"{str(folder)!r} holds no training to resume (no {PLAN})") from None
+        check_keys(f"key of {PLAN}", plan, Plan.__dataclass_fields__)
+        return cls(Plan(**plan), folder)
 
     @property
     def policy(self) -> Path:
@@ -179,16 +76,16 @@ class Training:
         """Train to the end and return the policy file: the model that did best on the validation split."""
         from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
-        features = self.settings.features
-        envs = VecMonitor(
-            DummyVecEnv([lambda: make_env(self.order, features, "train")] * self.settings.n_envs)
-        )
-        judges = VecMonitor(DummyVecEnv([lambda: make_env(self.order, features, "validation")]))
-        envs.seed(self.order.seed)
+        plan = self.plan
+        envs = VecMonitor(DummyVecEnv([lambda: plan.make_env("train")] * plan.n_envs))
+        judges = VecMonitor(DummyVecEnv([lambda: plan.make_env("validation")]))
         started = time.perf_counter()
         try:
             model = self._model(envs)
-            left = self.settings.n_timesteps - model.num_timesteps
+            # The constructor seeds environment i with seed + i: neighbouring trainings would drive the same
+            # levels in three of four environments.
+            envs.seed(SEEDS_APART * plan.seed + model.num_timesteps)
+            left = plan.n_timesteps - model.num_timesteps
             if left > 0:
                 model.learn(
                     left,
@@ -208,7 +105,7 @@ class Training:
         import torch
 
         torch.set_num_threads(1)
-        algorithm = getattr(stable_baselines3, self.order.algo.upper())
+        algorithm = getattr(stable_baselines3, self.plan.algo.upper())
         newest = self._newest_checkpoint()
         if newest is not None:
             model = algorithm.load(newest, envs, device="cpu")
@@ -219,12 +116,12 @@ class Training:
                 model.load_replay_buffer(buffer)
             return model
         return algorithm(
-            self.settings.policy,
+            self.plan.policy,
             envs,
-            seed=self.order.seed,
+            seed=self.plan.seed,
             device="cpu",
             tensorboard_log=str(self.folder / "tensorboard"),
-            **self.settings.model,
+            **arguments_of(self.plan.model),
         )
 
     def _newest_checkpoint(self) -> Path | None:
@@ -242,18 +139,20 @@ class Training:
                     self.eval_env.seed(JUDGED)
                 return super()._on_step()
 
-        every = max(self.order.eval_every // self.settings.n_envs, 1)
+        every = max(self.plan.eval_every // self.plan.n_envs, 1)
         return [
             CheckpointCallback(
-                every, str(self.folder / "checkpoints"), "model", save_replay_buffer=self.order.algo != "ppo"
+                every, str(self.folder / "checkpoints"), "model", save_replay_buffer=self.plan.algo != "ppo"
             ),
-            SameLevels(
-                judges,
-                eval_freq=every,
-                n_eval_episodes=self.order.eval_episodes,
-                best_model_save_path=str(self.folder / "best"),
-                log_path=str(self.folder / "best"),
-                verbose=0,
+            _carried_on(
+                SameLevels(
+                    judges,
+                    eval_freq=every,
+                    n_eval_episodes=self.plan.eval_episodes,
+                    best_model_save_path=str(self.folder / "best"),
+                    log_path=str(self.folder / "best"),
+                    verbose=0,
+                )
             ),
         ]
 
@@ -262,20 +161,32 @@ class Training:
         import stable_baselines3
 
         best = self.folder / "best" / "best_model.zip"
-        algorithm = getattr(stable_baselines3, self.order.algo.upper())
+        algorithm = getattr(stable_baselines3, self.plan.algo.upper())
         model = algorithm.load(best if best.exists() else self.folder / "last.zip", device="cpu")
         model.save(self.policy, exclude=TRAINING_ONLY)
         write_card(self.policy, self._card(wall_time))
         return self.policy
 
     def _card(self, wall_time: float) -> dict[str, Any]:
+        plan = self.plan
         return {
             "lgmd_gym": lgmd_gym.__version__,
-            "algo": self.order.algo,
-            "camera": self.order.lenses(),
-            "features": Features.from_dict(self.settings.features).to_dict(),
-            "levels": list(self.order.demands) or None,
-            "order": self.order.to_dict(),
-            "steps": self.settings.n_timesteps,
+            "algo": plan.algo,
+            "camera": plan.camera,
+            "features": plan.features,
+            "levels": plan.demands or None,
+            "plan": plan.to_dict(),
             "wall_time": round(wall_time, 1),
         }
+
+
+def _carried_on(looks: Any) -> Any:
+    """Have looks at the validation split go on from those of a training that was broken off."""
+    file = Path(looks.log_path).with_suffix(".npz")
+    if file.exists():
+        with np.load(file) as before:
+            looks.evaluations_timesteps = before["timesteps"].tolist()
+            looks.evaluations_results = before["results"].tolist()
+            looks.evaluations_length = before["ep_lengths"].tolist()
+            looks.best_mean_reward = float(before["results"].mean(axis=1).max())
+    return looks
