@@ -69,7 +69,9 @@ def judge(options: "cli.Judge") -> int:
     from lgmd_gym.benchmark.judge_tables import judge_table
 
     arms = judge_run(options.run, options.arms)
-    console_of().print(judge_table(arms, str(options.run)))
+    for condition in dict.fromkeys(arm.condition for arm in arms):
+        told = [arm for arm in arms if arm.condition == condition]
+        console_of().print(judge_table(told, f"{options.run.name}, {condition}"))
     return 0
 
 

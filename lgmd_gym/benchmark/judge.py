@@ -1,4 +1,9 @@
-"""Arms over the same episodes: several trainings of one kind of policy, or a rule, which is an arm of one."""
+"""Arms over the same episodes: several trainings of one kind of policy, or a rule, which is an arm of one.
+
+The mean return of an arm is the interquartile mean over its trainings; not over episodes, whose worst quarter
+is the contacts. Intervals come from a stratified bootstrap that draws trainings and, among threats and among
+quiet cases apart, whole cases: the same cases for all arms, so that their differences are paired.
+"""
 
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
@@ -9,54 +14,56 @@ import numpy as np
 
 from lgmd_gym.benchmark.bootstrap import DRAWS
 from lgmd_gym.benchmark.folder import read_rows, read_settings
-from lgmd_gym.benchmark.rows import key_of
 from lgmd_gym.benchmark.summary import automatic, wilson
 from lgmd_gym.benchmark.traffic_rows import SUITE as TRAFFIC
 from lgmd_gym.errors import unknown_name
 
 Row = dict[str, Any]
+RETURN = "episode_return"
+SHARES = ("avoided", "premature_brake", "false_brake")
+ENOUGH = 5  # trainings; a bootstrap over fewer says less than it seems to
 
 
-class Share(NamedTuple):
-    """A share of episodes, mean over an arm's trainings, with its Wilson interval.
+class Estimate(NamedTuple):
+    """A value with its 95 % interval.
 
-    The interval counts each episode once, however many trainings played it: they meet the same road.
+    Attributes:
+        value: The value.
+        low: Lower end; None for an arm of two to four trainings.
+        high: Upper end; None likewise.
+        n: Number of cases.
     """
 
     value: float
-    low: float
-    high: float
+    low: float | None
+    high: float | None
     n: int
 
 
 class Arm(NamedTuple):
-    """What an arm did.
+    """What an arm did under one condition.
 
     Attributes:
         name: The arm's.
-        trainings: Agents in it.
-        value: Interquartile mean, over the trainings, of the mean return.
-        low: Lower end of its 95 % interval.
-        high: Upper end.
+        condition: The camera's.
+        trainings: Agents in it. With one, intervals speak of the cases alone.
+        returned: Interquartile mean, over the trainings, of the mean return.
         spread: Lowest and highest mean return of a training.
-        avoided: Share of the threats; None without any.
-        premature: Share of the threats braked for too early; None without any.
-        false_brakes: Share of the quiet episodes; None without any.
+        less_first: Return less that of the first arm; None for the first itself.
+        shares: Of `SHARES`, means over the trainings; without those that no case has.
     """
 
     name: str
+    condition: str
     trainings: int
-    value: float
-    low: float
-    high: float
+    returned: Estimate
     spread: tuple[float, float]
-    avoided: Share | None
-    premature: Share | None
-    false_brakes: Share | None
+    less_first: Estimate | None
+    shares: dict[str, Estimate]
 
 
-def judge_run(path: Path, arms: Sequence[str]) -> list[Arm]:
-    """Judge the arms of a run.
+def judge_run(path: Path, arms: Sequence[str] = ()) -> list[Arm]:
+    """Judge the arms of a run, under each of its conditions.
 
     Args:
         path: Run folder.
@@ -64,46 +71,51 @@ def judge_run(path: Path, arms: Sequence[str]) -> list[Arm]:
             an agent's string alone; none for one arm per agent.
 
     Raises:
-        ValueError: For a folder without such a run, an arm that matches nobody, or episodes that one of its
-            agents has and another has not.
+        ValueError: For a folder without such a run, failed or missing episodes, or an arm of nobody.
     """
     rows, _ = read_rows(path)
     if read_settings(path)["suite"] == TRAFFIC:
         raise ValueError(f"{str(path)!r} is a traffic run, which has no returns")
-    rows = [row for row in automatic(rows) if row["error"] is None]
+    failed = sum(row["error"] is not None for row in rows)
+    if failed or not rows:
+        what = f"{failed} episodes failed" if failed else "no episode has been played"
+        raise ValueError(f"{what}; go on with lgmd-gym bench --resume {path}")
+    if any(row.get(RETURN) is None for row in rows):
+        raise ValueError("the run has no returns: an older version made it; play it again")
     agents = list(dict.fromkeys(row["agent"] for row in rows))
-    return [judge(name, members, rows) for name, members in _members(arms or agents, agents)]
+    members = _members(arms or agents, agents)
+    conditions = dict.fromkeys(row["condition"] for row in rows)
+    return [arm for name in conditions for arm in judge_rows(automatic(rows), members, name)]
 
 
-def judge(name: str, members: Sequence[str], rows: Sequence[Row]) -> Arm:
-    """Judge one arm on the rows of its members.
+def judge_rows(rows: Sequence[Row], members: Sequence[tuple[str, list[str]]], condition: str) -> list[Arm]:
+    """Judge arms on rows of one condition.
+
+    Args:
+        rows: Rows of all of them.
+        members: Each arm's name and agents.
+        condition: Which rows count.
 
     Raises:
-        ValueError: If one of them lacks an episode of another's.
+        ValueError: If an agent lacks an episode of another's.
     """
-    played = [{key_of(row)[1:]: row for row in rows if row["agent"] == agent} for agent in members]
-    keys = sorted(played[0])
-    for agent, own in zip(members, played, strict=True):
-        if sorted(own) != keys:
-            raise ValueError(f"agent {agent!r} has not played all that {members[0]!r} has; resume the run")
-    table = [[own[key] for key in keys] for own in played]
-    if any(row.get("episode_return") is None for row in table[0]):
-        raise ValueError("the run has no returns: an older version made it; play it again")
-    returns = np.array([[row["episode_return"] for row in line] for line in table])
-    threats = np.array([row["threat"] for row in table[0]], dtype=bool)
-    means = returns.mean(axis=1)
-    low, high = interval(returns, threats)
-    return Arm(
-        name,
-        len(members),
-        interquartile_mean(means),
-        low,
-        high,
-        (float(means.min()), float(means.max())),
-        _share(table, "avoided", threats),
-        _share(table, "premature_brake", threats),
-        _share(table, "false_brake", ~threats),
-    )
+    rows = [row for row in rows if row["condition"] == condition]
+    first_agent = members[0][1][0]
+    keys = sorted(_key(row) for row in rows if row["agent"] == first_agent)
+    for agent in dict.fromkeys(agent for _, agents in members for agent in agents):
+        if sorted(_key(row) for row in rows if row["agent"] == agent) != keys:
+            raise ValueError(f"agent {agent!r} has not played all that {first_agent!r} has; resume the run")
+    drawn = Draws(rows, first_agent)
+    found: list[Arm] = []
+    first: np.ndarray | None = None
+    for name, agents in members:
+        arm, returns = _judge(name, condition, agents, rows, drawn)
+        if first is not None:
+            arm = arm._replace(less_first=_difference(arm, returns, found[0], first))
+        else:
+            first = returns
+        found.append(arm)
+    return found
 
 
 def interquartile_mean(values: Any) -> Any:
@@ -118,49 +130,113 @@ def interquartile_mean(values: Any) -> Any:
     return ordered[..., cut : ordered.shape[-1] - cut].mean(axis=-1)
 
 
-def interval(returns: np.ndarray, strata: np.ndarray, draws: int = DRAWS) -> tuple[float, float]:
-    """Return the 95 % interval of the interquartile mean over trainings of the mean return.
-
-    A stratified bootstrap: each draw takes trainings, and within each stratum episodes, the same for all
-    trainings. The interquartile mean is taken over trainings and not over episodes, whose worst quarter is
-    the contacts.
+class Draws:
+    """Bootstrap samples of cases, the same for all arms.
 
     Args:
-        returns: Shape (trainings, episodes).
-        strata: Of each episode, shape (episodes,).
-        draws: Number of bootstrap samples.
+        rows: Rows of one condition.
+        agent: Whose rows say which cases are threats.
+        count: Number of samples.
     """
-    rng = np.random.default_rng(0)
-    trainings, episodes = returns.shape
-    means = np.zeros((draws, trainings))
-    for stratum in np.unique(strata):
-        part = returns[:, strata == stratum]
-        n = part.shape[1]
-        means += rng.multinomial(n, np.full(n, 1.0 / n), size=draws) @ part.T / episodes
-    drawn = np.take_along_axis(means, rng.integers(trainings, size=(draws, trainings)), axis=1)
-    low, high = np.percentile(interquartile_mean(drawn), (2.5, 97.5))
+
+    def __init__(self, rows: Sequence[Row], agent: str, count: int = DRAWS) -> None:
+        threat = {row["case"]: bool(row["threat"]) for row in rows if row["agent"] == agent}
+        self.cases = sorted(threat)
+        self.count = count
+        self._weights = np.zeros((count, len(self.cases)))
+        rng = np.random.default_rng(0)
+        for kind in (True, False):
+            chosen = np.array([threat[case] is kind for case in self.cases])
+            n = int(chosen.sum())
+            if n:
+                self._weights[:, chosen] = rng.multinomial(n, np.full(n, 1.0 / n), size=count)
+
+    def means(self, table: np.ndarray, seed: int) -> np.ndarray:
+        """Return means of sampled cases for sampled trainings, shape (samples, trainings).
+
+        Args:
+            table: A value per training and case, NaN where a case has none.
+            seed: Of the trainings' sampling.
+        """
+        has = np.isfinite(table[0])
+        weights = self._weights[:, has]
+        means = (weights @ table[:, has].T) / weights.sum(axis=1, keepdims=True)
+        picks = np.random.default_rng(seed).integers(len(table), size=means.shape)
+        return np.take_along_axis(means, picks, axis=1)
+
+
+def _judge(
+    name: str, condition: str, agents: list[str], rows: Sequence[Row], drawn: Draws
+) -> tuple[Arm, np.ndarray]:
+    """Return an arm and the samples of its return."""
+    told = {agent: [row for row in rows if row["agent"] == agent] for agent in agents}
+    table = _table(told, drawn.cases, RETURN)
+    means = table.mean(axis=1)
+    samples = interquartile_mean(drawn.means(table, seed=len(name)))
+    n = len(drawn.cases)
+    value = Estimate(float(interquartile_mean(means)), *_bounds(samples, len(agents)), n)
+    shares = {}
+    for key in SHARES:
+        table = _table(told, drawn.cases, key, threat=key != "false_brake")
+        if np.isfinite(table).any():
+            shares[key] = _share(table, drawn.means(table, seed=len(name)).mean(axis=1))
+    spread = (float(means.min()), float(means.max()))
+    return Arm(name, condition, len(agents), value, spread, None, shares), samples
+
+
+def _share(table: np.ndarray, samples: np.ndarray) -> Estimate:
+    """Return a share with the wider of its bootstrap and Wilson's interval, each case counted once.
+
+    A bootstrap of shares that are all 0 or all 1 has no width; Wilson's knows nothing of trainings.
+    """
+    n = int(np.isfinite(table[0]).sum())
+    value = float(np.nanmean(table))
+    low, high = _bounds(samples, len(table))
+    if low is None or high is None:
+        return Estimate(value, None, None, n)
+    least, most = wilson(value * n, n)
+    return Estimate(value, min(low, least), max(high, most), n)
+
+
+def _difference(arm: Arm, samples: np.ndarray, first: Arm, others: np.ndarray) -> Estimate:
+    fewest = min((arm.trainings, first.trainings), key=lambda count: (not 1 < count < ENOUGH, count))
+    change = arm.returned.value - first.returned.value
+    return Estimate(change, *_bounds(samples - others, fewest), arm.returned.n)
+
+
+def _bounds(samples: np.ndarray, trainings: int) -> tuple[float | None, float | None]:
+    if 1 < trainings < ENOUGH:
+        return None, None
+    low, high = np.percentile(samples, (2.5, 97.5))
     return float(low), float(high)
+
+
+def _table(told: dict[str, list[Row]], cases: list[str], key: str, threat: bool | None = None) -> np.ndarray:
+    """Return the mean of a key per agent and case, NaN for none; of threats or quiet episodes if asked."""
+    table = np.full((len(told), len(cases)), np.nan)
+    for line, rows in zip(table, told.values(), strict=True):
+        values: dict[str, list[float]] = {}
+        for row in rows:
+            if row[key] is not None and threat in (None, row["threat"]):
+                values.setdefault(row["case"], []).append(float(row[key]))
+        for case, found in values.items():
+            line[cases.index(case)] = np.mean(found)
+    return table
+
+
+def _key(row: Row) -> tuple[str, int]:
+    return row["case"], row["seed"]
 
 
 def _members(arms: Sequence[str], agents: list[str]) -> list[tuple[str, list[str]]]:
     """Return each arm's name and agents."""
     found = []
     for arm in arms:
+        name, _, pattern = arm.partition("=")
+        members = [agent for agent in agents if name and fnmatchcase(agent, pattern)]
         if arm in agents:
-            found.append((arm, [arm]))
-            continue
-        name, sign, pattern = arm.partition("=")
-        members = [agent for agent in agents if sign and fnmatchcase(agent, pattern)]
+            name, members = arm, [arm]
         if not members:
-            raise unknown_name("agent, or name=pattern of agents,", pattern or arm, agents)
+            raise unknown_name("arm (an agent of the run, or name=pattern)", arm, agents)
         found.append((name, members))
     return found
-
-
-def _share(table: list[list[Row]], key: str, wanted: np.ndarray) -> Share | None:
-    n = int(wanted.sum())
-    if n == 0:
-        return None
-    value = float(np.mean([[bool(row[key]) for row, is_in in zip(line, wanted, strict=True) if is_in]
-                           for line in table]))  # fmt: skip
-    return Share(value, *wilson(value * n, n), n)

@@ -5,31 +5,34 @@ from collections.abc import Sequence
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from lgmd_gym.benchmark.judge import Arm, Share
+from lgmd_gym.benchmark.judge import Arm, Estimate
 
 CAPTION = (
-    "return: interquartile mean over trainings [95 %, stratified bootstrap of trainings and episodes]; "
-    "shares: mean over trainings of n episodes [Wilson 95 % interval, each episode once]"
+    "return: interquartile mean over trainings; [95 %: trainings and cases drawn; of one training cases "
+    "alone, of two to four none]; less the first: paired by case; shares: mean over trainings"
 )
+SHARES = {"avoided": "avoided", "premature_brake": "premature", "false_brake": "false braking"}
 
 
 def judge_table(arms: Sequence[Arm], title: str) -> Table:
-    """Return one line per arm."""
-    table = Table(title=title, caption=CAPTION, box=SIMPLE_HEAD)
-    table.add_column("arm")
-    for heading in ("trainings", "return", "lowest, highest", "avoided", "premature", "false braking"):
+    """Return one line per arm; the arms are of one condition, and so of the same cases."""
+    shares = [key for key in SHARES if key in arms[0].shares]
+    table = Table("arm", title=title, caption=CAPTION, box=SIMPLE_HEAD)
+    for heading in ("trainings", "return", "lowest, highest", "less the first"):
         table.add_column(heading, justify="right")
+    for key in shares:
+        table.add_column(f"{SHARES[key]}\n% of {arms[0].shares[key].n}", justify="right", no_wrap=True)
     for arm in arms:
-        value = f"{arm.value:.2f} [{arm.low:.2f}, {arm.high:.2f}]"
         spread = f"{arm.spread[0]:.2f}, {arm.spread[1]:.2f}" if arm.trainings > 1 else "–"
-        shares = (_told(item) for item in (arm.avoided, arm.premature, arm.false_brakes))
-        cells = (arm.name, str(arm.trainings), value, spread, *shares)
+        less = "–" if arm.less_first is None else _told(arm.less_first, "+.2f")
+        told = (_told(arm.shares[key], ".0f", 100.0) for key in shares)
+        cells = (arm.name, str(arm.trainings), _told(arm.returned, ".2f"), spread, less, *told)
         table.add_row(*(cell.replace("[", "\\[") for cell in cells))
     return table
 
 
-def _told(share: Share | None) -> str:
-    if share is None:
-        return "–"
-    value, low, high, n = share
-    return f"{100 * value:.1f} % of {n} [{100 * low:.0f}–{100 * high:.0f}]"
+def _told(item: Estimate, style: str, factor: float = 1.0) -> str:
+    value = f"{factor * item.value:{style}}"
+    if item.low is None or item.high is None:
+        return value
+    return f"{value} [{factor * item.low:{style}}, {factor * item.high:{style}}]"
