@@ -8,25 +8,27 @@ from rich.table import Table
 from lgmd_gym.benchmark.judge import Arm, Estimate
 
 CAPTION = (
-    "return: interquartile mean over trainings; [95 %: trainings and cases drawn; of one training cases "
-    "alone, of two to four none]; less the first: paired by case; shares: mean over trainings"
+    "return: interquartile mean over trainings (worst to best); [95 %: trainings and cases drawn; of one "
+    "training cases alone, of two to four none]; less the first: paired by case; shares: mean over trainings"
 )
-SHARES = {"avoided": "avoided", "premature_brake": "premature", "false_brake": "false braking"}
+SHARES = {"avoided": "avoided", "premature_brake": "premature", "false_brake": "false"}
 
 
 def judge_table(arms: Sequence[Arm], title: str) -> Table:
     """Return one line per arm; the arms are of one condition, and so of the same cases."""
     shares = [key for key in SHARES if key in arms[0].shares]
     table = Table("arm", title=title, caption=CAPTION, box=SIMPLE_HEAD)
-    for heading in ("trainings", "return", "lowest, highest", "less the first"):
-        table.add_column(heading, justify="right")
+    for heading in ("train-\nings", "return", "less the\nfirst"):
+        table.add_column(heading, justify="right", no_wrap=True)
     for key in shares:
-        table.add_column(f"{SHARES[key]}\n% of {arms[0].shares[key].n}", justify="right", no_wrap=True)
+        table.add_column(f"{SHARES[key]},\n% of {arms[0].shares[key].n}", justify="right", no_wrap=True)
     for arm in arms:
-        spread = f"{arm.spread[0]:.2f}, {arm.spread[1]:.2f}" if arm.trainings > 1 else "–"
-        less = "–" if arm.less_first is None else _told(arm.less_first, "+.2f")
+        less = "–" if arm.less_first is None else _told(arm.less_first, "+.1f")
         told = (_told(arm.shares[key], ".0f", 100.0) for key in shares)
-        cells = (arm.name, str(arm.trainings), _told(arm.returned, ".2f"), spread, less, *told)
+        returned = _told(arm.returned, ".1f")
+        if arm.trainings > 1:
+            returned += f" ({arm.spread[0]:.1f} to {arm.spread[1]:.1f})"
+        cells = (arm.name, str(arm.trainings), returned, less, *told)
         table.add_row(*(cell.replace("[", "\\[") for cell in cells))
     return table
 
