@@ -93,7 +93,7 @@ class DangerZoneParams(RuleParams):
 
     level: float = above_zero(4.0, 2.0, 9.0)
     frames: int = count(3, 1, 12)
-    reaction: float = above_zero(0.4, 0.25, 0.6)
+    reaction: float = above_zero(0.4, 0.25, 0.6, places_eye=True)
     yaw_rate: float = above_zero(0.03, 0.01, 0.3)
     settle: int = count(15, 1, 60)
 

@@ -10,9 +10,18 @@ from lgmd_gym.agents.options import positive, whole
 from lgmd_gym.errors import check_keys
 
 
-def above_zero(default: float, low: float, high: float) -> Any:
-    """Return a field for a number > 0; `low` to `high` is what tuning searches."""
-    return field(default=default, metadata={"check": positive, "range": (low, high)})
+def above_zero(default: float, low: float, high: float, *, places_eye: bool = False) -> Any:
+    """Return a field for a number > 0; `low` to `high` is what tuning searches.
+
+    Args:
+        default: The default.
+        low: Lowest value that tuning tries.
+        high: Highest one.
+        places_eye: Whether the rule's cameras depend on it; tuning then leaves it alone, since all that was
+            seen would have to be seen anew.
+    """
+    metadata = {"check": positive, "range": (low, high), "places_eye": places_eye}
+    return field(default=default, metadata=metadata)
 
 
 def count(default: int, low: int, high: int) -> Any:

@@ -39,8 +39,8 @@ class StoppingZoneParams(RuleParams):
         crawl: Own speed below which it does not judge [m/s].
     """
 
-    deceleration: float = above_zero(9.0, 7.0, 10.0)
-    reaction: float = above_zero(0.4, 0.25, 0.6)
+    deceleration: float = above_zero(9.0, 7.0, 10.0, places_eye=True)
+    reaction: float = above_zero(0.4, 0.25, 0.6, places_eye=True)
     ground: float = above_zero(3.0, 2.0, 7.0)
     upright: float = above_zero(0.5, 0.2, 1.2)
     frames: int = count(2, 1, 8)

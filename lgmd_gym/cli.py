@@ -220,8 +220,9 @@ class Train:
 class Tune:
     """Tune a rule on training levels of LGMD/RandomBraking-v0 and false-reaction cases with other seeds.
 
-    Validation levels choose among the best trials; test levels and the protocol suites stay unseen. What a
-    rule's eye sees is recorded once, so that a trial takes seconds.
+    Validation levels choose among the best trials; test levels and the protocol suites stay unseen. What the
+    rule's eye sees is recorded once, so that a trial takes seconds; parameters that place cameras stay as
+    they are. A rule that does not latch (graded) is played out, which takes minutes a trial.
     """
 
     agent: str = "stopping-zone"
@@ -231,7 +232,7 @@ class Tune:
     levels: int = 100
     """Levels of either split, from 0 on; half of them are threats."""
     seeds: int = 1
-    """Seeds of the false-reaction suite, from 1000 on."""
+    """Seeds of the false-reaction suite, from 1000 on to search and from 2000 on to choose."""
     false_cost: float = 1.0
     """What a false brake costs, in contacts at full speed."""
     jobs: int = 2

@@ -1,8 +1,9 @@
 """Tuning of a rule's parameters on training levels, chosen on validation levels, kept in a study on disk.
 
-Optuna proposes parameters within the ranges that a rule's fields state. A trial plays numbered levels of
-`LGMD/RandomBraking-v0` and the false-reaction suite with seeds that reports never use, each with a texture of
-its own. The protocol suites and the test split are never touched.
+Optuna proposes parameters within the ranges that a rule's fields state; those that place its cameras stay as
+they are. A trial is scored on numbered levels of `LGMD/RandomBraking-v0` and on the false-reaction suite with
+seeds that reports never use, each with a texture of its own. The protocol suites and the test split are never
+touched.
 """
 
 from collections.abc import Callable
@@ -57,7 +58,9 @@ def tune(
         load_if_exists=True,
     )
     if not search.trials:
-        search.enqueue_trial(defaults(rule))
+        search.enqueue_trial(
+            {name: value for name, value in defaults(rule).items() if name in searched(rule)}
+        )
 
     def objective(trial: Any) -> float:
         score = train.score(spelled(agent, _proposed(trial, rule)))
@@ -97,6 +100,11 @@ def tunable(agent: str) -> type[Rule]:
     return rules[agent]
 
 
+def searched(rule: type[Rule]) -> list[str]:
+    """Return the names of the parameters that tuning searches: all but those that place the cameras."""
+    return [item.name for item in fields(rule.Params) if not item.metadata.get("places_eye")]
+
+
 def defaults(rule: type[Rule]) -> dict[str, Any]:
     """Return a rule's parameters at their defaults."""
     return {item.name: item.default for item in fields(rule.Params)}
@@ -110,6 +118,8 @@ def spelled(agent: str, options: dict[str, Any]) -> str:
 def _proposed(trial: Any, rule: type[Rule]) -> dict[str, Any]:
     proposed: dict[str, Any] = {}
     for item in fields(rule.Params):
+        if item.name not in searched(rule):
+            continue
         low, high = item.metadata["range"]
         whole = isinstance(item.default, int)
         proposed[item.name] = (trial.suggest_int if whole else trial.suggest_float)(item.name, low, high)

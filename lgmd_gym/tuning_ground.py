@@ -139,7 +139,8 @@ class Ground:
         drives = self._seen_by(made)
         onsets = [onset(made, drive) for drive in drives]
         new = [key for key in enumerate(onsets) if key not in self._outcomes]
-        rows = self._run(outcome, ((drives[index], found) for index, found in new))
+        told = ((*self.places[index], drives[index].truth, found) for index, found in new)
+        rows = self._run(outcome, told)
         self._outcomes.update(zip(new, rows, strict=True))
         return Score.of(self._outcomes[key] for key in enumerate(onsets))
 
@@ -152,9 +153,10 @@ class Ground:
         return self._drives
 
     def _closed_loop(self, agent: str, made: Any) -> list[Row]:
+        truths = self._run(blind_truth, self.places)
         tasks = (
-            (Task(agent, drive.case, drive.seed, textured(made, drive.seed), drive.truth),)
-            for drive in self._seen_by(made)
+            (Task(agent, case, seed, textured(made, seed), truth),)
+            for (case, seed), truth in zip(self.places, truths, strict=True)
         )
         rows = [result.row for result in self._run(run_task, tasks)]
         failed = next((row["error"] for row in rows if row["error"] is not None), None)
@@ -188,10 +190,14 @@ def onset(rule: Any, drive: Drive) -> int | None:
     return None
 
 
-def outcome(drive: Drive, found: int | None) -> Row:
+def outcome(case: Case, seed: int, truth: Counterfactual, found: int | None) -> Row:
     """Return the row of braking fully from a decision on."""
-    episode = _played(drive.case, drive.seed, BLIND, BrakeFrom(found))
-    return make_row("", drive.case, drive.seed, episode, drive.truth)
+    return make_row("", case, seed, _played(case, seed, BLIND, BrakeFrom(found)), truth)
+
+
+def blind_truth(case: Case, seed: int) -> Counterfactual:
+    """Return what driving without braking meets."""
+    return Counterfactual.of(_played(case, seed, BLIND, BrakeFrom(None)))
 
 
 def textured(agent: Any, seed: int) -> Eyesight:

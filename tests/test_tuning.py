@@ -47,9 +47,18 @@ def test_only_rules_are_tuned():
         tuning.tunable("fova")
 
 
-@pytest.mark.parametrize("agent", ["spike-threshold:threshold=60", "frame-difference:level=2"])
-def test_a_recorded_drive_tells_what_the_closed_loop_does(agent):
-    ground, made = tuning_ground.Ground("train", 8, 0), make_agent(agent)
+@pytest.mark.parametrize(
+    ("agent", "levels", "seeds"),
+    [
+        ("spike-threshold:threshold=60", 8, 0),
+        ("frame-difference:level=2", 8, 0),
+        pytest.param("stopping-zone", 20, 1, marks=pytest.mark.slow),
+    ],
+)
+def test_a_recorded_drive_tells_what_the_closed_loop_does(agent, levels, seeds):
+    ground, made = tuning_ground.Ground("train", levels, seeds), make_agent(agent)
+    ground.score("no-brake")
+    ground.score("spike-threshold")  # an eye before this one leaves nothing behind
     assert tuning_ground.latches(made)
     open_loop = ground.score(agent)
     rows = ground._closed_loop(agent, made)
@@ -69,6 +78,12 @@ def test_a_recorded_drive_tells_what_the_closed_loop_does(agent):
 def test_what_eases_off_is_played_out():
     assert not tuning_ground.latches(make_agent("graded"))
     assert not tuning_ground.latches(make_agent("ttc-oracle"))
+
+
+def test_what_places_the_cameras_is_not_searched():
+    assert {"deceleration", "reaction"}.isdisjoint(tuning.searched(tuning.tunable("stopping-zone")))
+    assert "ground" in tuning.searched(tuning.tunable("stopping-zone"))
+    assert tuning.searched(tuning.tunable("spike-threshold")) == ["threshold", "frames"]
 
 
 @pytest.mark.slow

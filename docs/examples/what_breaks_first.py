@@ -2,9 +2,10 @@
 
     python docs/examples/what_breaks_first.py stopping-zone 1
 
-The first table spoils the lens, the air and the target: how many of the cases of R152 and FMVSS 127 stay
-without contact, and in how many false-reaction cases it brakes. The second one sets dark, asphalt-grey and
-light targets by day, at night and in fog on three textures of the asphalt: contacts avoided of R152's cases.
+The first table spoils the lens, the air and the target: how many of the cases of R152 and FMVSS 127 are
+avoided (no contact, and not braked prematurely), and in how many false-reaction cases it brakes. The second one
+sets dark, asphalt-grey and light targets by day, at night and in fog on three textures of the asphalt, and counts
+what is avoided of R152's cases.
 Rates carry Wilson's 95 % interval. The argument after the agent is the number of seeds.
 """
 
@@ -55,6 +56,7 @@ SPOILT: dict[str, tuple[Spoil, dict[str, Any]]] = {
     "dark box (30)": (laid_over(vehicles="box"), {"shade": 30}),
     "light box (220)": (laid_over(vehicles="box"), {"shade": 220}),
 }
+BLIND = Eyesight({"name": "wide", "shape": [8, 8]})  # who never brakes need not look
 SHADES = {"dark (30)": 30, "asphalt (104)": 104, "light (220)": 220}
 AIR = {"day": "clear", "night": "night", "fog": "fog"}
 TEXTURES = (0.5, 1.0, 1.6)  # contrast of the asphalt, times the natural one
@@ -68,7 +70,7 @@ def play(agent: str, cases: Sequence[Case], seeds: int, spoil: Spoil, jobs: int)
     worn = Eyesight([spoil(lens) for lens in named], eye.params, eye.condition, eye.include_frame)
 
     def both(case: Case, seed: int) -> Row:
-        truth = run_task(Task(NO_BRAKE, case, seed, Eyesight())).truth
+        truth = run_task(Task(NO_BRAKE, case, seed, BLIND)).truth
         return run_task(Task(agent, case, seed, worn, truth)).row
 
     rows: Any = Parallel(n_jobs=jobs)(delayed(both)(case, seed) for case in cases for seed in range(seeds))
