@@ -2,10 +2,10 @@
 
     python docs/examples/what_breaks_first.py stopping-zone 1
 
-The first table spoils the lens, the air and the target: how many of the cases of R152 and FMVSS 127 are
-avoided (no contact, and not braked prematurely), and in how many false-reaction cases it brakes. The second one
-sets dark, asphalt-grey and light targets by day, at night and in fog on three textures of the asphalt, and counts
-what is avoided of R152's cases.
+The first table spoils the lens, the air and the target. It tells how many of the cases of R152 and FMVSS 127
+are avoided (no contact, and not braked prematurely), and in how many false-reaction cases the agent brakes.
+The second one sets dark, asphalt-grey and light targets by day, at night and in fog on three textures of the
+asphalt, and tells how many of R152's cases are avoided.
 Rates carry Wilson's 95 % interval. The argument after the agent is the number of seeds.
 """
 
