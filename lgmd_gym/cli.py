@@ -41,7 +41,7 @@ class Bench:
     traffic: --suite traffic --seeds 110."""
     agents: tuple[str, ...] | None = None
     """Agents with options, as in spike-threshold:threshold=45,frames=2, or your own as MODULE:CLASS. Default:
-    no-brake always-brake random-brake spike-threshold ttc-oracle."""
+    no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""
     seeds: int | None = None
     """Seeds per case, from 0 on; a seed draws the place on the road and the target's grey. Default: 3."""
     conditions: tuple[str, ...] | None = None

@@ -15,11 +15,7 @@ if TYPE_CHECKING:
     from lgmd_gym.benchmark.runner import Run
     from lgmd_gym.benchmark.traffic import TrafficRun
 
-SUITE, AGENTS, SEEDS = (
-    "quick",
-    ("no-brake", "always-brake", "random-brake", "spike-threshold", "ttc-oracle"),
-    3,
-)
+SUITE, SEEDS = "quick", 3
 
 
 def bench(options: "cli.Bench") -> int:
@@ -96,6 +92,7 @@ def _resumed(options: "cli.Bench", console: Console) -> "Run | TrafficRun":
 
 def _new(options: "cli.Bench", console: Console) -> "Run | TrafficRun":
     from lgmd_gym.benchmark.config import RunConfig
+    from lgmd_gym.benchmark.runner import DEFAULT_AGENTS
     from lgmd_gym.benchmark.runs import repeat_run
 
     cluster = _cluster(options)
@@ -109,7 +106,7 @@ def _new(options: "cli.Bench", console: Console) -> "Run | TrafficRun":
     }
     given = {name: value for name, value in given.items() if value is not None}
     if options.config is None:
-        config = RunConfig(**({"suite": SUITE, "agents": AGENTS, "seeds": SEEDS} | given))
+        config = RunConfig(**({"suite": SUITE, "agents": DEFAULT_AGENTS, "seeds": SEEDS} | given))
     else:
         if given:
             names = ", ".join(f"--{name}" for name in given)

@@ -20,7 +20,14 @@ from lgmd_gym.benchmark.rows import key_of
 from lgmd_gym.benchmark.session import Session
 from lgmd_gym.benchmark.tasks import NO_BRAKE, Result, Task, run_task
 
-DEFAULT_AGENTS = (NO_BRAKE, "always-brake", "random-brake", "spike-threshold", "ttc-oracle")
+DEFAULT_AGENTS = (
+    NO_BRAKE,
+    "always-brake",
+    "random-brake",
+    "spike-threshold",
+    "stopping-zone",
+    "ttc-oracle",
+)
 TRACED_SEED = 0  # whose time series are kept of every agent, for the plots
 
 
