@@ -1,6 +1,8 @@
 """What policies see, how they are trained, and that a trained one acts as it was trained to."""
 
 import json
+import re
+import zipfile
 
 import gymnasium as gym
 import numpy as np
@@ -11,7 +13,7 @@ import lgmd_gym  # noqa: F401
 from lgmd_gym import cli
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.features import FADE, LIMIT, Features, Memory, shrunk
-from lgmd_gym.agents.policy import read_card
+from lgmd_gym.agents.policy import find_policy, read_card
 from lgmd_gym.training import PolicyView
 from lgmd_gym.training.orders import DEMANDS, Order
 from lgmd_gym.training.settings import read_settings
@@ -314,6 +316,32 @@ def test_other_algorithms_train(tmp_path, algo):
 def test_bad_policies_are_named(text, words):
     with pytest.raises(ValueError, match=words):
         make_agent(text)
+
+
+def test_the_shipped_policy_is_small_sound_and_tells_nothing_of_its_maker():
+    file = find_policy("zone-dqn")
+    assert file.stat().st_size < 1_000_000
+    with zipfile.ZipFile(file) as parts:
+        assert not any(re.search(rb"/(tmp|home|root|work)/", parts.read(name)) for name in parts.namelist())
+    plan = read_card(file)["plan"]
+    assert plan["camera"] == make_agent("stopping-zone").camera  # the rule's eye, as it is now
+    assert plan["model"] == read_settings("dqn", plan["env_id"]).model  # as its training is described
+
+
+@pytest.mark.parametrize("family", ["CCRs", "EmptyRoad"])
+def test_the_shipped_policy_brakes_for_a_car_and_not_for_a_road(family):
+    agent = make_agent("policy:zone-dqn")
+    env = gym.make(f"LGMD/{family}-v0", ego_speed=11.0, camera=agent.camera)
+    observation, info = env.reset(seed=1)
+    agent.reset(1)
+    braked = done = False
+    while not done:
+        action = agent.act(observation, info)
+        braked = braked or bool(action[0] < 0)
+        observation, _, terminated, truncated, info = env.step(action)
+        done = terminated or truncated
+    assert braked is (family == "CCRs")
+    assert not info["collision"]
 
 
 @pytest.mark.parametrize(

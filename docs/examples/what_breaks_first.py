@@ -50,7 +50,7 @@ SPOILT: dict[str, tuple[Spoil, dict[str, Any]]] = {
     "heave 5 mm rms": (laid_over(heave_m=0.005), {}),
     "brake dive 0.1° per m/s²": (laid_over(dive_deg=0.1), {}),
     "exposure 11 ms": (laid_over(shutter_s=0.011), {}),
-    "robust: all of these": (laid_over(condition="robust"), {}),
+    "robust: 0.1° rms and the last four": (laid_over(condition="robust"), {}),
     "target as grey as asphalt": (laid_over(), {"shade": 104}),
     "the same, a box without shadow": (laid_over(vehicles="box"), {"shade": 104}),
     "dark box (30)": (laid_over(vehicles="box"), {"shade": 30}),
