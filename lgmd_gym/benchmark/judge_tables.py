@@ -8,8 +8,8 @@ from rich.table import Table
 from lgmd_gym.benchmark.judge import Arm, Estimate
 
 CAPTION = (
-    "return: interquartile mean over trainings (worst to best); [95 %: trainings and cases drawn; of one "
-    "training cases alone, of two to four none]; less the first: paired by case; shares: mean over trainings"
+    "return: interquartile mean over trainings (below: worst to best); [95 %: trainings and cases drawn; of "
+    "one training cases alone, of two to four none]; less the first: paired by case; shares: means"
 )
 SHARES = {"avoided": "avoided", "premature_brake": "premature", "false_brake": "false"}
 
@@ -17,7 +17,8 @@ SHARES = {"avoided": "avoided", "premature_brake": "premature", "false_brake": "
 def judge_table(arms: Sequence[Arm], title: str) -> Table:
     """Return one line per arm; the arms are of one condition, and so of the same cases."""
     shares = [key for key in SHARES if key in arms[0].shares]
-    table = Table("arm", title=title, caption=CAPTION, box=SIMPLE_HEAD)
+    table = Table(title=title, caption=CAPTION, box=SIMPLE_HEAD)
+    table.add_column("arm", min_width=15, overflow="fold")
     for heading in ("train-\nings", "return", "less the\nfirst"):
         table.add_column(heading, justify="right", no_wrap=True)
     for key in shares:
@@ -27,7 +28,7 @@ def judge_table(arms: Sequence[Arm], title: str) -> Table:
         told = (_told(arm.shares[key], ".0f", 100.0) for key in shares)
         returned = _told(arm.returned, ".1f")
         if arm.trainings > 1:
-            returned += f" ({arm.spread[0]:.1f} to {arm.spread[1]:.1f})"
+            returned += f"\n{arm.spread[0]:.1f} to {arm.spread[1]:.1f}"
         cells = (arm.name, str(arm.trainings), returned, less, *told)
         table.add_row(*(cell.replace("[", "\\[") for cell in cells))
     return table
