@@ -68,6 +68,16 @@ def test_other_zones_do_not_brake_but_nearer_ones_at_higher_levels():
         agent = make_agent("stopping-zone")
         sight = zone_sight(ground={zone: 5.0}, upright={zone: upright})
         assert brakes(agent, *[sight] * 10) == expected
+        agent.reset(0)
+        assert not brakes(agent, *[sight] * 3)  # a nearer zone needs four frames
+
+
+@pytest.mark.parametrize(("zone_kmh", "expected"), [(10, False), (30, False), (40, True), (70, True)])
+def test_at_speed_zones_for_less_than_half_of_it_do_not_count(zone_kmh, expected):
+    """At 80 km/h the roadside is enough to excite upright fields made for 10 to 30."""
+    zone = SPEEDS_KMH.index(zone_kmh)
+    sight = zone_sight(speed=79.9 / 3.6, ground={zone: 9.0}, upright={zone: 9.0})
+    assert brakes(make_agent("stopping-zone"), *[sight] * 10) == expected
 
 
 def test_it_does_not_judge_while_turning_nor_crawling():
