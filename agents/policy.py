@@ -51,6 +51,11 @@ class Policy(Agent):
         """Whether it was trained on frames."""
         return FRAME in self._memory.features.inputs
 
+    @property
+    def alert(self) -> bool:
+        """Whether it brakes: that some neuron of many is excited is no warning of the policy's."""
+        return self._demand < 0.0
+
     def reset(self, seed: int | None = None) -> None:
         """Forget the last episode."""
         super().reset(seed)

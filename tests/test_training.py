@@ -266,6 +266,7 @@ def test_the_shipped_policy_brakes_for_a_car_and_not_for_a_road(family):
     while not done:
         action = agent.act(observation, info)
         braked = braked or bool(action[0] < 0)
+        assert agent.alert is bool(action[0] < 0)  # whatever the neurons of its twenty cameras alert
         observation, _, terminated, truncated, info = env.step(action)
         done = terminated or truncated
     assert braked is (family == "CCRs")
