@@ -1,10 +1,11 @@
 """Ground truth about the ego and what is ahead of it."""
 
 from collections.abc import Sequence
-from math import cos, hypot, sin
+from math import cos, sin
 from typing import Any, NamedTuple
 
-from lgmd_gym.envs.contact import Rectangle, first_touch
+from lgmd_gym.envs.contact import first_touch
+from lgmd_gym.envs.sweep import gap_on_path, time_on_paths
 from lgmd_gym.envs.undefined import UNDEFINED
 from lgmd_gym.envs.vehicles import EgoCar
 
@@ -37,29 +38,20 @@ def ahead(ego: EgoCar, obstacles: Sequence[Any]) -> Ahead | None:
             if touch is not None and (found is None or touch * GAP_HORIZON < found.gap):
                 found = Ahead(touch * GAP_HORIZON, other)
         return found
-    gaps = ((_gap_on_path(ego, other.rectangle), other) for other in obstacles)
-    return min((Ahead(gap, other) for gap, other in gaps if gap is not None), key=_by_gap, default=None)
+    gaps = ((_gap_on_path(ego, other), other) for other in obstacles)
+    return min((Ahead(gap, other) for gap, other in gaps if gap == gap), key=_by_gap, default=None)
 
 
 def _by_gap(front: Ahead) -> float:
     return front.gap
 
 
-def _gap_on_path(ego: EgoCar, outline: Rectangle) -> float | None:
-    """Return how far the ego can go along a bent path before it touches an outline [m]."""
-    gone = 0.0
-    while gone < GAP_HORIZON:
-        here = _outline(ego, gone)
-        free = _distance(here, outline)
-        if free > GAP_STEP:  # nothing can be touched before that way is gone
-            gone += free
-            continue
-        there = _outline(ego, gone + GAP_STEP)
-        touch = first_touch(here, outline, there.x - here.x, there.y - here.y)
-        if touch is not None:
-            return gone + touch * GAP_STEP
-        gone += GAP_STEP
-    return None
+def _gap_on_path(ego: EgoCar, other: Any) -> float:
+    """Return how far the ego can go along a bent path before it touches a standing outline [m], or NaN."""
+    outline = other.rectangle
+    sizes = (float(ego.LENGTH), float(ego.WIDTH), float(outline.length), float(outline.width))
+    place = (outline.x, outline.y, outline.heading)
+    return gap_on_path((ego.path.table, ego.along), place, sizes, GAP_HORIZON, GAP_STEP)
 
 
 def time_to_contact(ego: EgoCar, obstacles: Sequence[Any]) -> float:
@@ -81,33 +73,11 @@ def time_to_contact(ego: EgoCar, obstacles: Sequence[Any]) -> float:
 
 def _time_on_paths(ego: EgoCar, other: Any) -> float | None:
     """Return the time to contact of two on their paths, at least one of them bent [s]."""
-    fastest = ego.speed + other.speed
-    time = 0.0
-    while time < TTC_HORIZON and fastest > 0.0:
-        here, outline = _outline(ego, ego.speed * time), _outline(other, other.speed * time)
-        free = _distance(here, outline) / fastest
-        if free > TTC_STEP:  # even head-on they cannot touch before that time is over
-            time += free
-            continue
-        later = time + TTC_STEP
-        there, moved = _outline(ego, ego.speed * later), _outline(other, other.speed * later)
-        dx, dy = (there.x - here.x) - (moved.x - outline.x), (there.y - here.y) - (moved.y - outline.y)
-        touch = first_touch(here, outline, dx, dy)
-        if touch is not None:
-            return time + touch * TTC_STEP
-        time = later
-    return None
-
-
-def _outline(item: Any, further: float) -> Rectangle:
-    """Return the outline `further` metres on."""
-    x, y, heading = item.path.pose(item.along + further)
-    return Rectangle(x, y, heading, item.LENGTH, item.WIDTH)
-
-
-def _distance(one: Rectangle, other: Rectangle) -> float:
-    """Return the distance of the circles around two outlines, negative if they overlap [m]."""
-    return hypot(other.x - one.x, other.y - one.y) - one.reach - other.reach
+    places = (ego.path.table, ego.along), (other.path.table, other.along)
+    sizes = (float(ego.LENGTH), float(ego.WIDTH), float(other.LENGTH), float(other.WIDTH))
+    speeds = (float(ego.speed), float(other.speed))
+    time = time_on_paths(*places, speeds, sizes, TTC_HORIZON, TTC_STEP)
+    return None if time != time else time
 
 
 def headway(ego: EgoCar, front: Ahead | None) -> float:

@@ -2,14 +2,17 @@
 
 from bisect import bisect_right
 from dataclasses import dataclass
+from functools import cached_property
 from math import cos, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from lgmd_gym.envs.units import check_finite, check_within
 
 # Nodes and weights of three-point Gauss-Legendre quadrature on [0, 1]; over cells this short it integrates
 # the direction of travel to about 1e-12 m.
-_NODES = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 8 / 18), (0.5 + 0.15**0.5, 5 / 18))
+GAUSS = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 8 / 18), (0.5 + 0.15**0.5, 5 / 18))
 _CELL = 0.5  # [m]
 
 
@@ -58,12 +61,25 @@ class Path:
     Args:
         start: Where distance 0 is.
         bends: In the order they are driven.
+
+    Attributes:
+        stations: Distances at which cells begin, rising [m].
+        cells: x, y, heading, curvature and its slope at each.
     """
 
     def __init__(self, start: Pose, bends: tuple[Bend, ...] = ()) -> None:
         self.start = start
         self.bends = bends
-        self._stations, self._cells = _integrate(start, bends)
+        self.stations, self.cells = _integrate(start, bends)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Path":
+        """A path never changes, so that copies of an environment share it."""
+        return self
+
+    @cached_property
+    def table(self) -> np.ndarray:
+        """Stations and cells for the kernels of `sweep`, shape (cells, 6)."""
+        return np.column_stack([np.array(self.stations), np.array(self.cells)])
 
     @property
     def straight(self) -> bool:
@@ -72,19 +88,19 @@ class Path:
 
     def pose(self, distance: float) -> Pose:
         """Return the place `distance` metres along the path; negative is before its start."""
-        index = bisect_right(self._stations, distance) - 1
+        index = bisect_right(self.stations, distance) - 1
         if index < 0:
-            x, y, heading, _, _ = self._cells[0]
+            x, y, heading, _, _ = self.cells[0]
             return Pose(x + distance * cos(heading), y + distance * sin(heading), heading)
-        x, y, heading, curvature, slope = self._cells[index]
-        return _advance(x, y, heading, curvature, slope, distance - self._stations[index])
+        x, y, heading, curvature, slope = self.cells[index]
+        return _advance(x, y, heading, curvature, slope, distance - self.stations[index])
 
 
 def _advance(x: float, y: float, heading: float, curvature: float, slope: float, way: float) -> Pose:
     """Return the pose `way` metres on, curvature in highway-env's sense (+ to the right)."""
     if curvature == 0.0 and slope == 0.0:
         return Pose(x + way * cos(heading), y + way * sin(heading), heading)
-    for node, weight in _NODES:
+    for node, weight in GAUSS:
         part = node * way
         angle = heading + part * (curvature + part * slope / 2)
         x += weight * way * cos(angle)
