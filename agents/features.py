@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.agents.options import positive, whole
-from lgmd_gym.agents.stopping_zone import SPEEDS_KMH, around_the_zone, excitation
+from lgmd_gym.agents.zone_memory import TOLD, ZONED, ZoneMemory, check_zones
 from lgmd_gym.errors import check_keys, unknown_name
 
 # Where each observation is brought near [-1, 1] from: (value - offset) / scale.
@@ -18,19 +18,12 @@ SCALES = {
     "ego_speed": (0.0, 20.0),  # [m/s]
     "ego_yaw_rate": (0.0, 0.5),  # [rad/s]
 }
-# What is made of observations over decisions: its sources, how it is scaled.
+# What is made of one observation over time: which one, and how it is scaled.
 DERIVED = {
-    "speed_change": (("ego_speed",), 1.0),  # since the last decision [m/s]; full braking takes 0.9 in 0.1 s
-    "spike_peak": (("spike_frequency",), 100.0),  # fades by FADE a decision: silence is not clearance
+    "speed_change": ("ego_speed", 1.0),  # since the last decision [m/s]; full braking takes 0.9 in 0.1 s
+    "spike_peak": ("spike_frequency", 100.0),  # fades by FADE a frame: silence is not clearance
 }
-# What the eye of `stopping-zone` tells, sorted by own speed; see `around_the_zone`.
-ZONED = {
-    "zones": (("membrane_potential", "ego_speed"), 3.0),  # excitation k/(n σ3)
-    "zones_peak": (("membrane_potential", "ego_speed"), 3.0),  # the same, fading as spike_peak does
-    "zones_ffi": (("ffi", "ego_speed"), 20.0),  # the mean change of light in its place [grey levels]
-}
-AROUND = 5  # values that `around_the_zone` gives
-FADE = 0.93
+FADE = 0.955  # half is left after half a second
 HARD = -0.5  # a demand of this or less is hard braking, which may latch
 LIMIT = 5.0  # beyond this, scaled values are clipped
 FRAME = "frame"  # passed on as it is; `shrink` pixels become one
@@ -42,9 +35,9 @@ class Features:
     """What a policy sees.
 
     Attributes:
-        inputs: Observation keys, or what is derived from them over decisions: `speed_change` and
-            `spike_peak`, the highest spike frequency lately; with the eye of `stopping-zone` also `zones`,
-            `zones_peak` and `zones_ffi`, its fields sorted by own speed.
+        inputs: Observation keys, or what is derived from them over time: `speed_change` and `spike_peak`, the
+            highest spike frequency lately; with the eye of `stopping-zone` also `zones`, `zones_spikes` and
+            `zones_ffi`, its fields sorted by own speed (`ZoneMemory`).
         history: Number of decisions remembered, the present one included, >= 1.
         repeat: Environment decisions that one decision of the policy holds for, >= 1; at 30 Hz, 3 let it
             decide at 10 Hz.
@@ -99,7 +92,7 @@ class Features:
         """
         spaces = {}
         for name in self.inputs:
-            shape = shapes[sources_of(name)[0]]
+            shape = shapes[source_of(name)]
             if name == FRAME:
                 height, width, channels = shape
                 shape = (height // self.shrink, width // self.shrink, channels * self.history)
@@ -107,18 +100,18 @@ class Features:
             else:
                 if name in ZONED:
                     check_zones(name, shape)
-                size = AROUND if name in ZONED else shape[0]
+                size = TOLD if name in ZONED else shape[0]
                 spaces[name] = (-LIMIT, LIMIT, (self.history * size,), np.float32)
         return spaces
 
 
-def sources_of(name: str) -> tuple[str, ...]:
-    """Return the observations that an input is made of."""
-    return (DERIVED | ZONED)[name][0] if name in DERIVED or name in ZONED else (name,)
+def source_of(name: str) -> str:
+    """Return the observation that an input is made of."""
+    return (DERIVED | ZONED)[name][0] if name in DERIVED or name in ZONED else name
 
 
 class Memory:
-    """The last decisions' inputs.
+    """What a policy is shown: it takes in every observation, and tells at the policy's own pace.
 
     Args:
         features: What is kept.
@@ -126,67 +119,59 @@ class Memory:
 
     def __init__(self, features: Features) -> None:
         self.features = features
-        self._kept: dict[str, deque[np.ndarray]] = {}
+        self._needed = {source_of(name) for name in features.inputs}
+        if any(name in ZONED for name in features.inputs):
+            self._needed |= {"ego_speed", "ego_yaw_rate"}
+        self._needed.discard(FRAME)  # only the one at the decision counts
         self.clear()
 
     def clear(self) -> None:
-        """Forget everything; the next observation then fills the whole history."""
-        self._kept = {}
+        """Forget everything; the next thing told then fills the whole history."""
+        self._kept: dict[str, deque[np.ndarray]] = {}
+        self._observation: dict[str, Any] = {}
         self._speed: np.ndarray | None = None
-        self._peaks: dict[str, np.ndarray] = {}
+        self._peak: np.ndarray | None = None
+        self._zones = {name: ZoneMemory(name, FADE) for name in self.features.inputs if name in ZONED}
 
-    def see(self, observation: dict[str, Any]) -> dict[str, np.ndarray]:
-        """Take in an observation of `LGMDObservation` and return what the policy is shown.
+    def see(self, observation: dict[str, Any]) -> None:
+        """Take in an observation of `LGMDObservation`; to be called at every decision of the environment.
 
         Raises:
             ValueError: If the observation lacks an input, or the eye is not the one it needs.
         """
+        for name in self._needed:
+            if name not in observation:
+                raise ValueError(f"the policy needs the observation {name!r}, which this eye does not give")
+        self._observation = observation
+        if "spike_peak" in self.features.inputs:
+            now = np.asarray(observation["spike_frequency"])
+            self._peak = now if self._peak is None else np.maximum(now, FADE * self._peak)
+        for zones in self._zones.values():
+            speed, yaw_rate = (float(observation[name][0]) for name in ("ego_speed", "ego_yaw_rate"))
+            zones.see(observation[zones.source], speed, yaw_rate)
+
+    def tell(self) -> dict[str, np.ndarray]:
+        """Return what the policy is shown; to be called at each of its decisions, after `see`."""
         shown = {}
         for name in self.features.inputs:
-            for source in sources_of(name):
-                if source not in observation:
-                    raise ValueError(
-                        f"the policy needs the observation {source!r}, which this eye does not give"
-                    )
-            value = self._prepared(name, observation)
+            value = self._prepared(name)
             kept = self._kept.setdefault(name, deque([value] * self.features.history, self.features.history))
             kept.append(value)
             shown[name] = np.concatenate(kept, axis=-1)
         return shown
 
-    def _prepared(self, name: str, observation: dict[str, Any]) -> np.ndarray:
-        value = np.asarray(observation[sources_of(name)[0]])
+    def _prepared(self, name: str) -> np.ndarray:
+        if name in ZONED:
+            return self._zones[name].told().astype(np.float32)
+        value = np.asarray(self._observation[source_of(name)])
         if name == FRAME:
             return shrunk(value, self.features.shrink)
-        if name in ZONED:
-            value = zoned(name, value, float(observation["ego_speed"][0]))
         if name == "speed_change":
             value, self._speed = value - (value if self._speed is None else self._speed), value
-        elif name.endswith("_peak"):
-            before = self._peaks.get(name)
-            self._peaks[name] = value = value if before is None else np.maximum(value, FADE * before)
-        offset, scale = SCALES.get(name) or (0.0, (DERIVED | ZONED)[name][1])
+        elif name == "spike_peak":
+            value = np.asarray(self._peak)
+        offset, scale = SCALES.get(name) or (0.0, DERIVED[name][1])
         return np.clip((value - offset) / scale, -LIMIT, LIMIT).astype(np.float32)
-
-
-def zoned(name: str, value: np.ndarray, speed: float) -> np.ndarray:
-    """Return an input that is sorted by own speed [m/s], shape (5,)."""
-    check_zones(name, value.shape)
-    ground, upright = np.split(value if name == "zones_ffi" else excitation(value), 2)
-    return around_the_zone(ground, upright, speed)
-
-
-def check_zones(name: str, shape: tuple[int, ...]) -> None:
-    """Refuse values that are not those of the eye of `stopping-zone`.
-
-    Raises:
-        ValueError: Names the input and the mend.
-    """
-    if shape != (2 * len(SPEEDS_KMH),):
-        raise ValueError(
-            f"the policy input {name!r} needs the eye of stopping-zone with {2 * len(SPEEDS_KMH)} cameras, "
-            f"got {shape[0]}; train with --eye stopping-zone"
-        )
 
 
 def shrunk(frame: np.ndarray, side: int) -> np.ndarray:

@@ -76,7 +76,7 @@ class Fovea(Rule):
         distance = stopping_distance(max(sight.speed, 0.0), 9.0, p.reaction) + LENS_SETBACK
         wanted = 2 * degrees(atan(p.half_width / distance))
         field = min(int(np.searchsorted(NESTED_DEG, wanted)), len(NESTED_DEG) - 1)
-        return self._gate.open(sight) and stood[field]
+        return self._gate.open(sight.yaw_rate) and stood[field]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,4 +126,4 @@ class DangerZone(Rule):
         """Return whether something has entered the zone of the present speed."""
         told = excitation(sight.membrane_potential)
         entered = [s.add(level >= self.params.level) for s, level in zip(self._streaks, told, strict=True)]
-        return self._gate.open(sight) and entered[zone_of(sight.speed)]
+        return self._gate.open(sight.yaw_rate) and entered[zone_of(sight.speed)]

@@ -60,7 +60,7 @@ class ImageRule(Rule):
 
     def judge(self, sight: Sight) -> bool:
         """Return whether the measure has stood at the level long enough."""
-        return self._streak.add(self._gate.open(sight) and self._value >= self.params.level)
+        return self._streak.add(self._gate.open(sight.yaw_rate) and self._value >= self.params.level)
 
     def measure(self, before: np.ndarray, now: np.ndarray) -> float:
         """Return the measure of two frames, uint8 (height, width)."""

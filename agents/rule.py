@@ -108,8 +108,8 @@ class SteeringGate:
         self.yaw_rate, self.frames = yaw_rate, frames
         self._left = 0
 
-    def open(self, sight: Sight) -> bool:
-        """Return whether the image can be trusted at this frame."""
-        turning = abs(sight.yaw_rate) > self.yaw_rate
+    def open(self, yaw_rate: float) -> bool:
+        """Return whether the image can be trusted at this frame, given own yaw rate [rad/s]."""
+        turning = abs(yaw_rate) > self.yaw_rate
         self._left = self.frames if turning else max(self._left - 1, 0)
         return self._left == 0

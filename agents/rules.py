@@ -191,5 +191,5 @@ class SpeedGated(Rule):
     def judge(self, sight: Sight) -> bool:
         """Return whether the frequency has stood at the present speed's level."""
         p = self.params
-        level = p.threshold + p.per_speed * max(sight.speed, 0.0) if self._gate.open(sight) else inf
+        level = p.threshold + p.per_speed * max(sight.speed, 0.0) if self._gate.open(sight.yaw_rate) else inf
         return self._streak.add(float(np.max(sight.spike_frequency)) >= level)

@@ -105,7 +105,7 @@ class StoppingZone(Rule):
         self._since_upright = np.where(upright >= p.upright, 0, self._since_upright + 1)
         both = on_ground & (upright >= p.near_upright)
         near = [streak.add(held) for streak, held in zip(self._near, both, strict=True)]
-        can_judge = self._gate.open(sight) and sight.speed > p.crawl
+        can_judge = self._gate.open(sight.yaw_rate) and sight.speed > p.crawl
         here = zone_of(sight.speed)
         nearest = zone_of(p.near_share * sight.speed)
         in_zone = entered[here] and bool(self._since_upright[here] < p.memory)
@@ -129,18 +129,6 @@ def zone_of(speed: float) -> int:
 def stopping_distance(speed: Any, deceleration: float, reaction: float) -> Any:
     """Return speed²/(2 · deceleration) + speed · reaction [m]."""
     return speed**2 / (2 * deceleration) + speed * reaction
-
-
-def around_the_zone(ground: np.ndarray, upright: np.ndarray, speed: float) -> np.ndarray:
-    """Return what the fields that matter at a speed [m/s] tell, from one value per ground and upright field.
-
-    Five values: ground and upright field of the zone of that speed, the same of the next one farther, and the
-    strongest pair of all nearer zones, as the weaker of its two (0 if there is none).
-    """
-    here = zone_of(speed)
-    ahead = min(here + 1, len(SPEEDS_KMH) - 1)
-    near = np.minimum(ground[:here], upright[:here]).max(initial=0.0)
-    return np.array([ground[here], upright[here], ground[ahead], upright[ahead], near])
 
 
 def excitation(potential: Any) -> np.ndarray:

@@ -187,7 +187,7 @@ class Train:
     """
 
     algo: str = "sac"
-    """sac, ppo or dqn."""
+    """sac, ppo or dqn; or recorded, which learns when to brake from recorded drives, in minutes."""
     env: str = "LGMD/RandomBraking-v0"
     """Environment id; RandomBraking is trained on its split train and judged on validation."""
     camera: tuple[str, ...] = ()
@@ -197,19 +197,24 @@ class Train:
     inputs: tuple[str, ...] = ()
     """Observations the policy sees: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed,
     speed_change, ego_yaw_rate; those are the default. Also frame and, with the eye of stopping-zone, zones,
-    zones_peak, zones_ffi."""
-    demands: tuple[float, ...] = (0.0, -0.4, -1.0)
-    """Demands the policy chooses among, from -1 (full braking) to 1; empty for any. SAC takes no choice."""
+    zones_spikes, zones_ffi."""
+    demands: tuple[float, ...] | None = None
+    """Demands the policy chooses among, from -1 (full braking) to 1; empty for any. SAC takes no choice.
+    Default: 0 -0.4 -1, of recorded 0 -1."""
     steps: int | None = None
-    """Decisions of the policy; default: what the hyperparameters say."""
+    """Decisions of the policy, of recorded drives; default: what the hyperparameters say."""
     seed: int = 0
     """Of the network and the levels drawn."""
     hyperparams: Path | None = None
     """YAML file in the format of rl-zoo; default: the package's own."""
     eval_every: int = 20_000
-    """Decisions between two looks at the validation split."""
-    eval_episodes: int = 60
-    """Episodes of a look."""
+    """Decisions between two looks at the validation split; recorded looks after every pass."""
+    eval_episodes: int | None = None
+    """Episodes of a look; default: 60, of recorded 600."""
+    drives: Path | None = None
+    """Training folder of a recorded one with the same eye, whose drives are learnt from."""
+    jobs: int = 2
+    """Processes that record drives."""
     out: Path | None = None
     """Training folder; must not exist. Default: runs/train-ALGO-DATE-TIME."""
     resume: Path | None = None

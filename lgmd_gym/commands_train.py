@@ -30,11 +30,12 @@ def train(options: "cli.Train") -> int:
             demands=options.demands,
             eval_every=options.eval_every,
             eval_episodes=options.eval_episodes,
+            drives=options.drives,
         )
         out = options.out or Path("runs") / f"train-{options.algo}-{time.strftime('%Y%m%d-%H%M%S')}"
         training = Training.start(order, out)
     try:
-        policy = training.run(progress=sys.stderr.isatty())
+        policy = training.run(progress=sys.stderr.isatty(), jobs=options.jobs)
     except KeyboardInterrupt:
         print(f"interrupted; go on with: lgmd-gym train --resume {training.folder}", file=sys.stderr)
         return 130

@@ -4,61 +4,121 @@ import numpy as np
 import pytest
 
 from lgmd_gym.agents.features import FADE, LIMIT, Features, Memory, shrunk
+from lgmd_gym.agents.stopping_zone import SPEEDS_KMH
+from lgmd_gym.agents.zone_memory import ZONED
 
 
 def observed(value):
     return {"spike_frequency": np.array([value], np.float32), "ego_speed": np.array([10.0], np.float32)}
 
 
+def seen(memory, *observations):
+    """See some observations, then tell once."""
+    for observation in observations:
+        memory.see(observation)
+    return memory.tell()
+
+
 def test_memory_scales_and_remembers():
     memory = Memory(Features(inputs=("spike_frequency", "ego_speed"), history=3))
-    first = memory.see(observed(50.0))
+    first = seen(memory, observed(50.0))
     assert first["spike_frequency"].tolist() == [0.5, 0.5, 0.5]
     assert first["ego_speed"].tolist() == [0.5, 0.5, 0.5]
-    memory.see(observed(100.0))
-    assert memory.see(observed(9e9))["spike_frequency"].tolist() == [0.5, 1.0, LIMIT]
+    seen(memory, observed(100.0))
+    assert seen(memory, observed(9e9))["spike_frequency"].tolist() == [0.5, 1.0, LIMIT]
     memory.clear()
-    assert memory.see(observed(0.0))["spike_frequency"].tolist() == [0.0, 0.0, 0.0]
+    assert seen(memory, observed(0.0))["spike_frequency"].tolist() == [0.0, 0.0, 0.0]
 
 
 def test_memory_derives_braking_and_fading_peaks():
+    """Peaks fade with every observation, speed changes from one telling to the next."""
     memory = Memory(Features(inputs=("spike_peak", "speed_change"), history=1))
-    told = []
-    for frequency, speed in ((0, 10.0), (200, 9.5), (0, 8.6)):
-        given = {"spike_frequency": np.array([frequency], np.float32), "ego_speed": np.array([speed])}
-        told.append(memory.see(given))
-    assert [float(item["spike_peak"][0]) for item in told] == pytest.approx([0.0, 2.0, 2.0 * FADE])
+
+    def given(frequency, speed):
+        return {"spike_frequency": np.array([frequency], np.float32), "ego_speed": np.array([speed])}
+
+    told = [
+        seen(memory, given(0, 10.0)),
+        seen(memory, given(200, 9.7), given(0, 9.5)),
+        seen(memory, given(0, 9.0), given(0, 8.6)),
+    ]
+    assert [float(item["spike_peak"][0]) for item in told] == pytest.approx([0.0, 2 * FADE, 2 * FADE**3])
     assert [float(item["speed_change"][0]) for item in told] == pytest.approx([0.0, -0.5, -0.9])
 
 
-def zone_eye(ground, upright, speed):
-    """An observation of the eye of `stopping-zone`, from excitations of the 10 ground and upright fields."""
-    k = np.concatenate([ground, upright])
+def zone_eye(fields, speed=10.0, yaw_rate=0.0):
+    """An observation of the eye of `stopping-zone`: excitations as {(speed of the zone [km/h], pair): k}."""
+    k = np.zeros(20)
+    for (zone, pair), value in fields.items():
+        k[SPEEDS_KMH.index(zone) + 10 * ("ground", "upright").index(pair)] = value
     return {
-        "membrane_potential": (1 / (1 + np.exp(-k))).astype(np.float64),
-        "ffi": np.arange(20.0),
+        "membrane_potential": 1 / (1 + np.exp(-k)),
+        "spike_frequency": 10.0 * k,
+        "ffi": k,
         "ego_speed": np.array([speed], np.float32),
+        "ego_yaw_rate": np.array([yaw_rate], np.float32),
     }
 
 
-def test_zones_are_sorted_by_own_speed_and_their_peaks_fade():
-    ground, upright = np.zeros(10), np.zeros(10)
-    ground[4], upright[4] = 3.0, 1.5  # the zone of 40 km/h
-    ground[5], upright[2] = 6.0, 9.0  # the next one; a nearer one, of which the weaker field counts: none
-    ground[1], upright[1] = 0.9, 1.2
-    memory = Memory(Features(inputs=("zones", "zones_peak", "zones_ffi"), history=1))
-    shown = memory.see(zone_eye(ground, upright, 10.0))
-    assert shown["zones"] == pytest.approx([1.0, 0.5, 2.0, 0.0, 0.3], abs=1e-5)
-    assert shown["zones_ffi"] == pytest.approx([0.2, 0.7, 0.25, 0.75, 0.15])
-    shown = memory.see(zone_eye(np.zeros(10), np.zeros(10), 10.0))
-    assert shown["zones"] == pytest.approx([0.0] * 5, abs=1e-5)
-    assert shown["zones_peak"] == pytest.approx([FADE, FADE * 0.5, FADE * 2, 0.0, FADE * 0.3], abs=1e-5)
-    fastest = Memory(Features(inputs=("zones",), history=1)).see(zone_eye(ground, upright, 40.0))
-    assert fastest["zones"][0] == fastest["zones"][2] == 0.0  # no zone is farther than the last
+SEEN = {
+    (40, "ground"): 3.0,  # the zone of 10 m/s
+    (40, "upright"): 1.5,
+    (50, "ground"): 6.0,  # the next one farther
+    (30, "upright"): 9.0,  # a nearer one whose ground field is silent
+    (25, "ground"): 0.9,  # a nearer one: the weaker of the two counts
+    (25, "upright"): 1.2,
+    (10, "ground"): 9.0,  # made for less than half of 10 m/s: does not count
+    (10, "upright"): 9.0,
+}
+
+
+def zones_of(memory, *observations, name="zones"):
+    """What stood in two frames (the fifth value once more in four), and the peaks, before tanh."""
+    scale = ZONED[name][1]
+    told = scale * np.arctanh(seen(memory, *observations)[name].astype(np.float64))
+    return told[:6].round(2).tolist(), told[6:].round(2).tolist()
+
+
+@pytest.mark.parametrize("name", ZONED)
+def test_zones_are_sorted_by_own_speed(name):
+    memory = Memory(Features(inputs=(name,), history=1))
+    factor = 10.0 if name == "zones_spikes" else 1.0
+    around = np.array([3.0, 1.5, 6.0, 0.0, 0.9]) * factor
+    held, peak = zones_of(memory, zone_eye(SEEN), name=name)
+    assert held == pytest.approx([*around, around[-1]], abs=0.01)  # nothing is known before the first frame
+    assert peak == pytest.approx(around.tolist(), abs=0.01)
+    fastest = Memory(Features(inputs=(name,), history=1))
+    held, _ = zones_of(fastest, zone_eye({(90, "ground"): 3.0}, speed=40.0), name=name)
+    assert held[:4] == pytest.approx([3.0 * factor, 0.0, 3.0 * factor, 0.0], abs=0.01)  # none is farther
+
+
+def test_zones_tell_what_stood_and_what_was():
+    memory = Memory(Features(inputs=("zones",), history=1))
+    quiet, here = zone_eye({}), zone_eye({(40, "ground"): 3.0})
+    near = zone_eye({(30, "ground"): 2.0, (30, "upright"): 4.0})
+    assert zones_of(memory, quiet) == ([0.0] * 6, [0.0] * 5)
+    held, peak = zones_of(memory, here, quiet, quiet)  # one frame is no sight, but leaves a peak
+    assert held == [0.0] * 6
+    assert peak[0] == pytest.approx(3.0 * FADE**2, abs=0.01)
+    held, _ = zones_of(memory, here, here, quiet)  # two frames are, also if they are over
+    assert held == pytest.approx([3.0, 0, 0, 0, 0, 0], abs=0.01)
+    assert zones_of(memory, quiet)[0] == [0.0] * 6  # told once
+    assert zones_of(memory, near, near, near)[0] == pytest.approx([0, 0, 0, 0, 2.0, 0], abs=0.01)
+    assert zones_of(memory, near)[0] == pytest.approx([0, 0, 0, 0, 2.0, 2.0], abs=0.01)
+
+
+def test_zones_are_silent_while_the_car_turns_and_forget():
+    memory = Memory(Features(inputs=("zones",), history=1))
+    there = {(40, "ground"): 3.0}
+    assert zones_of(memory, zone_eye(there, yaw_rate=0.02))[1][0] == pytest.approx(3.0, abs=0.01)
+    silent = ([0.0] * 6, [0.0] * 5)
+    assert zones_of(memory, zone_eye(there, yaw_rate=-0.04)) == silent
+    assert zones_of(memory, *[zone_eye(there)] * 14) == silent  # half a second
+    assert zones_of(memory, *[zone_eye(there)] * 2)[0][0] == pytest.approx(3.0, abs=0.01)
 
 
 def test_zones_need_their_eye():
-    given = observed(1.0) | {"membrane_potential": np.array([0.5, 0.6])}
+    given = observed(1.0) | {"membrane_potential": np.array([0.5, 0.6]), "ego_yaw_rate": np.zeros(1)}
     with pytest.raises(ValueError, match="needs the eye of stopping-zone with 20 cameras, got 2; train with"):
         Memory(Features(inputs=("zones",))).see(given)
 

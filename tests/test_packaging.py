@@ -204,7 +204,7 @@ def test_wheel_from_the_sdist_holds_everything_and_nothing_generic(tmp_path):
         if inside.parts[0] == "lgmd_gym":
             assert inside.as_posix() in names
     assert "lgmd_gym/py.typed" in names
-    assert "lgmd_gym/agents/policies/zone-dqn.zip" in names
+    assert "lgmd_gym/agents/policies/zones.zip" in names
     zipfile.ZipFile(tmp_path / wheel).extractall(tmp_path / "site")
     code = "import gymnasium, lgmd_gym.envs as e; gymnasium.make('LGMD/CCRs-v0').reset(); print(e.__file__)"
     env = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}

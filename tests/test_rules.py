@@ -92,7 +92,7 @@ def test_it_does_not_judge_while_turning_nor_crawling():
 def test_steering_gate_opens_after_its_frames():
     gate = SteeringGate(0.03, 2)
     yaw_rates = (0.0, 0.05, 0.0, 0.0, 0.0)
-    assert [gate.open(zone_sight(yaw_rate=rate)) for rate in yaw_rates] == [True, False, False, True, True]
+    assert [gate.open(rate) for rate in yaw_rates] == [True, False, False, True, True]
 
 
 def test_zones_end_where_the_car_stops():

@@ -14,6 +14,7 @@ from lgmd_gym import cli
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policy import find_policy, read_card
 from lgmd_gym.training import PolicyView
+from lgmd_gym.training.online import newest_checkpoint
 from lgmd_gym.training.orders import DEMANDS, Order
 from lgmd_gym.training.settings import read_settings
 from lgmd_gym.training.trainer import Training
@@ -210,9 +211,9 @@ def test_a_training_goes_on_from_its_checkpoint(tmp_path):
     best = np.load(tmp_path / "run" / "best" / "evaluations.npz")["results"].mean()
     (tmp_path / "hyper.yml").write_text("default: {n_envs: 7}")  # a training goes by its own plan
     again = Training.resume(tmp_path / "run")
-    assert again._newest_checkpoint().name == "model_32_steps.zip"
+    assert newest_checkpoint(tmp_path / "run").name == "model_32_steps.zip"
     again.run()
-    assert again._newest_checkpoint().name == "model_96_steps.zip"
+    assert newest_checkpoint(tmp_path / "run").name == "model_96_steps.zip"
     assert read_card(again.policy)["plan"] == told | {"n_timesteps": 96}
     looks = np.load(tmp_path / "run" / "best" / "evaluations.npz")
     assert looks["timesteps"].tolist() == [32, 64, 96]  # the first look has not been forgotten
@@ -235,7 +236,7 @@ def test_other_algorithms_train(tmp_path, algo):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("policy:zone-dnq", "neither a file nor shipped. 'zone-dnq'; did you mean 'zone-dqn'"),
+        ("policy:zone", "neither a file nor shipped. 'zone'; did you mean 'zones'"),
         ("policy:nowhere.zip", "policy 'nowhere.zip' cannot be read: No such file"),
         ("policy:pyproject.toml", "is no policy of lgmd-gym train"),
         ("no-brake,ttc-oracle", "separate agents by spaces"),
@@ -247,18 +248,18 @@ def test_bad_policies_are_named(text, words):
 
 
 def test_the_shipped_policy_is_small_sound_and_tells_nothing_of_its_maker():
-    file = find_policy("zone-dqn")
+    file = find_policy("zones")
     assert file.stat().st_size < 1_000_000
     with zipfile.ZipFile(file) as parts:
         assert not any(re.search(rb"/(tmp|home|root|work)/", parts.read(name)) for name in parts.namelist())
     plan = read_card(file)["plan"]
     assert plan["camera"] == make_agent("stopping-zone").camera  # the rule's eye, as it is now
-    assert plan["model"] == read_settings("dqn", plan["env_id"]).model  # as its training is described
+    assert plan["model"] == read_settings("recorded", plan["env_id"]).model  # as its training is described
 
 
 @pytest.mark.parametrize("family", ["CCRs", "EmptyRoad"])
 def test_the_shipped_policy_brakes_for_a_car_and_not_for_a_road(family):
-    agent = make_agent("policy:zone-dqn")
+    agent = make_agent("policy:zones")
     env = gym.make(f"LGMD/{family}-v0", ego_speed=11.0, camera=agent.camera)
     observation, info = env.reset(seed=1)
     agent.reset(1)

@@ -7,15 +7,18 @@ from typing import Any
 
 import gymnasium as gym
 
-from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.features import FRAME, Features
+from lgmd_gym.agents import HOLD, make_agent
+from lgmd_gym.agents.features import FRAME, HARD, Features
 from lgmd_gym.envs.units import check_within
-from lgmd_gym.training.settings import read_settings
+from lgmd_gym.training.recipe import Recipe
+from lgmd_gym.training.settings import RECORDED, read_settings
 from lgmd_gym.training.view import PolicyView
 
 RANDOM_ID = "LGMD/RandomBraking-v0"
 DEMANDS = (0.0, -0.4, -1.0)
 CAMERAS = ("fovea", "tele", "wide")
+SEEDS_APART = 1_000_000  # between what neighbouring trainings reset their environments with
+JUDGED = 10_000  # from which the validation split is reset for a look
 
 
 @dataclass(frozen=True)
@@ -23,19 +26,20 @@ class Plan:
     """A training with nothing left open: plain values, as in a training's folder and a policy's card.
 
     Attributes:
-        algo: "ppo", "sac" or "dqn".
+        algo: "ppo", "sac", "dqn" or "recorded".
         env_id: The environment; those of a split are trained on "train" and judged on "validation".
         env_kwargs: Further arguments of `gym.make`.
         camera: See `LGMDObservation`.
         demands: Demands the policy chooses among; none for any.
         features: Arguments of `PolicyView`.
         n_envs: Environments side by side.
-        n_timesteps: Decisions of the policy, over all environments.
+        n_timesteps: Decisions of the policy, over all environments; of "recorded", drives.
         policy: stable-baselines3's name of the network.
-        model: Further arguments of the algorithm, as in the YAML file.
+        model: Further arguments of the algorithm, as in the YAML file; of "recorded", of `Recipe`.
         seed: Of the network and the environments.
-        eval_every: Decisions between two looks at the validation split.
+        eval_every: Decisions between two looks at the validation split; "recorded" looks after every pass.
         eval_episodes: Episodes of a look.
+        drives: Folder of a training of "recorded" whose drives are learnt from; None to record them.
     """
 
     algo: str
@@ -51,13 +55,20 @@ class Plan:
     seed: int
     eval_every: int
     eval_episodes: int
+    drives: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return asdict(self)
 
-    def make_env(self, split: str) -> gym.Env:
+    def make_env(self, split: str) -> PolicyView:
         """Return one environment as the policy sees it, of a split if it has splits."""
+        # Looks are told in the environment's own returns.
+        features = self.features if split == "train" else {**self.features, "reward_scale": 1.0}
+        return PolicyView(self.make_plain(split), **features)
+
+    def make_plain(self, split: str) -> gym.Env:
+        """Return one environment inside `LGMDObservation`, of a split if it has splits."""
         arguments = dict(self.env_kwargs)
         if self.env_id == RANDOM_ID:
             arguments.setdefault("split", split)
@@ -66,9 +77,7 @@ class Plan:
             arguments["config"] = {**(arguments.get("config") or {}), "action": levels}
         if FRAME in self.features["inputs"]:
             arguments["include_frame"] = True
-        # Looks are told in the environment's own returns.
-        features = self.features if split == "train" else {**self.features, "reward_scale": 1.0}
-        return PolicyView(gym.make(self.env_id, camera=self.camera, **arguments), **features)
+        return gym.make(self.env_id, camera=self.camera, **arguments)
 
 
 @dataclass(frozen=True)
@@ -76,17 +85,19 @@ class Order:
     """What a user wants trained; what it leaves open is filled in by hyperparameters and defaults.
 
     Attributes:
-        algo: "ppo", "sac" or "dqn".
+        algo: "ppo", "sac", "dqn" or "recorded".
         env_id: The environment; those of a split are trained on "train" and judged on "validation".
         camera: Camera presets; empty for "fovea", "tele" and "wide".
         eye: Name of an agent whose own eye is used, such as "stopping-zone"; None for `camera`.
-        steps: Decisions of the policy; None for what the hyperparameters say.
+        steps: Decisions of the policy, of "recorded" drives; None for what the hyperparameters say.
         seed: Of the network and the environments.
         hyperparams: YAML file in rl-zoo's format; None for the package's.
         inputs: What the policy sees, see `Features`; empty for what the hyperparameters say.
-        demands: Demands the policy chooses among, in [-1, 1]; empty for any, which DQN cannot.
-        eval_every: Decisions between two looks at the validation split.
-        eval_episodes: Episodes of a look.
+        demands: Demands the policy chooses among, in [-1, 1]; empty for any, which DQN cannot; None for 0,
+            -0.4 and -1, of "recorded" 0 and -1.
+        eval_every: Decisions between two looks at the validation split; "recorded" looks after every pass.
+        eval_episodes: Episodes of a look; None for 60, of "recorded" 600.
+        drives: Folder of a training of "recorded" whose drives are learnt from; None to record them.
         env_kwargs: Further arguments of `gym.make`.
     """
 
@@ -98,16 +109,24 @@ class Order:
     seed: int = 0
     hyperparams: Path | None = None
     inputs: Sequence[str] = ()
-    demands: Sequence[float] = DEMANDS
+    demands: Sequence[float] | None = None
     eval_every: int = 20_000
-    eval_episodes: int = 60
+    eval_episodes: int | None = None
+    drives: Path | None = None
     env_kwargs: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        recorded = self.algo == RECORDED
+        if self.demands is None:
+            object.__setattr__(self, "demands", (0.0, -1.0) if recorded else DEMANDS)
         if self.algo == "dqn" and not self.demands:
             raise ValueError("dqn chooses among demands: give some, as --demands 0 -1")
-        for demand in self.demands:
+        for demand in self.demands or ():
             check_within("demands", demand, -1.0, 1.0)
+        if recorded and (sorted(self.demands or ())[1:] != [HOLD] or min(self.demands or ()) > HARD):
+            raise ValueError(f"recorded learns when to brake: demands must be 0 and {HARD} or less, as 0 -1")
+        if self.drives is not None and not recorded:
+            raise ValueError(f"drives are what algo 'recorded' learns from; {self.algo} drives itself")
         if self.eye is not None and self.camera:
             raise ValueError(f"give either camera or eye, got {list(self.camera)} and {self.eye!r}")
 
@@ -119,20 +138,26 @@ class Order:
         """
         settings = read_settings(self.algo, self.env_id, self.hyperparams)
         wished = {"inputs": list(self.inputs)} if self.inputs else {}
+        features = Features.from_dict(settings.features | wished)
+        if self.algo == RECORDED:
+            Recipe.from_dict(settings.model)
+            if not features.latch:
+                raise ValueError("recorded learns when to brake: its hyperparameters need latch: true")
         return Plan(
             algo=self.algo,
             env_id=self.env_id,
             env_kwargs=dict(self.env_kwargs),
             camera=self._lenses(),
-            demands=[] if self.algo == "sac" else list(self.demands),  # SAC knows no choice
-            features=Features.from_dict(settings.features | wished).to_dict(),
+            demands=[] if self.algo == "sac" else list(self.demands or ()),  # SAC knows no choice
+            features=features.to_dict(),
             n_envs=settings.n_envs,
             n_timesteps=self.steps or settings.n_timesteps,
             policy=settings.policy,
             model=settings.model,
             seed=self.seed,
             eval_every=self.eval_every,
-            eval_episodes=self.eval_episodes,
+            eval_episodes=self.eval_episodes or (600 if self.algo == RECORDED else 60),
+            drives=None if self.drives is None else str(self.drives),
         )
 
     def _lenses(self) -> Any:

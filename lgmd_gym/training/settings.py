@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from lgmd_gym.agents.policy import ALGORITHMS
 from lgmd_gym.errors import unknown_name
 
+RECORDED = "recorded"  # an algorithm of our own, see `lgmd_gym.training.learner`
 WRAPPER = "lgmd_gym.training.PolicyView"
 
 
@@ -32,15 +33,16 @@ def read_settings(algo: str, env_id: str, file: Path | None = None) -> Settings:
     """Return the hyperparameters of an algorithm for an environment.
 
     Args:
-        algo: "ppo", "sac" or "dqn".
+        algo: "ppo", "sac", "dqn" or "recorded".
         env_id: The environment's id; an entry `default` serves all that have none.
         file: A YAML file in rl-zoo's format; None for the one that comes with this package.
 
     Raises:
         ValueError: For an unknown algorithm, an unreadable file, or one without such an entry.
     """
-    if algo not in ALGORITHMS:
-        raise unknown_name("algorithm", algo, ALGORITHMS)
+    known = (*ALGORITHMS, RECORDED)
+    if algo not in known:
+        raise unknown_name("algorithm", algo, known)
     entries = _read(file or Path(str(files("lgmd_gym.training") / f"{algo}.yml")))
     entry = entries.get(env_id, entries.get("default"))
     if not isinstance(entry, dict):

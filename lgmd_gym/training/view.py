@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
-from lgmd_gym.agents.features import Features, Memory, sources_of
+from lgmd_gym.agents.features import Features, Memory, source_of
 
 
 class PolicyView(gym.Wrapper, RecordConstructorArgs):
@@ -35,7 +35,7 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
             raise ValueError(f"PolicyView needs the Dict observation of LGMDObservation, got {given}")
         shapes = {name: space.shape or () for name, space in given.spaces.items()}
         for name in self.features.inputs:
-            if any(source not in shapes for source in sources_of(name)):
+            if source_of(name) not in shapes:
                 raise ValueError(
                     f"the policy input {name!r} is not observed; make it with include_{name}=True"
                 )
@@ -52,7 +52,8 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
         """Reset the environment; the first observation fills the history."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._memory.clear()
-        return self._memory.see(observation), info
+        self._memory.see(observation)
+        return self._memory.tell(), info
 
     def step(self, action: Any) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         """Hold an action for `repeat` decisions, or to the episode's end if it latches."""
@@ -63,11 +64,13 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
         while True:
             observation, reward, terminated, truncated, info = self.env.step(action)
             total, held = total + float(reward), held + 1
+            if not latched:
+                self._memory.see(observation)
             if terminated or truncated or (held >= features.repeat and not latched):
                 break
         if latched:  # the end of what can be decided, whatever ended the episode
             terminated, truncated = True, False
-        return self._memory.see(observation), features.reward_scale * total, terminated, truncated, info
+        return self._memory.tell(), features.reward_scale * total, terminated, truncated, info
 
     def _demand(self, action: Any) -> float:
         """Return the longitudinal demand that an action stands for."""

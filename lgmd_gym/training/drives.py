@@ -1,0 +1,117 @@
+"""Drives without braking, recorded once, and what braking would have brought at every one of their decisions.
+
+With a brake that latches, an episode is a drive up to one decision. So one drive holds all that a policy can
+see before it brakes, and copies without eyes tell what braking at each of its decisions leads to.
+"""
+
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from joblib import Parallel, delayed
+
+from lgmd_gym.agents.base import HOLD
+from lgmd_gym.agents.features import FRAME, SCALES, shrunk
+from lgmd_gym.training.onsets import Outcome, outcomes
+from lgmd_gym.training.orders import Plan
+
+BLIND = {"name": "wide", "shape": [8, 8]}  # the eye of the twin, never opened
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One drive without braking, of T decisions of the policy.
+
+    Attributes:
+        seen: The environment's observations by name, at each of its own decisions up to the policy's last:
+            ((T - 1) · repeat + 1, n) each.
+        frames: Camera frames at the policy's decisions, shrunk already, uint8 (T, height, width, channels);
+            None if they are not wanted.
+        rewards: Reward of holding the speed for each decision, float32 (T,).
+        returns: Return of braking at each decision, from there on, float32 (T,).
+        contacts: Whether that ends in a contact, bool (T,).
+        threat: Whether the drive itself ended in a contact.
+    """
+
+    seen: dict[str, np.ndarray]
+    frames: np.ndarray | None
+    rewards: np.ndarray
+    returns: np.ndarray
+    contacts: np.ndarray
+    threat: bool
+
+    def __len__(self) -> int:
+        return len(self.rewards)
+
+
+def record(plan: Plan, split: str, seeds: range, jobs: int, tell: Callable[[int], Any]) -> list[Drive]:
+    """Record one drive for each seed that an environment is reset with.
+
+    Args:
+        plan: Of a training with a brake that latches, and of two demands: to hold the speed and to brake.
+        split: "train" or "validation".
+        seeds: One drive each.
+        jobs: Processes.
+        tell: Called with the number of drives that have been added.
+    """
+    size = max(min(len(seeds) // (4 * jobs), 20), 1)
+    parts = [seeds[start : start + size] for start in range(0, len(seeds), size)]
+    told: Any = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(_record_some)(plan, split, part) for part in parts
+    )
+    drives: list[Drive] = []
+    for some in told:
+        drives += some
+        tell(len(some))
+    return drives
+
+
+def _record_some(plan: Plan, split: str, seeds: range) -> list[Drive]:
+    sighted, twin = plan.make_plain(split), replace(plan, camera=BLIND).make_plain(split)
+    try:
+        return [_drive(plan, sighted, twin.unwrapped, seed) for seed in seeds]
+    finally:
+        sighted.close()
+        twin.close()
+
+
+def _drive(plan: Plan, sighted: gym.Env, twin: Any, seed: int) -> Drive:
+    """Drive an environment and its twin, which no eye watches, so that it can be copied at every decision."""
+    hold, brake = plan.demands.index(HOLD), plan.demands.index(min(plan.demands))
+    moments, frames, copies, rewards, done = [], [], [], [], False
+    observation, info = sighted.reset(seed=seed)
+    twin.reset(seed=seed)
+    while not done:
+        if FRAME in plan.features["inputs"]:
+            frames.append(shrunk(observation[FRAME], plan.features["shrink"]))
+        copies.append(deepcopy(twin))
+        rewards.append(0.0)
+        for _ in range(plan.features["repeat"]):
+            moments.append(observation)
+            observation, reward, terminated, truncated, info = sighted.step(hold)
+            twin.step(hold)
+            rewards[-1] += float(reward)
+            done = terminated or truncated
+            if done:
+                break
+    found = outcomes(len(copies), lambda onset: _braked(copies[onset], brake))
+    del moments[(len(rewards) - 1) * plan.features["repeat"] + 1 :]  # no decision comes after them
+    return Drive(
+        {name: np.stack([moment[name] for moment in moments]) for name in SCALES},
+        np.stack(frames) if frames else None,
+        np.array(rewards, np.float32),
+        np.array([item.ret for item in found], np.float32),
+        np.array([item.contact for item in found]),
+        bool(info["collision"]),
+    )
+
+
+def _braked(env: Any, brake: int) -> Outcome:
+    ret, done, info = 0.0, False, {}
+    while not done:
+        _, reward, terminated, truncated, info = env.step(brake)
+        ret, done = ret + float(reward), terminated or truncated
+    return Outcome(ret, bool(info["collision"]))

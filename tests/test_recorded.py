@@ -1,0 +1,354 @@
+"""Learning from recorded drives: that records tell what driving does, and that the sums are right."""
+
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from lgmd_gym import cli
+from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.features import Features
+from lgmd_gym.agents.policy import read_card
+from lgmd_gym.training.drives import Drive, record
+from lgmd_gym.training.onsets import STRAIGHT, Outcome, outcomes
+from lgmd_gym.training.orders import Order
+from lgmd_gym.training.recipe import Recipe
+from lgmd_gym.training.recordings import drives_of, load, origin_of, save
+from lgmd_gym.training.trainer import Training
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("stable_baselines3")
+
+from lgmd_gym.training.learner import Learner, dearer, expected_return  # noqa: E402
+from lgmd_gym.training.lessons import Lessons  # noqa: E402
+
+YAML = """
+default:
+  env_wrapper:
+    - lgmd_gym.training.PolicyView: {history: 3, repeat: 5, latch: true, reward_scale: 0.5}
+  n_timesteps: 6
+  n_epochs: 3
+  batch_size: 4
+  policy_kwargs: {net_arch: {pi: [8], vf: []}}
+"""
+
+
+def order(tmp_path, **changes):
+    file = tmp_path / "hyper.yml"
+    file.write_text(YAML)
+    given = {"algo": "recorded", "camera": ("fovea",), "hyperparams": file, "eval_episodes": 4}
+    return Order(**given | changes)
+
+
+@pytest.mark.parametrize("demands", [(0.0, -1.0), (-0.6, 0.0)])
+def test_a_record_tells_what_closed_loops_return(tmp_path, demands):
+    plan = order(tmp_path, demands=demands).plan()
+    drives = record(plan, "train", range(3, 6), 1, lambda count: None)
+    assert {drive.threat for drive in drives} == {False, True}
+    view = replace(plan, features={**plan.features, "reward_scale": 1.0}).make_env("train")
+    hold, brake = demands.index(0.0), demands.index(min(demands))
+    for seed, drive in zip(range(3, 6), drives, strict=True):
+        for onset in (0, 4, len(drive) - 2):
+            view.reset(seed=seed)
+            held = [view.step(hold)[1] for _ in range(onset)]
+            assert held == pytest.approx(drive.rewards[:onset].tolist(), abs=1e-4)
+            _, ret, _, _, info = view.step(brake)
+            assert ret == pytest.approx(drive.returns[onset], abs=3 * STRAIGHT)
+            assert info["collision"] == drive.contacts[onset]
+
+
+@pytest.mark.slow
+def test_processes_record_the_same(tmp_path):
+    plan, counted = order(tmp_path).plan(), []
+    one = record(plan, "validation", range(4), 1, lambda count: None)
+    two = record(plan, "validation", range(4), 2, counted.append)
+    assert sum(counted) == 4
+    for left, right in zip(one, two, strict=True):
+        assert left.returns.tobytes() == right.returns.tobytes()
+        assert all(left.seen[name].tobytes() == right.seen[name].tobytes() for name in left.seen)
+
+
+def test_few_replays_find_jumps_and_bends():
+    asked = []
+
+    def truth(onset):
+        contact = onset >= 37
+        return Outcome(-12.0 - onset * 0.1 if contact else -3.0 + 0.05 * onset, contact)
+
+    def replay(onset):
+        asked.append(onset)
+        return truth(onset)
+
+    found = outcomes(60, replay)
+    assert len(asked) == len(set(asked)) < 40
+    for onset, item in enumerate(found):
+        assert item.contact == truth(onset).contact
+        assert item.ret == pytest.approx(truth(onset).ret, abs=STRAIGHT)
+    assert outcomes(1, truth) == [truth(0)]
+
+
+def made_up(length=4, seed=0, threat=True, frame=False):
+    """A drive of so many decisions, of three of the environment's each."""
+    rng = np.random.default_rng(seed)
+    moments = (length - 1) * 3 + 1
+    names = ("ego_speed", "ego_yaw_rate", "spike_frequency")
+    seen = {name: rng.random((moments, 1), dtype=np.float32) * 20 for name in names}
+    frames = rng.integers(0, 255, (length, 40, 40, 2), dtype=np.uint8) if frame else None
+    contacts = np.arange(length) > length // 2 if threat else np.zeros(length, bool)
+    drawn = rng.normal(size=(2, length)).astype(np.float32)
+    return Drive(seen, frames, drawn[0], drawn[1], contacts, threat)
+
+
+def test_lessons_show_what_the_policys_view_shows(tmp_path):
+    """History is put together from indices: compared with the wrapper itself, step by step."""
+    plan = order(tmp_path).plan()
+    drives = record(plan, "train", range(2), 1, lambda count: None)
+    batch = Lessons(drives, Features.from_dict(plan.features)).batch([1, 0])
+    view = plan.make_env("train")
+    row = 0
+    for seed in (1, 0):
+        shown, _ = view.reset(seed=seed)
+        for moment in range(len(drives[seed])):
+            assert (int(batch.place[0][row]), int(batch.place[1][row])) == (1 - seed, moment)
+            for name, value in shown.items():
+                assert batch.shown[name][row].tolist() == pytest.approx(value.tolist(), abs=1e-6)
+            shown, *_ = view.step(0)
+            row += 1
+    assert row == len(batch.shown["ego_speed"])
+    assert batch.valid.sum() == row
+    assert batch.threats.tolist() == [drives[1].threat, drives[0].threat]
+
+
+def test_frames_have_their_history_in_the_channels():
+    features = Features(inputs=("frame", "ego_speed"), history=3)
+    drives = [made_up(2, frame=True), made_up(4, seed=1, frame=True)]
+    shown = Lessons(drives, features).batch([1]).shown["frame"]
+    assert shown.shape == (4, 6, 40, 40)
+    wanted = np.concatenate([drives[1].frames[index] for index in (1, 2, 3)], axis=-1)
+    assert np.array_equal(shown[3].numpy(), np.moveaxis(wanted, -1, 0))
+
+
+def test_the_expected_return_is_that_of_drawn_episodes():
+    drives = [made_up(5), made_up(3, seed=1, threat=False)]
+    batch = Lessons(drives, Features(inputs=("ego_speed",), history=1)).batch([0, 1])
+    logits = torch.randn(2, 5, generator=torch.Generator().manual_seed(0))
+    told = expected_return(logits, batch)
+    rng = np.random.default_rng(0)
+    for index, drive in enumerate(drives):
+        chance = 1 / (1 + np.exp(-logits[index].numpy()))
+        drawn = []
+        for _ in range(20_000):
+            total = 0.0
+            for moment in range(len(drive)):
+                if rng.random() < chance[moment]:
+                    total += drive.returns[moment]
+                    break
+                total += drive.rewards[moment]
+            drawn.append(total)
+        error = np.std(drawn) / np.sqrt(len(drawn))
+        assert float(told[index]) == pytest.approx(np.mean(drawn), abs=4 * error)
+
+
+def test_false_braking_gets_dearer_and_nothing_else():
+    drives = [made_up(5), made_up(3, seed=1, threat=False)]
+    batch = Lessons(drives, Features(inputs=("ego_speed",), history=1)).batch([0, 1])
+    dear = dearer(batch, 3.0)
+    assert torch.equal(dear.returns[0], batch.returns[0])
+    for moment in range(3):
+        held = float(drives[1].rewards[moment:].sum())
+        wanted = held + 3.0 * (float(drives[1].returns[moment]) - held)
+        assert float(dear.returns[1, moment]) == pytest.approx(wanted, abs=1e-5)
+    assert dear.returns[1, 3:].tolist() == [0.0, 0.0]
+    assert torch.allclose(dearer(batch, 1.0).returns, batch.returns, atol=1e-6)
+
+
+def learner(tmp_path, drives, judges, **changes):
+    plan = order(tmp_path).plan()
+    features = {**plan.features, "inputs": ["spike_frequency", "ego_speed"], "repeat": 3}
+    model = {"n_epochs": 60, "batch_size": 8, "learning_rate": 0.03, **changes}
+    return Learner(replace(plan, features=features, model=model), drives, judges)
+
+
+def told_apart(count, seed):
+    """Drives in which a spike says that it is time: braking there is worth 5, anywhere else it costs 5."""
+    rng, drives = np.random.default_rng(seed), []
+    for number in range(count):
+        length, threat = int(rng.integers(5, 9)), number % 2 == 0
+        when = int(rng.integers(1, length - 1))
+        drive = made_up(length, seed=number, threat=threat)
+        spikes = np.zeros(((length - 1) * 3 + 1, 1), np.float32)
+        returns = np.full(length, -5.0, np.float32)
+        if threat:
+            spikes[3 * when], returns[when] = 200.0, 5.0
+        contacts = np.arange(length) != when if threat else np.zeros(length, bool)
+        seen = {**drive.seen, "spike_frequency": spikes}
+        drives.append(Drive(seen, None, np.full(length, -0.1, np.float32), returns, contacts, threat))
+    return drives
+
+
+def test_it_learns_what_can_be_learnt(tmp_path):
+    taught = learner(tmp_path, told_apart(40, 0), told_apart(20, 1))
+    before = taught.look(taught.judges)
+    assert (before.avoided, before.false) == (0.0, 0.0)  # it does not brake before it has learnt to
+    logged = []
+    taught.learn(lambda number, reached: logged.append((number, reached)))
+    assert [number for number, _ in logged] == list(range(1, 61))
+    after = taught.look(taught.judges)
+    assert (after.avoided, after.false) == (1.0, 0.0)
+    assert after.ret == pytest.approx(taught.best.ret) == pytest.approx(logged[-1][1]["best"])
+    threats = [drive for drive in told_apart(20, 1) if drive.threat]
+    wanted = [5.0 - 0.1 * int(drive.returns.argmax()) for drive in threats]
+    wanted += [-0.1 * len(drive) for drive in told_apart(20, 1) if not drive.threat]
+    assert after.ret == pytest.approx(np.mean(wanted), abs=1e-4)
+
+
+def test_a_look_plays_each_drive_to_its_first_braking(tmp_path):
+    drives = [made_up(4), made_up(3, seed=1, threat=False), made_up(5, seed=2)]
+    taught = learner(tmp_path, drives, drives)
+    table = torch.tensor([[-1.0, 2, -1, 3, 0], [-1, -1, -1, 9, 9], [-1, -1, -1, 1, -1]])
+    taught.logits = lambda batch: table
+    look = taught.look(taught.judges)
+    ends = [
+        drives[0].rewards[0] + drives[0].returns[1],
+        drives[1].rewards.sum(),  # what lies beyond its end is no decision
+        drives[2].rewards[:3].sum() + drives[2].returns[3],
+    ]
+    assert look.ret == pytest.approx(np.mean(ends), abs=1e-6)
+    assert (look.avoided, look.false) == (0.5, 0.0)
+
+
+def test_a_look_at_records_tells_what_driving_returns(tmp_path):
+    plan, seeds = order(tmp_path, inputs=("spike_peak", "ffi", "ego_speed")).plan(), range(5)
+    drives = record(plan, "validation", seeds, 1, lambda count: None)
+    plan = replace(plan, model={"n_epochs": 60, "batch_size": 5, "learning_rate": 0.03})
+    taught = Learner(plan, drives, drives)
+    taught.learn(lambda number, reached: None)  # by heart
+    view, driven, onsets = plan.make_env("validation"), [], []
+    for seed in seeds:
+        shown, _ = view.reset(seed=seed)
+        total, done, onset = 0.0, False, 0
+        while not done:
+            action = taught.model.predict(shown, deterministic=True)[0]
+            shown, reward, terminated, truncated, _ = view.step(action)
+            total, done, onset = total + float(reward), terminated or truncated, onset + int(action == 0)
+        driven.append(total)
+        onsets.append(onset)
+    assert len(set(onsets)) > 3
+    assert taught.look(taught.judges).ret == pytest.approx(np.mean(driven), abs=3 * STRAIGHT)
+
+
+def test_it_learns_the_same_twice(tmp_path):
+    weights = []
+    for _ in range(2):
+        taught = learner(tmp_path, told_apart(12, 0), told_apart(6, 1), n_epochs=3)
+        taught.learn(lambda number, reached: None)
+        weights.append([value.numpy().tobytes() for value in taught.model.policy.state_dict().values()])
+    assert weights[0] == weights[1]
+
+
+def test_drives_are_kept_and_learnt_from_again(tmp_path, monkeypatch):
+    """The whole way by the command; a second training takes the first one's drives and other inputs."""
+    hyper = str(order(tmp_path).hyperparams)
+    common = ["train", "--algo", "recorded", "--camera", "fovea", "--hyperparams", hyper, "--jobs", "1"]
+    first, second = tmp_path / "first", tmp_path / "second"
+    assert cli.run([*common, "--eval-episodes", "4", "--out", str(first)]) == 0
+    monkeypatch.setattr("lgmd_gym.training.recordings.record", None)  # nothing is recorded anew
+    again = [*common, "--eval-episodes", "3", "--steps", "5", "--inputs", "ffi", "ego_speed"]
+    assert cli.run([*again, "--drives", str(first), "--out", str(second)]) == 0
+    assert not (second / "drives").exists()
+    assert len((second / "log" / "progress.csv").read_text().splitlines()) == 1 + 3
+    card = read_card(second / "policy.zip")
+    assert card["algo"] == "ppo"
+    assert card["plan"]["algo"] == "recorded"
+    assert card["plan"]["drives"] is None  # a path is nobody's business
+    agent = make_agent(f"policy:{second / 'policy.zip'}")
+    observation, info = gym.make("LGMD/CCRs-v0", camera=agent.camera).reset(seed=0)
+    assert agent.act(observation, info).shape == (1,)
+    assert cli.run(["train", "--resume", str(first)]) == 0  # goes on from the drives
+
+
+def test_a_file_gives_back_its_drives(tmp_path):
+    drives = [made_up(4, frame=True), made_up(2, seed=1, threat=False, frame=True)]
+    save(drives, tmp_path / "some.npz", {"camera": "fovea"})
+    again, origin = load(tmp_path / "some.npz")
+    assert origin == {"camera": "fovea"}
+    for left, right in zip(drives, again, strict=True):
+        assert left.threat == right.threat
+        for name in ("rewards", "returns", "contacts"):
+            assert np.array_equal(getattr(left, name), getattr(right, name))
+        assert all(np.array_equal(left.seen[name], right.seen[name]) for name in left.seen)
+        assert np.array_equal(left.frames, right.frames)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"camera": ("wide",)}, 'recorded with another camera \\("fovea", not "wide"\\); record anew'),
+        ({"steps": 9}, "holds 2 drives, 9 are wanted; ask for fewer"),
+        ({"inputs": ("frame",), "steps": 2}, "recorded with another shrink"),
+    ],
+)
+def test_drives_of_another_kind_are_refused(tmp_path, changes, words):
+    kept = tmp_path / "drives" / "train"
+    kept.mkdir(parents=True)
+    for number in range(2):
+        save([made_up()], kept / f"{number}.npz", origin_of(order(tmp_path).plan()))
+    plan = order(tmp_path, drives=tmp_path, **changes).plan()
+    with pytest.raises(ValueError, match=words):
+        drives_of(plan, "train", tmp_path, progress=False, jobs=1)
+
+
+def test_an_interrupted_recording_goes_on(tmp_path, monkeypatch):
+    from lgmd_gym.training import recordings
+
+    asked, plan = [], order(tmp_path, steps=5).plan()
+
+    def recorded(plan, split, seeds, jobs, tell):
+        if len(asked) == 2:
+            raise KeyboardInterrupt
+        asked.append(seeds)
+        return [made_up(seed=seed) for seed in seeds]
+
+    monkeypatch.setattr(recordings, "PART", 2)
+    monkeypatch.setattr(recordings, "record", recorded)
+    with pytest.raises(KeyboardInterrupt):
+        drives_of(plan, "train", tmp_path, progress=False, jobs=1)
+    del asked[:1]
+    drives = drives_of(plan, "train", tmp_path, progress=False, jobs=1)
+    assert asked == [range(2, 4), range(4, 5)]
+    assert [drive.rewards[0] for drive in drives] == [made_up(seed=seed).rewards[0] for seed in range(5)]
+
+
+def test_no_drives_are_named(tmp_path):
+    plan = order(tmp_path, drives=tmp_path / "nowhere").plan()
+    with pytest.raises(ValueError, match=r"no recorded drives in .*nowhere.*; train once with"):
+        drives_of(plan, "train", tmp_path, progress=False, jobs=1)
+    (tmp_path / "train.npz").write_text("nothing")
+    with pytest.raises(ValueError, match="holds no recorded drives"):
+        load(tmp_path / "train.npz")
+
+
+@pytest.mark.parametrize("demands", [(0.0, -0.4), (0.0, -0.5, -1.0), (-1.0,), (), (0.3, -1.0)])
+def test_it_takes_holding_and_hard_braking_only(demands):
+    with pytest.raises(ValueError, match=r"demands must be 0 and -0\.5 or less, as 0 -1"):
+        Order("recorded", demands=demands)
+
+
+def test_orders_that_cannot_be_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="'recorded' learns from; dqn drives itself"):
+        Order("dqn", demands=(0.0, -1.0), drives=tmp_path)
+    wanted = order(tmp_path)
+    wanted.hyperparams.write_text(YAML.replace("latch: true", "latch: false"))
+    with pytest.raises(ValueError, match="need latch: true"):
+        wanted.plan()
+    with pytest.raises(ValueError, match="did you mean 'n_epochs'"):
+        Recipe.from_dict({"epochs": 3})
+    with pytest.raises(ValueError, match="batch_size must be a whole number >= 1, got 0"):
+        Recipe.from_dict({"batch_size": 0})
+    with pytest.raises(ValueError, match="first_chance"):
+        Recipe.from_dict({"first_chance": 1.0})
+    wanted.hyperparams.write_text(YAML.replace("batch_size", "batchsize"))
+    with pytest.raises(ValueError, match="did you mean 'batch_size'"):
+        Training.start(wanted, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
