@@ -4,7 +4,10 @@ import importlib.util
 import re
 from pathlib import Path
 
+import gymnasium as gym
 import pytest
+
+from lgmd_gym.agents import make_agent
 
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = ROOT / "docs" / "examples"
@@ -52,6 +55,33 @@ def test_contact_sheet(tmp_path):
     assert [list(row) for row in sheet.values()] == [["clear", "night"]] * 2
     assert all(row["night"].mean() < 0.5 * row["clear"].mean() for row in sheet.values())
     assert 10_000 < (tmp_path / "sheet.png").stat().st_size < 200_000
+
+
+def test_on_record(capsys):
+    """What is told of a rule is what the benchmark's closed loop does with it."""
+    example = load("on_record")
+    drives = example.recorded("stopping-zone", 4, jobs=1)
+    told = example.braked("stopping-zone", drives)
+    env = gym.make("LGMD/RandomBraking-v0", split="test", camera=make_agent("stopping-zone").camera)
+    for seed, (ret, contact, brakes) in enumerate(told):
+        agent = make_agent("stopping-zone")
+        observation, info = env.reset(seed=seed)
+        agent.reset(seed)
+        total, braked, done = 0.0, False, False
+        while not done:
+            action = agent.act(observation, info)
+            braked = braked or bool(action[0] < 0.0)
+            observation, reward, terminated, truncated, info = env.step(action)
+            total, done = total + float(reward), terminated or truncated
+        assert ret == pytest.approx(total, abs=0.15)  # returns lie on lines between replays
+        assert (bool(contact), bool(brakes)) == (info["collision"], braked)
+    assert {brakes for *_, brakes in told} == {0.0, 1.0}
+    example.recorded = lambda agent, count: drives
+    example.main(["4", "stopping-zone", "no-brake+stopping-zone"])
+    rule, mean = capsys.readouterr().out.splitlines()[2:]
+    assert rule.endswith("stopping-zone")
+    assert "+0.00 [+0.00, +0.00]" in rule
+    assert mean.endswith("no-brake+stopping-zone")
 
 
 def test_what_breaks_first(capsys):

@@ -14,7 +14,7 @@ from lgmd_gym.training.drives import Drive, record
 from lgmd_gym.training.onsets import STRAIGHT, Outcome, outcomes
 from lgmd_gym.training.orders import Order
 from lgmd_gym.training.recipe import Recipe
-from lgmd_gym.training.recordings import drives_of, load, origin_of, save
+from lgmd_gym.training.recordings import check_drives, drives_of, load, origin_of, save
 from lgmd_gym.training.trainer import Training
 
 torch = pytest.importorskip("torch")
@@ -296,7 +296,7 @@ def test_drives_of_another_kind_are_refused(tmp_path, changes, words):
         save([made_up()], kept / f"{number}.npz", origin_of(order(tmp_path).plan()))
     plan = order(tmp_path, drives=tmp_path, **changes).plan()
     with pytest.raises(ValueError, match=words):
-        drives_of(plan, "train", tmp_path, progress=False, jobs=1)
+        check_drives(plan)
 
 
 def test_an_interrupted_recording_goes_on(tmp_path, monkeypatch):
@@ -321,9 +321,10 @@ def test_an_interrupted_recording_goes_on(tmp_path, monkeypatch):
 
 
 def test_no_drives_are_named(tmp_path):
-    plan = order(tmp_path, drives=tmp_path / "nowhere").plan()
+    wanted = order(tmp_path, drives=tmp_path / "nowhere")
     with pytest.raises(ValueError, match=r"no recorded drives in .*nowhere.*; train once with"):
-        drives_of(plan, "train", tmp_path, progress=False, jobs=1)
+        Training.start(wanted, tmp_path / "run")
+    assert not (tmp_path / "run").exists()  # so that the same command will do once the drives are there
     (tmp_path / "train.npz").write_text("nothing")
     with pytest.raises(ValueError, match="holds no recorded drives"):
         load(tmp_path / "train.npz")

@@ -28,31 +28,47 @@ def drives_of(plan: Plan, split: str, folder: Path, progress: bool, jobs: int) -
         folder: Of the training.
         progress: Whether to show it on stderr.
         jobs: Processes that record.
-
-    Raises:
-        ValueError: If another's drives are too few, or were recorded with another eye or environment.
     """
-    wanted = plan.n_timesteps if split == "train" else plan.eval_episodes
+    wanted = _wanted(plan, split)
     kept = Path(plan.drives or folder) / "drives" / split
     if plan.drives is None:
-        kept.mkdir(parents=True, exist_ok=True)
-        _record_missing(plan, split, kept, wanted, progress, jobs)
+        _record_missing(plan, split, kept, progress, jobs)
     drives: list[Drive] = []
     for file in sorted(kept.glob("*.npz")):
         if len(drives) < wanted:
-            some, origin = load(file)
-            _check_same(origin, origin_of(plan), file)
-            drives += some
-    if not drives:
-        raise ValueError(f"no recorded drives in {str(kept)!r}; train once with --algo recorded")
-    if len(drives) < wanted:
-        raise ValueError(f"{str(kept)!r} holds {len(drives)} drives, {wanted} are wanted; ask for fewer")
+            drives += load(file)[0]
     return drives[:wanted]
 
 
-def _record_missing(plan: Plan, split: str, kept: Path, wanted: int, progress: bool, jobs: int) -> None:
+def check_drives(plan: Plan) -> None:
+    """Refuse another training's drives that will not do, before anything is done.
+
+    Raises:
+        ValueError: If they are none, too few, or were recorded with another eye or environment.
+    """
+    for split in ("train", "validation") if plan.drives is not None else ():
+        kept, count = Path(plan.drives or "") / "drives" / split, 0
+        for file in sorted(kept.glob("*.npz")):
+            some, origin = load(file)
+            _check_same(origin, origin_of(plan), file)
+            count += len(some)
+        if count == 0:
+            raise ValueError(f"no recorded drives in {str(kept)!r}; train once with --algo recorded")
+        if count < _wanted(plan, split):
+            raise ValueError(
+                f"{str(kept)!r} holds {count} drives, {_wanted(plan, split)} are wanted; ask for fewer"
+            )
+
+
+def _wanted(plan: Plan, split: str) -> int:
+    return plan.n_timesteps if split == "train" else plan.eval_episodes
+
+
+def _record_missing(plan: Plan, split: str, kept: Path, progress: bool, jobs: int) -> None:
     from tqdm import tqdm
 
+    kept.mkdir(parents=True, exist_ok=True)
+    wanted = _wanted(plan, split)
     first = SEEDS_APART * plan.seed if split == "train" else JUDGED
     with tqdm(total=wanted, desc=f"recording {split}", unit="drive", disable=not progress) as bar:
         for start in range(0, wanted, PART):

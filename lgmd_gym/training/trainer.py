@@ -10,6 +10,7 @@ from lgmd_gym.agents.policy import write_card
 from lgmd_gym.errors import check_keys
 from lgmd_gym.folders import new_folder
 from lgmd_gym.training.orders import Order, Plan
+from lgmd_gym.training.recordings import check_drives
 from lgmd_gym.training.settings import RECORDED
 
 PLAN = "plan.json"
@@ -45,6 +46,7 @@ class Training:
         """
         plan = order.plan()
         plan.make_env("train").close()
+        check_drives(plan)
         new_folder(folder, "training folder")
         (folder / PLAN).write_text(json.dumps(plan.to_dict(), indent=2) + "\n", encoding="utf-8")
         return cls(plan, folder)
