@@ -11,10 +11,12 @@ if TYPE_CHECKING:
 
 def train(options: "cli.Train") -> int:
     """Train, and say where the policy is."""
+    from lgmd_gym.agents.options import whole
     from lgmd_gym.training.orders import Order
     from lgmd_gym.training.trainer import Training
 
     _check_installed()
+    whole("jobs", options.jobs, 1)
     if options.resume is not None:
         training = Training.resume(options.resume)
     else:

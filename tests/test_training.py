@@ -284,6 +284,9 @@ def test_the_shipped_policy_brakes_for_a_car_and_not_for_a_road(family):
         (["--resume", "nowhere"], "holds no training to resume"),
         (["--inputs", "zones"], "needs the eye of stopping-zone with 20 cameras, got 3; train with --eye"),
         (["--eye", "stopping-zone", "--camera", "wide"], "give either camera or eye"),
+        (["--steps", "0"], "steps must be a whole number >= 1, got 0"),
+        (["--jobs", "0"], "jobs must be a whole number >= 1, got 0"),
+        (["--eval-episodes", "0"], "eval_episodes must be a whole number >= 1, got 0"),
     ],
 )
 def test_bad_training_is_one_line_and_exit_code_two(arguments, words, capsys, monkeypatch, tmp_path):

@@ -9,6 +9,7 @@ import gymnasium as gym
 
 from lgmd_gym.agents import HOLD, make_agent
 from lgmd_gym.agents.features import FRAME, HARD, Features
+from lgmd_gym.agents.options import whole
 from lgmd_gym.envs.units import check_within
 from lgmd_gym.training.recipe import Recipe
 from lgmd_gym.training.settings import RECORDED, read_settings
@@ -121,6 +122,9 @@ class Order:
             object.__setattr__(self, "demands", (0.0, -1.0) if recorded else DEMANDS)
         if self.algo == "dqn" and not self.demands:
             raise ValueError("dqn chooses among demands: give some, as --demands 0 -1")
+        for name in ("steps", "eval_every", "eval_episodes"):
+            if getattr(self, name) is not None:
+                whole(name, getattr(self, name), 1)
         for demand in self.demands or ():
             check_within("demands", demand, -1.0, 1.0)
         if recorded and (sorted(self.demands or ())[1:] != [HOLD] or min(self.demands or ()) > HARD):
@@ -151,7 +155,7 @@ class Order:
             demands=[] if self.algo == "sac" else list(self.demands or ()),  # SAC knows no choice
             features=features.to_dict(),
             n_envs=settings.n_envs,
-            n_timesteps=self.steps or settings.n_timesteps,
+            n_timesteps=settings.n_timesteps if self.steps is None else self.steps,
             policy=settings.policy,
             model=settings.model,
             seed=self.seed,
