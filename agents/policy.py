@@ -66,9 +66,10 @@ class Policy(Agent):
     def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Decide anew at every `repeat`-th call, else hold; once latched, hold to the end."""
         features = self._memory.features
-        if not features.latches(self._demand):
-            self._memory.see(observation)
-        if self._decision % features.repeat == 0 and not features.latches(self._demand):
+        if features.latches(self._demand):
+            return self._demand
+        self._memory.see(observation)
+        if self._decision % features.repeat == 0:
             action, _ = self._model.predict(self._memory.tell(), deterministic=True)
             self._demand = self._levels[int(action)] if self._levels else float(np.reshape(action, -1)[0])
         self._decision += 1

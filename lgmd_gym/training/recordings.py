@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -49,9 +50,9 @@ def check_drives(plan: Plan) -> None:
     for split in ("train", "validation") if plan.drives is not None else ():
         kept, count = Path(plan.drives or "") / "drives" / split, 0
         for file in sorted(kept.glob("*.npz")):
-            some, origin = load(file)
-            _check_same(origin, origin_of(plan), file)
-            count += len(some)
+            with _opened(file) as some:  # reads these two arrays and no drives
+                _check_same(json.loads(str(some["origin"])), origin_of(plan), file)
+                count += len(some["lengths"])
         if count == 0:
             raise ValueError(f"no recorded drives in {str(kept)!r}; train once with --algo recorded")
         if count < _wanted(plan, split):
@@ -135,11 +136,18 @@ def load(file: Path) -> tuple[list[Drive], dict[str, Any]]:
     Raises:
         ValueError: If it holds none.
     """
+    with _opened(file) as kept:
+        return list(_cut(kept)), json.loads(str(kept["origin"]))
+
+
+def _opened(file: Path) -> Any:
     try:
-        with np.load(file) as kept:
-            return list(_cut(kept)), json.loads(str(kept["origin"]))
-    except (OSError, KeyError, ValueError) as error:
+        kept = np.load(file)
+        if "origin" not in kept:
+            raise ValueError("no origin in it")
+    except (OSError, ValueError, BadZipFile) as error:
         raise ValueError(f"{str(file)!r} holds no recorded drives ({error})") from None
+    return kept
 
 
 def _cut(kept: Any) -> Iterator[Drive]:
