@@ -5,16 +5,16 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 import pytest
+from drive_maker import YAML, made_up, order
 
 from lgmd_gym import cli
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.features import Features
 from lgmd_gym.agents.policy import read_card
 from lgmd_gym.training.drives import Drive, record
-from lgmd_gym.training.onsets import STRAIGHT, Outcome, outcomes
+from lgmd_gym.training.onsets import STRAIGHT
 from lgmd_gym.training.orders import Order
 from lgmd_gym.training.recipe import Recipe
-from lgmd_gym.training.recordings import check_drives, drives_of, load, origin_of, save
 from lgmd_gym.training.trainer import Training
 
 torch = pytest.importorskip("torch")
@@ -22,82 +22,6 @@ pytest.importorskip("stable_baselines3")
 
 from lgmd_gym.training.learner import Learner, dearer, expected_return  # noqa: E402
 from lgmd_gym.training.lessons import Lessons  # noqa: E402
-
-YAML = """
-default:
-  env_wrapper:
-    - lgmd_gym.training.PolicyView: {history: 3, repeat: 5, latch: true, reward_scale: 0.5}
-  n_timesteps: 6
-  n_epochs: 3
-  batch_size: 4
-  policy_kwargs: {net_arch: {pi: [8], vf: []}}
-"""
-
-
-def order(tmp_path, **changes):
-    file = tmp_path / "hyper.yml"
-    file.write_text(YAML)
-    given = {"algo": "recorded", "camera": ("fovea",), "hyperparams": file, "eval_episodes": 4}
-    return Order(**given | changes)
-
-
-@pytest.mark.parametrize("demands", [(0.0, -1.0), (-0.6, 0.0)])
-def test_a_record_tells_what_closed_loops_return(tmp_path, demands):
-    plan = order(tmp_path, demands=demands).plan()
-    drives = record(plan, "train", range(3, 6), 1, lambda count: None)
-    assert {drive.threat for drive in drives} == {False, True}
-    view = replace(plan, features={**plan.features, "reward_scale": 1.0}).make_env("train")
-    hold, brake = demands.index(0.0), demands.index(min(demands))
-    for seed, drive in zip(range(3, 6), drives, strict=True):
-        for onset in (0, 4, len(drive) - 2):
-            view.reset(seed=seed)
-            held = [view.step(hold)[1] for _ in range(onset)]
-            assert held == pytest.approx(drive.rewards[:onset].tolist(), abs=1e-4)
-            _, ret, _, _, info = view.step(brake)
-            assert ret == pytest.approx(drive.returns[onset], abs=3 * STRAIGHT)
-            assert info["collision"] == drive.contacts[onset]
-
-
-@pytest.mark.slow
-def test_processes_record_the_same(tmp_path):
-    plan, counted = order(tmp_path).plan(), []
-    one = record(plan, "validation", range(4), 1, lambda count: None)
-    two = record(plan, "validation", range(4), 2, counted.append)
-    assert sum(counted) == 4
-    for left, right in zip(one, two, strict=True):
-        assert left.returns.tobytes() == right.returns.tobytes()
-        assert all(left.seen[name].tobytes() == right.seen[name].tobytes() for name in left.seen)
-
-
-def test_few_replays_find_jumps_and_bends():
-    asked = []
-
-    def truth(onset):
-        contact = onset >= 37
-        return Outcome(-12.0 - onset * 0.1 if contact else -3.0 + 0.05 * onset, contact)
-
-    def replay(onset):
-        asked.append(onset)
-        return truth(onset)
-
-    found = outcomes(60, replay)
-    assert len(asked) == len(set(asked)) < 40
-    for onset, item in enumerate(found):
-        assert item.contact == truth(onset).contact
-        assert item.ret == pytest.approx(truth(onset).ret, abs=STRAIGHT)
-    assert outcomes(1, truth) == [truth(0)]
-
-
-def made_up(length=4, seed=0, threat=True, frame=False):
-    """A drive of so many decisions, of three of the environment's each."""
-    rng = np.random.default_rng(seed)
-    moments = (length - 1) * 3 + 1
-    names = ("ego_speed", "ego_yaw_rate", "spike_frequency")
-    seen = {name: rng.random((moments, 1), dtype=np.float32) * 20 for name in names}
-    frames = rng.integers(0, 255, (length, 40, 40, 2), dtype=np.uint8) if frame else None
-    contacts = np.arange(length) > length // 2 if threat else np.zeros(length, bool)
-    drawn = rng.normal(size=(2, length)).astype(np.float32)
-    return Drive(seen, frames, drawn[0], drawn[1], contacts, threat)
 
 
 def test_lessons_show_what_the_policys_view_shows(tmp_path):
@@ -266,68 +190,6 @@ def test_drives_are_kept_and_learnt_from_again(tmp_path, monkeypatch):
     observation, info = gym.make("LGMD/CCRs-v0", camera=agent.camera).reset(seed=0)
     assert agent.act(observation, info).shape == (1,)
     assert cli.run(["train", "--resume", str(first)]) == 0  # goes on from the drives
-
-
-def test_a_file_gives_back_its_drives(tmp_path):
-    drives = [made_up(4, frame=True), made_up(2, seed=1, threat=False, frame=True)]
-    save(drives, tmp_path / "some.npz", {"camera": "fovea"})
-    again, origin = load(tmp_path / "some.npz")
-    assert origin == {"camera": "fovea"}
-    for left, right in zip(drives, again, strict=True):
-        assert left.threat == right.threat
-        for name in ("rewards", "returns", "contacts"):
-            assert np.array_equal(getattr(left, name), getattr(right, name))
-        assert all(np.array_equal(left.seen[name], right.seen[name]) for name in left.seen)
-        assert np.array_equal(left.frames, right.frames)
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"camera": ("wide",)}, 'recorded with another camera \\("fovea", not "wide"\\); record anew'),
-        ({"steps": 9}, "holds 2 drives, 9 are wanted; ask for fewer"),
-        ({"inputs": ("frame",), "steps": 2}, "recorded with another shrink"),
-    ],
-)
-def test_drives_of_another_kind_are_refused(tmp_path, changes, words):
-    kept = tmp_path / "drives" / "train"
-    kept.mkdir(parents=True)
-    for number in range(2):
-        save([made_up()], kept / f"{number}.npz", origin_of(order(tmp_path).plan()))
-    plan = order(tmp_path, drives=tmp_path, **changes).plan()
-    with pytest.raises(ValueError, match=words):
-        check_drives(plan)
-
-
-def test_an_interrupted_recording_goes_on(tmp_path, monkeypatch):
-    from lgmd_gym.training import recordings
-
-    asked, plan = [], order(tmp_path, steps=5).plan()
-
-    def recorded(plan, split, seeds, jobs, tell):
-        if len(asked) == 2:
-            raise KeyboardInterrupt
-        asked.append(seeds)
-        return [made_up(seed=seed) for seed in seeds]
-
-    monkeypatch.setattr(recordings, "PART", 2)
-    monkeypatch.setattr(recordings, "record", recorded)
-    with pytest.raises(KeyboardInterrupt):
-        drives_of(plan, "train", tmp_path, progress=False, jobs=1)
-    del asked[:1]
-    drives = drives_of(plan, "train", tmp_path, progress=False, jobs=1)
-    assert asked == [range(2, 4), range(4, 5)]
-    assert [drive.rewards[0] for drive in drives] == [made_up(seed=seed).rewards[0] for seed in range(5)]
-
-
-def test_no_drives_are_named(tmp_path):
-    wanted = order(tmp_path, drives=tmp_path / "nowhere")
-    with pytest.raises(ValueError, match=r"no recorded drives in .*nowhere.*; train once with"):
-        Training.start(wanted, tmp_path / "run")
-    assert not (tmp_path / "run").exists()  # so that the same command will do once the drives are there
-    (tmp_path / "train.npz").write_text("nothing")
-    with pytest.raises(ValueError, match="holds no recorded drives"):
-        load(tmp_path / "train.npz")
 
 
 @pytest.mark.parametrize("demands", [(0.0, -0.4), (0.0, -0.5, -1.0), (-1.0,), (), (0.3, -1.0)])
