@@ -24,45 +24,34 @@ class Outcome:
 def outcomes(length: int, replay: Callable[[int], Outcome]) -> list[Outcome]:
     """Return the outcome of braking at each of `length` decisions.
 
-    Every fourth decision is replayed, and the middle of two as long as it lies off the line through them by
-    more than 0.05 or they differ in contact; in between, returns lie on lines, a little off. The last
-    decision that still avoids a contact is found exactly.
+    Every fourth decision is replayed, and the middle of two of these. Where it lies off the line through them
+    by more than 0.05, or they differ in contact, all between them are replayed; else they lie on that line, a
+    little off. The last decision that still avoids a contact is found exactly.
 
     Args:
         length: Number of decisions, >= 1.
-        replay: Plays a drive that brakes at a decision.
+        replay: Plays a drive that brakes at a decision; called once for each.
     """
-    found = _Found(replay)
     grid = [*range(0, length - 1, STRIDE), length - 1]
+    known = {onset: replay(onset) for onset in grid}
     for first, last in pairwise(grid):
-        found.fill(first, last)
-    return [found.at(onset) for onset in range(length)]
+        known |= _between(first, known[first], last, known[last], replay)
+    return [known[onset] for onset in range(length)]
 
 
-class _Found:
-    """Outcomes by decision, replayed or put on a line."""
-
-    def __init__(self, replay: Callable[[int], Outcome]) -> None:
-        self._replay = replay
-        self._known: dict[int, Outcome] = {}
-
-    def at(self, onset: int) -> Outcome:
-        if onset not in self._known:
-            self._known[onset] = self._replay(onset)
-        return self._known[onset]
-
-    def fill(self, first: int, last: int) -> None:
-        """Find all between two decisions."""
-        if last - first < 2:
-            return
-        low, high, middle = self.at(first), self.at(last), (first + last) // 2
-        half = self.at(middle)
-        rise = (high.ret - low.ret) / (last - first)
-        straight = abs(half.ret - low.ret - rise * (middle - first)) <= STRAIGHT
-        if straight and low.contact == half.contact == high.contact:
-            for onset in range(first + 1, last):
-                line = Outcome(low.ret + rise * (onset - first), low.contact)
-                self._known.setdefault(onset, line)
-            return
-        self.fill(first, middle)
-        self.fill(middle, last)
+def _between(
+    first: int, low: Outcome, last: int, high: Outcome, replay: Callable[[int], Outcome]
+) -> dict[int, Outcome]:
+    """Return the outcomes of the decisions between two."""
+    inner = range(first + 1, last)
+    if not inner:
+        return {}
+    middle = (first + last) // 2
+    half = replay(middle)
+    rise = (high.ret - low.ret) / (last - first)
+    straight = abs(half.ret - low.ret - rise * (middle - first)) <= STRAIGHT
+    if straight and low.contact == half.contact == high.contact:
+        found = {onset: Outcome(low.ret + rise * (onset - first), low.contact) for onset in inner}
+    else:
+        found = {onset: replay(onset) for onset in inner if onset != middle}
+    return found | {middle: half}
