@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 if TYPE_CHECKING:
-    from lgmd_gym import cli
+    from lgmd_gym.cli_options import Doctor, Drive, Gallery, List
 
 
-def drive(options: "cli.Drive") -> int:
+def drive(options: "Drive") -> int:
     """Play one episode and say how it ended."""
     from lgmd_gym.agents import make_agent
     from lgmd_gym.benchmark.eyesight import Eyesight
@@ -38,7 +38,7 @@ def drive(options: "cli.Drive") -> int:
     return 0
 
 
-def show_list(options: "cli.List") -> int:
+def show_list(options: "List") -> int:
     """Print what there is to name."""
     from lgmd_gym import listing
 
@@ -46,7 +46,7 @@ def show_list(options: "cli.List") -> int:
     return 0
 
 
-def gallery(options: "cli.Gallery") -> int:
+def gallery(options: "Gallery") -> int:
     """Make the gallery and say where it is."""
     from lgmd_gym.gallery import make_gallery
 
@@ -55,7 +55,7 @@ def gallery(options: "cli.Gallery") -> int:
     return 0
 
 
-def doctor(options: "cli.Doctor") -> int:
+def doctor(options: "Doctor") -> int:
     """Examine this installation; 1 if something is at fault."""
     from lgmd_gym import doctor as doctors
 

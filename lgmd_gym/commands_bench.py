@@ -11,14 +11,14 @@ from rich.console import Console
 from lgmd_gym.commands import _read_params, console_of
 
 if TYPE_CHECKING:
-    from lgmd_gym import cli
     from lgmd_gym.benchmark.runner import Run
     from lgmd_gym.benchmark.traffic import TrafficRun
+    from lgmd_gym.cli_options import Bench, Compare, Judge
 
 SUITE, SEEDS = "quick", 3
 
 
-def bench(options: "cli.Bench") -> int:
+def bench(options: "Bench") -> int:
     """Play a suite and report; 0 if all was played, 1 if something failed, 130 after Ctrl-C."""
     console = console_of()
     run = _resumed(options, console) if options.resume is not None else _new(options, console)
@@ -41,7 +41,7 @@ def bench(options: "cli.Bench") -> int:
     return int(bool(failed or run.stopped))
 
 
-def compare(options: "cli.Compare") -> int:
+def compare(options: "Compare") -> int:
     """Print and draw the paired differences of two runs, or of agents within one."""
     from lgmd_gym import plots_bench
     from lgmd_gym.benchmark.compare import compare_runs
@@ -59,7 +59,7 @@ def compare(options: "cli.Compare") -> int:
     return 0
 
 
-def judge(options: "cli.Judge") -> int:
+def judge(options: "Judge") -> int:
     """Print the arms of a run."""
     from lgmd_gym.benchmark.judge import judge_run
     from lgmd_gym.benchmark.judge_tables import judge_table
@@ -71,7 +71,7 @@ def judge(options: "cli.Judge") -> int:
     return 0
 
 
-def _cluster(options: "cli.Bench") -> str | None:
+def _cluster(options: "Bench") -> str | None:
     """Return the cluster's address that the options name, None for processes."""
     if options.backend == "dask" and options.address is None:
         raise ValueError("--backend dask needs --address tcp://HOST:8786, the scheduler's")
@@ -80,7 +80,7 @@ def _cluster(options: "cli.Bench") -> str | None:
     return options.address
 
 
-def _resumed(options: "cli.Bench", console: Console) -> "Run | TrafficRun":
+def _resumed(options: "Bench", console: Console) -> "Run | TrafficRun":
     from lgmd_gym.benchmark.runs import resume_run
 
     assert options.resume is not None
@@ -90,7 +90,7 @@ def _resumed(options: "cli.Bench", console: Console) -> "Run | TrafficRun":
     return run
 
 
-def _new(options: "cli.Bench", console: Console) -> "Run | TrafficRun":
+def _new(options: "Bench", console: Console) -> "Run | TrafficRun":
     from lgmd_gym.benchmark.config import RunConfig
     from lgmd_gym.benchmark.runner import DEFAULT_AGENTS
     from lgmd_gym.benchmark.runs import repeat_run
@@ -117,7 +117,7 @@ def _new(options: "cli.Bench", console: Console) -> "Run | TrafficRun":
     return repeat_run(config, options.jobs, out, cluster)
 
 
-def _report(run: "Run | TrafficRun", console: Console, options: "cli.Bench") -> None:
+def _report(run: "Run | TrafficRun", console: Console, options: "Bench") -> None:
     """Print the tables; write summary, plots and report."""
     from lgmd_gym.benchmark.traffic import TrafficRun
     from lgmd_gym.neuron import LGMDParams

@@ -14,13 +14,13 @@ from lgmd_gym.commands import console_of
 from lgmd_gym.folders import new_folder
 
 if TYPE_CHECKING:
-    from lgmd_gym import cli
+    from lgmd_gym.cli_options import Paper, Video
     from lgmd_gym.clips import Choice
     from lgmd_gym.clips_detect import Detection
     from lgmd_gym.clips_run import Order, Watched
 
 
-def video(options: "cli.Video") -> int:
+def video(options: "Video") -> int:
     """Watch clips and report; 0 if all could be read to their ends, 2 if one breaks off."""
     from lgmd_gym import clips_tables
     from lgmd_gym.clips import Watch
@@ -59,7 +59,7 @@ def video(options: "cli.Video") -> int:
     return 2 if troubles else 0
 
 
-def _choices(options: "cli.Video") -> "dict[str, Choice]":
+def _choices(options: "Video") -> "dict[str, Choice]":
     """Return the named choices with the options laid over each."""
     from lgmd_gym.clips import CHOICES, changed, named_choice
     from lgmd_gym.commands import _read_params
@@ -75,7 +75,7 @@ def _choices(options: "cli.Video") -> "dict[str, Choice]":
     return {name: changed(named_choice(name), **over) for name in names}
 
 
-def _orders(options: "cli.Video") -> "tuple[list[Order], set[Path]]":
+def _orders(options: "Video") -> "tuple[list[Order], set[Path]]":
     """Return the clips to watch, all of which can be opened, and those whose crash is known or known not."""
     from lgmd_gym.clips_crashes import read_crashes
     from lgmd_gym.clips_run import Order
@@ -111,7 +111,7 @@ def _orders(options: "cli.Video") -> "tuple[list[Order], set[Path]]":
 
 
 def _watch_all(
-    orders: "list[Order]", name: str, choice: "Choice", suffix: str, options: "cli.Video"
+    orders: "list[Order]", name: str, choice: "Choice", suffix: str, options: "Video"
 ) -> "list[Watched]":
     """Watch every clip by one choice, with a progress bar."""
     from lgmd_gym.clips_run import watch_clip
@@ -164,7 +164,7 @@ def _note(text: str) -> None:
     print(f"lgmd-gym: {text}", file=sys.stderr)
 
 
-def paper(options: "cli.Paper") -> int:
+def paper(options: "Paper") -> int:
     """Run the paper's experiments, draw their figures and print what holds; 2 if a clip breaks off."""
     from lgmd_gym import paper as experiments
     from lgmd_gym.paper_claims import claim_table, verdicts, write_claims
@@ -194,15 +194,15 @@ def paper(options: "cli.Paper") -> int:
     return 2 if troubles else 0
 
 
-def _film_options(options: "cli.Paper") -> "cli.Video":
+def _film_options(options: "Paper") -> "Video":
     """Return the options of `video` for the clips of `paper`."""
-    from lgmd_gym import cli
+    from lgmd_gym.cli_options import Video
 
-    return cli.Video(clips=(str(options.clips),), crashes=options.crashes)
+    return Video(clips=(str(options.clips),), crashes=options.crashes)
 
 
 def _watch_paper(
-    out: Path, orders: "list[Order]", judged: set[Path], films: "cli.Video", console: Console
+    out: Path, orders: "list[Order]", judged: set[Path], films: "Video", console: Console
 ) -> "tuple[list[Detection], list[str]]":
     """Watch the clips by every choice, print the tables, and return the paper's choice's answers."""
     from lgmd_gym import clips_tables

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from lgmd_gym import cli
+    from lgmd_gym.cli_options import Train
 
 
-def train(options: "cli.Train") -> int:
+def train(options: "Train") -> int:
     """Train, and say where the policy is."""
     from lgmd_gym.agents.options import whole
     from lgmd_gym.training.orders import Order

@@ -6,11 +6,11 @@ from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from lgmd_gym import cli
+    from lgmd_gym.cli_options import Tune
     from lgmd_gym.tuning_ground import Ground
 
 
-def tune(options: "cli.Tune") -> int:
+def tune(options: "Tune") -> int:
     """Search or, with `--sensitivity`, shift a rule's parameters; print and keep what comes out."""
     from lgmd_gym import tuning
     from lgmd_gym.tuning_ground import Ground

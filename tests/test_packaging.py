@@ -94,6 +94,7 @@ MAY = {
     "gallery_scenes": ("agents", "benchmark", "docstrings", "drive", "envs", "errors", "video", "view"),
     "listing": ("agents", "benchmark", "envs", "camera"),
     "commands": None,  # knows all
+    "cli_options": (),
     "cli": None,
     "__main__": ("cli",),
     "": None,  # the package itself, lazily
