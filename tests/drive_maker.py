@@ -24,11 +24,10 @@ def order(tmp_path, **changes):
 
 
 def made_up(length=4, seed=0, threat=True, frame=False):
-    """A drive of so many decisions, of three of the environment's each."""
+    """A drive of so many decisions of the environment."""
     rng = np.random.default_rng(seed)
-    moments = (length - 1) * 3 + 1
     names = ("ego_speed", "ego_yaw_rate", "spike_frequency")
-    seen = {name: rng.random((moments, 1), dtype=np.float32) * 20 for name in names}
+    seen = {name: rng.random((length, 1), dtype=np.float32) * 20 for name in names}
     frames = rng.integers(0, 255, (length, 40, 40, 2), dtype=np.uint8) if frame else None
     contacts = np.arange(length) > length // 2 if threat else np.zeros(length, bool)
     drawn = rng.normal(size=(2, length)).astype(np.float32)

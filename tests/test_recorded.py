@@ -33,19 +33,39 @@ def test_lessons_show_what_the_policys_view_shows(tmp_path):
     row = 0
     for seed in (1, 0):
         shown, _ = view.reset(seed=seed)
-        for moment in range(len(drives[seed])):
+        done, moment = False, 0
+        while not done:
             assert (int(batch.place[0][row]), int(batch.place[1][row])) == (1 - seed, moment)
             for name, value in shown.items():
                 assert batch.shown[name][row].tolist() == pytest.approx(value.tolist(), abs=1e-6)
-            shown, *_ = view.step(0)
-            row += 1
+            shown, reward, terminated, truncated, _ = view.step(0)
+            assert plan.features["reward_scale"] * float(batch.rewards[1 - seed, moment]) == pytest.approx(
+                reward
+            )
+            row, moment, done = row + 1, moment + 1, terminated or truncated
     assert row == len(batch.shown["ego_speed"])
     assert batch.valid.sum() == row
     assert batch.threats.tolist() == [drives[1].threat, drives[0].threat]
 
 
+def test_a_later_start_is_a_drive_that_begins_later():
+    features = Features(inputs=("spike_peak", "frame", "ego_speed"), history=2, repeat=3)
+    drive = made_up(11, frame=True)
+    whole = Lessons([made_up(4, seed=1, frame=True), drive], features)
+    assert whole.starts == 3
+    for start in range(3):
+        cut = {name: array[start:] for name, array in drive.seen.items()}
+        rest = (getattr(drive, name)[start:] for name in ("frames", "rewards", "returns", "contacts"))
+        alone = Lessons([Drive(cut, *rest, drive.threat)], features, starts=1).batch([0])
+        batch = whole.batch([1], [start])
+        assert batch.valid.sum() == len(range(start, 11, 3))
+        for name, shown in alone.shown.items():
+            assert torch.equal(batch.shown[name], shown)
+        assert all(torch.equal(left, right) for left, right in zip(batch[2:], alone[2:], strict=True))
+
+
 def test_frames_have_their_history_in_the_channels():
-    features = Features(inputs=("frame", "ego_speed"), history=3)
+    features = Features(inputs=("frame", "ego_speed"), history=3, repeat=1)
     drives = [made_up(2, frame=True), made_up(4, seed=1, frame=True)]
     shown = Lessons(drives, features).batch([1]).shown["frame"]
     assert shown.shape == (4, 6, 40, 40)
@@ -55,7 +75,7 @@ def test_frames_have_their_history_in_the_channels():
 
 def test_the_expected_return_is_that_of_drawn_episodes():
     drives = [made_up(5), made_up(3, seed=1, threat=False)]
-    batch = Lessons(drives, Features(inputs=("ego_speed",), history=1)).batch([0, 1])
+    batch = Lessons(drives, Features(inputs=("ego_speed",), history=1, repeat=1)).batch([0, 1])
     logits = torch.randn(2, 5, generator=torch.Generator().manual_seed(0))
     told = expected_return(logits, batch)
     rng = np.random.default_rng(0)
@@ -76,7 +96,7 @@ def test_the_expected_return_is_that_of_drawn_episodes():
 
 def test_false_braking_gets_dearer_and_nothing_else():
     drives = [made_up(5), made_up(3, seed=1, threat=False)]
-    batch = Lessons(drives, Features(inputs=("ego_speed",), history=1)).batch([0, 1])
+    batch = Lessons(drives, Features(inputs=("ego_speed",), history=1, repeat=1)).batch([0, 1])
     dear = dearer(batch, 3.0)
     assert torch.equal(dear.returns[0], batch.returns[0])
     for moment in range(3):
@@ -89,7 +109,7 @@ def test_false_braking_gets_dearer_and_nothing_else():
 
 def learner(tmp_path, drives, judges, **changes):
     plan = order(tmp_path).plan()
-    features = {**plan.features, "inputs": ["spike_frequency", "ego_speed"], "repeat": 3}
+    features = {**plan.features, "inputs": ["spike_frequency", "ego_speed"], "repeat": 1}
     model = {"n_epochs": 60, "batch_size": 8, "learning_rate": 0.03, **changes}
     return Learner(replace(plan, features=features, model=model), drives, judges)
 
@@ -101,10 +121,10 @@ def told_apart(count, seed):
         length, threat = int(rng.integers(5, 9)), number % 2 == 0
         when = int(rng.integers(1, length - 1))
         drive = made_up(length, seed=number, threat=threat)
-        spikes = np.zeros(((length - 1) * 3 + 1, 1), np.float32)
+        spikes = np.zeros((length, 1), np.float32)
         returns = np.full(length, -5.0, np.float32)
         if threat:
-            spikes[3 * when], returns[when] = 200.0, 5.0
+            spikes[when], returns[when] = 200.0, 5.0
         contacts = np.arange(length) != when if threat else np.zeros(length, bool)
         seen = {**drive.seen, "spike_frequency": spikes}
         drives.append(Drive(seen, None, np.full(length, -0.1, np.float32), returns, contacts, threat))

@@ -15,7 +15,7 @@ from joblib import Parallel, delayed
 
 from lgmd_gym.agents.base import HOLD
 from lgmd_gym.agents.features import FRAME, SCALES, shrunk
-from lgmd_gym.training.onsets import Outcome, outcomes
+from lgmd_gym.training.onsets import STRIDE, Outcome, outcomes
 from lgmd_gym.training.orders import Plan
 
 BLIND = {"name": "wide", "shape": [8, 8]}  # the eye of the twin, never opened
@@ -23,13 +23,13 @@ BLIND = {"name": "wide", "shape": [8, 8]}  # the eye of the twin, never opened
 
 @dataclass(frozen=True)
 class Drive:
-    """One drive without braking, of T decisions of the policy.
+    """One drive without braking, of T decisions of the environment.
+
+    A policy may decide at any of them, so that policies of every pace learn from the same drives.
 
     Attributes:
-        seen: The environment's observations by name, at each of its own decisions up to the policy's last:
-            ((T - 1) · repeat + 1, n) each.
-        frames: Camera frames at the policy's decisions, shrunk already, uint8 (T, height, width, channels);
-            None if they are not wanted.
+        seen: The environment's observations by name, (T, n) each.
+        frames: Camera frames, shrunk already, uint8 (T, height, width, channels); None if not wanted.
         rewards: Reward of holding the speed for each decision, float32 (T,).
         returns: Return of braking at each decision, from there on, float32 (T,).
         contacts: Whether that ends in a contact, bool (T,).
@@ -79,7 +79,7 @@ def _record_some(plan: Plan, split: str, seeds: range) -> list[Drive]:
 
 
 def _drive(plan: Plan, sighted: gym.Env, twin: Any, seed: int) -> Drive:
-    """Drive an environment and its twin, which no eye watches, so that it can be copied at every decision."""
+    """Drive an environment, and a twin that no eye watches, so that it can be copied and braked at will."""
     hold, brake = plan.demands.index(HOLD), plan.demands.index(min(plan.demands))
     moments, frames, copies, rewards, done = [], [], [], [], False
     observation, info = sighted.reset(seed=seed)
@@ -87,18 +87,21 @@ def _drive(plan: Plan, sighted: gym.Env, twin: Any, seed: int) -> Drive:
     while not done:
         if FRAME in plan.features["inputs"]:
             frames.append(shrunk(observation[FRAME], plan.features["shrink"]))
-        copies.append(deepcopy(twin))
-        rewards.append(0.0)
-        for _ in range(plan.features["repeat"]):
-            moments.append(observation)
-            observation, reward, terminated, truncated, info = sighted.step(hold)
-            twin.step(hold)
-            rewards[-1] += float(reward)
-            done = terminated or truncated
-            if done:
-                break
-    found = outcomes(len(copies), lambda onset: _braked(copies[onset], brake))
-    del moments[(len(rewards) - 1) * plan.features["repeat"] + 1 :]  # no decision comes after them
+        if len(moments) % STRIDE == 0:
+            copies.append(deepcopy(twin))
+        moments.append(observation)
+        observation, reward, terminated, truncated, info = sighted.step(hold)
+        twin.step(hold)
+        rewards.append(float(reward))
+        done = terminated or truncated
+
+    def replay(onset: int) -> Outcome:
+        env = deepcopy(copies[onset // STRIDE])
+        for _ in range(onset % STRIDE):
+            env.step(hold)
+        return _braked(env, brake)
+
+    found = outcomes(len(moments), replay)
     return Drive(
         {name: np.stack([moment[name] for moment in moments]) for name in SCALES},
         np.stack(frames) if frames else None,

@@ -15,6 +15,7 @@ from lgmd_gym.training.orders import JUDGED, SEEDS_APART, Plan
 
 PART = 100  # drives in one file
 TOLD = ("rewards", "returns", "contacts")
+FORMAT = 2  # one drive's arrays are all of one length: the environment's decisions
 
 
 def drives_of(plan: Plan, split: str, folder: Path, progress: bool, jobs: int) -> list[Drive]:
@@ -85,11 +86,11 @@ def origin_of(plan: Plan) -> dict[str, Any]:
     """Return what drives depend on, as plain values; frames only if they are part of them."""
     framed = FRAME in plan.features["inputs"]
     origin = {
+        "format": FORMAT,
         "env_id": plan.env_id,
         "env_kwargs": plan.env_kwargs,
         "camera": plan.camera,
         "demands": plan.demands,
-        "repeat": plan.features["repeat"],
         "shrink": plan.features["shrink"] if framed else None,
         "lgmd_gym": lgmd_gym.__version__,
     }
@@ -115,7 +116,6 @@ def save(drives: list[Drive], file: Path, origin: dict[str, Any]) -> None:
     arrays: dict[str, Any] = {
         "origin": np.array(json.dumps(origin)),
         "lengths": np.array([len(drive) for drive in drives]),
-        "moments": np.array([len(drive.seen["ego_speed"]) for drive in drives]),
         "threats": np.array([drive.threat for drive in drives]),
     }
     for name in TOLD:
@@ -154,13 +154,13 @@ def _cut(kept: Any) -> Iterator[Drive]:
     arrays = {name: kept[name] for name in kept.files if name != "origin"}
     seen = {name.removeprefix("seen/"): array for name, array in arrays.items() if name.startswith("seen/")}
     frames = arrays.get("frames")
-    decisions, moments = (np.cumsum([0, *arrays[name]]) for name in ("lengths", "moments"))
+    ends = np.cumsum([0, *arrays["lengths"]])
     for index, threat in enumerate(arrays["threats"]):
-        told, lived = (slice(*ends[index : index + 2]) for ends in (decisions, moments))
-        rewards, returns, contacts = (arrays[name][told] for name in TOLD)
+        lived = slice(*ends[index : index + 2])
+        rewards, returns, contacts = (arrays[name][lived] for name in TOLD)
         yield Drive(
             {name: array[lived] for name, array in seen.items()},
-            None if frames is None else frames[told],
+            None if frames is None else frames[lived],
             rewards,
             returns,
             contacts,
