@@ -205,12 +205,19 @@ class Tune:
     """Tune a rule on training levels of LGMD/RandomBraking-v0 and false-reaction cases with other seeds.
 
     Validation levels choose among the best trials; test levels and the protocol suites stay unseen. What the
-    rule's eye sees is recorded once, so that a trial takes seconds; parameters that place cameras stay as
-    they are. A rule that does not latch (graded) is played out, which takes minutes a trial.
+    rule's eye sees is recorded once, so that a trial takes seconds. With cameras, placing or neuron the eye
+    itself is searched, too, and every trial has to see anew: about a minute. A rule that does not latch
+    (graded) is played out, which takes minutes a trial.
     """
 
     agent: str = "stopping-zone"
     """Name of a rule."""
+    cameras: tuple[str, ...] = ()
+    """Camera presets to choose among, for a rule with one camera, as fovea tele wide."""
+    placing: bool = False
+    """Search also what places the rule's own cameras, as stopping-zone's deceleration and reaction."""
+    neuron: tuple[str, ...] = ()
+    """Parameters of the neuron to search, each from half to twice the paper's, as sigma_3 t_sp."""
     trials: int = 40
     """Trials to add to the study."""
     levels: int = 100
@@ -224,7 +231,7 @@ class Tune:
     study: Path = Path("tune.db")
     """SQLite file of the study; one that exists is gone on with."""
     best: Path = Path("best.toml")
-    """TOML file for the chosen parameters; must not exist."""
+    """TOML file for the chosen parameters; must not exist. Those of the neuron go into BEST-neuron.toml."""
     sensitivity: bool = False
     """Do not search: shift each parameter by 20 % both ways and print the scores."""
 

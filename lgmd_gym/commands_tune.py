@@ -1,5 +1,6 @@
 """What `lgmd-gym tune` does with its parsed options."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -8,14 +9,18 @@ from rich.table import Table
 if TYPE_CHECKING:
     from lgmd_gym.cli_options import Tune
     from lgmd_gym.tuning_ground import Ground
+    from lgmd_gym.tuning_space import Proposal, Space
 
 
 def tune(options: "Tune") -> int:
     """Search or, with `--sensitivity`, shift a rule's parameters; print and keep what comes out."""
     from lgmd_gym import tuning
     from lgmd_gym.tuning_ground import Ground
+    from lgmd_gym.tuning_space import Space
 
-    tuning.tunable(options.agent)
+    space = Space(
+        agent=options.agent, cameras=options.cameras, placing=options.placing, neuron=options.neuron
+    )
     for name, value, low in (
         ("trials", options.trials, 1),
         ("levels", options.levels, 1),
@@ -29,13 +34,14 @@ def tune(options: "Tune") -> int:
     console = Console()
     validation = Ground("validation", options.levels, options.seeds, options.jobs)
     if options.sensitivity:
-        _sensitivity(options.agent, validation, console)
+        _sensitivity(space, validation, console)
         return 0
-    if options.best.exists():
-        raise ValueError(f"{str(options.best)!r} exists and is kept; choose another --best")
+    for path in (options.best, _beside(options.best)):
+        if path.exists():
+            raise ValueError(f"{str(path)!r} exists and is kept; choose another --best")
     train = Ground("train", options.levels, options.seeds, options.jobs)
     found = tuning.tune(
-        options.agent,
+        space,
         options.study,
         options.trials,
         train,
@@ -43,19 +49,41 @@ def tune(options: "Tune") -> int:
         options.false_cost,
         tell=lambda line: console.print(line, soft_wrap=True),
     )
-    options.best.write_text("".join(f"{name} = {value!r}\n" for name, value in found.items()), "utf-8")
-    console.print(f"chosen on validation levels: --agents {options.agent}:toml={options.best}")
+    console.print(f"chosen on validation levels: {_kept(options.agent, found, options.best)}", soft_wrap=True)
     return 0
 
 
-def _sensitivity(agent: str, ground: "Ground", console: Console) -> None:
+def _beside(best: Path) -> Path:
+    """Return the file for the neuron's parameters."""
+    return best.with_name(f"{best.stem}-neuron{best.suffix}")
+
+
+def _kept(agent: str, found: "Proposal", best: Path) -> str:
+    """Write what was found into files, and return the options of `lgmd-gym bench` that use them."""
+    from lgmd_gym.tuning_space import CAMERA, neuron_params, rule_options
+
+    told = f"--agents {agent}:toml={best}"
+    _write(best, rule_options(found))
+    if CAMERA in found:
+        told += f" --camera {found[CAMERA]}"
+    if neuron_params(found):
+        _write(_beside(best), neuron_params(found))
+        told += f" --params {_beside(best)}"
+    return told
+
+
+def _write(path: Path, values: "Proposal") -> None:
+    path.write_text("".join(f"{name} = {value!r}\n" for name, value in values.items()), "utf-8")
+
+
+def _sensitivity(space: "Space", ground: "Ground", console: Console) -> None:
     from lgmd_gym import tuning
 
-    base = ground.score(agent)
-    title = f"{agent}: each parameter 20 % lower and higher, on validation levels"
+    base = tuning.scored(space, {}, ground)
+    title = f"{space.agent}: each parameter 20 % lower and higher, on validation levels"
     table = Table("parameter", "value", "energy avoided", "false", title=title)
     rows = [("defaults", "", base)]
-    rows += [(name, f"{value:.4g}", score) for name, value, score in tuning.sensitivity(agent, ground)]
+    rows += [(name, f"{value:.4g}", score) for name, value, score in tuning.sensitivity(space, ground)]
     for name, value, score in rows:
         false = f"{round(score.false_rate * score.quiet)}/{score.quiet}"
         table.add_row(name, value, f"{score.avoided_energy:.3f} (n = {score.threats})", false)

@@ -6,7 +6,7 @@ eye sees can be recorded once, and the rule be asked on the record when it brake
 
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from joblib import Parallel, delayed
 from lgmd_gym.agents import BRAKE, HOLD, Agent, Rule, make_agent
 from lgmd_gym.benchmark.cases import Case
 from lgmd_gym.benchmark.episode import Episode, make_env, play
-from lgmd_gym.benchmark.eyesight import DEFAULT_CAMERA, Eyesight
+from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.benchmark.metrics import Counterfactual
 from lgmd_gym.benchmark.rows import make_row
 from lgmd_gym.benchmark.suites import find_suite
@@ -23,6 +23,7 @@ from lgmd_gym.benchmark.tasks import Task, run_task
 
 SEEDS_FROM = 1000  # of the false-reaction suite: reports count from 0
 TEXTURES = (0.5, 1.6)  # contrast of the asphalt, times the natural one
+OWN = Eyesight()  # each agent's own
 BLIND = Eyesight(camera={"name": "wide", "shape": [8, 8]})  # where nobody looks
 
 Row = dict[str, Any]
@@ -127,16 +128,20 @@ class Ground:
         self._eye, self._drives = "", []
         self._outcomes: dict[tuple[int, int | None], Row] = {}
 
-    def score(self, agent: str) -> Score:
+    def score(self, agent: str, eyesight: Eyesight = OWN) -> Score:
         """Score an agent's string on all of it.
+
+        Args:
+            agent: The string.
+            eyesight: What it sees through, where that is not left to the agent.
 
         Raises:
             RuntimeError: If an episode of an agent that does not latch fails; with its traceback.
         """
         made = make_agent(agent)
         if not latches(made):
-            return Score.of(self._closed_loop(agent, made))
-        drives = self._seen_by(made)
+            return Score.of(self._closed_loop(agent, eyesight.of(made)))
+        drives = self._seen_through(eyesight.of(made))
         onsets = [onset(made, drive) for drive in drives]
         new = [key for key in enumerate(onsets) if key not in self._outcomes]
         told = ((*self.places[index], drives[index].truth, found) for index, found in new)
@@ -144,18 +149,18 @@ class Ground:
         self._outcomes.update(zip(new, rows, strict=True))
         return Score.of(self._outcomes[key] for key in enumerate(onsets))
 
-    def _seen_by(self, agent: Any) -> list[Drive]:
-        """Return the drives through an agent's eye, recorded anew if it is not the last one's."""
-        eye = json.dumps([agent.camera, agent.neuron, agent.include_frame])
-        if eye != self._eye:
-            self._drives = self._run(record, ((*place, textured(agent, place[1])) for place in self.places))
-            self._eye = eye
+    def _seen_through(self, eye: Eyesight) -> list[Drive]:
+        """Return the drives through an eye, recorded anew if it is not the last one."""
+        told = json.dumps(asdict(eye.plain))
+        if told != self._eye:
+            worn = ((*place, textured(eye, place[1])) for place in self.places)
+            self._drives, self._eye = self._run(record, worn), told
         return self._drives
 
-    def _closed_loop(self, agent: str, made: Any) -> list[Row]:
+    def _closed_loop(self, agent: str, eye: Eyesight) -> list[Row]:
         truths = self._run(blind_truth, self.places)
         tasks = (
-            (Task(agent, case, seed, textured(made, seed), truth),)
+            (Task(agent, case, seed, textured(eye, seed), truth),)
             for (case, seed), truth in zip(self.places, truths, strict=True)
         )
         rows = [result.row for result in self._run(run_task, tasks)]
@@ -200,14 +205,13 @@ def blind_truth(case: Case, seed: int) -> Counterfactual:
     return Counterfactual.of(_played(case, seed, BLIND, BrakeFrom(None)))
 
 
-def textured(agent: Any, seed: int) -> Eyesight:
-    """Return an agent's own eye with the texture that belongs to a seed."""
-    eye = Eyesight().of(agent)
+def textured(eye: Eyesight, seed: int) -> Eyesight:
+    """Return an agent's eye with the texture that belongs to a seed."""
     rng = np.random.default_rng([7, seed])
     look = {"seed": 10_000 + seed, "texture": round(float(rng.uniform(*TEXTURES)), 3)}
-    cameras = eye.camera if isinstance(eye.camera, list) else [eye.camera or DEFAULT_CAMERA]
+    cameras = eye.camera if isinstance(eye.camera, list) else [eye.camera]
     worn = [{**({"name": item} if isinstance(item, str) else item), **look} for item in cameras]
-    return Eyesight(worn, eye.params, eye.condition, eye.include_frame)
+    return replace(eye, camera=worn)
 
 
 def avoided_energy(row: Row) -> float:

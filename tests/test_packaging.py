@@ -59,7 +59,8 @@ MAY = {
     "plots_paper": ("paper", "paper_claims", "plots", "stimuli"),
     "commands_paper": None,  # knows all
     "commands_tune": None,
-    "tuning": ("agents", "errors", "tuning_ground"),
+    "tuning": ("tuning_ground", "tuning_space"),
+    "tuning_space": ("agents", "benchmark", "camera", "errors", "neuron"),
     "tuning_ground": ("agents", "benchmark"),
     "commands_bench": None,
     "plots_bench": ("benchmark", "plots"),

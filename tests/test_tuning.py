@@ -2,8 +2,10 @@
 
 import pytest
 
-from lgmd_gym import tuning, tuning_ground
+from lgmd_gym import cli, tuning, tuning_ground
 from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.eyesight import Eyesight
+from lgmd_gym.tuning_space import Space, eyesight, searched, spelled, tunable
 
 
 class Known:
@@ -12,8 +14,8 @@ class Known:
     def __init__(self):
         self.asked = []
 
-    def score(self, agent):
-        self.asked.append(agent)
+    def score(self, agent, eyesight):
+        self.asked.append((agent, eyesight))
         threshold = make_agent(agent).params.threshold
         return tuning_ground.Score(1.0 - abs(threshold - 100.0) / 300.0, 0.0, 10, 10)
 
@@ -22,18 +24,18 @@ def test_a_study_finds_the_top_and_goes_on(tmp_path):
     pytest.importorskip("optuna")
     study, told = tmp_path / "study.db", []
     train = Known()
-    tuning.tune("spike-threshold", study, 3, train, Known(), tell=told.append)
+    tuning.tune(Space(agent="spike-threshold"), study, 3, train, Known(), tell=told.append)
     assert len(train.asked) == 3
-    assert "threshold=30.0" in train.asked[0]  # the defaults come first
-    found = tuning.tune("spike-threshold", study, 20, train, Known(), tell=told.append)
+    assert "threshold=30.0" in train.asked[0][0]  # the defaults come first
+    found = tuning.tune(Space(agent="spike-threshold"), study, 20, train, Known(), tell=told.append)
     assert len(train.asked) == 23
     assert any(line.startswith("trial 22:") for line in told)
     assert abs(found["threshold"] - 100.0) < 35.0
-    make_agent(tuning.spelled("spike-threshold", found))
+    make_agent(spelled("spike-threshold", found))
 
 
 def test_sensitivity_moves_one_parameter_at_a_time():
-    rows = tuning.sensitivity("spike-threshold", Known())
+    rows = tuning.sensitivity(Space(agent="spike-threshold"), Known())
     assert [(name, value) for name, value, _ in rows] == [
         ("threshold", pytest.approx(24.0)),
         ("threshold", pytest.approx(36.0)),
@@ -42,9 +44,67 @@ def test_sensitivity_moves_one_parameter_at_a_time():
     ]
 
 
-def test_only_rules_are_tuned():
-    with pytest.raises(ValueError, match="unknown rule 'fova'; did you mean 'fovea'"):
-        tuning.tunable("fova")
+def test_sensitivity_shifts_the_neuron_and_what_places_the_cameras():
+    known = Known()
+    rows = tuning.sensitivity(Space(agent="spike-threshold", neuron=("sigma_3",)), known)
+    assert [(name, value) for name, value, _ in rows[4:]] == [
+        ("neuron.sigma_3", 0.8),
+        ("neuron.sigma_3", 1.2),
+    ]
+    assert known.asked[-1] == ("spike-threshold", Eyesight(params={"sigma_3": 1.2}))
+    names = [name for name, _, _ in Space(agent="stopping-zone").shifts()]
+    assert names.count("deceleration") == names.count("reaction") == names.count("ground") == 2
+
+
+class Eye:
+    """Ground that likes a tele lens and a neuron with sigma_3 near 1.5."""
+
+    def score(self, agent, eyesight):
+        away = abs(eyesight.params["sigma_3"] - 1.5)
+        return tuning_ground.Score(0.5 * (eyesight.camera == "tele") - 0.3 * away, 0.0, 10, 10)
+
+
+def test_lens_and_neuron_are_searched_on_demand(tmp_path):
+    pytest.importorskip("optuna")
+    space = Space(agent="spike-threshold", cameras=("fovea", "tele"), neuron=("sigma_3",))
+    found = tuning.tune(space, tmp_path / "study.db", 30, Eye(), Eye(), tell=lambda line: None)
+    assert found["camera"] == "tele"
+    assert abs(found["neuron.sigma_3"] - 1.5) < 0.3
+    assert spelled("spike-threshold", found).startswith("spike-threshold:threshold=")
+    assert "neuron" not in spelled("spike-threshold", found)
+    assert eyesight(found).camera == "tele"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"agent": "fova"}, "unknown rule 'fova'; did you mean 'fovea'"),
+        ({"cameras": ("telle",)}, "unknown camera 'telle'; did you mean 'tele'"),
+        ({"agent": "stopping-zone", "cameras": ("tele",)}, "needs the cameras of its own eye"),
+        ({"neuron": ("sigma3",)}, "unknown number of the neuron 'sigma3'; did you mean 'sigma_3'"),
+        (
+            {"neuron": ("t_ffi",)},
+            "unknown number of the neuron 't_ffi'",
+        ),  # infinite: neither halved nor doubled
+    ],
+)
+def test_what_cannot_be_searched_is_refused(changes, words):
+    with pytest.raises(ValueError, match=words):
+        Space(**({"agent": "spike-threshold"} | changes))
+
+
+def test_what_is_found_is_what_the_benchmark_takes(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("optuna")
+    monkeypatch.chdir(tmp_path)
+    common = ["--levels", "2", "--seeds", "0", "--trials", "2", "--jobs", "1"]
+    searched_too = ["--agent", "spike-threshold", "--cameras", "tele", "fovea", "--neuron", "sigma_3"]
+    assert cli.run(["tune", *common, *searched_too]) == 0
+    told = capsys.readouterr().out.splitlines()[-1].split(": ", 1)[1].split()
+    assert told[0] == "--agents"
+    assert "--params" in told
+    assert cli.run(["bench", *told, "--suite", "r152", "--seeds", "1", "--jobs", "1"]) == 0
+    assert cli.run(["tune", *common, *searched_too]) == 2
+    assert "'best.toml' exists and is kept" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -61,7 +121,7 @@ def test_a_recorded_drive_tells_what_the_closed_loop_does(agent, levels, seeds):
     ground.score("spike-threshold")  # an eye before this one leaves nothing behind
     assert tuning_ground.latches(made)
     open_loop = ground.score(agent)
-    rows = ground._closed_loop(agent, made)
+    rows = ground._closed_loop(agent, Eyesight().of(made))
     assert open_loop == tuning_ground.Score.of(rows)
     assert open_loop.threats
     assert open_loop.quiet
@@ -80,10 +140,12 @@ def test_what_eases_off_is_played_out():
     assert not tuning_ground.latches(make_agent("ttc-oracle"))
 
 
-def test_what_places_the_cameras_is_not_searched():
-    assert {"deceleration", "reaction"}.isdisjoint(tuning.searched(tuning.tunable("stopping-zone")))
-    assert "ground" in tuning.searched(tuning.tunable("stopping-zone"))
-    assert tuning.searched(tuning.tunable("spike-threshold")) == ["threshold", "frames"]
+def test_what_places_the_cameras_is_searched_on_demand():
+    placing, rule = {"deceleration", "reaction"}, tunable("stopping-zone")
+    assert placing.isdisjoint(searched(rule))
+    assert placing < set(searched(rule, placing=True))
+    assert "ground" in searched(rule)
+    assert searched(tunable("spike-threshold")) == ["threshold", "frames"]
 
 
 @pytest.mark.slow
