@@ -48,20 +48,16 @@ def test_lessons_show_what_the_policys_view_shows(tmp_path):
     assert batch.threats.tolist() == [drives[1].threat, drives[0].threat]
 
 
-def test_a_later_start_is_a_drive_that_begins_later():
-    features = Features(inputs=("spike_peak", "frame", "ego_speed"), history=2, repeat=3)
+def test_a_policy_of_three_decisions_each_learns_from_every_third():
     drive = made_up(11, frame=True)
-    whole = Lessons([made_up(4, seed=1, frame=True), drive], features)
-    assert whole.starts == 3
-    for start in range(3):
-        cut = {name: array[start:] for name, array in drive.seen.items()}
-        rest = (getattr(drive, name)[start:] for name in ("frames", "rewards", "returns", "contacts"))
-        alone = Lessons([Drive(cut, *rest, drive.threat)], features, starts=1).batch([0])
-        batch = whole.batch([1], [start])
-        assert batch.valid.sum() == len(range(start, 11, 3))
-        for name, shown in alone.shown.items():
-            assert torch.equal(batch.shown[name], shown)
-        assert all(torch.equal(left, right) for left, right in zip(batch[2:], alone[2:], strict=True))
+    shown = Lessons([made_up(4, seed=1, frame=True), drive], Features(("frame", "ego_speed"), 1, 3, 1))
+    batch = shown.batch([1])
+    assert batch.valid.tolist() == [[1.0] * 4]
+    assert batch.returns[0].tolist() == drive.returns[::3].tolist()
+    assert batch.contacts[0].tolist() == drive.contacts[::3].tolist()
+    sums = [drive.rewards[first : first + 3].sum() for first in (0, 3, 6, 9)]
+    assert batch.rewards[0].tolist() == pytest.approx(sums, abs=1e-6)
+    assert np.array_equal(np.moveaxis(batch.shown["frame"].numpy(), 1, -1), drive.frames[::3])
 
 
 def test_frames_have_their_history_in_the_channels():

@@ -4,6 +4,7 @@ import contextlib
 import logging
 import threading
 import time
+import warnings
 from _thread import interrupt_main
 from collections.abc import Iterator
 from concurrent.futures.process import BrokenProcessPool
@@ -35,6 +36,8 @@ def open_pool(jobs: int, cluster: str | None = None) -> Iterator[Parallel]:
         ValueError: If the cluster cannot be reached.
     """
     if cluster is None:
+        # joblib replaces a worker that has grown by 300 MB, as by PyTorch for a policy, and warns of a leak.
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
         try:
             with Parallel(n_jobs=jobs, return_as="generator_unordered") as parallel:
                 yield parallel

@@ -53,7 +53,7 @@ class Learner:
     def __init__(self, plan: Plan, drives: list[Drive], judges: list[Drive]) -> None:
         self.plan, self.recipe = plan, Recipe.from_dict(plan.model)
         features = Features.from_dict(plan.features)
-        self.lessons, self.judges = Lessons(drives, features), Lessons(judges, features, starts=1)
+        self.lessons, self.judges = Lessons(drives, features), Lessons(judges, features)
         self.model = self._untaught()
         self.best = Look(-np.inf, 0.0, 0.0)
 
@@ -100,8 +100,7 @@ class Learner:
             policy.set_training_mode(True)
             gained = 0.0
             for chosen in np.array_split(rng.permutation(len(self.lessons)), steps):
-                starts = rng.integers(self.lessons.starts, size=len(chosen))
-                batch = dearer(self.lessons.batch(chosen, starts), recipe.false_cost)
+                batch = dearer(self.lessons.batch(chosen), recipe.false_cost)
                 value = expected_return(self.logits(batch), batch).mean()
                 optimizer.zero_grad()
                 (-0.1 * value).backward()

@@ -1,5 +1,7 @@
 """Recorded drives as batches to learn from: what a policy would be shown, and what braking brings."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,85 +36,68 @@ class Batch(NamedTuple):
 class Lessons:
     """Recorded drives as a policy with certain features would see them.
 
-    A policy that decides at every third decision of the environment may begin with the first, the second or
-    the third: each drive is as many lessons.
-
     Args:
         drives: At least one.
         features: Of the policy.
-        starts: Decisions of the environment at which a policy may begin; None for as many as one of its own
-            holds for.
     """
 
-    def __init__(self, drives: list[Drive], features: Features, starts: int | None = None) -> None:
+    def __init__(self, drives: list[Drive], features: Features) -> None:
         self.drives, self._features = drives, features
-        self.starts = min(features.repeat if starts is None else starts, *(len(drive) for drive in drives))
-        self._first = np.cumsum([0, *(len(drive) for drive in drives)])
-        self._shown = self._relived()
+        self._starts = np.cumsum([0, *(_decisions(drive, features.repeat) for drive in drives)])
+        self._shown = {}
+        if FRAME in features.inputs:
+            frames = [drive.frames[:: features.repeat] for drive in drives if drive.frames is not None]
+            self._shown[FRAME] = np.concatenate(frames)
+        signals = tuple(name for name in features.inputs if name != FRAME)
+        if signals:
+            # History is put together batch by batch: kept here, all would be there six times.
+            memory = Memory(replace(features, inputs=signals, history=1))
+            moments = [shown for drive in drives for shown in _relived(drive, memory)]
+            self._shown |= {name: np.stack([moment[name] for moment in moments]) for name in signals}
 
     def __len__(self) -> int:
         return len(self.drives)
 
-    def _relived(self) -> dict[str, np.ndarray]:
-        """Return what is shown at each decision of the environment, if it is one of the policy's."""
-        signals = tuple(name for name in self._features.inputs if name != FRAME)
-        shown = {}
-        if FRAME in self._features.inputs:
-            shown[FRAME] = np.concatenate([drive.frames for drive in self.drives if drive.frames is not None])
-        if signals:
-            # History is put together batch by batch: kept here, all would be there six times.
-            memory = Memory(Features(signals, history=1, repeat=self._features.repeat))
-            for first, drive in zip(self._first, self.drives, strict=False):
-                for start in range(self.starts):
-                    self._relive(drive, start, memory, shown, first)
-        return shown
-
-    def _relive(
-        self, drive: Drive, start: int, memory: Memory, shown: dict[str, np.ndarray], first: int
-    ) -> None:
-        memory.clear()
-        for moment in range(start, len(drive)):
-            memory.see({name: array[moment] for name, array in drive.seen.items()})
-            if (moment - start) % self._features.repeat == 0:
-                for name, told in memory.tell().items():
-                    if name not in shown:
-                        shown[name] = np.zeros((self._first[-1], *told.shape), told.dtype)
-                    shown[name][first + moment] = told
-
-    def batch(self, chosen: Any, starts: Any = 0) -> Batch:
-        """Return the drives with these indices, from these starts on (one for all, or one each)."""
+    def batch(self, chosen: Any) -> Batch:
+        """Return the drives with these indices."""
         repeat = self._features.repeat
-        starts = np.broadcast_to(starts, len(chosen))
         drives = [self.drives[index] for index in chosen]
-        moments = [np.arange(start, len(d), repeat) for d, start in zip(drives, starts, strict=True)]
-        lengths = np.array([len(some) for some in moments])
-        rows, columns = np.repeat(np.arange(len(drives)), lengths), _counted(lengths)
-        first = (self._first[np.asarray(chosen)] + starts)[rows]
-        shown = {name: self._with_history(name, columns, first) for name in self._shown}
+        lengths = np.array([_decisions(drive, repeat) for drive in drives])
+        rows = np.repeat(np.arange(len(drives)), lengths)
+        columns = np.concatenate([np.arange(length) for length in lengths])
+        starts = self._starts[np.asarray(chosen)][rows]
+        shown = {name: self._with_history(name, columns, starts) for name in self._shown}
 
         def laid_out(told: list[np.ndarray]) -> torch.Tensor:
             table = np.zeros((len(drives), lengths.max()), told[0].dtype)
             table[rows, columns] = np.concatenate(told)
             return torch.from_numpy(table)
 
-        pairs = list(zip(drives, moments, strict=True))
         return Batch(
             shown,
-            (torch.from_numpy(rows), torch.from_numpy(columns)),
-            rewards=laid_out([np.add.reduceat(drive.rewards, at) for drive, at in pairs]),
-            returns=laid_out([drive.returns[at] for drive, at in pairs]),
-            valid=laid_out([np.ones(len(at), np.float32) for at in moments]),
-            contacts=laid_out([drive.contacts[at] for drive, at in pairs]),
+            place=(torch.from_numpy(rows), torch.from_numpy(columns)),
+            rewards=laid_out([np.add.reduceat(d.rewards, range(0, len(d), repeat)) for d in drives]),
+            returns=laid_out([drive.returns[::repeat] for drive in drives]),
+            valid=laid_out([np.ones(length, np.float32) for length in lengths]),
+            contacts=laid_out([drive.contacts[::repeat] for drive in drives]),
             threats=torch.tensor([drive.threat for drive in drives]),
         )
 
-    def _with_history(self, name: str, columns: np.ndarray, first: np.ndarray) -> torch.Tensor:
+    def _with_history(self, name: str, columns: np.ndarray, starts: np.ndarray) -> torch.Tensor:
         back = range(self._features.history - 1, -1, -1)
-        at = [first + self._features.repeat * np.maximum(columns - steps, 0) for steps in back]
-        joined = np.concatenate([self._shown[name][moments] for moments in at], axis=-1)
+        parts = [self._shown[name][starts + np.maximum(columns - steps, 0)] for steps in back]
+        joined = np.concatenate(parts, axis=-1)
         return torch.from_numpy(np.moveaxis(joined, -1, 1).copy() if name == FRAME else joined)
 
 
-def _counted(lengths: np.ndarray) -> np.ndarray:
-    """Return 0, 1, ... up to each of the lengths, one after another."""
-    return np.concatenate([np.arange(length) for length in lengths])
+def _decisions(drive: Drive, repeat: int) -> int:
+    """Return how often a policy decides on a drive."""
+    return -(-len(drive) // repeat)
+
+
+def _relived(drive: Drive, memory: Memory) -> Iterator[dict[str, np.ndarray]]:
+    memory.clear()
+    for moment in range(len(drive)):
+        memory.see({name: array[moment] for name, array in drive.seen.items()})
+        if moment % memory.features.repeat == 0:
+            yield memory.tell()
