@@ -36,7 +36,7 @@ class StoppingZoneParams(RuleParams):
             flows by is enough to excite their upright fields, and a steel plate the ground ones.
         yaw_rate: Own yaw rate beyond which it does not judge [rad/s].
         settle: Frames for which it does not judge after that.
-        crawl: Own speed below which it does not judge [m/s].
+        crawl: Own speed below which it does not judge [m/s]; UN R152 5.2.1.3 begins at 10 km/h (2.8 m/s).
     """
 
     deceleration: float = above_zero(9.0, 7.0, 10.0, places_eye=True)
@@ -50,7 +50,7 @@ class StoppingZoneParams(RuleParams):
     near_share: float = above_zero(0.5, 0.3, 0.8)
     yaw_rate: float = above_zero(0.03, 0.01, 0.1)
     settle: int = count(15, 1, 60)
-    crawl: float = above_zero(1.5, 0.5, 2.5)
+    crawl: float = above_zero(2.5, 0.5, 2.7)
 
 
 class StoppingZone(Rule):

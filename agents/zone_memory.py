@@ -22,8 +22,8 @@ ZONED = {
 class ZoneMemory:
     """The fields around the zone of own speed, over the frames since the policy's last decision.
 
-    As the rule of that eye does, it believes what two consecutive frames tell, and nothing while the car
-    turns and for half a second after: own rotation excites the fields as an obstacle does.
+    As the rule of that eye does, it believes what two consecutive frames tell, and nothing at a crawl, while
+    the car turns, and for half a second after that: own rotation excites the fields as an obstacle does.
 
     Args:
         name: "zones", "zones_spikes" or "zones_ffi".
@@ -34,7 +34,7 @@ class ZoneMemory:
         self.source, self._scale = ZONED[name]
         self._name, self._fade = name, fade
         params = StoppingZoneParams()
-        self._near_share = params.near_share
+        self._near_share, self._crawl = params.near_share, params.crawl
         self._gate = SteeringGate(params.yaw_rate, params.settle)
         self._last: list[np.ndarray] = []  # newest last, NEAR_FRAMES at most
         self._peak, self._held = np.zeros(AROUND), np.zeros(AROUND + 1)
@@ -51,7 +51,7 @@ class ZoneMemory:
             ValueError: If the eye is another one.
         """
         check_zones(self._name, signal.shape)
-        trusted = self._gate.open(yaw_rate)
+        trusted = self._gate.open(yaw_rate) and speed > self._crawl
         told = excitation(signal) if self._name == "zones" else np.asarray(signal, np.float64)
         ground, upright = np.split(told, 2)
         around = around_the_zone(ground, upright, speed, self._near_share) * trusted

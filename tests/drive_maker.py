@@ -8,7 +8,12 @@ from lgmd_gym.training.orders import Order
 YAML = """
 default:
   env_wrapper:
-    - lgmd_gym.training.PolicyView: {history: 3, repeat: 5, latch: true, reward_scale: 0.5}
+    - lgmd_gym.training.PolicyView:
+        inputs: [spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, ego_yaw_rate]
+        history: 3
+        repeat: 5
+        latch: true
+        reward_scale: 0.5
   n_timesteps: 6
   n_epochs: 3
   batch_size: 4

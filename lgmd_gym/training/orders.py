@@ -145,8 +145,7 @@ class Order:
         features = Features.from_dict(settings.features | wished)
         if self.algo == RECORDED:
             Recipe.from_dict(settings.model)
-            if not features.latch:
-                raise ValueError("recorded learns when to brake: its hyperparameters need latch: true")
+            _check_recordable(features)
         return Plan(
             algo=self.algo,
             env_id=self.env_id,
@@ -172,3 +171,14 @@ class Order:
         if camera is None:
             raise ValueError(f"agent {self.eye!r} has no eye of its own; use camera, or eye 'stopping-zone'")
         return camera
+
+
+def _check_recordable(features: Features) -> None:
+    if not features.latch:
+        raise ValueError("recorded learns when to brake: its hyperparameters need latch: true")
+    if "speed_change" in features.inputs:
+        # A policy that had it braked in traffic whenever the driver sped up.
+        raise ValueError(
+            "recorded drives hold their speed, so that 'speed_change' teaches nothing and misleads wherever "
+            "the speed does change; leave it out of the inputs"
+        )
