@@ -125,7 +125,7 @@ def test_a_recorded_drive_tells_what_the_closed_loop_does(agent, levels, seeds):
     assert open_loop == tuning_ground.Score.of(rows)
     assert open_loop.threats
     assert open_loop.quiet
-    found = [tuning_ground.onset(made, drive) for drive in ground._drives]
+    found = [tuning_ground.onset(made, drive) for drive in ground._seen_through(Eyesight().of(made))]
     assert {index is None for index in found} == {True, False}  # it brakes in some and not in all
     for key, row in zip(enumerate(found), rows, strict=True):
         recorded = ground._outcomes[key]
@@ -133,6 +133,15 @@ def test_a_recorded_drive_tells_what_the_closed_loop_does(agent, levels, seeds):
             recorded[name] == row[name]
             for name in ("collision", "relative_impact_speed", "ttc_at_brake", "duration", "episode_return")
         )
+
+
+def test_the_last_eyes_are_kept(monkeypatch):
+    ground, recorded = tuning_ground.Ground("train", 1, 0), []
+    monkeypatch.setattr(tuning_ground, "record", lambda *place: recorded.append(place[-1]) or recorded[-1])
+    eyes = [Eyesight(camera=name) for name in ("wide", "tele", "fovea", "standard", "paper")]
+    for eye in (*eyes[:4], eyes[0], eyes[4], eyes[0], eyes[1]):
+        assert ground._seen_through(eye)[0].camera[0]["name"] == eye.camera
+    assert len(recorded) == 6  # the four, the fifth, and the second anew, which was dropped for it
 
 
 def test_what_eases_off_is_played_out():
