@@ -117,6 +117,13 @@ def test_zones_are_silent_while_the_car_turns_and_forget():
     assert zones_of(memory, *[zone_eye(there)] * 2)[0][0] == pytest.approx(3.0, abs=0.01)
 
 
+def test_zones_are_silent_at_a_crawl():
+    memory = Memory(Features(inputs=("zones",), history=1))
+    there = {(10, "ground"): 3.0, (10, "upright"): 3.0}
+    assert zones_of(memory, *[zone_eye(there, speed=2.4)] * 3) == ([0.0] * 6, [0.0] * 5)
+    assert zones_of(memory, *[zone_eye(there, speed=2.6)] * 2)[0][0] == pytest.approx(3.0, abs=0.01)
+
+
 def test_zones_need_their_eye():
     given = observed(1.0) | {"membrane_potential": np.array([0.5, 0.6]), "ego_yaw_rate": np.zeros(1)}
     with pytest.raises(ValueError, match="needs the eye of stopping-zone with 20 cameras, got 2; train with"):

@@ -274,6 +274,21 @@ def test_the_shipped_policy_brakes_for_a_car_and_not_for_a_road(family):
     assert not info["collision"]
 
 
+@pytest.mark.parametrize("acceleration", [3.0, 0.5, -3.0])
+def test_the_shipped_policy_takes_no_offence_at_the_drivers_foot(acceleration):
+    """An earlier one was shown how its speed changed, which it never did in what it learnt from."""
+    agent = make_agent("policy:zones")
+    times = np.arange(0.0, 8.0, 1 / 30)
+    speeds = (0.0 if acceleration > 0 else 24.0) + acceleration * times
+    for speed in speeds:
+        seen = {
+            "membrane_potential": np.full(20, 0.55, np.float32),
+            "ego_speed": np.array([speed], np.float32),
+            "ego_yaw_rate": np.zeros(1, np.float32),
+        }
+        assert agent.act(seen, {})[0] == 0.0
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
