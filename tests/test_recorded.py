@@ -143,6 +143,19 @@ def test_it_learns_what_can_be_learnt(tmp_path):
     assert after.ret == pytest.approx(np.mean(wanted), abs=1e-4)
 
 
+def test_certainty_has_its_price(tmp_path):
+    """Where braking is always wrong, one that pays for being sure goes on trying it."""
+    quiet = [made_up(8, seed=seed, threat=False) for seed in range(12)]
+    drives = [replace(drive, returns=np.full(8, -5.0, np.float32)) for drive in quiet]
+    best, reached = np.mean([drive.rewards.sum() for drive in drives]), []
+    for decay in (0.0, 0.05):
+        learner(tmp_path, drives, drives, logit_decay=decay).learn(
+            lambda number, told: reached.append(told["train"])
+        )
+    assert reached[59] == pytest.approx(best, abs=0.1)
+    assert reached[119] < best - 0.5
+
+
 def test_a_look_plays_each_drive_to_its_first_braking(tmp_path):
     drives = [made_up(4), made_up(3, seed=1, threat=False), made_up(5, seed=2)]
     taught = learner(tmp_path, drives, drives)
@@ -227,6 +240,8 @@ def test_orders_that_cannot_be_are_refused(tmp_path):
         Recipe.from_dict({"epochs": 3})
     with pytest.raises(ValueError, match="batch_size must be a whole number >= 1, got 0"):
         Recipe.from_dict({"batch_size": 0})
+    with pytest.raises(ValueError, match=r"logit_decay must be in \[0, 1\]"):
+        Recipe.from_dict({"logit_decay": -1.0})
     with pytest.raises(ValueError, match="first_chance"):
         Recipe.from_dict({"first_chance": 1.0})
     wanted.hyperparams.write_text(YAML.replace("batch_size", "batchsize"))

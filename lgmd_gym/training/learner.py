@@ -101,9 +101,11 @@ class Learner:
             gained = 0.0
             for chosen in np.array_split(rng.permutation(len(self.lessons)), steps):
                 batch = dearer(self.lessons.batch(chosen), recipe.false_cost)
-                value = expected_return(self.logits(batch), batch).mean()
+                logits = self.logits(batch)
+                value = expected_return(logits, batch).mean()
+                certainty = (logits * batch.valid).square().sum(1).mean()
                 optimizer.zero_grad()
-                (-0.1 * value).backward()
+                (-0.1 * (value - recipe.logit_decay * certainty)).backward()
                 torch.nn.utils.clip_grad_norm_(taught, 1.0)
                 optimizer.step()
                 schedule.step()

@@ -20,6 +20,9 @@ class Recipe:
         false_cost: How many times what it costs braking in a drive without a threat costs while learning.
             Few drives are of the kinds that tempt to brake, and 2 keeps it from trying its luck.
         first_chance: Chance of braking at a decision before anything is learnt.
+        logit_decay: What certainty costs: weight of the squared log odds of braking, summed over a drive's
+            decisions. Without it a slow learner, such as a network on frames, is soon sure never to brake,
+            and then learns nothing more.
         policy_kwargs: Of stable-baselines3's policy.
     """
 
@@ -29,6 +32,7 @@ class Recipe:
     weight_decay: float = 0.01
     false_cost: float = 2.0
     first_chance: float = 0.03
+    logit_decay: float = 0.0
     policy_kwargs: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -36,6 +40,7 @@ class Recipe:
             whole(name, getattr(self, name), 1)
         for name in ("learning_rate", "false_cost"):
             positive(name, getattr(self, name))
+        check_within("logit_decay", self.logit_decay, 0.0, 1.0)
         check_within("first_chance", self.first_chance, 1e-6, 0.999)
 
     @classmethod
