@@ -13,6 +13,7 @@ from joblib.externals.loky import get_reusable_executor
 from lgmd_gym import cli
 from lgmd_gym.agents import AGENTS
 from lgmd_gym.benchmark.rows import KEYS
+from lgmd_gym.training.orders import Order
 from lgmd_gym.video import VideoWriter
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -53,13 +54,16 @@ def test_code_blocks_run(path, tmp_path, monkeypatch):
     get_reusable_executor().shutdown(wait=True)  # another page's workers look in another folder
     space = {"__name__": path.stem}
     for kind, block in BLOCK.findall(path.read_text()):
-        assert kind in ("python", "bash", "text"), f"say here what is done with a block of {kind}"
+        assert kind in ("python", "bash", "text", "yaml"), f"say here what is done with a block of {kind}"
         if kind == "python":
             exec(compile(block, path.name, "exec"), space)
             keep_module(path, block, tmp_path)
         elif kind == "bash":
             for line in block.strip().splitlines():
                 run_line(line)
+        elif kind == "yaml":  # hyperparameters
+            (tmp_path / "hyper.yml").write_text(block)
+            Order("recorded", hyperparams=tmp_path / "hyper.yml", inputs=("frame",)).plan()
     sys.modules.pop("my_agent", None)
 
 
