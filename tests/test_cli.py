@@ -165,6 +165,8 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # A shell that runs this in its background has its children ignore the interrupt.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     while not (out / "episodes.jsonl").exists() or (out / "episodes.jsonl").read_text().count("\n") < 20:
         time.sleep(0.2)
