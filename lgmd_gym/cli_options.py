@@ -192,6 +192,8 @@ class Train:
     """Episodes of a look; default: 60, of recorded 600."""
     drives: Path | None = None
     """Training folder of a recorded one with the same eye, whose drives are learnt from."""
+    traffic: int = 0
+    """Drives through traffic, where braking is the fault, that recorded learns from beside the levels."""
     jobs: int = 2
     """Processes that record drives."""
     out: Path | None = None

@@ -33,6 +33,7 @@ def train(options: "Train") -> int:
             eval_every=options.eval_every,
             eval_episodes=options.eval_episodes,
             drives=options.drives,
+            traffic=options.traffic,
         )
         out = options.out or Path("runs") / f"train-{options.algo}-{time.strftime('%Y%m%d-%H%M%S')}"
         training = Training.start(order, out)

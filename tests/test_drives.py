@@ -7,8 +7,9 @@ import pytest
 from drive_maker import made_up, order
 
 from lgmd_gym.training.drives import record
+from lgmd_gym.training.lots import check_drives, drives_of
 from lgmd_gym.training.onsets import STRAIGHT, Outcome, outcomes
-from lgmd_gym.training.recordings import check_drives, drives_of, load, origin_of, save
+from lgmd_gym.training.recordings import load, origin_of, save
 from lgmd_gym.training.trainer import Training
 
 
@@ -62,10 +63,11 @@ def test_few_replays_find_jumps_and_bends():
 
 def test_a_file_gives_back_its_drives(tmp_path):
     drives = [made_up(4, frame=True), made_up(2, seed=1, threat=False, frame=True)]
-    save(drives, tmp_path / "some.npz", {"camera": "fovea"})
+    save([drives, []], tmp_path / "some.npz", {"camera": "fovea"})
     again, origin = load(tmp_path / "some.npz")
     assert origin == {"camera": "fovea"}
-    for left, right in zip(drives, again, strict=True):
+    assert again[1:] == [[]]
+    for left, right in zip(drives, again[0], strict=True):
         assert left.threat == right.threat
         for name in ("rewards", "returns", "contacts"):
             assert np.array_equal(getattr(left, name), getattr(right, name))
@@ -85,14 +87,14 @@ def test_drives_of_another_kind_are_refused(tmp_path, changes, words):
     kept = tmp_path / "drives" / "train"
     kept.mkdir(parents=True)
     for number in range(2):
-        save([made_up()], kept / f"{number}.npz", origin_of(order(tmp_path).plan()))
+        save([[made_up()]], kept / f"{number}.npz", origin_of(order(tmp_path).plan()))
     plan = order(tmp_path, drives=tmp_path, **changes).plan()
     with pytest.raises(ValueError, match=words):
         check_drives(plan)
 
 
 def test_an_interrupted_recording_goes_on(tmp_path, monkeypatch):
-    from lgmd_gym.training import recordings
+    from lgmd_gym.training import lots
 
     asked, plan = [], order(tmp_path, steps=5).plan()
 
@@ -102,8 +104,8 @@ def test_an_interrupted_recording_goes_on(tmp_path, monkeypatch):
         asked.append(seeds)
         return [made_up(seed=seed) for seed in seeds]
 
-    monkeypatch.setattr(recordings, "PART", 2)
-    monkeypatch.setattr(recordings, "record", recorded)
+    monkeypatch.setattr(lots, "PART", 2)
+    monkeypatch.setattr(lots, "record", recorded)
     with pytest.raises(KeyboardInterrupt):
         drives_of(plan, "train", tmp_path, progress=False, jobs=1)
     del asked[:1]

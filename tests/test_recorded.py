@@ -206,7 +206,7 @@ def test_drives_are_kept_and_learnt_from_again(tmp_path, monkeypatch):
     common = ["train", "--algo", "recorded", "--camera", "fovea", "--hyperparams", hyper, "--jobs", "1"]
     first, second = tmp_path / "first", tmp_path / "second"
     assert cli.run([*common, "--eval-episodes", "4", "--out", str(first)]) == 0
-    monkeypatch.setattr("lgmd_gym.training.recordings.record", None)  # nothing is recorded anew
+    monkeypatch.setattr("lgmd_gym.training.lots.record", None)  # nothing is recorded anew
     again = [*common, "--eval-episodes", "3", "--steps", "5", "--inputs", "ffi", "ego_speed"]
     assert cli.run([*again, "--drives", str(first), "--out", str(second)]) == 0
     assert not (second / "drives").exists()

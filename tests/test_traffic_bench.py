@@ -19,8 +19,9 @@ from lgmd_gym.benchmark.traffic_drive import RESEED, Ride
 from lgmd_gym.benchmark.traffic_rows import KEYS, Braking, make_row
 from lgmd_gym.benchmark.traffic_summary import poisson_interval, traffic_scores
 from lgmd_gym.benchmark.traffic_tables import COLUMNS, traffic_table, write_traffic_summary
-from lgmd_gym.benchmark.traffic_trace import Emergencies, fork, look_ahead, record
+from lgmd_gym.benchmark.traffic_trace import fork, look_ahead, record
 from lgmd_gym.envs.traffic import KINDS
+from lgmd_gym.envs.traffic_emergencies import Emergencies
 
 EYES = Eyesight()
 SHORT = {"duration": 12}

@@ -10,10 +10,9 @@ import numpy as np
 from lgmd_gym.agents import HOLD, demand
 from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.envs.traffic import make_traffic
+from lgmd_gym.envs.traffic_emergencies import HARD, HORIZON, Emergencies, drive_on
 
 EVERY = 300  # decisions between two kept states: copying one takes as long as some 20 decisions
-HORIZON = 10.0  # [s] after a brake within which an emergency makes it needed; the horizon of `ttc`
-HARD = 5.0  # [m/s²], UN R152 2.1: an emergency braking demand is for 5.0 m/s² at least
 
 
 class Seen(NamedTuple):
@@ -21,28 +20,6 @@ class Seen(NamedTuple):
 
     observation: dict[str, Any]
     info: dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Emergencies:
-    """The emergencies of a drive in which nobody brakes but the driver.
-
-    An emergency is the ego's contact, with whatever part of it, or the driver himself braking by `HARD` or
-    more: whoever brakes then brakes with good reason, even if the driver alone would have managed.
-
-    Attributes:
-        contact: Time of the ego's contact [s]; None without one.
-        hard: Times of the decisions after which the driver braked hard [s], ascending.
-    """
-
-    contact: float | None
-    hard: tuple[float, ...]
-
-    def need(self, time: float, horizon: float = HORIZON) -> float | None:
-        """Return how long after `time` [s] the next emergency is, 0 if it is one; None beyond `horizon`."""
-        times = [*self.hard, *([] if self.contact is None else [self.contact])]
-        after = [moment - time for moment in times if -1e-9 <= moment - time <= horizon + 1e-9]
-        return max(min(after), 0.0) if after else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,13 +114,4 @@ def look_ahead(env: gym.Env, time: float, horizon: float = HORIZON) -> Emergenci
         horizon: How far to look [s].
     """
     base: Any = fork(env, blind=True).unwrapped
-    vars(base.road).pop("step", None)  # nobody watches this branch
-    policy_hz = base.config["policy_frequency"]
-    hard = [time] if base.ego.driver <= -HARD else []
-    for step in range(1, round(horizon * policy_hz) + 1):
-        if base.road.touch is not None:
-            return Emergencies(time + (step - 1) / policy_hz, tuple(hard))
-        base.coast()
-        if base.ego.driver <= -HARD:
-            hard.append(time + step / policy_hz)
-    return Emergencies(time + horizon if base.road.touch is not None else None, tuple(hard))
+    return drive_on(base, time, horizon)

@@ -47,6 +47,33 @@ class Drive:
         return len(self.rewards)
 
 
+class Moments:
+    """What is seen at the decisions of a drive, as it is kept.
+
+    Args:
+        plan: Of the training.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._seen: list[dict[str, np.ndarray]] = []
+        self._frames: list[np.ndarray] = []
+        self._shrink = plan.features["shrink"] if FRAME in plan.features["inputs"] else None
+
+    def __len__(self) -> int:
+        return len(self._seen)
+
+    def add(self, observation: dict[str, np.ndarray]) -> None:
+        """Keep an observation."""
+        self._seen.append({name: observation[name] for name in SCALES})
+        if self._shrink is not None:
+            self._frames.append(shrunk(observation[FRAME], self._shrink))
+
+    def arrays(self) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
+        """Return what was seen by name, and the frames if they are wanted."""
+        seen = {name: np.stack([moment[name] for moment in self._seen]) for name in SCALES}
+        return seen, np.stack(self._frames) if self._frames else None
+
+
 def record(plan: Plan, split: str, seeds: range, jobs: int, tell: Callable[[int], Any]) -> list[Drive]:
     """Record one drive for each seed that an environment is reset with.
 
@@ -81,15 +108,13 @@ def _record_some(plan: Plan, split: str, seeds: range) -> list[Drive]:
 def _drive(plan: Plan, sighted: gym.Env, twin: Any, seed: int) -> Drive:
     """Drive an environment, and a twin that no eye watches, so that it can be copied and braked at will."""
     hold, brake = plan.demands.index(HOLD), plan.demands.index(min(plan.demands))
-    moments, frames, copies, rewards, done = [], [], [], [], False
+    moments, copies, rewards, done = Moments(plan), [], [], False
     observation, info = sighted.reset(seed=seed)
     twin.reset(seed=seed)
     while not done:
-        if FRAME in plan.features["inputs"]:
-            frames.append(shrunk(observation[FRAME], plan.features["shrink"]))
         if len(moments) % STRIDE == 0:
             copies.append(deepcopy(twin))
-        moments.append(observation)
+        moments.add(observation)
         observation, reward, terminated, truncated, info = sighted.step(hold)
         twin.step(hold)
         rewards.append(float(reward))
@@ -103,8 +128,7 @@ def _drive(plan: Plan, sighted: gym.Env, twin: Any, seed: int) -> Drive:
 
     found = outcomes(len(moments), replay)
     return Drive(
-        {name: np.stack([moment[name] for moment in moments]) for name in SCALES},
-        np.stack(frames) if frames else None,
+        *moments.arrays(),
         np.array(rewards, np.float32),
         np.array([item.ret for item in found], np.float32),
         np.array([item.contact for item in found]),

@@ -41,6 +41,8 @@ class Plan:
         eval_every: Decisions between two looks at the validation split; "recorded" looks after every pass.
         eval_episodes: Episodes of a look.
         drives: Folder of a training of "recorded" whose drives are learnt from; None to record them.
+        traffic: Drives through traffic that "recorded" learns from beside the levels; for the looks, a
+            quarter as many.
     """
 
     algo: str
@@ -57,6 +59,7 @@ class Plan:
     eval_every: int
     eval_episodes: int
     drives: str | None = None
+    traffic: int = 0
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
@@ -99,6 +102,7 @@ class Order:
         eval_every: Decisions between two looks at the validation split; "recorded" looks after every pass.
         eval_episodes: Episodes of a look; None for 60, of "recorded" 600.
         drives: Folder of a training of "recorded" whose drives are learnt from; None to record them.
+        traffic: Drives through traffic that "recorded" learns from beside the levels.
         env_kwargs: Further arguments of `gym.make`.
     """
 
@@ -114,6 +118,7 @@ class Order:
     eval_every: int = 20_000
     eval_episodes: int | None = None
     drives: Path | None = None
+    traffic: int = 0
     env_kwargs: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -131,6 +136,9 @@ class Order:
             raise ValueError(f"recorded learns when to brake: demands must be 0 and {HARD} or less, as 0 -1")
         if self.drives is not None and not recorded:
             raise ValueError(f"drives are what algo 'recorded' learns from; {self.algo} drives itself")
+        whole("traffic", self.traffic, 0)
+        if self.traffic and not recorded:
+            raise ValueError(f"traffic is what algo 'recorded' learns from; {self.algo} has env_id alone")
         if self.eye is not None and self.camera:
             raise ValueError(f"give either camera or eye, got {list(self.camera)} and {self.eye!r}")
 
@@ -161,6 +169,7 @@ class Order:
             eval_every=self.eval_every,
             eval_episodes=self.eval_episodes or (600 if self.algo == RECORDED else 60),
             drives=None if self.drives is None else str(self.drives),
+            traffic=self.traffic,
         )
 
     def _lenses(self) -> Any:

@@ -4,8 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from lgmd_gym.training.learner import Learner
+from lgmd_gym.training.lots import drives_of
 from lgmd_gym.training.orders import Plan
-from lgmd_gym.training.recordings import drives_of
 
 
 def learn_recorded(plan: Plan, folder: Path, progress: bool, jobs: int) -> Any:

@@ -9,8 +9,8 @@ import lgmd_gym
 from lgmd_gym.agents.policy import write_card
 from lgmd_gym.errors import check_keys
 from lgmd_gym.folders import new_folder
+from lgmd_gym.training.lots import check_drives
 from lgmd_gym.training.orders import Order, Plan
-from lgmd_gym.training.recordings import check_drives
 from lgmd_gym.training.settings import RECORDED
 
 PLAN = "plan.json"
