@@ -22,7 +22,9 @@ class Bench:
     """Agents with options, as in spike-threshold:threshold=45,frames=2, or your own as MODULE:CLASS. Default:
     no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""
     seeds: int | None = None
-    """Seeds per case, from 0 on; a seed draws the place on the road and the target's grey. Default: 3."""
+    """Seeds per case; a seed draws the place on the road and the target's grey. Default: 3."""
+    first_seed: int | None = None
+    """Seeds are played from this one on. Default: 0."""
     conditions: tuple[str, ...] | None = None
     """Camera conditions, each played: clear, night, fog, robust. Default: clear."""
     camera: str | None = None

@@ -100,6 +100,7 @@ def _new(options: "Bench", console: Console) -> "Run | TrafficRun":
         "suite": options.suite,
         "agents": options.agents,
         "seeds": options.seeds,
+        "first_seed": options.first_seed,
         "conditions": options.conditions,
         "camera": options.camera,
         "params": _read_params(options.params),
@@ -109,7 +110,7 @@ def _new(options: "Bench", console: Console) -> "Run | TrafficRun":
         config = RunConfig(**({"suite": SUITE, "agents": DEFAULT_AGENTS, "seeds": SEEDS} | given))
     else:
         if given:
-            names = ", ".join(f"--{name}" for name in given)
+            names = ", ".join(f"--{name.replace('_', '-')}" for name in given)
             raise ValueError(f"--config says what to play; leave out {names}, or change the file")
         config = RunConfig.load(options.config)
     name = Path(config.suite).stem
@@ -128,7 +129,8 @@ def _report(run: "Run | TrafficRun", console: Console, options: "Bench") -> None
     level = LGMDParams.from_dict(run.eyesight.params or {}).t_sf
     fps = next((f"{row['fps']:g} Hz" for row in rows if row["fps"]), "?")
     eye = f"camera {run.eyesight.label} at {fps}, T_sf = {level:g} spikes/s"
-    title = f"{run.suite}: {eye}, {run.seeds} seeds"
+    first = f" from {run.config.first_seed} on" if run.config.first_seed else ""
+    title = f"{run.suite}: {eye}, {run.seeds} seeds{first}"
     if isinstance(run, TrafficRun):
         _report_traffic(run, console, f"{title} of {len(run.kinds)} kinds of traffic")
         return
@@ -172,20 +174,21 @@ def _write_curves(path: Path) -> None:
 
 
 def _draw_cases(run: "Run", alert_level: float) -> None:
-    """Draw every case's seed 0, all agents in one figure."""
+    """Draw every case's first seed, all agents in one figure."""
     from lgmd_gym import plots
-    from lgmd_gym.benchmark.runner import TRACED_SEED, trace_name
+    from lgmd_gym.benchmark.runner import trace_name
 
+    seed = run.config.first_seed
     folder = run.folder.path / "plots"
     folder.mkdir(exist_ok=True)
     for condition in run.conditions:
         for case in run.cases:
-            names = {agent: trace_name(agent, case.name, TRACED_SEED, condition) for agent in run.agents}
+            names = {agent: trace_name(agent, case.name, seed, condition) for agent in run.agents}
             found = {agent: run.folder.series(name) for agent, name in names.items()}
             episodes = {agent: series for agent, series in found.items() if series is not None}
             if episodes:
-                file = trace_name("", case.name, TRACED_SEED, condition).replace("____seed0", "")
-                title = f"{case.name}, seed {TRACED_SEED}, {condition}"
+                file = trace_name("", case.name, seed, condition).replace(f"____seed{seed}", "")
+                title = f"{case.name}, seed {seed}, {condition}"
                 plots.episode_figure(folder / f"{file}.png", title, episodes, alert_level)
 
 

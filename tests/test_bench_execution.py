@@ -99,6 +99,24 @@ def test_a_run_is_repeated_from_its_own_config(short_suite, tmp_path):
     assert (tmp_path / "b" / "run.toml").read_text() == (tmp_path / "a" / "run.toml").read_text()
 
 
+def test_seeds_from_one_on_are_those_of_a_longer_run(short_suite, tmp_path, capsys):
+    whole = Run(str(short_suite), ["spike-threshold"], 3, 1, tmp_path / "whole")
+    assert whole.play()
+    out = tmp_path / "late"
+    flags = ["--suite", str(short_suite), "--agents", "spike-threshold", "--jobs", "1", "--out", str(out)]
+    assert cli.run(["bench", *flags, "--seeds", "2", "--first-seed", "1"]) == 0
+    assert "2 seeds from 1 on" in " ".join(capsys.readouterr().out.split())
+    late = resume_run(out, 1)  # nothing is missing
+    assert late.play()
+    assert late.total == len(late.rows)
+    assert late.rows == [row for row in whole.rows if row["seed"] > 0]
+    page = (out / "report.html").read_text()
+    assert "seeds from 1 on" in page
+    assert "hardest contact" in page or "narrowest stop" in page  # the first seed played has its traces
+    again = repeat_run(RunConfig.load(out / "run.toml"), 1, tmp_path / "again")
+    assert again.config.played == range(1, 3)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -118,8 +136,8 @@ def test_bad_configs_name_the_mend(tmp_path, text, words, capsys):
 
 
 def test_config_and_options_do_not_mix(tmp_path, capsys):
-    assert cli.run(["bench", "--config", "run.toml", "--seeds", "2"]) == 2
-    assert "leave out --seeds" in capsys.readouterr().err
+    assert cli.run(["bench", "--config", "run.toml", "--seeds", "2", "--first-seed", "4"]) == 2
+    assert "leave out --seeds, --first-seed," in capsys.readouterr().err
 
 
 def test_an_unreachable_cluster_fails_in_seconds(tmp_path, capsys):

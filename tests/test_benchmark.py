@@ -324,7 +324,7 @@ def test_bad_runs_are_refused_before_anything_is_played(tmp_path):
         (("quik", ["no-brake"], 1, 1, tmp_path / "a"), "did you mean 'quick'"),
         (("quick", ["nobrake"], 1, 1, tmp_path / "a"), "did you mean 'no-brake'"),
         (("quick", [], 1, 1, tmp_path / "a"), "at least one"),
-        (("quick", ["no-brake"], 0, 1, tmp_path / "a"), "seeds must be >= 1, got 0"),
+        (("quick", ["no-brake"], 0, 1, tmp_path / "a"), "seeds must be a whole number >= 1, got 0"),
         (("quick", ["no-brake"], 1, 0, tmp_path / "a"), "jobs must be >= 1, got 0"),
         (("quick", ["no-brake"], 1, 1, tmp_path / "there"), "exists and is kept"),
         (("quick", ["no-brake"], 1, 1, tmp_path / "a", Eyesight("fova")), "did you mean 'fovea'"),

@@ -306,7 +306,7 @@ def test_a_run_that_was_broken_off_is_played_to_its_end(tmp_path):
 @pytest.mark.slow
 def test_jobs_change_nothing():
     def rows(jobs):
-        given = run_traffic(["spike-threshold", "random-brake"], ["merge", "intersection"], 2, jobs)
+        given = run_traffic(["spike-threshold", "random-brake"], ["merge", "intersection"], range(2), jobs)
         return sorted(given, key=lambda item: (item["case"], item["agent"]))
 
     assert rows(1) == rows(2)
@@ -316,15 +316,19 @@ def test_bad_input_is_refused_before_anything_is_played(tmp_path):
     for arguments, message in (
         ((["spike-treshold"], ["merge"], 1, 1), "did you mean 'spike-threshold'"),
         ((["no-brake"], ["merg"], 1, 1), "did you mean 'merge'"),
-        (([], ["merge"], 1, 1), "agents needs at least one name"),
-        ((["no-brake"], [], 1, 1), "kinds needs at least one name"),
-        ((["no-brake"], ["merge"], 0, 1), "seeds must be >= 1, got 0"),
+        (([], ["merge"], 1, 1), "agents needs at least one"),
+        ((["no-brake"], [], 1, 1), "kinds needs at least one"),
         ((["no-brake"], ["merge"], 1, -1), "jobs must be >= 1, got -1"),
     ):
+        agents, kinds, seeds, jobs = arguments
         with pytest.raises(ValueError, match=message):
-            run_traffic(*arguments)
+            run_traffic(agents, kinds, range(seeds), jobs)
         with pytest.raises(ValueError, match=message):
             TrafficRun(*arguments, tmp_path / "run")
     with pytest.raises(ValueError, match="foeva"):
-        run_traffic(["no-brake"], ["merge"], 1, 1, Eyesight(camera="foeva"))
+        run_traffic(["no-brake"], ["merge"], [0], 1, Eyesight(camera="foeva"))
+    with pytest.raises(ValueError, match="seeds needs at least one"):
+        run_traffic(["no-brake"], ["merge"], [], 1)
+    with pytest.raises(ValueError, match="seeds must be a whole number >= 1, got 0"):
+        TrafficRun(["no-brake"], ["merge"], 0, 1, tmp_path / "run")
     assert not (tmp_path / "run").exists()

@@ -18,19 +18,21 @@ def run(
     params: Any = None,
     conditions: Iterable[str] = ("clear",),
     cluster: str | None = None,
+    first_seed: int = 0,
 ) -> "pd.DataFrame":
     """Play a suite and return its rows.
 
     Args:
         suite: Name of a suite, the path of a suite file (".toml"), or "traffic".
         agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
-        seeds: Number of seeds, played from 0 on.
+        seeds: Number of seeds.
         jobs: Processes; 1 plays in this one.
         out: Run folder to keep, which must not exist; None keeps none.
         camera: See `LGMDObservation`; None for each agent's own, see `Agent.camera`.
         params: See `LGMDObservation`.
         conditions: Camera conditions by name, such as "clear" and "robust"; the suite is played under each.
         cluster: Address of a Dask scheduler to play on, in place of processes.
+        first_seed: Seeds are played from this one on.
 
     Returns:
         One line per episode with the columns of `lgmd_gym.benchmark.rows.KEYS`, `no-brake` included; for
@@ -50,7 +52,8 @@ def run(
 
     with TemporaryDirectory() as spare:
         folder = Path(out or Path(spare) / "run")
-        played = start_run(suite, agents, seeds, jobs, folder, Eyesight(camera, params), conditions, cluster)
+        eyesight = Eyesight(camera, params)
+        played = start_run(suite, agents, seeds, jobs, folder, eyesight, conditions, cluster, first_seed)
         if not played.play():
             raise RuntimeError(f"{played.stopped}: {len(played.rows)} of {played.total} episodes kept")
         return pd.DataFrame(played.rows)

@@ -25,10 +25,11 @@ class RunConfig:
     Attributes:
         suite: A suite's name, or the path of a suite file.
         agents: Agent strings.
-        seeds: Number of seeds, played from 0 on, >= 1.
+        seeds: Number of seeds, >= 1.
         conditions: Camera conditions by name, each of which is played.
         camera: See `LGMDObservation`; plain values, None for each agent's own eye.
         params: See `LGMDObservation`; plain values, None for the defaults.
+        first_seed: Seeds are played from this one on, >= 0.
     """
 
     suite: str
@@ -37,6 +38,18 @@ class RunConfig:
     conditions: tuple[str, ...] = (CLEAR,)
     camera: Any = None
     params: dict[str, Any] | None = None
+    first_seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, low in (("seeds", 1), ("first_seed", 0)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or value < low:
+                raise ValueError(f"{name} must be a whole number >= {low}, got {value!r}")
+
+    @property
+    def played(self) -> range:
+        """The seeds."""
+        return range(self.first_seed, self.first_seed + self.seeds)
 
     @property
     def eyesight(self) -> Eyesight:
@@ -65,8 +78,6 @@ class RunConfig:
                 raise ValueError(f"key {key!r} is missing")
         if not isinstance(values["suite"], str):
             raise ValueError(f"suite must be a string, got {values['suite']!r}")
-        if isinstance(values["seeds"], bool) or not isinstance(values["seeds"], int):
-            raise ValueError(f"seeds must be a whole number >= 1, got {values['seeds']!r}")
         for key in ("agents", "conditions"):
             items = values.get(key, [CLEAR])
             if not isinstance(items, list) or not all(isinstance(item, str) for item in items):

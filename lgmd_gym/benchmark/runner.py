@@ -28,7 +28,6 @@ DEFAULT_AGENTS = (
     "stopping-zone",
     "ttc-oracle",
 )
-TRACED_SEED = 0  # whose time series are kept of every agent, for the plots
 
 
 class Run(Session):
@@ -41,12 +40,13 @@ class Run(Session):
     Args:
         suite: Name of a suite, or the path of a suite file (see `own_suites`).
         agents: Agent strings.
-        seeds: Number of seeds, played from 0 on.
+        seeds: Number of seeds.
         jobs: Processes; 1 plays in this one.
         out: The run folder, which must not exist; or an open one, whose episodes are not played again.
         eyesight: Camera and neuron parameters; each agent's own eye by default.
         conditions: Camera conditions by name; the suite is played once under each.
         cluster: Address of a Dask scheduler to play on, in place of processes.
+        first_seed: Seeds are played from this one on; its time series are kept of every agent.
 
     Raises:
         ValueError: For an unknown name, a count below 1, a cluster that does not answer, or a folder that
@@ -63,6 +63,7 @@ class Run(Session):
         eyesight: Eyesight | None = None,
         conditions: Iterable[str] = (CLEAR,),
         cluster: str | None = None,
+        first_seed: int = 0,
     ) -> None:
         found = get_suite(suite)
         self.cases: tuple[Case, ...] = found.cases
@@ -71,16 +72,7 @@ class Run(Session):
         for name, given in (("agents", agents), ("conditions", conditions)):
             if not given:
                 raise ValueError(f"{name} needs at least one name, got none")
-        if seeds < 1:
-            raise ValueError(f"seeds must be >= 1, got {seeds!r}")
         plain = (eyesight or Eyesight()).plain
-        self.conditions = {condition: plain.under(condition) for condition in conditions}
-        for under in self.conditions.values():
-            # Refuses an unusable camera or parameter here rather than once per episode.
-            for agent in made:
-                make_env(self.cases[0], under.of(agent)).close()
-        check_pool(jobs, cluster)
-        folder = out if isinstance(out, RunFolder) else RunFolder.create(out)
         own = suite.endswith(".toml")
         config = RunConfig(
             suite=OWN_SUITE if own else suite,
@@ -89,7 +81,15 @@ class Run(Session):
             conditions=conditions,
             camera=plain.camera,
             params=plain.params,
+            first_seed=first_seed,
         )
+        self.conditions = {condition: plain.under(condition) for condition in conditions}
+        for under in self.conditions.values():
+            # Refuses an unusable camera or parameter here rather than once per episode.
+            for agent in made:
+                make_env(self.cases[0], under.of(agent)).close()
+        check_pool(jobs, cluster)
+        folder = out if isinstance(out, RunFolder) else RunFolder.create(out)
         if own and not (folder.path / OWN_SUITE).exists():
             save_suite(found, folder.path / OWN_SUITE)
         if not (folder.path / FILE).exists():
@@ -108,7 +108,7 @@ class Run(Session):
             Task(NO_BRAKE, case, seed, eyesight, condition=condition)
             for condition, eyesight in self.conditions.items()
             for case in self.cases
-            for seed in range(self.seeds)
+            for seed in self.config.played
         ]
         done = {key_of(row): row for row in self.rows}
         truths = {key[1:]: Counterfactual.of_row(row) for key, row in done.items() if key[0] == NO_BRAKE}
@@ -132,7 +132,10 @@ class Run(Session):
         """Play tasks and yield their results, each kept before it is yielded."""
         results = cast(Iterator[Result], parallel(delayed(run_task)(task) for task in tasks))
         for result in results:
-            task, traced = result.task, result.task.agent == NO_BRAKE or result.task.seed == TRACED_SEED
+            task, traced = (
+                result.task,
+                result.task.agent == NO_BRAKE or result.task.seed == self.config.first_seed,
+            )
             # Before the row: what has a row is never played again.
             if traced and result.series is not None:
                 self.folder.add_series(trace_name(*task.key), result.series)

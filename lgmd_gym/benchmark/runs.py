@@ -25,28 +25,30 @@ def start_run(
     eyesight: Eyesight | None = None,
     conditions: Iterable[str] = (CLEAR,),
     cluster: str | None = None,
+    first_seed: int = 0,
 ) -> Run | TrafficRun:
     """Return a new run, to be played.
 
     Args:
         suite: A name in `SUITE_NAMES`, or the path of a suite file, which ends in ".toml".
         agents: Agent strings.
-        seeds: Number of seeds, played from 0 on; for traffic, of every kind.
+        seeds: Number of seeds; for traffic, of every kind.
         jobs: Processes; 1 plays in this one.
         out: The run folder, which must not exist.
         eyesight: Camera and neuron parameters; each agent's own eye by default.
         conditions: Camera conditions by name; traffic is played under one.
         cluster: Address of a Dask scheduler to play on, in place of processes.
+        first_seed: Seeds are played from this one on.
 
     Raises:
         ValueError: For an unknown name, a count below 1, a cluster that does not answer, or a folder that
             exists or cannot be made; before anything is played.
     """
     if suite == TRAFFIC:
-        return TrafficRun(agents, KINDS, seeds, jobs, out, eyesight, conditions, cluster)
+        return TrafficRun(agents, KINDS, seeds, jobs, out, eyesight, conditions, cluster, first_seed)
     if suite not in SUITES and not suite.endswith(".toml"):
         raise unknown_name("suite", suite, SUITE_NAMES)
-    return Run(suite, agents, seeds, jobs, out, eyesight, conditions, cluster)
+    return Run(suite, agents, seeds, jobs, out, eyesight, conditions, cluster, first_seed)
 
 
 def repeat_run(config: RunConfig, jobs: int, out: Path, cluster: str | None = None) -> Run | TrafficRun:
@@ -56,7 +58,15 @@ def repeat_run(config: RunConfig, jobs: int, out: Path, cluster: str | None = No
         ValueError: As `start_run`.
     """
     return start_run(
-        config.suite, config.agents, config.seeds, jobs, out, config.eyesight, config.conditions, cluster
+        config.suite,
+        config.agents,
+        config.seeds,
+        jobs,
+        out,
+        config.eyesight,
+        config.conditions,
+        cluster,
+        config.first_seed,
     )
 
 
@@ -70,7 +80,10 @@ def resume_run(path: Path, jobs: int, cluster: str | None = None) -> Run | Traff
     settings = folder.settings()
     eyesight = Eyesight(settings["camera"], settings["params"])
     agents, seeds, conditions = settings["agents"], settings["seeds"], settings["conditions"]
+    first = settings.get("first_seed", 0)  # of a run broken off before there was a choice
     if settings["suite"] == TRAFFIC:
-        return TrafficRun(agents, settings["kinds"], seeds, jobs, folder, eyesight, conditions, cluster)
+        return TrafficRun(
+            agents, settings["kinds"], seeds, jobs, folder, eyesight, conditions, cluster, first
+        )
     suite = str(path / OWN_SUITE) if settings["suite"] == OWN_SUITE else settings["suite"]
-    return Run(suite, agents, seeds, jobs, folder, eyesight, conditions, cluster)
+    return Run(suite, agents, seeds, jobs, folder, eyesight, conditions, cluster, first)

@@ -89,6 +89,7 @@ class Session:
                 "suite": config.suite,
                 "agents": list(config.agents),
                 "seeds": config.seeds,
+                "first_seed": config.first_seed,
                 "conditions": list(config.conditions),
                 "camera": config.camera,
                 "params": config.params,

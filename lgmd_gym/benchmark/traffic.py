@@ -35,7 +35,7 @@ FULL_SEEDS = 110  # of every kind: 300 km and more without braking
 def run_traffic(
     agents: Iterable[str],
     kinds: Iterable[str] = tuple(KINDS),
-    seeds: int = FULL_SEEDS,
+    seeds: Iterable[int] = range(FULL_SEEDS),
     jobs: int = 1,
     eyesight: Eyesight | None = None,
     done: Collection[tuple[str, str]] = (),
@@ -49,22 +49,23 @@ def run_traffic(
     Args:
         agents: Agent strings.
         kinds: Names in `lgmd_gym.envs.traffic.KINDS`.
-        seeds: Number of seeds per kind, played from 0 on.
+        seeds: Of every kind.
         jobs: Processes; 1 plays in this one.
         eyesight: Camera and neuron parameters.
         done: Pairs of agent and case that need not be played.
         cluster: Address of a Dask scheduler to play on, in place of processes.
 
     Raises:
-        ValueError: For an unknown name, none at all, or a count below 1; before anything is played.
+        ValueError: For an unknown name, or none at all; before anything is played.
     """
     agents, kinds, eyesight = list(dict.fromkeys(agents)), list(dict.fromkeys(kinds)), eyesight or Eyesight()
+    seeds = list(seeds)
     _check(agents, kinds, seeds, eyesight)
     check_pool(jobs, cluster)
     # Seed by seed rather than kind by kind, so that what Ctrl-C leaves is a fair sample.
     wanted = [
         ([agent for agent in agents if (agent, case_name(kind, seed)) not in done], kind, seed)
-        for seed in range(seeds)
+        for seed in seeds
         for kind in kinds
     ]
     return _play([task for task in wanted if task[0]], jobs, eyesight, cluster)
@@ -79,15 +80,13 @@ def _play(
             yield from rows
 
 
-def _check(agents: list[str], kinds: list[str], seeds: int, eyesight: Eyesight) -> None:
-    for name, given in (("agents", agents), ("kinds", kinds)):
+def _check(agents: list[str], kinds: list[str], seeds: list[int], eyesight: Eyesight) -> None:
+    for name, given in (("agents", agents), ("kinds", kinds), ("seeds", seeds)):
         if not given:
-            raise ValueError(f"{name} needs at least one name, got none")
+            raise ValueError(f"{name} needs at least one, got none")
     made = [make_agent(agent) for agent in agents]
     for kind in kinds:
         find_kind(kind)
-    if seeds < 1:
-        raise ValueError(f"seeds must be >= 1, got {seeds!r}")
     # Refuses an unusable camera or parameter here rather than once per drive.
     for agent in made:
         make_traffic(kinds[0], **eyesight.of(agent).arguments).close()
@@ -138,12 +137,13 @@ class TrafficRun(Session):
     Args:
         agents: Agent strings.
         kinds: Names in `lgmd_gym.envs.traffic.KINDS`.
-        seeds: Number of seeds per kind, played from 0 on.
+        seeds: Number of seeds per kind.
         jobs: Processes; 1 plays in this one.
         out: The run folder, which must not exist; or an open one, whose drives are not played again.
         eyesight: Camera and neuron parameters.
         conditions: One camera condition by name.
         cluster: Address of a Dask scheduler to play on, in place of processes.
+        first_seed: Seeds are played from this one on.
 
     Raises:
         ValueError: As `run_traffic`, for several conditions, or for a folder that exists or cannot be made;
@@ -160,6 +160,7 @@ class TrafficRun(Session):
         eyesight: Eyesight | None = None,
         conditions: Iterable[str] = (CLEAR,),
         cluster: str | None = None,
+        first_seed: int = 0,
     ) -> None:
         conditions = tuple(conditions)
         if len(conditions) != 1:
@@ -170,9 +171,6 @@ class TrafficRun(Session):
         held = out.rows if isinstance(out, RunFolder) else []
         done = {(row["agent"], row["case"]) for row in held}
         agents = tuple(dict.fromkeys(agents))
-        under = plain.under(conditions[0])
-        self._coming = run_traffic(agents, self.kinds, seeds, jobs, under, done, cluster)
-        folder = out if isinstance(out, RunFolder) else RunFolder.create(out)
         config = RunConfig(
             suite=SUITE,
             agents=agents,
@@ -180,7 +178,11 @@ class TrafficRun(Session):
             conditions=conditions,
             camera=plain.camera,
             params=plain.params,
+            first_seed=first_seed,
         )
+        under = plain.under(conditions[0])
+        self._coming = run_traffic(agents, self.kinds, config.played, jobs, under, done, cluster)
+        folder = out if isinstance(out, RunFolder) else RunFolder.create(out)
         if not (folder.path / FILE).exists():
             config.save(folder.path / FILE)
         super().__init__(config, folder, list(held), jobs, cluster)

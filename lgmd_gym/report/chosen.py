@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from lgmd_gym.benchmark.runner import TRACED_SEED
 from lgmd_gym.benchmark.scores import impact
 from lgmd_gym.benchmark.summary import case_order
 from lgmd_gym.benchmark.tasks import NO_BRAKE
@@ -18,12 +17,18 @@ def seen_agent(agents: list[str]) -> str:
     return next(iter([*by_name, *(agent for agent in agents if agent != NO_BRAKE), NO_BRAKE]))
 
 
+def first_seed(rows: list[Row]) -> int:
+    """Return the seed whose time series are kept of every agent."""
+    return min((row["seed"] for row in rows), default=0)
+
+
 def telling_cases(rows: list[Row], agent: str) -> dict[str, Row]:
     """Return why an episode is shown, and the episode: the extremes of the traced seed."""
+    first = first_seed(rows)
     own = [
         row
         for row in sorted(rows, key=lambda row: case_order(row["case"]))
-        if row["agent"] == agent and row["seed"] == TRACED_SEED and row["error"] is None
+        if row["agent"] == agent and row["seed"] == first and row["error"] is None
     ]
     avoided = [row for row in own if row["avoided"]]
     contacts = [row for row in own if row["collision"]]
@@ -50,12 +55,10 @@ def telling_cases(rows: list[Row], agent: str) -> dict[str, Row]:
 def false_reactions(rows: list[Row], agents: list[str]) -> list[Row]:
     """Return the traced seed's false brakings by agents that look, the hardest first, at most a dozen."""
     looking = [agent for agent in agents if agent.split(":")[0] not in BLIND]
+    first = first_seed(rows)
     found = [
         row
         for row in rows
-        if row["error"] is None
-        and row["false_brake"]
-        and row["seed"] == TRACED_SEED
-        and row["agent"] in looking
+        if row["error"] is None and row["false_brake"] and row["seed"] == first and row["agent"] in looking
     ]
     return sorted(found, key=lambda row: (-row["peak_deceleration"], row["case"], row["agent"]))[:GALLERY]

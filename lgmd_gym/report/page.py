@@ -21,7 +21,7 @@ from lgmd_gym.benchmark.tables import mean_kmh, rate_text
 from lgmd_gym.benchmark.tasks import NO_BRAKE
 from lgmd_gym.envs.units import KMH
 from lgmd_gym.neuron import LGMDParams
-from lgmd_gym.report.chosen import false_reactions, seen_agent, telling_cases
+from lgmd_gym.report.chosen import false_reactions, first_seed, seen_agent, telling_cases
 from lgmd_gym.report.grids import grids
 from lgmd_gym.report.pictures import Picture, figure_uri, frames_at, moments
 
@@ -87,6 +87,7 @@ def write_report(path: Path) -> Path:
     text = pages.get_template("page.html").render(
         suite=next(iter(source.cases)).split("/")[0],
         settings=source.settings,
+        first_seed=first_seed(source.rows),
         agents=source.agents,
         episodes=len(source.rows),
         failed=sum(row["error"] is not None for row in source.rows),
