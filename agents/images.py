@@ -1,4 +1,8 @@
-"""Baselines on the frames themselves, without a neuron: what simpler measures reach through one fovea."""
+"""Baselines on the frames themselves, without a neuron: what simpler measures reach through one fovea.
+
+Their defaults were found by `lgmd-gym tune --cameras fovea tele wide` (60 trials, of the flow 24) on the
+splits train and validation, as rules on the neuron are tuned; `docs/benchmark.md` compares them.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -78,7 +82,10 @@ class FrameDifferenceParams(ImageParams):
         settle: See `ImageParams`.
     """
 
-    level: float = above_zero(3.0, 0.5, 20.0)
+    level: float = above_zero(4.78, 0.5, 20.0)
+    frames: int = count(8, 1, 12)
+    yaw_rate: float = above_zero(0.0384, 0.01, 0.3)
+    settle: int = count(60, 1, 60)
 
 
 class FrameDifference(ImageRule):
@@ -108,7 +115,10 @@ class FlowDivergenceParams(ImageParams):
         settle: See `ImageParams`.
     """
 
-    level: float = above_zero(0.3, 0.05, 3.0)
+    level: float = above_zero(0.454, 0.05, 3.0)
+    frames: int = count(4, 1, 12)
+    yaw_rate: float = above_zero(0.0713, 0.01, 0.3)
+    settle: int = count(25, 1, 60)
 
 
 class FlowDivergence(ImageRule):

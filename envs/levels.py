@@ -16,6 +16,7 @@ CLEAR = "clear"
 CONDITIONS = (CLEAR, "night", "fog", "robust")  # the camera's, by name; a test holds them together
 THREAT_SHARE = 0.5
 SPEED_KMH = (10.0, 80.0)
+HEADWAY = (0.5, 3.0)  # [s]; FMVSS 127 has a lead brake 12 m ahead at 80 km/h, which is 0.54 s
 
 
 def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> None:
@@ -96,7 +97,7 @@ def _moving(rng: np.random.Generator) -> dict[str, Any]:
 def _braking(rng: np.random.Generator) -> dict[str, Any]:
     return {
         "ego_speed": _speed(rng, 30.0),
-        "headway": float(rng.uniform(0.9, 3.0)),
+        "headway": float(rng.uniform(*HEADWAY)),
         "deceleration": float(rng.uniform(2.0, 6.0)),
         "build_up": float(rng.uniform(0.3, 1.0)),
         "overlap": _overlap(rng),
@@ -126,7 +127,7 @@ THREATS: dict[str, Any] = {
     },
 }
 QUIET: dict[str, Any] = {
-    "Following": lambda rng: {"ego_speed": _speed(rng), "headway": float(rng.uniform(1.0, 3.0))},
+    "Following": lambda rng: {"ego_speed": _speed(rng), "headway": float(rng.uniform(*HEADWAY))},
     "BrakeRelease": lambda rng: {
         "ego_speed": _speed(rng, 40.0),
         "headway": float(rng.uniform(1.5, 2.5)),

@@ -188,6 +188,6 @@ def _check_recordable(features: Features) -> None:
     if "speed_change" in features.inputs:
         # A policy that had it braked in traffic whenever the driver sped up.
         raise ValueError(
-            "nobody speeds up in recorded drives, so that 'speed_change' teaches little and misleads "
+            "nobody speeds up on recorded levels, so that 'speed_change' teaches little and misleads "
             "wherever somebody does; leave it out of the inputs"
         )
