@@ -129,12 +129,12 @@ def told_apart(count, seed):
 
 def test_it_learns_what_can_be_learnt(tmp_path):
     taught = learner(tmp_path, told_apart(40, 0), told_apart(20, 1))
-    before = taught.look(taught.judges)
+    before = taught.look()
     assert (before.avoided, before.false) == (0.0, 0.0)  # it does not brake before it has learnt to
     logged = []
     taught.learn(lambda number, reached: logged.append((number, reached)))
     assert [number for number, _ in logged] == list(range(1, 61))
-    after = taught.look(taught.judges)
+    after = taught.look()
     assert (after.avoided, after.false) == (1.0, 0.0)
     assert after.ret == pytest.approx(taught.best.ret) == pytest.approx(logged[-1][1]["best"])
     threats = [drive for drive in told_apart(20, 1) if drive.threat]
@@ -161,7 +161,7 @@ def test_a_look_plays_each_drive_to_its_first_braking(tmp_path):
     taught = learner(tmp_path, drives, drives)
     table = torch.tensor([[-1.0, 2, -1, 3, 0], [-1, -1, -1, 9, 9], [-1, -1, -1, 1, -1]])
     taught.logits = lambda batch: table
-    look = taught.look(taught.judges)
+    look = taught.look()
     ends = [
         drives[0].rewards[0] + drives[0].returns[1],
         drives[1].rewards.sum(),  # what lies beyond its end is no decision
@@ -169,6 +169,22 @@ def test_a_look_plays_each_drive_to_its_first_braking(tmp_path):
     ]
     assert look.ret == pytest.approx(np.mean(ends), abs=1e-6)
     assert (look.avoided, look.false) == (0.5, 0.0)
+
+
+def test_a_look_tells_levels_from_traffic(tmp_path):
+    levels = [made_up(4), made_up(3, seed=1, threat=False)]
+    pieces = [made_up(3, seed=seed, threat=False) for seed in (2, 3)]
+    plan = replace(order(tmp_path).plan(), eval_episodes=2)
+    features = {**plan.features, "inputs": ["ego_speed"], "repeat": 1}
+    plan = replace(plan, features=features, model={"n_epochs": 1})
+    taught = Learner(plan, levels, levels + pieces, pieces=2)
+    table = torch.tensor([[-1.0] * 4, [-1.0] * 4, [-1.0, 1, -1, -1], [-1.0] * 4])
+    taught.logits = lambda batch: table
+    look = taught.look()
+    assert (look.avoided, look.false, look.traffic) == (0.0, 0.0, 0.5)
+    ends = [drive.rewards.sum() for drive in (*levels, pieces[1])]
+    ends.append(pieces[0].rewards[0] + pieces[0].returns[1])
+    assert look.ret == pytest.approx(np.mean(ends), abs=1e-6)
 
 
 def test_a_look_at_records_tells_what_driving_returns(tmp_path):
@@ -188,7 +204,7 @@ def test_a_look_at_records_tells_what_driving_returns(tmp_path):
         driven.append(total)
         onsets.append(onset)
     assert len(set(onsets)) > 3
-    assert taught.look(taught.judges).ret == pytest.approx(np.mean(driven), abs=3 * STRAIGHT)
+    assert taught.look().ret == pytest.approx(np.mean(driven), abs=3 * STRAIGHT)
 
 
 def test_it_learns_the_same_twice(tmp_path):

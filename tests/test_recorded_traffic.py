@@ -119,6 +119,8 @@ def test_a_training_with_traffic_and_another_with_its_drives(tmp_path, monkeypat
     monkeypatch.setattr("lgmd_gym.training.lots.record_traffic", None)  # nothing is recorded anew
     fewer = [*common[:-1], "1", "--drives", str(first)]
     assert cli.run([*fewer, "--out", str(second)]) == 0
+    heads = (second / "log" / "progress.csv").read_text().splitlines()[0].split(",")
+    assert set(heads) == {"train", "ret", "avoided", "false", "traffic", "best"}
     plan = order(tmp_path, steps=3, traffic=1, drives=first).plan()
     assert len(drives_of(plan, "train", tmp_path, False, 1)) == 3 + len(kept["traffic-train"][0])
 

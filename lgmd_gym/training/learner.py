@@ -31,14 +31,16 @@ class Look(NamedTuple):
     """How a policy does without chance, braking where its chance is above one half.
 
     Attributes:
-        ret: Mean return.
+        ret: Mean return, of levels and pieces of traffic alike.
         avoided: Share of threats that end without contact.
-        false: Share of drives without a threat in which it brakes.
+        false: Share of levels without a threat in which it brakes.
+        traffic: Share of pieces of traffic in which it brakes; NaN without any.
     """
 
     ret: float
     avoided: float
     false: float
+    traffic: float
 
 
 class Learner:
@@ -48,14 +50,16 @@ class Learner:
         plan: Of the training.
         drives: To learn from.
         judges: To look at after every pass.
+        pieces: How many of these, at their end, are pieces of traffic.
     """
 
-    def __init__(self, plan: Plan, drives: list[Drive], judges: list[Drive]) -> None:
+    def __init__(self, plan: Plan, drives: list[Drive], judges: list[Drive], pieces: int = 0) -> None:
         self.plan, self.recipe = plan, Recipe.from_dict(plan.model)
         features = Features.from_dict(plan.features)
         self.lessons, self.judges = Lessons(drives, features), Lessons(judges, features)
         self.model = self._untaught()
-        self.best = Look(-np.inf, 0.0, 0.0)
+        self._levels = len(judges) - pieces
+        self.best = Look(-np.inf, 0.0, 0.0, 0.0)
 
     def _untaught(self) -> Any:
         from stable_baselines3 import PPO
@@ -110,11 +114,12 @@ class Learner:
                 optimizer.step()
                 schedule.step()
                 gained += float(value.detach()) * len(chosen) / len(self.lessons)
-            look = self.look(self.judges)
+            look = self.look()
             if look.ret > self.best.ret:
                 self.best = look
                 best = {name: value.clone() for name, value in policy.state_dict().items()}
-            log(number, {"train": gained, **look._asdict(), "best": self.best.ret})
+            told = {name: value for name, value in look._asdict().items() if value == value}  # no NaN
+            log(number, {"train": gained, **told, "best": self.best.ret})
         policy.load_state_dict(best)
         return self.model
 
@@ -126,15 +131,21 @@ class Learner:
         table[batch.place] = told[:, brake] - told[:, hold]
         return table
 
-    def look(self, lessons: Lessons) -> Look:
-        """Return how the policy does without chance."""
+    def look(self) -> Look:
+        """Return how the policy does on `judges` without chance."""
         self.model.policy.set_training_mode(False)
         parts = [
-            self._ends(lessons.batch(range(start, min(start + JUDGED_AT_ONCE, len(lessons)))))
-            for start in range(0, len(lessons), JUDGED_AT_ONCE)
+            self._ends(self.judges.batch(range(start, min(start + JUDGED_AT_ONCE, len(self.judges)))))
+            for start in range(0, len(self.judges), JUDGED_AT_ONCE)
         ]
         returns, brakes, contacts, threats = (torch.cat(item).numpy() for item in zip(*parts, strict=True))
-        return Look(float(returns.mean()), _share(~contacts[threats]), _share(brakes[~threats]))
+        level = np.arange(len(threats)) < self._levels
+        return Look(
+            float(returns.mean()),
+            _share(~contacts[threats]),
+            _share(brakes[level & ~threats]),
+            _share(brakes[~level]),
+        )
 
     @torch.no_grad()
     def _ends(self, batch: Batch) -> tuple[torch.Tensor, ...]:

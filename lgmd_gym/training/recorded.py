@@ -18,7 +18,7 @@ def learn_recorded(plan: Plan, folder: Path, progress: bool, jobs: int) -> Any:
     from tqdm import tqdm
 
     drives, judges = (drives_of(plan, split, folder, progress, jobs) for split in ("train", "validation"))
-    learner = Learner(plan, drives, judges)
+    learner = Learner(plan, drives, judges, pieces=len(judges) - plan.eval_episodes)
     logger = configure(str(folder / "log"), ["csv", "tensorboard"])
     try:
         with tqdm(total=learner.recipe.n_epochs, desc="learning", unit="pass", disable=not progress) as bar:
