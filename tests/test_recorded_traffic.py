@@ -1,6 +1,7 @@
 """Quiet driving through traffic as lessons: what is kept of it, and what braking there is said to cost."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,6 +19,13 @@ from lgmd_gym.training.recordings import load, origin_of, save
 from lgmd_gym.training.traffic import cuts, quiet_drive, record_traffic
 
 HIGHWAY, INTERSECTION = 0, 3  # seeds, and kinds: they take turns
+SHORT = {"duration": 12}
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Drives of 12 s instead of 60."""
+    monkeypatch.setattr(traffic, "make_traffic", partial(traffic.make_traffic, config=SHORT))
 
 
 @pytest.mark.parametrize(("env_id", "speed"), [("LGMD/EmptyRoad-v0", 12.0), ("LGMD/Following-v0", 20.0)])
@@ -80,12 +88,12 @@ def test_what_is_near_an_emergency_is_left_out(tmp_path, monkeypatch, emergencie
 
 
 @pytest.mark.parametrize("seed", [HIGHWAY, INTERSECTION])
-def test_it_sees_what_the_suite_would_show(tmp_path, monkeypatch, seed):
+def test_it_sees_what_the_suite_would_show(tmp_path, monkeypatch, short, seed):
     monkeypatch.setattr(traffic, "draw_view", lambda *_: {"condition": "fog"})
     monkeypatch.setattr(traffic, "cuts", lambda quiet, policy_hz: [(0, len(quiet))])
     told = []
     (pieces,) = record_traffic(order(tmp_path).plan(), "train", range(seed, seed + 1), 1, told.append)
-    trace = record_trace(list(traffic.KINDS)[seed], seed, Eyesight(camera="fovea").under("fog"))
+    trace = record_trace(list(traffic.KINDS)[seed], seed, Eyesight(camera="fovea").under("fog"), SHORT)
     assert told == [1]
     (whole,) = pieces
     assert len(whole) == len(trace.seen) - 1  # nothing is decided in the last one
@@ -93,16 +101,16 @@ def test_it_sees_what_the_suite_would_show(tmp_path, monkeypatch, seed):
         assert np.array_equal(array, np.stack([item.observation[name] for item in trace.seen[:-1]]))
 
 
-def test_emergencies_are_those_of_the_suite(tmp_path):
+def test_emergencies_are_those_of_the_suite(tmp_path, short):
     """In a drive with some."""
     kind, seed = list(traffic.KINDS)[INTERSECTION], INTERSECTION
-    trace = record_trace(kind, seed, Eyesight(camera="fovea"))
+    trace = record_trace(kind, seed, Eyesight(camera="fovea"), SHORT)
     assert trace.emergencies.hard
     _, found = traffic._driven(order(tmp_path).plan(), traffic.make_traffic(kind, camera="fovea"), seed)
     assert found == trace.emergencies
 
 
-def test_a_training_with_traffic_and_another_with_its_drives(tmp_path, monkeypatch):
+def test_a_training_with_traffic_and_another_with_its_drives(tmp_path, monkeypatch, short):
     file = tmp_path / "hyper.yml"
     file.write_text(YAML)
     common = ["train", "--algo", "recorded", "--camera", "fovea", "--hyperparams", str(file), "--jobs", "1"]
