@@ -110,6 +110,7 @@ def test_emergencies_are_those_of_the_suite(tmp_path, short):
     assert found == trace.emergencies
 
 
+@pytest.mark.slow
 def test_a_training_with_traffic_and_another_with_its_drives(tmp_path, monkeypatch, short):
     file = tmp_path / "hyper.yml"
     file.write_text(YAML)
@@ -154,7 +155,7 @@ def test_traffic_of_another_training_is_enough_or_refused(tmp_path):
 
 
 def test_who_drives_himself_takes_no_recorded_traffic():
-    with pytest.raises(ValueError, match="'recorded' learns from; dqn has env_id alone"):
+    with pytest.raises(ValueError, match="only algo 'recorded' learns from traffic; leave it out with 'dqn'"):
         Order("dqn", demands=(0.0, -1.0), traffic=3)
     with pytest.raises(ValueError, match="traffic must be a whole number >= 0, got -1"):
         Order("recorded", traffic=-1)

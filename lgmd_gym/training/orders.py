@@ -138,7 +138,7 @@ class Order:
             raise ValueError(f"drives are what algo 'recorded' learns from; {self.algo} drives itself")
         whole("traffic", self.traffic, 0)
         if self.traffic and not recorded:
-            raise ValueError(f"traffic is what algo 'recorded' learns from; {self.algo} has env_id alone")
+            raise ValueError(f"only algo 'recorded' learns from traffic; leave it out with {self.algo!r}")
         if self.eye is not None and self.camera:
             raise ValueError(f"give either camera or eye, got {list(self.camera)} and {self.eye!r}")
 
