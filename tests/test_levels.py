@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lgmd_gym import CameraParams, EgoCamera, camera
+from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.envs import FAMILIES
 from lgmd_gym.envs.levels import CONDITIONS, LEVELS, QUIET, THREATS, draw_scenario, level_generator
 from lgmd_gym.envs.random_braking import RandomBrakingEnv
@@ -33,6 +34,16 @@ def test_every_family_is_drawn():
     assert set(drawn) == set(FAMILIES)
     share = np.mean([family in THREATS for family in drawn])
     assert share == pytest.approx(0.5, abs=0.07)
+
+
+def test_levels_reach_the_protocols_headways():
+    """A braking lead of FMVSS 127 is 0.54 s ahead; who never met one so close in training brakes too late."""
+    told = [dict(case.arguments) for case in find_suite("fmvss127").cases if case.family == "CCRb"]
+    asked = min(item["gap"] / item["ego_speed"] for item in told)
+    for draw in THREATS["CCRb"], QUIET["Following"]:
+        drawn = [draw(level_generator("train", level))["headway"] for level in range(2000)]
+        assert min(drawn) < asked
+        assert max(drawn) > 2.5
 
 
 def test_threats_threaten_and_the_rest_does_not():
