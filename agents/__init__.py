@@ -2,16 +2,16 @@
 
 from typing import Any
 
+from lgmd_gym.agents.adapter import AgentAdapter, import_agent
 from lgmd_gym.agents.base import BRAKE, HOLD, Agent, demand
 from lgmd_gym.agents.baselines import AlwaysBrake, NoBrake, RandomBrake
-from lgmd_gym.agents.fields import DangerZone, Fovea
-from lgmd_gym.agents.foreign import ForeignAgent, import_agent
-from lgmd_gym.agents.images import FlowDivergence, FrameDifference
+from lgmd_gym.agents.field_rules import DangerZone, NestedFields
+from lgmd_gym.agents.image_rules import FlowDivergence, FrameDifference
 from lgmd_gym.agents.options import check_options, parse
 from lgmd_gym.agents.oracles import EtaOracle, StoppingDistanceOracle, TauOracle, TTCOracle
-from lgmd_gym.agents.policy import Policy
+from lgmd_gym.agents.policies.policy import Policy
 from lgmd_gym.agents.rule import Rule
-from lgmd_gym.agents.rules import AdaptiveThreshold, Graded, SpeedGated, SpikeThreshold
+from lgmd_gym.agents.spike_rules import AdaptiveThreshold, Graded, SpeedGated, SpikeThreshold
 from lgmd_gym.agents.stopping_zone import StoppingZone
 from lgmd_gym.errors import unknown_name
 
@@ -42,7 +42,7 @@ AGENTS: dict[str, type[Agent]] = {
         AdaptiveThreshold,
         Graded,
         SpeedGated,
-        Fovea,
+        NestedFields,
         DangerZone,
         StoppingZone,
         FrameDifference,
@@ -78,7 +78,7 @@ def make_agent(text: str) -> Agent:
         foreign: Any = import_agent(name)
         options = parse(f"agent:{options_text}")[1]
         check_options(name, foreign, options)
-        return ForeignAgent(name, foreign(**options))
+        return AgentAdapter(name, foreign(**options))
     name, options = parse(text)
     if name not in AGENTS:
         raise unknown_name("agent", name, AGENTS)

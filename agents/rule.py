@@ -10,7 +10,7 @@ from lgmd_gym.agents.base import BRAKE, HOLD, Agent
 from lgmd_gym.agents.params import RuleParams
 
 
-class Sight(NamedTuple):
+class SensorReading(NamedTuple):
     """What the car's own sensors tell at one camera frame.
 
     Attributes:
@@ -27,7 +27,7 @@ class Sight(NamedTuple):
 
 
 class Rule(Agent):
-    """Brakes fully once `judge` has said so, and keeps braking to a standstill.
+    """Brakes fully once `should_brake` has said so, and keeps braking to a standstill.
 
     It latches because silence is not clearance: when a flat-shaded car fills a narrow field nothing moves
     in the image any more and the neuron falls silent at the worst moment.
@@ -62,26 +62,26 @@ class Rule(Agent):
 
     def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Brake fully if latched."""
-        for sight in sights(observation, info):
-            self._latched = self.judge(sight) or self._latched
+        for sight in sensor_readings(observation, info):
+            self._latched = self.should_brake(sight) or self._latched
         return BRAKE if self._latched else HOLD
 
-    def judge(self, sight: Sight) -> bool:
+    def should_brake(self, sight: SensorReading) -> bool:
         """Return whether a camera frame gives reason to brake; called with every frame, in order."""
         raise NotImplementedError
 
 
-def sights(observation: dict[str, Any], info: dict[str, Any]) -> Iterator[Sight]:
+def sensor_readings(observation: dict[str, Any], info: dict[str, Any]) -> Iterator[SensorReading]:
     """Yield every camera frame since the last decision if `info` carries `lgmd/trace`, else the last one."""
     yaw_rate = float(observation["ego_yaw_rate"][0])
     trace = info.get("lgmd/trace")
     if trace is None:
         frequency, potential = observation["spike_frequency"], observation["membrane_potential"]
-        yield Sight(frequency, potential, float(observation["ego_speed"][0]), yaw_rate)
+        yield SensorReading(frequency, potential, float(observation["ego_speed"][0]), yaw_rate)
         return
     for frame in trace:
         said = frame.response
-        yield Sight(said.spike_frequency, said.membrane_potential, float(frame.ego_speed), yaw_rate)
+        yield SensorReading(said.spike_frequency, said.membrane_potential, float(frame.ego_speed), yaw_rate)
 
 
 class Streak:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.agents.params import RuleParams, above_zero, count
-from lgmd_gym.agents.rule import Rule, Sight, SteeringGate, Streak
+from lgmd_gym.agents.rule import Rule, SensorReading, SteeringGate, Streak
 
 SPEEDS_KMH = (10, 20, 25, 30, 40, 50, 60, 70, 80, 90)  # one pair of fields each
 LENS_HEIGHT, LENS_SETBACK, HALF_WIDTH = 1.2, 1.7, 1.2  # [m]
@@ -96,7 +96,7 @@ class StoppingZone(Rule):
         self._since_upright = np.full(len(SPEEDS_KMH), p.memory)
         self._gate = SteeringGate(p.yaw_rate, p.settle)
 
-    def judge(self, sight: Sight) -> bool:
+    def should_brake(self, sight: SensorReading) -> bool:
         """Return whether something upright is in the zone of the present speed, or nearer."""
         p = self.params
         ground, upright = np.split(excitation(self._checked(sight)), 2)
@@ -111,7 +111,7 @@ class StoppingZone(Rule):
         in_zone = entered[here] and bool(self._since_upright[here] < p.memory)
         return can_judge and (in_zone or any(near[nearest:here]))
 
-    def _checked(self, sight: Sight) -> np.ndarray:
+    def _checked(self, sight: SensorReading) -> np.ndarray:
         potential = sight.membrane_potential
         if len(potential) != 2 * len(SPEEDS_KMH):
             raise ValueError(

@@ -8,8 +8,9 @@ import gymnasium as gym
 import numpy as np
 
 import lgmd_gym  # noqa: F401  (registers the environments)
-from lgmd_gym import LGMD, LGMDParams, plots
-from lgmd_gym.stimuli import Grating, Looming, Receding, Screen, Translating, frames
+from lgmd_gym import LGMD, LGMDParams
+from lgmd_gym.paper.stimuli import Grating, Looming, Receding, Screen, Translating, frames
+from lgmd_gym.plotting import figures as plots
 
 SCREEN = Screen()
 SECONDS = 4.0

@@ -16,15 +16,15 @@ from typing import Any, get_args
 
 import figures
 
-from lgmd_gym import cli
-from lgmd_gym.benchmark.runner import DEFAULT_AGENTS, Run
+from lgmd_gym.benchmark.analysis.tables import mean_kmh
+from lgmd_gym.benchmark.run_cases import DEFAULT_AGENTS, Run
 from lgmd_gym.benchmark.summary import Rate, scores
-from lgmd_gym.benchmark.tables import mean_kmh
-from lgmd_gym.docstrings import About
+from lgmd_gym.cli import main as cli
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.random_braking import RandomBrakingEnv
-from lgmd_gym.envs.traffic_env import TrafficEnv
-from lgmd_gym.gallery_scenes import Scene, film, find_scenes
+from lgmd_gym.envs.traffic.env import TrafficEnv
+from lgmd_gym.gallery.docstrings import About
+from lgmd_gym.gallery.scenes import Scene, film, find_scenes
 
 AGENT = "spike-threshold"
 
@@ -62,7 +62,7 @@ def environment_page(scene: Scene) -> str:
     if scene.judged:
         example = f'gym.make("lgmd_gym:{scene.target}")'
     else:
-        example = f'lgmd_gym.envs.traffic.make_traffic("{scene.name}")'
+        example = f'lgmd_gym.envs.traffic.registration.make_traffic("{scene.name}")'
     parts = [
         f"# {scene.target}",
         scene.about.lead,
@@ -123,7 +123,7 @@ def benchmark_table() -> str:
     ]
     for item in scores(run.rows, lambda row: ""):
         taken = f"{mean_kmh(item.speed_reduction)} km/h"
-        rates = [_rate(rate) for rate in (item.avoided, item.premature, item.false_brakes)]
+        rates = [_rate(rate) for rate in (item.avoided, item.premature, item.false_activations)]
         rows.append(f"| `{item.agent}` | {rates[0]} | {taken} | {rates[1]} | {rates[2]} |")
     return "\n".join(rows) + "\n"
 

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from lgmd_gym.envs.braking import BrakingEnv
-    from lgmd_gym.envs.catalogue import FAMILIES, make_scenario
-    from lgmd_gym.envs.path import Bend
+    from lgmd_gym.envs.dynamics.path import Bend
+    from lgmd_gym.envs.dynamics.speed_profile import Segment
     from lgmd_gym.envs.registration import env_id, register_envs
-    from lgmd_gym.envs.scenario import Actor, RoadPlan, Scenario
-    from lgmd_gym.envs.script import Phase
+    from lgmd_gym.envs.scenarios.catalogue import FAMILIES, make_scenario
+    from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
 
 __all__ = [
     "FAMILIES",
     "Actor",
     "Bend",
     "BrakingEnv",
-    "Phase",
     "RoadPlan",
     "Scenario",
+    "Segment",
     "env_id",
     "make_scenario",
     "register_envs",
@@ -29,15 +29,15 @@ __all__ = [
 
 _HOMES = {
     "BrakingEnv": "braking",
-    "FAMILIES": "catalogue",
-    "make_scenario": "catalogue",
+    "FAMILIES": "scenarios.catalogue",
+    "make_scenario": "scenarios.catalogue",
     "env_id": "registration",
     "register_envs": "registration",
-    "Actor": "scenario",
-    "Bend": "path",
-    "Phase": "script",
-    "RoadPlan": "scenario",
-    "Scenario": "scenario",
+    "Actor": "scenarios.scenario",
+    "Bend": "dynamics.path",
+    "Segment": "dynamics.speed_profile",
+    "RoadPlan": "scenarios.scenario",
+    "Scenario": "scenarios.scenario",
 }
 
 

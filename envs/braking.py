@@ -8,17 +8,17 @@ import numpy as np
 from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.road.road import RoadNetwork
 
-from lgmd_gym.envs import measures
-from lgmd_gym.envs.brake import BrakeParams
-from lgmd_gym.envs.interface import EgoState, make_action
-from lgmd_gym.envs.network import build_network
-from lgmd_gym.envs.path import Path, Pose
+from lgmd_gym.envs import surrogate_safety as measures
+from lgmd_gym.envs.dynamics.brake import BrakeParams
+from lgmd_gym.envs.dynamics.path import Path, Pose
+from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
 from lgmd_gym.envs.reward import RewardParams, step_reward
-from lgmd_gym.envs.road import BrakingRoad
-from lgmd_gym.envs.scenario import EGO_LENGTH, LANE_WIDTH, RoadPlan, Scenario
-from lgmd_gym.envs.script import SpeedScript
+from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, LANE_WIDTH, RoadPlan, Scenario
+from lgmd_gym.envs.simulation.network import build_network
+from lgmd_gym.envs.simulation.road import BrakingRoad
+from lgmd_gym.envs.simulation.vehicles import KINDS, EgoCar
+from lgmd_gym.envs.spaces import EgoState, make_action
 from lgmd_gym.envs.undefined import UNDEFINED
-from lgmd_gym.envs.vehicles import KINDS, EgoCar
 from lgmd_gym.errors import check_keys
 
 SHADES = (30, 220)  # range from which a target's body grey is drawn
@@ -65,7 +65,7 @@ class BrakingEnv(AbstractEnv):
 
     `ego_speed`, `gap`, `ttc`, `thw`, `drac`, `required_deceleration`, `collision`, `impact_speed`,
     `relative_impact_speed`, `deceleration` (beyond the script), `target_speed`, and highway-env's `speed`
-    and `crashed`; SI units, NaN where undefined, definitions in `lgmd_gym.envs.measures`.
+    and `crashed`; SI units, NaN where undefined, definitions in `lgmd_gym.envs.surrogate_safety`.
 
     ## Arguments
 
@@ -168,7 +168,7 @@ class BrakingEnv(AbstractEnv):
         if self._network is None or self._network[0] != scenario.road or scenario.road.placed:
             self._network = scenario.road, build_network(scenario.road, start)
         road = BrakingRoad(self._network[1], rng)
-        script = SpeedScript(scenario.ego_speed, scenario.ego_profile)
+        script = SpeedProfile(scenario.ego_speed, scenario.ego_profile)
         ego = EgoCar(road, Path(start, scenario.ego_path), script, self._brake, self.config["throttle"])
         road.vehicles.append(ego)
         for actor in scenario.actors:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from lgmd_gym.envs.braking import BrakingEnv
-from lgmd_gym.envs.levels import (
+from lgmd_gym.envs.scenarios.distribution import (
     CONDITIONS,
     LEVELS,
     check_levels,
@@ -31,7 +31,7 @@ class RandomBrakingEnv(BrakingEnv):
         split: "train", "validation" or "test": a million levels each.
         start_level: First level in use.
         num_levels: How many from there on; 0 for all that are left.
-        conditions: Camera conditions to draw from, each as likely: "clear", "night", "fog", "robust".
+        conditions: Camera conditions to draw from, each as likely: "clear", "night", "fog", "degraded".
         config: See `BrakingEnv`.
         render_mode: See `BrakingEnv`.
 

@@ -62,7 +62,7 @@ def make_observed(
     Args:
         family: A name in `FAMILIES` for `BrakingEnv`, or "RandomBraking" for `RandomBrakingEnv`.
         camera: See `LGMDObservation`; plain values, so that an `EnvSpec` survives JSON. None for no eye,
-            as for `lgmd_gym.vector.LGMDObservation`, which brings one for the whole batch.
+            as for `lgmd_gym.wrappers.vector.LGMDObservation`, which brings one for the whole batch.
         params: See `LGMDObservation`.
         fps: See `LGMDObservation`.
         include_frame: See `LGMDObservation`.
@@ -71,15 +71,15 @@ def make_observed(
         config: Configuration of `BrakingEnv`.
         render_mode: None, "rgb_array" or "human".
         **arguments: The family's own arguments, in SI units, and `condition`, the light and weather by name,
-            laid over the camera: "clear", "night", "fog" or "robust"; or those of `RandomBrakingEnv`.
+            laid over the camera: "clear", "night", "fog" or "degraded"; or those of `RandomBrakingEnv`.
 
     Raises:
         ValueError: For an unknown argument, key or name (the nearest is named), or a value out of its range.
     """
     from lgmd_gym.envs.braking import BrakingEnv
-    from lgmd_gym.envs.catalogue import make_scenario
-    from lgmd_gym.envs.levels import CLEAR, check_conditions
     from lgmd_gym.envs.random_braking import RandomBrakingEnv
+    from lgmd_gym.envs.scenarios.catalogue import make_scenario
+    from lgmd_gym.envs.scenarios.distribution import CLEAR, check_conditions
     from lgmd_gym.errors import check_keys
 
     if family == RANDOM:
@@ -93,7 +93,7 @@ def make_observed(
             env.camera_fields["condition"] = condition
     if camera is None:
         return env
-    from lgmd_gym.wrappers import LGMDObservation
+    from lgmd_gym.wrappers.observation import LGMDObservation
 
     return LGMDObservation(
         env,

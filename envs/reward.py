@@ -3,8 +3,8 @@
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
-from lgmd_gym.envs import measures
-from lgmd_gym.envs.units import check_within
+from lgmd_gym.envs import surrogate_safety as measures
+from lgmd_gym.envs.dynamics.units import check_within
 
 if TYPE_CHECKING:
     from lgmd_gym.envs.braking import BrakingEnv

@@ -12,8 +12,8 @@ from lgmd_gym.envs.registration import register_envs
 if TYPE_CHECKING:
     from lgmd_gym.camera import BirdsEye, CameraParams, EgoCamera
     from lgmd_gym.neuron import LGMD, LGMDParams, Response
-    from lgmd_gym.view import LGMDView
-    from lgmd_gym.wrappers import LGMDObservation
+    from lgmd_gym.rendering.view import LGMDView
+    from lgmd_gym.wrappers.observation import LGMDObservation
 
 __all__ = [
     "LGMD",
@@ -35,7 +35,7 @@ _HOMES = {
     "CameraParams": "camera",
     "EgoCamera": "camera",
     "LGMDObservation": "wrappers",
-    "LGMDView": "view",
+    "LGMDView": "rendering.view",
 }
 
 register_envs()

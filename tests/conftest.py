@@ -1,9 +1,9 @@
 """What several test files share."""
 
 import pytest
-from clip_maker import store
+from support.clips import store
 
-from lgmd_gym.stimuli import Looming, Plain, Screen, frames
+from lgmd_gym.paper.stimuli import Looming, Plain, Screen, frames
 
 
 @pytest.fixture(scope="session")

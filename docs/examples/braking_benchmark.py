@@ -11,9 +11,9 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from lgmd_gym.benchmark.runner import Run
+from lgmd_gym.benchmark.run_cases import Run
 from lgmd_gym.benchmark.summary import Rate, Score, scores
-from lgmd_gym.plots import COLOURS
+from lgmd_gym.plotting.figures import COLOURS
 
 AGENTS = ["spike-threshold:threshold=30", "spike-threshold:threshold=90,frames=2", "ttc-oracle"]
 
@@ -24,7 +24,7 @@ def main(folder: Path, picture: Path | None = None, seeds: int = 1) -> list[Scor
     run.play()
     found = scores(run.rows, lambda row: "")
     for item in found:
-        avoided, false = item.avoided, item.false_brakes
+        avoided, false = item.avoided, item.false_activations
         print(f"{item.agent:40} avoided {avoided.k}/{avoided.n}  false braking {false.k}/{false.n}")
     if picture is not None:
         draw(found, picture)
@@ -35,7 +35,7 @@ def draw(found: list[Score], picture: Path) -> None:
     """Draw each agent's rates as points with Wilson's 95 % intervals: few episodes say little."""
     figure = Figure(figsize=(8.0, 2.6), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True)
-    columns = (("threats avoided", "avoided", 2), ("false braking", "false_brakes", 1))
+    columns = (("threats avoided", "avoided", 2), ("false braking", "false_activations", 1))
     for axis, (title, field, colour) in zip(axes, columns, strict=True):
         for row, item in enumerate(found):
             rate: Rate = getattr(item, field)

@@ -16,8 +16,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.training.drives import Drive, record
-from lgmd_gym.training.orders import Order
+from lgmd_gym.training.config import Order
+from lgmd_gym.training.offline.episodes import Drive, record
 
 DRAWS = 2000
 

@@ -11,7 +11,7 @@ from PIL import Image
 
 from lgmd_gym import LGMDView
 from lgmd_gym.agents import make_agent
-from lgmd_gym.view_canvas import PINK, RED, SKY, UNLIT, YELLOW
+from lgmd_gym.rendering.canvas import PINK, RED, SKY, UNLIT, YELLOW
 
 START, EVERY, WIDTH = 2.0, 3, 800  # a film begins at [s], takes every third decision, is so wide [px]
 

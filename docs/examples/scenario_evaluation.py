@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import lgmd_gym  # noqa: F401  (registers the environments)
-from lgmd_gym.plots import COLOURS
+from lgmd_gym.plotting.figures import COLOURS
 
 # A demand waits for one camera frame and the dead time; the linear build-up costs half its length.
 DELAY, DECELERATION = 1 / 30 + 0.1 + 0.2 / 2, 9.0  # [s], [m/s²]

@@ -16,11 +16,11 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.cases import Case
-from lgmd_gym.benchmark.eyesight import DEFAULT_CAMERA, Eyesight
+from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.sensors import DEFAULT_CAMERA, SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.summary import wilson
-from lgmd_gym.benchmark.tasks import NO_BRAKE, Task, run_task
+from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
 from lgmd_gym.camera import CameraParams
 
 Lens = dict[str, Any]
@@ -50,13 +50,13 @@ SPOILT: dict[str, tuple[Spoil, dict[str, Any]]] = {
     "heave 5 mm rms": (laid_over(heave_m=0.005), {}),
     "brake dive 0.1° per m/s²": (laid_over(dive_deg=0.1), {}),
     "exposure 11 ms": (laid_over(shutter_s=0.011), {}),
-    "robust: 0.1° rms and the last four": (laid_over(condition="robust"), {}),
+    "robust: 0.1° rms and the last four": (laid_over(condition="degraded"), {}),
     "target as grey as asphalt": (laid_over(), {"shade": 104}),
     "the same, a box without shadow": (laid_over(vehicles="box"), {"shade": 104}),
     "dark box (30)": (laid_over(vehicles="box"), {"shade": 30}),
     "light box (220)": (laid_over(vehicles="box"), {"shade": 220}),
 }
-BLIND = Eyesight({"name": "wide", "shape": [8, 8]})  # who never brakes need not look
+BLIND = SensorConfig({"name": "wide", "shape": [8, 8]})  # who never brakes need not look
 SHADES = {"dark (30)": 30, "asphalt (104)": 104, "light (220)": 220}
 AIR = {"day": "clear", "night": "night", "fog": "fog"}
 TEXTURES = (0.5, 1.0, 1.6)  # contrast of the asphalt, times the natural one
@@ -64,10 +64,10 @@ TEXTURES = (0.5, 1.0, 1.6)  # contrast of the asphalt, times the natural one
 
 def play(agent: str, cases: Sequence[Case], seeds: int, spoil: Spoil, jobs: int) -> list[Row]:
     """Return the rows of an agent behind a spoilt eye."""
-    eye = Eyesight().of(make_agent(agent))
+    eye = SensorConfig().of(make_agent(agent))
     lenses = eye.camera if isinstance(eye.camera, list) else [eye.camera or DEFAULT_CAMERA]
     named = [{"name": lens} if isinstance(lens, str) else dict(lens) for lens in lenses]
-    worn = Eyesight([spoil(lens) for lens in named], eye.params, eye.condition, eye.include_frame)
+    worn = SensorConfig([spoil(lens) for lens in named], eye.params, eye.condition, eye.include_frame)
 
     def both(case: Case, seed: int) -> Row:
         truth = run_task(Task(NO_BRAKE, case, seed, BLIND)).truth
@@ -91,7 +91,7 @@ def rate(rows: Sequence[Row], key: str) -> str:
 
 def with_arguments(cases: Sequence[Case], **arguments: Any) -> list[Case]:
     """Return the cases with further arguments."""
-    return [Case(c.name, c.family, (*c.arguments, *arguments.items()), c.warned_driver) for c in cases]
+    return [Case(c.name, c.family, (*c.arguments, *arguments.items()), c.fcw_driver) for c in cases]
 
 
 def first_table(
@@ -106,7 +106,7 @@ def first_table(
         rows = play(agent, with_arguments(threats, **arguments), seeds, spoil, jobs)
         # Targets' shades and shapes say nothing of cases without a target in the lane.
         calm = [] if arguments else play(agent, quiet, seeds, spoil, jobs)
-        told = (rate(rows, "avoided"), rate(rows, "premature_brake"), rate(calm, "false_brake"))
+        told = (rate(rows, "avoided"), rate(rows, "premature_brake"), rate(calm, "false_activation"))
         print(f"| {name} | {' | '.join(told)} |", flush=True)
 
 

@@ -30,7 +30,7 @@ def run(
         out: Run folder to keep, which must not exist; None keeps none.
         camera: See `LGMDObservation`; None for each agent's own, see `Agent.camera`.
         params: See `LGMDObservation`.
-        conditions: Camera conditions by name, such as "clear" and "robust"; the suite is played under each.
+        conditions: Camera conditions by name, such as "clear" and "degraded"; the suite is played under each.
         cluster: Address of a Dask scheduler to play on, in place of processes.
         first_seed: Seeds are played from this one on.
 
@@ -47,13 +47,13 @@ def run(
 
     import pandas as pd
 
-    from lgmd_gym.benchmark.eyesight import Eyesight
     from lgmd_gym.benchmark.runs import start_run
+    from lgmd_gym.benchmark.sensors import SensorConfig
 
     with TemporaryDirectory() as spare:
         folder = Path(out or Path(spare) / "run")
-        eyesight = Eyesight(camera, params)
-        played = start_run(suite, agents, seeds, jobs, folder, eyesight, conditions, cluster, first_seed)
+        sensor_config = SensorConfig(camera, params)
+        played = start_run(suite, agents, seeds, jobs, folder, sensor_config, conditions, cluster, first_seed)
         if not played.play():
             raise RuntimeError(f"{played.stopped}: {len(played.rows)} of {played.total} episodes kept")
         return pd.DataFrame(played.rows)

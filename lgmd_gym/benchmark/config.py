@@ -6,9 +6,9 @@ from typing import Any
 
 import tomli_w
 
-from lgmd_gym.benchmark.eyesight import CLEAR, Eyesight
 from lgmd_gym.benchmark.folder import provenance
-from lgmd_gym.benchmark.own_suites import read_toml
+from lgmd_gym.benchmark.sensors import CLEAR, SensorConfig
+from lgmd_gym.benchmark.suite_file import read_toml
 from lgmd_gym.errors import check_keys
 
 FILE = "run.toml"
@@ -52,9 +52,9 @@ class RunConfig:
         return range(self.first_seed, self.first_seed + self.seeds)
 
     @property
-    def eyesight(self) -> Eyesight:
+    def sensor_config(self) -> SensorConfig:
         """Camera and neuron parameters, before any condition."""
-        return Eyesight(self.camera, self.params)
+        return SensorConfig(self.camera, self.params)
 
     @classmethod
     def load(cls, path: Path) -> "RunConfig":

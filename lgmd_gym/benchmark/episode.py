@@ -7,8 +7,8 @@ import gymnasium as gym
 import numpy as np
 
 from lgmd_gym.agents import Agent
-from lgmd_gym.benchmark.cases import Case
-from lgmd_gym.benchmark.eyesight import Eyesight
+from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs import env_id
 
 # One value per decision each; `held` is 1 while a standing ego is kept from starting, which no deceleration
@@ -56,11 +56,11 @@ class Episode:
     reward_sum: float = float("nan")
 
 
-def make_env(case: Case, eyesight: Eyesight, **options: Any) -> gym.Env:
+def make_env(case: Case, sensor_config: SensorConfig, **options: Any) -> gym.Env:
     """Return the environment of a case; `options` go to `gym.make`."""
     return gym.make(
         env_id(case.family),
-        **eyesight.of().arguments,
+        **sensor_config.of().arguments,
         trace=True,
         **dict(case.arguments),
         **options,

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym._version import __version__
-from lgmd_gym.folders import new_folder
+from lgmd_gym.benchmark.new_folder import new_folder
 
 PACKAGES = ("numpy", "numba", "gymnasium", "highway-env", "joblib")
 

@@ -270,7 +270,7 @@ def peak_deceleration(o: Outcome) -> Value:
 
 
 @metric
-def false_brake(o: Outcome) -> Value:
+def false_activation(o: Outcome) -> Value:
     """Whether the ego braked beyond 0.25 g where there is no threat."""
     return not o.truth.threat and peak_deceleration(o)[0] > NUISANCE, True
 

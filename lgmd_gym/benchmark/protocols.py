@@ -7,7 +7,7 @@ from dataclasses import replace
 from math import radians
 from typing import Any
 
-from lgmd_gym.benchmark.cases import Case, cases, metres, one
+from lgmd_gym.benchmark.case import Case, cases, metres, one
 
 OVERLAPS = (-50, -75, 100, 75, 50)  # N1 8.2.2: per cent of the ego's width; the sign is the side
 LOCATIONS_2026 = (100, 75, 50, 25, 0)  # per cent of the ego's width; 125 and -25 are the extended range
@@ -32,7 +32,7 @@ def ncap2023() -> tuple[Case, ...]:
     for per_cent in OVERLAPS:
         tail = f"-warned{overlap_tail(per_cent)}"
         cells = cases(suite, "CCRs", warned, tail, overlap=per_cent / 100)
-        rows += [replace(cell, warned_driver=True) for cell in cells]
+        rows += [replace(cell, fcw_driver=True) for cell in cells]
     return (*rows, *braking_lead(suite), *_crossing(suite))
 
 
@@ -55,7 +55,7 @@ def ncap2026() -> tuple[Case, ...]:
             suite, "CCRb", list(range(30, 90, 10)), tail, headway=1.0, deceleration=4.0, impact_location=where
         )
         warned = cases(suite, "CCRs", list(range(60, 90, 10)), f"-warned{tail}", impact_location=where)
-        rows += [replace(cell, warned_driver=True) for cell in warned]
+        rows += [replace(cell, fcw_driver=True) for cell in warned]
     for degrees_left in (-20, -10, 10, 20):
         turned = round(radians(degrees_left), 6)
         rows += cases(

@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from lgmd_gym.benchmark.cases import Case
+from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import Episode
-from lgmd_gym.benchmark.eyesight import CLEAR
 from lgmd_gym.benchmark.metrics import METRICS, PREMATURE, Counterfactual, Outcome, measure
+from lgmd_gym.benchmark.sensors import CLEAR
 
-NAMED = ("agent", "suite", "case", "warned_driver", "seed", "condition")
+NAMED = ("agent", "suite", "case", "fcw_driver", "seed", "condition")
 # Every key of a row in its order; null where undefined. The metrics' docstrings say what each is.
 KEYS = (*NAMED, "camera", *METRICS, "error")
 
@@ -49,4 +49,4 @@ def error_row(agent: str, case: Case, seed: int, error: str, condition: str = CL
 
 
 def _named(agent: str, case: Case, seed: int, condition: str) -> dict[str, Any]:
-    return dict(zip(NAMED, (agent, case.suite, case.name, case.warned_driver, seed, condition), strict=True))
+    return dict(zip(NAMED, (agent, case.suite, case.name, case.fcw_driver, seed, condition), strict=True))

@@ -4,13 +4,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from lgmd_gym.benchmark.config import OWN_SUITE, RunConfig
-from lgmd_gym.benchmark.eyesight import CLEAR, Eyesight
 from lgmd_gym.benchmark.folder import RunFolder
-from lgmd_gym.benchmark.runner import Run
+from lgmd_gym.benchmark.run_cases import Run
+from lgmd_gym.benchmark.sensors import CLEAR, SensorConfig
 from lgmd_gym.benchmark.suites import SUITES
-from lgmd_gym.benchmark.traffic import TrafficRun
-from lgmd_gym.benchmark.traffic_rows import SUITE as TRAFFIC
-from lgmd_gym.envs.traffic import KINDS
+from lgmd_gym.benchmark.traffic.rows import SUITE as TRAFFIC
+from lgmd_gym.benchmark.traffic.run import TrafficRun
+from lgmd_gym.envs.traffic.registration import KINDS
 from lgmd_gym.errors import unknown_name
 
 SUITE_NAMES = (*SUITES, TRAFFIC)
@@ -22,7 +22,7 @@ def start_run(
     seeds: int,
     jobs: int,
     out: Path,
-    eyesight: Eyesight | None = None,
+    sensor_config: SensorConfig | None = None,
     conditions: Iterable[str] = (CLEAR,),
     cluster: str | None = None,
     first_seed: int = 0,
@@ -35,7 +35,7 @@ def start_run(
         seeds: Number of seeds; for traffic, of every kind.
         jobs: Processes; 1 plays in this one.
         out: The run folder, which must not exist.
-        eyesight: Camera and neuron parameters; each agent's own eye by default.
+        sensor_config: Camera and neuron parameters; each agent's own eye by default.
         conditions: Camera conditions by name; traffic is played under one.
         cluster: Address of a Dask scheduler to play on, in place of processes.
         first_seed: Seeds are played from this one on.
@@ -45,10 +45,10 @@ def start_run(
             exists or cannot be made; before anything is played.
     """
     if suite == TRAFFIC:
-        return TrafficRun(agents, KINDS, seeds, jobs, out, eyesight, conditions, cluster, first_seed)
+        return TrafficRun(agents, KINDS, seeds, jobs, out, sensor_config, conditions, cluster, first_seed)
     if suite not in SUITES and not suite.endswith(".toml"):
         raise unknown_name("suite", suite, SUITE_NAMES)
-    return Run(suite, agents, seeds, jobs, out, eyesight, conditions, cluster, first_seed)
+    return Run(suite, agents, seeds, jobs, out, sensor_config, conditions, cluster, first_seed)
 
 
 def repeat_run(config: RunConfig, jobs: int, out: Path, cluster: str | None = None) -> Run | TrafficRun:
@@ -63,7 +63,7 @@ def repeat_run(config: RunConfig, jobs: int, out: Path, cluster: str | None = No
         config.seeds,
         jobs,
         out,
-        config.eyesight,
+        config.sensor_config,
         config.conditions,
         cluster,
         config.first_seed,
@@ -78,12 +78,12 @@ def resume_run(path: Path, jobs: int, cluster: str | None = None) -> Run | Traff
     """
     folder = RunFolder.reopen(path)
     settings = folder.settings()
-    eyesight = Eyesight(settings["camera"], settings["params"])
+    sensor_config = SensorConfig(settings["camera"], settings["params"])
     agents, seeds, conditions = settings["agents"], settings["seeds"], settings["conditions"]
     first = settings.get("first_seed", 0)  # of a run broken off before there was a choice
     if settings["suite"] == TRAFFIC:
         return TrafficRun(
-            agents, settings["kinds"], seeds, jobs, folder, eyesight, conditions, cluster, first
+            agents, settings["kinds"], seeds, jobs, folder, sensor_config, conditions, cluster, first
         )
     suite = str(path / OWN_SUITE) if settings["suite"] == OWN_SUITE else settings["suite"]
-    return Run(suite, agents, seeds, jobs, folder, eyesight, conditions, cluster, first)
+    return Run(suite, agents, seeds, jobs, folder, sensor_config, conditions, cluster, first)

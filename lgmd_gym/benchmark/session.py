@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.executor import PoolLostError
 from lgmd_gym.benchmark.folder import RunFolder
-from lgmd_gym.benchmark.pool import PoolLostError
 
 Row = dict[str, Any]
 INTERRUPTED = "interrupted"
@@ -32,7 +32,7 @@ class Session:
     ) -> None:
         self.config, self.folder, self.rows, self.jobs, self.cluster = config, folder, rows, jobs, cluster
         self.suite, self.agents, self.seeds = config.suite, list(config.agents), config.seeds
-        self.eyesight = config.eyesight
+        self.sensor_config = config.sensor_config
         self.stopped = ""
 
     @property

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from lgmd_gym.benchmark import protocols
-from lgmd_gym.benchmark.cases import Case, cases, level, one
+from lgmd_gym.benchmark.case import Case, cases, level, one
 from lgmd_gym.errors import unknown_name
 
 RANDOM_LEVELS = 60

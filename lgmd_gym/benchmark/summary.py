@@ -8,8 +8,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-from lgmd_gym.benchmark.bootstrap import Mean, cluster_mean
-from lgmd_gym.benchmark.eyesight import CLEAR
+from lgmd_gym.benchmark.sensors import CLEAR
+from lgmd_gym.benchmark.statistics import Mean, cluster_mean
 
 Row = dict[str, Any]
 COLUMNS = (
@@ -26,7 +26,7 @@ COLUMNS = (
     "ttc_at_brake",
     "premature",
     "quiet",
-    "false_brakes",
+    "false_activations",
     "false_low",
     "false_high",
     "errors",
@@ -76,7 +76,7 @@ class Score(NamedTuple):
         speed_reduction: Mean over threats, bootstrapped by case [m/s].
         ttc_at_brake: Median over threats in which it braked [s]; None without one.
         premature: Threats in which it braked too early to count.
-        false_brakes: Episodes without a threat in which it braked.
+        false_activations: Episodes without a threat in which it braked.
         errors: Episodes that could not be played.
     """
 
@@ -86,7 +86,7 @@ class Score(NamedTuple):
     speed_reduction: Mean
     ttc_at_brake: float | None
     premature: Rate
-    false_brakes: Rate
+    false_activations: Rate
     errors: int
 
 
@@ -103,7 +103,7 @@ def score(agent: str, group: str, rows: list[Row]) -> Score:
         cluster_mean([row["speed_reduction"] for row in threats], [row["case"] for row in threats]),
         median(braked) if braked else None,
         Rate.of(row["premature_brake"] for row in threats),
-        Rate.of(row["false_brake"] for row in quiet),
+        Rate.of(row["false_activation"] for row in quiet),
         len(rows) - len(played),
     )
 
@@ -135,7 +135,7 @@ def case_order(case: str) -> list[tuple[int, str]]:
 
 def automatic(rows: list[Row]) -> list[Row]:
     """Return the rows that totals of automatic braking count: not those in which a warned driver brakes."""
-    return [row for row in rows if not row.get("warned_driver")]
+    return [row for row in rows if not row.get("fcw_driver")]
 
 
 def write_summary(rows: list[Row], path: Path) -> None:
@@ -153,7 +153,7 @@ def write_summary(rows: list[Row], path: Path) -> None:
 
 
 def _line(item: Score, condition: str) -> list[Any]:
-    avoided, false, speed = item.avoided, item.false_brakes, item.speed_reduction
+    avoided, false, speed = item.avoided, item.false_activations, item.speed_reduction
     threats = [avoided.n, avoided.k, _bound(avoided, "low"), _bound(avoided, "high")]
     quiet = [false.n, false.k, _bound(false, "low"), _bound(false, "high")]
     means = [_round(value) for value in (speed.value, speed.low, speed.high, item.ttc_at_brake)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pinhole import project
-from lgmd_gym.camera.stage import Stage, object_buffer, read_objects, scene_of
+from lgmd_gym.camera.render.context import RenderContext, object_buffer, read_objects, scene_of
 
 
 class EgoCamera:
@@ -33,7 +33,7 @@ class EgoCamera:
 
     def __init__(self, params: Any = None, **fields: Any) -> None:
         self._params = CameraParams.make(params, **fields)
-        self.stage = Stage([self._params])
+        self.stage = RenderContext([self._params])
         self._objects = object_buffer()
         self._cam: np.ndarray | None = None
 

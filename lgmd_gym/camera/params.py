@@ -168,7 +168,7 @@ class CameraParams:
         return replace(base, **given) if base else cls(**given)
 
     def with_condition(self, condition: str) -> CameraParams:
-        """Return this camera under a named condition (`clear`, `night`, `fog`, `robust`)."""
+        """Return this camera under a named condition (`clear`, `night`, `fog`, `degraded`)."""
         if condition not in CONDITIONS:
             raise unknown_name("camera condition", condition, CONDITIONS)
         return replace(self, **CONDITIONS[condition])
@@ -225,7 +225,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "clear": {},
     "night": {"light": "night", "read_noise": 2.0, "shot_noise": 3.0},
     "fog": {"visibility_m": 120.0},
-    "robust": {
+    "degraded": {
         "read_noise": 1.5,
         "shot_noise": 2.0,
         "vibration_deg": 0.1,

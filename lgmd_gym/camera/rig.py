@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.camera.ego import EgoCamera, check_frame
-from lgmd_gym.camera.stage import Stage, object_buffer, read_objects, scene_of, shared_key
+from lgmd_gym.camera.render.context import RenderContext, object_buffer, read_objects, scene_of, shared_key
 
 
 class CameraRig:
@@ -35,7 +35,7 @@ class CameraRig:
             if isinstance(camera, EgoCamera):
                 groups.setdefault(shared_key(camera.params), []).append(k)
         stages = [
-            Stage([self.cameras[k].params for k in members])
+            RenderContext([self.cameras[k].params for k in members])
             if len(members) > 1
             else self.cameras[members[0]].stage
             for members in groups.values()

@@ -3,8 +3,14 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lgmd_gym.neuron import general, kernels, layout
-from lgmd_gym.neuron.inputs import (
+from lgmd_gym.neuron import general_kernel as general
+from lgmd_gym.neuron import kernels
+from lgmd_gym.neuron import state as layout
+from lgmd_gym.neuron.params import LGMDParams
+from lgmd_gym.neuron.response import Response
+from lgmd_gym.neuron.scalars import RESPONSE, constants, resting
+from lgmd_gym.neuron.threads import Threads
+from lgmd_gym.neuron.validation import (
     checked_fps,
     checked_frames,
     checked_num,
@@ -13,10 +19,6 @@ from lgmd_gym.neuron.inputs import (
     checked_shape,
     checked_threads,
 )
-from lgmd_gym.neuron.params import LGMDParams
-from lgmd_gym.neuron.response import Response
-from lgmd_gym.neuron.scalars import RESPONSE, constants, resting
-from lgmd_gym.neuron.threads import Threads
 
 _UINT8 = np.dtype(np.uint8)
 

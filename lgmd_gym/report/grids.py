@@ -3,9 +3,9 @@
 import re
 from typing import Any, NamedTuple
 
-from lgmd_gym.benchmark.points import UNKNOWN, colour_2023, colour_of_row_2026
-from lgmd_gym.benchmark.scores import WEIGHTS, impact
-from lgmd_gym.envs.units import KMH
+from lgmd_gym.benchmark.analysis.ncap_points import UNKNOWN, colour_2023, colour_of_row_2026
+from lgmd_gym.benchmark.analysis.protocol_limits import WEIGHTS, impact
+from lgmd_gym.envs.dynamics.units import KMH
 
 Row = dict[str, Any]
 PATTERNS = (

@@ -5,25 +5,25 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lgmd_gym import plots_bench
-from lgmd_gym.benchmark.compare import compare_runs
-from lgmd_gym.benchmark.compare_tables import change_text
+from lgmd_gym.benchmark.analysis import plots as plots_bench
+from lgmd_gym.benchmark.analysis.compare import compare_runs
+from lgmd_gym.benchmark.analysis.compare_tables import change_text
+from lgmd_gym.benchmark.analysis.froc import LEAD, curves, load_traces
+from lgmd_gym.benchmark.analysis.ncap_points import points_2023, points_2026
+from lgmd_gym.benchmark.analysis.protocol_limits import JUDGES, meets_r152, verdicts
+from lgmd_gym.benchmark.analysis.tables import mean_kmh, rate_text
 from lgmd_gym.benchmark.config import OWN_SUITE
-from lgmd_gym.benchmark.detector import LEAD, curves, load_traces
-from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.benchmark.folder import read_rows, read_series, read_settings
-from lgmd_gym.benchmark.own_suites import get_suite
-from lgmd_gym.benchmark.points import points_2023, points_2026
-from lgmd_gym.benchmark.runner import trace_name
-from lgmd_gym.benchmark.scores import JUDGES, meets_r152, verdicts
+from lgmd_gym.benchmark.run_cases import trace_name
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.summary import automatic, by_condition, case_order, scores
-from lgmd_gym.benchmark.tables import mean_kmh, rate_text
-from lgmd_gym.benchmark.tasks import NO_BRAKE
-from lgmd_gym.envs.units import KMH
+from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.neuron import LGMDParams
-from lgmd_gym.report.chosen import false_reactions, first_seed, seen_agent, telling_cases
 from lgmd_gym.report.grids import grids
 from lgmd_gym.report.pictures import Picture, figure_uri, frames_at, moments
+from lgmd_gym.report.selection import false_reactions, first_seed, seen_agent, telling_cases
 
 Row = dict[str, Any]
 POINTS = {"ncap2023": points_2023, "ncap2026": points_2026}
@@ -55,9 +55,9 @@ class Source:
         agents = list(dict.fromkeys([NO_BRAKE, *settings["agents"]]))
         return cls(path, settings, rows, agents, {case.name: case for case in get_suite(suite).cases})
 
-    def eyesight(self, condition: str) -> Eyesight:
+    def sensor_config(self, condition: str) -> SensorConfig:
         """Return camera and neuron under a condition."""
-        return Eyesight(self.settings["camera"], self.settings["params"]).under(condition)
+        return SensorConfig(self.settings["camera"], self.settings["params"]).under(condition)
 
     def series(self, row: Row, agent: str | None = None) -> dict[str, Any] | None:
         """Return the time series of a row's episode, or of another agent's in the same place."""
@@ -66,8 +66,8 @@ class Source:
 
     def frames(self, row: Row, wanted: dict[str, int]) -> list[Picture]:
         """Return frames of a row's episode."""
-        case, eyesight = self.cases[row["case"]], self.eyesight(row["condition"])
-        return frames_at(case, row["agent"], row["seed"], eyesight, wanted)
+        case, sensor_config = self.cases[row["case"]], self.sensor_config(row["condition"])
+        return frames_at(case, row["agent"], row["seed"], sensor_config, wanted)
 
 
 def write_report(path: Path) -> Path:
@@ -128,14 +128,14 @@ def _of(rows: list[Row], agent: str) -> list[Row]:
 
 def _score(item: Any) -> dict[str, Any]:
     share = item.avoided.k / item.avoided.n if item.avoided.n else None
-    calm = 1.0 - item.false_brakes.k / item.false_brakes.n if item.false_brakes.n else None
+    calm = 1.0 - item.false_activations.k / item.false_activations.n if item.false_activations.n else None
     return {
         "agent": item.agent,
         "avoided": (rate_text(item.avoided), _band(share)),
         "speed": mean_kmh(item.speed_reduction),
         "ttc": "–" if item.ttc_at_brake is None else f"{item.ttc_at_brake:.2f}",
         "premature": rate_text(item.premature),
-        "false": (rate_text(item.false_brakes), _band(calm)),
+        "false": (rate_text(item.false_activations), _band(calm)),
         "errors": item.errors,
     }
 
@@ -176,8 +176,8 @@ def _cases(rows: list[Row], agents: list[str]) -> list[tuple[str, list[tuple[str
         line = []
         for agent in agents:
             item = cells.get((agent, case))
-            good = item.avoided.k + item.false_brakes.n - item.false_brakes.k if item else 0
-            n = item.avoided.n + item.false_brakes.n if item else 0
+            good = item.avoided.k + item.false_activations.n - item.false_activations.k if item else 0
+            n = item.avoided.n + item.false_activations.n if item else 0
             line.append((f"{good}/{n}" if n else "", _band(good / n) if n else ""))
         lines.append((case.split("/", 1)[1], line))
     return lines

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.cases import Case
+from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import make_env
-from lgmd_gym.benchmark.eyesight import Eyesight
 from lgmd_gym.benchmark.metrics import brake_onset
+from lgmd_gym.benchmark.sensors import SensorConfig
 
 
 class Picture(NamedTuple):
@@ -49,18 +49,20 @@ def moments(series: dict[str, np.ndarray]) -> dict[str, int]:
     return found | {"end": len(series["time"]) - 1}
 
 
-def frames_at(case: Case, agent: str, seed: int, eyesight: Eyesight, wanted: dict[str, int]) -> list[Picture]:
+def frames_at(
+    case: Case, agent: str, seed: int, sensor_config: SensorConfig, wanted: dict[str, int]
+) -> list[Picture]:
     """Play an episode again and return the frames of the first camera at some decisions.
 
     Args:
         case: The case.
         agent: Who brakes.
         seed: Of the environment and the agent.
-        eyesight: Camera and neuron parameters; the agent's own where it is left open.
+        sensor_config: Camera and neuron parameters; the agent's own where it is left open.
         wanted: What stands below a frame, and its decision.
     """
     player, last = make_agent(agent), max(wanted.values())
-    env = make_env(case, eyesight.of(player))
+    env = make_env(case, sensor_config.of(player))
     try:
         observation, info = env.reset(seed=seed)
         player.reset(seed)

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.training.orders import JUDGED, SEEDS_APART, Plan
-from lgmd_gym.training.settings import arguments_of
+from lgmd_gym.training.config import JUDGED, SEEDS_APART, Plan
+from lgmd_gym.training.hyperparameters import arguments_of
 
 
 def learn_online(plan: Plan, folder: Path, progress: bool) -> Any:

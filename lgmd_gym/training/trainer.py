@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import lgmd_gym
-from lgmd_gym.agents.policy import write_card
+from lgmd_gym.agents.policies.policy import write_card
+from lgmd_gym.benchmark.new_folder import new_folder
 from lgmd_gym.errors import check_keys
-from lgmd_gym.folders import new_folder
-from lgmd_gym.training.lots import check_drives
-from lgmd_gym.training.orders import Order, Plan
-from lgmd_gym.training.settings import RECORDED
+from lgmd_gym.training.config import Order, Plan
+from lgmd_gym.training.hyperparameters import RECORDED
+from lgmd_gym.training.offline.splits import check_drives
 
 PLAN = "plan.json"
 # Of a saved model: where it logged, and the episodes it was in.
@@ -79,7 +79,7 @@ class Training:
         """
         started = time.perf_counter()
         if self.plan.algo == RECORDED:
-            from lgmd_gym.training.recorded import learn_recorded
+            from lgmd_gym.training.offline.train import learn_recorded
 
             model, algo = learn_recorded(self.plan, self.folder, progress, jobs), "ppo"
         else:

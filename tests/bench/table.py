@@ -66,7 +66,7 @@ def closed_loop(identity, **arguments):
 
 def many(count):
     """Return a function that steps `count` environments in one process, two threads for the neurons."""
-    from lgmd_gym.vector import LGMDObservation
+    from lgmd_gym.wrappers.vector import LGMDObservation
 
     bare = gym.make_vec("LGMD/CCRs-v0", num_envs=count, vectorization_mode="sync", camera=None)
     envs, hold = LGMDObservation(bare, threads=2), np.zeros((count, 1), np.float32)
@@ -115,7 +115,7 @@ def import_seconds():
 
 def rows():
     """Yield what, figure and comparison."""
-    from opencv_lgmd import OpenCVLGMD
+    from support.opencv_lgmd import OpenCVLGMD
 
     for shape in ((90, 160), (288, 352)):
         ours, theirs = interleaved(neuron(shape), neuron(shape, OpenCVLGMD))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from test_camera_support import add_car, straight_env
+from support.roads import add_car, straight_env
 
 from lgmd_gym.camera import CameraParams, CameraRig, EgoCamera
 

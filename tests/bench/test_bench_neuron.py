@@ -23,7 +23,7 @@ import time
 
 import numpy as np
 import pytest
-from opencv_lgmd import OpenCVLGMD, TunedOpenCVLGMD
+from support.opencv_lgmd import OpenCVLGMD, TunedOpenCVLGMD
 
 from lgmd_gym.neuron import LGMD, LGMDParams
 

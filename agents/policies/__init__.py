@@ -1,0 +1,1 @@
+"""Learned policies: the agent, its features, and the shipped policy files."""

@@ -1,0 +1,1 @@
+"""Vehicle motion and contact as plain mathematics, without highway-env."""

@@ -1,0 +1,1 @@
+"""Scenario families: functions from SI arguments to a `Scenario`, their registry and their random distribution."""

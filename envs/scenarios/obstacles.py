@@ -1,0 +1,150 @@
+"""What lies on or stands beside the road and is no car: nothing calls for braking."""
+
+from math import atan2, cos, hypot, pi, sin
+
+from lgmd_gym.envs.dynamics.path import Bend, Path, Pose, arc
+from lgmd_gym.envs.dynamics.units import KMH, check_speed, check_within
+from lgmd_gym.envs.scenarios.registry import START_TTC, family
+from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, EGO_WIDTH, LANE_WIDTH, Actor, RoadPlan, Scenario
+
+STEEL, SHADOW, RAIL = 150, 30, 175  # body greys
+RAIL_PIECE, RAIL_HEIGHT, RAIL_DEPTH, RAIL_LENGTH = 4.0, 0.75, 0.3, 120.0  # [m], the last of the curve
+
+
+@family("EmptyRoad")
+def drive_alone(ego_speed: float = 50 * KMH) -> Scenario:
+    """Drive along an empty road: only its lines and its surface move.
+
+    Args:
+        ego_speed: In (0, 40] [m/s].
+    """
+    return Scenario(family="EmptyRoad", ego_speed=check_speed("ego_speed", ego_speed), duration=10.0)
+
+
+@family("SteelPlate")
+def drive_over_plate(ego_speed: float = 80 * KMH, shade: int = STEEL) -> Scenario:
+    """Drive over a steel plate of 2.4 × 3.7 m (49 CFR 571.127 S9.2 at 80, GB 39901 at 60 km/h).
+
+    Args:
+        ego_speed: In (0, 40] [m/s].
+        shade: Grey of the plate in [0, 255].
+    """
+    speed = check_speed("ego_speed", ego_speed)
+    plate = Actor(
+        gap=START_TTC * speed, kind="road_marking", shade=shade, length=3.7, width=2.4, height=0.025
+    )
+    return Scenario(family="SteelPlate", ego_speed=speed, duration=START_TTC + 2.0, actors=(plate,))
+
+
+@family("BridgeShadow")
+def drive_through_shadow(ego_speed: float = 80 * KMH, length: float = 12.0, shade: int = SHADOW) -> Scenario:
+    """Drive through the shadow of a bridge across the road.
+
+    Args:
+        ego_speed: In (0, 40] [m/s].
+        length: Of the shadow along the road, in [1, 100] [m].
+        shade: Grey of the shadow in [0, 255].
+    """
+    speed = check_speed("ego_speed", ego_speed)
+    deep = check_within("length", length, 1.0, 100.0, "m")
+    shadow = Actor(
+        gap=START_TTC * speed, kind="road_marking", shade=shade, length=deep, width=40.0, height=0.0
+    )
+    duration = START_TTC + deep / speed + 2.0
+    return Scenario(family="BridgeShadow", ego_speed=speed, duration=duration, actors=(shadow,))
+
+
+@family("PedestrianPass")
+def pass_pedestrian(
+    ego_speed: float = 30 * KMH,
+    clearance: float = 1.0,
+    walking_speed: float = 5 * KMH,
+    shade: int | None = None,
+) -> Scenario:
+    """Pass a walker on the right who goes the same way (GB 39901: 1.0 m, 30 km/h).
+
+    Args:
+        ego_speed: In (0, 40] [m/s].
+        clearance: Between the ego's side and the walker's, in [0.2, 10] [m].
+        walking_speed: In [0, ego_speed) [m/s].
+        shade: Grey of the clothes in [0, 255]; None draws it from the seed.
+    """
+    speed = check_speed("ego_speed", ego_speed)
+    walking = check_speed("walking_speed", walking_speed, zero=True)
+    if walking >= speed:
+        raise ValueError(f"walking_speed must be below ego_speed {speed:g} m/s, got {walking:g}")
+    width, depth = 0.5, 0.6
+    aside = EGO_WIDTH / 2 + check_within("clearance", clearance, 0.2, 10.0, "m") + width / 2
+    walker = Actor(
+        gap=START_TTC * (speed - walking),
+        lateral_offset=-aside,
+        speed=walking,
+        kind="box",
+        shade=shade,
+        length=depth,
+        width=width,
+        height=1.75,
+    )
+    duration = START_TTC + (depth + EGO_LENGTH) / (speed - walking) + 2.0
+    return Scenario(family="PedestrianPass", ego_speed=speed, duration=duration, actors=(walker,))
+
+
+@family("CurveGuardRail")
+def drive_along_rail(ego_speed: float = 50 * KMH, radius: float = 60.0, left: bool = True) -> Scenario:
+    """Drive a curve with a guard rail along its outside.
+
+    Args:
+        ego_speed: In (0, 40]; the lateral acceleration v²/radius must stay within 4 m/s² [m/s].
+        radius: Of the ego's path, in [15, 500] [m].
+        left: Whether the curve turns left.
+    """
+    speed = check_speed("ego_speed", ego_speed)
+    bend_radius = check_within("radius", radius, 15.0, 500.0, "m")
+    if speed**2 / bend_radius > 4.0:
+        raise ValueError(
+            f"{speed:g} m/s on a radius of {bend_radius:g} m is {speed**2 / bend_radius:.1f} m/s² sideways, "
+            f"beyond 4; drive below {(4.0 * bend_radius) ** 0.5:.1f} m/s"
+        )
+    side = 1.0 if left else -1.0
+    entry = 3.0 * speed
+    curve = arc(bend_radius, side * min(pi / 2, RAIL_LENGTH / bend_radius))
+    # Outside is to the right of a left curve: the ego's own side; else beyond the other lane.
+    outside = LANE_WIDTH / 2 + 1.0 + (0.0 if left else LANE_WIDTH)
+    way = Path(Pose(0.0, 0.0, 0.0), (Bend(entry), curve))
+    rails = _rail(way, entry - 15.0, entry + curve.length + 15.0, side * outside)
+    return Scenario(
+        family="CurveGuardRail",
+        ego_speed=speed,
+        duration=(entry + curve.length) / speed + 2.0,
+        actors=rails,
+        ego_path=(Bend(entry), curve),
+        road=RoadPlan(kind="curve", at=entry, bends=(curve,)),
+    )
+
+
+def _rail(way: Path, start: float, end: float, to_right: float) -> tuple[Actor, ...]:
+    """Return boxes end to end along a path, `to_right` metres beside it."""
+
+    def beside(distance: float) -> tuple[float, float]:
+        pose = way.pose(distance)
+        return pose.x - to_right * sin(pose.heading), pose.y + to_right * cos(pose.heading)
+
+    pieces = []
+    count = int((end - start) / RAIL_PIECE)
+    for number in range(count):
+        x0, y0 = beside(start + number * RAIL_PIECE)
+        x1, y1 = beside(start + (number + 1) * RAIL_PIECE)
+        length = hypot(x1 - x0, y1 - y0)
+        pieces.append(
+            Actor(
+                gap=(x0 + x1) / 2 - EGO_LENGTH / 2 - length / 2,
+                lateral_offset=-(y0 + y1) / 2,
+                heading=-atan2(y1 - y0, x1 - x0),
+                kind="box",
+                shade=RAIL,
+                length=length,
+                width=RAIL_DEPTH,
+                height=RAIL_HEIGHT,
+            )
+        )
+    return tuple(pieces)

@@ -1,0 +1,1 @@
+"""highway-env roads and vehicles built from a `Scenario`."""

@@ -1,0 +1,1 @@
+"""Traffic environments on highway-env's roads and drivers."""

@@ -1,0 +1,129 @@
+"""The five kinds of traffic, each on a highway-env environment."""
+
+from typing import Any, ClassVar, cast
+
+from highway_env.envs.highway_env import HighwayEnv
+from highway_env.envs.intersection_env import IntersectionEnv
+from highway_env.envs.merge_env import MergeGenericEnv
+from highway_env.envs.roundabout_env import RoundaboutEnv
+from highway_env.envs.two_way_env import TwoWayEnv
+
+from lgmd_gym.envs.traffic.drivers import TrafficCar
+from lgmd_gym.envs.traffic.env import TrafficEnv
+
+
+class HighwayTraffic(TrafficEnv, HighwayEnv):
+    """Three lanes; a dozen cars ahead, slower than the ego, and three from behind, faster: cut-ins."""
+
+    settings: ClassVar[dict[str, Any]] = {"lanes_count": 3, "vehicles_count": 11}
+
+    def _settle(self) -> None:
+        for number in range(3):
+            lane = self.road.network.get_lane(("0", "1", int(self.np_random.integers(3))))
+            place = lane.local_coordinates(self.ego.position)[0] - 35.0 * (
+                number + self.np_random.uniform(0.8, 1.2)
+            )
+            speed = self.np_random.uniform(25.0, 29.0)
+            self.road.cars.append(TrafficCar(self.road, lane.position(place, 0.0), speed=speed))
+
+
+class MergeTraffic(TrafficEnv, MergeGenericEnv):
+    """A motorway past an access ramp from which a car joins beside the ego."""
+
+    settings: ClassVar[dict[str, Any]] = {"vehicles_count": 8, "after_merge_length": 500}
+
+    def _settle(self) -> None:
+        for car in self.road.cars:
+            if car is not self.ego and car.lane_index[0] == "a":
+                # In highway-env all of them are at the speed limit and nobody ever comes nearer.
+                car.speed = car.target_speed = self.np_random.uniform(23.0, 30.0)
+
+    def _is_finished(self) -> bool:
+        return bool(self.ego.position[0] > self.end_position)
+
+
+class TwoWayTraffic(TrafficEnv, TwoWayEnv):  # type: ignore[misc]
+    """A country road: slower cars ahead, a stream of oncoming ones in the next lane."""
+
+    LENGTH: ClassVar[float] = 1500.0
+
+    def _make_road(self, length: float = LENGTH) -> None:
+        super()._make_road(length)  # type: ignore[arg-type]
+
+    def _settle(self) -> None:
+        for car in self.road.cars:
+            # At the end of the road the network would turn them around into the other lane.
+            car.follows = False
+            if car is not self.ego and car.lane_index[0] == "a":
+                car.speed = car.target_speed = self.np_random.uniform(14.0, 19.0)
+        lane = self.road.network.get_lane(("b", "a", 0))
+        for number in range(7):
+            place = 450.0 + 130.0 * number + self.np_random.uniform(-50.0, 50.0)
+            speed = self.np_random.uniform(15.0, 20.0)
+            position, heading = lane.position(place, 0.0), lane.heading_at(place)
+            car = TrafficCar(self.road, position, heading, speed, ("b", "a", 0), enable_lane_change=False)
+            car.follows = False
+            self.road.cars.append(car)
+
+    def _exchange(self) -> None:
+        # Who has left the road behind the ego sees nobody any more.
+        self.road.cars[:] = [car for car in self.road.cars if car.position[0] > 0.0]
+
+    def _is_finished(self) -> bool:
+        return bool(self.ego.position[0] > self.LENGTH - 100.0)
+
+
+class IntersectionTraffic(TrafficEnv, IntersectionEnv):
+    """A crossing of two roads under highway-env's rules of priority; the ego turns or goes straight on."""
+
+    regulated: ClassVar[bool] = True
+    warm_up: ClassVar[float] = 0.0  # highway-env's own lasts 3 s
+    settings: ClassVar[dict[str, Any]] = {
+        "other_vehicles_type": "lgmd_gym.envs.traffic.drivers.CrossingCar",
+        "destination": None,
+        "initial_vehicle_count": 8,
+        "spawn_probability": 0.35,
+    }
+
+    def _settle(self) -> None:
+        lane: Any = self.ego.lane
+        self.ego.target_speed = lane.speed_limit
+
+    def _exchange(self) -> None:
+        self._clear_vehicles()
+        if self.steps % self.config["simulation_frequency"] == 0:  # as in highway-env, once a second
+            self._spawn_vehicle(spawn_probability=self.config["spawn_probability"])
+
+    def _is_finished(self) -> bool:
+        return bool(self.has_arrived(self.ego, exit_distance=70.0))
+
+
+class RoundaboutTraffic(TrafficEnv, RoundaboutEnv):
+    """A roundabout with two lanes and four arms; who is in it has the right of way."""
+
+    regulated: ClassVar[bool] = True
+    warm_up: ClassVar[float] = 2.0
+
+    def _make_road(self) -> None:
+        super()._make_road()
+        for lane in cast(list[Any], self.road.network.lanes_list()):
+            lane.priority = int(hasattr(lane, "radius"))
+            # At highway-env's 16 to 20 m/s a bend of 20 m would take 1.3 g and more.
+            lane.speed_limit = 12.0
+
+    def _settle(self) -> None:
+        lane = self.road.network.get_lane(("ser", "ses", 0))
+        place = self.np_random.uniform(20.0, 70.0)  # highway-env puts it right at the entry
+        self.ego.position, self.ego.heading = lane.position(place, 0.0), lane.heading_at(place)
+        self.ego.plan_route_to(str(self.np_random.choice(["exr", "nxr", "wxr"])))
+        for arm in ("eer", "ner", "wer"):
+            start = self.road.network.get_lane((arm, arm[:2] + "s", 0))
+            place = self.np_random.uniform(0.0, 80.0)
+            speed = self.np_random.uniform(8.0, 12.0)
+            car = TrafficCar(self.road, start.position(place, 0.0), start.heading_at(place), speed)
+            car.plan_route_to(str(self.np_random.choice(["exr", "sxr", "nxr", "wxr"])))
+            self.road.cars.append(car)
+
+    def _is_finished(self) -> bool:
+        lane = self.ego.lane_index
+        return bool(lane[1].endswith("xr") and self.ego.lane.local_coordinates(self.ego.position)[0] > 60.0)

@@ -1,0 +1,1 @@
+"""Analysis of finished runs: protocol limits, comparisons, detection curves, tables and figures."""

@@ -1,0 +1,1 @@
+"""The traffic suite: recorded drives, replays of agents on them, rows and summaries."""

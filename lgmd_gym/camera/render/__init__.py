@@ -1,0 +1,1 @@
+"""The compiled kernels that render camera frames, and their lookup tables."""

@@ -1,0 +1,122 @@
+"""A panorama all round instead of the skyline: natural noise, or an image of the user's own."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from lgmd_gym.camera.effects import far_veil
+from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.pinhole import CAM_COS_PITCH, CAM_CU, CAM_CV, CAM_FOCAL, CAM_SIN_PITCH, CAM_YAW
+from lgmd_gym.camera.render.jit import kernel
+
+_MAX_LOG2 = 13  # no wider than 8192 px: 0.044° each
+_ROWS = 128  # heights are multiples of this
+_NIGHT = 0.035  # light of a night sky, as a share of the day's
+
+
+def panorama_table(p: CameraParams) -> np.ndarray:
+    """Return the panorama of a camera in its own light and air, no finer than its pixels.
+
+    Columns go round from the direction +x towards +y; every texel is as high as wide, and the horizon
+    is half-way down.
+
+    Returns:
+        float32, shape (height, width), width a power of two; shape (0, 0) for the skyline.
+
+    Raises:
+        ValueError: If an image cannot be read.
+    """
+    if p.panorama == "skyline":
+        return np.zeros((0, 0), dtype=np.float32)
+    grey = natural_panorama(p.seed) if p.panorama == "natural" else _image(p.panorama)
+    grey = grey.astype(np.float32)
+    # Halve it while a pixel at the centre of the frame covers more than about 1.4 texels.
+    while grey.shape[1] > 16 and 1.0 / p.focal_px > 1.4 * 2.0 * math.pi / grey.shape[1]:
+        grey = 0.25 * (grey[0::2, 0::2] + grey[1::2, 0::2] + grey[0::2, 1::2] + grey[1::2, 1::2])
+        if grey.shape[0] % 2:
+            grey = np.concatenate((grey, grey[-1:]))
+    if p.light == "night":
+        grey *= _NIGHT
+    if p.visibility_m > 0.0:
+        haze, left = far_veil(p)
+        grey = haze + left * (grey - haze)
+    return np.ascontiguousarray(grey, dtype=np.float32)
+
+
+@lru_cache(maxsize=2)
+def natural_panorama(seed: int) -> np.ndarray:
+    """Return noise with the statistics of natural scenes; uint8, shape (1024, 4096), 45° up and down.
+
+    Amplitude falls as 1/frequency (Field 1987; Tolhurst et al. 1992 find exponents of 0.8 to 1.5), grey
+    is log-normal with a contrast (deviation over mean) of 0.4, and the sky is lighter than what is below.
+    """
+    rng = np.random.default_rng([seed, 6])
+    shape = (1024, 4096)
+    spectrum = np.fft.rfft2(rng.standard_normal((2 * shape[0], shape[1]), dtype=np.float32))
+    fy = np.fft.fftfreq(2 * shape[0])[:, None] * 4096.0
+    fx = np.fft.rfftfreq(shape[1])[None, :] * 4096.0
+    spectrum *= 1.0 / np.sqrt(fx * fx + fy * fy + 4.0)
+    spectrum[0, 0] = 0.0
+    noise = np.fft.irfft2(spectrum, (2 * shape[0], shape[1]))[: shape[0]]
+    noise /= noise.std()
+    elevation = (0.5 * shape[0] - 0.5 - np.arange(shape[0])[:, None]) * 360.0 / shape[1]
+    sky = 0.35 * np.tanh(elevation / 8.0)
+    return np.clip(118.0 * np.exp(0.38 * noise + sky - 0.07), 0.0, 255.0).astype(np.uint8)
+
+
+def _image(path: str) -> np.ndarray:
+    try:
+        stamp = Path(path).stat().st_mtime_ns
+        return _read_image(path, stamp)
+    except Exception as error:  # decoders raise errors of every kind
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise ValueError(
+            f"camera panorama={path!r} cannot be read as an image ({reason}); "
+            "pass the path of a PNG or JPEG, or 'skyline' or 'natural'"
+        ) from error
+
+
+@lru_cache(maxsize=4)
+def _read_image(path: str, stamp: int) -> np.ndarray:
+    """Read an image as grey, uint8, its width a power of two, its height a multiple of 128."""
+    from PIL import Image
+
+    with Image.open(path) as image:
+        grey = image.convert("L")
+    wide = 1 << min(max(round(math.log2(grey.width)), 4), _MAX_LOG2)
+    high = min(max(round(grey.height * wide / grey.width), 1), wide // 2 + _ROWS)
+    pixels = np.asarray(grey.resize((wide, high), Image.Resampling.BOX))
+    missing = -high % _ROWS
+    return np.pad(pixels, ((missing // 2, missing - missing // 2), (0, 0)), mode="edge")
+
+
+@kernel
+def draw_panorama(image, cam, table, horizon):
+    """Fill the rows down to the horizon; arguments as for `draw_sky`, and `panorama_table(...)`."""
+    height, width = image.shape
+    f, c, s = cam[CAM_FOCAL], cam[CAM_COS_PITCH], cam[CAM_SIN_PITCH]
+    rows = int(min(max(math.ceil(horizon), 0.0), height))
+    high, wide = table.shape
+    texels = wide / (2.0 * math.pi)
+    for j in range(width):
+        u = j + 0.5 - cam[CAM_CU]
+        turn = math.atan2(u, f * c)
+        for i in range(rows):
+            v = i + 0.5 - cam[CAM_CV]
+            ahead = f * c + v * s
+            if s != 0.0:
+                turn = math.atan2(u, ahead)
+            rise = math.atan2(f * s - v * c, math.sqrt(ahead * ahead + u * u))
+            x = (cam[CAM_YAW] + turn) * texels - 0.5
+            y = min(max(0.5 * high - rise * texels - 0.5, 0.0), high - 1.0)
+            left, top = math.floor(x), int(y)
+            wx, wy = x - left, y - top
+            a, b = int(left) & (wide - 1), (int(left) + 1) & (wide - 1)
+            low = min(top + 1, high - 1)
+            above = table[top, a] + wx * (table[top, b] - table[top, a])
+            below = table[low, a] + wx * (table[low, b] - table[low, a])
+            image[i, j] = above + wy * (below - above)

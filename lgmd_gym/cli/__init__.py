@@ -1,0 +1,1 @@
+"""The `lgmd-gym` command line: option dataclasses, and one module per command."""

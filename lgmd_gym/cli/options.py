@@ -1,0 +1,273 @@
+"""What can be said to each command of `lgmd-gym`, with the help that is shown for it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from tyro.conf import Positional
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    """Play a suite with every agent and seed, print the scores, and write a run folder.
+
+    The folder gets episodes.jsonl (one row per episode, as it finishes), summary.csv, report.html, run.toml,
+    run.json, time series and one PNG per case. Ctrl-C keeps what is finished.
+    """
+
+    suite: str | None = None
+    """Name of a suite (`lgmd-gym list suites`), or a suite file, NAME.toml. Default: quick. 300 km of
+    traffic: --suite traffic --seeds 110."""
+    agents: tuple[str, ...] | None = None
+    """Agents with options, as in spike-threshold:threshold=45,frames=2, or your own as MODULE:CLASS. Default:
+    no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""
+    seeds: int | None = None
+    """Seeds per case; a seed draws the place on the road and the target's grey. Default: 3."""
+    first_seed: int | None = None
+    """Seeds are played from this one on. Default: 0."""
+    conditions: tuple[str, ...] | None = None
+    """Camera conditions, each played: clear, night, fog, degraded. Default: clear."""
+    camera: str | None = None
+    """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
+    params: Path | None = None
+    """TOML file of LGMD parameters."""
+    config: Path | None = None
+    """The run.toml of a run folder: plays the same again, in place of the options above."""
+    resume: Path | None = None
+    """Run folder of a broken-off run: plays what is missing, with that run's own settings."""
+    jobs: int = 2
+    """Processes."""
+    backend: Literal["processes", "dask"] = "processes"
+    """Where to play: on this machine, or on a Dask cluster that runs already."""
+    address: str | None = None
+    """Of the cluster's scheduler, as tcp://10.0.0.1:8786."""
+    out: Path | None = None
+    """Run folder; must not exist. Default: runs/SUITE-DATE-TIME."""
+    plots: bool = True
+    """Draw one PNG per case."""
+    report: bool = True
+    """Write report.html."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compare:
+    """Say how two runs differ, pair by pair: the same case, seed and condition.
+
+    Differences are B less A, with 95 % intervals from a bootstrap that draws whole cases.
+    """
+
+    run_a: Positional[Path]
+    """Run folder."""
+    run_b: Positional[Path | None] = None
+    """Another run folder; without it, agents within the first are compared."""
+    agents: tuple[str, ...] | None = None
+    """Two agents: A's and B's. Default: every agent that both runs hold, or all pairs within one."""
+    out: Path | None = None
+    """PNG of the differences to write; must not exist."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judge:
+    """Judge arms of a run: trainings of one kind taken together, or rules, over the same episodes.
+
+    Play them first: lgmd-gym bench --suite random --seeds 1 --agents policy:a0.zip policy:a1.zip ttc-oracle.
+    """
+
+    run: Positional[Path]
+    """Run folder."""
+    arms: tuple[str, ...] = ()
+    """An agent of the run, or name=pattern of agents, as in lgmd=policy:*lgmd*. Default: every agent."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """Play one episode and print how it ended; watch it in a window or write a video.
+
+    Each picture shows what the eye sees, the neuron's layers and spikes, and the road from above.
+    """
+
+    target: Positional[str]
+    """An environment id such as LGMD/CCRs-v0, a case such as quick/CCRs/v30, or traffic/merge."""
+    agent: str = "spike-threshold"
+    """Who brakes, with options as in spike-threshold:threshold=45."""
+    video: Path | None = None
+    """Video file to write (.mp4, .gif, …); must not exist."""
+    live: bool = False
+    """Show a window, in real time; Escape closes it."""
+    overlays: tuple[str, ...] = ("zone", "targets")
+    """Over the eye's frame: zone (the lane ahead), targets (bodies ahead); --overlays alone for none."""
+    seed: int = 0
+    """Draws the place on the road and the target's grey."""
+    camera: str | None = None
+    """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
+    params: Path | None = None
+    """TOML file of LGMD parameters."""
+    set: tuple[str, ...] = ()
+    """Scenario arguments in SI units, as in --set ego_speed=8.3 shade=40."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Video:
+    """Watch video clips with the neuron: spike traces, figures, overlay videos, a detection table.
+
+    For each clip the run folder gets trace.csv (one row per frame), trace.png and, if asked, overlay.mp4.
+    """
+
+    clips: Positional[tuple[str, ...]]
+    """Video files, or folders of them; any file that ffmpeg reads."""
+    choices: tuple[str, ...] = ("paper",)
+    """Named ways to watch, compared in one table if several: paper, calm, paper-18hz, t_sf-60, t_sp-0.78,
+    released, off-only, fixed-inhibition, yue-rind-2006; or all."""
+    crashes: Path | None = None
+    """CSV with the columns clip,crash_frame (empty for no crash): prints the detection table."""
+    crash_frame: int | None = None
+    """Crash frame of a single clip, 0-based: marked in the figure."""
+    out: Path | None = None
+    """Run folder; must not exist. Default: runs/video-DATE-TIME."""
+    params: Path | None = None
+    """TOML file of LGMD parameters, in place of the choice's."""
+    threshold: float | None = None
+    """Alarm level T_sf [spikes/s]; read it together with the frame rate."""
+    fps: float | None = None
+    """Resample to this rate [Hz]; the neuron's answer depends on it."""
+    drop_duplicates: float | None = None
+    """Hide frames that change by less than this fraction of the typical change, as 0.25; 0 shows all."""
+    size: tuple[int, int] | None = None
+    """Scale to this width and height [px]."""
+    roi: tuple[int, int, int, int] | None = None
+    """The neuron sees only this region: top left height width [px]."""
+    overlay: bool = False
+    """Write the overlay video: picture, excitation, spikes, alert lamp."""
+    plots: bool = True
+    """Draw the figures."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paper:
+    """Run every experiment of the paper; write the figures and a table of which claims hold.
+
+    The crash and near-miss clips of the paper are not part of the package: give a folder of your own.
+    """
+
+    out: Path | None = None
+    """Run folder; must not exist. Default: runs/paper-DATE-TIME."""
+    clips: Path | None = None
+    """Folder of driving clips; needs --crashes."""
+    crashes: Path | None = None
+    """CSV with the columns clip,crash_frame (empty for no crash)."""
+    picture: Path | None = None
+    """Picture for the shifting panorama; default: a random one with a natural spectrum."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train:
+    """Train a policy with stable-baselines3; it then brakes as --agents policy:FOLDER/policy.zip.
+
+    The folder gets TensorBoard logs, checkpoints, what the looks at the validation split said, and the
+    policy that did best there. Ctrl-C keeps the checkpoints; --resume goes on from the last one.
+    """
+
+    algo: str = "sac"
+    """sac, ppo or dqn; or recorded, which learns when to brake from recorded drives, in minutes."""
+    env: str = "LGMD/RandomBraking-v0"
+    """Environment id; RandomBraking is trained on its split train and judged on validation."""
+    camera: tuple[str, ...] = ()
+    """Camera presets, a neuron each; default: fovea, tele and wide."""
+    eye: str | None = None
+    """Agent whose own eye is used instead, such as stopping-zone."""
+    inputs: tuple[str, ...] = ()
+    """Observations the policy sees: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed,
+    speed_change, ego_yaw_rate; those are the default. Also frame and, with the eye of stopping-zone, zones,
+    zones_spikes, zones_ffi."""
+    demands: tuple[float, ...] | None = None
+    """Demands the policy chooses among, from -1 (full braking) to 1; empty for any. SAC takes no choice.
+    Default: 0 -0.4 -1, of recorded 0 -1."""
+    steps: int | None = None
+    """Decisions of the policy, of recorded drives; default: what the hyperparameters say."""
+    seed: int = 0
+    """Of the network and the levels drawn."""
+    hyperparams: Path | None = None
+    """YAML file in the format of rl-zoo; default: the package's own."""
+    eval_every: int = 20_000
+    """Decisions between two looks at the validation split; recorded looks after every pass."""
+    eval_episodes: int | None = None
+    """Episodes of a look; default: 60, of recorded 600."""
+    drives: Path | None = None
+    """Training folder of a recorded one with the same eye, whose drives are learnt from."""
+    traffic: int = 0
+    """Drives through traffic, where braking is the fault, that recorded learns from beside the levels."""
+    jobs: int = 2
+    """Processes that record drives."""
+    out: Path | None = None
+    """Training folder; must not exist. Default: runs/train-ALGO-DATE-TIME."""
+    resume: Path | None = None
+    """Training folder of a broken-off training, to go on with under its own settings."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tune:
+    """Tune a rule on training levels of LGMD/RandomBraking-v0 and false-reaction cases with other seeds.
+
+    Validation levels choose among the best trials; test levels and the protocol suites stay unseen. What the
+    rule's eye sees is recorded once, so that a trial takes seconds. With cameras, placing or neuron the eye
+    itself is searched, too, and every trial has to see anew: about a minute. A rule that does not latch
+    (graded) is played out, which takes minutes a trial.
+    """
+
+    agent: str = "stopping-zone"
+    """Name of a rule."""
+    cameras: tuple[str, ...] = ()
+    """Camera presets to choose among, for a rule with one camera, as fovea tele wide."""
+    placing: bool = False
+    """Search also what places the rule's own cameras, as stopping-zone's deceleration and reaction."""
+    neuron: tuple[str, ...] = ()
+    """Parameters of the neuron to search, each from half to twice the paper's, as sigma_3 t_sp."""
+    trials: int = 40
+    """Trials to add to the study."""
+    levels: int = 100
+    """Levels of either split, from 0 on; half of them are threats."""
+    seeds: int = 1
+    """Seeds of the false-reaction suite, from 1000 on to search and from 2000 on to choose."""
+    false_cost: float = 1.0
+    """What a false brake costs, in contacts at full speed."""
+    jobs: int = 2
+    """Processes."""
+    study: Path = Path("tune.db")
+    """SQLite file of the study; one that exists is gone on with."""
+    best: Path = Path("best.toml")
+    """TOML file for the chosen parameters; must not exist. Those of the neuron go into BEST-neuron.toml."""
+    sensitivity: bool = False
+    """Do not search: shift each parameter by 20 % both ways and print the scores."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class List:
+    """List what there is to name: suites with their cases, agents, environments, cameras."""
+
+    what: Positional[Literal["all", "suites", "agents", "envs", "cameras"]] = "all"
+    """Which list."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gallery:
+    """Make a page of videos of every scenario, with what each agent makes of it; a few minutes.
+
+    The page needs no network: open index.html in the folder.
+    """
+
+    out: Path = Path("gallery")
+    """Folder; must not exist."""
+    families: tuple[str, ...] = ()
+    """Scenario families or kinds of traffic, as CCRs merge; none for all."""
+    agent: str = "spike-threshold"
+    """Who brakes in the videos."""
+    seeds: int = 3
+    """Seeds per scenario that the agents are judged by."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doctor:
+    """Check versions, numba's cache, the video codec and the display, and drive for two seconds.
+
+    Exit code 1 if something is at fault; the table says what to do.
+    """

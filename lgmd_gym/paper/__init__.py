@@ -1,0 +1,1 @@
+"""The experiments of the seed paper: stimuli, measurements, claims and figures."""

@@ -1,0 +1,1 @@
+"""The matplotlib style and the figures that several packages share."""

@@ -1,0 +1,1 @@
+"""The neuron on video clips: playback, alert detection, summaries, tables and figures."""

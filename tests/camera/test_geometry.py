@@ -1,0 +1,157 @@
+import math
+
+import numpy as np
+import pytest
+from support.roads import EGO_LENGTH, add_car, lens_x, straight_env
+
+from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera.pinhole import Pose, camera_vector, ground_footprint, horizon_row, project
+
+PLAIN = {"texture": 0.0, "roadside": 0.0, "vehicles": "box"}
+
+
+def changed(camera, env, car):
+    """Bounds (top, bottom, left, right) of the pixels that the car changes."""
+    with_car = camera.render(env)
+    env.road.vehicles.remove(car)
+    without = camera.render(env)
+    env.road.vehicles.append(car)
+    diff = np.abs(with_car.astype(int) - without) > 12
+    rows = np.flatnonzero(diff.any(axis=1))
+    # Left and right above the horizon: below it the shadow is wider than the car.
+    cols = np.flatnonzero(diff[: diff.shape[0] // 2].any(axis=0))
+    return rows[0], rows[-1] + 1, cols[0], cols[-1] + 1
+
+
+@pytest.mark.parametrize("shape", [(90, 160), (160, 90), (61, 200)])
+@pytest.mark.parametrize("gap", [8.0, 20.0])
+def test_a_box_covers_the_pixels_that_projection_says(shape, gap):
+    env = straight_env(line_types=False)
+    camera = EgoCamera("standard", shape=shape, **PLAIN)
+    # Dark, and higher than the lens, so that its rear face alone sets left, right and top.
+    car = add_car(env, lens_x(env) + gap + 2.0, 3.5, shade=10, size=(4.0, 1.8, 1.6))
+    top, bottom, left, right = changed(camera, env, car)
+    f = 0.5 * shape[1] / math.tan(math.radians(20.0))
+    # By hand: rear face at `gap` metres, 1.8 m wide, from 1.2 m below to 0.4 m above the lens.
+    assert left == pytest.approx(shape[1] / 2 - f * 0.9 / gap, abs=1.0)
+    assert right == pytest.approx(shape[1] / 2 + f * 0.9 / gap, abs=1.0)
+    assert top == pytest.approx(max(shape[0] / 2 - f * 0.4 / gap, 0), abs=1.0)
+    assert bottom >= min(shape[0] / 2 + f * 1.2 / gap, shape[0]) - 1.0
+    corners = camera.project([[lens_x(env) + gap, 3.5 + side * 0.9, 1.6] for side in (-1, 1)])
+    assert corners[0] == pytest.approx((shape[1] / 2 - f * 0.9 / gap, shape[0] / 2 - f * 0.4 / gap))
+    assert corners[1, 0] == pytest.approx(shape[1] / 2 + f * 0.9 / gap)
+
+
+def test_larger_y_is_on_the_right():
+    env = straight_env()
+    camera = EgoCamera("wide", **PLAIN)
+    car = add_car(env, 25.0, 3.5 + 3.5, shade=10)
+    _, _, left, _ = changed(camera, env, car)
+    assert left > 80
+    car.position[1] = 0.0
+    _, _, _, right = changed(camera, env, car)
+    assert right < 80
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.7, math.pi / 2, -2.0, math.pi])
+def test_straight_ahead_is_the_middle_for_any_heading(heading):
+    env = straight_env(heading=heading, x=100.0, line_types=False)
+    ahead = env.vehicle.position + 30.0 * np.array([math.cos(heading), math.sin(heading)])
+    car = add_car(env, *ahead, shade=10, heading=heading)
+    camera = EgoCamera("standard", **PLAIN)
+    _, _, left, right = changed(camera, env, car)
+    assert (left + right) / 2 == pytest.approx(80.0, abs=1.0)
+    u, v = camera.project([*ahead, 1.2])
+    assert (u, v) == pytest.approx((80.0, 45.0))
+
+
+def test_mount_is_behind_the_front_bumper():
+    env = straight_env()
+    camera = EgoCamera("wide", mount_setback=0.5, mount_left=0.4, mount_height=1.5)
+    camera.render(env)
+    lens = np.array([EGO_LENGTH / 2 - 0.5, 3.5 - 0.4, 1.5])
+    assert camera.project(lens + np.array([10.0, 0.0, 0.0])) == pytest.approx((80.0, 45.0))
+    # Ten metres ahead, one to the right and one up: f/10 = 13.86 px.
+    assert camera.project(lens + np.array([10.0, 1.0, 1.0])) == pytest.approx(
+        (80 + 13.856, 45 - 13.856), abs=1e-3
+    )
+
+
+@pytest.mark.parametrize("pitch", [-8.0, 0.0, 5.0])
+def test_horizon_row(pitch):
+    env = straight_env(line_types=False)
+    camera = EgoCamera("wide", pitch_deg=pitch, **PLAIN)
+    frame = camera.render(env)
+    v = 45 + 80 / math.tan(math.radians(30)) * math.tan(math.radians(pitch))
+    far = camera.project([1e7, 3.5, 0.0])
+    assert far[1] == pytest.approx(v, abs=0.01)
+    # Asphalt below, in the middle; the skyline and the sky are of another grey.
+    assert np.all(np.abs(frame[math.ceil(v) + 2 :, 80].astype(int) - 104) <= 1)
+    assert np.all(frame[: math.floor(v) - 8, 80] > 150)
+
+
+def test_yaw_and_gaze_turn_the_picture():
+    env = straight_env()
+    camera = EgoCamera("wide", yaw_deg=10.0, **PLAIN)
+    point = [lens_x(env) + 20.0, 3.5, 1.2]
+    camera.render(env)
+    shift = camera.params.focal_px * math.tan(math.radians(10.0))
+    assert camera.project(point)[0] == pytest.approx(80.0 - shift)
+    camera.render(env, gaze=(-10.0, 5.0))
+    rise = camera.params.focal_px * math.tan(math.radians(5.0))
+    assert camera.project(point) == pytest.approx((80.0, 45.0 + rise))
+
+
+def test_path_gaze_looks_into_the_turn():
+    env = straight_env()
+    point = [lens_x(env) + 20.0, 3.5, 1.2]
+    camera = EgoCamera("wide", gaze="path")
+    camera.render(env)
+    assert camera.project(point)[0] == pytest.approx(80.0)
+    env.vehicle.action = {"steering": 0.05, "acceleration": 0.0}  # to the right
+    camera.render(env)
+    assert camera.project(point)[0] < 75.0
+
+
+def test_behind_the_lens_is_nan():
+    env = straight_env()
+    camera = EgoCamera("wide")
+    camera.render(env)
+    assert np.isnan(camera.project([[-5.0, 3.5, 0.0]])).all()
+    with pytest.raises(ValueError, match="render"):
+        EgoCamera("wide").project([1.0, 2.0, 3.0])
+
+
+def test_ground_footprint_against_projection():
+    cam = camera_vector(Pose(0.0, 0.0, 1.2, 0.0, 0.0), 138.56, (90, 160))
+    ahead, along, across = ground_footprint(cam, 60.5)
+    assert ahead == pytest.approx(1.2 * 138.56 / 15.5)
+    u, v = project(cam, np.array([ahead, across, 0.0]))
+    assert (u, v) == pytest.approx((81.0, 60.5))
+    above = project(cam, np.array([ahead + along, 0.0, 0.0]))
+    assert above[1] == pytest.approx(59.5, abs=0.1)
+    assert ground_footprint(cam, 44.0)[0] == math.inf
+    assert horizon_row(cam) == pytest.approx(45.0)
+
+
+def test_out_is_filled_and_checked():
+    env = straight_env()
+    camera = EgoCamera(CameraParams(shape=(40, 60)))
+    out = np.zeros((40, 60), np.uint8)
+    assert camera.render(env, out) is out
+    assert out.std() > 5
+    for bad in (np.zeros((60, 40), np.uint8), np.zeros((40, 60), np.float32)):
+        with pytest.raises(ValueError, match="out must be"):
+            camera.render(env, bad)
+
+
+def test_render_batch_is_render_of_each():
+    envs = [straight_env(x=10.0 * k, heading=0.1 * k) for k in range(3)]
+    add_car(envs[1], 40.0, 3.5)
+    camera = EgoCamera("wide")
+    batch = camera.render_batch(envs)
+    assert batch.shape == (3, 90, 160)
+    for env, frame in zip(envs, batch, strict=True):
+        assert np.array_equal(EgoCamera("wide").render(env), frame)
+    with pytest.raises(ValueError, match="out must be"):
+        camera.render_batch(envs, np.zeros((2, 90, 160), np.uint8))

@@ -1,0 +1,182 @@
+"""The command line, by running it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from lgmd_gym.cli import main as cli
+
+
+def run(*arguments, cwd=None):
+    return subprocess.run(
+        [sys.executable, "-m", "lgmd_gym", *arguments], capture_output=True, text=True, cwd=cwd, timeout=120
+    )
+
+
+def test_bench_from_start_to_end(tmp_path):
+    out = tmp_path / "deep" / "run"
+    done = run("bench", "--agents", "spike-threshold", "--seeds", "1", "--out", str(out))
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.rstrip().endswith(f"run folder: {out}")
+    assert "spike-threshold" in done.stdout
+    assert "T_sf = 30" in done.stdout
+    rows = [json.loads(line) for line in (out / "episodes.jsonl").read_text().splitlines()]
+    assert {row["agent"] for row in rows} == {"no-brake", "spike-threshold"}
+    assert len(list((out / "plots").glob("*.png"))) == len({row["case"] for row in rows})
+    assert (out / "summary.csv").exists()
+    again = run("bench", "--agents", "spike-threshold", "--seeds", "1", "--out", str(out))
+    assert again.returncode == 2
+    assert "exists and is kept" in again.stderr
+
+
+def test_drive_writes_a_video(tmp_path):
+    from imageio_ffmpeg import read_frames
+
+    video = tmp_path / "out.mp4"
+    done = run(
+        "drive", "LGMD/CCRs-v0", "--agent", "spike-threshold", "--set", "ego_speed=4", "--video", str(video)
+    )
+    assert done.returncode == 0, done.stderr
+    assert "no contact" in done.stdout
+    reader = read_frames(str(video))
+    assert next(reader)["size"] == (1280, 720)
+    pictures = [np.frombuffer(picture, np.uint8) for picture in reader]
+    assert len(pictures) > 100
+    assert pictures[-1].std() > 20
+    assert (pictures[0] != pictures[-1]).any()
+
+
+def test_drive_says_how_a_case_ended():
+    done = run("drive", "quick/CCRs/v20", "--agent", "no-brake")
+    assert done.returncode == 0, done.stderr
+    assert "contact at 20.0 km/h" in done.stdout
+
+
+def test_lists_and_helps(capsys):
+    assert cli.run(["list"]) == 0
+    listed = capsys.readouterr().out
+    for name in ("quick", "spike-threshold", "LGMD/CCRs-v0", "fovea"):
+        assert name in listed
+    for command in ([], ["bench"], ["drive"], ["list"]):
+        with pytest.raises(SystemExit) as stop:
+            cli.run([*command, "--help"])
+        assert not stop.value.code
+    assert "spike frequency" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "which command? One of bench, drive, list"),
+        (["benc"], "benc"),
+        (["bench", "--agent", "no-brake"], "did you mean --agents?"),
+        (["bench", "--seeds", "x"], "--seeds"),
+        (["bench", "--seeds", "0"], "seeds must be a whole number >= 1, got 0"),
+        (["bench", "--suite", "quik"], "did you mean 'quick'?"),
+        (["bench", "--suite", "trafic"], "did you mean 'traffic'?"),
+        (["bench", "--first-seed", "-1"], "first_seed must be a whole number >= 0, got -1"),
+        (["bench", "--suite", "traffic", "--seeds", "0"], "seeds must be a whole number >= 1, got 0"),
+        (["bench", "--agents", "spike-treshold"], "did you mean 'spike-threshold'?"),
+        (["bench", "--camera", "fova"], "did you mean 'fovea'?"),
+        (["bench", "--params", "nowhere.toml"], "params file 'nowhere.toml' cannot be read"),
+        (["bench", "--out", "/proc/nowhere/run"], "run folder '/proc/nowhere/run' cannot be made"),
+        (["drive", "LGMD/CCR-v0"], "did you mean 'LGMD/CCR"),
+        (["drive", "quick/CCRs/v35"], "did you mean 'quick/CCRs/v"),
+        (["drive", "LGMD/CCRs-v0", "--set", "ego_speed=50"], "for 50 km/h pass 13.89"),
+        (["drive", "LGMD/CCRs-v0", "--set", "ego_speed=-1"], "ego_speed must be in (0, 40] m/s, got -1"),
+        (["drive", "LGMD/CCRs-v0", "--set", "speed=5"], "did you mean 'ego_speed'?"),
+        (["drive", "LGMD/CCRs-v0", "--set", "ego_speed"], "must be NAME=NUMBER"),
+        (["drive", "LGMD/CCRs-v0", "--video", "out.txt"], "needs a suffix among .mp4"),
+        (["drive", "LGMD/CCRs-v0", "--video", "nowhere/out.mp4"], "does not exist; make it first"),
+        (["list", "agent"], "agent"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_two(arguments, words, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(arguments) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("lgmd-gym: ")
+    assert said.err.count("\n") == 1
+    assert words in said.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_traffic_from_start_to_end(tmp_path):
+    out = tmp_path / "run"
+    arguments = ["--suite", "traffic", "--agents", "spike-threshold", "--seeds", "1", "--out", str(out)]
+    done = run("bench", *arguments)
+    assert done.returncode == 0, done.stderr
+    assert "false brakes" in done.stdout
+    rows = [json.loads(line) for line in (out / "episodes.jsonl").read_text().splitlines()]
+    kinds = ["highway", "intersection", "merge", "roundabout", "two-way"]
+    assert sorted(row["case"] for row in rows) == [f"traffic/{kind}/s0" for kind in kinds]
+    assert len((out / "summary.csv").read_text().splitlines()) == 1 + 1 + len(kinds)
+
+
+def test_a_failing_episode_makes_exit_code_one(tmp_path, monkeypatch, capsys):
+    from lgmd_gym.benchmark import task as tasks
+
+    def fail(task, agent, sensor_config):
+        raise RuntimeError("no road today")
+
+    monkeypatch.setattr(tasks, "_play", fail)
+    arguments = [
+        "bench",
+        "--jobs",
+        "1",
+        "--seeds",
+        "1",
+        "--agents",
+        "no-brake",
+        "--out",
+        str(tmp_path / "run"),
+    ]
+    assert cli.run(arguments) == 1
+    assert "19 episodes failed" in capsys.readouterr().out
+    assert "no road today" in (tmp_path / "run" / "episodes.jsonl").read_text()
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_what_is_finished(tmp_path):
+    """A real interrupt of the command and its worker processes, as a terminal sends it."""
+    out = tmp_path / "run"
+    command = [
+        sys.executable,
+        "-m",
+        "lgmd_gym",
+        "bench",
+        "--suite",
+        "ncap2023",
+        "--seeds",
+        "5",
+        "--out",
+        str(out),
+    ]
+    process = subprocess.Popen(
+        [*command, "--no-plots"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # A shell that runs this in its background has its children ignore the interrupt.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    while not (out / "episodes.jsonl").exists() or (out / "episodes.jsonl").read_text().count("\n") < 20:
+        time.sleep(0.2)
+        assert process.poll() is None
+    os.killpg(process.pid, signal.SIGINT)
+    said, complaint = process.communicate(timeout=60)
+    assert process.returncode == 130
+    rows = [json.loads(line) for line in (out / "episodes.jsonl").read_text().splitlines()]
+    assert 20 <= len(rows) < 4000
+    assert f"interrupted: {len(rows)} of" in said
+    assert "Traceback" not in complaint
+    assert (out / "summary.csv").exists()

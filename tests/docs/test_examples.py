@@ -1,0 +1,114 @@
+"""The examples, and README's blocks, run."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import gymnasium as gym
+import pytest
+
+from lgmd_gym.agents import make_agent
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "docs" / "examples"
+
+
+def load(name):
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_braking_benchmark(tmp_path, capsys):
+    load("braking_benchmark").main(tmp_path / "run", tmp_path / "picture.png")
+    lines = capsys.readouterr().out.splitlines()
+    oracle = next(line for line in lines if line.startswith("ttc-oracle"))
+    assert "avoided 12/12" in oracle
+    assert "false braking 0/7" in oracle
+    assert (tmp_path / "picture.png").stat().st_size > 10_000
+
+
+def test_scenario_evaluation(capsys, tmp_path):
+    example = load("scenario_evaluation")
+    example.main(tmp_path / "picture.png", cameras=("wide", "fovea"), speeds=(30,), seeds=1)
+    wide, fovea, needed = [float(value) for value in re.findall(r"([\d.]+) s", capsys.readouterr().out)]
+    assert 0.0 < wide < fovea < 4.0
+    assert needed == pytest.approx(0.70, abs=0.01)  # 8.33 m/s / (2 · 9 m/s²) and 0.23 s
+    assert (tmp_path / "picture.png").stat().st_size > 10_000
+
+
+def test_rl_training(capsys, tmp_path):
+    """PPO with MultiInputPolicy learns 2,000 steps: parameters move and stay finite."""
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("stable_baselines3")
+    model = load("rl_training").main(2000, tmp_path / "picture.png")
+    assert model.num_timesteps >= 2000
+    assert model._n_updates > 0
+    assert all(bool(torch.isfinite(weight).all()) for weight in model.policy.parameters())
+    assert "2000 steps: contact in" in capsys.readouterr().out
+    assert (tmp_path / "picture.png").stat().st_size > 5_000
+
+
+def test_contact_sheet(tmp_path):
+    sheet = load("contact_sheet").main(tmp_path / "sheet.png", quick=True)
+    assert [list(row) for row in sheet.values()] == [["clear", "night"]] * 2
+    assert all(row["night"].mean() < 0.5 * row["clear"].mean() for row in sheet.values())
+    assert 10_000 < (tmp_path / "sheet.png").stat().st_size < 200_000
+
+
+def test_on_record(capsys):
+    """What is told of a rule is what the benchmark's closed loop does with it."""
+    example = load("on_record")
+    drives = example.recorded("stopping-zone", 4, jobs=1)
+    told = example.braked("stopping-zone", drives)
+    env = gym.make("LGMD/RandomBraking-v0", split="test", camera=make_agent("stopping-zone").camera)
+    for seed, (ret, contact, brakes) in enumerate(told):
+        agent = make_agent("stopping-zone")
+        observation, info = env.reset(seed=seed)
+        agent.reset(seed)
+        total, braked, done = 0.0, False, False
+        while not done:
+            action = agent.act(observation, info)
+            braked = braked or bool(action[0] < 0.0)
+            observation, reward, terminated, truncated, info = env.step(action)
+            total, done = total + float(reward), terminated or truncated
+        assert ret == pytest.approx(total, abs=0.15)  # returns lie on lines between replays
+        assert (bool(contact), bool(brakes)) == (info["collision"], braked)
+    assert {brakes for *_, brakes in told} == {0.0, 1.0}
+    example.recorded = lambda agent, count: drives
+    example.main(["4", "stopping-zone", "no-brake+stopping-zone"])
+    rule, mean = capsys.readouterr().out.splitlines()[2:]
+    assert rule.endswith("stopping-zone")
+    assert "+0.00 [+0.00, +0.00]" in rule
+    assert mean.endswith("no-brake+stopping-zone")
+
+
+def test_what_breaks_first(capsys):
+    """A lens that looks up sees no ground, and the rule that watches it misses what it else avoids."""
+    example = load("what_breaks_first")
+    example.SPOILT["lens to the sky"] = (example.pitched(20.0), {})
+    example.first_table("stopping-zone", 1, 1, ("clear", "lens to the sky"), every=14)
+    clear, sky = capsys.readouterr().out.splitlines()[2:]
+    assert clear.startswith("| clear | 2/2 [34–100] | 0/2 [0–66] | 0/3 ")
+    assert sky.startswith("| lens to the sky | 0/2 ")
+    example.second_table("stopping-zone", 1, 1, every=6)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "| target, texture | day | night | fog |"
+    assert len(lines) == 2 + 9
+    assert "| asphalt (104), texture 1.6 | 1/1 " in "".join(lines)
+
+
+def test_every_example_is_run_here():
+    tested = Path(__file__).read_text()
+    assert all(f'load("{path.stem}")' in tested for path in EXAMPLES.glob("*.py"))
+
+
+def test_picture(tmp_path):
+    from PIL import Image
+
+    load("picture").main(tmp_path / "view.png", tmp_path / "film.gif", ego_speed=5.0, after=2)
+    assert Image.open(tmp_path / "view.png").size == (1280, 720)
+    film = Image.open(tmp_path / "film.gif")
+    assert film.size == (800, 450)
+    assert film.n_frames > 20

@@ -1,0 +1,240 @@
+"""The braking environments without an eye: scripts, contact, arguments, determinism."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from lgmd_gym.envs import FAMILIES, BrakingEnv, make_scenario
+from lgmd_gym.envs.dynamics.units import KMH
+from lgmd_gym.envs.registration import IDS
+
+HOLD, BRAKE = np.array([0.0], np.float32), np.array([-1.0], np.float32)
+
+
+def play(env, action, seed=0):
+    _, info = env.reset(seed=seed)
+    infos, rewards = [info], []
+    while True:
+        _, reward, terminated, truncated, info = env.step(action)
+        infos.append(info)
+        rewards.append(reward)
+        if terminated or truncated:
+            return infos, rewards, terminated
+
+
+def test_ids_are_the_families():
+    assert set(IDS) == set(FAMILIES)
+
+
+@pytest.mark.parametrize("family", ["CCRs", "CCRm", "CCRb"])
+def test_approach_ends_in_contact_unless_braked(family):
+    env = BrakingEnv(make_scenario(family))
+    infos, rewards, terminated = play(env, HOLD)
+    assert terminated
+    assert infos[-1]["collision"]
+    assert infos[-1]["gap"] == pytest.approx(0, abs=1e-9)
+    braked, braked_rewards, _ = play(env, BRAKE)
+    assert not braked[-1]["collision"]
+    assert sum(braked_rewards) > sum(rewards)
+
+
+@pytest.mark.parametrize("family", ["AdjacentPass", "Following", "EmptyRoad"])
+def test_quiet_families_need_no_brake_and_pay_for_braking(family):
+    env = BrakingEnv(make_scenario(family))
+    infos, rewards, _ = play(env, HOLD)
+    assert not infos[-1]["collision"]
+    assert all(np.isnan(info["ttc"]) for info in infos)
+    assert min(rewards) > 0
+    braked, braked_rewards, _ = play(env, BRAKE)
+    assert sum(braked_rewards) < sum(rewards)
+    assert max(info["deceleration"] for info in braked) == pytest.approx(9.0)
+    assert braked[-1]["ego_speed"] == 0.0
+
+
+@pytest.mark.parametrize("kmh", [10, 35, 50, 80])
+def test_impact_speed_and_time_are_exact(kmh):
+    env = BrakingEnv(make_scenario("CCRs", ego_speed=kmh * KMH))
+    infos, _, _ = play(env, HOLD)
+    assert infos[0]["ttc"] == pytest.approx(5.0)
+    assert infos[-1]["impact_speed"] == pytest.approx(kmh * KMH, abs=0.01 * KMH)
+    assert len(infos) - 1 in (150, 151)  # the touch falls on the edge of a decision
+
+
+@pytest.mark.parametrize("start", [40, 100, 140])
+def test_impact_speed_after_late_braking_is_the_closed_form(start):
+    """From a demand at a decision: delay, ramp, then constant deceleration up to the gap."""
+    speed = 50 * KMH
+    env = BrakingEnv(make_scenario("CCRs", ego_speed=speed))
+    env.reset(seed=0)
+    info = {}
+    for step in range(400):
+        _, _, terminated, _, info = env.step(BRAKE if step >= start else HOLD)
+        if terminated:
+            break
+    gap = 5 * speed - speed * (start / 30 + 1 / 30 + 0.1)
+    ramp_way, after = speed * 0.2 - 9 * 0.2**2 / 6, speed - 0.9
+    left = gap - ramp_way
+    if left > after**2 / 18:
+        assert not info["collision"]
+        assert info["gap"] == pytest.approx(left - after**2 / 18, abs=0.01)
+    elif left > 0:
+        assert info["impact_speed"] == pytest.approx((after**2 - 18 * left) ** 0.5, abs=0.1 * KMH)
+    else:
+        assert info["collision"]
+
+
+def test_relative_impact_speed_is_against_the_target():
+    infos, _, _ = play(BrakingEnv(make_scenario("CCRm", ego_speed=50 * KMH, target_speed=20 * KMH)), HOLD)
+    assert infos[-1]["relative_impact_speed"] == pytest.approx(30 * KMH)
+    assert infos[-1]["impact_speed"] == pytest.approx(50 * KMH)
+
+
+def test_braking_lead_follows_its_script():
+    env = BrakingEnv(make_scenario("CCRb", ego_speed=50 * KMH, gap=40.0, deceleration=6.0))
+    infos, _, _ = play(env, HOLD)
+    speeds = np.array([info["target_speed"] for info in infos])
+    assert speeds[90] == pytest.approx(50 * KMH)
+    assert speeds[120] == pytest.approx(50 * KMH - 3.0)  # the ramp of 1 s to 6 m/s²
+    assert speeds[150] == pytest.approx(50 * KMH - 9.0)
+    assert (np.diff(speeds) <= 1e-9).all()
+    assert infos[80]["gap"] == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize("overlap", [1.0, 0.75, 0.5, -0.5, -1.0])
+def test_overlap_covers_its_share_of_the_ego(overlap):
+    env = BrakingEnv(make_scenario("CCRs", overlap=overlap))
+    env.reset(seed=0)
+    ego, target = env.road.vehicles
+    left = max(ego.position[1] - 0.9, target.position[1] - target.WIDTH / 2)
+    right = min(ego.position[1] + 0.9, target.position[1] + target.WIDTH / 2)
+    full = target.WIDTH / 1.8 if abs(overlap) == 1 else abs(overlap)
+    assert (right - left) / 1.8 == pytest.approx(full)
+    if abs(overlap) < 1:  # + is left, and y grows to the right
+        assert np.sign(target.position[1] - ego.position[1]) == -np.sign(overlap)
+
+
+def test_gap_and_ttc_of_an_overlapping_target_in_the_next_lane():
+    env = BrakingEnv(make_scenario("AdjacentPass", lateral_offset=-3.5))
+    _, info = env.reset(seed=0)
+    assert np.isnan(info["gap"])
+    assert np.isnan(info["ttc"])
+    assert "action" not in info
+
+
+def test_same_seed_same_everything_other_seed_other_scene():
+    first, second = (BrakingEnv(make_scenario("CCRs")) for _ in range(2))
+    one, other = play(first, HOLD, seed=3), play(second, HOLD, seed=3)
+    assert one[1:] == other[1:]
+    np.testing.assert_equal(one[0], other[0])
+    assert first.road.vehicles[1].shade == second.road.vehicles[1].shade
+    place = first.road.vehicles[0].position[0]
+    first.reset(seed=4)
+    assert first.road.vehicles[0].position[0] != pytest.approx(place)
+
+
+def test_shade_is_kept_when_given():
+    env = BrakingEnv(make_scenario("CCRs", shade=77))
+    env.reset(seed=1)
+    assert env.road.vehicles[1].shade == 77
+
+
+def test_released_brake_regains_the_scripted_speed():
+    env = BrakingEnv(make_scenario("EmptyRoad", ego_speed=10.0))
+    env.reset(seed=0)
+    for _ in range(20):
+        env.step(BRAKE)
+    slowed = env.vehicle.speed
+    assert slowed < 7
+    for _ in range(200):
+        *_, info = env.step(HOLD)
+    assert info["ego_speed"] == pytest.approx(10.0, abs=0.05)
+
+
+def test_throttle_counts_only_where_allowed():
+    speeds = {}
+    for throttle in (False, True):
+        env = BrakingEnv(make_scenario("EmptyRoad", ego_speed=10.0), config={"throttle": throttle})
+        env.reset(seed=0)
+        for _ in range(60):
+            *_, info = env.step(np.array([1.0]))
+        speeds[throttle] = info["ego_speed"]
+    assert speeds[False] == 10.0
+    assert speeds[True] > 14.0
+
+
+def test_discrete_actions():
+    config = {"action": {"type": "DiscreteDemand", "levels": [0.0, -1.0]}}
+    env = BrakingEnv(make_scenario("EmptyRoad", ego_speed=5.0), config=config)
+    assert env.action_space == gym.spaces.Discrete(2)
+    env.reset(seed=0)
+    for _ in range(60):
+        *_, terminated, _, info = env.step(1)
+    assert terminated
+    assert info["ego_speed"] == 0.0
+
+
+def test_metadata_is_not_shared():
+    slow = BrakingEnv(make_scenario("EmptyRoad"), config={"policy_frequency": 10})
+    fast = BrakingEnv(make_scenario("EmptyRoad"))
+    assert (slow.metadata["render_fps"], fast.metadata["render_fps"]) == (10, 30)
+    assert "render_fps" not in BrakingEnv.metadata
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: make_scenario("CCRs", ego_speed=50), "50 m/s = 180 km/h.*for 50 km/h pass 13.89"),
+        (lambda: make_scenario("CCRs", ego_speed=-3), r"ego_speed must be in \(0, 40\] m/s, got -3"),
+        (lambda: make_scenario("CCRs", ego_speed="fast"), "ego_speed must be a number, got 'fast'"),
+        (lambda: make_scenario("CCRs", ego_speed=float("nan")), "ego_speed must be finite"),
+        (lambda: make_scenario("CCRx"), "unknown scenario 'CCRx'; did you mean 'CCR"),
+        (
+            lambda: make_scenario("CCRs", speed=5),
+            "unknown argument of CCRs 'speed'; did you mean 'ego_speed'",
+        ),
+        (lambda: make_scenario("CCRs", overlap=1.5), r"overlap must be in \[-1, 1\], got 1.5"),
+        (lambda: make_scenario("CCRs", overlap=0.5, lateral_offset=0.0), "pass one"),
+        (
+            lambda: make_scenario("CCRs", impact_location=2.0),
+            r"impact_location must be in \[-0.25, 1.25\], got 2",
+        ),
+        (lambda: make_scenario("CCRb", gap=20.0, headway=1.0), "pass one"),
+        (lambda: make_scenario("CCRm", ego_speed=5.0), "target_speed must be below ego_speed 5"),
+        (lambda: make_scenario("AdjacentPass", lateral_offset=1.0), "for a car in the way use CCRs"),
+        (lambda: make_scenario("CCRs", shade=300), r"shade must be in \[0, 255\], got 300"),
+        (lambda: BrakingEnv(make_scenario("CCRs"), config={"simulation_freq": 60}), "'simulation_frequency'"),
+        (lambda: BrakingEnv(make_scenario("CCRs"), config={"policy_frequency": 7}), "7 Hz does not divide"),
+        (lambda: BrakingEnv(make_scenario("CCRs"), config={"reward": {"brakes": 1}}), "'brake'"),
+        (
+            lambda: BrakingEnv(make_scenario("CCRs"), config={"action": {"type": "Discrete"}}),
+            "DiscreteDemand",
+        ),
+        (
+            lambda: BrakingEnv(make_scenario("CCRs"), config={"max_deceleration": -9}),
+            "max_deceleration must be",
+        ),
+    ],
+)
+def test_bad_input_names_the_value_and_the_mend(call, words):
+    with pytest.raises(ValueError, match=words) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+
+
+def test_nan_action_is_refused():
+    env = BrakingEnv(make_scenario("CCRs"))
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="finite number"):
+        env.step(np.array([np.nan]))
+
+
+def test_deep_copy_goes_its_own_way():
+    import copy
+
+    env = BrakingEnv(make_scenario("CCRs"))
+    env.reset(seed=0)
+    fork = copy.deepcopy(env)
+    for _ in range(30):
+        fork.step(BRAKE)
+    assert env.vehicle.speed == pytest.approx(50 * KMH)
+    assert fork.vehicle.speed < 8

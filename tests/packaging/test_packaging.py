@@ -1,0 +1,188 @@
+"""What is installed, what imports what, and how fast an import is."""
+
+import ast
+import os
+import subprocess
+import sys
+import time
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+HEAVY = ("torch", "pandas", "matplotlib", "cv2", "highway_env", "numba", "stable_baselines3")
+HOMES = {"lgmd_gym": ROOT / "lgmd_gym", "lgmd_gym.envs": ROOT / "envs", "lgmd_gym.agents": ROOT / "agents"}
+
+# The folders of the package, highest first. A folder imports only from folders further down.
+ORDER = (
+    "cli",
+    "gallery",
+    "report",
+    "training",
+    "tuning",
+    "paper",
+    "rendering",
+    "video",
+    "benchmark",
+    "plotting",
+    "agents",
+    "envs",
+    "wrappers",
+    "sensing",
+    "camera",
+    "neuron",
+    "errors",
+)
+# Within these folders, the sub-folders in the same order; "" is the folder's own files.
+ORDER_WITHIN = {
+    "benchmark": ("analysis", ""),
+    "envs": ("traffic", "", "simulation", "scenarios", "dynamics"),
+    "training": ("", "offline"),
+    "video": ("clips", ""),
+}
+
+
+def folder_of(module):
+    return module.split(".")[1] if "." in module else ""
+
+
+def modules():
+    for home in ("lgmd_gym", "lgmd_gym.envs", "lgmd_gym.agents"):
+        for path in sorted(HOMES[home].rglob("*.py")):
+            inside = path.relative_to(HOMES[home])
+            if home == "lgmd_gym" and inside.parts[0] in ("envs", "agents"):
+                continue  # the links
+            parts = [home, *inside.with_suffix("").parts]
+            yield ".".join(part for part in parts if part != "__init__"), path
+
+
+def imports_of(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path} imports relatively"
+            if node.module == "lgmd_gym":
+                yield from (f"lgmd_gym.{alias.name}" for alias in node.names)
+            else:
+                yield node.module
+
+
+def test_every_folder_has_a_place_in_the_order():
+    found = {folder_of(module) for module, _ in modules()} - {"", "__main__", "_version"}
+    assert found == set(ORDER)
+
+
+def test_folders_import_one_way():
+    """`lgmd_gym` itself, `__main__` and the version stand outside the order."""
+    wrong = []
+    for module, path in modules():
+        folder = folder_of(module)
+        if folder not in ORDER:
+            continue
+        for name in imports_of(path):
+            target = folder_of(name)
+            if name.startswith("lgmd_gym.") and target in ORDER and ORDER.index(target) < ORDER.index(folder):
+                wrong.append(f"{module} imports {name}")
+    assert wrong == []
+
+
+def subfolder_of(module):
+    folder, _, rest = module.removeprefix("lgmd_gym.").partition(".")
+    name = rest.split(".")[0]
+    return name if name in ORDER_WITHIN.get(folder, ()) else ""
+
+
+def test_subfolders_import_one_way():
+    wrong = []
+    for module, path in modules():
+        order = ORDER_WITHIN.get(folder_of(module))
+        if order is None:
+            continue
+        for name in imports_of(path):
+            same = name.startswith("lgmd_gym.") and folder_of(name) == folder_of(module)
+            if same and order.index(subfolder_of(name)) < order.index(subfolder_of(module)):
+                wrong.append(f"{module} imports {name}")
+    assert wrong == []
+
+
+@pytest.mark.parametrize(("room", "strangers"), [
+    ("neuron", ("gymnasium", "highway_env", "lgmd_gym.camera")),
+    ("camera", ("gymnasium", "pandas", "lgmd_gym.neuron")),
+    ("agents", ("gymnasium", "highway_env", "lgmd_gym.envs", "lgmd_gym.neuron")),
+])  # fmt: skip
+def test_rooms_know_no_strangers(room, strangers):
+    loaded = run(f"import sys, lgmd_gym.{room}; print(*sys.modules)").split()
+    # The package itself registers ids with Gymnasium, so that one is loaded by the parent.
+    bare = set(run("import sys, lgmd_gym; print(*sys.modules)").split())
+    assert [name for name in strangers if name in loaded and name not in bare] == []
+
+
+def run(code, **kwargs):
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, **kwargs
+    ).stdout
+
+
+def test_import_is_light():
+    loaded = run("import sys, lgmd_gym; print(*sys.modules)").split()
+    assert [name for name in HEAVY if name in loaded] == []
+
+
+def test_import_is_fast():
+    """Under half a second beyond the interpreter's own start; the fastest of several runs."""
+
+    def timed(code):
+        start = time.perf_counter()
+        run(code)
+        return time.perf_counter() - start
+
+    assert min(timed("import lgmd_gym") for _ in range(5)) - min(timed("pass") for _ in range(5)) < 0.5
+
+
+def test_package_list_is_the_tree():
+    mapping = PROJECT["tool"]["setuptools"]["package-dir"]
+    listed = PROJECT["tool"]["setuptools"]["packages"]
+    found = {module for module, path in modules() if path.name == "__init__.py"}
+    assert set(listed) == found
+    assert mapping == {"lgmd_gym": "lgmd_gym", "lgmd_gym.envs": "envs", "lgmd_gym.agents": "agents"}
+    for link in ("envs", "agents"):
+        assert os.readlink(ROOT / "lgmd_gym" / link) == f"../{link}"
+
+
+@pytest.mark.slow
+def test_wheel_from_the_sdist_holds_everything_and_nothing_generic(tmp_path):
+    """As a user gets it: sdist -> wheel -> imported from another folder."""
+    subprocess.run(["git", "clone", "-q", str(ROOT), str(tmp_path / "clone")], check=True)
+    build = "import setuptools.build_meta as b; print(b.build_sdist(r'{out}'))"
+    source = run(build.format(out=tmp_path), cwd=tmp_path / "clone").splitlines()[-1]
+    subprocess.run(["tar", "-xzf", str(tmp_path / source), "-C", str(tmp_path)], check=True)
+    folder = tmp_path / source.removesuffix(".tar.gz")
+    wheel = run(build.replace("sdist", "wheel").format(out=tmp_path), cwd=folder).splitlines()[-1]
+    names = zipfile.ZipFile(tmp_path / wheel).namelist()
+    tops = {name.split("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"lgmd_gym"}
+    for source_file in (tmp_path / "clone").glob("*/**/*.py"):
+        inside = source_file.relative_to(tmp_path / "clone")
+        if inside.parts[0] in ("envs", "agents"):
+            inside = Path("lgmd_gym") / inside
+        if inside.parts[0] == "lgmd_gym":
+            assert inside.as_posix() in names
+    assert "lgmd_gym/py.typed" in names
+    assert "lgmd_gym/agents/policies/zones.zip" in names
+    zipfile.ZipFile(tmp_path / wheel).extractall(tmp_path / "site")
+    code = "import gymnasium, lgmd_gym.envs as e; gymnasium.make('LGMD/CCRs-v0').reset(); print(e.__file__)"
+    env = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
+    assert run(code, cwd=tmp_path, env=env).startswith(str(tmp_path / "site"))
+
+
+def test_ci_runs_readmes_test_command():
+    commands = [
+        line for line in (ROOT / "README.md").read_text().splitlines() if line.startswith("python3 -m venv")
+    ]
+    assert len(commands) == 2
+    assert commands[0].endswith("lgmd-gym bench")
+    assert commands[1] in (ROOT / ".ci" / "run").read_text()
