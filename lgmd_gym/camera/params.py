@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, TypeAlias
 
 from lgmd_gym.errors import check_keys, unknown_name
 
@@ -235,3 +235,9 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     },
 }
 """Named conditions: fields laid over a camera by `CameraParams.with_condition`."""
+
+
+CameraItem: TypeAlias = str | CameraParams | Mapping[str, Any]
+"""One camera: a preset name, a `CameraParams`, or the fields of one."""
+CameraSpec: TypeAlias = CameraItem | Sequence[CameraItem]
+"""The `camera` argument of environments and wrappers: one camera, or several."""

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, TypeAlias
 
 from lgmd_gym.errors import check_keys
 from lgmd_gym.neuron.bounds import checked
@@ -214,3 +214,7 @@ def _toml(value: Any) -> str:
     if isinstance(value, list):
         return f"[{', '.join(map(_toml, value))}]"
     return repr(value)
+
+
+NeuronSpec: TypeAlias = LGMDParams | Mapping[str, Any] | None
+"""The `params` argument of environments and wrappers; None for the default parameters."""
