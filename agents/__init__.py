@@ -3,7 +3,7 @@
 from typing import Any
 
 from lgmd_gym.agents.adapter import AgentAdapter, import_agent
-from lgmd_gym.agents.base import BRAKE, HOLD, Agent, demand
+from lgmd_gym.agents.base import BRAKE, HOLD, Agent, to_action
 from lgmd_gym.agents.baselines import AlwaysBrake, NoBrake, RandomBrake
 from lgmd_gym.agents.field_rules import DangerZone, NestedFields
 from lgmd_gym.agents.image_rules import FlowDivergence, FrameDifference
@@ -28,8 +28,8 @@ __all__ = [
     "SpikeThreshold",
     "StoppingZone",
     "TTCOracle",
-    "demand",
     "make_agent",
+    "to_action",
 ]
 
 AGENTS: dict[str, type[Agent]] = {

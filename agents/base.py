@@ -9,9 +9,9 @@ BRAKE = -1.0  # full braking, see `BrakingEnv`
 HOLD = 0.0  # the scripted speed
 
 
-def demand(value: float) -> np.ndarray:
+def to_action(demand: float) -> np.ndarray:
     """Return a longitudinal demand in [-1, 1] as an action of `ContinuousDemand`, shape (1,), float32."""
-    return np.array([value], dtype=np.float32)
+    return np.array([demand], dtype=np.float32)
 
 
 class Agent:
@@ -54,8 +54,8 @@ class Agent:
     def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
         """Return the action for an observation: an array of shape (1,) in [-1, 1]."""
         self._alert = bool(info.get("lgmd/alert", False))
-        return demand(self.choose(observation, info))
+        return to_action(self.demand(observation, info))
 
-    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Return the longitudinal demand in [-1, 1]; what a subclass defines."""
         raise NotImplementedError

@@ -13,7 +13,7 @@ class NoBrake(Agent):
 
     name = "no-brake"
 
-    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Hold the scripted speed."""
         return HOLD
 
@@ -23,7 +23,7 @@ class AlwaysBrake(Agent):
 
     name = "always-brake"
 
-    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Brake fully."""
         return BRAKE
 
@@ -50,7 +50,7 @@ class RandomBrake(Agent):
         self._onset = np.random.default_rng(seed).exponential(1.0 / self.rate)
         self._decisions = 0
 
-    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Brake fully once the moment has come."""
         time = self._decisions / self.fps
         self._decisions += 1

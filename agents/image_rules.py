@@ -53,7 +53,7 @@ class ImageRule(Rule):
         self._streak, self._before = Streak(self.params.frames), None
         self._gate = SteeringGate(self.params.yaw_rate, self.params.settle)
 
-    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Measure, then brake fully if latched."""
         frame = np.ascontiguousarray(observation["frame"][:, :, 0])
         self._value = 0.0 if self._before is None else self.measure(self._before, frame)

@@ -30,7 +30,7 @@ class Oracle(Agent):
         super().reset(seed)
         self._latched = False
 
-    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Brake fully if latched."""
         self._latched = self.due(info) or self._latched
         return BRAKE if self._latched else HOLD

@@ -60,7 +60,7 @@ class Rule(Agent):
         super().reset(seed)
         self._latched = False
 
-    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Brake fully if latched."""
         for sight in sensor_readings(observation, info):
             self._latched = self.should_brake(sight) or self._latched

@@ -140,7 +140,7 @@ class Graded(Rule):
         super().reset(seed)
         self._level, self._before = 0.0, 0.0
 
-    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Return the present level of braking, in [-1, 0]."""
         p = self.params
         for sight in sensor_readings(observation, info):

@@ -24,14 +24,14 @@ DERIVED = {
     "spike_peak": ("spike_frequency", 100.0),  # fades by FADE a frame: silence is not clearance
 }
 FADE = 0.955  # half is left after half a second
-HARD = -0.5  # a demand of this or less is hard braking, which may latch
+LATCH_DEMAND = -0.5  # a demand of this or less is hard braking, which may latch
 LIMIT = 5.0  # beyond this, scaled values are clipped
 FRAME = "frame"  # passed on as it is; `shrink` pixels become one
 INPUTS = (*SCALES, *DERIVED, *ZONED, FRAME)
 
 
 @dataclass(frozen=True)
-class Features:
+class FeatureConfig:
     """What a policy sees.
 
     Attributes:
@@ -69,7 +69,7 @@ class Features:
         object.__setattr__(self, "reward_scale", positive("reward_scale", self.reward_scale))
 
     @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> "Features":
+    def from_dict(cls, values: dict[str, Any]) -> "FeatureConfig":
         """Return features from plain values; unknown keys are refused."""
         check_keys("policy feature", values, cls.__dataclass_fields__)
         return cls(**values)
@@ -80,9 +80,11 @@ class Features:
 
     def latches(self, demand: float) -> bool:
         """Return whether a demand in [-1, 1] is to be held to the episode's end."""
-        return self.latch and demand <= HARD
+        return self.latch and demand <= LATCH_DEMAND
 
-    def limits(self, shapes: dict[str, tuple[int, ...]]) -> dict[str, tuple[Any, Any, tuple[int, ...], Any]]:
+    def box_arguments(
+        self, shapes: dict[str, tuple[int, ...]]
+    ) -> dict[str, tuple[Any, Any, tuple[int, ...], Any]]:
         """Return lowest value, highest value, shape and dtype of each input, given the observation's shapes.
 
         Signals are (history · n,), oldest first; frames (height, width, channels · history).
@@ -92,7 +94,7 @@ class Features:
         """
         spaces = {}
         for name in self.inputs:
-            shape = shapes[source_of(name)]
+            shape = shapes[source_observation(name)]
             if name == FRAME:
                 height, width, channels = shape
                 shape = (height // self.shrink, width // self.shrink, channels * self.history)
@@ -105,27 +107,27 @@ class Features:
         return spaces
 
 
-def source_of(name: str) -> str:
+def source_observation(name: str) -> str:
     """Return the observation that an input is made of."""
     return (DERIVED | ZONED)[name][0] if name in DERIVED or name in ZONED else name
 
 
-class Memory:
+class FeatureHistory:
     """What a policy is shown: it takes in every observation, and tells at the policy's own pace.
 
     Args:
         features: What is kept.
     """
 
-    def __init__(self, features: Features) -> None:
+    def __init__(self, features: FeatureConfig) -> None:
         self.features = features
-        self._needed = {source_of(name) for name in features.inputs}
+        self._needed = {source_observation(name) for name in features.inputs}
         if any(name in ZONED for name in features.inputs):
             self._needed |= {"ego_speed", "ego_yaw_rate"}
         self._needed.discard(FRAME)  # only the one at the decision counts
-        self.clear()
+        self.reset()
 
-    def clear(self) -> None:
+    def reset(self) -> None:
         """Forget everything; the next thing told then fills the whole history."""
         self._kept: dict[str, deque[np.ndarray]] = {}
         self._observation: dict[str, Any] = {}
@@ -133,7 +135,7 @@ class Memory:
         self._peak: np.ndarray | None = None
         self._zones = {name: ZoneMemory(name, FADE) for name in self.features.inputs if name in ZONED}
 
-    def see(self, observation: dict[str, Any]) -> None:
+    def update(self, observation: dict[str, Any]) -> None:
         """Take in an observation of `LGMDObservation`; to be called at every decision of the environment.
 
         Raises:
@@ -150,7 +152,7 @@ class Memory:
             speed, yaw_rate = (float(observation[name][0]) for name in ("ego_speed", "ego_yaw_rate"))
             zones.see(observation[zones.source], speed, yaw_rate)
 
-    def tell(self) -> dict[str, np.ndarray]:
+    def stack(self) -> dict[str, np.ndarray]:
         """Return what the policy is shown; to be called at each of its decisions, after `see`."""
         shown = {}
         for name in self.features.inputs:
@@ -163,9 +165,9 @@ class Memory:
     def _prepared(self, name: str) -> np.ndarray:
         if name in ZONED:
             return self._zones[name].told().astype(np.float32)
-        value = np.asarray(self._observation[source_of(name)])
+        value = np.asarray(self._observation[source_observation(name)])
         if name == FRAME:
-            return shrunk(value, self.features.shrink)
+            return shrink_frame(value, self.features.shrink)
         if name == "speed_change":
             value, self._speed = value - (value if self._speed is None else self._speed), value
         elif name == "spike_peak":
@@ -174,7 +176,7 @@ class Memory:
         return np.clip((value - offset) / scale, -LIMIT, LIMIT).astype(np.float32)
 
 
-def shrunk(frame: np.ndarray, side: int) -> np.ndarray:
+def shrink_frame(frame: np.ndarray, side: int) -> np.ndarray:
     """Return a frame, uint8 (height, width, channels), with each square of `side` px as its mean."""
     if side == 1:
         return frame

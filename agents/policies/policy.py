@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.agents.base import Agent
-from lgmd_gym.agents.policies.features import FRAME, Features, Memory
+from lgmd_gym.agents.policies.features import FRAME, FeatureConfig, FeatureHistory
 from lgmd_gym.errors import unknown_name
 
 CARD = "lgmd_gym.json"  # beside the model, in the same zip
@@ -36,8 +36,8 @@ class Policy(Agent):
         self.name = f"policy:{path}"
         file = find_policy(path)
         self.card = read_card(file)
-        self._memory = Memory(Features.from_dict(self.card["features"]))
-        self._levels = self.card["levels"]
+        self._memory = FeatureHistory(FeatureConfig.from_dict(self.card["features"]))
+        self._levels = self.card["demands"]
         self._model = _load(file, self.card["algo"])
         self.reset()
 
@@ -59,18 +59,18 @@ class Policy(Agent):
     def reset(self, seed: int | None = None) -> None:
         """Forget the last episode."""
         super().reset(seed)
-        self._memory.clear()
+        self._memory.reset()
         self._decision = 0
         self._demand = 0.0
 
-    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Decide anew at every `repeat`-th call, else hold; once latched, hold to the end."""
         features = self._memory.features
         if features.latches(self._demand):
             return self._demand
-        self._memory.see(observation)
+        self._memory.update(observation)
         if self._decision % features.repeat == 0:
-            action, _ = self._model.predict(self._memory.tell(), deterministic=True)
+            action, _ = self._model.predict(self._memory.stack(), deterministic=True)
             self._demand = self._levels[int(action)] if self._levels else float(np.reshape(action, -1)[0])
         self._decision += 1
         return self._demand

@@ -9,7 +9,7 @@ import gymnasium as gym
 
 from lgmd_gym.agents import HOLD, make_agent
 from lgmd_gym.agents.options import whole
-from lgmd_gym.agents.policies.features import FRAME, HARD, Features
+from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
 from lgmd_gym.envs.dynamics.units import check_within
 from lgmd_gym.training.hyperparameters import RECORDED, read_settings
 from lgmd_gym.training.offline.hyperparameters import Recipe
@@ -96,7 +96,7 @@ class Order:
         steps: Decisions of the policy, of "recorded" drives; None for what the hyperparameters say.
         seed: Of the network and the environments.
         hyperparams: YAML file in rl-zoo's format; None for the package's.
-        inputs: What the policy sees, see `Features`; empty for what the hyperparameters say.
+        inputs: What the policy sees, see `FeatureConfig`; empty for what the hyperparameters say.
         demands: Demands the policy chooses among, in [-1, 1]; empty for any, which DQN cannot; None for 0,
             -0.4 and -1, of "recorded" 0 and -1.
         eval_every: Decisions between two looks at the validation split; "recorded" looks after every pass.
@@ -132,8 +132,10 @@ class Order:
                 whole(name, getattr(self, name), 1)
         for demand in self.demands or ():
             check_within("demands", demand, -1.0, 1.0)
-        if recorded and (sorted(self.demands or ())[1:] != [HOLD] or min(self.demands or ()) > HARD):
-            raise ValueError(f"recorded learns when to brake: demands must be 0 and {HARD} or less, as 0 -1")
+        if recorded and (sorted(self.demands or ())[1:] != [HOLD] or min(self.demands or ()) > LATCH_DEMAND):
+            raise ValueError(
+                f"recorded learns when to brake: demands must be 0 and {LATCH_DEMAND} or less, as 0 -1"
+            )
         if self.drives is not None and not recorded:
             raise ValueError(f"drives are what algo 'recorded' learns from; {self.algo} drives itself")
         whole("traffic", self.traffic, 0)
@@ -150,7 +152,7 @@ class Order:
         """
         settings = read_settings(self.algo, self.env_id, self.hyperparams)
         wished = {"inputs": list(self.inputs)} if self.inputs else {}
-        features = Features.from_dict(settings.features | wished)
+        features = FeatureConfig.from_dict(settings.features | wished)
         if self.algo == RECORDED:
             Recipe.from_dict(settings.model)
             _check_recordable(features)
@@ -182,7 +184,7 @@ class Order:
         return camera
 
 
-def _check_recordable(features: Features) -> None:
+def _check_recordable(features: FeatureConfig) -> None:
     if not features.latch:
         raise ValueError("recorded learns when to brake: its hyperparameters need latch: true")
     if "speed_change" in features.inputs:

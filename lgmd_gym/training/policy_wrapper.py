@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
-from lgmd_gym.agents.policies.features import Features, Memory, source_of
+from lgmd_gym.agents.policies.features import FeatureConfig, FeatureHistory, source_observation
 
 
 class PolicyView(gym.Wrapper, RecordConstructorArgs):
@@ -19,7 +19,7 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
 
     Args:
         env: An environment inside `LGMDObservation`, with `include_frame` if frames are wanted.
-        **features: Fields of `lgmd_gym.agents.policies.features.Features`.
+        **features: Fields of `lgmd_gym.agents.policies.features.FeatureConfig`.
 
     Raises:
         ValueError: For an unknown field or input, or one that the observation lacks.
@@ -28,21 +28,21 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
     def __init__(self, env: gym.Env, **features: Any) -> None:
         RecordConstructorArgs.__init__(self, **features)
         gym.Wrapper.__init__(self, env)
-        self.features = Features.from_dict(features)
-        self._memory = Memory(self.features)
+        self.features = FeatureConfig.from_dict(features)
+        self._memory = FeatureHistory(self.features)
         given = env.observation_space
         if not isinstance(given, spaces.Dict):
             raise ValueError(f"PolicyView needs the Dict observation of LGMDObservation, got {given}")
         shapes = {name: space.shape or () for name, space in given.spaces.items()}
         for name in self.features.inputs:
-            if source_of(name) not in shapes:
+            if source_observation(name) not in shapes:
                 raise ValueError(
                     f"the policy input {name!r} is not observed; make it with include_{name}=True"
                 )
         self.observation_space = spaces.Dict(
             {
                 name: spaces.Box(low, high, shape, dtype)
-                for name, (low, high, shape, dtype) in self.features.limits(shapes).items()
+                for name, (low, high, shape, dtype) in self.features.box_arguments(shapes).items()
             }
         )
 
@@ -51,9 +51,9 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """Reset the environment; the first observation fills the history."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._memory.clear()
-        self._memory.see(observation)
-        return self._memory.tell(), info
+        self._memory.reset()
+        self._memory.update(observation)
+        return self._memory.stack(), info
 
     def step(self, action: Any) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         """Hold an action for `repeat` decisions, or to the episode's end if it latches."""
@@ -67,12 +67,12 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
             observation, reward, terminated, truncated, info = self.env.step(action)
             total, held = total + float(reward), held + 1
             if not latched:
-                self._memory.see(observation)
+                self._memory.update(observation)
             if terminated or truncated or (held >= features.repeat and not latched):
                 break
         if latched:  # the end of what can be decided, whatever ended the episode
             terminated, truncated = True, False
-        return self._memory.tell(), features.reward_scale * total, terminated, truncated, info
+        return self._memory.stack(), features.reward_scale * total, terminated, truncated, info
 
     def _demand(self, action: Any) -> float:
         """Return the longitudinal demand that an action stands for."""

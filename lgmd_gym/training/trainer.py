@@ -97,7 +97,7 @@ class Training:
             "algo": algo,  # of stable-baselines3, which reads the file
             "camera": plan.camera,
             "features": plan.features,
-            "levels": plan.demands or None,
-            "plan": {**plan.to_dict(), "drives": None},  # a path on the machine it was trained on
+            "demands": plan.demands or None,
+            "config": {**plan.to_dict(), "drives": None},  # a path on the machine it was trained on
             "wall_time": round(wall_time, 1),
         }

@@ -84,7 +84,7 @@ class Recorder(Agent):
         super().__init__()
         self.moments: list[tuple[dict[str, Any], dict[str, Any]]] = []
 
-    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Keep it, and hold the speed."""
         told = {key: value for key, value in info.items() if key.startswith("lgmd/")}
         self.moments.append((observation, told))
@@ -102,7 +102,7 @@ class BrakeFrom(Agent):
         super().__init__()
         self._left = onset
 
-    def choose(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Count down."""
         if self._left is None:
             return HOLD

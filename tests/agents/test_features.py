@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lgmd_gym.agents.policies.features import FADE, LIMIT, Features, Memory, shrunk
+from lgmd_gym.agents.policies.features import FADE, LIMIT, FeatureConfig, FeatureHistory, shrink_frame
 from lgmd_gym.agents.policies.zone_memory import ZONED
 from lgmd_gym.agents.stopping_zone import SPEEDS_KMH
 
@@ -15,24 +15,24 @@ def observed(value):
 def seen(memory, *observations):
     """See some observations, then tell once."""
     for observation in observations:
-        memory.see(observation)
-    return memory.tell()
+        memory.update(observation)
+    return memory.stack()
 
 
 def test_memory_scales_and_remembers():
-    memory = Memory(Features(inputs=("spike_frequency", "ego_speed"), history=3))
+    memory = FeatureHistory(FeatureConfig(inputs=("spike_frequency", "ego_speed"), history=3))
     first = seen(memory, observed(50.0))
     assert first["spike_frequency"].tolist() == [0.5, 0.5, 0.5]
     assert first["ego_speed"].tolist() == [0.5, 0.5, 0.5]
     seen(memory, observed(100.0))
     assert seen(memory, observed(9e9))["spike_frequency"].tolist() == [0.5, 1.0, LIMIT]
-    memory.clear()
+    memory.reset()
     assert seen(memory, observed(0.0))["spike_frequency"].tolist() == [0.0, 0.0, 0.0]
 
 
 def test_memory_derives_braking_and_fading_peaks():
     """Peaks fade with every observation, speed changes from one telling to the next."""
-    memory = Memory(Features(inputs=("spike_peak", "speed_change"), history=1))
+    memory = FeatureHistory(FeatureConfig(inputs=("spike_peak", "speed_change"), history=1))
 
     def given(frequency, speed):
         return {"spike_frequency": np.array([frequency], np.float32), "ego_speed": np.array([speed])}
@@ -81,19 +81,19 @@ def zones_of(memory, *observations, name="zones"):
 
 @pytest.mark.parametrize("name", ZONED)
 def test_zones_are_sorted_by_own_speed(name):
-    memory = Memory(Features(inputs=(name,), history=1))
+    memory = FeatureHistory(FeatureConfig(inputs=(name,), history=1))
     factor = 10.0 if name == "zones_spikes" else 1.0
     around = np.array([3.0, 1.5, 6.0, 0.0, 0.9]) * factor
     held, peak = zones_of(memory, zone_eye(SEEN), name=name)
     assert held == pytest.approx([*around, around[-1]], abs=0.01)  # nothing is known before the first frame
     assert peak == pytest.approx(around.tolist(), abs=0.01)
-    fastest = Memory(Features(inputs=(name,), history=1))
+    fastest = FeatureHistory(FeatureConfig(inputs=(name,), history=1))
     held, _ = zones_of(fastest, zone_eye({(90, "ground"): 3.0}, speed=40.0), name=name)
     assert held[:4] == pytest.approx([3.0 * factor, 0.0, 3.0 * factor, 0.0], abs=0.01)  # none is farther
 
 
 def test_zones_tell_what_stood_and_what_was():
-    memory = Memory(Features(inputs=("zones",), history=1))
+    memory = FeatureHistory(FeatureConfig(inputs=("zones",), history=1))
     quiet, here = zone_eye({}), zone_eye({(40, "ground"): 3.0})
     near = zone_eye({(30, "ground"): 2.0, (30, "upright"): 4.0})
     assert zones_of(memory, quiet) == ([0.0] * 6, [0.0] * 5)
@@ -108,7 +108,7 @@ def test_zones_tell_what_stood_and_what_was():
 
 
 def test_zones_are_silent_while_the_car_turns_and_forget():
-    memory = Memory(Features(inputs=("zones",), history=1))
+    memory = FeatureHistory(FeatureConfig(inputs=("zones",), history=1))
     there = {(40, "ground"): 3.0}
     assert zones_of(memory, zone_eye(there, yaw_rate=0.02))[1][0] == pytest.approx(3.0, abs=0.01)
     silent = ([0.0] * 6, [0.0] * 5)
@@ -118,7 +118,7 @@ def test_zones_are_silent_while_the_car_turns_and_forget():
 
 
 def test_zones_are_silent_at_a_crawl():
-    memory = Memory(Features(inputs=("zones",), history=1))
+    memory = FeatureHistory(FeatureConfig(inputs=("zones",), history=1))
     there = {(10, "ground"): 3.0, (10, "upright"): 3.0}
     assert zones_of(memory, *[zone_eye(there, speed=2.4)] * 3) == ([0.0] * 6, [0.0] * 5)
     assert zones_of(memory, *[zone_eye(there, speed=2.6)] * 2)[0][0] == pytest.approx(3.0, abs=0.01)
@@ -127,13 +127,13 @@ def test_zones_are_silent_at_a_crawl():
 def test_zones_need_their_eye():
     given = observed(1.0) | {"membrane_potential": np.array([0.5, 0.6]), "ego_yaw_rate": np.zeros(1)}
     with pytest.raises(ValueError, match="needs the eye of stopping-zone with 20 cameras, got 2; train with"):
-        Memory(Features(inputs=("zones",))).see(given)
+        FeatureHistory(FeatureConfig(inputs=("zones",))).update(given)
 
 
 def test_frames_shrink_to_means():
     frame = np.zeros((4, 6, 1), np.uint8)
     frame[:2, 2:4] = 100
-    small = shrunk(frame, 2)
+    small = shrink_frame(frame, 2)
     assert small.shape == (2, 3, 1)
     assert small[0, 1, 0] == 100
     assert small.sum() == 100
@@ -155,4 +155,4 @@ def test_frames_shrink_to_means():
 )
 def test_bad_features_are_refused(values, words):
     with pytest.raises(ValueError, match=words):
-        Features.from_dict(values)
+        FeatureConfig.from_dict(values)

@@ -192,7 +192,7 @@ class Broken(Agent):
 
     name = "broken"
 
-    def choose(self, observation, info):
+    def demand(self, observation, info):
         if info["ttc"] < 4:
             raise RuntimeError("out of ideas")
         return 0.0

@@ -11,7 +11,7 @@ from rich.console import Console
 from support.traffic import NearWall, Wall
 
 import lgmd_gym.agents as agents_room
-from lgmd_gym.agents import BRAKE, HOLD, Agent, demand, make_agent
+from lgmd_gym.agents import BRAKE, HOLD, Agent, make_agent, to_action
 from lgmd_gym.benchmark.episode import SensorConfig
 from lgmd_gym.benchmark.runs import resume_run
 from lgmd_gym.benchmark.traffic.recording import fork, look_ahead, record
@@ -41,7 +41,7 @@ class During(Agent):
         self.decision = 0
         self.resets.append(seed)
 
-    def choose(self, observation, info):
+    def demand(self, observation, info):
         time = self.decision / 30
         self.decision += 1
         return (
@@ -58,7 +58,7 @@ class Watching(Agent):
         super().__init__()
         self.seen = []
 
-    def choose(self, observation, info):
+    def demand(self, observation, info):
         truth = {key: value for key, value in info.items() if key != "lgmd/trace"}
         self.seen.append(({key: value.tolist() for key, value in observation.items()}, truth))
         return HOLD
@@ -86,7 +86,7 @@ def test_a_fork_goes_on_bit_for_bit(merge):
     for decision in (0, 37, 300, 313):
         env = merge.fork(decision)
         for later in range(decision + 1, decision + 40):
-            observation, *_, info = env.step(demand(HOLD))
+            observation, *_, info = env.step(to_action(HOLD))
             recorded = merge.seen[later]
             assert all(np.array_equal(observation[key], recorded.observation[key]) for key in observation)
             told = {key: value for key, value in info.items() if key != "lgmd/trace"}
@@ -98,12 +98,12 @@ def test_forks_go_their_own_ways(merge):
     other = fork(env)
     before = env.unwrapped.ego.position.tolist(), env.unwrapped.steps
     for _ in range(20):
-        braked = other.step(demand(BRAKE))[4]
+        braked = other.step(to_action(BRAKE))[4]
     look_ahead(env, 2.0, 1.0)
     assert (env.unwrapped.ego.position.tolist(), env.unwrapped.steps) == before
     assert braked["ego_speed"] < env.unwrapped.ego.speed
     for _ in range(20):
-        observation = env.step(demand(HOLD))[0]
+        observation = env.step(to_action(HOLD))[0]
     assert observation["ego_speed"] == merge.seen[80].observation["ego_speed"]
 
 
@@ -268,7 +268,7 @@ def test_zero_in_300_km_still_allows_one_in_a_hundred():
 
 def test_a_run_streams_rows_and_keeps_them(tmp_path, monkeypatch):
     class Broken(Agent):
-        def choose(self, observation, info):
+        def demand(self, observation, info):
             raise RuntimeError("no idea")
 
     monkeypatch.setitem(agents_room.AGENTS, "broken", Broken)

@@ -8,7 +8,7 @@ import pytest
 from support.recordings import YAML, made_up, order
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.policies.features import Features
+from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.agents.policies.policy import read_card
 from lgmd_gym.cli import main as cli
 from lgmd_gym.training.config import Order
@@ -28,7 +28,7 @@ def test_lessons_show_what_the_policys_view_shows(tmp_path):
     """History is put together from indices: compared with the wrapper itself, step by step."""
     plan = order(tmp_path).plan()
     drives = record(plan, "train", range(2), 1, lambda count: None)
-    batch = Lessons(drives, Features.from_dict(plan.features)).batch([1, 0])
+    batch = Lessons(drives, FeatureConfig.from_dict(plan.features)).batch([1, 0])
     view = plan.make_env("train")
     row = 0
     for seed in (1, 0):
@@ -50,7 +50,7 @@ def test_lessons_show_what_the_policys_view_shows(tmp_path):
 
 def test_a_policy_of_three_decisions_each_learns_from_every_third():
     drive = made_up(11, frame=True)
-    shown = Lessons([made_up(4, seed=1, frame=True), drive], Features(("frame", "ego_speed"), 1, 3, 1))
+    shown = Lessons([made_up(4, seed=1, frame=True), drive], FeatureConfig(("frame", "ego_speed"), 1, 3, 1))
     batch = shown.batch([1])
     assert batch.valid.tolist() == [[1.0] * 4]
     assert batch.returns[0].tolist() == drive.returns[::3].tolist()
@@ -61,7 +61,7 @@ def test_a_policy_of_three_decisions_each_learns_from_every_third():
 
 
 def test_frames_have_their_history_in_the_channels():
-    features = Features(inputs=("frame", "ego_speed"), history=3, repeat=1)
+    features = FeatureConfig(inputs=("frame", "ego_speed"), history=3, repeat=1)
     drives = [made_up(2, frame=True), made_up(4, seed=1, frame=True)]
     shown = Lessons(drives, features).batch([1]).shown["frame"]
     assert shown.shape == (4, 6, 40, 40)
@@ -71,7 +71,7 @@ def test_frames_have_their_history_in_the_channels():
 
 def test_the_expected_return_is_that_of_drawn_episodes():
     drives = [made_up(5), made_up(3, seed=1, threat=False)]
-    batch = Lessons(drives, Features(inputs=("ego_speed",), history=1, repeat=1)).batch([0, 1])
+    batch = Lessons(drives, FeatureConfig(inputs=("ego_speed",), history=1, repeat=1)).batch([0, 1])
     logits = torch.randn(2, 5, generator=torch.Generator().manual_seed(0))
     told = expected_return(logits, batch)
     rng = np.random.default_rng(0)
@@ -92,7 +92,7 @@ def test_the_expected_return_is_that_of_drawn_episodes():
 
 def test_false_braking_gets_dearer_and_nothing_else():
     drives = [made_up(5), made_up(3, seed=1, threat=False)]
-    batch = Lessons(drives, Features(inputs=("ego_speed",), history=1, repeat=1)).batch([0, 1])
+    batch = Lessons(drives, FeatureConfig(inputs=("ego_speed",), history=1, repeat=1)).batch([0, 1])
     dear = dearer(batch, 3.0)
     assert torch.equal(dear.returns[0], batch.returns[0])
     for moment in range(3):
@@ -229,8 +229,8 @@ def test_drives_are_kept_and_learnt_from_again(tmp_path, monkeypatch):
     assert len((second / "log" / "progress.csv").read_text().splitlines()) == 1 + 3
     card = read_card(second / "policy.zip")
     assert card["algo"] == "ppo"
-    assert card["plan"]["algo"] == "recorded"
-    assert card["plan"]["drives"] is None  # a path is nobody's business
+    assert card["config"]["algo"] == "recorded"
+    assert card["config"]["drives"] is None  # a path is nobody's business
     agent = make_agent(f"policy:{second / 'policy.zip'}")
     observation, info = gym.make("LGMD/CCRs-v0", camera=agent.camera).reset(seed=0)
     assert agent.act(observation, info).shape == (1,)

@@ -214,7 +214,7 @@ def test_a_training_goes_on_from_its_checkpoint(tmp_path):
     assert newest_checkpoint(tmp_path / "run").name == "model_32_steps.zip"
     again.run()
     assert newest_checkpoint(tmp_path / "run").name == "model_96_steps.zip"
-    assert read_card(again.policy)["plan"] == told | {"n_timesteps": 96}
+    assert read_card(again.policy)["config"] == told | {"n_timesteps": 96}
     looks = np.load(tmp_path / "run" / "best" / "evaluations.npz")
     assert looks["timesteps"].tolist() == [32, 64, 96]  # the first look has not been forgotten
     assert looks["results"][0].mean() == best
@@ -252,7 +252,7 @@ def test_the_shipped_policy_is_small_sound_and_tells_nothing_of_its_maker():
     assert file.stat().st_size < 1_000_000
     with zipfile.ZipFile(file) as parts:
         assert not any(re.search(rb"/(tmp|home|root|work)/", parts.read(name)) for name in parts.namelist())
-    plan = read_card(file)["plan"]
+    plan = read_card(file)["config"]
     assert plan["camera"] == make_agent("stopping-zone").camera  # the rule's eye, as it is now
     assert plan["model"] == read_settings("recorded", plan["env_id"]).model  # as its training is described
 

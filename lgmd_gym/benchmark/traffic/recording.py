@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 import numpy as np
 
-from lgmd_gym.agents import HOLD, demand
+from lgmd_gym.agents import HOLD, to_action
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs.traffic.emergencies import HARD, HORIZON, Emergencies, drive_on
 from lgmd_gym.envs.traffic.registration import make_traffic
@@ -53,7 +53,7 @@ class Trace:
         env = fork(self.kept[decision // EVERY])
         recorded = observation = self.seen[decision].observation
         for _ in range(decision % EVERY):
-            observation = env.step(demand(HOLD))[0]
+            observation = env.step(to_action(HOLD))[0]
         if not all(np.array_equal(observation[key], recorded[key]) for key in recorded):
             raise RuntimeError(
                 f"{self.kind} traffic, seed {self.seed} does not repeat at decision {decision}"
@@ -77,7 +77,7 @@ def record(kind: str, seed: int, sensor_config: SensorConfig, config: dict[str, 
     while True:
         if (len(seen) - 1) % EVERY == 0:
             kept.append(fork(env))
-        observation, _, terminated, truncated, info = env.step(demand(HOLD))
+        observation, _, terminated, truncated, info = env.step(to_action(HOLD))
         seen.append(Seen(observation, info))
         if terminated or truncated:
             break

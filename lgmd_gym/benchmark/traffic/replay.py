@@ -2,7 +2,7 @@
 
 import gymnasium as gym
 
-from lgmd_gym.agents import HOLD, Agent, demand
+from lgmd_gym.agents import HOLD, Agent, to_action
 from lgmd_gym.benchmark.traffic.recording import Seen, Trace, look_ahead
 from lgmd_gym.benchmark.traffic.rows import Braking, Log
 
@@ -98,6 +98,6 @@ class Ride:
         if self.env is None:
             self._done = decision + 2 == len(self.trace.seen)
             return self.trace.seen[decision + 1]
-        observation, _, terminated, truncated, info = self.env.step(demand(wish))
+        observation, _, terminated, truncated, info = self.env.step(to_action(wish))
         self._done = terminated or truncated
         return Seen(observation, info)

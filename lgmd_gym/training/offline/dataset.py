@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 
-from lgmd_gym.agents.policies.features import FRAME, Features, Memory
+from lgmd_gym.agents.policies.features import FRAME, FeatureConfig, FeatureHistory
 from lgmd_gym.training.offline.episodes import Drive
 
 
@@ -41,7 +41,7 @@ class Lessons:
         features: Of the policy.
     """
 
-    def __init__(self, drives: list[Drive], features: Features) -> None:
+    def __init__(self, drives: list[Drive], features: FeatureConfig) -> None:
         self.drives, self._features = drives, features
         self._starts = np.cumsum([0, *(_decisions(drive, features.repeat) for drive in drives)])
         self._shown = {}
@@ -51,7 +51,7 @@ class Lessons:
         signals = tuple(name for name in features.inputs if name != FRAME)
         if signals:
             # History is put together batch by batch: kept here, all would be there six times.
-            memory = Memory(replace(features, inputs=signals, history=1))
+            memory = FeatureHistory(replace(features, inputs=signals, history=1))
             moments = [shown for drive in drives for shown in _relived(drive, memory)]
             self._shown |= {name: np.stack([moment[name] for moment in moments]) for name in signals}
 
@@ -95,9 +95,9 @@ def _decisions(drive: Drive, repeat: int) -> int:
     return -(-len(drive) // repeat)
 
 
-def _relived(drive: Drive, memory: Memory) -> Iterator[dict[str, np.ndarray]]:
-    memory.clear()
+def _relived(drive: Drive, memory: FeatureHistory) -> Iterator[dict[str, np.ndarray]]:
+    memory.reset()
     for moment in range(len(drive)):
-        memory.see({name: array[moment] for name, array in drive.seen.items()})
+        memory.update({name: array[moment] for name, array in drive.seen.items()})
         if moment % memory.features.repeat == 0:
-            yield memory.tell()
+            yield memory.stack()

@@ -14,7 +14,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from lgmd_gym.agents.base import HOLD
-from lgmd_gym.agents.policies.features import FRAME, SCALES, shrunk
+from lgmd_gym.agents.policies.features import FRAME, SCALES, shrink_frame
 from lgmd_gym.training.config import Plan
 from lgmd_gym.training.offline.onsets import STRIDE, Outcome, outcomes
 
@@ -66,7 +66,7 @@ class Moments:
         """Keep an observation."""
         self._seen.append({name: observation[name] for name in SCALES})
         if self._shrink is not None:
-            self._frames.append(shrunk(observation[FRAME], self._shrink))
+            self._frames.append(shrink_frame(observation[FRAME], self._shrink))
 
     def arrays(self) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
         """Return what was seen by name, and the frames if they are wanted."""

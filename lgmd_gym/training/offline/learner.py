@@ -18,7 +18,7 @@ import torch
 from torch.nn.functional import logsigmoid
 
 from lgmd_gym.agents.base import HOLD
-from lgmd_gym.agents.policies.features import Features
+from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.training.config import Plan
 from lgmd_gym.training.offline.dataset import Batch, Lessons
 from lgmd_gym.training.offline.episodes import Drive
@@ -55,7 +55,7 @@ class Learner:
 
     def __init__(self, plan: Plan, drives: list[Drive], judges: list[Drive], pieces: int = 0) -> None:
         self.plan, self.recipe = plan, Recipe.from_dict(plan.model)
-        features = Features.from_dict(plan.features)
+        features = FeatureConfig.from_dict(plan.features)
         self.lessons, self.judges = Lessons(drives, features), Lessons(judges, features)
         self.model = self._untaught()
         self._levels = len(judges) - pieces

@@ -12,7 +12,7 @@ import gymnasium as gym
 import numpy as np
 from joblib import Parallel, delayed
 
-from lgmd_gym.agents.base import HOLD, demand
+from lgmd_gym.agents.base import HOLD, to_action
 from lgmd_gym.agents.policies.features import FRAME
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.reward import RewardParams
@@ -82,7 +82,7 @@ def _driven(plan: Plan, env: gym.Env, seed: int) -> tuple[Moments, Emergencies]:
         if info["driver_acceleration"] <= -HARD:
             hard.append(len(moments) / policy_hz)
         moments.add(observation)
-        observation, _, terminated, truncated, info = env.step(demand(HOLD))
+        observation, _, terminated, truncated, info = env.step(to_action(HOLD))
         done = terminated or truncated
     beyond = drive_on(base, len(moments) / policy_hz)
     return moments, Emergencies(beyond.contact, (*hard, *beyond.hard))
