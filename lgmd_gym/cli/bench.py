@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from lgmd_gym.cli.commands import _read_params, console_of
+from lgmd_gym.cli.console import make_console
+from lgmd_gym.cli.params import read_params
 
 if TYPE_CHECKING:
     from lgmd_gym.benchmark.run_cases import Run
@@ -20,7 +21,7 @@ SUITE, SEEDS = "quick", 3
 
 def bench(options: "Bench") -> int:
     """Play a suite and report; 0 if all was played, 1 if something failed, 130 after Ctrl-C."""
-    console = console_of()
+    console = make_console()
     run = _resumed(options, console) if options.resume is not None else _new(options, console)
     with _progress(run) as tick:
         complete = run.play(tick)
@@ -50,7 +51,7 @@ def compare(options: "Compare") -> int:
     if options.out is not None and options.out.exists():
         raise ValueError(f"{str(options.out)!r} exists and is kept; choose another --out")
     found = compare_runs(options.run_a, options.run_b, options.agents)
-    console = console_of()
+    console = make_console()
     for item in found:
         console.print(compare_table(item))
     if options.out is not None:
@@ -67,7 +68,7 @@ def judge(options: "Judge") -> int:
     arms = judge_run(options.run, options.arms)
     for condition in dict.fromkeys(arm.condition for arm in arms):
         told = [arm for arm in arms if arm.condition == condition]
-        console_of().print(judge_table(told, f"{options.run.name}, {condition}"))
+        make_console().print(judge_table(told, f"{options.run.name}, {condition}"))
     return 0
 
 
@@ -103,7 +104,7 @@ def _new(options: "Bench", console: Console) -> "Run | TrafficRun":
         "first_seed": options.first_seed,
         "conditions": options.conditions,
         "camera": options.camera,
-        "params": _read_params(options.params),
+        "params": read_params(options.params),
     }
     given = {name: value for name, value in given.items() if value is not None}
     if options.config is None:

@@ -1,47 +1,59 @@
-"""What can be said to each command of `lgmd-gym`, with the help that is shown for it."""
+"""Options of each command; attribute docstrings are the help texts."""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
+
+
+def _default_hint(default: str) -> str:
+    """Return the hint after a help text; an option without a default has none."""
+    return "" if default in ("", "None") else f"(default: {default})"
+
+
+# Optional values whose help shows a readable placeholder and no "None".
+Name = Annotated[str | None, arg(metavar="NAME", help_behavior_hint=_default_hint)]
+Names = Annotated[tuple[str, ...] | None, arg(metavar="NAME [NAME ...]", help_behavior_hint=_default_hint)]
+Count = Annotated[int | None, arg(metavar="N", help_behavior_hint=_default_hint)]
+Number = Annotated[float | None, arg(metavar="X", help_behavior_hint=_default_hint)]
+File = Annotated[Path | None, arg(metavar="PATH", help_behavior_hint=_default_hint)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bench:
-    """Play a suite with every agent and seed, print the scores, and write a run folder.
+    """Run agents on a suite, print the scores and write a run folder.
 
-    The folder gets episodes.jsonl (one row per episode, as it finishes), summary.csv, report.html, run.toml,
-    run.json, time series and one PNG per case. Ctrl-C keeps what is finished.
+    The folder contains episodes.jsonl (one row per episode, written as it finishes), summary.csv,
+    report.html, run.toml, run.json, time series and one PNG per case. Ctrl-C keeps the finished episodes.
     """
 
-    suite: str | None = None
-    """Name of a suite (`lgmd-gym list suites`), or a suite file, NAME.toml. Default: quick. 300 km of
-    traffic: --suite traffic --seeds 110."""
-    agents: tuple[str, ...] | None = None
-    """Agents with options, as in spike-threshold:threshold=45,frames=2, or your own as MODULE:CLASS. Default:
-    no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""
-    seeds: int | None = None
-    """Seeds per case; a seed draws the place on the road and the target's grey. Default: 3."""
-    first_seed: int | None = None
-    """Seeds are played from this one on. Default: 0."""
-    conditions: tuple[str, ...] | None = None
-    """Camera conditions, each played: clear, night, fog, degraded. Default: clear."""
-    camera: str | None = None
+    suite: Name = None
+    """Suite name (see `lgmd-gym list suites`) or path of a suite file, NAME.toml. Default: quick."""
+    agents: Names = None
+    """Agents with options, for example spike-threshold:threshold=45,frames=2; MODULE:CLASS for an agent of
+    your own. Default: no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""
+    seeds: Count = None
+    """Number of seeds per case; a seed sets the place on the road and the target's grey. Default: 3."""
+    first_seed: Count = None
+    """First seed. Default: 0."""
+    conditions: Names = None
+    """Camera conditions, each run separately: clear, night, fog, degraded. Default: clear."""
+    camera: Name = None
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
-    params: Path | None = None
+    params: File = None
     """TOML file of LGMD parameters."""
-    config: Path | None = None
-    """The run.toml of a run folder: plays the same again, in place of the options above."""
-    resume: Path | None = None
-    """Run folder of a broken-off run: plays what is missing, with that run's own settings."""
+    config: File = None
+    """run.toml of an earlier run to repeat; replaces the options above."""
+    resume: File = None
+    """Folder of an interrupted run; runs the missing episodes with the settings of that run."""
     jobs: int = 2
-    """Processes."""
+    """Number of processes."""
     backend: Literal["processes", "dask"] = "processes"
-    """Where to play: on this machine, or on a Dask cluster that runs already."""
-    address: str | None = None
-    """Of the cluster's scheduler, as tcp://10.0.0.1:8786."""
-    out: Path | None = None
+    """Executor: local processes or a running Dask cluster."""
+    address: Name = None
+    """Address of the Dask scheduler, for example tcp://10.0.0.1:8786."""
+    out: File = None
     """Run folder; must not exist. Default: runs/SUITE-DATE-TIME."""
     plots: bool = True
     """Draw one PNG per case."""
@@ -81,29 +93,29 @@ class Judge:
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """Play one episode and print how it ended; watch it in a window or write a video.
+    """Run one episode and print how it ended; optionally show it in a window or write a video.
 
-    Each picture shows what the eye sees, the neuron's layers and spikes, and the road from above.
+    Every picture shows the camera frame, the neuron's layers and spikes, and the road from above.
     """
 
     target: Positional[str]
-    """An environment id such as LGMD/CCRs-v0, a case such as quick/CCRs/v30, or traffic/merge."""
+    """Environment id (LGMD/CCRs-v0), case (quick/CCRs/v30) or kind of traffic (traffic/merge)."""
     agent: str = "spike-threshold"
-    """Who brakes, with options as in spike-threshold:threshold=45."""
-    video: Path | None = None
-    """Video file to write (.mp4, .gif, …); must not exist."""
+    """Agent, with options as in spike-threshold:threshold=45."""
+    video: File = None
+    """Video file to write (.mp4, .gif, ...); must not exist."""
     live: bool = False
-    """Show a window, in real time; Escape closes it."""
-    overlays: tuple[str, ...] = ("zone", "targets")
-    """Over the eye's frame: zone (the lane ahead), targets (bodies ahead); --overlays alone for none."""
+    """Show a window in real time; Escape closes it."""
+    overlays: Annotated[tuple[str, ...], arg(metavar="[NAME ...]")] = ("zone", "targets")
+    """Overlays on the camera frame: zone (lane ahead), targets (vehicles); --overlays alone for none."""
     seed: int = 0
-    """Draws the place on the road and the target's grey."""
-    camera: str | None = None
+    """Seed of the environment: place on the road and grey of the target."""
+    camera: Name = None
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
-    params: Path | None = None
+    params: File = None
     """TOML file of LGMD parameters."""
-    set: tuple[str, ...] = ()
-    """Scenario arguments in SI units, as in --set ego_speed=8.3 shade=40."""
+    set: Annotated[tuple[str, ...], arg(metavar="NAME=NUMBER [...]", help_behavior_hint=_default_hint)] = ()
+    """Scenario arguments in SI units, for example --set ego_speed=8.3 shade=40."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,10 +254,10 @@ class Tune:
 
 @dataclass(frozen=True, kw_only=True)
 class List:
-    """List what there is to name: suites with their cases, agents, environments, cameras."""
+    """List suites, agents, environments and cameras."""
 
     what: Positional[Literal["all", "suites", "agents", "envs", "cameras"]] = "all"
-    """Which list."""
+    """Table to print."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,7 +279,7 @@ class Gallery:
 
 @dataclass(frozen=True, kw_only=True)
 class Doctor:
-    """Check versions, numba's cache, the video codec and the display, and drive for two seconds.
+    """Check package versions, numba's cache, the video codec and the display, and simulate for two seconds.
 
-    Exit code 1 if something is at fault; the table says what to do.
+    The exit code is 1 if a check finds a fault; the output suggests a fix.
     """

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from lgmd_gym.benchmark.new_folder import new_folder
-from lgmd_gym.cli.commands import console_of
+from lgmd_gym.cli.console import make_console
 
 if TYPE_CHECKING:
     from lgmd_gym.cli.options import Paper, Video
@@ -33,7 +33,7 @@ def video(options: "Video") -> int:
     out = new_folder(options.out or Path("runs") / f"video-{time.strftime('%Y%m%d-%H%M%S')}", "run folder")
     orders = [order._replace(folder=_clip_folder(out, order.clip)) for order in orders]
     _describe(out, {"clips": [order.clip for order in orders], "choices": chosen})
-    console, troubles, detections = console_of(120), [], {}
+    console, troubles, detections = make_console(120), [], {}
     for name, choice in chosen.items():
         suffix = f"-{name}" if len(chosen) > 1 else ""
         watched = _watch_all(orders, name, choice, suffix, options)
@@ -61,12 +61,12 @@ def video(options: "Video") -> int:
 
 def _choices(options: "Video") -> "dict[str, Choice]":
     """Return the named choices with the options laid over each."""
-    from lgmd_gym.cli.commands import _read_params
+    from lgmd_gym.cli.params import read_params
     from lgmd_gym.neuron import LGMDParams
     from lgmd_gym.video.clips.playback import CHOICES, changed, named_choice
 
     names = tuple(CHOICES) if options.choices == ("all",) else dict.fromkeys(options.choices)
-    plain = _read_params(options.params)
+    plain = read_params(options.params)
     params = None if plain is None else LGMDParams.from_dict(plain)
     over = {
         "params": params, "t_sf": options.threshold, "fps": options.fps, "size": options.size,
@@ -181,7 +181,7 @@ def paper(options: "Paper") -> int:
     with _progress("paper", experiments.STEPS) as move:
         done = iter(range(1, experiments.STEPS + 1))
         found = experiments.experiments(lambda: move(next(done)), options.picture)
-    console, troubles, answers = console_of(120), [], None
+    console, troubles, answers = make_console(120), [], None
     if films is not None:
         answers, troubles = _watch_paper(out, orders, judged, films, console)
     claims = verdicts(found, answers)

@@ -1,4 +1,4 @@
-"""The command line, by running it."""
+"""End-to-end tests of the command line."""
 
 import json
 import os
@@ -13,13 +13,12 @@ import pytest
 from lgmd_gym.cli import main as cli
 
 
-def run(*arguments, cwd=None):
-    return subprocess.run(
-        [sys.executable, "-m", "lgmd_gym", *arguments], capture_output=True, text=True, cwd=cwd, timeout=120
-    )
+def run(*arguments):
+    command = [sys.executable, "-m", "lgmd_gym", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120)
 
 
-def test_bench_from_start_to_end(tmp_path):
+def test_bench_writes_a_run_folder(tmp_path):
     out = tmp_path / "deep" / "run"
     done = run("bench", "--agents", "spike-threshold", "--seeds", "1", "--out", str(out))
     assert done.returncode == 0, done.stderr
@@ -52,28 +51,49 @@ def test_drive_writes_a_video(tmp_path):
     assert (pictures[0] != pictures[-1]).any()
 
 
-def test_drive_says_how_a_case_ended():
+def test_drive_prints_the_result_of_a_case():
     done = run("drive", "quick/CCRs/v20", "--agent", "no-brake")
     assert done.returncode == 0, done.stderr
     assert "contact at 20.0 km/h" in done.stdout
 
 
-def test_lists_and_helps(capsys):
+def test_drive_reports_an_empty_road():
+    done = run("drive", "LGMD/EmptyRoad-v0", "--agent", "no-brake")
+    assert done.returncode == 0, done.stderr
+    assert "no contact" in done.stdout
+    assert "no vehicle ahead" in done.stdout
+
+
+def test_list_prints_every_table(capsys):
     assert cli.run(["list"]) == 0
     listed = capsys.readouterr().out
     for name in ("quick", "spike-threshold", "LGMD/CCRs-v0", "fovea"):
         assert name in listed
-    for command in ([], ["bench"], ["drive"], ["list"]):
-        with pytest.raises(SystemExit) as stop:
-            cli.run([*command, "--help"])
-        assert not stop.value.code
-    assert "spike frequency" in capsys.readouterr().out
+
+
+def test_help_lists_every_command(capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.run(["--help"])
+    assert not stop.value.code
+    text = capsys.readouterr().out
+    for name in cli.COMMANDS:
+        assert f"• {name}" in text
+
+
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_help_of_a_command_is_readable(command, capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.run([command, "--help"])
+    assert not stop.value.code
+    text = capsys.readouterr().out
+    assert "{None}" not in text
+    assert "(default: None)" not in text
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "which command? One of bench, drive, list"),
+        ([], "a command is required: bench, compare, drive"),
         (["benc"], "benc"),
         (["bench", "--agent", "no-brake"], "did you mean --agents?"),
         (["bench", "--seeds", "x"], "--seeds"),
@@ -100,16 +120,16 @@ def test_lists_and_helps(capsys):
 def test_bad_input_is_one_line_and_exit_code_two(arguments, words, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert cli.run(arguments) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.startswith("lgmd-gym: ")
-    assert said.err.count("\n") == 1
-    assert words in said.err
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.startswith("lgmd-gym: ")
+    assert output.err.count("\n") == 1
+    assert words in output.err
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow
-def test_traffic_from_start_to_end(tmp_path):
+def test_bench_runs_the_traffic_suite(tmp_path):
     out = tmp_path / "run"
     arguments = ["--suite", "traffic", "--agents", "spike-threshold", "--seeds", "1", "--out", str(out)]
     done = run("bench", *arguments)
@@ -121,62 +141,41 @@ def test_traffic_from_start_to_end(tmp_path):
     assert len((out / "summary.csv").read_text().splitlines()) == 1 + 1 + len(kinds)
 
 
-def test_a_failing_episode_makes_exit_code_one(tmp_path, monkeypatch, capsys):
+def test_a_failed_episode_gives_exit_code_one(tmp_path, monkeypatch, capsys):
     from lgmd_gym.benchmark import task as tasks
 
     def fail(task, agent, sensor_config):
         raise RuntimeError("no road today")
 
     monkeypatch.setattr(tasks, "_play", fail)
-    arguments = [
-        "bench",
-        "--jobs",
-        "1",
-        "--seeds",
-        "1",
-        "--agents",
-        "no-brake",
-        "--out",
-        str(tmp_path / "run"),
-    ]
-    assert cli.run(arguments) == 1
+    options = ["--jobs", "1", "--seeds", "1", "--agents", "no-brake", "--out", str(tmp_path / "run")]
+    assert cli.run(["bench", *options]) == 1
     assert "19 episodes failed" in capsys.readouterr().out
     assert "no road today" in (tmp_path / "run" / "episodes.jsonl").read_text()
 
 
 @pytest.mark.slow
-def test_ctrl_c_keeps_what_is_finished(tmp_path):
-    """A real interrupt of the command and its worker processes, as a terminal sends it."""
+def test_ctrl_c_keeps_finished_episodes(tmp_path):
+    """Send SIGINT to the command and its worker processes, as a terminal does."""
     out = tmp_path / "run"
-    command = [
-        sys.executable,
-        "-m",
-        "lgmd_gym",
-        "bench",
-        "--suite",
-        "ncap2023",
-        "--seeds",
-        "5",
-        "--out",
-        str(out),
-    ]
+    options = ["--suite", "ncap2023", "--seeds", "5", "--no-plots", "--out", str(out)]
     process = subprocess.Popen(
-        [*command, "--no-plots"],
+        [sys.executable, "-m", "lgmd_gym", "bench", *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        # A shell that runs this in its background has its children ignore the interrupt.
+        # The children of a shell's background job ignore SIGINT by default.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     while not (out / "episodes.jsonl").exists() or (out / "episodes.jsonl").read_text().count("\n") < 20:
         time.sleep(0.2)
         assert process.poll() is None
     os.killpg(process.pid, signal.SIGINT)
-    said, complaint = process.communicate(timeout=60)
+    stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 130
     rows = [json.loads(line) for line in (out / "episodes.jsonl").read_text().splitlines()]
     assert 20 <= len(rows) < 4000
-    assert f"interrupted: {len(rows)} of" in said
-    assert "Traceback" not in complaint
+    assert f"interrupted: {len(rows)} of" in stdout
+    assert "Traceback" not in stderr
     assert (out / "summary.csv").exists()

@@ -1,67 +1,68 @@
-"""The doctor finds a sound machine sound, and each fault that is put in."""
+"""Tests of `lgmd-gym doctor`: no fault on a working installation, and a finding for every injected fault."""
 
 import pytest
 
-from lgmd_gym.cli import checks as doctor
+from lgmd_gym.cli import doctor
 from lgmd_gym.cli import main as cli
 
 
-def states(findings):
-    return {item.check: item.state for item in findings}
+def faults(findings):
+    return [item for item in findings if item.state == doctor.FAULT]
 
 
-def test_a_sound_machine(capsys, monkeypatch):
-    monkeypatch.setattr(doctor, "SELF_TEST", 0.2)
+def test_a_working_installation_has_no_fault(capsys, monkeypatch):
+    monkeypatch.setattr(doctor, "SELF_TEST_S", 0.2)
     assert cli.run(["doctor"]) == 0
-    said = capsys.readouterr().out
-    for words in ("numba 0", "__pycache__", "ffmpeg", "m short", "camera frames/s"):
-        assert words in said
-    assert "fault" not in said
+    output = capsys.readouterr().out
+    for words in ("numba 0", "__pycache__", "ffmpeg", "m before the target", "camera frames/s"):
+        assert words in output
+    assert "fault" not in output
 
 
 @pytest.mark.parametrize(
-    ("asked", "words"),
-    [("numpy>=99", "needs >=99"), ("no-such-package-here>=1", "no-such-package-here is missing")],
+    ("requirement", "message"),
+    [("numpy>=99", "requires >=99"), ("no-such-package-here>=1", "no-such-package-here is missing")],
 )
-def test_wrong_versions(asked, words, monkeypatch):
-    monkeypatch.setattr(doctor, "requires", lambda package: [asked, 'torch>=99; extra == "train"'])
-    (fault,) = [item for item in doctor.check_versions() if item.state == doctor.FAULT]
-    assert words in fault.words
-    assert "pip install" in fault.mend
+def test_an_unmet_requirement_is_a_fault(requirement, message, monkeypatch):
+    monkeypatch.setattr(doctor, "requires", lambda package: [requirement, 'torch>=99; extra == "train"'])
+    (fault,) = faults(doctor.check_versions())
+    assert message in fault.message
+    assert "pip install" in fault.fix
 
 
-def test_no_codec(monkeypatch):
+def test_a_missing_codec_is_a_fault(monkeypatch):
     monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", "/nowhere/ffmpeg")
-    found = list(doctor.examine_one("video"))
-    assert states(found) == {"video": doctor.FAULT}
-    assert "imageio-ffmpeg" in found[0].mend
+    (fault,) = faults(doctor.run_check("video"))
+    assert "imageio-ffmpeg" in fault.fix
 
 
-def test_no_cache(monkeypatch):
+def test_an_unwritable_kernel_cache_is_a_fault(monkeypatch):
     monkeypatch.setattr(doctor, "_cache_folder", lambda module: "/proc/nowhere")
-    (fault,) = doctor.check_cache()
-    assert fault.state == doctor.FAULT
-    assert "set NUMBA_CACHE_DIR" in fault.mend
+    (fault,) = faults(doctor.check_cache())
+    assert "set NUMBA_CACHE_DIR" in fault.fix
 
 
-def test_a_brake_that_does_not_hold(monkeypatch):
-    monkeypatch.setattr(doctor, "SELF_TEST", 0.01)
-    monkeypatch.setattr(doctor, "_approach", lambda name: ((True, 0.0), 10))
-    assert states(doctor.check_drive())["self-test"] == doctor.FAULT
+def test_contact_with_the_rule_is_a_fault(monkeypatch):
+    monkeypatch.setattr(doctor, "SELF_TEST_S", 0.01)
+    monkeypatch.setattr(doctor, "_run_approach", lambda name: ((True, 0.0), 10))
+    (fault,) = faults(doctor.check_simulation())
+    assert "got contact and contact" in fault.message
 
 
-def test_a_drive_that_ends_in_two_ways(monkeypatch):
+def test_different_results_for_one_seed_are_a_fault(monkeypatch):
     gaps = iter(range(1000))
-    monkeypatch.setattr(doctor, "SELF_TEST", 0.01)
-    monkeypatch.setattr(doctor, "_approach", lambda name: ((name == "no-brake", float(next(gaps, 0))), 10))
-    (fault,) = [item for item in doctor.check_drive() if item.state == doctor.FAULT]
-    assert "two ways" in fault.words
+    monkeypatch.setattr(doctor, "SELF_TEST_S", 0.01)
+    monkeypatch.setattr(
+        doctor, "_run_approach", lambda name: ((name == "no-brake", float(next(gaps, 0))), 10)
+    )
+    (fault,) = faults(doctor.check_simulation())
+    assert "two different results" in fault.message
 
 
-def test_faults_make_exit_code_one(monkeypatch, capsys):
+def test_a_fault_gives_exit_code_one(monkeypatch, capsys):
     def fail():
-        raise OSError("the [disk] is gone")
+        raise OSError("no space left on [disk]")
 
     monkeypatch.setattr(doctor, "CHECKS", {"disk": fail})
     assert cli.run(["doctor"]) == 1
-    assert "the [disk] is gone" in capsys.readouterr().out
+    assert "no space left on [disk]" in capsys.readouterr().out

@@ -1,0 +1,49 @@
+"""The `drive` command."""
+
+from math import isfinite
+from typing import Any
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.cli.options import Drive
+from lgmd_gym.cli.params import read_params
+from lgmd_gym.rendering.playback import drive
+
+KMH = 3.6  # km/h per m/s
+
+
+def run(options: Drive) -> int:
+    """Run one episode and print how it ended."""
+    agent = make_agent(options.agent)
+    result = drive(
+        options.target,
+        agent,
+        options.seed,
+        _parse_arguments(options.set),
+        video=options.video,
+        live=options.live,
+        overlays=options.overlays,
+        **SensorConfig(options.camera, read_params(options.params)).of(agent).arguments,
+    )
+    if result.stopped:
+        print(f"window closed after {result.duration:.2f} s")
+    elif result.collision:
+        print(f"contact at {KMH * result.impact_speed:.1f} km/h relative speed after {result.duration:.2f} s")
+    else:
+        gap = f"free distance ahead {result.gap:.2f} m" if isfinite(result.gap) else "no vehicle ahead"
+        print(f"no contact: {KMH * result.ego_speed:.1f} km/h after {result.duration:.2f} s, {gap}")
+    if options.video is not None:
+        print(f"video: {options.video}")
+    return 0
+
+
+def _parse_arguments(pairs: tuple[str, ...]) -> dict[str, Any]:
+    """Return NAME=NUMBER pairs as a dict."""
+    arguments: dict[str, Any] = {}
+    for pair in pairs:
+        name, _, value = pair.partition("=")
+        try:
+            arguments[name] = int(value) if name == "shade" else float(value)
+        except ValueError:
+            raise ValueError(f"--set must be NAME=NUMBER, for example ego_speed=8.3, got {pair!r}") from None
+    return arguments
