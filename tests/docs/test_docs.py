@@ -1,4 +1,4 @@
-"""Every code block of README and the documentation runs; every page is reached; nothing is left out."""
+"""The documentation: its code blocks run, its links resolve, and the reference is complete."""
 
 import re
 import shlex
@@ -21,7 +21,7 @@ DOCS = ROOT / "docs"
 PAGES = sorted(
     path for path in DOCS.rglob("*.md") if not {"_generated", "_build"} & set(path.relative_to(DOCS).parts)
 )
-# Installing and testing are run by .ci/run, and by whoever reads this; the rest of a shell block runs here.
+# Lines of shell blocks that do not run here; .ci/run installs the package and runs the tests.
 ELSEWHERE = (
     "python3 -m venv",
     "source .venv",
@@ -47,17 +47,19 @@ def pages():
 
 @pytest.mark.parametrize("path", pages())
 def test_code_blocks_run(path, tmp_path, monkeypatch):
-    """In the order of the page, in one folder, Python blocks in one namespace."""
+    """Run the blocks of a page in order, in one folder; Python blocks share a namespace."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     make_clip(tmp_path / "clip.mp4")
-    get_reusable_executor().shutdown(wait=True)  # another page's workers look in another folder
+    get_reusable_executor().shutdown(wait=True)  # workers of another page have another working folder
     space = {"__name__": path.stem}
     for kind, block in BLOCK.findall(path.read_text()):
-        assert kind in ("python", "bash", "text", "yaml"), f"say here what is done with a block of {kind}"
+        assert kind in ("python", "bash", "text", "yaml"), (
+            f"{path.name}: unexpected code block of kind {kind!r}"
+        )
         if kind == "python":
             exec(compile(block, path.name, "exec"), space)
-            keep_module(path, block, tmp_path)
+            write_module(path, block, tmp_path)
         elif kind == "bash":
             for line in block.strip().splitlines():
                 run_line(line)
@@ -76,8 +78,8 @@ def make_clip(path):
             writer.write(picture)
 
 
-def keep_module(path, block, folder):
-    """A page that says "Write `name.py`:" before a block means the file."""
+def write_module(path, block, folder):
+    """Write a block to a file if the page introduces it with "Write `name.py`:"."""
     before = path.read_text().split(block)[0]
     named = re.search(r"Write `(\w+\.py)`:\s*```python\n$", before)
     if named:
@@ -88,7 +90,7 @@ def run_line(line):
     line = line.split("#")[0].strip()
     if not line or line.startswith(ELSEWHERE):
         return
-    assert line.startswith("lgmd-gym "), f"say in ELSEWHERE who runs: {line}"
+    assert line.startswith("lgmd-gym "), f"not an lgmd-gym command and not in ELSEWHERE: {line}"
     assert cli.run(shlex.split(line)[1:]) == 0, line
 
 
@@ -98,24 +100,24 @@ def test_every_page_is_in_a_toctree():
         for block in re.findall(r"^```\{toctree\}\n(.*?)^```", path.read_text(), re.DOTALL | re.MULTILINE):
             named |= {(path.parent / line).resolve() for line in block.split() if not line.startswith(":")}
     reached = {path.with_suffix("") for path in PAGES} - {DOCS / "index"}
-    assert reached <= named, f"not reached: {sorted(map(str, reached - named))}"
+    assert reached <= named, f"in no toctree: {sorted(map(str, reached - named))}"
 
 
-def test_links_between_pages_lead_somewhere():
+def test_links_between_pages_resolve():
     for path in PAGES:
         for target in re.findall(r"\]\(([^)#]+)\)", path.read_text()):
             if not target.startswith("http") and "_generated" not in target:
                 assert (path.parent / target).exists(), f"{path.name} links to {target}"
 
 
-def test_reference_leaves_nothing_out():
+def test_the_reference_lists_every_row_key_and_agent():
     metrics = (DOCS / "reference" / "metrics.md").read_text()
     assert [key for key in KEYS if f"`{key}`" not in metrics] == []
     agents = (DOCS / "reference" / "agents.md").read_text()
     assert [cls.__name__ for cls in AGENTS.values() if f"agents.{cls.__name__}\n" not in agents] == []
 
 
-def test_citation_file_names_the_package():
+def test_the_citation_file_matches_the_project():
     text = (ROOT / "CITATION.cff").read_text()
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert re.search(r"^cff-version: 1\.2\.0$", text, re.MULTILINE)
@@ -123,8 +125,8 @@ def test_citation_file_names_the_package():
     assert f"license: {project['license']}" in text
 
 
-def test_pictures_of_the_repository_are_small():
-    """All pictures that a clone brings, together under 3 MB."""
+def test_pictures_are_small():
+    """All pictures in the repository are under 3 MB together."""
     kinds = {".png", ".gif", ".jpg", ".mp4", ".svg"}
     ours = [path for path in DOCS.rglob("*") if path.suffix in kinds]
     kept = [path for path in ours if not {"_generated", "_build"} & set(path.relative_to(DOCS).parts)]

@@ -1,4 +1,4 @@
-"""The examples, and README's blocks, run."""
+"""The scripts in docs/examples run and print plausible results."""
 
 import importlib.util
 import re
@@ -39,7 +39,7 @@ def test_scenario_evaluation(capsys, tmp_path):
 
 
 def test_rl_training(capsys, tmp_path):
-    """PPO with MultiInputPolicy learns 2,000 steps: parameters move and stay finite."""
+    """PPO with MultiInputPolicy updates its parameters, which stay finite, in 2,000 steps."""
     torch = pytest.importorskip("torch")
     pytest.importorskip("stable_baselines3")
     model = load("rl_training").main(2000, tmp_path / "picture.png")
@@ -58,7 +58,7 @@ def test_contact_sheet(tmp_path):
 
 
 def test_on_record(capsys):
-    """What is told of a rule is what the benchmark's closed loop does with it."""
+    """The result on recorded episodes equals that of the closed loop."""
     example = load("on_record")
     drives = example.recorded("stopping-zone", 4, jobs=1)
     told = example.braked("stopping-zone", drives)
@@ -85,7 +85,7 @@ def test_on_record(capsys):
 
 
 def test_what_breaks_first(capsys):
-    """A lens that looks up sees no ground, and the rule that watches it misses what it else avoids."""
+    """A camera that points at the sky makes the rule miss the targets that it avoids otherwise."""
     example = load("what_breaks_first")
     example.SPOILT["lens to the sky"] = (example.pitched(20.0), {})
     example.first_table("stopping-zone", 1, 1, ("clear", "lens to the sky"), every=14)
@@ -99,7 +99,7 @@ def test_what_breaks_first(capsys):
     assert "| asphalt (104), texture 1.6 | 1/1 " in "".join(lines)
 
 
-def test_every_example_is_run_here():
+def test_every_example_has_a_test():
     tested = Path(__file__).read_text()
     assert all(f'load("{path.stem}")' in tested for path in EXAMPLES.glob("*.py"))
 

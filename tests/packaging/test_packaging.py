@@ -1,4 +1,4 @@
-"""What is installed, what imports what, and how fast an import is."""
+"""Packaging: contents of the wheel, import direction and import time."""
 
 import ast
 import os
@@ -64,7 +64,7 @@ def imports_of(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path} imports relatively"
+            assert node.level == 0, f"{path} has a relative import"
             if node.module == "lgmd_gym":
                 yield from (f"lgmd_gym.{alias.name}" for alias in node.names)
             else:
@@ -109,16 +109,16 @@ def test_subfolders_import_one_way():
     assert wrong == []
 
 
-@pytest.mark.parametrize(("room", "strangers"), [
+@pytest.mark.parametrize(("folder", "unrelated"), [
     ("neuron", ("gymnasium", "highway_env", "lgmd_gym.camera")),
     ("camera", ("gymnasium", "pandas", "lgmd_gym.neuron")),
     ("agents", ("gymnasium", "highway_env", "lgmd_gym.envs", "lgmd_gym.neuron")),
 ])  # fmt: skip
-def test_rooms_know_no_strangers(room, strangers):
-    loaded = run(f"import sys, lgmd_gym.{room}; print(*sys.modules)").split()
-    # The package itself registers ids with Gymnasium, so that one is loaded by the parent.
+def test_low_level_folders_load_no_unrelated_package(folder, unrelated):
+    loaded = run(f"import sys, lgmd_gym.{folder}; print(*sys.modules)").split()
+    # lgmd_gym/__init__ itself loads Gymnasium to register the ids.
     bare = set(run("import sys, lgmd_gym; print(*sys.modules)").split())
-    assert [name for name in strangers if name in loaded and name not in bare] == []
+    assert [name for name in unrelated if name in loaded and name not in bare] == []
 
 
 def run(code, **kwargs):
@@ -133,7 +133,7 @@ def test_import_is_light():
 
 
 def test_import_is_fast():
-    """Under half a second beyond the interpreter's own start; the fastest of several runs."""
+    """The import adds under 0.5 s to the start of the interpreter (fastest of five runs)."""
 
     def timed(code):
         start = time.perf_counter()
@@ -143,7 +143,20 @@ def test_import_is_fast():
     assert min(timed("import lgmd_gym") for _ in range(5)) - min(timed("pass") for _ in range(5)) < 0.5
 
 
-def test_package_list_is_the_tree():
+def test_the_package_folder_holds_four_modules_and_folders():
+    flat = {path.name for path in (ROOT / "lgmd_gym").glob("*.py")}
+    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py"}
+
+
+def test_every_package_states_its_contents_in_one_sentence():
+    for module, path in modules():
+        if path.name == "__init__.py":
+            docstring = ast.get_docstring(ast.parse(path.read_text()))
+            assert docstring, f"{module} has no docstring"
+            assert docstring.splitlines()[0].endswith("."), f"{module}: {docstring.splitlines()[0]!r}"
+
+
+def test_the_package_list_matches_the_folders():
     mapping = PROJECT["tool"]["setuptools"]["package-dir"]
     listed = PROJECT["tool"]["setuptools"]["packages"]
     found = {module for module, path in modules() if path.name == "__init__.py"}
@@ -154,8 +167,8 @@ def test_package_list_is_the_tree():
 
 
 @pytest.mark.slow
-def test_wheel_from_the_sdist_holds_everything_and_nothing_generic(tmp_path):
-    """As a user gets it: sdist -> wheel -> imported from another folder."""
+def test_a_wheel_built_from_the_sdist_is_complete_and_has_one_top_level_package(tmp_path):
+    """Build the sdist, build a wheel from it, and import the wheel from another folder."""
     subprocess.run(["git", "clone", "-q", str(ROOT), str(tmp_path / "clone")], check=True)
     build = "import setuptools.build_meta as b; print(b.build_sdist(r'{out}'))"
     source = run(build.format(out=tmp_path), cwd=tmp_path / "clone").splitlines()[-1]
@@ -179,7 +192,7 @@ def test_wheel_from_the_sdist_holds_everything_and_nothing_generic(tmp_path):
     assert run(code, cwd=tmp_path, env=env).startswith(str(tmp_path / "site"))
 
 
-def test_ci_runs_readmes_test_command():
+def test_ci_runs_the_test_command_of_the_readme():
     commands = [
         line for line in (ROOT / "README.md").read_text().splitlines() if line.startswith("python3 -m venv")
     ]
