@@ -1,9 +1,9 @@
-"""Closed-loop braking benchmark: hold two thresholds of the plain rule against the oracle.
+"""Closed-loop braking benchmark: compare two thresholds of the spike-threshold rule with an oracle.
 
     python docs/examples/braking_benchmark.py runs/example docs/tutorials/braking_benchmark.png
 
-Writes the run folder (rows, summary, time series), prints avoided threats and false braking per agent, and
-draws both with their intervals.
+Writes the run folder, prints avoided threats and false activations per agent, and plots both with their
+intervals.
 """
 
 import sys
@@ -13,29 +13,29 @@ from matplotlib.figure import Figure
 
 from lgmd_gym.benchmark.run_cases import Run
 from lgmd_gym.benchmark.summary import Rate, Score, scores
-from lgmd_gym.plotting.figures import COLOURS
+from lgmd_gym.plotting.style import COLOURS
 
 AGENTS = ["spike-threshold:threshold=30", "spike-threshold:threshold=90,frames=2", "ttc-oracle"]
 
 
 def main(folder: Path, picture: Path | None = None, seeds: int = 1) -> list[Score]:
-    """Play the quick suite, print one line per agent, and draw them."""
+    """Run the quick suite, print one line per agent and plot the rates."""
     run = Run("quick", AGENTS, seeds=seeds, jobs=1, out=folder)
     run.play()
     found = scores(run.rows, lambda row: "")
     for item in found:
         avoided, false = item.avoided, item.false_activations
-        print(f"{item.agent:40} avoided {avoided.k}/{avoided.n}  false braking {false.k}/{false.n}")
+        print(f"{item.agent:40} avoided {avoided.k}/{avoided.n}  false activations {false.k}/{false.n}")
     if picture is not None:
         draw(found, picture)
     return found
 
 
 def draw(found: list[Score], picture: Path) -> None:
-    """Draw each agent's rates as points with Wilson's 95 % intervals: few episodes say little."""
+    """Plot the rates of each agent with Wilson's 95 % intervals."""
     figure = Figure(figsize=(8.0, 2.6), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True)
-    columns = (("threats avoided", "avoided", 2), ("false braking", "false_activations", 1))
+    columns = (("threats avoided", "avoided", 2), ("false activations", "false_activations", 1))
     for axis, (title, field, colour) in zip(axes, columns, strict=True):
         for row, item in enumerate(found):
             rate: Rate = getattr(item, field)

@@ -1,8 +1,8 @@
-"""What the eye sees: every road of highway-env under every condition, in one picture.
+"""Contact sheet: camera frames of every highway-env road under every condition.
 
     python docs/examples/contact_sheet.py docs/contact_sheet.png
 
-The same camera, the same moment; only the condition changes.
+Camera and time are the same in each row; only the condition changes.
 """
 
 import sys
@@ -18,7 +18,7 @@ from lgmd_gym.plotting.figures import contact_sheet
 def main(
     path: str | Path = "docs/contact_sheet.png", quick: bool = False
 ) -> dict[str, dict[str, np.ndarray]]:
-    """Draw the sheet; `quick` takes two roads and two conditions."""
+    """Save the sheet and return its frames; `quick` limits it to two roads and two conditions."""
     roads = tuple(ROADS)[:2] if quick else tuple(ROADS)
     conditions = tuple(CONDITIONS)[:2] if quick else tuple(CONDITIONS)
     sheet = road_sheet(roads, conditions)

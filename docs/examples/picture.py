@@ -1,4 +1,4 @@
-"""The picture and the film of README: an approach through the eye, from the first glimpse to the stop.
+"""The picture and the film of the README: an approach to a standing car.
 
 python docs/examples/picture.py docs/picture.png docs/approach.gif
 """
@@ -13,9 +13,9 @@ from lgmd_gym import LGMDView
 from lgmd_gym.agents import make_agent
 from lgmd_gym.rendering.canvas import PINK, RED, SKY, UNLIT, YELLOW
 
-START, EVERY, WIDTH = 2.0, 3, 800  # a film begins at [s], takes every third decision, is so wide [px]
+START, EVERY, WIDTH = 2.0, 3, 800  # start of the film [s], decisions per film frame, width [px]
 
-# Small but telling areas, which a palette made by counting pixels forgets: signals and cars from above.
+# Colours of small areas (signals, vehicles in the top view), which pixel counts would drop from the palette.
 SIGNALS = (SKY, YELLOW, RED, PINK, UNLIT, (50, 200, 0), (100, 200, 255))
 
 
@@ -23,10 +23,10 @@ def main(path: Path, film: Path | None = None, ego_speed: float = 11.1, after: i
     """Save the view `after` decisions after the first alert of an approach at `ego_speed` [m/s].
 
     Args:
-        path: Of the picture.
-        film: Of a GIF of the whole approach; None for none, which ends the approach at the picture.
-        ego_speed: [m/s].
-        after: Decisions from the alert to the picture.
+        path: Picture file.
+        film: GIF file of the whole approach; without it, the approach ends at the picture.
+        ego_speed: Ego speed [m/s].
+        after: Number of decisions from the alert to the picture.
     """
     agent = make_agent("spike-threshold")
     title = f"LGMD/CCRs-v0 at {3.6 * ego_speed:.0f} km/h   {agent.name}"
@@ -51,7 +51,7 @@ def main(path: Path, film: Path | None = None, ego_speed: float = 11.1, after: i
 
 
 def save_gif(pictures: list[Image.Image], path: Path) -> None:
-    """Save pictures with one palette for all, without dithering, which would flicker and cost space."""
+    """Save a GIF with one palette and no dithering, which would flicker and increase the file size."""
     common = pictures[-10].quantize(96).getpalette()[: 3 * 96]
     palette = Image.new("P", (1, 1))
     palette.putpalette([*common, *(value for colour in SIGNALS for value in colour)])

@@ -1,9 +1,9 @@
-"""Scenario evaluation: how late may the alert come? Time to contact at the alert over speed and lens.
+"""Scenario evaluation: time to contact at the neuron's alert, by speed and lens.
 
     python docs/examples/scenario_evaluation.py docs/tutorials/scenario_evaluation.png
 
-Nothing brakes here: the neuron only watches approaches to a standing car, so that lenses can be compared
-on the same drive. An early alert is worth nothing if an empty road raises it too, so that is played as well.
+No agent brakes, so that all lenses are compared on the same approach to a standing car. An early alert is only
+useful if an empty road causes none; the script therefore counts alerts on an empty road too.
 """
 
 import sys
@@ -14,14 +14,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import lgmd_gym  # noqa: F401  (registers the environments)
-from lgmd_gym.plotting.figures import COLOURS
+from lgmd_gym.plotting.style import COLOURS
 
-# A demand waits for one camera frame and the dead time; the linear build-up costs half its length.
+# Delay of a demand: one camera frame, the dead time, and half of the linear build-up.
 DELAY, DECELERATION = 1 / 30 + 0.1 + 0.2 / 2, 9.0  # [s], [m/s²]
 
 
 def ttc_at_alert(camera: str, kmh: float, seed: int) -> float:
-    """Return the time to contact [s] at the first alert of an undisturbed approach; NaN without one."""
+    """Return the time to contact [s] at the first alert of an approach without braking; NaN without an alert."""
     env = gym.make("LGMD/CCRs-v0", ego_speed=kmh / 3.6, camera=camera)
     _, info = env.reset(seed=seed)
     hold = np.zeros(1, np.float32)
@@ -33,7 +33,7 @@ def ttc_at_alert(camera: str, kmh: float, seed: int) -> float:
 
 
 def alerts_on_empty_road(camera: str, kmh: float, seeds: int) -> int:
-    """Return with how many seeds the neuron alerts where nothing but the road is to be seen."""
+    """Return the number of seeds with an alert on an empty road."""
     env = gym.make("LGMD/EmptyRoad-v0", ego_speed=kmh / 3.6, camera=camera)
     count = 0
     for seed in range(seeds):
@@ -47,7 +47,7 @@ def alerts_on_empty_road(camera: str, kmh: float, seeds: int) -> int:
 
 
 def ttc_needed(kmh: float) -> float:
-    """Return the time to contact [s] at which a demand for full braking just avoids a standing car."""
+    """Return the time to contact [s] at which a demand for full braking just avoids contact with a standing car."""
     return DELAY + kmh / 3.6 / (2 * DECELERATION)
 
 
@@ -57,7 +57,7 @@ def main(
     speeds: tuple[int, ...] = (10, 20, 30, 40, 50, 60),
     seeds: int = 5,
 ) -> dict[str, np.ndarray]:
-    """Print the median over seeds for each lens and speed; return all, per camera (speeds, seeds)."""
+    """Print the median over seeds; return all times per camera, each float64 of shape (speeds, seeds) [s]."""
     found = {
         camera: np.array([[ttc_at_alert(camera, kmh, seed) for seed in range(seeds)] for kmh in speeds])
         for camera in cameras
@@ -80,7 +80,7 @@ def main(
 def draw(
     found: dict[str, np.ndarray], empty: dict[str, np.ndarray], speeds: tuple[int, ...], picture: Path
 ) -> None:
-    """Draw medians as lines, every seed as a dot, and hollow where the empty road alone alerts."""
+    """Plot medians as lines and seeds as dots; hollow markers mean alerts on an empty road."""
     figure = Figure(figsize=(7.5, 3.8), layout="constrained")
     axis = figure.subplots()
     for index, (camera, values) in enumerate(found.items()):
@@ -92,7 +92,7 @@ def draw(
         axis.plot(speeds, values, ".", color=colour, alpha=0.4, markersize=4)
     smooth = np.linspace(speeds[0], speeds[-1], 50)
     axis.plot(smooth, [ttc_needed(kmh) for kmh in smooth], "--", color="0.4", label="needed to stop")
-    axis.plot([], [], "o", color="0.4", markerfacecolor="white", label="an empty road alerts, too")
+    axis.plot([], [], "o", color="0.4", markerfacecolor="white", label="alerts on an empty road too")
     axis.set(xlabel="ego speed [km/h]", ylabel="time to contact at the alert [s]", ylim=(0, None))
     axis.grid(alpha=0.3)
     axis.legend(frameon=False)

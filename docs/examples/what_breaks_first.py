@@ -1,12 +1,12 @@
-"""What breaks an agent first: its own eye, spoilt in one way at a time, on protocol cases.
+"""Robustness of an agent: protocol cases with one change of camera, weather or target at a time.
 
     python docs/examples/what_breaks_first.py stopping-zone 1
 
-The first table spoils the lens, the air and the target. It tells how many of the cases of R152 and FMVSS 127
-are avoided (no contact, and not braked prematurely), and in how many false-reaction cases the agent brakes.
-The second one sets dark, asphalt-grey and light targets by day, at night and in fog on three textures of the
-asphalt, and tells how many of R152's cases are avoided.
-Rates carry Wilson's 95 % interval. The argument after the agent is the number of seeds.
+The first table changes the camera, the weather or the target. It lists how many cases of R152 and FMVSS 127 are
+avoided (no contact and no premature braking), and the number of false activations in the false-reaction cases.
+The second table combines dark, asphalt-grey and light targets with day, night and fog and three asphalt textures,
+and lists how many cases of R152 are avoided.
+Rates have Wilson's 95 % interval. The second argument is the number of seeds.
 """
 
 import sys
@@ -25,53 +25,53 @@ from lgmd_gym.camera import CameraParams
 
 Lens = dict[str, Any]
 Row = dict[str, Any]
-Spoil = Callable[[Lens], Lens]
+Change = Callable[[Lens], Lens]
 
 
-def laid_over(**fields: Any) -> Spoil:
-    """Return what lays camera fields over a lens."""
+def with_fields(**fields: Any) -> Change:
+    """Return a function that replaces camera fields."""
     return lambda lens: {**lens, **fields}
 
 
-def pitched(degrees: float) -> Spoil:
-    """Return what mounts a lens with an error of pitch, upwards [deg]."""
+def pitched(degrees: float) -> Change:
+    """Return a function that adds a mounting error in pitch, positive upwards [deg]."""
     return lambda lens: {**lens, "pitch_deg": CameraParams.make(lens).pitch_deg + degrees}
 
 
-# What is spoilt -> what happens to each lens, and arguments of the cases.
-SPOILT: dict[str, tuple[Spoil, dict[str, Any]]] = {
-    "clear": (laid_over(), {}),
-    "night": (laid_over(condition="night"), {}),
-    "fog, 120 m": (laid_over(condition="fog"), {}),
+# Name -> change of each camera, and arguments of the cases.
+CHANGES: dict[str, tuple[Change, dict[str, Any]]] = {
+    "clear": (with_fields(), {}),
+    "night": (with_fields(condition="night"), {}),
+    "fog, 120 m": (with_fields(condition="fog"), {}),
     "lens pitched up 0.3°": (pitched(0.3), {}),
     "lens pitched down 0.3°": (pitched(-0.3), {}),
-    "vibration 0.01° rms": (laid_over(vibration_deg=0.01), {}),
-    "vibration 0.03° rms": (laid_over(vibration_deg=0.03), {}),
-    "heave 5 mm rms": (laid_over(heave_m=0.005), {}),
-    "brake dive 0.1° per m/s²": (laid_over(dive_deg=0.1), {}),
-    "exposure 11 ms": (laid_over(shutter_s=0.011), {}),
-    "robust: 0.1° rms and the last four": (laid_over(condition="degraded"), {}),
-    "target as grey as asphalt": (laid_over(), {"shade": 104}),
-    "the same, a box without shadow": (laid_over(vehicles="box"), {"shade": 104}),
-    "dark box (30)": (laid_over(vehicles="box"), {"shade": 30}),
-    "light box (220)": (laid_over(vehicles="box"), {"shade": 220}),
+    "vibration 0.01° rms": (with_fields(vibration_deg=0.01), {}),
+    "vibration 0.03° rms": (with_fields(vibration_deg=0.03), {}),
+    "heave 5 mm rms": (with_fields(heave_m=0.005), {}),
+    "brake dive 0.1° per m/s²": (with_fields(dive_deg=0.1), {}),
+    "exposure 11 ms": (with_fields(shutter_s=0.011), {}),
+    "degraded: 0.1° rms and the last four": (with_fields(condition="degraded"), {}),
+    "target as grey as asphalt": (with_fields(), {"shade": 104}),
+    "the same, a box without shadow": (with_fields(vehicles="box"), {"shade": 104}),
+    "dark box (30)": (with_fields(vehicles="box"), {"shade": 30}),
+    "light box (220)": (with_fields(vehicles="box"), {"shade": 220}),
 }
-BLIND = SensorConfig({"name": "wide", "shape": [8, 8]})  # who never brakes need not look
+NO_VIEW = SensorConfig({"name": "wide", "shape": [8, 8]})  # no-brake needs no useful image
 SHADES = {"dark (30)": 30, "asphalt (104)": 104, "light (220)": 220}
 AIR = {"day": "clear", "night": "night", "fog": "fog"}
-TEXTURES = (0.5, 1.0, 1.6)  # contrast of the asphalt, times the natural one
+TEXTURES = (0.5, 1.0, 1.6)  # contrast of the asphalt, relative to the default
 
 
-def play(agent: str, cases: Sequence[Case], seeds: int, spoil: Spoil, jobs: int) -> list[Row]:
-    """Return the rows of an agent behind a spoilt eye."""
-    eye = SensorConfig().of(make_agent(agent))
-    lenses = eye.camera if isinstance(eye.camera, list) else [eye.camera or DEFAULT_CAMERA]
+def play(agent: str, cases: Sequence[Case], seeds: int, change: Change, jobs: int) -> list[Row]:
+    """Return the rows of an agent with changed cameras."""
+    own = SensorConfig().of(make_agent(agent))
+    lenses = own.camera if isinstance(own.camera, list) else [own.camera or DEFAULT_CAMERA]
     named = [{"name": lens} if isinstance(lens, str) else dict(lens) for lens in lenses]
-    worn = SensorConfig([spoil(lens) for lens in named], eye.params, eye.condition, eye.include_frame)
+    changed = SensorConfig([change(lens) for lens in named], own.params, own.condition, own.include_frame)
 
     def both(case: Case, seed: int) -> Row:
-        truth = run_task(Task(NO_BRAKE, case, seed, BLIND)).truth
-        return run_task(Task(agent, case, seed, worn, truth)).row
+        truth = run_task(Task(NO_BRAKE, case, seed, NO_VIEW)).truth
+        return run_task(Task(agent, case, seed, changed, truth)).row
 
     rows: Any = Parallel(n_jobs=jobs)(delayed(both)(case, seed) for case in cases for seed in range(seeds))
     failed = next((row["error"] for row in rows if row["error"]), None)
@@ -81,45 +81,49 @@ def play(agent: str, cases: Sequence[Case], seeds: int, spoil: Spoil, jobs: int)
 
 
 def rate(rows: Sequence[Row], key: str) -> str:
-    """Return k/n of what rows say of a key, with its interval in per cent; a dash for no rows."""
-    told = [bool(row[key]) for row in rows if row[key] is not None]
-    if not told:
+    """Return k/n of a boolean row key with its interval in per cent; a dash without rows."""
+    values = [bool(row[key]) for row in rows if row[key] is not None]
+    if not values:
         return "–"
-    low, high = wilson(sum(told), len(told))
-    return f"{sum(told)}/{len(told)} [{100 * low:.0f}–{100 * high:.0f}]"
+    low, high = wilson(sum(values), len(values))
+    return f"{sum(values)}/{len(values)} [{100 * low:.0f}–{100 * high:.0f}]"
 
 
 def with_arguments(cases: Sequence[Case], **arguments: Any) -> list[Case]:
-    """Return the cases with further arguments."""
+    """Return the cases with additional arguments."""
     return [Case(c.name, c.family, (*c.arguments, *arguments.items()), c.fcw_driver) for c in cases]
 
 
 def first_table(
-    agent: str, seeds: int, jobs: int, names: Sequence[str] = tuple(SPOILT), every: int = 1
+    agent: str, seeds: int, jobs: int, names: Sequence[str] = tuple(CHANGES), every: int = 1
 ) -> None:
-    """Print what a spoilt lens, air or target costs."""
+    """Print the table of changed cameras, weather and targets."""
     threats = [*find_suite("r152").cases, *find_suite("fmvss127").cases][::every]
-    quiet = find_suite("false-reaction").cases[::every]
-    print("| what | avoided | premature | false braking |\n|---|---|---|---|")
+    non_threats = find_suite("false-reaction").cases[::every]
+    print("| change | avoided | premature | false activations |\n|---|---|---|---|")
     for name in names:
-        spoil, arguments = SPOILT[name]
-        rows = play(agent, with_arguments(threats, **arguments), seeds, spoil, jobs)
-        # Targets' shades and shapes say nothing of cases without a target in the lane.
-        calm = [] if arguments else play(agent, quiet, seeds, spoil, jobs)
-        told = (rate(rows, "avoided"), rate(rows, "premature_brake"), rate(calm, "false_activation"))
-        print(f"| {name} | {' | '.join(told)} |", flush=True)
+        change, arguments = CHANGES[name]
+        rows = play(agent, with_arguments(threats, **arguments), seeds, change, jobs)
+        # Shades and shapes of targets do not apply to cases without a target in the lane.
+        false_reaction = [] if arguments else play(agent, non_threats, seeds, change, jobs)
+        cells = (
+            rate(rows, "avoided"),
+            rate(rows, "premature_brake"),
+            rate(false_reaction, "false_activation"),
+        )
+        print(f"| {name} | {' | '.join(cells)} |", flush=True)
 
 
 def second_table(agent: str, seeds: int, jobs: int, every: int = 1) -> None:
-    """Print contacts avoided by shade, light and texture."""
+    """Print avoided contacts by target shade, light and asphalt texture."""
     cases = find_suite("r152").cases[::every]
     print(f"| target, texture | {' | '.join(AIR)} |\n|---|{'---|' * len(AIR)}")
     for name, shade in SHADES.items():
         for texture in TEXTURES:
-            spoils = [laid_over(condition=air, texture=texture) for air in AIR.values()]
+            changes = [with_fields(condition=air, texture=texture) for air in AIR.values()]
             shaded = with_arguments(cases, shade=shade)
-            told = [rate(play(agent, shaded, seeds, spoil, jobs), "avoided") for spoil in spoils]
-            print(f"| {name}, texture {texture:g} | {' | '.join(told)} |", flush=True)
+            cells = [rate(play(agent, shaded, seeds, change, jobs), "avoided") for change in changes]
+            print(f"| {name}, texture {texture:g} | {' | '.join(cells)} |", flush=True)
 
 
 if __name__ == "__main__":

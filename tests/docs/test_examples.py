@@ -25,7 +25,7 @@ def test_braking_benchmark(tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     oracle = next(line for line in lines if line.startswith("ttc-oracle"))
     assert "avoided 12/12" in oracle
-    assert "false braking 0/7" in oracle
+    assert "false activations 0/7" in oracle
     assert (tmp_path / "picture.png").stat().st_size > 10_000
 
 
@@ -87,11 +87,11 @@ def test_on_record(capsys):
 def test_what_breaks_first(capsys):
     """A camera that points at the sky makes the rule miss the targets that it avoids otherwise."""
     example = load("what_breaks_first")
-    example.SPOILT["lens to the sky"] = (example.pitched(20.0), {})
-    example.first_table("stopping-zone", 1, 1, ("clear", "lens to the sky"), every=14)
+    example.CHANGES["camera pitched up 20°"] = (example.pitched(20.0), {})
+    example.first_table("stopping-zone", 1, 1, ("clear", "camera pitched up 20°"), every=14)
     clear, sky = capsys.readouterr().out.splitlines()[2:]
     assert clear.startswith("| clear | 2/2 [34–100] | 0/2 [0–66] | 0/3 ")
-    assert sky.startswith("| lens to the sky | 0/2 ")
+    assert sky.startswith("| camera pitched up 20° | 0/2 ")
     example.second_table("stopping-zone", 1, 1, every=6)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "| target, texture | day | night | fog |"

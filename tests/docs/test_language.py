@@ -36,7 +36,8 @@ def test_no_banned_word():
 
 
 def test_the_pattern_matches_every_listed_word():
-    words = "mend told tells somebody nobody anybody dearer wish worn lived unlearnt thereof".split()
-    words += ["gone on with", "leave to be desired", "what it is made of", "a breath of", "deaf ear"]
+    words = ["mend", "told", "tells", "somebody", "nobody", "anybody", "dearer", "wish", "worn", "lived"]
+    words += ["unlearnt", "thereof", "gone on with", "leave to be desired", "what it is made of"]
+    words += ["a breath of", "deaf ear"]
     assert [word for word in words if not BANNED.search(f"a {word} b")] == []
     assert not BANNED.search("worn paint, amend, recommended")
