@@ -9,9 +9,9 @@ intervals.
 import sys
 from pathlib import Path
 
+from lgmd_gym.benchmark.run_cases import Run
 from matplotlib.figure import Figure
 
-from lgmd_gym.benchmark.run_cases import Run
 from lgmd_gym.benchmark.summary import Rate, Score, scores
 from lgmd_gym.plotting.style import COLOURS
 

@@ -2,8 +2,8 @@
 
     python docs/examples/scenario_evaluation.py docs/tutorials/scenario_evaluation.png
 
-No agent brakes, so that all lenses are compared on the same approach to a standing car. An early alert is only
-useful if an empty road causes none; the script therefore counts alerts on an empty road too.
+No agent brakes, so that all lenses are compared on the same approach to a standing car. An early alert is
+useful only if an empty road causes none; the script therefore counts alerts on an empty road too.
 """
 
 import sys
@@ -21,7 +21,7 @@ DELAY, DECELERATION = 1 / 30 + 0.1 + 0.2 / 2, 9.0  # [s], [m/s²]
 
 
 def ttc_at_alert(camera: str, kmh: float, seed: int) -> float:
-    """Return the time to contact [s] at the first alert of an approach without braking; NaN without an alert."""
+    """Return the time to contact [s] at the first alert without braking; NaN without an alert."""
     env = gym.make("LGMD/CCRs-v0", ego_speed=kmh / 3.6, camera=camera)
     _, info = env.reset(seed=seed)
     hold = np.zeros(1, np.float32)
@@ -47,7 +47,7 @@ def alerts_on_empty_road(camera: str, kmh: float, seeds: int) -> int:
 
 
 def ttc_needed(kmh: float) -> float:
-    """Return the time to contact [s] at which a demand for full braking just avoids contact with a standing car."""
+    """Return the time to contact [s] at which full braking just avoids contact with a standing car."""
     return DELAY + kmh / 3.6 / (2 * DECELERATION)
 
 

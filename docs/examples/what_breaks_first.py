@@ -2,10 +2,10 @@
 
     python docs/examples/what_breaks_first.py stopping-zone 1
 
-The first table changes the camera, the weather or the target. It lists how many cases of R152 and FMVSS 127 are
-avoided (no contact and no premature braking), and the number of false activations in the false-reaction cases.
-The second table combines dark, asphalt-grey and light targets with day, night and fog and three asphalt textures,
-and lists how many cases of R152 are avoided.
+The first table changes the camera, the weather or the target. It lists how many cases of R152 and FMVSS 127
+are avoided (no contact and no premature braking), and the false activations in the false-reaction cases.
+The second table combines dark, asphalt-grey and light targets with day, night and fog and three asphalt
+textures, and lists how many cases of R152 are avoided.
 Rates have Wilson's 95 % interval. The second argument is the number of seeds.
 """
 
