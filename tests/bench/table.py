@@ -1,6 +1,6 @@
-"""The performance table of README: `python tests/bench/table.py`.
+"""Speed table of the README: `python tests/bench/table.py`.
 
-Medians of interleaved rounds in one process and run, on one core unless a row says otherwise, so that a busy
+All figures are medians of interleaved rounds in one process, on one core unless a row states otherwise. A busy
 machine slows both sides of a ratio.
 """
 
@@ -22,38 +22,38 @@ sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 
 def interleaved(*calls, rounds=21, repeats=50):
-    """Return the median seconds per call of each function, taken in turns."""
+    """Return the median time per call of each function [s], called in turns."""
     times = [[] for _ in calls]
-    for turn in range(rounds + 1):
+    for round_ in range(rounds + 1):
         for index, call in enumerate(calls):
             start = time.perf_counter()
             for _ in range(repeats):
                 call()
-            if turn:  # the first round compiles and warms up
+            if round_:  # the first round compiles the kernels
                 times[index].append((time.perf_counter() - start) / repeats)
     return [statistics.median(part) for part in times]
 
 
 def neuron(shape, kind=LGMD):
-    """Return a function that steps a neuron over drifting texture."""
+    """Return a function that steps a neuron on a drifting texture."""
     from test_bench_neuron import scene
 
-    frames, cell, turn = scene(shape), kind(shape), iter(range(10**9))
-    return lambda: cell.step(frames[next(turn) % len(frames)])
+    frames, model, index = scene(shape), kind(shape), iter(range(10**9))
+    return lambda: model.step(frames[next(index) % len(frames)])
 
 
 def camera(name, vehicles):
     """Return a function that renders a road with vehicles."""
     from test_bench_camera import scene
 
-    env, eye = scene(vehicles), EgoCamera(name)
-    out = eye.render(env)
-    return lambda: eye.render(env, out)
+    env, ego_camera = scene(vehicles), EgoCamera(name)
+    out = ego_camera.render(env)
+    return lambda: ego_camera.render(env, out)
 
 
-def closed_loop(identity, **arguments):
-    """Return a function that steps an environment, one camera frame each, and resets it when it ends."""
-    env, hold = gym.make(identity, **arguments), np.zeros(1, np.float32)
+def closed_loop(env_id, **arguments):
+    """Return a function that steps an environment by one camera frame and resets it when it ends."""
+    env, hold = gym.make(env_id, **arguments), np.zeros(1, np.float32)
     env.reset(seed=0)
 
     def step():
@@ -65,7 +65,7 @@ def closed_loop(identity, **arguments):
 
 
 def many(count):
-    """Return a function that steps `count` environments in one process, two threads for the neurons."""
+    """Return a function that steps `count` environments in one process; two threads step the neurons."""
     from lgmd_gym.wrappers.vector import LGMDObservation
 
     bare = gym.make_vec("LGMD/CCRs-v0", num_envs=count, vectorization_mode="sync", camera=None)
@@ -75,7 +75,7 @@ def many(count):
 
 
 def top_view():
-    """Return a function that steps highway-env with its own grey top view, two cars, 30 Hz, 160×90."""
+    """Return a function that steps highway-env with its grey top view: two cars, 30 Hz, 160×90."""
     import highway_env  # noqa: F401
 
     config = {
@@ -103,7 +103,7 @@ def top_view():
 
 
 def import_seconds():
-    """Return the median seconds that `import lgmd_gym` adds to the interpreter's start."""
+    """Return the median time that `import lgmd_gym` adds to the start of the interpreter [s]."""
 
     def timed(code):
         start = time.perf_counter()
@@ -114,7 +114,7 @@ def import_seconds():
 
 
 def rows():
-    """Yield what, figure and comparison."""
+    """Yield the rows: what is measured, its median, and the comparison."""
     from support.opencv_lgmd import OpenCVLGMD
 
     for shape in ((90, 160), (288, 352)):
@@ -131,7 +131,7 @@ def rows():
         yield f"camera `{name}`, {width}×{height}, {vehicles} vehicles", f"{seconds * 1e6:.0f} µs", ""
     ours, theirs = interleaved(closed_loop("LGMD/CCRs-v0"), top_view(), repeats=60)
     what = "closed loop, 2 vehicles, 160×90, physics 60 Hz"
-    yield what, f"{1 / ours:,.0f} frames/s", f"{theirs / ours:.1f}× highway-env with its own grey top view"
+    yield what, f"{1 / ours:,.0f} frames/s", f"{theirs / ours:.1f}× highway-env with its grey top view"
     (seconds,) = interleaved(many(64), rounds=9, repeats=4)
     yield "64 environments in one process", f"{64 / seconds:,.0f} frames/s", "neurons batched, two threads"
     yield "`import lgmd_gym`", f"{import_seconds():.2f} s", ""
