@@ -10,7 +10,7 @@ import numpy as np
 import lgmd_gym  # noqa: F401  (registers the environments)
 from lgmd_gym import LGMD, LGMDParams
 from lgmd_gym.paper.stimuli import Grating, Looming, Receding, Screen, Translating, frames
-from lgmd_gym.plotting import figures as plots
+from lgmd_gym.plotting import figures, style
 
 SCREEN = Screen()
 SECONDS = 4.0
@@ -40,13 +40,13 @@ def layers(path: Path) -> None:
         observation, *_, info = env.step([0.0])
     frame = observation["frame"][:, :, 0]
     neuron.step(frame)
-    plots.layers(path, neuron, frame)
+    figures.layers_figure(path, neuron, frame)
 
 
 def answers(path: Path) -> None:
     """Draw what the neuron says to four stimuli."""
-    plt = plots._pyplot()
-    with plt.rc_context(plots.STYLE):
+    plt = style.load_pyplot()
+    with plt.rc_context(style.STYLE):
         figure, axes = plt.subplots(
             2, 4, figsize=(10.0, 4.2), sharex=True, sharey="row", layout="constrained"
         )
@@ -54,8 +54,8 @@ def answers(path: Path) -> None:
             neuron = LGMD(SCREEN.shape, fps=SCREEN.fps)
             said = [neuron.step(frame) for frame in frames(SCREEN, SECONDS, **scene)]
             time = np.arange(len(said)) / SCREEN.fps
-            column[0].plot(time, [answer.membrane_potential for answer in said], color=plots.COLOURS[2])
-            column[1].plot(time, [answer.spike_frequency for answer in said], color=plots.COLOURS[1])
+            column[0].plot(time, [answer.membrane_potential for answer in said], color=style.COLOURS[2])
+            column[1].plot(time, [answer.spike_frequency for answer in said], color=style.COLOURS[1])
             column[1].axhline(neuron.params.t_sf, color="0.5", linestyle="--", linewidth=1.0)
             column[0].set_title(name)
             column[1].set_xlabel("time [s]")
@@ -67,16 +67,16 @@ def answers(path: Path) -> None:
 
 def adaptation(path: Path) -> None:
     """Draw what the adaptive inhibition does to a fast grating, with and without it."""
-    plt = plots._pyplot()
+    plt = style.load_pyplot()
     scene = {"background": Grating()}
     models = {"w adapts (the paper)": LGMDParams(), "w fixed at σ1": LGMDParams(t_f=math.inf)}
-    with plt.rc_context(plots.STYLE):
+    with plt.rc_context(style.STYLE):
         figure, axes = plt.subplots(1, 2, figsize=(8.0, 2.8), layout="constrained")
         for index, (name, params) in enumerate(models.items()):
             neuron = LGMD(SCREEN.shape, fps=SCREEN.fps, params=params)
             said = [neuron.step(frame) for frame in frames(SCREEN, 2.0, **scene)]
             time = np.arange(len(said)) / SCREEN.fps
-            look = {"color": plots.COLOURS[2 - index], "label": name, "linestyle": ("-", "--")[index]}
+            look = {"color": style.COLOURS[2 - index], "label": name, "linestyle": ("-", "--")[index]}
             axes[0].plot(time, [answer.inhibition_weight for answer in said], **look)
             axes[1].plot(time, [answer.membrane_potential for answer in said], **look)
         axes[0].set_ylabel("inhibition weight w")
@@ -106,16 +106,16 @@ ARROWS = (("L", "P"), ("P", "ON"), ("P", "OFF"), ("ON", "S"), ("OFF", "S"), ("S"
 
 def diagram(path: Path) -> None:
     """Draw what feeds what."""
-    plt = plots._pyplot()
+    plt = style.load_pyplot()
     figure, axis = plt.subplots(figsize=(10.0, 3.2), layout="constrained")
     axis.set(xlim=(-0.7, 12.0), ylim=(-1.4, 2.2))
     axis.axis("off")
     for x, y, words in BOXES.values():
-        shape = {"boxstyle": "round,pad=0.35", "facecolor": "#eef4f9", "edgecolor": plots.COLOURS[2]}
+        shape = {"boxstyle": "round,pad=0.35", "facecolor": "#eef4f9", "edgecolor": style.COLOURS[2]}
         axis.text(x, y, words, ha="center", va="center", fontsize=9, bbox=shape, zorder=3)
     for start, end in ARROWS:
         dashed = start == "F"
-        look = {"arrowstyle": "-|>", "color": plots.COLOURS[1] if dashed else "0.35"}
+        look = {"arrowstyle": "-|>", "color": style.COLOURS[1] if dashed else "0.35"}
         look |= {
             "linestyle": "--" if dashed else "-",
             "shrinkA": 24,

@@ -19,7 +19,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 import lgmd_gym  # noqa: F401  (registers the environments)
 from lgmd_gym.benchmark.metrics import NUISANCE
-from lgmd_gym.plotting.figures import COLOURS
+from lgmd_gym.plotting.style import COLOURS
 
 ENV = "LGMD/RandomBraking-v0"
 

@@ -22,7 +22,7 @@ from lgmd_gym.paper.experiments import (
     line_fit,
 )
 from lgmd_gym.paper.stimuli import SIZES, Grating, Screen, frames
-from lgmd_gym.plotting.figures import COLOURS, STYLE, _pyplot
+from lgmd_gym.plotting.style import COLOURS, STYLE, load_pyplot
 
 LEVEL = 30.0
 LOOKS = dict(zip(MODELS, (COLOURS[0], COLOURS[1], COLOURS[2]), strict=True))
@@ -30,7 +30,7 @@ LOOKS = dict(zip(MODELS, (COLOURS[0], COLOURS[1], COLOURS[2]), strict=True))
 
 def paper_figures(found: Findings, folder: Path) -> list[Path]:
     """Draw every figure into a folder and return their paths."""
-    plt = _pyplot()
+    plt = load_pyplot()
     drawn = []
     draws = {
         "1-gratings": _gratings,

@@ -1,1 +1,1 @@
-"""The matplotlib style and the figures that several packages share."""
+"""Figures in one matplotlib style; matplotlib is imported on first use."""

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.plotting.figures import COLOURS, STYLE, _pyplot
+from lgmd_gym.plotting.style import COLOURS, STYLE, load_pyplot
 from lgmd_gym.video.clips.playback import Choice
 from lgmd_gym.video.clips.summary import BINS, Summary
 
@@ -22,7 +22,7 @@ def clip_figure(path: Path, title: str, summary: Summary, choice: Choice, crash_
         choice: How it was watched.
         crash_s: Time of the crash, drawn as a line [s]; None for none.
     """
-    plt = _pyplot()
+    plt = load_pyplot()
     with plt.rc_context(STYLE):
         figure = plt.figure(figsize=(9.0, 8.6), layout="constrained")
         figure.suptitle(f"{title}   ({choice.describe(summary.fps)})", fontsize=10)

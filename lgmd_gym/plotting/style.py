@@ -1,0 +1,65 @@
+"""The matplotlib style of all figures, and the context manager that creates and saves one."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+# Palette of Okabe and Ito, which colour-blind readers can distinguish; darkest first.
+COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+STYLE = {
+    "axes.grid": True,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "figure.dpi": 110,
+    "font.size": 9,
+    "grid.alpha": 0.3,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+}
+
+FigureFile = Path | BinaryIO  # the suffix of a path sets the format; an open file receives SVG
+
+
+def load_pyplot() -> Any:
+    """Import and return `matplotlib.pyplot` with the Agg backend, which needs no display."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot
+
+    return pyplot
+
+
+@contextmanager
+def saved_figure(
+    file: FigureFile,
+    rows: int,
+    columns: int,
+    *,
+    grid: bool = True,
+    save_options: dict[str, Any] | None = None,
+    **subplot_options: Any,
+) -> Iterator[tuple[Any, Any]]:
+    """Create a figure with subplots, and save and close it at the end of the block.
+
+    Args:
+        file: Destination.
+        rows: Number of rows of subplots.
+        columns: Number of columns of subplots.
+        grid: Whether the axes have grid lines.
+        save_options: Further arguments of `Figure.savefig`.
+        **subplot_options: Further arguments of `pyplot.subplots`.
+
+    Yields:
+        The figure, and its axes as returned by `pyplot.subplots`.
+    """
+    plt = load_pyplot()
+    file_format = (file.suffix.lstrip(".") or "png") if isinstance(file, Path) else "svg"
+    with plt.rc_context(STYLE | {"axes.grid": grid}):
+        figure, axes = plt.subplots(rows, columns, layout="constrained", **subplot_options)
+        try:
+            yield figure, axes
+            figure.savefig(file, format=file_format, **(save_options or {}))
+        finally:
+            plt.close(figure)
