@@ -1,70 +1,77 @@
-"""Agents that brake for good, compared on drives that are recorded once: one eye, the same drives for all.
+"""Compare agents with a latching brake on episodes that are recorded once.
 
     python docs/examples/on_record.py 600 stopping-zone policy:zones
 
-The number is that of levels, drawn from the split `test` of `LGMD/RandomBraking-v0`; nobody learns from them.
-The first agent's eye sees them, without braking; all others must have the same. Then each agent is asked on
-the record when it brakes, and what that leads to is on record, too. Agents joined by "+", such as several
-trainings, count as one: their mean. Printed are the mean return with its interval (95 %, drives drawn with
-replacement), what it is less the first one's on the same drives, and the shares of threats avoided and of
-quiet drives with false braking.
+The number is the number of levels, drawn from the split `test` of `LGMD/RandomBraking-v0`, which no training
+uses. They are recorded without braking through the cameras of the first agent; all agents must have the same
+cameras. An agent's first braking decision on the recorded observations and the recorded outcome of braking
+there give its result. Agents joined by "+", for example several trainings, are averaged. The columns are the
+mean return with its 95 % bootstrap interval, its difference from the first arm on the same episodes, and the
+shares of threats avoided and of non-threats with false activations.
 """
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.training.config import Order
-from lgmd_gym.training.offline.episodes import Drive, record
+from lgmd_gym.training import TrainConfig
+from lgmd_gym.training.offline.episodes import EpisodeRecorder, RecordedEpisode
 
-DRAWS = 2000
-
-
-def recorded(agent: str, count: int, jobs: int = 2) -> list[Drive]:
-    """Return drives on levels of the test split through an agent's own eye."""
-    plan = Order("recorded", eye=agent, inputs=("ego_speed",)).plan()
-    return record(plan, "test", range(count), jobs, lambda done: None)
+RESAMPLES = 2000
 
 
-def braked(agent: str, drives: list[Drive]) -> np.ndarray:
-    """Return, for each drive, its return, whether it ended in a contact, and whether the agent braked."""
-    made, told = make_agent(agent), []
-    for drive in drives:
+def record(agent: str, count: int, jobs: int = 2) -> list[RecordedEpisode]:
+    """Return episodes on levels of the test split, recorded through an agent's cameras."""
+    config = TrainConfig.from_hyperparams("offline", sensors_of=agent, inputs=("ego_speed",))
+    recorder = EpisodeRecorder(partial(config.make_env, "test"), hold=0, brake=1)
+    return recorder.record(range(count), jobs)
+
+
+def evaluate(agent: str, episodes: list[RecordedEpisode]) -> np.ndarray:
+    """Return for each episode its return, whether it ends in a contact, and whether the agent brakes."""
+    made, results = make_agent(agent), []
+    for episode in episodes:
         made.reset(0)
-        moments = ({name: array[k] for name, array in drive.seen.items()} for k in range(len(drive)))
-        onset = next((k for k, moment in enumerate(moments) if made.act(moment, {})[0] < 0.0), None)
+        onset = None
+        for decision in range(len(episode)):
+            observation = {name: array[decision] for name, array in episode.observations.items()}
+            if made.act(observation, {})[0] < 0.0:
+                onset = decision
+                break
         if onset is None:
-            told.append((drive.rewards.sum(), drive.threat, False))
+            results.append((episode.rewards.sum(), episode.threat, False))
         else:
-            held = drive.rewards[:onset].sum()
-            told.append((held + drive.returns[onset], drive.contacts[onset], True))
-    return np.array(told, dtype=float)
+            total = episode.rewards[:onset].sum() + episode.braking_returns[onset]
+            results.append((total, episode.braking_contacts[onset], True))
+    return np.array(results, dtype=float)
 
 
 def interval(values: np.ndarray) -> str:
-    """Return the mean with its bootstrapped 95 % interval."""
+    """Return the mean with its 95 % bootstrap interval."""
     rng = np.random.default_rng(0)
-    means = values[rng.integers(len(values), size=(DRAWS, len(values)))].mean(axis=1)
+    means = values[rng.integers(len(values), size=(RESAMPLES, len(values)))].mean(axis=1)
     low, high = np.percentile(means, (2.5, 97.5))
     return f"{values.mean():+.2f} [{low:+.2f}, {high:+.2f}]"
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Record, ask, and print."""
+    """Record the episodes, evaluate every arm and print one line per arm."""
     count, arms = int(arguments[0]), arguments[1:]
-    drives = recorded(arms[0].split("+")[0], count)
-    threats = np.array([drive.threat for drive in drives])
+    episodes = record(arms[0].split("+")[0], count)
+    threats = np.array([episode.threat for episode in episodes])
     print(f"{count} levels of the test split, {threats.sum()} threats")
-    print("return               less the first       avoided  false  arm")
-    first = None
+    print("return               difference           avoided  false  arm")
+    reference = None
     for arm in arms:
-        told = np.mean([braked(agent, drives) for agent in arm.split("+")], axis=0)
-        first = told[:, 0] if first is None else first
-        less = interval(told[:, 0] - first)
-        avoided, false = 1.0 - told[threats, 1].mean(), told[~threats, 2].mean()
-        print(f"{interval(told[:, 0])}  {less}  {avoided:6.1%}  {false:5.1%}  {arm}", flush=True)
+        results = np.mean([evaluate(agent, episodes) for agent in arm.split("+")], axis=0)
+        returns = results[:, 0]
+        reference = returns if reference is None else reference
+        avoided, false = 1.0 - results[threats, 1].mean(), results[~threats, 2].mean()
+        difference = interval(returns - reference)
+        print(f"{interval(returns)}  {difference}  {avoided:6.1%}  {false:5.1%}  {arm}", flush=True)
 
 
 if __name__ == "__main__":

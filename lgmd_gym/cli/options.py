@@ -173,47 +173,49 @@ class Paper:
 
 @dataclass(frozen=True, kw_only=True)
 class Train:
-    """Train a policy with stable-baselines3; it then brakes as --agents policy:FOLDER/policy.zip.
+    """Train a policy with stable-baselines3; run it with --agents policy:FOLDER/policy.zip.
 
-    The folder gets TensorBoard logs, checkpoints, what the looks at the validation split said, and the
-    policy that did best there. Ctrl-C keeps the checkpoints; --resume goes on from the last one.
+    The folder contains TensorBoard logs, checkpoints, the evaluations on the validation split and the policy
+    that did best in them. Ctrl-C keeps the checkpoints; --resume continues from the last one.
     """
 
     algo: str = "sac"
-    """sac, ppo or dqn; or recorded, which learns when to brake from recorded drives, in minutes."""
+    """Algorithm: sac, ppo, dqn, or offline (trained on recorded episodes in minutes)."""
     env: str = "LGMD/RandomBraking-v0"
-    """Environment id; RandomBraking is trained on its split train and judged on validation."""
-    camera: tuple[str, ...] = ()
-    """Camera presets, a neuron each; default: fovea, tele and wide."""
-    eye: str | None = None
-    """Agent whose own eye is used instead, such as stopping-zone."""
-    inputs: tuple[str, ...] = ()
-    """Observations the policy sees: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed,
-    speed_change, ego_yaw_rate; those are the default. Also frame and, with the eye of stopping-zone, zones,
-    zones_spikes, zones_ffi."""
-    demands: tuple[float, ...] | None = None
-    """Demands the policy chooses among, from -1 (full braking) to 1; empty for any. SAC takes no choice.
-    Default: 0 -0.4 -1, of recorded 0 -1."""
-    steps: int | None = None
-    """Decisions of the policy, of recorded drives; default: what the hyperparameters say."""
+    """Environment id; RandomBraking is trained on its split train and evaluated on its split validation."""
+    camera: Names = None
+    """Camera presets, one neuron each. Default: fovea tele wide."""
+    sensors_of: Name = None
+    """Agent whose cameras are used instead, for example stopping-zone."""
+    inputs: Names = None
+    """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change and
+    ego_yaw_rate; also frame, and with the cameras of stopping-zone zones, zones_spikes and zones_ffi.
+    Default: from the hyperparameters."""
+    demands: Annotated[
+        tuple[float, ...] | None, arg(metavar="[X ...]", help_behavior_hint=_default_hint)
+    ] = None
+    """Demands that the policy chooses from, from -1 (full braking) to 1; --demands alone for a continuous
+    demand. Default: 0 -0.4 -1 for ppo and dqn, continuous for sac, 0 -1 for offline."""
+    n_timesteps: Count = None
+    """Number of policy decisions, for offline of recorded episodes. Default: from the hyperparameters."""
     seed: int = 0
-    """Of the network and the levels drawn."""
-    hyperparams: Path | None = None
-    """YAML file in the format of rl-zoo; default: the package's own."""
-    eval_every: int = 20_000
-    """Decisions between two looks at the validation split; recorded looks after every pass."""
-    eval_episodes: int | None = None
-    """Episodes of a look; default: 60, of recorded 600."""
-    drives: Path | None = None
-    """Training folder of a recorded one with the same eye, whose drives are learnt from."""
-    traffic: int = 0
-    """Drives through traffic, where braking is the fault, that recorded learns from beside the levels."""
+    """Seed of the network and the environments."""
+    hyperparams: File = None
+    """YAML file in rl-zoo's format. Default: the file of this package."""
+    eval_freq: int = 20_000
+    """Number of decisions between two evaluations; offline evaluates after every epoch."""
+    eval_episodes: Count = None
+    """Number of episodes per evaluation. Default: 60, for offline 600."""
+    recordings: File = None
+    """Folder of an offline training with the same cameras whose recorded episodes are reused."""
+    traffic_episodes: int = 0
+    """Number of traffic episodes, in which braking is false, that offline trains on in addition."""
     jobs: int = 2
-    """Processes that record drives."""
-    out: Path | None = None
+    """Number of processes that record episodes."""
+    out: File = None
     """Training folder; must not exist. Default: runs/train-ALGO-DATE-TIME."""
-    resume: Path | None = None
-    """Training folder of a broken-off training, to go on with under its own settings."""
+    resume: File = None
+    """Folder of an interrupted training; continues it with its own options."""
 
 
 @dataclass(frozen=True, kw_only=True)

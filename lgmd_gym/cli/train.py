@@ -1,58 +1,59 @@
-"""What `lgmd-gym train` does with its parsed options."""
+"""The `train` command."""
 
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from lgmd_gym.cli.options import Train
+from lgmd_gym.cli.options import Train
+from lgmd_gym.training import TrainConfig, resume, train
 
 
-def train(options: "Train") -> int:
-    """Train, and say where the policy is."""
-    from lgmd_gym.agents.options import whole
-    from lgmd_gym.training.config import Order
-    from lgmd_gym.training.trainer import Training
-
+def run(options: Train) -> int:
+    """Train a policy, or resume a training, and print where the policy is."""
     _check_installed()
-    whole("jobs", options.jobs, 1)
-    if options.resume is not None:
-        training = Training.resume(options.resume)
-    else:
-        order = Order(
-            algo=options.algo,
-            env_id=options.env,
-            camera=options.camera,
-            eye=options.eye,
-            steps=options.steps,
-            seed=options.seed,
-            hyperparams=options.hyperparams,
-            inputs=options.inputs,
-            demands=options.demands,
-            eval_every=options.eval_every,
-            eval_episodes=options.eval_episodes,
-            drives=options.drives,
-            traffic=options.traffic,
-        )
-        out = options.out or Path("runs") / f"train-{options.algo}-{time.strftime('%Y%m%d-%H%M%S')}"
-        training = Training.start(order, out)
+    folder = options.resume or options.out or _default_folder(options.algo)
+    progress = sys.stderr.isatty()
     try:
-        policy = training.run(progress=sys.stderr.isatty(), jobs=options.jobs)
+        if options.resume is not None:
+            policy = resume(folder, progress=progress, jobs=options.jobs)
+        else:
+            policy = train(_config_of(options), folder, progress=progress, jobs=options.jobs)
     except KeyboardInterrupt:
-        print(f"interrupted; go on with: lgmd-gym train --resume {training.folder}", file=sys.stderr)
+        print(f"interrupted; to resume: lgmd-gym train --resume {folder}", file=sys.stderr)
         return 130
     print(f"policy: {policy}")
-    print(f"try it: lgmd-gym bench --suite random --seeds 1 --agents policy:{policy}")
+    print(f"evaluate it: lgmd-gym bench --suite random --seeds 1 --agents policy:{policy}")
     return 0
 
 
 def _check_installed() -> None:
-    """Refuse to start without the extra."""
     try:
         import stable_baselines3  # noqa: F401
         import yaml  # noqa: F401
     except ImportError as error:
         raise ValueError(
-            f'training needs the extra "train" ({error}): pip install "lgmd-gym[train]"'
+            f'training requires the extra "train" ({error}): pip install "lgmd-gym[train]"'
         ) from None
+
+
+def _config_of(options: Train) -> TrainConfig:
+    cameras = list(options.camera or ())
+    return TrainConfig.from_hyperparams(
+        options.algo,
+        options.env,
+        options.hyperparams,
+        inputs=options.inputs or (),
+        sensors_of=options.sensors_of,
+        camera=(cameras if len(cameras) > 1 else cameras[0]) if cameras else None,
+        demands=options.demands,
+        n_timesteps=options.n_timesteps,
+        seed=options.seed,
+        eval_freq=options.eval_freq,
+        eval_episodes=options.eval_episodes,
+        recordings=None if options.recordings is None else str(options.recordings),
+        traffic_episodes=options.traffic_episodes,
+    )
+
+
+def _default_folder(algo: str) -> Path:
+    return Path("runs") / f"train-{algo}-{time.strftime('%Y%m%d-%H%M%S')}"

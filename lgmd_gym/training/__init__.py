@@ -1,5 +1,7 @@
-"""Policies that learn with stable-baselines3: what they see, how they are trained, how good they are."""
+"""Training of policies with stable-baselines3 or offline on recorded episodes."""
 
-from lgmd_gym.training.policy_wrapper import PolicyView
+from lgmd_gym.training.config import TrainConfig
+from lgmd_gym.training.policy_wrapper import PolicyWrapper
+from lgmd_gym.training.trainer import resume, train
 
-__all__ = ["PolicyView"]
+__all__ = ["PolicyWrapper", "TrainConfig", "resume", "train"]

@@ -1,7 +1,7 @@
-"""What is to be trained: a user's order, and the plan that it comes to with everything filled in."""
+"""`TrainConfig`: the options of a training, from the command line, a YAML file or Python."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -10,186 +10,172 @@ import gymnasium as gym
 from lgmd_gym.agents import HOLD, make_agent
 from lgmd_gym.agents.options import whole
 from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
+from lgmd_gym.camera import CameraSpec
 from lgmd_gym.envs.dynamics.units import check_within
-from lgmd_gym.training.hyperparameters import RECORDED, read_settings
-from lgmd_gym.training.offline.hyperparameters import Recipe
-from lgmd_gym.training.policy_wrapper import PolicyView
+from lgmd_gym.errors import check_keys, unknown_name
+from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
+from lgmd_gym.training.policy_wrapper import PolicyWrapper
 
 RANDOM_ID = "LGMD/RandomBraking-v0"
-DEMANDS = (0.0, -0.4, -1.0)
 CAMERAS = ("fovea", "tele", "wide")
-SEEDS_APART = 1_000_000  # between what neighbouring trainings reset their environments with
-JUDGED = 10_000  # from which the validation split is reset for a look
+SEED_STRIDE = 1_000_000  # distance of the environment seeds of neighbouring training seeds
+VALIDATION_SEED = 10_000  # first environment seed of an evaluation
+DEMANDS = {"ppo": (0.0, -0.4, -1.0), "dqn": (0.0, -0.4, -1.0), "sac": (), OFFLINE: (0.0, -1.0)}
 
 
-@dataclass(frozen=True)
-class Plan:
-    """A training with nothing left open: plain values, as in a training's folder and a policy's card.
+@dataclass(frozen=True, kw_only=True)
+class TrainConfig:
+    """Options of a training, as plain values apart from `features`.
+
+    `from_hyperparams` fills in the hyperparameters of an algorithm; the constructor reads no file.
 
     Attributes:
-        algo: "ppo", "sac", "dqn" or "recorded".
-        env_id: The environment; those of a split are trained on "train" and judged on "validation".
+        algo: "ppo", "sac", "dqn" or "offline".
+        env_id: Environment id. `LGMD/RandomBraking-v0` is trained on its split "train" and evaluated on its
+            split "validation".
         env_kwargs: Further arguments of `gym.make`.
-        camera: See `LGMDObservation`.
-        demands: Demands the policy chooses among; none for any.
-        features: Arguments of `PolicyView`.
-        n_envs: Environments side by side.
-        n_timesteps: Decisions of the policy, over all environments; of "recorded", drives.
+        camera: Camera or cameras, see `LGMDObservation`.
+        demands: Demands that the policy chooses from, in [-1, 1]; empty for a continuous demand.
+        features: Inputs and timing of the policy.
+        n_envs: Number of environments stepped in parallel.
+        n_timesteps: Number of policy decisions over all environments; for "offline" number of recorded
+            episodes.
         policy: stable-baselines3's name of the network.
-        model: Further arguments of the algorithm, as in the YAML file; of "recorded", of `Recipe`.
-        seed: Of the network and the environments.
-        eval_every: Decisions between two looks at the validation split; "recorded" looks after every pass.
-        eval_episodes: Episodes of a look.
-        drives: Folder of a training of "recorded" whose drives are learnt from; None to record them.
-        traffic: Drives through traffic that "recorded" learns from beside the levels; for the looks, a
-            quarter as many.
+        algo_kwargs: Further arguments of the algorithm, as in the YAML file.
+        seed: Seed of the network and the environments.
+        eval_freq: Number of decisions between two evaluations; "offline" evaluates after every epoch.
+        eval_episodes: Number of episodes per evaluation.
+        recordings: Folder of an offline training whose recorded episodes are reused; None to record new ones.
+        traffic_episodes: Number of traffic episodes that "offline" trains on in addition; a quarter as many
+            are added to its evaluations.
+
+    Raises:
+        ValueError: If a value is invalid or does not fit the algorithm.
     """
 
     algo: str
-    env_id: str
-    env_kwargs: dict[str, Any]
-    camera: Any
-    demands: list[float]
-    features: dict[str, Any]
-    n_envs: int
-    n_timesteps: int
-    policy: str
-    model: dict[str, Any]
-    seed: int
-    eval_every: int
-    eval_episodes: int
-    drives: str | None = None
-    traffic: int = 0
+    env_id: str = RANDOM_ID
+    env_kwargs: dict[str, Any] = field(default_factory=dict)
+    camera: CameraSpec = CAMERAS
+    demands: Sequence[float] = ()
+    features: FeatureConfig = field(default_factory=FeatureConfig)
+    n_envs: int = 1
+    n_timesteps: int = 100_000
+    policy: str = "MultiInputPolicy"
+    algo_kwargs: dict[str, Any] = field(default_factory=dict)
+    seed: int = 0
+    eval_freq: int = 20_000
+    eval_episodes: int = 60
+    recordings: str | None = None
+    traffic_episodes: int = 0
+
+    def __post_init__(self) -> None:
+        if self.algo not in ALGORITHMS:
+            raise unknown_name("algorithm", self.algo, ALGORITHMS)
+        for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes"):
+            whole(name, getattr(self, name), 1)
+        whole("traffic_episodes", self.traffic_episodes, 0)
+        for demand in self.demands:
+            check_within("demands", demand, -1.0, 1.0)
+        if self.algo == "dqn" and not self.demands:
+            raise ValueError("dqn requires discrete demands; use for example --demands 0 -1")
+        if self.algo == "sac" and self.demands:
+            raise ValueError(f"sac requires a continuous demand, got demands {list(self.demands)}; omit them")
+        if self.algo == OFFLINE:
+            self._check_offline()
+        elif self.recordings is not None or self.traffic_episodes:
+            name = "traffic_episodes" if self.traffic_episodes else "recordings"
+            raise ValueError(f"{name} requires algo 'offline', got {self.algo!r}; omit it")
+
+    def _check_offline(self) -> None:
+        if sorted(self.demands)[1:] != [HOLD] or min(self.demands) > LATCH_DEMAND:
+            raise ValueError(
+                f"demands of algo 'offline' must be 0 and one of {LATCH_DEMAND} or less, "
+                f"got {list(self.demands)}; use for example --demands 0 -1"
+            )
+        if not self.features.latch:
+            raise ValueError("algo 'offline' requires latch: true in its hyperparameters")
+        if "speed_change" in self.features.inputs:
+            # A policy with this input braked in traffic whenever the driver accelerated.
+            raise ValueError(
+                "algo 'offline' does not support the input 'speed_change': the ego never accelerates in "
+                "recorded levels; remove it from the inputs"
+            )
+
+    @classmethod
+    def from_hyperparams(
+        cls,
+        algo: str = "sac",
+        env_id: str = RANDOM_ID,
+        file: Path | None = None,
+        *,
+        inputs: Sequence[str] = (),
+        sensors_of: str | None = None,
+        **options: Any,
+    ) -> "TrainConfig":
+        """Return the configuration that a hyperparameter file gives for an environment.
+
+        Args:
+            algo: "ppo", "sac", "dqn" or "offline".
+            env_id: Environment id; the entry `default` is used for an id without an entry.
+            file: YAML file in rl-zoo's format; None for the file of this package.
+            inputs: Inputs of the policy in place of those in the file.
+            sensors_of: Name of an agent whose cameras are used, such as "stopping-zone".
+            **options: Attributes of `TrainConfig` that replace those in the file; None keeps the default.
+
+        Raises:
+            ValueError: For unknown names, invalid values, or a file that cannot be read.
+        """
+        check_keys("training option", options, (item.name for item in fields(cls)))
+        given = {name: value for name, value in options.items() if value is not None}
+        if sensors_of is not None:
+            if "camera" in given:
+                raise ValueError(f"use either camera or sensors_of, got {given['camera']} and {sensors_of!r}")
+            given["camera"] = _cameras_of(sensors_of)
+        values = read_hyperparams(algo, env_id, file)
+        if inputs:
+            values["features"] |= {"inputs": inputs}
+        values["features"] = FeatureConfig.from_dict(values["features"])
+        defaults = {"demands": DEMANDS[algo], "eval_episodes": 600 if algo == OFFLINE else 60}
+        return cls(**{**defaults, **values, "algo": algo, "env_id": env_id, **given})
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> "TrainConfig":
+        """Return the configuration that `to_dict` returned; unknown keys raise ValueError."""
+        check_keys("training option", values, (item.name for item in fields(cls)))
+        return cls(**{**values, "features": FeatureConfig.from_dict(values.get("features", {}))})
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values."""
-        return asdict(self)
+        return asdict(self) | {"features": self.features.to_dict()}
 
-    def make_env(self, split: str) -> PolicyView:
-        """Return one environment as the policy sees it, of a split if it has splits."""
-        # Looks are told in the environment's own returns.
-        features = self.features if split == "train" else {**self.features, "reward_scale": 1.0}
-        return PolicyView(self.make_plain(split), **features)
+    def make_env(self, split: str, camera: CameraSpec | None = None) -> gym.Env:
+        """Return an environment with `LGMDObservation`.
 
-    def make_plain(self, split: str) -> gym.Env:
-        """Return one environment inside `LGMDObservation`, of a split if it has splits."""
+        Args:
+            split: "train", "validation" or "test"; ignored by environments without splits.
+            camera: Cameras in place of the configured ones.
+        """
         arguments = dict(self.env_kwargs)
         if self.env_id == RANDOM_ID:
             arguments.setdefault("split", split)
         if self.demands:
-            levels = {"type": "DiscreteDemand", "levels": self.demands}
-            arguments["config"] = {**(arguments.get("config") or {}), "action": levels}
-        if FRAME in self.features["inputs"]:
+            action = {"type": "DiscreteDemand", "levels": list(self.demands)}
+            arguments["config"] = {**(arguments.get("config") or {}), "action": action}
+        if FRAME in self.features.inputs:
             arguments["include_frame"] = True
-        return gym.make(self.env_id, camera=self.camera, **arguments)
+        return gym.make(self.env_id, camera=camera or self.camera, **arguments)
+
+    def make_policy_env(self, split: str) -> PolicyWrapper:
+        """Return an environment with the policy's observations; rewards are scaled on "train" only."""
+        features = self.features.to_dict()
+        if split != "train":
+            features["reward_scale"] = 1.0
+        return PolicyWrapper(self.make_env(split), **features)
 
 
-@dataclass(frozen=True)
-class Order:
-    """What a user wants trained; what it leaves open is filled in by hyperparameters and defaults.
-
-    Attributes:
-        algo: "ppo", "sac", "dqn" or "recorded".
-        env_id: The environment; those of a split are trained on "train" and judged on "validation".
-        camera: Camera presets; empty for "fovea", "tele" and "wide".
-        eye: Name of an agent whose own eye is used, such as "stopping-zone"; None for `camera`.
-        steps: Decisions of the policy, of "recorded" drives; None for what the hyperparameters say.
-        seed: Of the network and the environments.
-        hyperparams: YAML file in rl-zoo's format; None for the package's.
-        inputs: What the policy sees, see `FeatureConfig`; empty for what the hyperparameters say.
-        demands: Demands the policy chooses among, in [-1, 1]; empty for any, which DQN cannot; None for 0,
-            -0.4 and -1, of "recorded" 0 and -1.
-        eval_every: Decisions between two looks at the validation split; "recorded" looks after every pass.
-        eval_episodes: Episodes of a look; None for 60, of "recorded" 600.
-        drives: Folder of a training of "recorded" whose drives are learnt from; None to record them.
-        traffic: Drives through traffic that "recorded" learns from beside the levels.
-        env_kwargs: Further arguments of `gym.make`.
-    """
-
-    algo: str = "sac"
-    env_id: str = RANDOM_ID
-    camera: Sequence[str] = ()
-    eye: str | None = None
-    steps: int | None = None
-    seed: int = 0
-    hyperparams: Path | None = None
-    inputs: Sequence[str] = ()
-    demands: Sequence[float] | None = None
-    eval_every: int = 20_000
-    eval_episodes: int | None = None
-    drives: Path | None = None
-    traffic: int = 0
-    env_kwargs: dict[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        recorded = self.algo == RECORDED
-        if self.demands is None:
-            object.__setattr__(self, "demands", (0.0, -1.0) if recorded else DEMANDS)
-        if self.algo == "dqn" and not self.demands:
-            raise ValueError("dqn chooses among demands: give some, as --demands 0 -1")
-        for name in ("steps", "eval_every", "eval_episodes"):
-            if getattr(self, name) is not None:
-                whole(name, getattr(self, name), 1)
-        for demand in self.demands or ():
-            check_within("demands", demand, -1.0, 1.0)
-        if recorded and (sorted(self.demands or ())[1:] != [HOLD] or min(self.demands or ()) > LATCH_DEMAND):
-            raise ValueError(
-                f"recorded learns when to brake: demands must be 0 and {LATCH_DEMAND} or less, as 0 -1"
-            )
-        if self.drives is not None and not recorded:
-            raise ValueError(f"drives are what algo 'recorded' learns from; {self.algo} drives itself")
-        whole("traffic", self.traffic, 0)
-        if self.traffic and not recorded:
-            raise ValueError(f"only algo 'recorded' learns from traffic; leave it out with {self.algo!r}")
-        if self.eye is not None and self.camera:
-            raise ValueError(f"give either camera or eye, got {list(self.camera)} and {self.eye!r}")
-
-    def plan(self) -> Plan:
-        """Return the order with everything filled in.
-
-        Raises:
-            ValueError: For unknown names, unreadable hyperparameters, or an agent without an eye of its own.
-        """
-        settings = read_settings(self.algo, self.env_id, self.hyperparams)
-        wished = {"inputs": list(self.inputs)} if self.inputs else {}
-        features = FeatureConfig.from_dict(settings.features | wished)
-        if self.algo == RECORDED:
-            Recipe.from_dict(settings.model)
-            _check_recordable(features)
-        return Plan(
-            algo=self.algo,
-            env_id=self.env_id,
-            env_kwargs=dict(self.env_kwargs),
-            camera=self._lenses(),
-            demands=[] if self.algo == "sac" else list(self.demands or ()),  # SAC knows no choice
-            features=features.to_dict(),
-            n_envs=settings.n_envs,
-            n_timesteps=settings.n_timesteps if self.steps is None else self.steps,
-            policy=settings.policy,
-            model=settings.model,
-            seed=self.seed,
-            eval_every=self.eval_every,
-            eval_episodes=self.eval_episodes or (600 if self.algo == RECORDED else 60),
-            drives=None if self.drives is None else str(self.drives),
-            traffic=self.traffic,
-        )
-
-    def _lenses(self) -> Any:
-        if self.eye is None:
-            lenses = list(self.camera or CAMERAS)
-            return lenses if len(lenses) > 1 else lenses[0]
-        camera = make_agent(self.eye).camera
-        if camera is None:
-            raise ValueError(f"agent {self.eye!r} has no eye of its own; use camera, or eye 'stopping-zone'")
-        return camera
-
-
-def _check_recordable(features: FeatureConfig) -> None:
-    if not features.latch:
-        raise ValueError("recorded learns when to brake: its hyperparameters need latch: true")
-    if "speed_change" in features.inputs:
-        # A policy that had it braked in traffic whenever the driver sped up.
-        raise ValueError(
-            "nobody speeds up on recorded levels, so that 'speed_change' teaches little and misleads "
-            "wherever somebody does; leave it out of the inputs"
-        )
+def _cameras_of(agent: str) -> CameraSpec:
+    camera = make_agent(agent).camera
+    if camera is None:
+        raise ValueError(f"agent {agent!r} has no cameras of its own; use camera, or 'stopping-zone'")
+    return camera

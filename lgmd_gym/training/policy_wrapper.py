@@ -1,4 +1,4 @@
-"""`PolicyView`: an environment as a policy sees it, scaled, with memory, at the policy's own pace."""
+"""`PolicyWrapper`: the inputs, history and decision rate of a policy as a Gymnasium wrapper."""
 
 from typing import Any
 
@@ -10,34 +10,38 @@ from gymnasium.utils import RecordConstructorArgs
 from lgmd_gym.agents.policies.features import FeatureConfig, FeatureHistory, source_observation
 
 
-class PolicyView(gym.Wrapper, RecordConstructorArgs):
-    """Shows a policy what `features` say, and holds each of its actions for `repeat` decisions.
+class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
+    """Turns observations into policy inputs and repeats each action for `repeat` environment steps.
 
-    Observations become a `Dict` of float32 vectors in [-5, 5], oldest first, and frames uint8 with the
-    history in their channels; rewards of the decisions held are summed and scaled. As a plain wrapper with
-    keyword arguments it has the form of rl-zoo's `env_wrapper`.
+    The observation is a `Dict` of float32 vectors in [-5, 5], oldest values first, and of uint8 frames with
+    the history in their channels. The rewards of the repeated steps are summed and scaled. With `latch`, the
+    first hard braking is repeated until the episode ends, and the step terminates. The wrapper can be named
+    in rl-zoo's `env_wrapper`.
 
     Args:
-        env: An environment inside `LGMDObservation`, with `include_frame` if frames are wanted.
+        env: Environment with `LGMDObservation`; `include_frame` is required for the input `frame`.
         **features: Fields of `lgmd_gym.agents.policies.features.FeatureConfig`.
 
     Raises:
-        ValueError: For an unknown field or input, or one that the observation lacks.
+        ValueError: For an unknown field or input, or an input that is not in the observation.
     """
 
     def __init__(self, env: gym.Env, **features: Any) -> None:
         RecordConstructorArgs.__init__(self, **features)
         gym.Wrapper.__init__(self, env)
         self.features = FeatureConfig.from_dict(features)
-        self._memory = FeatureHistory(self.features)
-        given = env.observation_space
-        if not isinstance(given, spaces.Dict):
-            raise ValueError(f"PolicyView needs the Dict observation of LGMDObservation, got {given}")
-        shapes = {name: space.shape or () for name, space in given.spaces.items()}
+        self._history = FeatureHistory(self.features)
+        observation_space = env.observation_space
+        if not isinstance(observation_space, spaces.Dict):
+            raise ValueError(
+                f"PolicyWrapper requires the Dict observation of LGMDObservation, got {observation_space}"
+            )
+        shapes = {name: space.shape or () for name, space in observation_space.spaces.items()}
         for name in self.features.inputs:
             if source_observation(name) not in shapes:
                 raise ValueError(
-                    f"the policy input {name!r} is not observed; make it with include_{name}=True"
+                    f"policy input {name!r} is not in the observation; "
+                    f"make the environment with include_{name}=True"
                 )
         self.observation_space = spaces.Dict(
             {
@@ -49,32 +53,30 @@ class PolicyView(gym.Wrapper, RecordConstructorArgs):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Reset the environment; the first observation fills the history."""
+        """Reset the environment and fill the history with the first observation."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._memory.reset()
-        self._memory.update(observation)
-        return self._memory.stack(), info
+        self._history.reset()
+        self._history.update(observation)
+        return self._history.stack(), info
 
     def step(self, action: Any) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
-        """Hold an action for `repeat` decisions, or to the episode's end if it latches."""
-        features, total, held = self.features, 0.0, 0
-        latched = features.latches(self._demand(action))
-        if latched:
-            self.env.set_wrapper_attr(
-                "rendering_paused", True
-            )  # nothing depends on what is seen from here on
+        """Repeat an action for `repeat` steps, or until the episode ends if it latches."""
+        reward_sum, steps = 0.0, 0
+        latched = self.features.latches(self._demand(action))
+        if latched:  # no later observation is used
+            self.env.set_wrapper_attr("rendering_paused", True)
         while True:
             observation, reward, terminated, truncated, info = self.env.step(action)
-            total, held = total + float(reward), held + 1
+            reward_sum, steps = reward_sum + float(reward), steps + 1
             if not latched:
-                self._memory.update(observation)
-            if terminated or truncated or (held >= features.repeat and not latched):
+                self._history.update(observation)
+            if terminated or truncated or (steps >= self.features.repeat and not latched):
                 break
-        if latched:  # the end of what can be decided, whatever ended the episode
+        if latched:  # the policy decides nothing after this, so a truncation counts as a termination
             terminated, truncated = True, False
-        return self._memory.stack(), features.reward_scale * total, terminated, truncated, info
+        return self._history.stack(), self.features.reward_scale * reward_sum, terminated, truncated, info
 
     def _demand(self, action: Any) -> float:
-        """Return the longitudinal demand that an action stands for."""
-        levels = getattr(getattr(self.env.unwrapped, "action_type", None), "levels", None)
-        return float(np.reshape(action, -1)[0]) if levels is None else levels[int(action)]
+        """Return the longitudinal demand of an action."""
+        demands = getattr(getattr(self.env.unwrapped, "action_type", None), "levels", None)
+        return float(np.reshape(action, -1)[0]) if demands is None else demands[int(action)]

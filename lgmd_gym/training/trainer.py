@@ -1,21 +1,28 @@
-"""One training in a folder: its plan, and the policy file that comes out."""
+"""`train` and `resume`: one training in a folder, from its configuration to the policy file."""
 
+import inspect
 import json
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import lgmd_gym
+from lgmd_gym.agents.options import whole
 from lgmd_gym.agents.policies.policy import write_card
-from lgmd_gym.benchmark.new_folder import new_folder
+from lgmd_gym.benchmark.folder import new_folder
 from lgmd_gym.errors import check_keys
-from lgmd_gym.training.config import Order, Plan
-from lgmd_gym.training.hyperparameters import RECORDED
-from lgmd_gym.training.offline.splits import check_drives
+from lgmd_gym.training.config import TrainConfig
+from lgmd_gym.training.hyperparams import OFFLINE
+from lgmd_gym.training.policy_wrapper import PolicyWrapper
 
-PLAN = "plan.json"
-# Of a saved model: where it logged, and the episodes it was in.
-TRAINING_ONLY = (
+if TYPE_CHECKING:
+    from stable_baselines3 import PPO
+
+    from lgmd_gym.training.offline.learner import OfflineLearner
+
+CONFIG_FILE = "config.json"
+# Attributes of a saved model that describe its training only, such as paths.
+EXCLUDED = (
     "tensorboard_log",
     "ep_info_buffer",
     "ep_success_buffer",
@@ -25,79 +32,131 @@ TRAINING_ONLY = (
 )
 
 
-class Training:
-    """One training in a folder, new or resumed.
+def train(config: TrainConfig, folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
+    """Train a policy in a new folder, as `lgmd-gym train` does.
+
+    The folder gets the configuration, logs, checkpoints or recorded episodes, and policy.zip with the model
+    that has the best mean return on the validation split.
 
     Args:
-        plan: What is trained.
-        folder: Where; made by `start`, read by `resume`.
+        config: Configuration of the training.
+        folder: Training folder; must not exist.
+        progress: Whether to show progress bars.
+        jobs: Number of processes that record episodes.
+
+    Returns:
+        Policy file.
+
+    Raises:
+        ValueError: If the configuration cannot be trained or the folder exists; nothing is written then.
     """
+    whole("jobs", jobs, 1)
+    check_config(config)
+    new_folder(folder, "training folder")
+    (folder / CONFIG_FILE).write_text(json.dumps(config.to_dict(), indent=2) + "\n", encoding="utf-8")
+    return _train(config, folder, progress, jobs)
 
-    def __init__(self, plan: Plan, folder: Path) -> None:
-        self.plan, self.folder = plan, folder
 
-    @classmethod
-    def start(cls, order: Order, folder: Path) -> "Training":
-        """Begin a new one.
+def resume(folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
+    """Resume an interrupted training from its last checkpoint, with the configuration in its folder.
 
-        Raises:
-            ValueError: For anything in the order that cannot be, or a folder that exists or cannot be made;
-                before anything is trained.
-        """
-        plan = order.plan()
-        plan.make_env("train").close()
-        check_drives(plan)
-        new_folder(folder, "training folder")
-        (folder / PLAN).write_text(json.dumps(plan.to_dict(), indent=2) + "\n", encoding="utf-8")
-        return cls(plan, folder)
+    Args and return value are those of `train`.
 
-    @classmethod
-    def resume(cls, folder: Path) -> "Training":
-        """Go on with one that was broken off, from its last checkpoint and by its own plan.
+    Raises:
+        ValueError: If the folder contains no training.
+    """
+    whole("jobs", jobs, 1)
+    try:
+        values = json.loads((folder / CONFIG_FILE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise ValueError(
+            f"{str(folder)!r} contains no training to resume (no readable {CONFIG_FILE})"
+        ) from None
+    return _train(TrainConfig.from_dict(values), folder, progress, jobs)
 
-        Raises:
-            ValueError: If the folder holds no training.
-        """
-        try:
-            plan = json.loads((folder / PLAN).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            raise ValueError(f"{str(folder)!r} holds no training to resume (no {PLAN})") from None
-        check_keys(f"key of {PLAN}", plan, Plan.__dataclass_fields__)
-        return cls(Plan(**plan), folder)
 
-    @property
-    def policy(self) -> Path:
-        """The policy file that comes out."""
-        return self.folder / "policy.zip"
+def check_config(config: TrainConfig) -> None:
+    """Check everything that can fail before training: environment, algorithm arguments, recordings.
 
-    def run(self, progress: bool = False, jobs: int = 1) -> Path:
-        """Train to the end and return the policy file: the model that did best on the validation split.
+    Raises:
+        ValueError: For the first fault found.
+    """
+    env = config.make_policy_env("train")
+    try:
+        if config.algo == OFFLINE:
+            from lgmd_gym.training.recordings import check_recordings
 
-        Args:
-            progress: Whether to show it on stderr.
-            jobs: Processes that record drives.
-        """
-        started = time.perf_counter()
-        if self.plan.algo == RECORDED:
-            from lgmd_gym.training.offline.train import learn_recorded
-
-            model, algo = learn_recorded(self.plan, self.folder, progress, jobs), "ppo"
+            _make_learner(config, env)
+            check_recordings(config)
         else:
-            from lgmd_gym.training.online import learn_online
+            from lgmd_gym.training.online import algorithm_class
 
-            model, algo = learn_online(self.plan, self.folder, progress), self.plan.algo
-        model.save(self.policy, exclude=TRAINING_ONLY)
-        write_card(self.policy, self._card(algo, time.perf_counter() - started))
-        return self.policy
+            known = inspect.signature(algorithm_class(config.algo)).parameters
+            check_keys(f"hyperparameter of {config.algo}", config.algo_kwargs, known)
+    finally:
+        env.close()
 
-    def _card(self, algo: str, wall_time: float) -> dict[str, Any]:
-        plan = self.plan
-        return {
-            "lgmd_gym": lgmd_gym.__version__,
-            "algo": algo,  # of stable-baselines3, which reads the file
-            "camera": plan.camera,
-            "features": plan.features,
-            "demands": plan.demands or None,
-            "config": {**plan.to_dict(), "drives": None},  # a path on the machine it was trained on
-            "wall_time": round(wall_time, 1),
-        }
+
+def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path:
+    start = time.perf_counter()
+    if config.algo == OFFLINE:
+        model, model_class = _train_offline(config, folder, progress, jobs), "ppo"
+    else:
+        from lgmd_gym.training.online import train_online
+
+        model, model_class = train_online(config, folder, progress), config.algo
+    path = folder / "policy.zip"
+    model.save(path, exclude=EXCLUDED)
+    write_card(path, _card(config, model_class, time.perf_counter() - start))
+    return path
+
+
+def _train_offline(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> "PPO":
+    """Record the missing episodes, train on them and write the metrics of each epoch to the folder."""
+    from stable_baselines3.common.logger import configure
+    from tqdm import tqdm
+
+    from lgmd_gym.training.offline.dataset import OfflineDataset
+    from lgmd_gym.training.recordings import load_or_record
+
+    train_data, validation_data = (
+        OfflineDataset(load_or_record(config, split, folder, progress, jobs), config.features)
+        for split in ("train", "validation")
+    )
+    env = config.make_policy_env("train")
+    learner = _make_learner(config, env)
+    env.close()
+    logger = configure(str(folder / "log"), ["csv", "tensorboard"])
+    try:
+        with tqdm(total=learner.n_epochs, desc="training", unit="epoch", disable=not progress) as bar:
+
+            def log(epoch: int, metrics: dict[str, float]) -> None:
+                for name, value in metrics.items():
+                    logger.record(name, value)
+                logger.dump(epoch)
+                bar.set_postfix({name: f"{value:.2f}" for name, value in metrics.items()})
+                bar.update()
+
+            return learner.learn(train_data, validation_data, log)
+    finally:
+        logger.close()
+
+
+def _make_learner(config: TrainConfig, env: PolicyWrapper) -> "OfflineLearner":
+    from lgmd_gym.training.offline.learner import OfflineLearner
+
+    check_keys("hyperparameter of offline", config.algo_kwargs, inspect.signature(OfflineLearner).parameters)
+    return OfflineLearner(config.policy, env, config.demands, seed=config.seed, **config.algo_kwargs)
+
+
+def _card(config: TrainConfig, model_class: str, wall_time: float) -> dict[str, Any]:
+    """Return the description of a policy that is written into its file."""
+    return {
+        "lgmd_gym": lgmd_gym.__version__,
+        "algo": model_class,  # stable-baselines3 class that reads the file
+        "camera": config.camera,
+        "features": config.features.to_dict(),
+        "demands": list(config.demands) or None,
+        "config": {**config.to_dict(), "recordings": None},  # a path on the machine of the training
+        "wall_time": round(wall_time, 1),
+    }

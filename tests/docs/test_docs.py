@@ -13,7 +13,8 @@ from joblib.externals.loky import get_reusable_executor
 from lgmd_gym.agents import AGENTS
 from lgmd_gym.benchmark.rows import KEYS
 from lgmd_gym.cli import main as cli
-from lgmd_gym.training.config import Order
+from lgmd_gym.training import TrainConfig
+from lgmd_gym.training.trainer import check_config
 from lgmd_gym.video import VideoWriter
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -65,7 +66,8 @@ def test_code_blocks_run(path, tmp_path, monkeypatch):
                 run_line(line)
         elif kind == "yaml":  # hyperparameters
             (tmp_path / "hyper.yml").write_text(block)
-            Order("recorded", hyperparams=tmp_path / "hyper.yml", inputs=("frame",)).plan()
+            file = tmp_path / "hyper.yml"
+            check_config(TrainConfig.from_hyperparams("offline", file=file, inputs=("frame",)))
     sys.modules.pop("my_agent", None)
 
 

@@ -60,8 +60,8 @@ def test_contact_sheet(tmp_path):
 def test_on_record(capsys):
     """The result on recorded episodes equals that of the closed loop."""
     example = load("on_record")
-    drives = example.recorded("stopping-zone", 4, jobs=1)
-    told = example.braked("stopping-zone", drives)
+    drives = example.record("stopping-zone", 4, jobs=1)
+    told = example.evaluate("stopping-zone", drives)
     env = gym.make("LGMD/RandomBraking-v0", split="test", camera=make_agent("stopping-zone").camera)
     for seed, (ret, contact, brakes) in enumerate(told):
         agent = make_agent("stopping-zone")
@@ -76,7 +76,7 @@ def test_on_record(capsys):
         assert ret == pytest.approx(total, abs=0.15)  # returns lie on lines between replays
         assert (bool(contact), bool(brakes)) == (info["collision"], braked)
     assert {brakes for *_, brakes in told} == {0.0, 1.0}
-    example.recorded = lambda agent, count: drives
+    example.record = lambda agent, count: drives
     example.main(["4", "stopping-zone", "no-brake+stopping-zone"])
     rule, mean = capsys.readouterr().out.splitlines()[2:]
     assert rule.endswith("stopping-zone")

@@ -1,14 +1,14 @@
-"""Trainings small enough to test, and drives that nobody drove."""
+"""Small training configurations and synthetic recorded episodes."""
 
 import numpy as np
 
-from lgmd_gym.training.config import Order
-from lgmd_gym.training.offline.episodes import Drive
+from lgmd_gym.training import TrainConfig
+from lgmd_gym.training.offline.episodes import RecordedEpisode
 
-YAML = """
+OFFLINE_YAML = """
 default:
   env_wrapper:
-    - lgmd_gym.training.PolicyView:
+    - lgmd_gym.training.PolicyWrapper:
         inputs: [spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, ego_yaw_rate]
         history: 3
         repeat: 5
@@ -21,19 +21,25 @@ default:
 """
 
 
-def order(tmp_path, **changes):
-    file = tmp_path / "hyper.yml"
-    file.write_text(YAML)
-    given = {"algo": "recorded", "camera": ("fovea",), "hyperparams": file, "eval_episodes": 4}
-    return Order(**given | changes)
+def write_yaml(folder, text=OFFLINE_YAML):
+    """Write a hyperparameter file and return its path."""
+    path = folder / "hyper.yml"
+    path.write_text(text)
+    return path
 
 
-def made_up(length=4, seed=0, threat=True, frame=False):
-    """A drive of so many decisions of the environment."""
+def offline_config(folder, env_id="LGMD/RandomBraking-v0", **options):
+    """Configuration of a small offline training; its hyperparameter file is written to the folder."""
+    options = {"camera": "fovea", "eval_episodes": 4} | options
+    return TrainConfig.from_hyperparams("offline", env_id, write_yaml(folder), **options)
+
+
+def synthetic_episode(length=4, seed=0, threat=True, traffic=False, frames=False):
+    """Random episode of `length` environment decisions; in a threat, braking late ends in a contact."""
     rng = np.random.default_rng(seed)
     names = ("ego_speed", "ego_yaw_rate", "spike_frequency")
-    seen = {name: rng.random((length, 1), dtype=np.float32) * 20 for name in names}
-    frames = rng.integers(0, 255, (length, 40, 40, 2), dtype=np.uint8) if frame else None
+    observations = {name: rng.random((length, 1), dtype=np.float32) * 20 for name in names}
+    images = rng.integers(0, 255, (length, 40, 40, 2), dtype=np.uint8) if frames else None
     contacts = np.arange(length) > length // 2 if threat else np.zeros(length, bool)
-    drawn = rng.normal(size=(2, length)).astype(np.float32)
-    return Drive(seen, frames, drawn[0], drawn[1], contacts, threat)
+    rewards, braking_returns = rng.normal(size=(2, length)).astype(np.float32)
+    return RecordedEpisode(observations, images, rewards, braking_returns, contacts, threat, traffic)

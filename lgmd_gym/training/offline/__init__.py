@@ -1,1 +1,1 @@
-"""Offline training on recorded episodes."""
+"""Offline training: recorded episodes, datasets and the learner; independent of `TrainConfig`."""

@@ -1,103 +1,103 @@
-"""Recorded drives as batches to learn from: what a policy would be shown, and what braking brings."""
+"""`OfflineDataset`: batches of recorded episodes in the form that a policy is trained on."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
 
 from lgmd_gym.agents.policies.features import FRAME, FeatureConfig, FeatureHistory
-from lgmd_gym.training.offline.episodes import Drive
+from lgmd_gym.training.offline.episodes import RecordedEpisode
 
 
-class Batch(NamedTuple):
-    """N drives of at most T decisions of the policy, of M decisions together.
+class EpisodeBatch(NamedTuple):
+    """N episodes of at most T policy decisions, M decisions in total.
 
     Attributes:
-        shown: What the policy is shown, each (M, ...), images with channels first.
-        place: Where each decision belongs: drive and decision, (M,) each.
-        rewards: Of holding the speed, (N, T); 0 beyond a drive's end, as are the next two.
-        returns: Of braking, (N, T).
-        valid: 1 where there is a decision, (N, T).
-        contacts: Whether braking ends in a contact, bool (N, T).
-        threats: Whether the drive does, bool (N,).
+        inputs: Policy inputs by name, (M, ...) each, frames with channels first.
+        indices: Episode and decision of each row of `inputs`, (M,) each.
+        rewards: Rewards of holding the speed, (N, T); this and the next three are 0 after the episode's end.
+        braking_returns: Returns of braking, (N, T).
+        braking_contacts: Whether braking ends in a contact, bool (N, T).
+        mask: 1 at the decisions of the episode, (N, T).
+        threats: Whether the episode without braking ends in a contact, bool (N,).
     """
 
-    shown: dict[str, torch.Tensor]
-    place: tuple[torch.Tensor, torch.Tensor]
+    inputs: dict[str, torch.Tensor]
+    indices: tuple[torch.Tensor, torch.Tensor]
     rewards: torch.Tensor
-    returns: torch.Tensor
-    valid: torch.Tensor
-    contacts: torch.Tensor
+    braking_returns: torch.Tensor
+    braking_contacts: torch.Tensor
+    mask: torch.Tensor
     threats: torch.Tensor
 
 
-class Lessons:
-    """Recorded drives as a policy with certain features would see them.
+class OfflineDataset:
+    """Recorded episodes with the inputs and the decision rate of a policy.
 
     Args:
-        drives: At least one.
-        features: Of the policy.
+        episodes: Recorded episodes, at least one.
+        features: Inputs and timing of the policy.
     """
 
-    def __init__(self, drives: list[Drive], features: FeatureConfig) -> None:
-        self.drives, self._features = drives, features
-        self._starts = np.cumsum([0, *(_decisions(drive, features.repeat) for drive in drives)])
-        self._shown = {}
+    def __init__(self, episodes: list[RecordedEpisode], features: FeatureConfig) -> None:
+        self.episodes, self._features = episodes, features
+        self._starts = np.cumsum([0, *map(self._count_decisions, episodes)])
+        self._inputs = {}
         if FRAME in features.inputs:
-            frames = [drive.frames[:: features.repeat] for drive in drives if drive.frames is not None]
-            self._shown[FRAME] = np.concatenate(frames)
+            frames = [item.frames[:: features.repeat] for item in episodes if item.frames is not None]
+            self._inputs[FRAME] = np.concatenate(frames)
         signals = tuple(name for name in features.inputs if name != FRAME)
         if signals:
-            # History is put together batch by batch: kept here, all would be there six times.
-            memory = FeatureHistory(replace(features, inputs=signals, history=1))
-            moments = [shown for drive in drives for shown in _relived(drive, memory)]
-            self._shown |= {name: np.stack([moment[name] for moment in moments]) for name in signals}
+            # Batches add the history. Stored here, it would multiply the memory by its length.
+            history = FeatureHistory(replace(features, inputs=signals, history=1))
+            rows = [row for episode in episodes for row in _policy_inputs(episode, history)]
+            self._inputs |= {name: np.stack([row[name] for row in rows]) for name in signals}
 
     def __len__(self) -> int:
-        return len(self.drives)
+        return len(self.episodes)
 
-    def batch(self, chosen: Any) -> Batch:
-        """Return the drives with these indices."""
+    def batch(self, indices: Sequence[int] | np.ndarray) -> EpisodeBatch:
+        """Return the episodes with these indices."""
         repeat = self._features.repeat
-        drives = [self.drives[index] for index in chosen]
-        lengths = np.array([_decisions(drive, repeat) for drive in drives])
-        rows = np.repeat(np.arange(len(drives)), lengths)
+        episodes = [self.episodes[index] for index in indices]
+        lengths = np.array([self._count_decisions(episode) for episode in episodes])
+        rows = np.repeat(np.arange(len(episodes)), lengths)
         columns = np.concatenate([np.arange(length) for length in lengths])
-        starts = self._starts[np.asarray(chosen)][rows]
-        shown = {name: self._with_history(name, columns, starts) for name in self._shown}
+        starts = self._starts[np.asarray(indices)][rows]
 
-        def laid_out(told: list[np.ndarray]) -> torch.Tensor:
-            table = np.zeros((len(drives), lengths.max()), told[0].dtype)
-            table[rows, columns] = np.concatenate(told)
+        def padded(arrays: list[np.ndarray]) -> torch.Tensor:
+            table = np.zeros((len(episodes), lengths.max()), arrays[0].dtype)
+            table[rows, columns] = np.concatenate(arrays)
             return torch.from_numpy(table)
 
-        return Batch(
-            shown,
-            place=(torch.from_numpy(rows), torch.from_numpy(columns)),
-            rewards=laid_out([np.add.reduceat(d.rewards, range(0, len(d), repeat)) for d in drives]),
-            returns=laid_out([drive.returns[::repeat] for drive in drives]),
-            valid=laid_out([np.ones(length, np.float32) for length in lengths]),
-            contacts=laid_out([drive.contacts[::repeat] for drive in drives]),
-            threats=torch.tensor([drive.threat for drive in drives]),
+        return EpisodeBatch(
+            inputs={name: self._with_history(name, columns, starts) for name in self._inputs},
+            indices=(torch.from_numpy(rows), torch.from_numpy(columns)),
+            rewards=padded([np.add.reduceat(item.rewards, range(0, len(item), repeat)) for item in episodes]),
+            braking_returns=padded([item.braking_returns[::repeat] for item in episodes]),
+            braking_contacts=padded([item.braking_contacts[::repeat] for item in episodes]),
+            mask=padded([np.ones(length, np.float32) for length in lengths]),
+            threats=torch.tensor([item.threat for item in episodes]),
         )
 
+    def _count_decisions(self, episode: RecordedEpisode) -> int:
+        """Return the number of policy decisions in an episode."""
+        return -(-len(episode) // self._features.repeat)
+
     def _with_history(self, name: str, columns: np.ndarray, starts: np.ndarray) -> torch.Tensor:
-        back = range(self._features.history - 1, -1, -1)
-        parts = [self._shown[name][starts + np.maximum(columns - steps, 0)] for steps in back]
+        """Return an input with its history, oldest first; the first decision fills missing ones."""
+        lags = range(self._features.history - 1, -1, -1)
+        parts = [self._inputs[name][starts + np.maximum(columns - lag, 0)] for lag in lags]
         joined = np.concatenate(parts, axis=-1)
         return torch.from_numpy(np.moveaxis(joined, -1, 1).copy() if name == FRAME else joined)
 
 
-def _decisions(drive: Drive, repeat: int) -> int:
-    """Return how often a policy decides on a drive."""
-    return -(-len(drive) // repeat)
-
-
-def _relived(drive: Drive, memory: FeatureHistory) -> Iterator[dict[str, np.ndarray]]:
-    memory.reset()
-    for moment in range(len(drive)):
-        memory.update({name: array[moment] for name, array in drive.seen.items()})
-        if moment % memory.features.repeat == 0:
-            yield memory.stack()
+def _policy_inputs(episode: RecordedEpisode, history: FeatureHistory) -> Iterator[dict[str, np.ndarray]]:
+    """Yield the policy inputs at each policy decision."""
+    history.reset()
+    for decision in range(len(episode)):
+        history.update({name: array[decision] for name, array in episode.observations.items()})
+        if decision % history.features.repeat == 0:
+            yield history.stack()

@@ -1,179 +1,223 @@
-"""Learning when to brake from recorded drives: the expected return itself is followed uphill.
+"""`OfflineLearner`: gradient ascent on the expected return over recorded episodes.
 
-With a brake that latches, a policy is a chance p_t of braking at each decision of a drive, and the return of
-every choice is on record. So the expected return of a drive is a sum over its decisions,
+With a latching brake, a policy is a probability p_t of braking at each decision, and the return of every
+choice is recorded. The expected return of an episode is therefore a sum over its decisions,
 
     J = Σ_t s_t (p_t B_t + (1 - p_t) r_t),  s_t = Π_{u<t} (1 - p_u),
 
-of what braking there returns (B) and what holding the speed earns until the next (r): nothing is sampled,
-and nothing estimated by a second network. In expectation over episodes this is what REINFORCE (Williams
-1992) samples.
+of the return B of braking and the reward r of holding the speed until the next decision. No episode is
+sampled and no value function is estimated. The gradient is the expectation of REINFORCE's (Williams 1992).
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import gymnasium as gym
 import numpy as np
 import torch
 from torch.nn.functional import logsigmoid
 
 from lgmd_gym.agents.base import HOLD
-from lgmd_gym.agents.policies.features import FeatureConfig
-from lgmd_gym.training.config import Plan
-from lgmd_gym.training.offline.dataset import Batch, Lessons
-from lgmd_gym.training.offline.episodes import Drive
-from lgmd_gym.training.offline.hyperparameters import Recipe
+from lgmd_gym.agents.options import positive, whole
+from lgmd_gym.envs.dynamics.units import check_within
+from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset
 
-JUDGED_AT_ONCE = 64  # drives
+if TYPE_CHECKING:
+    from stable_baselines3 import PPO
+
+EVAL_BATCH_SIZE = 64  # [episodes]
+RETURN_SCALE = 0.1  # factor of the loss
 
 
-class Look(NamedTuple):
-    """How a policy does without chance, braking where its chance is above one half.
+class Evaluation(NamedTuple):
+    """Results of the deterministic policy, which brakes where its probability exceeds one half.
 
     Attributes:
-        ret: Mean return, of levels and pieces of traffic alike.
+        mean_return: Mean return over levels and traffic segments.
         avoided: Share of threats that end without contact.
-        false: Share of levels without a threat in which it brakes.
-        traffic: Share of pieces of traffic in which it brakes; NaN without any.
+        false_activations: Share of levels without a threat in which the policy brakes.
+        traffic_activations: Share of traffic segments in which the policy brakes; NaN without any.
     """
 
-    ret: float
+    mean_return: float
     avoided: float
-    false: float
-    traffic: float
+    false_activations: float
+    traffic_activations: float
 
 
-class Learner:
-    """A stable-baselines3 policy that learns from recorded drives.
+class OfflineLearner:
+    """Trains a stable-baselines3 policy on recorded episodes.
 
     Args:
-        plan: Of the training.
-        drives: To learn from.
-        judges: To look at after every pass.
-        pieces: How many of these, at their end, are pieces of traffic.
+        policy: stable-baselines3's name of the network.
+        env: Environment with the spaces of the policy.
+        demands: Demand of each action: `HOLD`, and a lower one that brakes.
+        seed: Seed of the network and of the order of episodes.
+        n_epochs: Number of passes over the training episodes.
+        batch_size: Number of episodes per gradient step.
+        learning_rate: Maximum of the one-cycle schedule (Smith & Topin 2018).
+        weight_decay: Weight decay of AdamW.
+        false_cost: Factor on the cost of braking in episodes without a threat, in training only. A factor
+            of 2 compensates for the few episodes that resemble a threat.
+        initial_brake_probability: Probability of braking at a decision before training.
+        logit_decay: Weight of the squared log odds of braking, summed over the decisions of an episode.
+            Without this penalty a network that learns slowly, for example on frames, saturates at never
+            braking and its gradient vanishes.
+        policy_kwargs: Further arguments of the network.
+
+    Raises:
+        ValueError: If a value is out of range.
     """
 
-    def __init__(self, plan: Plan, drives: list[Drive], judges: list[Drive], pieces: int = 0) -> None:
-        self.plan, self.recipe = plan, Recipe.from_dict(plan.model)
-        features = FeatureConfig.from_dict(plan.features)
-        self.lessons, self.judges = Lessons(drives, features), Lessons(judges, features)
-        self.model = self._untaught()
-        self._levels = len(judges) - pieces
-        self.best = Look(-np.inf, 0.0, 0.0, 0.0)
-
-    def _untaught(self) -> Any:
-        from stable_baselines3 import PPO
-
-        torch.set_num_threads(1)
-        env = self.plan.make_env("train")
-        # PPO gives the network and the file; its own learning is not used, nor is its critic.
-        kwargs = {"activation_fn": torch.nn.ReLU, "net_arch": {"pi": [64, 64], "vf": []}}
-        kwargs |= self.recipe.policy_kwargs
-        model = PPO(
-            self.plan.policy, env, 2e-3, 2, 2, seed=self.plan.seed, device="cpu", policy_kwargs=kwargs
-        )
-        env.close()
-        hold, brake = self._actions
-        odds = self.recipe.first_chance / (1.0 - self.recipe.first_chance)
-        bias: Any = model.policy.action_net.bias
+    def __init__(
+        self,
+        policy: str,
+        env: gym.Env,
+        demands: Sequence[float],
+        *,
+        seed: int = 0,
+        n_epochs: int = 100,
+        batch_size: int = 64,
+        learning_rate: float = 0.006,
+        weight_decay: float = 0.01,
+        false_cost: float = 2.0,
+        initial_brake_probability: float = 0.03,
+        logit_decay: float = 0.0,
+        policy_kwargs: dict[str, Any] | None = None,
+    ) -> None:
+        self.n_epochs = whole("n_epochs", n_epochs, 1)
+        self.batch_size = whole("batch_size", batch_size, 1)
+        self.learning_rate = positive("learning_rate", learning_rate)
+        self.weight_decay = check_within("weight_decay", weight_decay, 0.0, 1.0)
+        self.false_cost = positive("false_cost", false_cost)
+        self.logit_decay = check_within("logit_decay", logit_decay, 0.0, 1.0)
+        check_within("initial_brake_probability", initial_brake_probability, 1e-6, 0.999)
+        self._seed = seed
+        self._hold, self._brake = demands.index(HOLD), demands.index(min(demands))
+        self.model = _make_model(policy, env, seed, policy_kwargs or {})
+        odds = initial_brake_probability / (1.0 - initial_brake_probability)
+        bias: Any = self.model.policy.action_net.bias
         with torch.no_grad():
-            bias[brake], bias[hold] = float(np.log(odds)), 0.0
-        return model
+            bias[self._brake], bias[self._hold] = float(np.log(odds)), 0.0
 
-    @property
-    def _actions(self) -> tuple[int, int]:
-        demands = self.plan.demands
-        return demands.index(HOLD), demands.index(min(demands))
-
-    def learn(self, log: Callable[[int, dict[str, float]], None]) -> Any:
-        """Learn to the end and return the model as it did best on `judges`.
+    def learn(
+        self,
+        train: OfflineDataset,
+        validation: OfflineDataset,
+        log: Callable[[int, dict[str, float]], None] = lambda epoch, metrics: None,
+    ) -> "PPO":
+        """Train to the end and return the model with the best mean return on the validation episodes.
 
         Args:
-            log: Called after each pass with its number and what was reached.
+            train: Training episodes.
+            validation: Episodes evaluated after each epoch.
+            log: Called after each epoch with its number and its metrics.
         """
-        recipe, policy = self.recipe, self.model.policy
-        taught = [p for name, p in policy.named_parameters() if "value" not in name]
-        steps = -(-len(self.lessons) // recipe.batch_size)
-        optimizer = torch.optim.AdamW(taught, recipe.learning_rate, weight_decay=recipe.weight_decay)
+        policy = self.model.policy
+        trained = [value for name, value in policy.named_parameters() if "value" not in name]
+        steps = -(-len(train) // self.batch_size)
+        optimizer = torch.optim.AdamW(trained, self.learning_rate, weight_decay=self.weight_decay)
         schedule = torch.optim.lr_scheduler.OneCycleLR(
-            optimizer, recipe.learning_rate, total_steps=recipe.n_epochs * steps
+            optimizer, self.learning_rate, total_steps=self.n_epochs * steps
         )
-        rng = np.random.default_rng(self.plan.seed)
-        best = {name: value.clone() for name, value in policy.state_dict().items()}
-        for number in range(1, recipe.n_epochs + 1):
+        rng = np.random.default_rng(self._seed)
+        best_return, best_weights = -np.inf, _copy_weights(policy)
+        for epoch in range(1, self.n_epochs + 1):
             policy.set_training_mode(True)
-            gained = 0.0
-            for chosen in np.array_split(rng.permutation(len(self.lessons)), steps):
-                batch = dearer(self.lessons.batch(chosen), recipe.false_cost)
-                logits = self.logits(batch)
-                value = expected_return(logits, batch).mean()
-                certainty = (logits * batch.valid).square().sum(1).mean()
+            train_return = 0.0
+            for indices in np.array_split(rng.permutation(len(train)), steps):
+                batch = scale_false_braking_cost(train.batch(indices), self.false_cost)
                 optimizer.zero_grad()
-                (-0.1 * (value - recipe.logit_decay * certainty)).backward()
-                torch.nn.utils.clip_grad_norm_(taught, 1.0)
+                loss, mean_return = self._loss(batch)
+                loss.backward()
+                torch.nn.utils.clip_grad_norm_(trained, 1.0)
                 optimizer.step()
                 schedule.step()
-                gained += float(value.detach()) * len(chosen) / len(self.lessons)
-            look = self.look()
-            if look.ret > self.best.ret:
-                self.best = look
-                best = {name: value.clone() for name, value in policy.state_dict().items()}
-            told = {name: value for name, value in look._asdict().items() if value == value}  # no NaN
-            log(number, {"train": gained, **told, "best": self.best.ret})
-        policy.load_state_dict(best)
+                train_return += mean_return * len(indices) / len(train)
+            evaluation = self.evaluate(validation)
+            if evaluation.mean_return > best_return:
+                best_return = evaluation.mean_return
+                best_weights = _copy_weights(policy)
+            metrics = {"train_return": train_return, **evaluation._asdict(), "best_return": best_return}
+            log(epoch, {name: value for name, value in metrics.items() if not np.isnan(value)})
+        policy.load_state_dict(best_weights)
         return self.model
 
-    def logits(self, batch: Batch) -> torch.Tensor:
-        """Return the log odds of braking at each decision, (N, T)."""
-        told = self.model.policy.get_distribution(batch.shown).distribution.logits
-        hold, brake = self._actions
-        table = torch.zeros_like(batch.valid)
-        table[batch.place] = told[:, brake] - told[:, hold]
-        return table
+    def _loss(self, batch: EpisodeBatch) -> tuple[torch.Tensor, float]:
+        """Return the loss and the mean expected return."""
+        logits = self.logits(batch)
+        mean_return = expected_return(logits, batch).mean()
+        penalty = (logits * batch.mask).square().sum(1).mean()
+        return -RETURN_SCALE * (mean_return - self.logit_decay * penalty), float(mean_return.detach())
 
-    def look(self) -> Look:
-        """Return how the policy does on `judges` without chance."""
+    def logits(self, batch: EpisodeBatch) -> torch.Tensor:
+        """Return the log odds of braking at each decision, (N, T)."""
+        distribution: Any = self.model.policy.get_distribution(batch.inputs).distribution
+        action_logits = distribution.logits
+        logits = torch.zeros_like(batch.mask)
+        logits[batch.indices] = action_logits[:, self._brake] - action_logits[:, self._hold]
+        return logits
+
+    def evaluate(self, dataset: OfflineDataset) -> Evaluation:
+        """Return the results of the deterministic policy on recorded episodes."""
         self.model.policy.set_training_mode(False)
         parts = [
-            self._ends(self.judges.batch(range(start, min(start + JUDGED_AT_ONCE, len(self.judges)))))
-            for start in range(0, len(self.judges), JUDGED_AT_ONCE)
+            self._evaluate_batch(dataset.batch(range(len(dataset))[start : start + EVAL_BATCH_SIZE]))
+            for start in range(0, len(dataset), EVAL_BATCH_SIZE)
         ]
-        returns, brakes, contacts, threats = (torch.cat(item).numpy() for item in zip(*parts, strict=True))
-        level = np.arange(len(threats)) < self._levels
-        return Look(
-            float(returns.mean()),
-            _share(~contacts[threats]),
-            _share(brakes[level & ~threats]),
-            _share(brakes[~level]),
+        returns, brakes, contacts = (torch.cat(values).numpy() for values in zip(*parts, strict=True))
+        threats = np.array([episode.threat for episode in dataset.episodes])
+        traffic = np.array([episode.traffic for episode in dataset.episodes])
+        return Evaluation(
+            mean_return=float(returns.mean()),
+            avoided=_mean(~contacts[threats]),
+            false_activations=_mean(brakes[~traffic & ~threats]),
+            traffic_activations=_mean(brakes[traffic]),
         )
 
     @torch.no_grad()
-    def _ends(self, batch: Batch) -> tuple[torch.Tensor, ...]:
-        """Tell of each drive its return, and whether it brakes, ends in a contact, and is a threat."""
-        wants = (self.logits(batch) > 0.0) & (batch.valid > 0.0)
-        brakes = wants.any(1)
-        so_far = torch.cumsum(wants, 1)
-        before, first = so_far == 0, wants & (so_far == 1)
-        returns = (batch.rewards * before).sum(1) + (batch.returns * first).sum(1)
-        contacts = torch.where(brakes, (batch.contacts & first).any(1), batch.threats)
-        return returns, brakes, contacts, batch.threats
+    def _evaluate_batch(self, batch: EpisodeBatch) -> tuple[torch.Tensor, ...]:
+        """Return for each episode its return, whether the policy brakes, and whether it ends in a contact."""
+        wants_brake = (self.logits(batch) > 0.0) & (batch.mask > 0.0)
+        brakes = wants_brake.any(1)
+        count = torch.cumsum(wants_brake, 1)
+        before, onset = count == 0, wants_brake & (count == 1)
+        returns = (batch.rewards * before).sum(1) + (batch.braking_returns * onset).sum(1)
+        contacts = torch.where(brakes, (batch.braking_contacts & onset).any(1), batch.threats)
+        return returns, brakes, contacts
 
 
-def dearer(batch: Batch, false_cost: float) -> Batch:
-    """Return a batch in which braking without a threat costs so many times what it does."""
-    left = torch.flip(torch.cumsum(torch.flip(batch.rewards, [1]), 1), [1])  # of holding to the end
-    dear = left + false_cost * (batch.returns - left)
-    quiet = ~batch.threats[:, None] & (batch.valid > 0.0)
-    return batch._replace(returns=torch.where(quiet, dear, batch.returns))
+def _make_model(policy: str, env: gym.Env, seed: int, policy_kwargs: dict[str, Any]) -> "PPO":
+    """Return a PPO model; only its network and its file format are used."""
+    from stable_baselines3 import PPO
+
+    torch.set_num_threads(1)
+    kwargs = {"activation_fn": torch.nn.ReLU, "net_arch": {"pi": [64, 64], "vf": []}} | policy_kwargs
+    return PPO(policy, env, 2e-3, 2, 2, seed=seed, device="cpu", policy_kwargs=kwargs)
 
 
-def expected_return(logits: torch.Tensor, batch: Batch) -> torch.Tensor:
-    """Return the expected return of each drive, (N,), given the log odds of braking, (N, T)."""
-    brake = logsigmoid(logits)
-    hold = logsigmoid(-logits) * batch.valid
-    arrives = torch.cumsum(hold, 1) - hold
-    return (torch.exp(arrives + brake) * batch.returns + torch.exp(arrives + hold) * batch.rewards).sum(1)
+def _copy_weights(network: torch.nn.Module) -> dict[str, torch.Tensor]:
+    return {name: value.clone() for name, value in network.state_dict().items()}
 
 
-def _share(held: np.ndarray) -> float:
-    return float(held.mean()) if len(held) else float("nan")
+def scale_false_braking_cost(batch: EpisodeBatch, factor: float) -> EpisodeBatch:
+    """Return a batch in which braking without a threat costs `factor` times as much, relative to holding."""
+    holding_returns = torch.flip(torch.cumsum(torch.flip(batch.rewards, [1]), 1), [1])
+    scaled = holding_returns + factor * (batch.braking_returns - holding_returns)
+    non_threat = ~batch.threats[:, None] & (batch.mask > 0.0)
+    return batch._replace(braking_returns=torch.where(non_threat, scaled, batch.braking_returns))
+
+
+def expected_return(logits: torch.Tensor, batch: EpisodeBatch) -> torch.Tensor:
+    """Return the expected return of each episode, (N,), for the log odds of braking, (N, T)."""
+    log_brake = logsigmoid(logits)
+    log_hold = logsigmoid(-logits) * batch.mask
+    log_reached = torch.cumsum(log_hold, 1) - log_hold
+    return (
+        torch.exp(log_reached + log_brake) * batch.braking_returns
+        + torch.exp(log_reached + log_hold) * batch.rewards
+    ).sum(1)
+
+
+def _mean(flags: np.ndarray) -> float:
+    return float(flags.mean()) if len(flags) else float("nan")

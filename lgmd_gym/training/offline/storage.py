@@ -1,4 +1,4 @@
-"""Recorded drives in files, each with what they were recorded by."""
+"""Files of recorded episodes."""
 
 import json
 from collections.abc import Iterator
@@ -8,124 +8,105 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-import lgmd_gym
-from lgmd_gym.agents.policies.features import FRAME
-from lgmd_gym.training.config import Plan
-from lgmd_gym.training.offline.episodes import Drive
+from lgmd_gym.training.offline.episodes import RecordedEpisode
 
-TOLD = ("rewards", "returns", "contacts")
-FORMAT = 3  # drives by the seed that they come from; one drive's arrays are all of one length
+PER_DECISION = ("rewards", "braking_returns", "braking_contacts")
+PREFIX = "observations/"
 
 
-def origin_of(plan: Plan) -> dict[str, Any]:
-    """Return what drives depend on, as plain values; frames only if they are part of them."""
-    framed = FRAME in plan.features["inputs"]
-    origin = {
-        "format": FORMAT,
-        "env_id": plan.env_id,
-        "env_kwargs": plan.env_kwargs,
-        "camera": plan.camera,
-        "demands": plan.demands,
-        "shrink": plan.features["shrink"] if framed else None,
-        "lgmd_gym": lgmd_gym.__version__,
-    }
-    return json.loads(json.dumps(origin))
-
-
-def _check_same(theirs: dict[str, Any], ours: dict[str, Any], file: Path) -> None:
-    for key, value in ours.items():
-        if theirs.get(key) != value and not (key == "shrink" and value is None):
-            raise ValueError(
-                f"the drives in {str(file)!r} were recorded with another {key} "
-                f"({_short(theirs.get(key))}, not {_short(value)}); record anew, without --drives"
-            )
-
-
-def _short(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def save(by_seed: list[list[Drive]], file: Path, origin: dict[str, Any]) -> None:
-    """Write drives, and what they were recorded by, into a file that is there whole or not at all.
+def save(by_seed: list[list[RecordedEpisode]], file: Path, origin: dict[str, Any]) -> None:
+    """Write episodes to a file; an interrupted write leaves no file.
 
     Args:
-        by_seed: The drives that come from each seed; a drive through traffic gives any number of pieces.
-        file: To be written.
-        origin: See `origin_of`.
+        by_seed: Episodes of each seed; a traffic episode gives any number of segments.
+        file: File to write.
+        origin: Settings that the episodes were recorded with, as plain values.
     """
-    drives = [drive for some in by_seed for drive in some]
+    episodes = [episode for group in by_seed for episode in group]
     arrays: dict[str, Any] = {
         "origin": np.array(json.dumps(origin)),
-        "counts": np.array([len(some) for some in by_seed]),
-        "lengths": np.array([len(drive) for drive in drives]),
-        "threats": np.array([drive.threat for drive in drives]),
+        "counts": np.array([len(group) for group in by_seed]),
+        "lengths": np.array([len(episode) for episode in episodes]),
+        "threats": np.array([episode.threat for episode in episodes], bool),
+        "traffic": np.array([episode.traffic for episode in episodes], bool),
     }
-    arrays |= _joined(drives) if drives else {}
+    arrays |= _concatenated(episodes) if episodes else {}
     unfinished = file.with_suffix(".part")
     with unfinished.open("wb") as out:
         np.savez_compressed(out, **arrays)
     unfinished.rename(file)
 
 
-def _joined(drives: list[Drive]) -> dict[str, np.ndarray]:
-    joined = {name: np.concatenate([getattr(drive, name) for drive in drives]) for name in TOLD}
-    if drives[0].frames is not None:
-        joined["frames"] = np.concatenate([drive.frames for drive in drives if drive.frames is not None])
-    for name in drives[0].seen:
-        joined[f"seen/{name}"] = np.concatenate([drive.seen[name] for drive in drives])
-    return joined
+def _concatenated(episodes: list[RecordedEpisode]) -> dict[str, np.ndarray]:
+    arrays = {name: np.concatenate([getattr(episode, name) for episode in episodes]) for name in PER_DECISION}
+    if episodes[0].frames is not None:
+        arrays["frames"] = np.concatenate([item.frames for item in episodes if item.frames is not None])
+    for name in episodes[0].observations:
+        arrays[PREFIX + name] = np.concatenate([item.observations[name] for item in episodes])
+    return arrays
 
 
-def load(file: Path) -> tuple[list[list[Drive]], dict[str, Any]]:
-    """Return the drives in a file, by seed, and what they were recorded by.
+def load(file: Path) -> list[list[RecordedEpisode]]:
+    """Return the episodes in a file, by seed.
 
     Raises:
-        ValueError: If it holds none.
+        ValueError: If the file holds no recorded episodes.
     """
-    with _opened(file) as kept:
-        drives = _cut(kept)
-        return [[next(drives) for _ in range(count)] for count in kept["counts"]], _origin(kept)
+    with _open(file) as archive:
+        episodes = _episodes(archive)
+        return [[next(episodes) for _ in range(count)] for count in archive["counts"]]
 
 
 def check_file(file: Path, origin: dict[str, Any]) -> int:
-    """Return how many seeds a file has the drives of; reads no drives.
+    """Return the number of seeds in a file without loading its episodes.
+
+    Args:
+        file: File written by `save`.
+        origin: Required settings; a `shrink` of None accepts any.
 
     Raises:
-        ValueError: If it holds none, or they were recorded with another eye or environment than `origin`.
+        ValueError: If the file holds no recorded episodes, or was recorded with other settings.
     """
-    with _opened(file) as kept:
-        _check_same(_origin(kept), origin, file)
-        return len(kept["counts"])
+    with _open(file) as archive:
+        recorded = json.loads(str(archive["origin"]))
+        for key, value in origin.items():
+            if recorded.get(key) != value and not (key == "shrink" and value is None):
+                raise ValueError(
+                    f"the episodes in {str(file)!r} were recorded with another {key} "
+                    f"({_abbreviated(recorded.get(key))}, not {_abbreviated(value)}); "
+                    "record new episodes by omitting --recordings"
+                )
+        return len(archive["counts"])
 
 
-def _origin(kept: Any) -> dict[str, Any]:
-    return json.loads(str(kept["origin"]))
+def _abbreviated(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _opened(file: Path) -> Any:
+def _open(file: Path) -> Any:
     try:
-        kept = np.load(file)
-        if "origin" not in kept:
-            raise ValueError("no origin in it")
+        archive = np.load(file)
+        if "origin" not in archive:
+            raise ValueError("no entry 'origin'")
     except (OSError, ValueError, BadZipFile) as error:
-        raise ValueError(f"{str(file)!r} holds no recorded drives ({error})") from None
-    return kept
+        raise ValueError(f"{str(file)!r} holds no recorded episodes ({error})") from None
+    return archive
 
 
-def _cut(kept: Any) -> Iterator[Drive]:
-    arrays = {name: kept[name] for name in kept.files if name not in ("origin", "counts")}
-    seen = {name.removeprefix("seen/"): array for name, array in arrays.items() if name.startswith("seen/")}
+def _episodes(archive: Any) -> Iterator[RecordedEpisode]:
+    arrays = {name: archive[name] for name in archive.files if name not in ("origin", "counts")}
+    observations = {
+        name.removeprefix(PREFIX): array for name, array in arrays.items() if name.startswith(PREFIX)
+    }
     frames = arrays.get("frames")
-    ends = np.cumsum([0, *arrays["lengths"]])
-    for index, threat in enumerate(arrays["threats"]):
-        lived = slice(*ends[index : index + 2])
-        rewards, returns, contacts = (arrays[name][lived] for name in TOLD)
-        yield Drive(
-            {name: array[lived] for name, array in seen.items()},
-            None if frames is None else frames[lived],
-            rewards,
-            returns,
-            contacts,
-            bool(threat),
+    bounds = np.cumsum([0, *arrays["lengths"]])
+    for index in range(len(arrays["lengths"])):
+        part = slice(*bounds[index : index + 2])
+        yield RecordedEpisode(
+            {name: array[part] for name, array in observations.items()},
+            None if frames is None else frames[part],
+            *(arrays[name][part] for name in PER_DECISION),
+            threat=bool(arrays["threats"][index]),
+            traffic=bool(arrays["traffic"][index]),
         )

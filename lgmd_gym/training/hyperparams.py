@@ -1,0 +1,71 @@
+"""Hyperparameters in rl-zoo's format: one YAML file per algorithm, one entry per environment."""
+
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from lgmd_gym.errors import unknown_name
+
+OFFLINE = "offline"  # the algorithm of `lgmd_gym.training.offline.learner`
+ALGORITHMS = ("ppo", "sac", "dqn", OFFLINE)
+WRAPPER = "lgmd_gym.training.PolicyWrapper"
+
+
+def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> dict[str, Any]:
+    """Return the attributes of `TrainConfig` in a hyperparameter file; `features` is a dict.
+
+    Args:
+        algo: One of `ALGORITHMS`.
+        env_id: Environment id; the entry `default` is used for an id without an entry.
+        file: YAML file in rl-zoo's format; None for the file of this package.
+
+    Raises:
+        ValueError: For an unknown algorithm, a file that cannot be read, or one without a matching entry.
+    """
+    if algo not in ALGORITHMS:
+        raise unknown_name("algorithm", algo, ALGORITHMS)
+    path = file or Path(str(files("lgmd_gym.training") / f"{algo}.yml"))
+    entries = _read_yaml(path)
+    entry = entries.get(env_id, entries.get("default"))
+    if not isinstance(entry, dict):
+        raise unknown_name("entry of the hyperparameters for", env_id, entries)
+    algo_kwargs = dict(entry)
+    if algo_kwargs.pop("normalize", False):
+        raise ValueError("normalize is not supported: PolicyWrapper scales observations by constants")
+    values: dict[str, Any] = {"features": _features(algo_kwargs.pop("env_wrapper", None))}
+    for name, convert in (("n_timesteps", float), ("n_envs", float), ("policy", str)):
+        if name in algo_kwargs:
+            value = algo_kwargs.pop(name)
+            try:
+                values[name] = value if convert is str else int(convert(value))
+            except (TypeError, ValueError):
+                raise ValueError(f"{name} must be a number, got {value!r}") from None
+    return values | {"algo_kwargs": algo_kwargs}
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    import yaml
+
+    try:
+        entries = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"hyperparameters {str(path)!r} cannot be read: {error.strerror}") from None
+    except yaml.YAMLError as error:
+        first = str(error).splitlines()[0]
+        raise ValueError(f"hyperparameters {str(path)!r} are not valid YAML: {first}") from None
+    if not isinstance(entries, dict):
+        raise ValueError(f"hyperparameters {str(path)!r} must have one entry per environment id")
+    return entries
+
+
+def _features(wrappers: Any) -> dict[str, Any]:
+    """Return the arguments of `PolicyWrapper` in rl-zoo's `env_wrapper`."""
+    if wrappers is None:
+        return {}
+    items = wrappers if isinstance(wrappers, list) else [wrappers]
+    if len(items) != 1:
+        raise ValueError(f"env_wrapper must contain {WRAPPER} only, got {len(items)} wrappers")
+    name, arguments = (items[0], {}) if isinstance(items[0], str) else next(iter(items[0].items()))
+    if name != WRAPPER:
+        raise ValueError(f"env_wrapper must be {WRAPPER}, got {name!r}")
+    return dict(arguments or {})

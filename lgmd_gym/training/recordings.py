@@ -1,0 +1,152 @@
+"""Recorded episodes of an offline training: recorded once, or reused from another training."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from json import dumps, loads
+from pathlib import Path
+from typing import Any
+
+import lgmd_gym
+from lgmd_gym.agents import HOLD
+from lgmd_gym.agents.policies.features import FRAME
+from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
+from lgmd_gym.training.offline.episodes import EpisodeRecorder, RecordedEpisode
+from lgmd_gym.training.offline.storage import check_file, load, save
+from lgmd_gym.training.offline.traffic import TrafficRecorder
+
+FILE_SIZE = 100  # largest number of seeds in one file
+TRAFFIC_RATIO = 4  # training episodes in traffic per validation episode in traffic
+FORMAT = 4  # of the files; recordings of another format are refused
+
+
+@dataclass(frozen=True)
+class RecordingSet:
+    """Recorded episodes of one kind.
+
+    Attributes:
+        name: Name of the folder: "train", "validation", "traffic-train" or "traffic-validation".
+        seeds: Seeds of the environment.
+        record: Returns the episodes of some seeds, by seed; arguments as in `TrafficRecorder.record`.
+    """
+
+    name: str
+    seeds: range
+    record: Callable[..., list[list[RecordedEpisode]]]
+
+
+def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
+    """Return the recordings that a training requires for "train" or "validation"."""
+    train = split == "train"
+    shrink = _frame_shrink(config)
+    first = SEED_STRIDE * config.seed if train else VALIDATION_SEED
+    count = config.n_timesteps if train else config.eval_episodes
+    levels = EpisodeRecorder(
+        partial(config.make_env, split),
+        hold=config.demands.index(HOLD),
+        brake=config.demands.index(min(config.demands)),
+        shrink=shrink,
+    )
+    sets = [RecordingSet(split, range(first, first + count), partial(_record_levels, levels))]
+    if config.traffic_episodes:
+        # The traffic suite of the benchmark uses the seeds from 0 on.
+        first = SEED_STRIDE * (config.seed + 1) if train else VALIDATION_SEED
+        count = config.traffic_episodes if train else -(-config.traffic_episodes // TRAFFIC_RATIO)
+        traffic = TrafficRecorder(split, config.camera, shrink)
+        sets.append(RecordingSet(f"traffic-{split}", range(first, first + count), traffic.record))
+    return sets
+
+
+def _record_levels(recorder: EpisodeRecorder, *arguments: Any) -> list[list[RecordedEpisode]]:
+    return [[episode] for episode in recorder.record(*arguments)]
+
+
+def _frame_shrink(config: TrainConfig) -> int | None:
+    return config.features.shrink if FRAME in config.features.inputs else None
+
+
+def origin_of(config: TrainConfig) -> dict[str, Any]:
+    """Return the settings that recorded episodes depend on, as plain values."""
+    origin = {
+        "format": FORMAT,
+        "env_id": config.env_id,
+        "env_kwargs": config.env_kwargs,
+        "camera": config.camera,
+        "demands": config.demands,
+        "shrink": _frame_shrink(config),
+        "lgmd_gym": lgmd_gym.__version__,
+    }
+    return loads(dumps(origin))
+
+
+def load_or_record(
+    config: TrainConfig, split: str, folder: Path, progress: bool = False, jobs: int = 1
+) -> list[RecordedEpisode]:
+    """Return the recorded episodes of a training; record those that are missing in its folder.
+
+    An interrupted recording resumes at the first missing file.
+
+    Args:
+        config: Configuration of the training; its `recordings` are used instead of new ones.
+        split: "train" or "validation".
+        folder: Training folder.
+        progress: Whether to show a progress bar.
+        jobs: Number of processes.
+    """
+    episodes: list[RecordedEpisode] = []
+    for recordings in recording_sets(config, split):
+        files = _folder_of(recordings, config.recordings or folder)
+        if config.recordings is None:
+            _record_missing(recordings, files, origin_of(config), progress, jobs)
+        by_seed: list[list[RecordedEpisode]] = []
+        for file in sorted(files.glob("*.npz")):
+            if len(by_seed) < len(recordings.seeds):
+                by_seed += load(file)
+        episodes += [episode for group in by_seed[: len(recordings.seeds)] for episode in group]
+    return episodes
+
+
+def check_recordings(config: TrainConfig) -> None:
+    """Check the recordings of another training that a configuration names.
+
+    Raises:
+        ValueError: If there are none or too few, or they were recorded with other settings.
+    """
+    if config.recordings is None:
+        return
+    for split in ("train", "validation"):
+        for recordings in recording_sets(config, split):
+            files = _folder_of(recordings, config.recordings)
+            count = sum(check_file(file, origin_of(config)) for file in sorted(files.glob("*.npz")))
+            if count == 0:
+                option = "" if recordings.name == split else f" --traffic-episodes {config.traffic_episodes}"
+                raise ValueError(
+                    f"no recorded episodes in {str(files)!r}; "
+                    f"train once with --algo offline{option}, without --recordings"
+                )
+            if count < len(recordings.seeds):
+                raise ValueError(
+                    f"{str(files)!r} holds {count} episodes, {len(recordings.seeds)} are required; "
+                    "reduce the number of episodes"
+                )
+
+
+def _folder_of(recordings: RecordingSet, training: str | Path) -> Path:
+    return Path(training) / "episodes" / recordings.name
+
+
+def _record_missing(
+    recordings: RecordingSet, files: Path, origin: dict[str, Any], progress: bool, jobs: int
+) -> None:
+    from tqdm import tqdm
+
+    files.mkdir(parents=True, exist_ok=True)
+    seeds = recordings.seeds
+    description = f"recording {recordings.name}"
+    with tqdm(total=len(seeds), desc=description, unit="episode", disable=not progress) as bar:
+        for start in range(0, len(seeds), FILE_SIZE):
+            part, file = seeds[start : start + FILE_SIZE], files / f"{start:06d}.npz"
+            if file.exists():
+                bar.update(len(part))
+            else:
+                save(recordings.record(part, jobs, bar.update), file, origin)

@@ -1,0 +1,151 @@
+"""`TrainConfig`: hyperparameter files, defaults, invalid values; errors of `lgmd-gym train`."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from support.recordings import OFFLINE_YAML, offline_config, write_yaml
+
+from lgmd_gym.cli import main as cli
+from lgmd_gym.training import TrainConfig, train
+from lgmd_gym.training.hyperparams import read_hyperparams
+from lgmd_gym.training.trainer import check_config
+
+RANDOM_ID = "LGMD/RandomBraking-v0"
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac", "dqn"])
+def test_packaged_hyperparameters(algo):
+    config = TrainConfig.from_hyperparams(algo)
+    assert config.n_timesteps >= 100_000
+    assert (config.features.history, config.features.repeat) == (6, 3)
+    assert config.features.latch is (algo == "dqn")
+    assert config.features == TrainConfig.from_hyperparams(algo, "LGMD/CCRs-v0").features
+    check_config(config)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: [", "are not valid YAML"),
+        ("- 3", "must have one entry per environment id"),
+        ("LGMD/CCRm-v0: {}", "did you mean 'LGMD/CCRm-v0'"),
+        ("default: {normalize: true}", "normalize is not supported"),
+        ("default: {n_timesteps: many}", "n_timesteps must be a number, got 'many'"),
+        ("default: {env_wrapper: gymnasium.wrappers.FlattenObservation}", "env_wrapper must be lgmd_gym"),
+        ("default: {env_wrapper: [a, b]}", "PolicyWrapper only, got 2 wrappers"),
+    ],
+)
+def test_invalid_hyperparameter_files_are_rejected(tmp_path, text, message):
+    with pytest.raises(ValueError, match=message):
+        read_hyperparams("ppo", RANDOM_ID, write_yaml(tmp_path, text))
+
+
+def test_options_replace_the_hyperparameters(tmp_path):
+    config = offline_config(tmp_path, inputs=("ffi",), n_timesteps=9, seed=None)
+    assert config.features.inputs == ("ffi",)
+    assert config.features.repeat == 5
+    assert (config.n_timesteps, config.seed) == (9, 0)
+
+
+def test_config_survives_json():
+    config = TrainConfig.from_hyperparams("ppo", camera={"name": "wide", "shape": [45, 80]})
+    values = json.loads(json.dumps(config.to_dict()))
+    restored = TrainConfig.from_dict(values)
+    assert restored.features == config.features
+    assert json.loads(json.dumps(restored.to_dict())) == values
+
+
+def test_cameras_are_presets_or_those_of_an_agent():
+    assert TrainConfig.from_hyperparams("sac", camera="wide").camera == "wide"
+    assert list(TrainConfig.from_hyperparams("sac").camera) == ["fovea", "tele", "wide"]
+    camera = TrainConfig.from_hyperparams("sac", sensors_of="stopping-zone").camera
+    assert camera[0]["name"] == "ground10"
+    with pytest.raises(ValueError, match="agent 'spike-threshold' has no cameras of its own"):
+        TrainConfig.from_hyperparams("sac", sensors_of="spike-threshold")
+
+
+@pytest.mark.parametrize("demands", [(0.0, -0.4), (0.0, -0.5, -1.0), (-1.0,), (), (0.3, -1.0)])
+def test_offline_requires_holding_and_hard_braking(demands):
+    with pytest.raises(ValueError, match=r"must be 0 and one of -0\.5 or less, got .* --demands 0 -1"):
+        TrainConfig.from_hyperparams("offline", demands=demands)
+
+
+@pytest.mark.parametrize(
+    ("algo", "options", "message"),
+    [
+        ("dqn", {"demands": ()}, "dqn requires discrete demands"),
+        ("sac", {"demands": (0.0, -1.0)}, r"sac requires a continuous demand, got demands \[0.0, -1.0\]"),
+        ("ppo", {"demands": (0.0, -2.0)}, "demands"),
+        ("dqn", {"recordings": "runs/a"}, "recordings requires algo 'offline', got 'dqn'"),
+        ("dqn", {"traffic_episodes": 3}, "traffic_episodes requires algo 'offline', got 'dqn'"),
+        ("offline", {"traffic_episodes": -1}, "traffic_episodes must be a whole number >= 0, got -1"),
+        ("offline", {"inputs": ("zones", "speed_change")}, "does not support the input 'speed_change'"),
+        ("ppo", {"n_timestep": 3}, "unknown training option 'n_timestep'; did you mean 'n_timesteps'"),
+    ],
+)
+def test_invalid_options_are_rejected(algo, options, message):
+    with pytest.raises(ValueError, match=message):
+        TrainConfig.from_hyperparams(algo, **options)
+
+
+def test_unknown_keys_in_a_stored_config_are_rejected():
+    values = TrainConfig.from_hyperparams("ppo").to_dict()
+    with pytest.raises(ValueError, match="unknown training option 'sed'; did you mean 'seed'"):
+        TrainConfig.from_dict(values | {"sed": 1})
+
+
+def test_offline_requires_a_latching_brake(tmp_path):
+    config = offline_config(tmp_path)
+    with pytest.raises(ValueError, match="requires latch: true"):
+        replace(config, features=replace(config.features, latch=False))
+
+
+@pytest.mark.parametrize(
+    ("algo", "algo_kwargs", "message"),
+    [
+        ("ppo", {"learning_rat": 0.1}, "hyperparameter of ppo 'learning_rat'; did you mean 'learning_rate'"),
+        ("offline", {"epochs": 3}, "unknown hyperparameter of offline 'epochs'; did you mean 'n_epochs'"),
+        ("offline", {"batch_size": 0}, "batch_size must be a whole number >= 1, got 0"),
+        ("offline", {"logit_decay": -1.0}, r"logit_decay must be in \[0, 1\]"),
+        ("offline", {"initial_brake_probability": 1.0}, "initial_brake_probability must be in"),
+        ("offline", {"false_cost": 0.0}, "false_cost must be a number > 0"),
+    ],
+)
+def test_invalid_algorithm_arguments_are_rejected(tmp_path, algo, algo_kwargs, message):
+    config = TrainConfig.from_hyperparams(algo, camera="fovea", algo_kwargs=algo_kwargs)
+    with pytest.raises(ValueError, match=message):
+        train(config, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--algo", "pppo"], "unknown algorithm 'pppo'; did you mean 'ppo'?"),
+        (["--inputs", "spikes"], "unknown policy input 'spikes'"),
+        (["--camera", "fovae"], "did you mean 'fovea'?"),
+        (["--hyperparams", "missing.yml"], "hyperparameters 'missing.yml' cannot be read"),
+        (["--resume", "missing"], "'missing' contains no training to resume"),
+        (["--inputs", "zones"], "train with --sensors-of stopping-zone"),
+        (["--sensors-of", "stopping-zone", "--camera", "wide"], "use either camera or sensors_of"),
+        (["--n-timesteps", "0"], "n_timesteps must be a whole number >= 1, got 0"),
+        (["--jobs", "0"], "jobs must be a whole number >= 1, got 0"),
+        (["--eval-episodes", "0"], "eval_episodes must be a whole number >= 1, got 0"),
+    ],
+)
+def test_command_prints_one_line_for_invalid_options(arguments, message, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(["train", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert message in error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_command_rejects_unknown_hyperparameters_in_a_file(tmp_path, capsys):
+    file = write_yaml(tmp_path, OFFLINE_YAML.replace("batch_size", "batchsize"))
+    out = tmp_path / "run"
+    assert cli.run(["train", "--algo", "offline", "--hyperparams", str(file), "--out", str(out)]) == 2
+    assert "did you mean 'batch_size'" in capsys.readouterr().err
+    assert not out.exists()

@@ -1,0 +1,54 @@
+"""`OfflineDataset`: policy inputs, decision rate and history of recorded episodes."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from support.recordings import offline_config, synthetic_episode
+
+from lgmd_gym.agents.policies.features import FeatureConfig
+from lgmd_gym.training.offline.dataset import OfflineDataset
+from lgmd_gym.training.offline.episodes import EpisodeRecorder
+
+
+def test_batches_equal_the_observations_of_the_policy_wrapper(tmp_path):
+    config = offline_config(tmp_path)
+    episodes = EpisodeRecorder(partial(config.make_env, "train"), hold=0, brake=1).record(range(2))
+    batch = OfflineDataset(episodes, config.features).batch([1, 0])
+    env = config.make_policy_env("train")
+    row = 0
+    for index, seed in enumerate((1, 0)):
+        observation, _ = env.reset(seed=seed)
+        done, decision = False, 0
+        while not done:
+            assert [int(values[row]) for values in batch.indices] == [index, decision]
+            for name, value in observation.items():
+                assert batch.inputs[name][row].tolist() == pytest.approx(value.tolist(), abs=1e-6)
+            observation, reward, terminated, truncated, _ = env.step(0)
+            expected = config.features.reward_scale * float(batch.rewards[index, decision])
+            assert reward == pytest.approx(expected)
+            row, decision, done = row + 1, decision + 1, terminated or truncated
+    assert row == len(batch.inputs["ego_speed"])
+    assert batch.mask.sum() == row
+    assert batch.threats.tolist() == [episodes[1].threat, episodes[0].threat]
+
+
+def test_a_lower_decision_rate_uses_every_third_decision():
+    episode = synthetic_episode(11, frames=True)
+    features = FeatureConfig(inputs=("frame", "ego_speed"), history=1, repeat=3, shrink=1)
+    batch = OfflineDataset([synthetic_episode(4, seed=1, frames=True), episode], features).batch([1])
+    assert batch.mask.tolist() == [[1.0] * 4]
+    assert batch.braking_returns[0].tolist() == episode.braking_returns[::3].tolist()
+    assert batch.braking_contacts[0].tolist() == episode.braking_contacts[::3].tolist()
+    sums = [episode.rewards[first : first + 3].sum() for first in (0, 3, 6, 9)]
+    assert batch.rewards[0].tolist() == pytest.approx(sums, abs=1e-6)
+    assert np.array_equal(np.moveaxis(batch.inputs["frame"].numpy(), 1, -1), episode.frames[::3])
+
+
+def test_frames_have_their_history_in_the_channels():
+    features = FeatureConfig(inputs=("frame", "ego_speed"), history=3, repeat=1)
+    episodes = [synthetic_episode(2, frames=True), synthetic_episode(4, seed=1, frames=True)]
+    frames = OfflineDataset(episodes, features).batch([1]).inputs["frame"]
+    assert frames.shape == (4, 6, 40, 40)
+    expected = np.concatenate([episodes[1].frames[index] for index in (1, 2, 3)], axis=-1)
+    assert np.array_equal(frames[3].numpy(), np.moveaxis(expected, -1, 0))

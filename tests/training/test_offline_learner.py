@@ -1,0 +1,183 @@
+"""`OfflineLearner`: expected return, evaluation and convergence on synthetic episodes."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+import torch
+from support.recordings import offline_config, synthetic_episode
+
+from lgmd_gym.agents.policies.features import FeatureConfig
+from lgmd_gym.training.offline.braking_outcomes import TOLERANCE
+from lgmd_gym.training.offline.dataset import OfflineDataset
+from lgmd_gym.training.offline.episodes import EpisodeRecorder, RecordedEpisode
+from lgmd_gym.training.offline.learner import (
+    OfflineLearner,
+    expected_return,
+    scale_false_braking_cost,
+)
+
+FEATURES = FeatureConfig(inputs=("spike_frequency", "ego_speed"), history=3, repeat=1, latch=True)
+NETWORK = {"net_arch": {"pi": [8], "vf": []}}
+
+
+def dataset(episodes, features=FEATURES):
+    return OfflineDataset(episodes, features)
+
+
+def learner(folder, features=FEATURES, **algo_kwargs):
+    config = replace(offline_config(folder), features=features)
+    algo_kwargs = {"n_epochs": 60, "batch_size": 8, "learning_rate": 0.03} | algo_kwargs
+    env = config.make_policy_env("train")
+    return OfflineLearner("MultiInputPolicy", env, config.demands, policy_kwargs=NETWORK, **algo_kwargs)
+
+
+def spike_episodes(count, seed):
+    """Episodes in which braking returns 5 at a spike and -5 at any other decision."""
+    rng, episodes = np.random.default_rng(seed), []
+    for number in range(count):
+        length, threat = int(rng.integers(5, 9)), number % 2 == 0
+        spike = int(rng.integers(1, length - 1))
+        episode = synthetic_episode(length, seed=number, threat=threat)
+        spikes = np.zeros((length, 1), np.float32)
+        braking_returns = np.full(length, -5.0, np.float32)
+        if threat:
+            spikes[spike], braking_returns[spike] = 200.0, 5.0
+        contacts = np.arange(length) != spike if threat else np.zeros(length, bool)
+        observations = {**episode.observations, "spike_frequency": spikes}
+        rewards = np.full(length, -0.1, np.float32)
+        episodes.append(RecordedEpisode(observations, None, rewards, braking_returns, contacts, threat))
+    return episodes
+
+
+def test_expected_return_equals_the_mean_of_sampled_episodes():
+    episodes = [synthetic_episode(5), synthetic_episode(3, seed=1, threat=False)]
+    batch = dataset(episodes).batch([0, 1])
+    logits = torch.randn(2, 5, generator=torch.Generator().manual_seed(0))
+    expected = expected_return(logits, batch)
+    rng = np.random.default_rng(0)
+    for index, episode in enumerate(episodes):
+        probabilities = 1 / (1 + np.exp(-logits[index].numpy()))
+        returns = []
+        for _ in range(20_000):
+            total = 0.0
+            for decision in range(len(episode)):
+                if rng.random() < probabilities[decision]:
+                    total += episode.braking_returns[decision]
+                    break
+                total += episode.rewards[decision]
+            returns.append(total)
+        standard_error = np.std(returns) / np.sqrt(len(returns))
+        assert float(expected[index]) == pytest.approx(np.mean(returns), abs=4 * standard_error)
+
+
+def test_cost_factor_scales_braking_without_a_threat_only():
+    episodes = [synthetic_episode(5), synthetic_episode(3, seed=1, threat=False)]
+    batch = dataset(episodes).batch([0, 1])
+    scaled = scale_false_braking_cost(batch, 3.0)
+    assert torch.equal(scaled.braking_returns[0], batch.braking_returns[0])
+    for decision in range(3):
+        holding = float(episodes[1].rewards[decision:].sum())
+        expected = holding + 3.0 * (float(episodes[1].braking_returns[decision]) - holding)
+        assert float(scaled.braking_returns[1, decision]) == pytest.approx(expected, abs=1e-5)
+    assert scaled.braking_returns[1, 3:].tolist() == [0.0, 0.0]
+    unscaled = scale_false_braking_cost(batch, 1.0)
+    assert torch.allclose(unscaled.braking_returns, batch.braking_returns, atol=1e-6)
+
+
+def test_learner_converges_to_the_optimum(tmp_path):
+    validation_episodes = spike_episodes(20, 1)
+    train, validation = dataset(spike_episodes(40, 0)), dataset(validation_episodes)
+    offline = learner(tmp_path)
+    before = offline.evaluate(validation)
+    assert (before.avoided, before.false_activations) == (0.0, 0.0)  # the untrained policy never brakes
+    epochs = []
+    offline.learn(train, validation, lambda epoch, metrics: epochs.append((epoch, metrics)))
+    assert [epoch for epoch, _ in epochs] == list(range(1, 61))
+    assert set(epochs[0][1]) == {"train_return", "mean_return", "avoided", "false_activations", "best_return"}
+    after = offline.evaluate(validation)
+    assert (after.avoided, after.false_activations) == (1.0, 0.0)
+    assert after.mean_return == pytest.approx(epochs[-1][1]["best_return"])
+    threats = [episode for episode in validation_episodes if episode.threat]
+    optimum = [5.0 - 0.1 * int(episode.braking_returns.argmax()) for episode in threats]
+    optimum += [-0.1 * len(episode) for episode in validation_episodes if not episode.threat]
+    assert after.mean_return == pytest.approx(np.mean(optimum), abs=1e-4)
+
+
+def test_logit_decay_keeps_the_braking_probability_above_zero(tmp_path):
+    """Where braking is always wrong, the penalty keeps the expected return below that of never braking."""
+    non_threats = [synthetic_episode(8, seed=seed, threat=False) for seed in range(12)]
+    episodes = [replace(item, braking_returns=np.full(8, -5.0, np.float32)) for item in non_threats]
+    optimum, returns = np.mean([episode.rewards.sum() for episode in episodes]), []
+
+    def log(epoch, metrics):
+        returns.append(metrics["train_return"])
+
+    for logit_decay in (0.0, 0.05):
+        learner(tmp_path, logit_decay=logit_decay).learn(dataset(episodes), dataset(episodes), log)
+    assert returns[59] == pytest.approx(optimum, abs=0.1)
+    assert returns[119] < optimum - 0.5
+
+
+def test_evaluation_ends_each_episode_at_the_first_braking_decision(tmp_path):
+    episodes = [
+        synthetic_episode(4),
+        synthetic_episode(3, seed=1, threat=False),
+        synthetic_episode(5, seed=2),
+    ]
+    offline = learner(tmp_path)
+    logits = torch.tensor([[-1.0, 2, -1, 3, 0], [-1, -1, -1, 9, 9], [-1, -1, -1, 1, -1]])
+    offline.logits = lambda batch: logits
+    evaluation = offline.evaluate(dataset(episodes))
+    returns = [
+        episodes[0].rewards[0] + episodes[0].braking_returns[1],
+        episodes[1].rewards.sum(),  # the logits after its end are padding
+        episodes[2].rewards[:3].sum() + episodes[2].braking_returns[3],
+    ]
+    assert evaluation.mean_return == pytest.approx(np.mean(returns), abs=1e-6)
+    assert (evaluation.avoided, evaluation.false_activations) == (0.5, 0.0)
+
+
+def test_evaluation_separates_levels_and_traffic(tmp_path):
+    levels = [synthetic_episode(4), synthetic_episode(3, seed=1, threat=False)]
+    segments = [synthetic_episode(3, seed=seed, threat=False, traffic=True) for seed in (2, 3)]
+    offline = learner(tmp_path)
+    logits = torch.tensor([[-1.0] * 4, [-1.0] * 4, [-1.0, 1, -1, -1], [-1.0] * 4])
+    offline.logits = lambda batch: logits
+    evaluation = offline.evaluate(dataset(levels + segments))
+    assert evaluation[1:] == (0.0, 0.0, 0.5)
+    returns = [episode.rewards.sum() for episode in (*levels, segments[1])]
+    returns.append(segments[0].rewards[0] + segments[0].braking_returns[1])
+    assert evaluation.mean_return == pytest.approx(np.mean(returns), abs=1e-6)
+
+
+def test_evaluation_equals_closed_loop_returns(tmp_path):
+    features = FeatureConfig(inputs=("spike_peak", "ffi", "ego_speed"), history=3, repeat=5, latch=True)
+    config, seeds = replace(offline_config(tmp_path), features=features), range(5)
+    recorder = EpisodeRecorder(partial(config.make_env, "validation"), hold=0, brake=1)
+    recorded = dataset(recorder.record(seeds), features)
+    offline = learner(tmp_path, features, batch_size=5)
+    model = offline.learn(recorded, recorded)
+    env, returns, onsets = config.make_policy_env("validation"), [], []
+    for seed in seeds:
+        observation, _ = env.reset(seed=seed)
+        total, done, onset = 0.0, False, 0
+        while not done:
+            action = model.predict(observation, deterministic=True)[0]
+            observation, reward, terminated, truncated, _ = env.step(action)
+            total, done, onset = total + float(reward), terminated or truncated, onset + int(action == 0)
+        returns.append(total)
+        onsets.append(onset)
+    assert len(set(onsets)) > 3
+    assert offline.evaluate(recorded).mean_return == pytest.approx(np.mean(returns), abs=3 * TOLERANCE)
+
+
+def test_same_seed_gives_the_same_weights(tmp_path):
+    weights = []
+    for _ in range(2):
+        model = learner(tmp_path, n_epochs=3).learn(
+            dataset(spike_episodes(12, 0)), dataset(spike_episodes(6, 1))
+        )
+        weights.append([value.numpy().tobytes() for value in model.policy.state_dict().values()])
+    assert weights[0] == weights[1]

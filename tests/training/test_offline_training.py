@@ -1,0 +1,61 @@
+"""Offline training with the command, from recording to the policy file."""
+
+from functools import partial
+
+import gymnasium as gym
+import pytest
+from support.recordings import offline_config, write_yaml
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.policies.policy import read_card
+from lgmd_gym.cli import main as cli
+from lgmd_gym.training.offline import traffic
+from lgmd_gym.training.offline.episodes import EpisodeRecorder
+from lgmd_gym.training.offline.storage import load
+from lgmd_gym.training.recordings import load_or_record
+
+
+def arguments(folder, out, *options):
+    common = ["train", "--algo", "offline", "--camera", "fovea", "--jobs", "1"]
+    return [*common, "--hyperparams", str(write_yaml(folder)), "--out", str(out), *options]
+
+
+def test_second_training_reuses_the_recordings_of_the_first(tmp_path, monkeypatch):
+    first, second = tmp_path / "first", tmp_path / "second"
+    assert cli.run(arguments(tmp_path, first, "--eval-episodes", "4")) == 0
+    monkeypatch.setattr(EpisodeRecorder, "record", None)  # any recording raises
+    options = ["--eval-episodes", "3", "--n-timesteps", "5", "--inputs", "ffi", "ego_speed"]
+    assert cli.run(arguments(tmp_path, second, *options, "--recordings", str(first))) == 0
+    assert not (second / "episodes").exists()
+    assert len((second / "log" / "progress.csv").read_text().splitlines()) == 1 + 3
+    card = read_card(second / "policy.zip")
+    assert card["algo"] == "ppo"
+    assert card["config"]["algo"] == "offline"
+    assert card["config"]["recordings"] is None  # no local path in a policy file
+    agent = make_agent(f"policy:{second / 'policy.zip'}")
+    observation, info = gym.make("LGMD/CCRs-v0", camera=agent.camera).reset(seed=0)
+    assert agent.act(observation, info).shape == (1,)
+    assert cli.run(["train", "--resume", str(first)]) == 0  # from the recorded episodes
+
+
+@pytest.mark.slow
+def test_training_with_traffic_and_reuse_of_its_recordings(tmp_path, monkeypatch):
+    make_traffic = partial(traffic.make_traffic, config={"duration": 12})
+    monkeypatch.setattr(traffic, "make_traffic", make_traffic)
+    monkeypatch.setattr(traffic, "MAX_LENGTH", 5.0)
+    first, second = tmp_path / "first", tmp_path / "second"
+    options = ["--eval-episodes", "3", "--n-timesteps", "3", "--traffic-episodes"]
+    assert cli.run(arguments(tmp_path, first, *options, "2")) == 0
+    levels, by_seed = (load(first / "episodes" / name / "000000.npz") for name in ("train", "traffic-train"))
+    assert [len(episodes) for episodes in levels] == [1, 1, 1]
+    assert len(by_seed) == 2
+    segments = [segment for episodes in by_seed for segment in episodes]
+    assert len(segments) > 2
+    assert all(segment.traffic and not segment.threat for segment in segments)
+    monkeypatch.setattr(traffic.TrafficRecorder, "record", None)  # any recording raises
+    assert cli.run(arguments(tmp_path, second, *options, "1", "--recordings", str(first))) == 0
+    columns = (second / "log" / "progress.csv").read_text().splitlines()[0].split(",")
+    expected = {"train_return", "mean_return", "avoided", "false_activations", "traffic_activations"}
+    assert set(columns) == expected | {"best_return"}
+    config = offline_config(tmp_path, n_timesteps=3, traffic_episodes=1, recordings=str(first))
+    assert len(load_or_record(config, "train", tmp_path)) == 3 + len(by_seed[0])

@@ -1,0 +1,106 @@
+"""Training with stable-baselines3: policies, seeds, checkpoints."""
+
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from support.recordings import write_yaml
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.policies.policy import read_card
+from lgmd_gym.training import TrainConfig, resume, train
+from lgmd_gym.training.online import newest_checkpoint
+
+DEMANDS = (0.0, -0.4, -1.0)
+YAML = """
+LGMD/CCRs-v0:
+  env_wrapper:
+    - lgmd_gym.training.PolicyWrapper: {history: 2, repeat: 4}
+  n_envs: 2
+  n_timesteps: 64
+  learning_rate: lin_0.001
+  n_steps: 16
+  batch_size: 16
+  policy_kwargs: {net_arch: [8]}
+"""
+
+
+def online_config(folder, algo="ppo", text=YAML, **options):
+    options = {"camera": "fovea", "eval_freq": 32, "eval_episodes": 1} | options
+    return TrainConfig.from_hyperparams(algo, "LGMD/CCRs-v0", write_yaml(folder, text), **options)
+
+
+@pytest.mark.parametrize(("demands", "latch"), [((), False), (DEMANDS, False), ((-1.0, 0.0), True)])
+def test_trained_policy_acts_as_the_model_predicts(tmp_path, demands, latch):
+    """With a latch, the first demand is full braking: an untrained network chooses it within 6 decisions."""
+    from stable_baselines3 import PPO
+
+    text = YAML.replace("repeat: 4", "repeat: 4, latch: true") if latch else YAML
+    config = online_config(tmp_path, text=text, demands=demands)
+    path = train(config, tmp_path / "run")
+    assert path.stat().st_size < 1_000_000
+    card = read_card(path)
+    assert card["camera"] == "fovea"
+    assert card["features"]["repeat"] == 4
+    agent = make_agent(f"policy:{path}")
+    model = PPO.load(path, device="cpu")
+    policy_env = config.make_policy_env("train")
+    env = gym.make("LGMD/CCRs-v0", camera=agent.camera)
+    policy_observation, _ = policy_env.reset(seed=3)
+    observation, info = env.reset(seed=3)
+    agent.reset(3)
+    for _ in range(6):
+        action, _ = model.predict(policy_observation, deterministic=True)
+        policy_observation, _, terminated, *_ = policy_env.step(action)
+        for _ in range(40 if terminated else 4):
+            demand = agent.act(observation, info)
+            assert demand == np.float32(demands[action] if demands else action)
+            observation, *_, info = env.step(demand)
+        if terminated:
+            break
+    assert terminated is latch
+    with pytest.raises(ValueError, match="run' exists"):
+        train(config, tmp_path / "run")
+
+
+def test_neighbouring_seeds_share_no_environment_seeds(tmp_path, monkeypatch):
+    """The constructor of stable-baselines3 seeds environment i with seed + i; the last seeding counts."""
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
+    seeds, seed_envs = [], DummyVecEnv.seed
+    monkeypatch.setattr(
+        DummyVecEnv, "seed", lambda self, seed: (seeds.append(seed), seed_envs(self, seed))[1]
+    )
+    for seed in (0, 1):
+        seeds.clear()
+        train(online_config(tmp_path, n_timesteps=32, eval_freq=10_000, seed=seed), tmp_path / f"{seed}")
+        assert seeds[-1] == 1_000_000 * seed
+
+
+def test_resume_continues_from_the_newest_checkpoint(tmp_path):
+    folder = tmp_path / "run"
+    train(online_config(tmp_path, n_timesteps=32), folder)
+    values = json.loads((folder / "config.json").read_text()) | {"n_timesteps": 96}
+    (folder / "config.json").write_text(json.dumps(values))
+    first_result = np.load(folder / "best" / "evaluations.npz")["results"].mean()
+    write_yaml(tmp_path, "default: {n_envs: 7}")  # only the stored configuration counts
+    assert newest_checkpoint(folder).name == "model_32_steps.zip"
+    policy = resume(folder)
+    assert newest_checkpoint(folder).name == "model_96_steps.zip"
+    assert read_card(policy)["config"] == values
+    evaluations = np.load(folder / "best" / "evaluations.npz")
+    assert evaluations["timesteps"].tolist() == [32, 64, 96]
+    assert evaluations["results"][0].mean() == first_result
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("algo", ["sac", "dqn"])
+def test_off_policy_algorithms_train(tmp_path, algo):
+    text = "default: {n_envs: 2, n_timesteps: 400, learning_starts: 100, policy_kwargs: {net_arch: [8]}}"
+    config = online_config(tmp_path, algo, text, eval_freq=200)
+    agent = make_agent(f"policy:{train(config, tmp_path / 'run')}")
+    observation, info = gym.make("LGMD/CCRs-v0", camera=agent.camera).reset(seed=0)
+    demand = agent.act(observation, info)
+    assert demand.shape == (1,)
+    assert algo == "sac" or float(demand[0]) in np.float32(DEMANDS)

@@ -1,0 +1,104 @@
+"""Files of recorded episodes, and the episodes that a training records or reuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.recordings import offline_config, synthetic_episode
+
+from lgmd_gym.training import recordings, train
+from lgmd_gym.training.offline.episodes import EpisodeRecorder
+from lgmd_gym.training.offline.storage import check_file, load, save
+from lgmd_gym.training.recordings import check_recordings, load_or_record, origin_of, recording_sets
+
+
+def write_episodes(folder, config, by_seed):
+    folder.mkdir(parents=True, exist_ok=True)
+    save(by_seed, folder / f"{len(list(folder.iterdir()))}.npz", origin_of(config))
+
+
+def test_files_restore_every_episode(tmp_path):
+    threat = synthetic_episode(4, frames=True)
+    segment = synthetic_episode(2, seed=1, threat=False, traffic=True, frames=True)
+    save([[threat, segment], []], tmp_path / "some.npz", {"camera": "fovea"})
+    assert check_file(tmp_path / "some.npz", {"camera": "fovea"}) == 2
+    restored, empty = load(tmp_path / "some.npz")
+    assert empty == []
+    for left, right in zip((threat, segment), restored, strict=True):
+        assert (left.threat, left.traffic) == (right.threat, right.traffic)
+        for name in ("rewards", "braking_returns", "braking_contacts", "frames"):
+            assert np.array_equal(getattr(left, name), getattr(right, name))
+        for name in left.observations:
+            assert np.array_equal(left.observations[name], right.observations[name])
+
+
+def test_file_without_episodes_is_rejected(tmp_path):
+    (tmp_path / "text.npz").write_text("text")
+    with pytest.raises(ValueError, match=r"text\.npz' holds no recorded episodes"):
+        load(tmp_path / "text.npz")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"camera": "wide"}, 'another camera \\("fovea", not "wide"\\); record new episodes'),
+        ({"n_timesteps": 9}, "holds 2 episodes, 9 are required; reduce the number"),
+        ({"inputs": ("frame",), "n_timesteps": 2}, "recorded with another shrink"),
+    ],
+)
+def test_unsuitable_recordings_are_rejected(tmp_path, options, message):
+    for _ in range(2):
+        write_episodes(tmp_path / "episodes" / "train", offline_config(tmp_path), [[synthetic_episode()]])
+    config = offline_config(tmp_path, recordings=str(tmp_path), **options)
+    with pytest.raises(ValueError, match=message):
+        check_recordings(config)
+
+
+def test_missing_recordings_are_rejected_before_the_folder_is_made(tmp_path):
+    config = offline_config(tmp_path, recordings=str(tmp_path / "missing"))
+    with pytest.raises(ValueError, match=r"no recorded episodes in .*missing.*; train once with"):
+        train(config, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_interrupted_recording_resumes_at_the_missing_file(tmp_path, monkeypatch):
+    recorded = []
+
+    def record(self, seeds, jobs, on_recorded):
+        if len(recorded) == 2:
+            raise KeyboardInterrupt
+        recorded.append(seeds)
+        return [synthetic_episode(seed=seed) for seed in seeds]
+
+    monkeypatch.setattr(recordings, "FILE_SIZE", 2)
+    monkeypatch.setattr(EpisodeRecorder, "record", record)
+    config = offline_config(tmp_path, n_timesteps=5)
+    with pytest.raises(KeyboardInterrupt):
+        load_or_record(config, "train", tmp_path)
+    del recorded[:1]
+    episodes = load_or_record(config, "train", tmp_path)
+    assert recorded == [range(2, 4), range(4, 5)]
+    expected = [synthetic_episode(seed=seed).rewards[0] for seed in range(5)]
+    assert [episode.rewards[0] for episode in episodes] == expected
+
+
+def test_traffic_recordings_are_required_in_addition(tmp_path):
+    config = offline_config(
+        tmp_path, recordings=str(tmp_path), traffic_episodes=9, eval_episodes=1, n_timesteps=1
+    )
+    sets = [*recording_sets(config, "train"), *recording_sets(config, "validation")]
+    assert [item.name for item in sets] == ["train", "traffic-train", "validation", "traffic-validation"]
+    assert [len(item.seeds) for item in sets] == [1, 9, 1, 3]
+    _, traffic_train, _, traffic_validation = (set(item.seeds) for item in sets)
+    assert not traffic_train & traffic_validation
+    assert min(traffic_train | traffic_validation) >= 10_000  # the traffic suite uses the seeds from 0 on
+    for name in ("train", "validation"):
+        write_episodes(tmp_path / "episodes" / name, config, [[synthetic_episode()]])
+    with pytest.raises(ValueError, match="--algo offline --traffic-episodes 9, without --recordings"):
+        check_recordings(config)
+    for name in ("traffic-train", "traffic-validation"):
+        by_seed = [[], [synthetic_episode(), synthetic_episode()], []]
+        write_episodes(tmp_path / "episodes" / name, config, by_seed)
+    with pytest.raises(ValueError, match="traffic-train' holds 3 episodes, 9 are required"):
+        check_recordings(config)
+    check_recordings(replace(config, traffic_episodes=3))

@@ -1,0 +1,72 @@
+"""The shipped policy `zones`, and errors for policy files."""
+
+import re
+import zipfile
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.policies.policy import find_policy, read_card
+from lgmd_gym.training import TrainConfig
+from lgmd_gym.training.hyperparams import read_hyperparams
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("policy:zone", "did you mean 'zones'"),
+        ("policy:missing.zip", "policy 'missing.zip' cannot be read: No such file"),
+        ("policy:pyproject.toml", "pyproject.toml' is no"),
+        ("no-brake,ttc-oracle", "separate agents by spaces"),
+    ],
+)
+def test_invalid_policy_names_are_rejected(text, message):
+    with pytest.raises(ValueError, match=message):
+        make_agent(text)
+
+
+def test_file_is_small_and_contains_no_local_path():
+    path = find_policy("zones")
+    assert path.stat().st_size < 1_000_000
+    with zipfile.ZipFile(path) as archive:
+        for name in archive.namelist():
+            assert not re.search(rb"/(tmp|home|root|work)/", archive.read(name)), name
+
+
+def test_card_matches_the_packaged_hyperparameters_and_cameras():
+    config = TrainConfig.from_dict(read_card(find_policy("zones"))["config"])
+    assert config.camera == make_agent("stopping-zone").camera
+    assert config.algo_kwargs == read_hyperparams("offline", config.env_id)["algo_kwargs"]
+
+
+@pytest.mark.parametrize("scenario", ["CCRs", "EmptyRoad"])
+def test_policy_brakes_for_a_car_and_not_on_an_empty_road(scenario):
+    agent = make_agent("policy:zones")
+    env = gym.make(f"LGMD/{scenario}-v0", ego_speed=11.0, camera=agent.camera)
+    observation, info = env.reset(seed=1)
+    agent.reset(1)
+    braked = done = False
+    while not done:
+        action = agent.act(observation, info)
+        braked = braked or bool(action[0] < 0)
+        assert agent.alert is bool(action[0] < 0)  # independent of the neurons' alerts
+        observation, _, terminated, truncated, info = env.step(action)
+        done = terminated or truncated
+    assert braked is (scenario == "CCRs")
+    assert not info["collision"]
+
+
+@pytest.mark.parametrize("acceleration", [3.0, 0.5, -3.0])
+def test_policy_does_not_react_to_own_acceleration(acceleration):
+    """Recorded levels contain no acceleration, so that a policy with the input `speed_change` braked here."""
+    agent = make_agent("policy:zones")
+    times = np.arange(0.0, 8.0, 1 / 30)
+    for speed in (0.0 if acceleration > 0 else 24.0) + acceleration * times:
+        observation = {
+            "membrane_potential": np.full(20, 0.55, np.float32),
+            "ego_speed": np.array([speed], np.float32),
+            "ego_yaw_rate": np.zeros(1, np.float32),
+        }
+        assert agent.act(observation, {})[0] == 0.0
