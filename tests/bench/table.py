@@ -1,7 +1,7 @@
 """Speed table of the README: `python tests/bench/table.py`.
 
-All figures are medians of interleaved rounds in one process, on one core unless a row states otherwise. A busy
-machine slows both sides of a ratio.
+All figures are medians of interleaved rounds in one process, on one core unless a row states otherwise. A
+busy machine slows both sides of a ratio.
 """
 
 import platform
