@@ -1,29 +1,29 @@
-"""Errors that name the value and the mend: the nearest known name for an unknown one."""
+"""Error messages that state the offending value and suggest a fix."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str]) -> ValueError:
-    """Return the ValueError for a name that is not among the known ones.
+    """Return a ValueError for an unknown name; its message suggests the closest known name.
 
     Args:
-        kind: What is named, for the message ("agent", "camera preset", ...).
-        name: What was given.
-        known: The names that would have been accepted.
+        kind: Kind of the named thing, for example "agent" or "camera preset".
+        name: The unknown name.
+        known: Valid names.
 
     Example:
         >>> unknown_name("agent", "spike-treshold", ["no-brake", "spike-threshold"])
         ValueError("unknown agent 'spike-treshold'; did you mean 'spike-threshold'?")
     """
     names = sorted(known)
-    nearest = get_close_matches(str(name), names, n=1, cutoff=0.5)
-    mend = f"did you mean {nearest[0]!r}?" if nearest else f"known: {', '.join(names) or 'none'}"
-    return ValueError(f"unknown {kind} {name!r}; {mend}")
+    closest = get_close_matches(str(name), names, n=1, cutoff=0.5)
+    fix = f"did you mean {closest[0]!r}?" if closest else f"known: {', '.join(names) or 'none'}"
+    return ValueError(f"unknown {kind} {name!r}; {fix}")
 
 
 def check_keys(kind: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Refuse the first key in `given` that is not in `known`, naming the nearest.
+    """Raise `unknown_name` for the first of the given keys that is not known.
 
     Raises:
         ValueError: For an unknown key.

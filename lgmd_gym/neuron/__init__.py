@@ -1,4 +1,4 @@
-"""The LGMD neuron: parameters, the stepper, its answer, and the danger zone."""
+"""The LGMD neuron: model parameters, compiled kernels, reference model and danger zone."""
 
 from lgmd_gym.neuron.danger_zone import danger_zone
 from lgmd_gym.neuron.model import LGMD

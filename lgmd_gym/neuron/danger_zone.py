@@ -1,11 +1,11 @@
-"""The danger zone: the ground a car is about to drive over, as a mask for the neuron."""
+"""Pixel weights of the danger zone, the stretch of road directly ahead (Hartbauer, 2017)."""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Sub-rows and sub-columns per pixel: the zone's edges are anti-aliased.
+# Sub-rows and sub-columns per pixel, for anti-aliased edges.
 _OVERSAMPLING = 4
 
 
@@ -20,78 +20,88 @@ def danger_zone(
     far_m: float = math.inf,
     clearance_m: float = 0.0,
 ) -> NDArray[np.float32]:
-    """Project the lane ahead to the image: weight 1 on it, 0 beside it, in between along its edges.
+    """Project the lane ahead to the image: weight 1 inside, 0 outside, fractions along the edges.
 
-    A pinhole camera over flat ground, in the middle of a straight lane (after Hartbauer, 2017). A row
-    below the horizon sees the ground at one distance; the zone's half width there is that of the lane.
-    With `clearance_m` the zone is the box of that height above the lane instead, so that it also
-    covers the upper part of a vehicle ahead: each row takes the widest section which it crosses.
+    The model is a pinhole camera above flat ground in the middle of a straight lane, as in the danger
+    zone of Hartbauer (2017). With `clearance_m`, the zone is the box of that height above the lane, which
+    also covers the upper part of a vehicle ahead; each row then has the width of its nearest section.
 
     Args:
         shape: (height, width) of the frames [px].
-        hfov_deg: Horizontal field of view [deg], in (0, 180).
-        width_m: Width of the zone [m].
-        height_m: Height of the camera above the ground [m].
-        pitch_deg: Pitch of the camera [deg], positive upwards.
-        near_m: Where the zone begins [m].
-        far_m: Where it ends [m].
-        clearance_m: Height of the zone above the ground [m].
+        hfov_deg: Horizontal field of view, in (0, 180) [deg].
+        width_m: Width of the zone, > 0 [m].
+        height_m: Height of the camera above the ground, > 0 [m].
+        pitch_deg: Pitch of the camera, positive upwards [deg].
+        near_m: Distance at which the zone begins, in [0, far_m) [m].
+        far_m: Distance at which the zone ends [m].
+        clearance_m: Height of the zone above the ground, >= 0 [m].
 
     Returns:
         Weights in [0, 1], float32, shape (height, width), for `LGMD(..., mask=...)`.
 
     Raises:
-        ValueError: For a value out of bounds, or when the zone lies outside the image.
+        ValueError: For a value out of range, or a zone outside the image.
 
     Example:
-        >>> danger_zone((90, 160), hfov_deg=40.0)[60].sum() > 0
-        True
+        >>> zone = danger_zone((90, 160), hfov_deg=40.0)
+        >>> [float(zone[row].max()) for row in (44, 60)]  # above and below the horizon
+        [0.0, 1.0]
     """
     height, width = shape
-    _check(hfov_deg, width_m, height_m, near_m, far_m, clearance_m)
+    _check_arguments(hfov_deg, width_m, height_m, near_m, far_m, clearance_m)
     focal = width / 2.0 / math.tan(math.radians(hfov_deg) / 2.0)
     step = 1.0 / _OVERSAMPLING
     rows = np.arange(step / 2, height, step) - height / 2.0
     columns = np.abs(np.arange(step / 2, width, step) - width / 2.0)
-    below = rows / focal  # the tangent of the angle below the optical axis
+    below_axis = rows / focal  # tangent of the angle below the optical axis
     tilt = math.tan(math.radians(pitch_deg))
-    slope = (below - tilt) / (1.0 + below * tilt)  # below the horizon
-    depth = _nearest_section(slope, height_m, clearance_m, max(near_m, 1e-6), far_m)
-    # A pitched camera sees a point at depth d along its axis at d * (cos + slope * sin).
-    axial = depth * (math.cos(math.radians(pitch_deg)) - slope * math.sin(math.radians(pitch_deg)))
-    half = np.where(np.isfinite(depth) & (axial > 0), focal * width_m / 2.0 / np.maximum(axial, 1e-9), -1.0)
-    inside = columns[None, :] <= half[:, None]
+    slope = (below_axis - tilt) / (1.0 + below_axis * tilt)  # tangent of the angle below the horizon
+    distance = _nearest_section(slope, height_m, clearance_m, max(near_m, 1e-6), far_m)
+    # Depth along the optical axis of a pitched camera.
+    depth = distance * (math.cos(math.radians(pitch_deg)) - slope * math.sin(math.radians(pitch_deg)))
+    visible = np.isfinite(distance) & (depth > 0)
+    half_width = np.where(visible, focal * width_m / 2.0 / np.maximum(depth, 1e-9), -1.0)
+    inside = columns[None, :] <= half_width[:, None]
     zone = inside.reshape(height, _OVERSAMPLING, width, _OVERSAMPLING).mean((1, 3), dtype=np.float32)
     if not zone.any():
         raise ValueError(
-            f"the danger zone from {near_m:g} to {far_m:g} m lies outside an image of {hfov_deg:g} deg; "
-            "lower near_m, raise far_m or widen hfov_deg"
+            f"the danger zone must overlap the image, got near_m {near_m:g}, far_m {far_m:g} and "
+            f"hfov_deg {hfov_deg:g}; lower near_m, raise far_m or widen hfov_deg"
         )
     return zone
 
 
 def _nearest_section(slope: NDArray, camera: float, clearance: float, near: float, far: float) -> NDArray:
-    """The distance at which each ray first meets the box over the lane; infinite where it never does."""
+    """Return the distance at which each ray enters the box above the lane; infinite without entry.
+
+    Args:
+        slope: Tangents of the rays' angles below the horizon.
+        camera: Height of the camera [m].
+        clearance: Height of the box [m].
+        near: Distance at which the box begins [m].
+        far: Distance at which the box ends [m].
+    """
     with np.errstate(divide="ignore"):
-        ground = np.where(slope > 0, camera / slope, np.inf)  # where the ray meets the ground
-        roof = (camera - clearance) / slope  # where it meets the plane of the clearance
-    if clearance >= camera:  # inside the box from the start, out of it through the roof or the far end
-        meets = np.where((slope >= 0) | (roof >= near), near, np.inf)
+        ground = np.where(slope > 0, camera / slope, np.inf)  # intersection with the ground
+        top = (camera - clearance) / slope  # intersection with the top of the box
+    if clearance >= camera:  # rays start at the height of the box
+        entry = np.where((slope >= 0) | (top >= near), near, np.inf)
     else:
-        meets = np.where(slope > 0, np.maximum(roof, near), np.inf)
+        entry = np.where(slope > 0, np.maximum(top, near), np.inf)
     if clearance == 0.0:
-        meets = np.where(ground >= near, ground, np.inf)
-    return np.where((meets <= far) & (meets <= ground), meets, np.inf)
+        entry = np.where(ground >= near, ground, np.inf)
+    return np.where((entry <= far) & (entry <= ground), entry, np.inf)
 
 
-def _check(hfov: float, width: float, height: float, near: float, far: float, clearance: float) -> None:
-    """Refuse what no camera or lane has."""
+def _check_arguments(
+    hfov: float, width: float, height: float, near: float, far: float, clearance: float
+) -> None:
     if not 0.0 < hfov < 180.0:
-        raise ValueError(f"hfov_deg = {hfov:g} must lie between 0 and 180")
+        raise ValueError(f"hfov_deg must be > 0 and < 180, got {hfov:g}")
     for name, value in (("width_m", width), ("height_m", height)):
         if not 0.0 < value < math.inf:
-            raise ValueError(f"{name} = {value:g} must be > 0 and finite, in metres")
+            raise ValueError(f"{name} must be > 0 and finite, got {value:g}")
     if not 0.0 <= near < far:
-        raise ValueError(f"near_m = {near:g} must be >= 0 and below far_m = {far:g}")
+        raise ValueError(f"near_m must be >= 0 and < far_m = {far:g}, got {near:g}")
     if not 0.0 <= clearance < math.inf:
-        raise ValueError(f"clearance_m = {clearance:g} must be >= 0 and finite, in metres")
+        raise ValueError(f"clearance_m must be >= 0 and finite, got {clearance:g}")

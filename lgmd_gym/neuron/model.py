@@ -1,21 +1,19 @@
-"""LGMD: the public stateful stepper on the kernels."""
+"""LGMD: the stateful neuron."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lgmd_gym.neuron import general_kernel as general
-from lgmd_gym.neuron import kernels
-from lgmd_gym.neuron import state as layout
-from lgmd_gym.neuron.params import LGMDParams
+from lgmd_gym.neuron import general_kernel, kernels, state
+from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.response import Response
-from lgmd_gym.neuron.scalars import RESPONSE, constants, resting
+from lgmd_gym.neuron.scalars import RESPONSE, initial_scalars, pack_constants
 from lgmd_gym.neuron.threads import Threads
 from lgmd_gym.neuron.validation import (
     checked_fps,
     checked_frames,
     checked_num,
-    checked_params,
     checked_region,
+    checked_selection,
     checked_shape,
     checked_threads,
 )
@@ -24,32 +22,35 @@ _UINT8 = np.dtype(np.uint8)
 
 
 class LGMD:
-    """One locust looming neuron, or N of them, that answers frame by frame.
+    """One or N locust looming neurons, stepped frame by frame.
 
-    The first frame has no predecessor: it changes nothing and fires nothing. A step starts no thread
-    unless `threads` asks for it.
+    The first frame has no predecessor, so it causes no change and no spikes. A step starts no thread unless
+    `threads` is given.
 
     Args:
         shape: (height, width) of the frames [px].
-        fps: Frames per second; the answer depends on it (spikes a frame are not scaled by dt).
-        params: The model's parameters; None takes the paper's.
-        num: Number of neurons N, each with a frame of its own; None for a single one with plain answers.
-        mask: Weight of each pixel in [0, 1], shape (height, width), such as from `danger_zone`; F and K
-            are means over the pixels of weight above 0. The neuron sees nothing else.
-        roi: (top, left, height, width) [px], the same as a mask of 1 in that rectangle and 0 elsewhere.
-        threads: Threads that share the neurons of one step; None or 1 runs in the calling thread.
+        fps: Frame rate [Hz]. Outputs depend on it, because spikes per frame do not scale with the frame
+            interval.
+        params: Parameters of the model, or a mapping of them; None for the defaults, those of the paper.
+        num: Number of neurons N, each with its own frames; None for a single neuron with scalar outputs.
+        mask: Pixel weights in [0, 1], shape (height, width), for example from `danger_zone`. F and K are
+            means over the pixels with a weight > 0. Other pixels have no effect.
+        roi: Region of interest (top, left, height, width) [px]; equals a mask of 1 inside and 0 outside.
+        threads: Number of threads that share the neurons of a step; None or 1 for the calling thread only.
 
     Attributes:
         shape: (height, width) of the frames [px].
-        fps: Frames per second.
-        params: The model's parameters.
-        num: Number of neurons, None for a single one.
+        fps: Frame rate [Hz].
+        params: Parameters of the model.
+        num: Number of neurons; None for a single neuron.
 
     Raises:
-        ValueError: For a value out of bounds, naming it and the mend.
+        ValueError: For an argument out of range.
+        TypeError: For an argument of another type.
 
     Example:
-        >>> neuron = LGMD((90, 160))
+        >>> import numpy as np
+        >>> neuron = LGMD((90, 160), fps=30.0)
         >>> neuron.step(np.zeros((90, 160), np.uint8)).spikes
         0
     """
@@ -58,7 +59,7 @@ class LGMD:
         self,
         shape: tuple[int, int],
         fps: float = 30.0,
-        params: LGMDParams | None = None,
+        params: NeuronSpec = None,
         num: int | None = None,
         *,
         mask: ArrayLike | None = None,
@@ -67,106 +68,97 @@ class LGMD:
     ) -> None:
         self.shape = checked_shape(shape)
         self.fps = checked_fps(fps)
-        self.params = checked_params(params)
+        self.params = LGMDParams.make(params)
         self.num = checked_num(num)
         self._threads = Threads(checked_threads(threads))
         self._count = 1 if self.num is None else self.num
         self._frames_shape = self.shape if self.num is None else (self.num, *self.shape)
         self._all_active = np.ones(self._count, np.bool_)
 
-        self._y0, self._x0, region, self._weight, n_pixels = checked_region(self.shape, mask, roi)
-        self._par = constants(self.params, self.fps, n_pixels)
-        self._rest = resting(self.params)
-        self._rows = np.tile(self._rest, (self._count, 1))
-        self._prev = np.zeros((self._count, *region), np.uint8)
+        self._y0, self._x0, region_shape, self._weight, n_pixels = checked_region(self.shape, mask, roi)
+        self._const = pack_constants(self.params, self.fps, n_pixels)
+        self._initial = initial_scalars(self.params)
+        self._scalars = np.tile(self._initial, (self._count, 1))
+        self._previous = np.zeros((self._count, *region_shape), np.uint8)
         self._fast = kernels.supports(self.params)
         if self._fast:
-            self._maps = layout.allocate(self._count, region)
+            self._maps = state.allocate(self._count, region_shape)
         else:
-            self._maps = general.allocate(
-                self._count, region, self.params.n_p, 2 if self.params.on_off else 1
-            )
+            paths = 2 if self.params.on_off else 1
+            self._maps = general_kernel.allocate(self._count, region_shape, self.params.n_p, paths)
 
     def step(self, frame: ArrayLike, active: ArrayLike | None = None) -> Response:
-        """Answer one frame.
+        """Process one frame per neuron.
 
         Args:
-            frame: Grey luminance in 0-255, uint8 or float, shape (H, W), or (N, H, W) from N neurons. Row
-                0 is the top. It is not kept; any memory layout works, contiguous uint8 is not copied.
-            active: Which of the N neurons see their frame, shape (N,), bool. The others keep their state,
-                answer as before, and their frames are not looked at. None steps all.
+            frame: Grey luminance in 0-255, uint8 or float, shape (H, W), or (N, H, W) for N neurons; row 0
+                is the top. Any memory layout is accepted; contiguous uint8 arrays are not copied.
+            active: Selection of the neurons to step, bool, shape (N,); None for all. The other neurons
+                keep their state and their last outputs, and their frames are ignored.
 
         Returns:
-            The answer: plain numbers from a single neuron, fresh arrays of shape (N,) from N.
+            Python scalars for a single neuron, new arrays of shape (N,) for N neurons.
 
         Raises:
-            ValueError: For a frame of another shape, with NaN or infinite pixels, or scaled to 0-1.
+            ValueError: For a frame of another shape, or with values that are not luminance in 0-255.
             TypeError: For a frame of another dtype.
         """
-        chosen = self._all_active if active is None else self._checked_active(active, "active")
+        selected = self._all_active if active is None else checked_selection("active", active, self._count)
         if type(frame) is not np.ndarray or (
             frame.dtype is not _UINT8 or frame.shape != self._frames_shape or not frame.flags.c_contiguous
         ):
-            frame = checked_frames(frame, self._frames_shape, None if active is None else chosen)
-        if frame.dtype != self._prev.dtype:
+            frame = checked_frames(frame, self._frames_shape, None if active is None else selected)
+        if frame.dtype != self._previous.dtype:
             frame = self._as_float(frame)
         frames = frame[None] if self.num is None else frame
-        state = (self._prev, self._y0, self._x0, self._weight, chosen, self._rows, self._par, *self._maps)
-        kernel = kernels.step if self._fast else general.step
+        region = (self._previous, self._y0, self._x0, self._weight)
+        args = (frames, *region, selected, self._scalars, self._const, *self._maps)
+        kernel = kernels.step if self._fast else general_kernel.step
         if self._threads.count == 1:
-            kernel(0, self._count, frames, *state)
+            kernel(0, self._count, *args)
         else:
-            self._threads.run(kernel, self._count, (frames, *state))
+            self._threads.run(kernel, self._count, args)
         return self._response()
 
     def reset(self, mask: ArrayLike | None = None) -> None:
-        """Forget every frame.
+        """Return to the state before the first frame.
 
         Args:
-            mask: Which of the N neurons forget, shape (N,), bool; None for all.
+            mask: Selection of the neurons to reset, bool, shape (N,); None for all.
         """
-        chosen = self._all_active if mask is None else self._checked_active(mask, "mask")
-        self._rows[chosen] = self._rest
-        for maps in self._maps:
-            maps[chosen] = 0
+        selected = self._all_active if mask is None else checked_selection("mask", mask, self._count)
+        self._scalars[selected] = self._initial
+        for values in self._maps:
+            values[selected] = 0
 
     @property
     def layers(self) -> dict[str, NDArray[np.float32]]:
-        """The maps of the last frame, float32, shape (H, W), or (N, H, W) from N neurons; fresh copies.
+        """Maps P, E, I, S and G of the last frame; new arrays of shape (H, W), or (N, H, W) for N neurons.
 
-        P, E (`|P|` by path), I (of the path that P excites: ON where P >= 0), S and G as in the
-        equations of `LGMDParams`; all 0 before the first change and outside the mask.
+        E is `|P|` by path, and I is that of the path which P excites (ON where P >= 0); see `LGMDParams` for
+        the equations. All maps are 0 before the first change and outside the mask.
         """
-        read = layout.layers if self._fast else general.layers
-        maps = read(self._rows, self._par, *self._maps)
-        h, w = self._prev.shape[1:]
-        whole = {}
-        for name, region in maps.items():
+        read = state.layers if self._fast else general_kernel.layers
+        maps = read(self._scalars, self._const, *self._maps)
+        h, w = self._previous.shape[1:]
+        images = {}
+        for name, values in maps.items():
             image = np.zeros((self._count, *self.shape), np.float32)
-            image[:, self._y0 : self._y0 + h, self._x0 : self._x0 + w] = region[..., :w]
-            whole[name] = image[0] if self.num is None else image
-        return whole
+            image[:, self._y0 : self._y0 + h, self._x0 : self._x0 + w] = values[..., :w]
+            images[name] = image[0] if self.num is None else image
+        return images
 
     def _response(self) -> Response:
-        """Read the answer out of the scalars."""
         if self.num is None:
-            frequency, spikes, k, k_hat, f, w, latency, alert = self._rows[0, RESPONSE].tolist()
+            frequency, spikes, k, k_hat, f, w, latency, alert = self._scalars[0, RESPONSE].tolist()
             return Response(frequency, int(spikes), k, k_hat, f, w, latency, alert > 0.0)
-        frequency, spikes, k, k_hat, f, w, latency, alert = self._rows[:, RESPONSE].T.copy()
+        frequency, spikes, k, k_hat, f, w, latency, alert = self._scalars[:, RESPONSE].T.copy()
         return Response(frequency, spikes.astype(np.int64), k, k_hat, f, w, latency, alert > 0.0)
 
     def _as_float(self, frame: NDArray) -> NDArray[np.float32]:
-        """Go over to float frames for good: from the first one on, luminance is held as float32."""
-        self._prev = self._prev.astype(np.float32, copy=False)
+        """Return the frame as float32, and store luminance as float32 from now on."""
+        self._previous = self._previous.astype(np.float32, copy=False)
         return frame.astype(np.float32, copy=False)
-
-    def _checked_active(self, which: ArrayLike, name: str) -> NDArray[np.bool_]:
-        """Return a choice of neurons as a bool array of shape (N,)."""
-        chosen = np.asarray(which)
-        if chosen.dtype != np.bool_ or chosen.shape != (self._count,):
-            given = f"{name} of dtype {chosen.dtype} and shape {chosen.shape}"
-            raise ValueError(f"{given} must be bool of shape ({self._count},)")
-        return np.ascontiguousarray(chosen)
 
     def __repr__(self) -> str:
         return f"LGMD(shape={self.shape}, fps={self.fps:g}, num={self.num})"

@@ -1,4 +1,4 @@
-"""The LGMD equations in float64 NumPy, one after the other: slow, obvious, the oracle of the tests."""
+"""Reference model: the LGMD equations in float64 NumPy, one after the other, for tests."""
 
 import math
 
@@ -12,10 +12,10 @@ Map = NDArray[np.float64]
 
 
 def neighbourhood(image: Map) -> tuple[Map, Map, Map]:
-    """Centre, sum of the 4 nearest, sum of the 4 diagonal pixels of every pixel; edges replicated.
+    """Return the centre, the sum of the 4 nearest and the sum of the 4 diagonal pixels of every pixel.
 
     Args:
-        image: Shape (H, W).
+        image: Map of shape (H, W); its edges are replicated.
     """
     p = np.pad(image, 1, mode="edge")
     nearest = p[:-2, 1:-1] + p[2:, 1:-1] + p[1:-1, :-2] + p[1:-1, 2:]
@@ -24,18 +24,18 @@ def neighbourhood(image: Map) -> tuple[Map, Map, Map]:
 
 
 class ReferenceLGMD:
-    """One neuron, stepped through the equations of the paper in their order.
+    """One neuron that evaluates the equations of the paper in their order.
 
     Args:
-        shape: (height, width) of the frames.
-        fps: Frames per second.
-        params: The model's parameters.
-        mask: Weight of each pixel in [0, 1], shape (H, W); None weighs all with 1.
+        shape: (height, width) of the frames [px].
+        fps: Frame rate [Hz].
+        params: Parameters of the model; None for the defaults.
+        mask: Pixel weights in [0, 1], shape (H, W); None for 1.
 
     Attributes:
-        layers: Maps P, E, I, S, G of the last frame, float64, shape (H, W); I is that of the path
+        layers: Maps P, E, I, S and G of the last frame, float64, shape (H, W); I is that of the path
             which P excites (ON where P >= 0, else OFF).
-        g: The grouped map ahead of the latency filter, shape (H, W).
+        g: Output of the grouping layer before the latency filter, shape (H, W).
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class ReferenceLGMD:
         self.reset()
 
     def reset(self) -> None:
-        """Forget every frame."""
+        """Return to the state before the first frame."""
         p, zeros = self.params, np.zeros(self.mask.shape)
         self.luminance: Map | None = None
         self.past_p = [zeros] * p.n_p
@@ -67,11 +67,11 @@ class ReferenceLGMD:
         self.layers = dict.fromkeys("PEISG", zeros)
 
     def gain(self, tau: float) -> float:
-        """The discrete gain of a first-order low-pass, dt / (dt + tau)."""
+        """Return the discrete gain of a first-order low-pass filter, dt / (dt + tau)."""
         return self.dt / (self.dt + tau)
 
     def step(self, frame: NDArray) -> Response:
-        """Answer one frame of luminance in 0-255, shape (H, W)."""
+        """Process one frame of luminance in 0-255, shape (H, W)."""
         p = self.params
         luminance = np.asarray(frame, float) * self.mask
         if self.luminance is None:
@@ -94,7 +94,7 @@ class ReferenceLGMD:
         return self.fire(potential.sum(), f, w)
 
     def feed_forward(self, photo: Map) -> float:
-        """F of equation 2, as late as it reaches the cell."""
+        """Return F with its delay (eq. 2)."""
         p = self.params
         f = np.abs(photo).sum() / self.n
         start = p.warm_start and self.first_change
@@ -102,15 +102,15 @@ class ReferenceLGMD:
         return before if p.ffi_delay else self.f_hat
 
     def latency(self, f: float) -> float:
-        """The time constant of G [ms] (eq. 9)."""
+        """Return the time constant of G [ms] (eq. 9)."""
         p = self.params
-        rest = 1.0 - f / p.t_f
+        fraction = 1.0 - f / p.t_f
         if p.latency == "jump":
-            return p.tau_g * (rest if rest >= 0.0 else p.sigma_2)
-        return p.tau_g * max(p.sigma_2, rest)
+            return p.tau_g * (fraction if fraction >= 0.0 else p.sigma_2)
+        return p.tau_g * max(p.sigma_2, fraction)
 
     def summation(self, photo: Map, w: float) -> Map:
-        """S of equations 3 to 8."""
+        """Return S (eq. 3 to 8)."""
         p = self.params
         half_waves = [np.maximum(photo, 0), np.maximum(-photo, 0)] if p.on_off else [photo]  # eq. 3
         last, self.paths = (
@@ -126,7 +126,7 @@ class ReferenceLGMD:
         return p.theta_1 * s_on + p.theta_2 * s_off + p.theta_3 * s_on * s_off  # eq. 8
 
     def inhibition(self, path: int, last: Map) -> Map:
-        """I of one path (eq. 4 to 6); `last` is its E of the frame before."""
+        """Return I of one path (eq. 4 to 6); `last` is E of that path in the last frame."""
         p = self.params
         now, total = self.paths[path], np.zeros_like(last)
         for ring, (tau, weight) in enumerate(zip(p.tau_2, p.weights, strict=True)):
@@ -138,7 +138,7 @@ class ReferenceLGMD:
         return total
 
     def grouping(self, s: Map) -> Map:
-        """The grouping layer of Yue & Rind (2006)."""
+        """Return g, the output of the grouping layer of Yue & Rind (2006)."""
         p = self.params
         local = sum(neighbourhood(s)) / 9.0
         omega = p.delta_c + np.abs(local).max() / p.c_w
@@ -146,7 +146,7 @@ class ReferenceLGMD:
         return np.where(g * p.c_de >= p.t_de, g, 0.0)
 
     def fire(self, k_sum: float, f: float, w: float) -> Response:
-        """K, its adaptation, spikes and frequency (eq. 10 to 12)."""
+        """Update K, its adaptation, spikes and frequency (eq. 10 to 12)."""
         p = self.params
         k = 1.0 / (1.0 + math.exp(-k_sum / (self.n * p.sigma_3)))
         if f >= p.t_ffi:

@@ -1,9 +1,9 @@
-"""The scalar half of a step: what one neuron does between and after the passes over its pixels.
+"""Scalar part of a step: feed-forward inhibition, membrane potential, spikes and spike frequency.
 
-The kernels keep one float64 row of scalars per neuron, whose first eight entries are the fields of
-`Response` in order; `constants` packs parameters and frame rate for them.
+The scalar state of a neuron is one float64 row. Its first eight entries are the fields of `Response`, in
+order. The constants are the parameters at a frame rate, packed into one float64 row.
 
-numba's cache watches the file of a kernel alone: after a change here, delete __pycache__/*.nbi.
+numba's cache tracks only the file of a kernel: delete __pycache__/*.nbi after a change in this file.
 """
 
 import math
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from lgmd_gym.neuron.params import LGMDParams
 
-# One row of scalars: the Response, then the state, then a ring of the spikes of n_ts frames.
+# Indices of the scalar state: Response, internal state, then a ring buffer of the spikes of n_ts frames.
 FREQUENCY, SPIKES, K, K_HAT, F, W, LATENCY, ALERT = range(8)
 AGE, F_HAT, K_SUM, COUNT, GAIN_G, RING = range(8, 14)
 RESPONSE = slice(0, 8)
 
-# The row of constants.
+# Indices of the constants.
 (
     N_PIXELS, GAIN_F, T_F, SIGMA_1, SIGMA_2, TAU_G, DT, SIGMA_3, KEEP, T_SFA, SIGMA_4, T_SP, N_TS, RATE, T_SF,
     T_FFI, FFI_DELAY, LATENCY_JUMPS, WARM_START, MAX_SPIKES, DELTA_C, C_W, T_G, THETA_1, THETA_2, THETA_3,
@@ -27,13 +27,13 @@ RESPONSE = slice(0, 8)
 ) = (*range(30), 32, 35)  # fmt: skip
 
 
-def constants(params: LGMDParams, fps: float, n_pixels: int) -> NDArray[np.float64]:
-    """Pack parameters at a frame rate in the order of the names above; the taps a_i come last.
+def pack_constants(params: LGMDParams, fps: float, n_pixels: int) -> NDArray[np.float64]:
+    """Return the constants of the kernels in the order of the indices above; the taps a_i come last.
 
     Args:
-        params: The model's parameters.
-        fps: Frames per second.
-        n_pixels: n, the pixels over which F and K are means.
+        params: Parameters of the model.
+        fps: Frame rate [Hz].
+        n_pixels: Number of pixels n in the means F and K.
     """
     p, dt = params, params.frame_interval_ms(fps)
     keep = 0.0 if p.tau_s == 0.0 else 1.0 / (1.0 + dt / p.tau_s)
@@ -49,45 +49,45 @@ def constants(params: LGMDParams, fps: float, n_pixels: int) -> NDArray[np.float
     )  # fmt: skip
 
 
-def resting(params: LGMDParams) -> NDArray[np.float64]:
-    """The scalars of a neuron that has seen nothing, shape (RING + n_ts,)."""
+def initial_scalars(params: LGMDParams) -> NDArray[np.float64]:
+    """Return the scalar state of a neuron before its first frame, shape (RING + n_ts,)."""
     row = np.zeros(RING + params.n_ts)
     row[[K, K_HAT, W, LATENCY]] = params.k_0, params.k_0, params.sigma_1, params.tau_g
     return row
 
 
 @njit(cache=True, nogil=True)
-def feed_forward(row: NDArray, par: NDArray, sum_p: float | np.floating) -> None:
-    """F, w and the latency of G from the sum of |P| (eq. 2 and 9)."""
-    f_now, before = sum_p / par[N_PIXELS], row[F_HAT]
-    gain = 1.0 if par[WARM_START] > 0.0 and row[AGE] == 1.0 else par[GAIN_F]
-    row[F_HAT] = before + gain * (f_now - before)
-    f = before if par[FFI_DELAY] > 0.0 else row[F_HAT]
-    rest = 1.0 - f / par[T_F]
-    low = rest < 0.0 if par[LATENCY_JUMPS] > 0.0 else rest < par[SIGMA_2]
-    latency = par[TAU_G] * (par[SIGMA_2] if low else rest)
-    row[F], row[W], row[LATENCY] = f, max(par[SIGMA_1], f / par[T_F]), latency
-    row[GAIN_G] = par[DT] / (par[DT] + latency)
+def feed_forward(row: NDArray, const: NDArray, sum_p: float | np.floating) -> None:
+    """Update F, w and the latency of G from the sum of |P| (eq. 2 and 9)."""
+    f_now, f_before = sum_p / const[N_PIXELS], row[F_HAT]
+    gain = 1.0 if const[WARM_START] > 0.0 and row[AGE] == 1.0 else const[GAIN_F]
+    row[F_HAT] = f_before + gain * (f_now - f_before)
+    f = f_before if const[FFI_DELAY] > 0.0 else row[F_HAT]
+    fraction = 1.0 - f / const[T_F]
+    limited = fraction < 0.0 if const[LATENCY_JUMPS] > 0.0 else fraction < const[SIGMA_2]
+    latency = const[TAU_G] * (const[SIGMA_2] if limited else fraction)
+    row[F], row[W], row[LATENCY] = f, max(const[SIGMA_1], f / const[T_F]), latency
+    row[GAIN_G] = const[DT] / (const[DT] + latency)
 
 
 @njit(cache=True, nogil=True)
-def fire(row: NDArray, par: NDArray, sum_g: float | np.floating) -> None:
-    """K, its adaptation, spikes and their frequency from the sum of g (eq. 9 to 12).
+def fire(row: NDArray, const: NDArray, sum_g: float | np.floating) -> None:
+    """Update K, its adaptation, spikes, frequency and alert from the sum of g (eq. 9 to 12).
 
-    The latency filter of G has one gain for all pixels, so that filtering the sum is filtering the map.
+    The latency filter of G has one gain for all pixels, so filtering the sum is the sum of the filtered map.
     """
     row[K_SUM] += row[GAIN_G] * (sum_g - row[K_SUM])
-    k = 1.0 / (1.0 + math.exp(-row[K_SUM] / (par[N_PIXELS] * par[SIGMA_3])))
-    if row[F] >= par[T_FFI]:
+    k = 1.0 / (1.0 + math.exp(-row[K_SUM] / (const[N_PIXELS] * const[SIGMA_3])))
+    if row[F] >= const[T_FFI]:
         k = 0.5
     rise = k - row[K]
-    adapted = par[KEEP] * (row[K_HAT] + rise if rise <= par[T_SFA] else k)
+    adapted = const[KEEP] * (row[K_HAT] + rise if rise <= const[T_SFA] else k)
     row[K], row[K_HAT] = k, max(0.5, adapted)
-    spikes = min(par[MAX_SPIKES], math.floor(math.exp(par[SIGMA_4] * (row[K_HAT] - par[T_SP]))))
+    spikes = min(const[MAX_SPIKES], math.floor(math.exp(const[SIGMA_4] * (row[K_HAT] - const[T_SP]))))
 
-    slot = RING + int(row[AGE]) % int(par[N_TS])
+    slot = RING + int(row[AGE]) % int(const[N_TS])
     row[COUNT] += spikes - row[slot]
     row[slot] = row[SPIKES] = spikes
-    row[FREQUENCY] = row[COUNT] * par[RATE] / par[N_TS]
-    row[ALERT] = 1.0 if row[FREQUENCY] >= par[T_SF] else 0.0
+    row[FREQUENCY] = row[COUNT] * const[RATE] / const[N_TS]
+    row[ALERT] = 1.0 if row[FREQUENCY] >= const[T_SF] else 0.0
     row[AGE] += 1.0

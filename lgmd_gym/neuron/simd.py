@@ -1,11 +1,11 @@
-"""Sixteen float32 lanes at a time inside numba kernels, as LLVM vectors.
+"""LLVM vectors of sixteen float32 lanes for numba kernels.
 
-LLVM's own vectoriser gives up on loops over as many arrays as an LGMD pass reads and writes: it cannot
-show that they do not overlap, and tests that anew for every short row. Written as vectors, the loads and
-stores are what the source says. LLVM maps the type to what the machine has (one AVX-512, two AVX or four
-SSE/NEON registers), so nothing here is bound to a processor.
+LLVM's auto-vectoriser fails on loops over as many arrays as an LGMD pass reads and writes: it cannot prove
+that the arrays do not overlap, and repeats that check for every short row. Explicit vectors avoid the check.
+LLVM maps the type to the registers of the machine (one AVX-512, two AVX or four SSE/NEON registers), so the
+code is portable.
 
-numba's cache watches the file of a kernel alone: after a change here, delete __pycache__/*.nbi.
+numba's cache tracks only the file of a kernel: delete __pycache__/*.nbi after a change in this file.
 """
 
 import operator
@@ -16,7 +16,7 @@ from numba import extending, types
 from numba.core import cgutils
 from numba.extending import models, overload, register_model
 
-# What it makes takes no typing context when called: a type checker cannot know.
+# Any, because a decorated function is called without its typing context.
 intrinsic: Any = extending.intrinsic
 
 LANES = 16
@@ -27,7 +27,7 @@ _ZEROS = ir.Constant(_FLOATS, [0.0] * LANES)
 
 
 class Float32x16(types.Type):
-    """The numba type of sixteen float32 lanes."""
+    """Numba type of sixteen float32 lanes."""
 
     def __init__(self) -> None:
         super().__init__(name="Float32x16")
@@ -43,14 +43,14 @@ class _Model(models.PrimitiveModel):
 
 
 def _pointer(context, builder, array_type, array, index, kind):
-    """Address of a one-dimensional array's element, as a pointer to a vector of `kind`."""
+    """Return the address of an element of a one-dimensional array, as a pointer to a vector of `kind`."""
     data = cgutils.create_struct_proxy(array_type)(context, builder, array).data
     return builder.bitcast(builder.gep(data, [index]), kind.as_pointer())
 
 
 @intrinsic
 def load(typingctx, array, index):
-    """The lanes array[index : index + 16] of a contiguous float32 or uint8 array, unchecked."""
+    """Load array[index : index + 16] of a contiguous float32 or uint8 array, without bounds checks."""
 
     def codegen(context, builder, signature, args):
         is_byte = signature.args[0].dtype == types.uint8
@@ -58,7 +58,7 @@ def load(typingctx, array, index):
         pointer = _pointer(context, builder, signature.args[0], args[0], args[1], kind)
         lanes = builder.load(pointer)
         lanes.align = 1 if is_byte else 4
-        # Through int32: the conversion from there is one instruction everywhere.
+        # Via int32, from which the conversion is one instruction on all machines.
         return builder.sitofp(builder.zext(lanes, _INTS), _FLOATS) if is_byte else lanes
 
     return vector(array, types.intp), codegen
@@ -66,7 +66,7 @@ def load(typingctx, array, index):
 
 @intrinsic
 def store(typingctx, array, index, value):
-    """Write the lanes to array[index : index + 16] of a contiguous float32 array, unchecked."""
+    """Store the lanes to array[index : index + 16] of a contiguous float32 array, without bounds checks."""
 
     def codegen(context, builder, signature, args):
         pointer = _pointer(context, builder, signature.args[0], args[0], args[1], _FLOATS)
@@ -78,7 +78,7 @@ def store(typingctx, array, index, value):
 
 @intrinsic
 def copy(typingctx, source, source_index, target, target_index):
-    """Copy 16 elements between contiguous arrays of one dtype, unchecked."""
+    """Copy 16 elements between contiguous arrays of the same dtype, without bounds checks."""
 
     def codegen(context, builder, signature, args):
         kind, align = (_BYTES, 1) if signature.args[0].dtype == types.uint8 else (_FLOATS, 4)
@@ -92,7 +92,7 @@ def copy(typingctx, source, source_index, target, target_index):
 
 @intrinsic
 def splat(typingctx, value):
-    """The same float32 in every lane."""
+    """Return a vector with the same float32 in every lane."""
 
     def codegen(context, builder, signature, args):
         empty, zeros = ir.Constant(_FLOATS, ir.Undefined), ir.Constant(_INTS, [0] * LANES)
@@ -103,7 +103,7 @@ def splat(typingctx, value):
 
 
 def _binary(emit):
-    """An intrinsic of two vectors from a function that emits its instruction."""
+    """Return an intrinsic of two vectors, given the function that emits its instruction."""
 
     @intrinsic
     def function(typingctx, a, b):
@@ -116,7 +116,7 @@ def _binary(emit):
 
 
 def _call(builder, name, args, result: ir.Type = _FLOATS):
-    """Call an LLVM intrinsic by its full name."""
+    """Emit a call of an LLVM intrinsic, given its full name."""
     kind = ir.FunctionType(result, [arg.type for arg in args])
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), args)
 
@@ -124,15 +124,15 @@ def _call(builder, name, args, result: ir.Type = _FLOATS):
 _add = _binary(lambda b, x, y: b.fadd(x, y))
 _sub = _binary(lambda b, x, y: b.fsub(x, y))
 _mul = _binary(lambda b, x, y: b.fmul(x, y))
-#: The larger of both lanes; neither may be NaN.
+# Larger of both lanes; neither may be NaN.
 maximum = _binary(lambda b, x, y: b.select(b.fcmp_ordered(">", x, y), x, y))
-#: x where x >= y, else 0.
+# x where x >= y, else 0.
 at_least = _binary(lambda b, x, y: b.select(b.fcmp_ordered(">=", x, y), x, _ZEROS))
 
 
 @intrinsic
 def madd(typingctx, a, b, c):
-    """The lanes a * b + c, in one rounding where the machine has it."""
+    """Return a * b + c, with a single rounding if the machine supports it."""
 
     def codegen(context, builder, signature, args):
         return _call(builder, f"llvm.fmuladd.v{LANES}f32", args)
@@ -142,7 +142,7 @@ def madd(typingctx, a, b, c):
 
 @intrinsic
 def magnitude(typingctx, a):
-    """|a|."""
+    """Return |a|."""
 
     def codegen(context, builder, signature, args):
         return _call(builder, f"llvm.fabs.v{LANES}f32", args)
@@ -151,8 +151,8 @@ def magnitude(typingctx, a):
 
 
 @intrinsic
-def unless_below(typingctx, a, least):
-    """The lanes of `a` whose magnitude is at least `least`, 0 for the others."""
+def clear_below(typingctx, a, limit):
+    """Return `a` where |a| >= limit, else 0."""
 
     def codegen(context, builder, signature, args):
         size = _call(builder, f"llvm.fabs.v{LANES}f32", args[:1])
@@ -162,8 +162,8 @@ def unless_below(typingctx, a, least):
 
 
 @intrinsic
-def by_sign(typingctx, sign, plus, minus):
-    """`plus` where sign >= 0, else `minus`."""
+def select_by_sign(typingctx, sign, plus, minus):
+    """Return `plus` where sign >= 0, else `minus`."""
 
     def codegen(context, builder, signature, args):
         return builder.select(builder.fcmp_ordered(">=", args[0], _ZEROS), args[1], args[2])
@@ -173,7 +173,7 @@ def by_sign(typingctx, sign, plus, minus):
 
 @intrinsic
 def total(typingctx, a):
-    """The sum of all lanes, float32."""
+    """Return the sum of all lanes, float32."""
 
     def codegen(context, builder, signature, args):
         kind = ir.FunctionType(ir.FloatType(), [ir.FloatType(), _FLOATS])
@@ -186,7 +186,7 @@ def total(typingctx, a):
 
 @intrinsic
 def largest(typingctx, a):
-    """The largest of all lanes, float32; none may be NaN."""
+    """Return the largest of all lanes, float32; none may be NaN."""
 
     def codegen(context, builder, signature, args):
         return _call(builder, f"llvm.vector.reduce.fmax.v{LANES}f32", args, ir.FloatType())

@@ -1,102 +1,109 @@
-"""Checks of what comes in: each refuses in one line that names the value and the mend."""
+"""Checks of the arguments and frames of `LGMD`."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lgmd_gym.neuron.params import LGMDParams
-
 
 def checked_shape(shape: Any) -> tuple[int, int]:
-    """Return (height, width) as ints of at least 1."""
+    """Return (height, width) as integers >= 1."""
     try:
         height, width = (int(side) for side in shape)
     except (TypeError, ValueError):
-        raise ValueError(f"shape {shape!r} must be (height, width) in pixels") from None
+        raise ValueError(f"shape must be (height, width) in pixels, got {shape!r}") from None
     if height < 1 or width < 1:
-        raise ValueError(f"shape {(height, width)} holds no pixel; height and width must be >= 1")
+        raise ValueError(f"shape must have height and width >= 1, got {(height, width)}")
     return height, width
 
 
 def checked_fps(fps: Any) -> float:
-    """Return the frame rate as a finite float above 0."""
+    """Return the frame rate [Hz] as a finite float > 0."""
     value = float(fps)
     if not 0.0 < value < np.inf:
-        raise ValueError(f"fps = {value:g} must be > 0 and finite, in frames per second")
+        raise ValueError(f"fps must be > 0 and finite, got {value:g}")
     return value
 
 
 def checked_num(num: int | None) -> int | None:
-    """Return the number of neurons, at least 1, or None for a single one."""
+    """Return the number of neurons, >= 1, or None for a single neuron."""
     if num is None:
         return None
     if isinstance(num, bool) or int(num) != num:
-        raise TypeError(f"num = {num!r} must be a whole number of neurons, or None for a single one")
+        raise TypeError(f"num must be an integer or None, got {num!r}")
     if num < 1:
-        raise ValueError(f"num = {num} must be >= 1, or None for a single neuron that answers plain numbers")
+        raise ValueError(f"num must be >= 1, got {num}; pass None for a single neuron with scalar outputs")
     return int(num)
 
 
-def checked_mask(mask: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
-    """Return the weights of the pixels, float32 of `shape` within [0, 1], not all 0."""
-    weight = np.array(mask, np.float32)
-    if weight.shape != shape:
-        raise ValueError(f"mask of shape {weight.shape} does not fit frames of {shape} (height, width)")
-    if not ((weight >= 0.0) & (weight <= 1.0)).all():
-        span = f"{float(weight.min()):g} to {float(weight.max()):g}"
-        raise ValueError(f"mask holds {span}; weights must lie in [0, 1]")
-    if not weight.any():
-        raise ValueError("mask is 0 everywhere; give at least one pixel a weight above 0, or mask=None")
-    return weight
-
-
-def checked_params(params: LGMDParams | None) -> LGMDParams:
-    """Return the parameters, or the paper's for None."""
-    if params is None:
-        return LGMDParams()
-    if not isinstance(params, LGMDParams):
-        raise TypeError(f"params must be LGMDParams, not {type(params).__name__}; see LGMDParams.from_dict")
-    return params
-
-
 def checked_threads(threads: int | None) -> int:
-    """Return the number of threads, at least 1."""
+    """Return the number of threads, >= 1."""
     count = 1 if threads is None else int(threads)
     if count < 1:
-        raise ValueError(f"threads = {threads} must be >= 1, or None for the calling thread alone")
+        raise ValueError(f"threads must be >= 1, got {threads}; pass None for the calling thread alone")
     return count
+
+
+def checked_mask(mask: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Return pixel weights as float32 of `shape`, in [0, 1] and not all 0."""
+    weight = np.array(mask, np.float32)
+    if weight.shape != shape:
+        raise ValueError(
+            f"mask must have the shape {shape} (height, width) of the frames, got {weight.shape}"
+        )
+    if not ((weight >= 0.0) & (weight <= 1.0)).all():
+        span = f"{float(weight.min()):g} to {float(weight.max()):g}"
+        raise ValueError(f"mask must have weights in [0, 1], got {span}")
+    if not weight.any():
+        raise ValueError("mask must have a weight > 0, got 0 everywhere; pass mask=None for all pixels")
+    return weight
 
 
 def checked_region(
     shape: tuple[int, int], mask: ArrayLike | None, roi: tuple[int, int, int, int] | None
 ) -> tuple[int, int, tuple[int, int], NDArray[np.float32], int]:
-    """The rectangle that has to be computed: top, left, (height, width), its weights, pixels that count."""
+    """Return the rectangle to compute.
+
+    Returns:
+        Top row, left column, (height, width), pixel weights (of shape (0, 0) if all are 1), and the number
+        of pixels with a weight > 0.
+    """
     if mask is not None and roi is not None:
-        raise ValueError("give mask or roi, not both; multiply the mask by 0 outside the region instead")
+        raise ValueError("mask and roi must not both be given; set the mask to 0 outside the region instead")
     if roi is not None:
         top, left, height, width = (int(side) for side in roi)
         if min(top, left) < 0 or min(height, width) < 1 or top + height > shape[0] or left + width > shape[1]:
-            raise ValueError(f"roi {tuple(roi)}, (top, left, height, width), leaves the frame of {shape}")
+            raise ValueError(
+                f"roi (top, left, height, width) must be inside frames of shape {shape}, got {tuple(roi)}"
+            )
         mask = np.zeros(shape, np.float32)
         mask[top : top + height, left : left + width] = 1.0
     if mask is None:
         return 0, 0, shape, np.zeros((0, 0), np.float32), shape[0] * shape[1]
     weight = checked_mask(mask, shape)
-    # One pixel around the support: there P is 0 but its neighbours' inhibition and grouping still reach.
+    # One pixel around the support: P is 0 there, but inhibition and grouping of its neighbours are not.
     rows, columns = np.flatnonzero(weight.any(1)), np.flatnonzero(weight.any(0))
     top, left = max(rows[0] - 1, 0), max(columns[0] - 1, 0)
     box = weight[top : rows[-1] + 2, left : columns[-1] + 2]
     return int(top), int(left), box.shape, np.ascontiguousarray(box), int(np.count_nonzero(weight))
 
 
+def checked_selection(name: str, selection: ArrayLike, count: int) -> NDArray[np.bool_]:
+    """Return a selection of neurons as a contiguous bool array of shape (count,)."""
+    selected = np.asarray(selection)
+    if selected.dtype != np.bool_ or selected.shape != (count,):
+        given = f"dtype {selected.dtype} and shape {selected.shape}"
+        raise ValueError(f"{name} must be a bool array of shape ({count},), got {given}")
+    return np.ascontiguousarray(selected)
+
+
 def checked_frames(frames: Any, shape: tuple[int, ...], active: NDArray[np.bool_] | None = None) -> NDArray:
-    """Return frames of `shape` as contiguous uint8 or float32; a contiguous uint8 array passes untouched.
+    """Return frames as contiguous uint8 or float32; contiguous uint8 frames are not copied.
 
     Args:
         frames: Luminance in 0-255, uint8 or float.
-        shape: (H, W), or (N, H, W).
-        active: Which of the N frames count, shape (N,); the others are not looked at.
+        shape: Expected shape, (H, W) or (N, H, W).
+        active: Selection of the frames to check, shape (N,); None for all.
     """
     frames = np.asarray(frames)
     if frames.shape != shape:
@@ -104,9 +111,7 @@ def checked_frames(frames: Any, shape: tuple[int, ...], active: NDArray[np.bool_
     if frames.dtype == np.uint8:
         return np.ascontiguousarray(frames)
     if frames.dtype.kind != "f":
-        raise TypeError(
-            f"frame of dtype {frames.dtype} must be uint8 or float, in 0-255; see .astype(np.uint8)"
-        )
+        raise TypeError(f"frame must be uint8 or float, got {frames.dtype}; use frame.astype(np.uint8)")
     frames = np.ascontiguousarray(frames, np.float32)
     stack = frames.reshape(-1, *shape[-2:])
     for frame in stack if active is None else stack[active]:
@@ -115,26 +120,27 @@ def checked_frames(frames: Any, shape: tuple[int, ...], active: NDArray[np.bool_
 
 
 def _check_luminance(frame: NDArray[np.float32]) -> None:
-    """Refuse a float frame that is not luminance in 0-255."""
     low, high = float(frame.min()), float(frame.max())
     if not (np.isfinite(low) and np.isfinite(high)):
-        bad = int(frame.size - np.count_nonzero(np.isfinite(frame)))
-        raise ValueError(f"frame holds {bad} NaN or infinite pixels; mend them, as with np.nan_to_num(frame)")
+        count = int(frame.size - np.count_nonzero(np.isfinite(frame)))
+        raise ValueError(
+            f"frame must be finite, got {count} NaN or infinite pixels; use np.nan_to_num(frame)"
+        )
     span = f"{low:g} to {high:g}"
-    # One grey level of slack for resampling that overshoots.
+    # One grey level of tolerance, because resampling may overshoot.
     if low < -1.0 or high > 256.0:
-        raise ValueError(f"frame holds {span}; luminance must lie in 0-255, as after np.clip(frame, 0, 255)")
+        raise ValueError(f"frame must be luminance in 0-255, got {span}; use np.clip(frame, 0, 255)")
     if low != high and low >= 0.0 and high <= 1.0:
-        raise ValueError(f"float frame of {span} looks scaled to 0-1; luminance is 0-255: pass frame * 255")
+        raise ValueError(f"frame must be luminance in 0-255, got a float frame of {span}; use frame * 255")
 
 
-def _shape_message(given: tuple[int, ...], wanted: tuple[int, ...]) -> str:
-    """Say how a frame's shape is wrong."""
-    axes = "(height, width)" if len(wanted) == 2 else "(num, height, width)"
+def _shape_message(given: tuple[int, ...], expected: tuple[int, ...]) -> str:
+    axes = "(height, width)" if len(expected) == 2 else "(num, height, width)"
+    message = f"frame must have the shape {expected} {axes}, got {given}"
     if 0 in given:
-        return f"frame of shape {given} is empty; this neuron takes {wanted} {axes}"
-    if len(given) == len(wanted) + 1 and given[-1] in (3, 4):
-        return f"frame of shape {given} looks like colour; pass grey luminance of {wanted} {axes}"
-    if given == wanted[::-1]:
-        return f"frame of shape {given} looks transposed; this neuron takes {wanted} {axes}, row 0 at the top"
-    return f"frame of shape {given} does not fit; this neuron takes {wanted} {axes}, fixed when it was made"
+        return f"{message}, which is empty"
+    if len(given) == len(expected) + 1 and given[-1] in (3, 4):
+        return f"{message}; convert colour to grey luminance"
+    if given == expected[::-1]:
+        return f"{message}; transpose it, row 0 is the top"
+    return message

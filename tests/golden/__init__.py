@@ -1,1 +1,1 @@
-"""Golden traces of the neuron, and the stimuli that they were made from."""
+"""Golden traces of the neuron and their stimuli."""

@@ -1,24 +1,22 @@
-"""Write the golden traces from the float64 reference: `python -m tests.golden.make` in the project's root.
+"""Write the golden traces with the float64 reference: `python -m tests.golden.make` in the project root.
 
-Only for a change of the model that is meant: say in the changelog why the traces differ.
+Only for an intended change of the model; the changelog must state why the traces differ.
 """
 
 from pathlib import Path
 
 import numpy as np
 
-from lgmd_gym.neuron.params import LGMDParams
 from lgmd_gym.neuron.reference import ReferenceLGMD
 from tests.golden.sequences import KINDS
+from tests.support.neurons import PRESETS
 
 SHAPE, COUNT, FPS = (45, 80), 40, 30.0
-PRESETS = ("default", "released", "fixed_inhibition", "off_only", "yue_rind2006")
 
 
 def trace(preset: str, kind: str) -> np.ndarray:
-    """The answers of the reference, one row a frame, the columns of `Response`; float64, (COUNT, 8)."""
-    params = LGMDParams() if preset == "default" else getattr(LGMDParams, preset)()
-    neuron = ReferenceLGMD(SHAPE, FPS, params)
+    """Return the outputs of the reference, one row of `Response` fields per frame; float64, (COUNT, 8)."""
+    neuron = ReferenceLGMD(SHAPE, FPS, PRESETS[preset])
     return np.array([neuron.step(frame) for frame in KINDS[kind](SHAPE, COUNT)], float)
 
 

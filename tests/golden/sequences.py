@@ -1,4 +1,4 @@
-"""Deterministic grey sequences for the neuron's tests: uint8, shape (frames, height, width)."""
+"""Deterministic grey frame sequences for tests of the neuron: uint8, shape (frames, height, width)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,12 +7,12 @@ Frames = NDArray[np.uint8]
 
 
 def random(shape: tuple[int, int], count: int, seed: int = 0) -> Frames:
-    """Independent white noise in every frame."""
+    """Return independent white noise in every frame."""
     return np.random.default_rng(seed).integers(0, 256, (count, *shape), dtype=np.uint8)
 
 
 def natural(shape: tuple[int, int], count: int, seed: int = 0) -> Frames:
-    """A 1/f texture that drifts by one row and two columns a frame."""
+    """Return a 1/f texture that drifts by one row and two columns per frame."""
     rng = np.random.default_rng(seed)
     h, w = shape[0] + count, shape[1] + 2 * count
     frequency = np.hypot(np.fft.fftfreq(h)[:, None], np.fft.fftfreq(w))
@@ -25,7 +25,7 @@ def natural(shape: tuple[int, int], count: int, seed: int = 0) -> Frames:
 def grating(
     shape: tuple[int, int], count: int, *, period_px: float = 24.0, hz: float = 2.0, fps: float = 30.0
 ) -> Frames:
-    """A full-contrast sine grating that drifts to the right."""
+    """Return a full-contrast sine grating that drifts to the right."""
     x, t = np.arange(shape[1]), np.arange(count)[:, None] / fps
     rows = np.rint(127.5 + 127.5 * np.sin(2 * np.pi * (x / period_px - hz * t))).astype(np.uint8)
     return np.broadcast_to(rows[:, None, :], (count, *shape)).copy()
@@ -34,7 +34,7 @@ def grating(
 def looming(
     shape: tuple[int, int], count: int, *, target: int = 40, background: int = 150, receding: bool = False
 ) -> Frames:
-    """A square on a flat ground, whose angular size grows as that of an object at constant speed."""
+    """Return a square on a uniform background that grows like an approaching object at constant speed."""
     y, x = np.mgrid[: shape[0], : shape[1]]
     distance = np.maximum(abs(y - (shape[0] - 1) / 2), abs(x - (shape[1] - 1) / 2))
     frames = np.full((count, *shape), background, np.uint8)

@@ -1,6 +1,6 @@
-"""Real dash-camera clips: peak spike frequency and first alarms, as measured when the model was settled.
+"""Real dash-camera clips: peak spike frequency and first alert frames, recorded with the final model.
 
-The clips are not part of the project. They are looked for in $LGMD_VIDEOS, else in ../shared/data/videos.
+The clips are not part of the project. Their folder is $LGMD_VIDEOS, by default ../shared/data/videos.
 """
 
 import os
@@ -13,7 +13,7 @@ import pytest
 from lgmd_gym.neuron import LGMD
 
 VIDEOS = Path(os.environ.get("LGMD_VIDEOS", Path(__file__).parents[3] / "shared" / "data" / "videos"))
-SETTLED = 8  # frames that count from here on
+FIRST_FRAME = 8  # earlier frames are ignored
 
 # Peak [spikes/s], first frame >= 15, first frame >= 30 spikes/s.
 TABLE = {
@@ -30,7 +30,7 @@ TABLE = {
 
 
 def grey_frames(path):
-    """The frames as BT.601 luma, uint8."""
+    """Yield the frames as BT.601 luma, uint8."""
     frames = imageio_ffmpeg.read_frames(str(path), pix_fmt="rgb24")
     width, height = next(frames)["size"]
     for data in frames:
@@ -42,12 +42,12 @@ def grey_frames(path):
 def test_real_clip(name):
     path = VIDEOS / f"{name}.mp4"
     if not path.exists():
-        pytest.skip(f"no clip {path.name}: set LGMD_VIDEOS to the folder of the dash-camera clips")
+        pytest.skip(f"clip {path.name} is missing; set LGMD_VIDEOS to the folder of the clips")
     neuron, rates = None, []
     for frame in grey_frames(path):
         neuron = neuron or LGMD(frame.shape, 30.0)
         rates.append(neuron.step(frame).spike_frequency)
     rates = np.array(rates)
-    rates[:SETTLED] = 0
+    rates[:FIRST_FRAME] = 0
     first = [int(np.argmax(rates >= level)) if (rates >= level).any() else None for level in (15, 30)]
     assert (rates.max(), *first) == pytest.approx(TABLE[name])

@@ -1,4 +1,4 @@
-"""The equations by hand, and the numbered facts of the model, on the float64 reference."""
+"""The float64 reference: equations evaluated by hand, and properties of the model."""
 
 import math
 
@@ -33,23 +33,23 @@ def test_photoreceptor_by_hand():
 
 
 def test_feed_forward_inhibition_by_hand():
-    answers, _ = run(pixels(0, 100, 200), LGMDParams(n_p=0))
+    warm, _ = run(pixels(0, 100, 200), LGMDParams(n_p=0))
     gain = (1000 / 30) / (1000 / 30 + 10)
-    assert answers[1].ffi == 100  # warm: starts at its first input
+    assert warm[1].ffi == 100  # the filter starts at its first input
     cold, _ = run(pixels(0, 100, 200), LGMDParams(n_p=0, warm_start=False))
     assert [r.ffi for r in cold] == pytest.approx([0, 100 * gain, 100 * gain + gain * (100 - 100 * gain)])
-    assert answers[1].inhibition_weight == 5.0
-    assert answers[1].excitation_latency == pytest.approx(0.1)
+    assert warm[1].inhibition_weight == 5.0
+    assert warm[1].excitation_latency == pytest.approx(0.1)
 
 
-def test_inhibition_spreads_by_hand_with_replicated_edges():
+def test_spread_of_inhibition_by_hand_with_replicated_edges():
     frame = np.zeros((5, 5))
     frame[2, 2], frame[0, 0] = 80, 16
     _, neuron = run(np.stack([0 * frame, frame]))
     spread = 80 * np.array([[0.125, 0.25, 0.125], [0.25, 1, 0.25], [0.125, 0.25, 0.125]])
     inhibition = neuron.layers["I"]
     assert inhibition[1:4, 1:4].ravel()[1:] == pytest.approx(spread.ravel()[1:])
-    # The corner is its own upper, left and upper left neighbour; the border's copies count once more.
+    # Replication makes the corner its own upper, left and upper left neighbour.
     assert inhibition[0, 0] == pytest.approx(16 * (1 + 2 * 0.25 + 0.125))
     assert inhibition[1, 1] == pytest.approx(80 * 0.125 + 16 * 0.125)
 
@@ -68,46 +68,49 @@ def test_grouping_to_spikes_by_hand():
     # Only the centre inhibits and nothing adapts: S = 100 - 0.5 * 100 everywhere, Ce = 50.
     params = LGMDParams(n_p=0, weights=(1, 0, 0), t_f=math.inf, sigma_3=100)
     frames = np.zeros((2, 3, 4)) + np.array([0, 100])[:, None, None]
-    (_, answer), neuron = run(frames, params)
+    (_, response), neuron = run(frames, params)
     g = 50 * 50 / (0.01 + 50 / 4)
     assert neuron.g == pytest.approx(np.full((3, 4), g))
     filtered = g * (1000 / 30) / (1000 / 30 + 10)
     k = 1 / (1 + math.exp(-filtered / 100))
-    assert answer.membrane_potential == pytest.approx(k)
-    assert answer.adapted_potential == pytest.approx(k * 500 / (500 + 1000 / 30))
-    assert answer.spikes == math.floor(math.exp(10 * (answer.adapted_potential - 0.7))) == 2
-    assert answer.spike_frequency == 2 * 30 / 6
+    assert response.membrane_potential == pytest.approx(k)
+    assert response.adapted_potential == pytest.approx(k * 500 / (500 + 1000 / 30))
+    assert response.spikes == math.floor(math.exp(10 * (response.adapted_potential - 0.7))) == 2
+    assert response.spike_frequency == 2 * 30 / 6
 
 
 def test_adaptation_by_hand():
     neuron = ReferenceLGMD((1, 1), params=LGMDParams(t_sp=0.5))
     keep = 500 / (500 + 1000 / 30)
-    potential = lambda k: -math.log(1 / k - 1)  # noqa: E731
-    neuron.fire(potential(0.9), 0, 0.5)  # a rise: K_hat = s K
+
+    def sum_for(k):
+        return -math.log(1 / k - 1)
+
+    neuron.fire(sum_for(0.9), 0, 0.5)  # a large rise: K_hat = s K
     assert neuron.k_hat == pytest.approx(keep * 0.9)
-    neuron.fire(potential(0.902), 0, 0.5)  # a small rise adapts
+    neuron.fire(sum_for(0.902), 0, 0.5)  # a small rise adapts
     assert neuron.k_hat == pytest.approx(keep * (keep * 0.9 + 0.002))
-    neuron.fire(potential(0.6), 0, 0.5)  # a fall takes it down to the floor
+    neuron.fire(sum_for(0.6), 0, 0.5)  # a fall lowers K_hat to its minimum
     assert neuron.k_hat == 0.5
 
 
-def test_the_window_holds_six_frames():
+def test_spikes_are_counted_over_six_frames():
     neuron = ReferenceLGMD((1, 1))
-    counts = [neuron.fire(k, 0, 0.5).spike_frequency for k in (50, 0, 0, 0, 0, 0, 0)]
-    assert counts == [50, 50, 50, 50, 50, 50, 0]
+    frequencies = [neuron.fire(k, 0, 0.5).spike_frequency for k in (50, 0, 0, 0, 0, 0, 0)]
+    assert frequencies == [50, 50, 50, 50, 50, 50, 0]
 
 
 @pytest.mark.parametrize("tau", [10.0, 60.0])
 def test_filters_reach_63_percent_at_their_time_constant(tau):
-    # A ramp of luminance keeps P at 1; 100 frames to a time constant.
+    # A ramp of luminance keeps P at 1; a time constant is 100 frames.
     frames = np.arange(102.0).reshape(-1, 1, 1)
     params = LGMDParams(n_p=0, warm_start=False, tau_1=tau, tau_2=(tau, 1, 1), weights=(1, 0, 0))
-    answers, neuron = run(frames, params, fps=1000 * 100 / tau)
-    assert answers[100].ffi == pytest.approx(1 - math.exp(-1), abs=0.005)
+    outputs, neuron = run(frames, params, fps=1000 * 100 / tau)
+    assert outputs[100].ffi == pytest.approx(1 - math.exp(-1), abs=0.005)
     assert neuron.layers["I"][0, 0] == pytest.approx(1 - math.exp(-1.01), abs=0.005)
 
 
-def test_fact_1_the_product_of_the_paths_is_inert():
+def test_product_of_the_paths_has_no_effect():
     frames = natural((20, 30), 8)
     with_product, a = run(frames, LGMDParams(theta_3=1e6))
     without, b = run(frames, LGMDParams(theta_3=0))
@@ -117,78 +120,79 @@ def test_fact_1_the_product_of_the_paths_is_inert():
 
 
 @pytest.mark.parametrize("flip", [lambda f: 255.0 - f, lambda f: f[..., ::-1], lambda f: f[:, ::-1]])
-def test_fact_2_polarity_and_mirror_symmetry(flip):
+def test_polarity_and_mirror_symmetry(flip):
     frames = looming((30, 40), 25).astype(float) + natural((30, 40), 25) / 16
-    plain, mirrored = run(frames)[0], run(flip(frames))[0]
-    assert max(r.spikes for r in plain) > 0
-    np.testing.assert_allclose(np.array(plain, float), np.array(mirrored, float), rtol=1e-12, atol=1e-12)
+    original, flipped = run(frames)[0], run(flip(frames))[0]
+    assert max(r.spikes for r in original) > 0
+    np.testing.assert_allclose(np.array(original, float), np.array(flipped, float), rtol=1e-12, atol=1e-12)
 
 
-def test_fact_3_luminance_scaled_to_one_gives_nothing():
+def test_luminance_scaled_to_0_1_causes_no_excitation():
     frames = looming((30, 40), 25)
     assert max(r.membrane_potential for r in run(frames)[0]) > 0.7
     assert {r.membrane_potential for r in run(frames / 255)[0]} == {0.5}
 
 
-def test_fact_4_one_outlier_silences_weaker_regions():
+def test_outlier_suppresses_weaker_regions():
     neuron, s = ReferenceLGMD((20, 20)), np.zeros((20, 20))
     s[2:8, 2:8] = 20
     alone = neuron.grouping(s)
     assert np.count_nonzero(alone) > 30
     assert alone[alone > 0].min() >= 30
     s[14:17, 14:17] = 200
-    beside = neuron.grouping(s)
-    assert not beside[:10, :10].any()
-    assert beside[15, 15] > 0
+    with_outlier = neuron.grouping(s)
+    assert not with_outlier[:10, :10].any()
+    assert with_outlier[15, 15] > 0
 
 
-def test_fact_4_how_much_of_the_field_must_survive():
+def test_fraction_of_pixels_needed_for_the_first_spike():
     assert 1 / (1 + math.exp(-0.847)) == pytest.approx(0.7, abs=1e-4)
     neuron = ReferenceLGMD((100, 100))
     assert neuron.fire(0.0283 * 100 * 100 * 30, 0, 0.5).membrane_potential >= 0.7
 
 
 @pytest.mark.parametrize(
-    ("fps", "spikes", "ceiling"), [(5, 1, 5), (15, 6, 90), (18, 7, 126), (30, 10, 300), (60, 14, 840)]
+    ("fps", "spikes", "max_frequency"), [(5, 1, 5), (15, 6, 90), (18, 7, 126), (30, 10, 300), (60, 14, 840)]
 )
-def test_facts_5_and_6_the_ceilings_of_the_spikes(fps, spikes, ceiling):
+def test_upper_bounds_of_spikes_and_frequency(fps, spikes, max_frequency):
     neuron = ReferenceLGMD((1, 1), fps)
     first = neuron.fire(100, 0, 0.5)
     assert first.adapted_potential == pytest.approx(500 / (500 + 1000 / fps))
     assert first.spikes == spikes
     for _ in range(5):
-        neuron.k = 0.5  # a fresh rise every frame holds it at the ceiling
+        neuron.k = 0.5  # a new rise in every frame keeps K_hat at its maximum
         last = neuron.fire(100, 0, 0.5)
-    assert last.spike_frequency == ceiling
+    assert last.spike_frequency == max_frequency
     if fps == 30:
         assert first.spike_frequency == 50
 
 
-@pytest.mark.parametrize(("period", "hz"), GRATINGS)
-def test_fact_7_gratings_are_silent_from_the_first_frame_on(period, hz):
-    frames = grating((4, 380), 30, period_px=period, hz=hz)
-    assert {r.membrane_potential for r in run(frames)[0]} == {0.5}
+def highest_potential_on_grating(period, hz, params=None):
+    return max(r.membrane_potential for r in run(grating((4, 380), 30, period_px=period, hz=hz), params)[0])
 
 
-def test_fact_7_gratings_fire_without_adaptive_inhibition_or_without_the_warm_start():
-    def loudest(params):
-        runs = [run(grating((4, 380), 30, period_px=p, hz=hz), params)[0] for p, hz in GRATINGS[::3]]
-        return max(r.membrane_potential for answers in runs for r in answers)
-
-    assert loudest(LGMDParams(t_f=math.inf)) > 0.99
-    assert loudest(LGMDParams(warm_start=False)) > 0.5
+def test_gratings_cause_no_excitation():
+    assert [pair for pair in GRATINGS if highest_potential_on_grating(*pair) > 0.5] == []
 
 
-def test_the_cell_is_silenced_by_feed_forward_inhibition():
+def test_gratings_cause_excitation_without_adaptive_inhibition_or_without_warm_start():
+    def highest(params):
+        return max(highest_potential_on_grating(*pair, params) for pair in GRATINGS[::3])
+
+    assert highest(LGMDParams(t_f=math.inf)) > 0.99
+    assert highest(LGMDParams(warm_start=False)) > 0.5
+
+
+def test_feed_forward_inhibition_silences_the_cell():
     frames = looming((30, 40), 25)
-    loud = run(frames, LGMDParams(t_f=math.inf))[0]
+    without = run(frames, LGMDParams(t_f=math.inf))[0]
     silenced = run(frames, LGMDParams(t_f=math.inf, t_ffi=5.0))[0]
-    above = [i for i, r in enumerate(loud) if r.ffi >= 5.0 and r.membrane_potential > 0.5]
+    above = [i for i, r in enumerate(without) if r.ffi >= 5.0 and r.membrane_potential > 0.5]
     assert above
     assert {silenced[i].membrane_potential for i in above} == {0.5}
 
 
-def test_off_only_sees_dark_objects_only():
+def test_off_only_responds_to_dark_objects_only():
     def total(target):
         return sum(r.spikes for r in run(looming((30, 40), 25, target=target), LGMDParams.off_only())[0])
 
@@ -196,7 +200,7 @@ def test_off_only_sees_dark_objects_only():
 
 
 def test_yue_rind_2006_by_hand():
-    # A step of 60 on one pixel, then nothing: P = 60, then what persists; I is the neighbours' last P.
+    # A step of 60 on one pixel: P is 60, then its persistent part; I is the last P of the neighbours.
     frame = np.zeros((5, 5))
     frame[2, 2] = 60
     neuron = ReferenceLGMD((5, 5), params=LGMDParams.yue_rind2006())
@@ -209,9 +213,9 @@ def test_yue_rind_2006_by_hand():
     )
 
 
-def test_yue_rind_2006_alerts_after_four_spikes_in_a_row_and_not_while_silenced():
+def test_yue_rind_2006_alerts_after_four_spikes_in_a_row_unless_silenced():
     neuron = ReferenceLGMD((1, 1), 25.0, LGMDParams.yue_rind2006())
-    answers = [neuron.fire(5, 0, 0.3) for _ in range(4)]
-    assert [r.spikes for r in answers] == [1, 1, 1, 1]
-    assert [r.alert for r in answers] == [False, False, False, True]
+    outputs = [neuron.fire(5, 0, 0.3) for _ in range(4)]
+    assert [r.spikes for r in outputs] == [1, 1, 1, 1]
+    assert [r.alert for r in outputs] == [False, False, False, True]
     assert neuron.fire(5, 10.0, 0.3).spikes == 0

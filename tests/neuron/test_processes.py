@@ -1,0 +1,83 @@
+"""Threads, forked processes, the compilation cache and the imports of the neuron."""
+
+import ast
+import multiprocessing
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from golden.sequences import natural
+
+import lgmd_gym.neuron
+from lgmd_gym.neuron import LGMD
+
+SHAPE = (24, 37)
+
+
+def test_step_starts_no_thread_for_a_single_neuron():
+    from numba.np.ufunc import parallel
+
+    before = threading.active_count()
+    frames = natural(SHAPE, 3)
+    for frame in frames:
+        LGMD(SHAPE).step(frame)
+        LGMD(SHAPE, threads=4).step(frame)
+        LGMD(SHAPE, num=3).step(frames)
+    assert threading.active_count() == before
+    assert not parallel._is_initialized
+
+
+def _step_and_send(queue, neuron, frames):
+    queue.put([tuple(map(np.ndarray.tolist, neuron.step(stack))) for stack in frames])
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@pytest.mark.parametrize("threads", [None, 2])
+def test_forked_child_continues_the_neuron_of_its_parent(threads):
+    context = multiprocessing.get_context("fork")
+    frames = np.stack([natural(SHAPE, 12, seed) for seed in range(4)], axis=1)
+    neuron = LGMD(SHAPE, num=4, threads=threads)
+    for stack in frames[:6]:
+        neuron.step(stack)
+    queue = context.SimpleQueue()
+    child = context.Process(target=_step_and_send, args=(queue, neuron, frames[6:]), daemon=True)
+    child.start()
+    child.join(60)
+    assert child.exitcode == 0
+    assert queue.get() == [tuple(map(np.ndarray.tolist, neuron.step(stack))) for stack in frames[6:]]
+
+
+OTHER_PROCESS = """
+import time
+start = time.perf_counter()
+import numpy as np
+from lgmd_gym.neuron import LGMD, LGMDParams
+for params in (LGMDParams(), LGMDParams.released()):
+    neuron = LGMD((90, 160), params=params)
+    for level in (0, 90, 20):
+        response = neuron.step(np.full((90, 160), level, np.uint8) + np.arange(160, dtype=np.uint8) // 2)
+print(time.perf_counter() - start, repr(response))
+"""
+
+
+def test_other_processes_use_the_compilation_cache_and_get_equal_outputs():
+    command = [sys.executable, "-c", OTHER_PROCESS]
+    runs = [subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(3)]
+    assert min(float(run.split()[0]) for run in runs[1:]) < 1.5
+    assert len({run.split(maxsplit=1)[1] for run in runs}) == 1
+
+
+def test_neuron_imports_no_other_part_of_the_package():
+    allowed = {"numpy", "numba", "llvmlite", "tomli_w", *sys.stdlib_module_names}
+    imported = set()
+    for path in Path(lgmd_gym.neuron.__file__).parent.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                imported |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                imported.add(node.module or "")
+    own = {name for name in imported if name.startswith("lgmd_gym.neuron") or name == "lgmd_gym.errors"}
+    assert {name for name in imported - own if name.split(".")[0] not in allowed} == set()

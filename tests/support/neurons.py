@@ -1,0 +1,17 @@
+"""Presets and runs of the neuron that several test files share."""
+
+from lgmd_gym.neuron import LGMD, LGMDParams
+
+PRESETS = {
+    "default": LGMDParams(),
+    "released": LGMDParams.released(),
+    "fixed_inhibition": LGMDParams.fixed_inhibition(),
+    "off_only": LGMDParams.off_only(),
+    "yue_rind2006": LGMDParams.yue_rind2006(),
+}
+
+
+def responses(frames, **options):
+    """Return the responses of a new neuron to a sequence of frames, (count, H, W)."""
+    neuron = LGMD(frames.shape[1:], **options)
+    return [neuron.step(frame) for frame in frames]
