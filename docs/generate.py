@@ -17,8 +17,11 @@ from typing import Any, get_args
 import figures
 
 from lgmd_gym.benchmark.analysis.tables import mean_kmh
-from lgmd_gym.benchmark.run_cases import DEFAULT_AGENTS, Run
-from lgmd_gym.benchmark.summary import Rate, scores
+from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.executor import Executor
+from lgmd_gym.benchmark.runner import Run
+from lgmd_gym.benchmark.statistics import Rate
+from lgmd_gym.benchmark.summary import summaries
 from lgmd_gym.cli import main as cli
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.random_braking import RandomBrakingEnv
@@ -115,13 +118,13 @@ def _prose(text: str) -> str:
 def benchmark_table() -> str:
     """Play the quick suite and return its scores as a Markdown table."""
     with TemporaryDirectory() as folder:
-        run = Run("quick", DEFAULT_AGENTS, seeds=3, jobs=2, out=Path(folder) / "run")
+        run = Run.new(RunConfig(), Path(folder) / "run", Executor(jobs=2))
         run.play()
     rows = [
         "| agent | avoided | impact speed taken off | premature | false braking |",
         "|---|---|---|---|---|",
     ]
-    for item in scores(run.rows, lambda row: ""):
+    for item in summaries(run.rows, lambda row: ""):
         taken = f"{mean_kmh(item.speed_reduction)} km/h"
         rates = [_rate(rate) for rate in (item.avoided, item.premature, item.false_activations)]
         rows.append(f"| `{item.agent}` | {rates[0]} | {taken} | {rates[1]} | {rates[2]} |")

@@ -9,20 +9,22 @@ intervals.
 import sys
 from pathlib import Path
 
-from lgmd_gym.benchmark.run_cases import Run
 from matplotlib.figure import Figure
 
-from lgmd_gym.benchmark.summary import Rate, Score, scores
+from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.runner import Run
+from lgmd_gym.benchmark.statistics import Rate
+from lgmd_gym.benchmark.summary import AgentSummary, summaries
 from lgmd_gym.plotting.style import COLOURS
 
-AGENTS = ["spike-threshold:threshold=30", "spike-threshold:threshold=90,frames=2", "ttc-oracle"]
+AGENTS = ("spike-threshold:threshold=30", "spike-threshold:threshold=90,frames=2", "ttc-oracle")
 
 
-def main(folder: Path, picture: Path | None = None, seeds: int = 1) -> list[Score]:
+def main(folder: Path, picture: Path | None = None, seeds: int = 1) -> list[AgentSummary]:
     """Run the quick suite, print one line per agent and plot the rates."""
-    run = Run("quick", AGENTS, seeds=seeds, jobs=1, out=folder)
+    run = Run.new(RunConfig(suite="quick", agents=AGENTS, seeds=seeds), folder)
     run.play()
-    found = scores(run.rows, lambda row: "")
+    found = summaries(run.rows, lambda row: "")
     for item in found:
         avoided, false = item.avoided, item.false_activations
         print(f"{item.agent:40} avoided {avoided.k}/{avoided.n}  false activations {false.k}/{false.n}")
@@ -31,7 +33,7 @@ def main(folder: Path, picture: Path | None = None, seeds: int = 1) -> list[Scor
     return found
 
 
-def draw(found: list[Score], picture: Path) -> None:
+def draw(found: list[AgentSummary], picture: Path) -> None:
     """Plot the rates of each agent with Wilson's 95 % intervals."""
     figure = Figure(figsize=(8.0, 2.6), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True)

@@ -18,8 +18,8 @@ from joblib import Parallel, delayed
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.sensors import DEFAULT_CAMERA, SensorConfig
+from lgmd_gym.benchmark.statistics import wilson
 from lgmd_gym.benchmark.suites import find_suite
-from lgmd_gym.benchmark.summary import wilson
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
 from lgmd_gym.camera import CameraParams
 
@@ -64,13 +64,13 @@ TEXTURES = (0.5, 1.0, 1.6)  # contrast of the asphalt, relative to the default
 
 def play(agent: str, cases: Sequence[Case], seeds: int, change: Change, jobs: int) -> list[Row]:
     """Return the rows of an agent with changed cameras."""
-    own = SensorConfig().of(make_agent(agent))
+    own = SensorConfig().for_agent(make_agent(agent))
     lenses = own.camera if isinstance(own.camera, list) else [own.camera or DEFAULT_CAMERA]
     named = [{"name": lens} if isinstance(lens, str) else dict(lens) for lens in lenses]
     changed = SensorConfig([change(lens) for lens in named], own.params, own.condition, own.include_frame)
 
     def both(case: Case, seed: int) -> Row:
-        truth = run_task(Task(NO_BRAKE, case, seed, NO_VIEW)).truth
+        truth = run_task(Task(NO_BRAKE, case, seed, NO_VIEW)).counterfactual
         return run_task(Task(agent, case, seed, changed, truth)).row
 
     rows: Any = Parallel(n_jobs=jobs)(delayed(both)(case, seed) for case in cases for seed in range(seeds))

@@ -1,59 +1,58 @@
-"""Suites of cases, episodes played in parallel, rows, and what they sum up to."""
+"""Benchmark: suites of cases, runs on many processes, rows and summaries."""
 
-from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.executor import SERIAL, Executor
 
 if TYPE_CHECKING:
     import pandas as pd
 
+__all__ = ["Executor", "RunConfig", "run"]
+
 
 def run(
-    suite: str,
-    agents: Iterable[str],
-    seeds: int = 3,
-    jobs: int = 1,
-    out: Path | str | None = None,
-    camera: Any = None,
-    params: Any = None,
-    conditions: Iterable[str] = ("clear",),
-    cluster: str | None = None,
-    first_seed: int = 0,
+    config: RunConfig,
+    folder: Path | str | None = None,
+    executor: Executor = SERIAL,
+    plots: bool = True,
+    report: bool = True,
 ) -> "pd.DataFrame":
-    """Play a suite and return its rows.
+    """Play a benchmark run and write the same folder as `lgmd-gym bench`.
 
     Args:
-        suite: Name of a suite, the path of a suite file (".toml"), or "traffic".
-        agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
-        seeds: Number of seeds.
-        jobs: Processes; 1 plays in this one.
-        out: Run folder to keep, which must not exist; None keeps none.
-        camera: See `LGMDObservation`; None for each agent's own, see `Agent.camera`.
-        params: See `LGMDObservation`.
-        conditions: Camera conditions by name, such as "clear" and "degraded"; the suite is played under each.
-        cluster: Address of a Dask scheduler to play on, in place of processes.
-        first_seed: Seeds are played from this one on.
+        config: Configuration of the run.
+        folder: Run folder, which must not exist; None keeps no folder.
+        executor: Processes to play on.
+        plots: Whether to draw one PNG per case.
+        report: Whether to write report.html.
 
     Returns:
-        One line per episode with the columns of `lgmd_gym.benchmark.rows.KEYS`, `no-brake` included; for
-        "traffic", those of `traffic_rows.KEYS`.
+        One line per episode with the columns `lgmd_gym.benchmark.rows.KEYS`, those of `no-brake` included;
+        for the suite "traffic", `lgmd_gym.benchmark.traffic.rows.KEYS`.
 
     Raises:
-        ValueError: For an unknown name, a count below 1, a cluster that does not answer, or a folder that
-            exists or cannot be made.
-        RuntimeError: If the run broke off: a worker was killed, or the disk is full.
-    """
-    from tempfile import TemporaryDirectory
+        ValueError: If the configuration is invalid, the cluster is not reachable, or the folder exists or
+            cannot be made.
+        RuntimeError: If the run stopped early, because a worker was killed or the disk is full.
 
+    Example:
+        >>> config = RunConfig(suite="quick", agents=("ttc-oracle",), seeds=1)
+        >>> table = run(config)  # doctest: +SKIP
+    """
     import pandas as pd
 
-    from lgmd_gym.benchmark.runs import start_run
-    from lgmd_gym.benchmark.sensors import SensorConfig
+    from lgmd_gym.benchmark.runner import Run
+    from lgmd_gym.report.outputs import write_outputs
 
     with TemporaryDirectory() as spare:
-        folder = Path(out or Path(spare) / "run")
-        sensor_config = SensorConfig(camera, params)
-        played = start_run(suite, agents, seeds, jobs, folder, sensor_config, conditions, cluster, first_seed)
-        if not played.play():
-            raise RuntimeError(f"{played.stopped}: {len(played.rows)} of {played.total} episodes kept")
-        return pd.DataFrame(played.rows)
+        benchmark = Run.new(config, Path(folder or Path(spare) / "run"), executor)
+        complete = benchmark.play()
+        if folder is not None:
+            write_outputs(benchmark.folder.path, plots, report)
+        if not complete:
+            kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
+            raise RuntimeError(f"{benchmark.stop_reason}: {kept}")
+        return pd.DataFrame(benchmark.rows)

@@ -1,5 +1,6 @@
-"""What a run plays, as `run.toml` in its folder: `lgmd-gym bench --config run.toml` plays the same again."""
+"""The configuration of a run, stored as `run.toml` in its folder."""
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -8,88 +9,135 @@ import tomli_w
 
 from lgmd_gym.benchmark.folder import provenance
 from lgmd_gym.benchmark.sensors import CLEAR, SensorConfig
-from lgmd_gym.benchmark.suite_file import read_toml
-from lgmd_gym.errors import check_keys
+from lgmd_gym.benchmark.suite_file import copy_suite, read_toml
+from lgmd_gym.benchmark.suites import TRAFFIC
+from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.camera import CONDITIONS, CameraSpec
+from lgmd_gym.envs.traffic.registration import KINDS
+from lgmd_gym.errors import check_keys, unknown_name
+from lgmd_gym.neuron import NeuronSpec
 
-FILE = "run.toml"
-OWN_SUITE = "suite.toml"  # beside it, if the suite is a user's own
-HEAD = (
-    "# lgmd-gym bench --config {file} plays the same again. Played by lgmd-gym {version}, commit {commit}.\n"
+RUN_FILE = "run.toml"
+SUITE_FILE = "suite.toml"  # copy of a user's own suite next to it
+DEFAULT_AGENTS = (
+    NO_BRAKE,
+    "always-brake",
+    "random-brake",
+    "spike-threshold",
+    "stopping-zone",
+    "ttc-oracle",
 )
+HEAD = "# Repeat with lgmd-gym bench --config {file}. Made by lgmd-gym {version}, commit {commit}.\n"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunConfig:
-    """Everything that decides a run's rows; not on how many processes, nor where.
+    """Everything that decides the rows of a run; not the processes or the folder.
 
     Attributes:
-        suite: A suite's name, or the path of a suite file.
-        agents: Agent strings.
-        seeds: Number of seeds, >= 1.
-        conditions: Camera conditions by name, each of which is played.
-        camera: See `LGMDObservation`; plain values, None for each agent's own eye.
-        params: See `LGMDObservation`; plain values, None for the defaults.
-        first_seed: Seeds are played from this one on, >= 0.
+        suite: Name of a suite, path of a suite file (".toml"), or "traffic".
+        agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
+        seeds: Number of seeds, >= 1; for traffic, of every kind.
+        first_seed: First seed, >= 0.
+        conditions: Camera conditions by name; the suite is played under each.
+        camera: See `LGMDObservation`; None for each agent's own, see `Agent.camera`.
+        params: See `LGMDObservation`; None for each agent's own or the defaults.
+        kinds: Kinds of traffic; None for all. Only for the suite "traffic".
+
+    Raises:
+        ValueError: If a value is unknown or out of range.
     """
 
-    suite: str
-    agents: tuple[str, ...]
-    seeds: int
-    conditions: tuple[str, ...] = (CLEAR,)
-    camera: Any = None
-    params: dict[str, Any] | None = None
+    suite: str = "quick"
+    agents: tuple[str, ...] = DEFAULT_AGENTS
+    seeds: int = 3
     first_seed: int = 0
+    conditions: tuple[str, ...] = (CLEAR,)
+    camera: CameraSpec | None = None
+    params: NeuronSpec = None
+    kinds: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.suite, str):
+            raise ValueError(f"suite must be a string, got {self.suite!r}")
         for name, low in (("seeds", 1), ("first_seed", 0)):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < low:
                 raise ValueError(f"{name} must be a whole number >= {low}, got {value!r}")
+        if self.kinds is not None and self.suite != TRAFFIC:
+            raise ValueError(f"kinds applies to suite 'traffic' only, got suite {self.suite!r}")
+        plain = SensorConfig(self.camera, self.params).plain
+        values: dict[str, Any] = {
+            "agents": _names("agents", self.agents),
+            "conditions": _names("conditions", self.conditions, "camera condition", CONDITIONS),
+            "camera": plain.camera,
+            "params": plain.params,
+        }
+        if self.suite == TRAFFIC:
+            kinds = KINDS if self.kinds is None else self.kinds
+            values["kinds"] = _names("kinds", kinds, "kind of traffic", KINDS)
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     @property
-    def played(self) -> range:
+    def seed_range(self) -> range:
         """The seeds."""
         return range(self.first_seed, self.first_seed + self.seeds)
 
     @property
     def sensor_config(self) -> SensorConfig:
-        """Camera and neuron parameters, before any condition."""
+        """Camera and neuron parameters, without a condition."""
         return SensorConfig(self.camera, self.params)
+
+    @property
+    def own_suite(self) -> bool:
+        """Whether the suite is a user's own file."""
+        return self.suite.endswith(".toml")
 
     @classmethod
     def load(cls, path: Path) -> "RunConfig":
-        """Read a file; a suite file is looked for beside it.
+        """Read a file written by `save`; the path of a suite file is relative to it.
 
         Raises:
-            ValueError: For a file that cannot be read, a key that is unknown (the nearest is named) or
-                missing, or a value of another kind.
+            ValueError: If the file cannot be read, a key is unknown or missing, or a value is invalid.
         """
         values = read_toml(path, "run config")
         try:
-            return cls._from_values(values, path.parent)
+            check_keys("key", values, [field.name for field in fields(cls)])
+            for key in ("suite", "agents", "seeds"):
+                if key not in values:
+                    raise ValueError(f"key {key!r} is missing")
+            config = cls(**values)
         except ValueError as error:
             raise ValueError(f"run config {str(path)!r}: {error}") from None
+        if config.own_suite:
+            object.__setattr__(config, "suite", str(path.parent / config.suite))
+        return config
 
-    @classmethod
-    def _from_values(cls, values: dict[str, Any], folder: Path) -> "RunConfig":
-        check_keys("key", values, [field.name for field in fields(cls)])
-        for key in ("suite", "agents", "seeds"):
-            if key not in values:
-                raise ValueError(f"key {key!r} is missing")
-        if not isinstance(values["suite"], str):
-            raise ValueError(f"suite must be a string, got {values['suite']!r}")
-        for key in ("agents", "conditions"):
-            items = values.get(key, [CLEAR])
-            if not isinstance(items, list) or not all(isinstance(item, str) for item in items):
-                raise ValueError(f"{key} must be a list of strings, got {items!r}")
-            values[key] = tuple(items)
-        if values["suite"].endswith(".toml"):
-            values["suite"] = str(folder / values["suite"])
-        return cls(**values)
-
-    def save(self, path: Path) -> None:
-        """Write a file that `load` reads back; its first line says what it was played with."""
+    def save(self, folder: Path) -> Path:
+        """Write `run.toml`, and a copy of a user's own suite, into a run folder; return the file's path."""
         made = provenance()
-        values = {key: value for key, value in asdict(self).items() if value is not None}
-        head = HEAD.format(file=path.name, version=made["lgmd_gym"], commit=made["commit"] or "unknown")
+        if self.own_suite:
+            copy_suite(Path(self.suite), folder / SUITE_FILE)
+        head = HEAD.format(file=RUN_FILE, version=made["lgmd_gym"], commit=made["commit"] or "unknown")
+        values = {key: value for key, value in self.to_dict().items() if value is not None}
+        path = folder / RUN_FILE
         path.write_text(head + tomli_w.dumps(values), encoding="utf-8")
+        return path
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the values for TOML and JSON; a user's own suite is `SUITE_FILE`."""
+        return asdict(self) | ({"suite": SUITE_FILE} if self.own_suite else {})
+
+
+def _names(name: str, values: Iterable[str], kind: str = "", known: Iterable[str] = ()) -> tuple[str, ...]:
+    """Return distinct names, at least one, all of them strings and among the known ones, if any."""
+    if isinstance(values, str) or not all(isinstance(value, str) for value in values):
+        raise ValueError(f"{name} must be a list of strings, got {values!r}")
+    names = tuple(dict.fromkeys(values))
+    if not names:
+        raise ValueError(f"{name} must hold at least one name, got none")
+    for value in names:
+        if kind and value not in known:
+            raise unknown_name(kind, value, known)
+    return names

@@ -1,7 +1,8 @@
-"""Play one agent through one case with one seed, and keep what happened."""
+"""Playing of one agent through one environment with one seed."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -11,39 +12,36 @@ from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs import env_id
 
-# One value per decision each; `held` is 1 while a standing ego is kept from starting, which no deceleration
-# shows.
-SERIES = (
-    "time",
-    "ego_speed",
-    "gap",
-    "ttc",
-    "drac",
-    "deceleration",
-    "target_speed",
-    "spike_frequency",
-    "membrane_potential",
-    "ffi",
-    "alert",
-    "held",
-)
-TRUTHS = ("ego_speed", "gap", "ttc", "drac", "deceleration", "target_speed")  # of `info`
-SIGNALS = ("spike_frequency", "membrane_potential", "ffi")  # of the observation, the highest of all cameras
+GROUND_TRUTH = ("ego_speed", "gap", "ttc", "drac", "deceleration", "target_speed")  # keys of `info`
+SIGNALS = ("spike_frequency", "membrane_potential", "ffi")  # keys of the observation; maximum over cameras
+# One value per decision each. `standstill_hold` is 1 while the agent keeps a standing ego from starting,
+# which the deceleration does not show.
+SERIES = ("time", *GROUND_TRUTH, *SIGNALS, "alert", "standstill_hold")
+
+
+class Step(NamedTuple):
+    """Result of a reset or of one step of an environment."""
+
+    observation: dict[str, Any]
+    info: dict[str, Any]
+    reward: float = 0.0
+    done: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """What happened, one value per decision and the outcome.
+    """Time series and outcome of one episode.
 
     Attributes:
-        series: Name to array of shape (decisions + 1,); NaN where undefined. The first value is the reset's.
-        collision: Whether the ego touched anybody.
-        impact_speed: The ego's speed at the touch [m/s]; NaN without one.
-        relative_impact_speed: Less the other's along the ego's heading [m/s]; NaN without a touch.
+        series: Arrays of shape (decisions + 1,) by name, the first value from the reset; NaN where undefined.
+        collision: Whether the ego had contact.
+        impact_speed: Ego speed at contact [m/s]; NaN without contact.
+        relative_impact_speed: Impact speed minus the target's speed along the ego's heading [m/s]; NaN
+            without contact.
         target_width: Width of the first actor [m]; NaN on an empty road.
-        fps: Camera frames per second [Hz].
+        fps: Camera frame rate [Hz].
         target_shade: Body grey of the first actor in [0, 255]; NaN on an empty road.
-        reward_sum: Sum of the environment's rewards, the return without discount.
+        reward_sum: Undiscounted return of the environment.
     """
 
     series: dict[str, np.ndarray]
@@ -57,41 +55,54 @@ class Episode:
 
 
 def make_env(case: Case, sensor_config: SensorConfig, **options: Any) -> gym.Env:
-    """Return the environment of a case; `options` go to `gym.make`."""
+    """Return the environment of a case; `options` are passed to `gym.make`."""
     return gym.make(
         env_id(case.family),
-        **sensor_config.of().arguments,
+        **sensor_config.for_agent().arguments,
         trace=True,
         **dict(case.arguments),
         **options,
     )
 
 
+def rollout(env: gym.Env, agent: Agent, seed: int) -> Iterator[tuple[Step, np.ndarray]]:
+    """Yield every step of an episode and the agent's action on it, the final step included.
+
+    Args:
+        env: Environment inside `LGMDObservation`.
+        agent: Acting agent.
+        seed: Seed of the environment and of the agent.
+    """
+    step = Step(*env.reset(seed=seed))
+    agent.reset(seed)
+    while True:
+        action = agent.act(step.observation, step.info)
+        yield step, action
+        if step.done:
+            return
+        observation, reward, terminated, truncated, info = env.step(action)
+        step = Step(observation, info, float(reward), terminated or truncated)
+
+
 def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
     """Play one episode to its end.
 
     Args:
-        env: A braking environment inside `LGMDObservation`.
-        agent: Who acts.
-        seed: Of the environment and of the agent.
+        env: Braking environment inside `LGMDObservation`.
+        agent: Acting agent.
+        seed: Seed of the environment and of the agent.
     """
-    observation, info = env.reset(seed=seed)
-    agent.reset(seed)
-    policy_hz = env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
     rows: list[tuple[float, ...]] = []
-    done, total = False, 0.0
-    while True:
-        # The agent judges what it has seen before the moment is noted, so that its alert belongs to it.
-        action = agent.act(observation, info)
-        held = info["ego_speed"] == 0.0 and float(action[0]) < 0.0
-        rows.append((len(rows) / policy_hz, *_moment(observation, info), float(agent.alert), float(held)))
-        if done:
-            break
-        observation, reward, terminated, truncated, info = env.step(action)
-        total += float(reward)
-        done = terminated or truncated
+    info, total, policy_hz = {}, 0.0, 0.0
+    for step, action in rollout(env, agent, seed):
+        info, total = step.info, total + step.reward
+        policy_hz = policy_hz or env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
+        standstill_hold = info["ego_speed"] == 0.0 and float(action[0]) < 0.0
+        truth = (info[name] for name in GROUND_TRUTH)
+        signals = (float(np.max(step.observation[name])) for name in SIGNALS)
+        rows.append((len(rows) / policy_hz, *truth, *signals, float(agent.alert), float(standstill_hold)))
     base: Any = env.unwrapped
-    actors, seen = base.scenario.actors, base.road.obstacles
+    actors, bodies = base.scenario.actors, base.road.obstacles
     return Episode(
         series={name: np.array(column) for name, column in zip(SERIES, zip(*rows, strict=True), strict=True)},
         collision=bool(info["collision"]),
@@ -99,11 +110,6 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
         relative_impact_speed=info["relative_impact_speed"],
         target_width=actors[0].width if actors else float("nan"),
         fps=env.get_wrapper_attr("fps"),
-        target_shade=float(seen[0].shade) if seen else float("nan"),
+        target_shade=float(bodies[0].shade) if bodies else float("nan"),
         reward_sum=total,
     )
-
-
-def _moment(observation: dict[str, Any], info: dict[str, Any]) -> tuple[float, ...]:
-    """Return one value for each name in `SERIES` but time, alert and held."""
-    return (*(info[name] for name in TRUTHS), *(float(np.max(observation[name])) for name in SIGNALS))

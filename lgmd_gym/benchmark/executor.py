@@ -1,4 +1,4 @@
-"""Where episodes are played: in this process, in processes beside it, or on a Dask cluster; all by joblib."""
+"""Execution of tasks in this process, in worker processes or on a Dask cluster, through joblib."""
 
 import contextlib
 import logging
@@ -6,45 +6,86 @@ import threading
 import time
 import warnings
 from _thread import interrupt_main
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from typing import Any
 
-from joblib import Parallel, parallel_config
+from joblib import Parallel, delayed, parallel_config
 
 from lgmd_gym._version import __version__
 
-CONNECT = 5.0  # [s] to reach the scheduler
-WORKERS = 10.0  # [s] to wait for a first worker
-PATIENCE = 20.0  # [s] without scheduler or without a worker, after which a cluster counts as lost
+CONNECT = 5.0  # [s] limit for reaching the scheduler
+WORKERS = 10.0  # [s] limit for the first worker
+PATIENCE = 20.0  # [s] without scheduler or worker after which a cluster counts as lost
+KILLED = "a task killed worker after worker"
+
+# Maps a function over tasks and yields the results as they finish.
+TaskMap = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 
 
 class PoolLostError(RuntimeError):
-    """The workers are gone; what was in flight is lost, all else is kept."""
+    """The workers are lost, and the tasks in flight with them."""
 
 
-@contextlib.contextmanager
-def open_pool(jobs: int, cluster: str | None = None) -> Iterator[Parallel]:
-    """Yield a `joblib.Parallel` whose results come as they finish.
+@dataclass(frozen=True, slots=True)
+class Executor:
+    """Number and place of the worker processes.
 
-    Args:
-        jobs: Processes; 1 plays in this one. On a cluster its workers decide.
+    Attributes:
+        jobs: Number of processes; 1 runs in this process. A cluster uses all of its workers instead.
         cluster: Address of a Dask scheduler, such as "tcp://10.0.0.1:8786"; None for this machine.
 
     Raises:
-        PoolLostError: If a worker process or the cluster dies.
-        ValueError: If the cluster cannot be reached.
+        ValueError: If `jobs` is below 1.
     """
-    if cluster is None:
-        # joblib replaces a worker that has grown by 300 MB, as by PyTorch for a policy, and warns of a leak.
-        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
-        try:
-            with Parallel(n_jobs=jobs, return_as="generator_unordered") as parallel:
-                yield parallel
-        except BrokenProcessPool:
-            raise PoolLostError("a worker process was killed (is memory short?)") from None
-        return
-    with contextlib.closing(_connect(cluster)) as client, _Watch(client) as watch:
+
+    jobs: int = 1
+    cluster: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.jobs < 1:
+            raise ValueError(f"jobs must be >= 1, got {self.jobs!r}")
+
+    def check(self) -> None:
+        """Check that the cluster, if any, is reachable and has workers with this version of the package.
+
+        Raises:
+            ValueError: If it is not, within seconds.
+        """
+        if self.cluster is not None:
+            with contextlib.closing(_connect(self.cluster)) as client:
+                _check_workers(client, self.cluster)
+
+    @contextlib.contextmanager
+    def open(self) -> Iterator[TaskMap]:
+        """Yield a function that maps a function over tasks and yields results as they finish.
+
+        Raises:
+            PoolLostError: If a worker process or the cluster dies.
+            ValueError: If the cluster cannot be reached.
+        """
+        with _local(self.jobs) if self.cluster is None else _dask(self.cluster) as parallel:
+            yield lambda function, tasks: parallel(delayed(function)(task) for task in tasks)  # type: ignore[return-value]
+
+
+SERIAL = Executor()
+
+
+@contextlib.contextmanager
+def _local(jobs: int) -> Iterator[Parallel]:
+    # joblib replaces a worker that has grown by 300 MB, as it does by loading PyTorch, and warns of a leak.
+    warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
+    try:
+        with Parallel(n_jobs=jobs, return_as="generator_unordered") as parallel:
+            yield parallel
+    except BrokenProcessPool:
+        raise PoolLostError("a worker process was killed (is memory short?)") from None
+
+
+@contextlib.contextmanager
+def _dask(address: str) -> Iterator[Parallel]:
+    with contextlib.closing(_connect(address)) as client, _ClusterMonitor(client) as monitor:
         try:
             with (
                 parallel_config(backend="dask", client=client),
@@ -52,27 +93,12 @@ def open_pool(jobs: int, cluster: str | None = None) -> Iterator[Parallel]:
             ):
                 yield parallel
         except KeyboardInterrupt:
-            if watch.lost:
-                raise PoolLostError(f"the cluster at {cluster} is lost: {watch.lost}") from None
+            if monitor.failure:
+                raise PoolLostError(f"the cluster at {address} is lost: {monitor.failure}") from None
             raise
         except _lost_errors() as error:
-            why = str(error).splitlines()[0]
-            raise PoolLostError(f"the cluster at {cluster} is lost: {why}") from None
-
-
-def check_pool(jobs: int, cluster: str | None) -> None:
-    """Refuse a number of processes below 1, and a cluster that cannot play.
-
-    Raises:
-        ValueError: Within seconds, if the cluster cannot be reached, has no worker, or its workers lack this
-            package or have it in another version.
-    """
-    if jobs < 1:
-        raise ValueError(f"jobs must be >= 1, got {jobs!r}")
-    if cluster is None:
-        return
-    with contextlib.closing(_connect(cluster)) as client:
-        _check_workers(client, cluster)
+            reason = str(error).splitlines()[0]
+            raise PoolLostError(f"the cluster at {address} is lost: {reason}") from None
 
 
 def _connect(address: str) -> Any:
@@ -80,20 +106,20 @@ def _connect(address: str) -> Any:
     try:
         from distributed import Client
     except ImportError:
-        raise ValueError("a Dask cluster needs dask; pip install 'lgmd-gym[cluster]'") from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its tracebacks of a lost cluster fill pages
+        raise ValueError("a Dask cluster requires dask; pip install 'lgmd-gym[cluster]'") from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # hide long tracebacks
     try:
         return Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        why = str(error).split("\n")[0]
+        reason = str(error).split("\n")[0]
         raise ValueError(
-            f"no Dask scheduler answers at {address!r} ({why}); start one with `dask scheduler` and give "
+            f"no Dask scheduler at {address!r} ({reason}); start one with `dask scheduler` and pass "
             "--address tcp://HOST:8786"
         ) from None
 
 
 def _lost_errors() -> tuple[type[BaseException], ...]:
-    """Return what Dask raises when a cluster goes; episodes themselves raise nothing, they become rows."""
+    """Return the exceptions of a lost cluster; tasks themselves raise none."""
     from distributed.client import FutureCancelledError
     from distributed.comm.core import CommClosedError
     from distributed.scheduler import KilledWorker
@@ -108,7 +134,7 @@ def _check_workers(client: Any, address: str) -> None:
             raise ValueError(f"cluster {address} has no worker; start some with `dask worker {address}`")
         time.sleep(0.1)
     try:
-        versions = client.run(_installed)
+        versions = client.run(_installed_version)
     except Exception as error:
         raise ValueError(
             f"a worker of {address} cannot import lgmd_gym ({error}); install it there"
@@ -116,28 +142,27 @@ def _check_workers(client: Any, address: str) -> None:
     for worker, version in versions.items():
         if version != __version__:
             raise ValueError(
-                f"worker {worker} has lgmd-gym {version}, this is {__version__}; make them equal"
+                f"worker {worker} has lgmd-gym {version}, this is {__version__}; install the same version"
             )
 
 
-def _installed() -> str:
-    """Return the version of this package where it is called."""
+def _installed_version() -> str:
     return __version__
 
 
-class _Watch:
-    """Interrupts the main thread once a cluster is lost: joblib would wait for its results for ever.
+class _ClusterMonitor:
+    """Interrupts the main thread once a cluster is lost, because joblib would wait for results forever.
 
     Attributes:
-        lost: What happened; "" for nothing.
+        failure: Reason of the loss; "" before one.
     """
 
     def __init__(self, client: Any) -> None:
-        self.client, self.lost = client, ""
+        self.client, self.failure = client, ""
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._thread = threading.Thread(target=self._watch, daemon=True)
 
-    def __enter__(self) -> "_Watch":
+    def __enter__(self) -> "_ClusterMonitor":
         self._thread.start()
         return self
 
@@ -145,24 +170,25 @@ class _Watch:
         self._stop.set()
         self._thread.join()
 
-    def _look(self) -> None:
-        good = time.monotonic()
+    def _watch(self) -> None:
+        last_good = time.monotonic()
         while not self._stop.wait(0.5):
-            trouble = self._trouble()
-            if not trouble:
-                good = time.monotonic()
-            elif time.monotonic() - good > PATIENCE or trouble == "a task killed worker after worker":
-                self.lost = trouble
+            failure = self._failure()
+            if not failure:
+                last_good = time.monotonic()
+            elif time.monotonic() - last_good > PATIENCE or failure == KILLED:
+                self.failure = failure
                 interrupt_main()
                 return
 
-    def _trouble(self) -> str:
+    def _failure(self) -> str:
+        """Return what is wrong with the cluster at present; "" for nothing."""
         if self.client.status != "running":
-            return "its scheduler does not answer"
-        # Episodes turn exceptions into rows, so that Dask's own verdict on a task is all that is left.
+            return "its scheduler does not respond"
+        # Tasks turn exceptions into rows, so only Dask itself sets this status.
         if any(future.status == "error" for future in list(self.client.futures.values())):
-            return "a task killed worker after worker"
+            return KILLED
         try:
             return "" if self.client.ncores() else "it has no worker left"
         except Exception:
-            return "its scheduler does not answer"
+            return "its scheduler does not respond"

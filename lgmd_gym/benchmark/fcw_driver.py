@@ -1,36 +1,36 @@
-"""The driver of Euro NCAP's warning tests, who brakes on the agent's alert."""
+"""The driver model of Euro NCAP's forward collision warning (FCW) tests."""
 
 from typing import Any
 
 import numpy as np
 
-REACTION = 1.2  # [s] from the alert to the brake, Euro NCAP AEB C2C v4.3.1, 8.4.6
-LEVEL = 4.0  # [m/s²], the same
+REACTION = 1.2  # [s] from the alert to braking, Euro NCAP AEB C2C v4.3.1, 8.4.6
+DECELERATION = 4.0  # [m/s²], same section
 
 
 class FCWDriver:
-    """Brakes at 4 m/s², 1.2 s after an agent's first alert; the agent's own demands do nothing.
+    """Brakes at 4 m/s², 1.2 s after the first alert of an agent, and ignores the agent's demands.
 
     Args:
-        agent: Who warns.
-        max_deceleration: Of full braking [m/s²].
-        decision_hz: Decisions per second [Hz].
+        agent: Agent that raises the alert.
+        max_deceleration: Deceleration of full braking [m/s²].
+        decision_hz: Decision rate [Hz].
     """
 
     def __init__(self, agent: Any, max_deceleration: float, decision_hz: float) -> None:
         self.agent = agent
-        self.name = f"{agent.name} (warned driver)"
-        self._demand = -LEVEL / max_deceleration
-        self._wait = round(REACTION * decision_hz)
+        self.name = f"{agent.name} (FCW driver)"
+        self._demand = -DECELERATION / max_deceleration
+        self._delay = round(REACTION * decision_hz)
         self._since_alert: int | None = None
 
     @property
     def alert(self) -> bool:
-        """Whether the agent warns."""
+        """Whether the agent raises an alert."""
         return bool(self.agent.alert)
 
     def reset(self, seed: int | None = None) -> None:
-        """Forget the last episode."""
+        """Reset the agent and the reaction timer."""
         self.agent.reset(seed)
         self._since_alert = None
 
@@ -41,5 +41,5 @@ class FCWDriver:
             self._since_alert += 1
         elif self.agent.alert:
             self._since_alert = 0
-        brakes = self._since_alert is not None and self._since_alert >= self._wait
+        brakes = self._since_alert is not None and self._since_alert >= self._delay
         return np.array([self._demand if brakes else 0.0], dtype=np.float32)

@@ -1,4 +1,4 @@
-"""A run folder: made once, written to as episodes finish, never overwritten."""
+"""Run folders: created once, appended to as episodes finish, never overwritten."""
 
 import json
 import os
@@ -8,75 +8,67 @@ import time
 from errno import ENOSPC
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgmd_gym._version import __version__
-from lgmd_gym.benchmark.new_folder import new_folder
+
+if TYPE_CHECKING:
+    from lgmd_gym.benchmark.rows import Row
 
 PACKAGES = ("numpy", "numba", "gymnasium", "highway-env", "joblib")
 
 
 class RunFolder:
-    """The files of one run: `episodes.jsonl`, `run.json`, `run.toml`, `traces/`, and what reports add.
+    """Files of one run: `episodes.jsonl`, `run.json`, `run.toml`, `traces/` and the outputs.
 
-    Use `create` for a new one and `reopen` for one that was broken off.
+    Use `create` for a new folder and `reopen` for an incomplete run.
 
     Attributes:
-        path: Where it is.
-        rows: The rows it held when it was opened.
-        mended: Whether a last line that had been cut off was taken away.
+        path: Path of the folder.
+        rows: Rows present when the folder was opened.
+        repaired: Whether an incomplete last line was removed.
     """
 
-    def __init__(self, path: Path, rows: list[dict[str, Any]], mended: bool = False) -> None:
-        self.path, self.rows, self.mended = path, rows, mended
-        # Unbuffered: what a full disk refuses must not be tried again at closing.
+    def __init__(self, path: Path, rows: "list[Row]", repaired: bool = False) -> None:
+        self.path, self.rows, self.repaired = path, rows, repaired
+        # Unbuffered, so that closing does not retry what a full disk has refused.
         self._rows = (path / "episodes.jsonl").open("ab", buffering=0)
 
     @classmethod
     def create(cls, path: Path) -> "RunFolder":
-        """Make a new folder.
+        """Create a folder.
 
         Raises:
-            ValueError: If it exists or cannot be made.
+            ValueError: If it exists or cannot be created.
         """
-        new_folder(path, "run folder")
-        return cls(path, [])
+        return cls(new_folder(path, "run folder"), [])
 
     @classmethod
     def reopen(cls, path: Path) -> "RunFolder":
-        """Open the folder of a broken-off run.
+        """Open the folder of an incomplete run.
 
-        A cut-off last line goes, and so do the rows of episodes that failed, which will be played again.
-
-        Raises:
-            ValueError: If it holds no run, or a damaged one.
-        """
-        rows, mended = read_rows(path)
-        played = [row for row in rows if row["error"] is None]
-        if mended or len(played) < len(rows):
-            text = "".join(json.dumps(row, allow_nan=False) + "\n" for row in played)
-            _replace(path / "episodes.jsonl", text)
-        return cls(path, played, mended)
-
-    def settings(self) -> dict[str, Any]:
-        """Return what `run.json` says.
+        An incomplete last line is removed, and so are error rows, whose episodes are played again.
 
         Raises:
-            ValueError: If it is missing, damaged, or from another version of this package.
+            ValueError: If it holds no run, a damaged one, or one of another version of this package.
         """
-        settings = read_settings(self.path)
-        made = settings.get("lgmd_gym")
+        rows, repaired = read_rows(path)
+        made = read_settings(path).get("lgmd_gym")
         if made != __version__:
             raise ValueError(f"the run was made by lgmd-gym {made}, this is {__version__}; start a new run")
-        return settings
+        played = [row for row in rows if row["error"] is None]
+        if repaired or len(played) < len(rows):
+            text = "".join(json.dumps(row, allow_nan=False) + "\n" for row in played)
+            _replace(path / "episodes.jsonl", text)
+        return cls(path, played, repaired)
 
-    def add(self, row: dict[str, Any]) -> None:
-        """Append one row and have it on disk before the next.
+    def add(self, row: "Row") -> None:
+        """Append one row and write it to disk.
 
         Raises:
-            OSError: If the disk is full; the rows before stay whole.
+            OSError: If the disk is full; earlier rows stay intact.
         """
         line = (json.dumps(row, allow_nan=False) + "\n").encode()
         before = self._rows.tell()
@@ -88,17 +80,13 @@ class RunFolder:
             raise
 
     def add_series(self, name: str, series: dict[str, np.ndarray]) -> None:
-        """Keep one episode's time series as `traces/<name>.npz`."""
+        """Write the time series of one episode to `traces/<name>.npz`."""
         folder = self.path / "traces"
         folder.mkdir(exist_ok=True)
         np.savez_compressed(folder / f"{name}.npz", allow_pickle=False, **series)
 
-    def series(self, name: str) -> dict[str, np.ndarray] | None:
-        """Return the time series kept under a name, None for none."""
-        return read_series(self.path, name)
-
     def describe(self, settings: dict[str, Any]) -> None:
-        """Write `run.json`: the settings, and the machine and versions they ran on."""
+        """Write `run.json`: the settings, the machine and the versions."""
         _replace(self.path / "run.json", json.dumps(settings | provenance(), indent=2) + "\n")
 
     def close(self) -> None:
@@ -106,8 +94,29 @@ class RunFolder:
         self._rows.close()
 
 
-def read_rows(path: Path) -> tuple[list[dict[str, Any]], bool]:
-    """Return the rows of a run folder, and whether a cut-off last line was left out.
+def new_folder(path: Path, kind: str) -> Path:
+    """Create a folder with its parents and return its path.
+
+    Args:
+        path: Folder to create.
+        kind: Kind of folder, for the message ("run folder", ...).
+
+    Raises:
+        ValueError: If it exists or cannot be created.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=False)
+    except FileExistsError:
+        raise ValueError(f"{kind} {str(path)!r} exists and is kept; choose another --out") from None
+    except OSError as error:
+        raise ValueError(
+            f"{kind} {str(path)!r} cannot be made ({error.strerror}); choose another --out"
+        ) from None
+    return path
+
+
+def read_rows(path: Path) -> "tuple[list[Row], bool]":
+    """Return the rows of a run folder, and whether an incomplete last line was skipped.
 
     Raises:
         ValueError: If the folder holds no run, or a damaged one.
@@ -130,7 +139,7 @@ def read_rows(path: Path) -> tuple[list[dict[str, Any]], bool]:
 
 
 def read_settings(path: Path) -> dict[str, Any]:
-    """Return what `run.json` of a run folder says.
+    """Return the contents of `run.json` of a run folder.
 
     Raises:
         ValueError: If it is missing or damaged.
@@ -143,7 +152,7 @@ def read_settings(path: Path) -> dict[str, Any]:
 
 
 def read_series(path: Path, name: str) -> dict[str, np.ndarray] | None:
-    """Return the time series that a run folder keeps under a name, None for none."""
+    """Return the time series in `traces/<name>.npz` of a run folder, None if there is no such file."""
     file = path / "traces" / f"{name}.npz"
     if not file.exists():
         return None
@@ -152,14 +161,14 @@ def read_series(path: Path, name: str) -> dict[str, np.ndarray] | None:
 
 
 def _replace(file: Path, text: str) -> None:
-    """Write a file in one go: whatever breaks off the writing, the old or the new one is there, whole."""
+    """Write a file atomically: an interruption leaves either the old or the new contents."""
     fresh = file.with_name(f"{file.name}.new")
     fresh.write_text(text, encoding="utf-8")
     fresh.replace(file)
 
 
 def provenance() -> dict[str, Any]:
-    """Return versions, commit, processor and date of this run."""
+    """Return the versions, commit, processor and date of this run."""
     return {
         "lgmd_gym": __version__,
         "commit": _commit(),
@@ -172,11 +181,11 @@ def provenance() -> dict[str, Any]:
 
 
 def _commit() -> str | None:
-    """Return the commit of the source tree this package is imported from; None if it is installed."""
+    """Return the commit of the source tree that holds this package; None for an installed package."""
     if not (Path(__file__).parents[2] / "pyproject.toml").is_file():
         return None
     try:
-        answer = subprocess.run(
+        described = subprocess.run(
             ["git", "describe", "--always", "--dirty"],
             cwd=Path(__file__).parent,
             capture_output=True,
@@ -186,7 +195,7 @@ def _commit() -> str | None:
         )
     except (OSError, subprocess.SubprocessError):
         return None
-    return answer.stdout.strip() or None
+    return described.stdout.strip() or None
 
 
 def _version(package: str) -> str | None:

@@ -1,7 +1,7 @@
-"""The metrics of an episode: small functions `outcome -> (value, valid)` in a register.
+"""Metrics of an episode: a registry of functions `paired episode -> (value, valid)`.
 
-A value that is not valid becomes null in the row: what is undefined is never written as 0 or −1. SI units,
-but for the two names that say otherwise.
+An invalid value becomes null in the row; an undefined value is never written as 0 or -1. Units are SI except
+where a metric's name gives another.
 """
 
 from collections.abc import Callable
@@ -14,9 +14,10 @@ import numpy as np
 from lgmd_gym.benchmark.episode import Episode
 
 GRAVITY = 9.80665  # [m/s²]
-NUISANCE = 0.25 * GRAVITY  # 49 CFR 571.127 S5.3: more than this beyond the driver is a false activation
-BRAKING, ONSET = 1.0, 0.3  # [m/s²], Euro NCAP AEB C2C v4.3.1, 2.1: beyond the one, walked back to the other
-EMERGENCY = 5.0  # [m/s²], UN R152 Rev.2, 5.2.1.2: where emergency braking begins
+NUISANCE = 0.25 * GRAVITY  # 49 CFR 571.127 S5.3: a false activation exceeds this beyond the driver's braking
+# Euro NCAP AEB C2C v4.3.1, 2.1: braking begins at the last value below ONSET before the first above BRAKING.
+BRAKING, ONSET = 1.0, 0.3  # [m/s²]
+EMERGENCY = 5.0  # [m/s²], start of emergency braking in UN R152 Rev.2, 5.2.1.2
 PREMATURE = 4.0  # [s] before the counterfactual contact; the protocols' T0
 
 Value = tuple[Any, bool]
@@ -25,12 +26,12 @@ UNDEFINED: Value = (None, False)
 
 @dataclass(frozen=True, slots=True)
 class Counterfactual:
-    """What `no-brake` met in the same case with the same seed.
+    """Outcome of `no-brake` in the same case with the same seed.
 
     Attributes:
-        threat: Whether it touched anybody.
-        contact_time: When [s]; NaN without contact.
-        relative_impact_speed: How fast [m/s]; NaN without contact.
+        threat: Whether it had contact.
+        contact_time: Time of contact [s]; NaN without contact.
+        relative_impact_speed: Relative impact speed [m/s]; NaN without contact.
     """
 
     threat: bool
@@ -39,78 +40,80 @@ class Counterfactual:
 
     @classmethod
     def of(cls, episode: Episode) -> "Counterfactual":
-        """Return the counterfactual that a `no-brake` episode shows."""
+        """Return the counterfactual given by a `no-brake` episode."""
         contact = float(episode.series["time"][-1]) if episode.collision else nan
         return cls(episode.collision, contact, episode.relative_impact_speed)
 
     @classmethod
     def of_row(cls, row: dict[str, Any]) -> "Counterfactual":
-        """Return the counterfactual that a `no-brake` row tells."""
+        """Return the counterfactual given by a `no-brake` row."""
         if not row["collision"]:
             return cls(False, nan, nan)
         return cls(True, row["duration"], row["relative_impact_speed"])
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
-    """An episode beside what would have happened without braking: all that a metric sees.
+class PairedEpisode:
+    """An episode with its counterfactual: the input of every metric.
 
     Attributes:
-        episode: What happened.
-        truth: What happens to `no-brake`.
-        premature: Braking earlier than this before the counterfactual contact is no success [s].
-        onset: Index of the moment at which braking begins; None for never.
+        episode: The episode.
+        counterfactual: Outcome of `no-brake`.
+        premature: Lead before the counterfactual contact beyond which braking is premature [s].
+        onset: Index of the decision at which braking begins; None for never.
         alert: Index of the first alert; None for never.
     """
 
     episode: Episode
-    truth: Counterfactual
+    counterfactual: Counterfactual
     premature: float
     onset: int | None
     alert: int | None
 
     @classmethod
-    def of(cls, episode: Episode, truth: Counterfactual, premature: float = PREMATURE) -> "Outcome":
-        """Return an episode's outcome."""
+    def of(
+        cls, episode: Episode, counterfactual: Counterfactual, premature: float = PREMATURE
+    ) -> "PairedEpisode":
+        """Return the pair, with its braking onset and first alert."""
         alerts = np.flatnonzero(episode.series["alert"])
         onset = brake_onset(episode.series["deceleration"])
-        return cls(episode, truth, premature, onset, int(alerts[0]) if alerts.size else None)
+        return cls(episode, counterfactual, premature, onset, int(alerts[0]) if alerts.size else None)
 
     def at(self, name: str, index: int | None) -> Value:
-        """Return a series' value at an index; undefined for None, NaN and infinity."""
+        """Return the value of a series at an index; undefined for None, NaN and infinity."""
         return UNDEFINED if index is None else number(self.episode.series[name][index])
 
 
-Metric = Callable[[Outcome], Value]
+Metric = Callable[[PairedEpisode], Value]
 METRICS: dict[str, Metric] = {}
 
 
 def metric(function: Metric) -> Metric:
-    """Enter a metric into `METRICS` under its function's name, which becomes a key of every row.
+    """Register a metric in `METRICS` under its function name, which becomes a key of every row.
 
     Raises:
-        ValueError: For a name that is taken.
+        ValueError: If the name is taken.
     """
     name = function.__name__
     if name in METRICS:
-        raise ValueError(f"metric {name!r} is defined twice")
+        raise ValueError(f"metric {name!r} is defined twice; rename one of them")
     METRICS[name] = function
     return function
 
 
-def measure(outcome: Outcome) -> dict[str, Any]:
-    """Return the value of every metric, None where it is not valid."""
-    values = {name: function(outcome) for name, function in METRICS.items()}
+def measure(pair: PairedEpisode) -> dict[str, Any]:
+    """Return the value of every metric, None where it is invalid."""
+    values = {name: function(pair) for name, function in METRICS.items()}
     return {name: value if valid else None for name, (value, valid) in values.items()}
 
 
 def number(value: Any) -> Value:
-    """Return a number and whether it is finite; JSON knows no NaN."""
+    """Return a value as a float and whether it is finite, because JSON has no NaN."""
     return float(value), isfinite(value)
 
 
 def brake_onset(deceleration: np.ndarray) -> int | None:
-    """Return the index at which braking begins: the first beyond 1 m/s², walked back to 0.3 m/s²."""
+    """Return the index at which braking begins: the first above 1 m/s², traced back to 0.3 m/s²."""
     beyond = np.flatnonzero(deceleration > BRAKING)
     if beyond.size == 0:
         return None
@@ -119,190 +122,188 @@ def brake_onset(deceleration: np.ndarray) -> int | None:
 
 
 @metric
-def threat(o: Outcome) -> Value:
+def threat(pair: PairedEpisode) -> Value:
     """Whether `no-brake` has contact in this case with this seed."""
-    return o.truth.threat, True
+    return pair.counterfactual.threat, True
 
 
 @metric
-def collision(o: Outcome) -> Value:
-    """Whether the ego touched anybody."""
-    return o.episode.collision, True
+def collision(pair: PairedEpisode) -> Value:
+    """Whether the ego had contact."""
+    return pair.episode.collision, True
 
 
 @metric
-def avoided(o: Outcome) -> Value:
+def avoided(pair: PairedEpisode) -> Value:
     """Whether a threat ended without contact and without premature braking."""
-    return not o.episode.collision and not premature_brake(o)[0], o.truth.threat
+    return not pair.episode.collision and not premature_brake(pair)[0], pair.counterfactual.threat
 
 
 @metric
-def ego_speed(o: Outcome) -> Value:
-    """The ego's speed at the start."""
-    return number(o.episode.series["ego_speed"][0])
+def ego_speed(pair: PairedEpisode) -> Value:
+    """Ego speed at the start."""
+    return number(pair.episode.series["ego_speed"][0])
 
 
 @metric
-def target_speed(o: Outcome) -> Value:
-    """The first actor's speed at the start."""
-    return number(o.episode.series["target_speed"][0])
+def target_speed(pair: PairedEpisode) -> Value:
+    """Speed of the first actor at the start."""
+    return number(pair.episode.series["target_speed"][0])
 
 
 @metric
-def target_shade(o: Outcome) -> Value:
-    """The first actor's body grey in [0, 255]; the asphalt's mean is 104 by day."""
-    return number(o.episode.target_shade)
+def target_shade(pair: PairedEpisode) -> Value:
+    """Body grey of the first actor in [0, 255]; the mean of the asphalt is 104 by day."""
+    return number(pair.episode.target_shade)
 
 
 @metric
-def impact_speed(o: Outcome) -> Value:
-    """The ego's speed at contact."""
-    return number(o.episode.impact_speed)
+def impact_speed(pair: PairedEpisode) -> Value:
+    """Ego speed at contact."""
+    return number(pair.episode.impact_speed)
 
 
 @metric
-def relative_impact_speed(o: Outcome) -> Value:
-    """Impact speed less the other's along the ego's heading."""
-    return number(o.episode.relative_impact_speed)
+def relative_impact_speed(pair: PairedEpisode) -> Value:
+    """Impact speed minus the target's speed along the ego's heading."""
+    return number(pair.episode.relative_impact_speed)
 
 
 @metric
-def speed_reduction(o: Outcome) -> Value:
-    """By how much the relative impact speed fell against no braking; all of it without contact."""
-    if not o.truth.threat:
+def speed_reduction(pair: PairedEpisode) -> Value:
+    """Reduction of the relative impact speed against no braking; all of it without contact."""
+    if not pair.counterfactual.threat:
         return UNDEFINED
-    left = o.episode.relative_impact_speed if o.episode.collision else 0.0
-    return number(o.truth.relative_impact_speed - left)
+    left = pair.episode.relative_impact_speed if pair.episode.collision else 0.0
+    return number(pair.counterfactual.relative_impact_speed - left)
 
 
 @metric
-def ttc_at_alert(o: Outcome) -> Value:
+def ttc_at_alert(pair: PairedEpisode) -> Value:
     """Time to contact at the first alert."""
-    return o.at("ttc", o.alert)
+    return pair.at("ttc", pair.alert)
 
 
 @metric
-def distance_at_alert(o: Outcome) -> Value:
+def distance_at_alert(pair: PairedEpisode) -> Value:
     """Free distance ahead along the ego's path at the first alert."""
-    return o.at("gap", o.alert)
+    return pair.at("gap", pair.alert)
 
 
 @metric
-def theta_at_alert_deg(o: Outcome) -> Value:
+def theta_at_alert_deg(pair: PairedEpisode) -> Value:
     """Angular size of the first actor at the first alert, from the front bumper."""
-    gap, seen = o.at("gap", o.alert)
-    if not seen or gap <= 0.0:
+    gap, valid = pair.at("gap", pair.alert)
+    if not valid or gap <= 0.0:
         return UNDEFINED
-    return number(degrees(2 * atan(o.episode.target_width / 2 / gap)))
+    return number(degrees(2 * atan(pair.episode.target_width / 2 / gap)))
 
 
 @metric
-def l_over_v_ms(o: Outcome) -> Value:
-    """Half the first actor's width over the closing speed at the first alert, l/|v|."""
-    if o.alert is None:
+def l_over_v_ms(pair: PairedEpisode) -> Value:
+    """Half width of the first actor over the closing speed at the first alert, l/|v|."""
+    if pair.alert is None:
         return UNDEFINED
-    closing = float(o.at("ego_speed", o.alert)[0] - o.at("target_speed", o.alert)[0])
-    return number(1000.0 * o.episode.target_width / 2 / closing) if closing > 0 else UNDEFINED
+    closing = float(pair.at("ego_speed", pair.alert)[0] - pair.at("target_speed", pair.alert)[0])
+    return number(1000.0 * pair.episode.target_width / 2 / closing) if closing > 0 else UNDEFINED
 
 
 @metric
-def warning_lead_time(o: Outcome) -> Value:
-    """From the first alert to emergency braking (5 m/s²), negative if the alert came later.
+def warning_lead_time(pair: PairedEpisode) -> Value:
+    """Time from the first alert to emergency braking (5 m/s²), negative if the alert came later.
 
-    UN R152 Rev.2, 5.2.1.1, asks for 0.8 s, or where that cannot be foreseen for no later than the braking.
+    UN R152 Rev.2, 5.2.1.1, requires 0.8 s, or the time of braking if the collision cannot be anticipated.
     """
-    hard = np.flatnonzero(o.episode.series["deceleration"] >= EMERGENCY)
-    if hard.size == 0 or o.alert is None:
+    hard = np.flatnonzero(pair.episode.series["deceleration"] >= EMERGENCY)
+    if hard.size == 0 or pair.alert is None:
         return UNDEFINED
-    time = o.episode.series["time"]
-    return number(time[hard[0]] - time[o.alert])
+    time = pair.episode.series["time"]
+    return number(time[hard[0]] - time[pair.alert])
 
 
 @metric
-def ttc_at_brake(o: Outcome) -> Value:
+def ttc_at_brake(pair: PairedEpisode) -> Value:
     """Time to contact when braking begins."""
-    return o.at("ttc", o.onset)
+    return pair.at("ttc", pair.onset)
 
 
 @metric
-def distance_at_brake(o: Outcome) -> Value:
+def distance_at_brake(pair: PairedEpisode) -> Value:
     """Free distance ahead along the ego's path when braking begins."""
-    return o.at("gap", o.onset)
+    return pair.at("gap", pair.onset)
 
 
 @metric
-def drac_at_brake(o: Outcome) -> Value:
+def drac_at_brake(pair: PairedEpisode) -> Value:
     """Deceleration rate to avoid a crash, Δv²/(2·gap), when braking begins."""
-    return o.at("drac", o.onset)
+    return pair.at("drac", pair.onset)
 
 
 @metric
-def max_drac(o: Outcome) -> Value:
-    """Highest deceleration rate to avoid a crash; undefined with contact, where it has no bound."""
-    values = o.episode.series["drac"]
-    if o.episode.collision or not np.isfinite(values).any():
-        return UNDEFINED
-    return number(np.nanmax(values))
+def max_drac(pair: PairedEpisode) -> Value:
+    """Highest deceleration rate to avoid a crash; undefined with contact, where it is unbounded."""
+    values = pair.episode.series["drac"]
+    values = values[np.isfinite(values)]
+    return number(values.max()) if values.size and not pair.episode.collision else UNDEFINED
 
 
 @metric
-def min_ttc(o: Outcome) -> Value:
-    """Lowest time to contact; 0 with contact, undefined if no contact was ever ahead."""
-    if o.episode.collision:
+def min_ttc(pair: PairedEpisode) -> Value:
+    """Lowest time to contact; 0 with contact, undefined if none was ever predicted."""
+    if pair.episode.collision:
         return 0.0, True
-    values = o.episode.series["ttc"]
+    values = pair.episode.series["ttc"]
     return number(np.nanmin(values)) if np.isfinite(values).any() else UNDEFINED
 
 
 @metric
-def stopping_margin(o: Outcome) -> Value:
-    """Least free distance ahead of a braked threat that ended without contact."""
-    gaps = o.episode.series["gap"]
-    if not o.truth.threat or o.episode.collision or o.onset is None or not np.isfinite(gaps).any():
-        return UNDEFINED
-    return number(np.nanmin(gaps))
+def stopping_margin(pair: PairedEpisode) -> Value:
+    """Lowest free distance ahead in a braked threat that ended without contact."""
+    gaps = pair.episode.series["gap"]
+    stopped = pair.counterfactual.threat and not pair.episode.collision and pair.onset is not None
+    return number(np.nanmin(gaps)) if stopped and np.isfinite(gaps).any() else UNDEFINED
 
 
 @metric
-def peak_deceleration(o: Outcome) -> Value:
-    """Highest deceleration beyond the script."""
-    return number(o.episode.series["deceleration"].max())
+def peak_deceleration(pair: PairedEpisode) -> Value:
+    """Highest deceleration beyond the scripted one."""
+    return number(pair.episode.series["deceleration"].max())
 
 
 @metric
-def false_activation(o: Outcome) -> Value:
-    """Whether the ego braked beyond 0.25 g where there is no threat."""
-    return not o.truth.threat and peak_deceleration(o)[0] > NUISANCE, True
+def false_activation(pair: PairedEpisode) -> Value:
+    """Whether the ego braked beyond 0.25 g without a threat."""
+    return not pair.counterfactual.threat and peak_deceleration(pair)[0] > NUISANCE, True
 
 
 @metric
-def premature_brake(o: Outcome) -> Value:
-    """Whether it began to brake, or to hold a standing car, too early before the contact."""
-    series = o.episode.series
-    braked = [] if o.onset is None else [series["time"][o.onset]]
-    begun = float(min((*braked, *series["time"][series["held"] > 0]), default=inf))
-    return o.truth.threat and begun < o.truth.contact_time - o.premature, True
+def premature_brake(pair: PairedEpisode) -> Value:
+    """Whether braking or a standstill hold began too long before the counterfactual contact."""
+    series = pair.episode.series
+    onsets = [] if pair.onset is None else [series["time"][pair.onset]]
+    start = float(min((*onsets, *series["time"][series["standstill_hold"] > 0]), default=inf))
+    return pair.counterfactual.threat and start < pair.counterfactual.contact_time - pair.premature, True
 
 
 @metric
-def episode_return(o: Outcome) -> Value:
-    """Sum of the environment's rewards, without discount: what policies are trained for."""
-    return number(o.episode.reward_sum)
+def episode_return(pair: PairedEpisode) -> Value:
+    """Undiscounted return of the environment, the objective of policies."""
+    return number(pair.episode.reward_sum)
 
 
 @metric
-def distance(o: Outcome) -> Value:
+def distance(pair: PairedEpisode) -> Value:
     """Distance driven."""
-    return number(np.trapezoid(o.episode.series["ego_speed"], o.episode.series["time"]))
+    return number(np.trapezoid(pair.episode.series["ego_speed"], pair.episode.series["time"]))
 
 
 @metric
-def duration(o: Outcome) -> Value:
-    """Time until the end."""
-    return number(o.episode.series["time"][-1])
+def duration(pair: PairedEpisode) -> Value:
+    """Duration of the episode."""
+    return number(pair.episode.series["time"][-1])
 
 
 @metric
-def fps(o: Outcome) -> Value:
-    """Camera frames per second."""
-    return number(o.episode.fps)
+def fps(pair: PairedEpisode) -> Value:
+    """Camera frame rate."""
+    return number(pair.episode.fps)

@@ -1,4 +1,4 @@
-"""The grids of the emergency-braking protocols, as cases; numbers only, each with its source.
+"""Test grids of the emergency-braking protocols, with the source of every number.
 
 N1 is Euro NCAP's test protocol AEB Car-to-Car v4.3.1 (February 2024, implementation 2023).
 """
@@ -7,88 +7,83 @@ from dataclasses import replace
 from math import radians
 from typing import Any
 
-from lgmd_gym.benchmark.case import Case, cases, metres, one
+from lgmd_gym.benchmark.case import Case, make_case, speed_cases, to_mps
 
 OVERLAPS = (-50, -75, 100, 75, 50)  # N1 8.2.2: per cent of the ego's width; the sign is the side
-LOCATIONS_2026 = (100, 75, 50, 25, 0)  # per cent of the ego's width; 125 and -25 are the extended range
+LOCATIONS_2026 = (100, 75, 50, 25, 0)  # per cent of the ego's width; the extended range adds 125 and -25
 R152_TARGET = 20  # km/h, UN R152 6.5
 
 
-def overlap_tail(per_cent: int) -> str:
-    """Return the part of a case's name that tells the overlap."""
-    return f"/overlap{per_cent}"
-
-
 def ncap2023() -> tuple[Case, ...]:
-    """N1 8.2: 45 CCRs AEB cells, 30 CCRs cells with a warned driver, 55 CCRm, 4 CCRb, 30 CCCscp."""
+    """Return the cells of N1 8.2: CCRs 45 AEB and 30 FCW, CCRm 55, CCRb 4, CCCscp 30."""
     suite = "ncap2023"
     aeb = list(range(10, 55, 5))
-    warned = list(range(55, 85, 5))
+    fcw = list(range(55, 85, 5))
     moving = list(range(30, 85, 5))
     rows: list[Case] = []
     for family, speeds in (("CCRs", aeb), ("CCRm", moving)):
         for per_cent in OVERLAPS:
-            rows += cases(suite, family, speeds, overlap_tail(per_cent), overlap=per_cent / 100)
+            rows += speed_cases(suite, family, speeds, f"/overlap{per_cent}", overlap=per_cent / 100)
     for per_cent in OVERLAPS:
-        tail = f"-warned{overlap_tail(per_cent)}"
-        cells = cases(suite, "CCRs", warned, tail, overlap=per_cent / 100)
+        tail = f"-warned/overlap{per_cent}"
+        cells = speed_cases(suite, "CCRs", fcw, tail, overlap=per_cent / 100)
         rows += [replace(cell, fcw_driver=True) for cell in cells]
     return (*rows, *braking_lead(suite), *_crossing(suite))
 
 
 def ncap2026() -> tuple[Case, ...]:
-    """Euro NCAP Crash Avoidance - Frontal Collisions v1.1, 3.1: the rear scenarios' standard range.
+    """Return the rear scenarios of Euro NCAP Crash Avoidance - Frontal Collisions v1.1, 3.1.
 
-    An impact location of p per cent puts the target's centre at (p - 50) per cent of the ego's width
-    from its centreline, + left, as the OpenSCENARIO files for that protocol do; the official calculator names
-    locations and leaves their geometry open. CCRb: headway 1.0 s, 4 m/s² within 1.0 s. The robustness layer
-    (5.2.1.3) adds, aligned: a turned target, a car beside it, night, and for CCRb 2 m/s² more or less and
-    0.5 s of headway more or less. Its glare is not built.
+    The standard range is covered. An impact location of p per cent places the target's centre (p - 50) per
+    cent of the ego's width from the ego's centreline, + left, as in the OpenSCENARIO files of the protocol;
+    the official calculator does not define the geometry. CCRb: headway 1.0 s, 4 m/s² within 1.0 s. The
+    robustness layer (5.2.1.3) adds, aligned: a rotated target, a car next to the target, night, and for CCRb
+    ±2 m/s² of deceleration and ±0.5 s of headway. Its glare condition is not implemented.
     """
     suite = "ncap2026"
     rows: list[Case] = []
     for per_cent in LOCATIONS_2026:
         tail, where = f"/location{per_cent}", per_cent / 100
-        rows += cases(suite, "CCRs", list(range(10, 60, 10)), tail, impact_location=where)
-        rows += cases(suite, "CCRm", list(range(30, 90, 10)), tail, impact_location=where)
-        rows += cases(
+        rows += speed_cases(suite, "CCRs", list(range(10, 60, 10)), tail, impact_location=where)
+        rows += speed_cases(suite, "CCRm", list(range(30, 90, 10)), tail, impact_location=where)
+        rows += speed_cases(
             suite, "CCRb", list(range(30, 90, 10)), tail, headway=1.0, deceleration=4.0, impact_location=where
         )
-        warned = cases(suite, "CCRs", list(range(60, 90, 10)), f"-warned{tail}", impact_location=where)
-        rows += [replace(cell, fcw_driver=True) for cell in warned]
+        fcw = speed_cases(suite, "CCRs", list(range(60, 90, 10)), f"-warned{tail}", impact_location=where)
+        rows += [replace(cell, fcw_driver=True) for cell in fcw]
     for degrees_left in (-20, -10, 10, 20):
-        turned = round(radians(degrees_left), 6)
-        rows += cases(
+        heading = round(radians(degrees_left), 6)
+        rows += speed_cases(
             suite,
             "CCRs",
             [30, 50],
             f"/robust-heading{degrees_left}",
             impact_location=0.5,
-            target_heading=turned,
+            target_heading=heading,
         )
     lead: dict[str, Any] = {"headway": 1.0, "deceleration": 4.0}
     for family, more in (("CCRs", {}), ("CCRm", {}), ("CCRb", lead)):
-        rows += cases(suite, family, [30, 50], "/robust-beside", impact_location=0.5, beside=True, **more)
-        night = {"impact_location": 0.5, "condition": "night", **more}
-        rows += cases(suite, family, [30, 50], "/robust-night", **night)
-    for what, change in (
+        for variant, change in (("beside", {"beside": True}), ("night", {"condition": "night"})):
+            arguments = {"impact_location": 0.5, **change, **more}
+            rows += speed_cases(suite, family, [30, 50], f"/robust-{variant}", **arguments)
+    for variant, change in (
         ("decel2", {"deceleration": 2.0}),
         ("decel6", {"deceleration": 6.0}),
         ("headway0.5", {"headway": 0.5}),
         ("headway1.5", {"headway": 1.5}),
     ):
-        rows += cases(suite, "CCRb", [50], f"/robust-{what}", impact_location=0.5, **(lead | change))
+        rows += speed_cases(suite, "CCRb", [50], f"/robust-{variant}", impact_location=0.5, **(lead | change))
     return tuple(rows)
 
 
 def braking_lead(suite: str) -> tuple[Case, ...]:
-    """N1 8.2.2.3: CCRb, both at 50 km/h, 2 and 6 m/s² at 12 and 40 m; the deceleration stands after 1 s."""
+    """Return N1 8.2.2.3: CCRb, both at 50 km/h, 2 and 6 m/s² reached within 1 s, gaps of 12 and 40 m."""
     return tuple(
-        one(
+        make_case(
             suite,
             "CCRb",
             f"v50/brake{strength}-gap{gap}",
-            ego_speed=metres(50),
+            ego_speed=to_mps(50),
             gap=float(gap),
             deceleration=float(strength),
             build_up=1.0,
@@ -99,62 +94,63 @@ def braking_lead(suite: str) -> tuple[Case, ...]:
 
 
 def _crossing(suite: str) -> tuple[Case, ...]:
-    """N1 8.2.5: CCCscp, from a stop 2.9 m off and at 20 to 60 km/h, target at 20 to 60 km/h.
+    """Return N1 8.2.5: CCCscp from a stop 2.9 m ahead of the path and at 20 to 60 km/h.
 
-    The target comes from the far side, the left, which the OpenSCENARIO file for 2026 has as its default.
+    The target drives at 20 to 60 km/h and comes from the far side, the left, which is the default of the
+    OpenSCENARIO file for 2026.
     """
     targets = range(20, 70, 10)
-    started = [
-        one(
+    from_stop = [
+        make_case(
             suite,
             "CCCscp",
             f"from-stop/target{target}",
-            ego_speed=metres(20),
-            target_speed=metres(target),
+            ego_speed=to_mps(20),
+            target_speed=to_mps(target),
             side="left",
             from_stop=True,
         )
         for target in targets
     ]
     moving = [
-        one(
+        make_case(
             suite,
             "CCCscp",
             f"v{speed}/target{target}",
-            ego_speed=metres(speed),
-            target_speed=metres(target),
+            ego_speed=to_mps(speed),
+            target_speed=to_mps(target),
             side="left",
         )
         for speed in range(20, 70, 10)
         for target in targets
     ]
-    return (*started, *moving)
+    return (*from_stop, *moving)
 
 
 def r152() -> tuple[Case, ...]:
-    """UN R152 Rev.2, 6.4 and 6.5: standing target at 20, 40, 42, 60, moving target at 30 and 60 km/h.
+    """Return UN R152 Rev.2, 6.4 and 6.5: stationary target at 20, 40, 42, 60, moving at 30 and 60 km/h.
 
-    40 km/h is driven at maximum mass and 42 in running order; the brake here does not know the mass, so
-    that the load states differ by their limits alone.
+    40 km/h is tested at maximum mass and 42 km/h in running order. The brake model has no mass, so the load
+    states differ only in their limits.
     """
     return (
-        *cases("r152", "CCRs", [20, 40, 42, 60]),
-        *cases("r152", "CCRm", [30, 60], target_speed=metres(R152_TARGET)),
+        *speed_cases("r152", "CCRs", [20, 40, 42, 60]),
+        *speed_cases("r152", "CCRm", [30, 60], target_speed=to_mps(R152_TARGET)),
     )
 
 
 def fmvss127() -> tuple[Case, ...]:
-    """49 CFR 571.127 S7.3 to S7.5 without manual braking: stopped, slower, decelerating lead vehicle.
+    """Return 49 CFR 571.127 S7.3 to S7.5 without manual braking: stopped, slower, decelerating lead.
 
-    The deceleration stands 1.0 s after its onset (S7.5 allows up to 1.5 s).
+    The deceleration is reached 1.0 s after its onset (S7.5 allows up to 1.5 s).
     """
     suite = "fmvss127"
     decelerating = tuple(
-        one(
+        make_case(
             suite,
             "CCRb",
             f"v{speed}/brake{tenths / 10:g}g-gap{gap}",
-            ego_speed=metres(speed),
+            ego_speed=to_mps(speed),
             gap=float(gap),
             deceleration=round(tenths / 10 * 9.80665, 6),
             build_up=1.0,
@@ -164,7 +160,7 @@ def fmvss127() -> tuple[Case, ...]:
         for gap in (12, 40)
     )
     return (
-        *cases(suite, "CCRs", list(range(10, 90, 10))),
-        *cases(suite, "CCRm", list(range(40, 90, 10)), target_speed=metres(20)),
+        *speed_cases(suite, "CCRs", list(range(10, 90, 10))),
+        *speed_cases(suite, "CCRm", list(range(40, 90, 10)), target_speed=to_mps(20)),
         *decelerating,
     )

@@ -1,22 +1,38 @@
-"""From an episode and its counterfactual to one row of `episodes.jsonl`."""
+"""Rows of `episodes.jsonl`, one per episode."""
 
 from typing import Any
 
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import Episode
-from lgmd_gym.benchmark.metrics import METRICS, PREMATURE, Counterfactual, Outcome, measure
+from lgmd_gym.benchmark.metrics import METRICS, PREMATURE, Counterfactual, PairedEpisode, measure
 from lgmd_gym.benchmark.sensors import CLEAR
 
-NAMED = ("agent", "suite", "case", "fcw_driver", "seed", "condition")
-# Every key of a row in its order; null where undefined. The metrics' docstrings say what each is.
-KEYS = (*NAMED, "camera", *METRICS, "error")
-
+Row = dict[str, Any]
 RowKey = tuple[str, str, int, str]
 
+ID_KEYS = ("agent", "suite", "case", "fcw_driver", "seed", "condition")
+# Every key of a row of a suite of cases, in order; null where undefined. The metrics' docstrings define them.
+KEYS = (*ID_KEYS, "camera", *METRICS, "error")
 
-def key_of(row: dict[str, Any]) -> RowKey:
-    """Return what tells a row from all others of its run: agent, case, seed, condition."""
-    return row["agent"], row["case"], row["seed"], row.get("condition", CLEAR)
+
+def key_of(row: Row) -> RowKey:
+    """Return what identifies a row within its run: agent, case, seed, condition."""
+    return row["agent"], row["case"], row["seed"], row["condition"]
+
+
+def series_name(key: RowKey) -> str:
+    """Return the file stem of the time series of a row."""
+    agent, case, seed, condition = key
+    name = f"{case}__{agent}__seed{seed}" + ("" if condition == CLEAR else f"__{condition}")
+    return name.replace("/", "_").replace(":", "_").replace(",", "_")
+
+
+def new_row(
+    keys: tuple[str, ...], agent: str, case: Case, seed: int, condition: str = CLEAR, **values: Any
+) -> Row:
+    """Return a row with its identifying keys and `values` set and all other keys null."""
+    identity = (agent, case.suite, case.name, case.fcw_driver, seed, condition)
+    return dict.fromkeys(keys) | dict(zip(ID_KEYS, identity, strict=True)) | values
 
 
 def make_row(
@@ -24,29 +40,22 @@ def make_row(
     case: Case,
     seed: int,
     episode: Episode,
-    truth: Counterfactual,
+    counterfactual: Counterfactual,
     premature: float = PREMATURE,
     condition: str = CLEAR,
-) -> dict[str, Any]:
+    camera: str | None = None,
+) -> Row:
     """Return the row of one episode.
 
     Args:
-        agent: The agent's string.
-        case: The case played.
-        seed: The seed played.
-        episode: What happened.
-        truth: What happens to `no-brake`; decides what is a threat.
-        premature: Braking earlier than this before the counterfactual contact is no success [s].
-        condition: The camera's condition.
+        agent: Agent string.
+        case: Case played.
+        seed: Seed played.
+        episode: Episode to measure.
+        counterfactual: Outcome of `no-brake`, which defines a threat.
+        premature: Lead before the counterfactual contact beyond which braking is premature [s].
+        condition: Camera condition.
+        camera: Camera names.
     """
-    named = _named(agent, case, seed, condition)
-    return dict.fromkeys(KEYS) | named | measure(Outcome.of(episode, truth, premature))
-
-
-def error_row(agent: str, case: Case, seed: int, error: str, condition: str = CLEAR) -> dict[str, Any]:
-    """Return the row of an episode that could not be played to its end."""
-    return dict.fromkeys(KEYS) | _named(agent, case, seed, condition) | {"error": error}
-
-
-def _named(agent: str, case: Case, seed: int, condition: str) -> dict[str, Any]:
-    return dict(zip(NAMED, (agent, case.suite, case.name, case.fcw_driver, seed, condition), strict=True))
+    pair = PairedEpisode.of(episode, counterfactual, premature)
+    return new_row(KEYS, agent, case, seed, condition, camera=camera, **measure(pair))

@@ -1,99 +1,98 @@
-"""What agents see through: the user's choice, or each agent's own eye."""
+"""Camera and neuron of the agents under test: the user's choice, or each agent's own."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, is_dataclass, replace
 from typing import Any
 
-from lgmd_gym.camera import CONDITIONS
+from lgmd_gym.camera import CONDITIONS, CameraParams, CameraSpec
 from lgmd_gym.errors import unknown_name
+from lgmd_gym.neuron import NeuronSpec
 
 DEFAULT_CAMERA = "fovea"
 CLEAR = "clear"
+BIRDSEYE = "birdseye"
 
 
 @dataclass(frozen=True, slots=True)
 class SensorConfig:
-    """What the agents see through.
+    """Camera, neuron parameters and camera condition.
 
     Attributes:
-        camera: See `LGMDObservation`. None leaves it to the agent: the eye it states (`Agent.camera`), or
-            "fovea" if it states none.
-        params: See `LGMDObservation`. None leaves it to the agent, too, if the eye is its own.
-        condition: A named condition laid over every camera ("clear", "night", "fog", "degraded").
-        include_frame: Whether the frames are part of what is observed.
+        camera: See `LGMDObservation`. None selects the agent's own camera (`Agent.camera`), or "fovea" for
+            an agent without one.
+        params: See `LGMDObservation`. None selects the agent's own parameters if the camera is its own.
+        condition: Named condition applied to every camera: "clear", "night", "fog" or "degraded".
+        include_frame: Whether the frames are part of the observation.
     """
 
-    camera: Any = None
-    params: Any = None
+    camera: CameraSpec | None = None
+    params: NeuronSpec = None
     condition: str = CLEAR
     include_frame: bool = False
 
-    def of(self, agent: Any = None) -> "SensorConfig":
-        """Return what an agent sees through, with nothing left open; None for an agent without wishes."""
-        frame = self.include_frame or bool(getattr(agent, "include_frame", False))
+    def for_agent(self, agent: Any = None) -> "SensorConfig":
+        """Return the config with the agent's own camera and parameters in place of None."""
+        include_frame = self.include_frame or bool(getattr(agent, "include_frame", False))
         camera, params = self.camera, self.params
         if camera is None:
             camera = getattr(agent, "camera", None)
             params = getattr(agent, "neuron", None) if params is None else params
-        return SensorConfig(DEFAULT_CAMERA if camera is None else camera, params, self.condition, frame)
+        return SensorConfig(
+            DEFAULT_CAMERA if camera is None else camera, params, self.condition, include_frame
+        )
 
     @property
     def plain(self) -> "SensorConfig":
-        """The same as plain values, which JSON and TOML can hold."""
+        """The same config as plain values, for JSON and TOML."""
         return replace(self, camera=_plain(self.camera), params=_plain(self.params))
 
-    def under(self, condition: str) -> "SensorConfig":
-        """Return the same under a named camera condition, such as "degraded".
+    def with_condition(self, condition: str) -> "SensorConfig":
+        """Return the config under a named camera condition.
 
         Raises:
-            ValueError: For an unknown condition, or a camera that knows none.
+            ValueError: If the condition is unknown or the camera supports none.
         """
         if condition not in CONDITIONS:
             raise unknown_name("camera condition", condition, CONDITIONS)
-        _under(self.camera, condition)
+        _with_condition(self.camera, condition)
         return replace(self, condition=condition)
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """What `LGMDObservation` takes of it.
+        """Keyword arguments of `LGMDObservation`.
 
         Raises:
-            ValueError: For a camera that no condition can be laid over.
+            ValueError: If the camera does not support the condition.
         """
-        camera = _under(self.camera, self.condition)
+        camera = _with_condition(self.camera, self.condition)
         return {"camera": camera, "params": self.params, "include_frame": self.include_frame}
 
     @property
     def label(self) -> str:
-        """The cameras' names for rows and titles, as in "fovea" or "zone8+upright8"."""
+        """Camera names for rows and titles, as in "fovea" or "zone8+upright8"."""
         return _name(self.camera) if self.camera is not None else "each agent's own"
 
 
-def _under(camera: Any, condition: str) -> Any:
-    """Return a camera argument with a condition laid over it."""
-    if condition == CLEAR:
+def _with_condition(camera: Any, condition: str) -> Any:
+    """Return a camera argument under a condition, whose fields replace the camera's."""
+    if condition == CLEAR or camera is None:
         return camera
-    if camera is None:
-        return None
     if isinstance(camera, list | tuple):
-        return [_under(item, condition) for item in camera]
-    if camera == "birdseye":
-        raise ValueError(f"condition {condition!r} cannot be laid over the view from above; use 'clear'")
-    if isinstance(camera, str):
-        return {"name": camera, "condition": condition}
-    if isinstance(camera, dict):
-        return {**camera, "condition": condition}
-    return camera.with_condition(condition)
+        return [_with_condition(item, condition) for item in camera]
+    if _name(camera) == BIRDSEYE:
+        raise ValueError(f"camera 'birdseye' does not support condition {condition!r}; use 'clear'")
+    return CameraParams.make(camera).with_condition(condition)
 
 
 def _plain(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return asdict(value)
-    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _name(camera: Any) -> str:
     if isinstance(camera, list | tuple):
         return "+".join(map(_name, camera))
-    if isinstance(camera, dict):
+    if isinstance(camera, Mapping):
         return str(camera.get("name", "custom"))
     return str(getattr(camera, "name", camera))

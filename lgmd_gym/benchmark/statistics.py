@@ -1,10 +1,11 @@
-"""Intervals for means of continuous values: a bootstrap that draws whole cases, not episodes.
+"""Intervals of rates, counts and means.
 
-Seeds of one case are near-copies of each other; drawing them one by one would make an interval that is too
-narrow. Rates take Wilson's interval instead: a bootstrap of 0 of N says [0, 0].
+Rates have Wilson's interval, counts Garwood's exact Poisson interval, and means a bootstrap that draws whole
+cases: seeds of one case are correlated, so drawing single episodes would give an interval that is too narrow.
 """
 
-from collections.abc import Hashable, Sequence
+import math
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,32 @@ import numpy as np
 DRAWS = 4000
 
 
+class Rate(NamedTuple):
+    """k of n with its Wilson 95 % interval."""
+
+    k: int
+    n: int
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, flags: Iterable[bool]) -> "Rate":
+        """Return the rate of True among `flags`."""
+        values = list(flags)
+        k, n = sum(values), len(values)
+        return cls(k, n, *wilson(k, n))
+
+
 class Mean(NamedTuple):
-    """A mean with its 95 % interval; None for bounds that a single cluster cannot give, or for no value."""
+    """A mean with its 95 % interval.
+
+    Attributes:
+        value: Mean; None without values.
+        low: Lower bound; None for fewer than two clusters.
+        high: Upper bound; None for fewer than two clusters.
+        n: Number of values.
+        clusters: Number of clusters.
+    """
 
     value: float | None
     low: float | None
@@ -22,15 +47,57 @@ class Mean(NamedTuple):
     clusters: int
 
 
+def wilson(k: float, n: int, z: float = 1.959964) -> tuple[float, float]:
+    """Return the Wilson score interval of k successes in n trials; (0, 1) for n = 0.
+
+    Example:
+        >>> [round(bound, 3) for bound in wilson(0, 10)]
+        [0.0, 0.278]
+    """
+    if n == 0:
+        return 0.0, 1.0
+    share = k / n
+    centre = share + z * z / (2 * n)
+    spread = z * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n))
+    scale = 1 + z * z / n
+    return max((centre - spread) / scale, 0.0), min((centre + spread) / scale, 1.0)
+
+
+def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Return the exact two-sided interval of a Poisson mean after `count` events (Garwood 1936).
+
+    Args:
+        count: Number of events, >= 0.
+        confidence: Coverage, in (0, 1).
+
+    Raises:
+        ValueError: If an argument is out of range.
+
+    Example:
+        >>> [round(bound, 3) for bound in poisson_interval(0)]
+        [0.0, 3.689]
+    """
+    if count < 0 or not 0.0 < confidence < 1.0:
+        raise ValueError(f"count must be >= 0 and confidence in (0, 1), got {count!r} and {confidence!r}")
+    tail = (1.0 - confidence) / 2
+    top = count + 20.0 * math.sqrt(count + 4.0) + 40.0
+    low = 0.0 if count == 0 else _root(lambda mean: 1.0 - _poisson_cdf(count - 1, mean) - tail, top)
+    return low, _root(lambda mean: tail - _poisson_cdf(count, mean), top)
+
+
+def binomial_tail(k: int, n: int, p: float) -> float:
+    """Return the probability of k or more successes in n trials of probability p."""
+    return math.fsum(math.comb(n, i) * p**i * (1.0 - p) ** (n - i) for i in range(k, n + 1))
+
+
 def cluster_mean(values: Sequence[float], clusters: Sequence[Hashable], draws: int = DRAWS) -> Mean:
     """Return the mean over all values, and a percentile bootstrap interval over clusters.
 
-    The draws are the same for the same number of clusters, and neither the mean nor the interval depends on
-    the order of the values.
+    The draws depend only on the number of clusters. The result does not depend on the order of the values.
 
     Args:
-        values: One per episode.
-        clusters: Each value's cluster, such as its case.
+        values: One value per episode.
+        clusters: Cluster of each value, such as its case.
         draws: Number of bootstrap samples.
 
     Example:
@@ -42,7 +109,6 @@ def cluster_mean(values: Sequence[float], clusters: Sequence[Hashable], draws: i
         groups.setdefault(cluster, []).append(value)
     if not groups:
         return Mean(None, None, None, 0, 0)
-    # Sorted, so that the order in which episodes finished does not matter.
     ordered = sorted(sorted(group) for group in groups.values())
     sums, counts = np.array([sum(group) for group in ordered]), np.array([len(group) for group in ordered])
     mean, k = float(sums.sum() / counts.sum()), len(ordered)
@@ -51,3 +117,21 @@ def cluster_mean(values: Sequence[float], clusters: Sequence[Hashable], draws: i
     weights = np.random.default_rng(0).multinomial(k, np.full(k, 1.0 / k), size=draws)
     low, high = np.percentile((weights @ sums) / (weights @ counts), (2.5, 97.5))
     return Mean(mean, float(low), float(high), len(values), k)
+
+
+def _poisson_cdf(count: int, mean: float) -> float:
+    """Return the probability of `count` events or fewer."""
+    if mean <= 0.0:
+        return 1.0
+    numbers = np.arange(count + 1)
+    log_factorials = np.concatenate(([0.0], np.cumsum(np.log(numbers[1:]))))
+    return float(np.exp(numbers * np.log(mean) - mean - log_factorials).sum())
+
+
+def _root(rising: Callable[[float], float], top: float) -> float:
+    """Return the zero of a rising function in [0, top], by bisection."""
+    low, high = 0.0, top
+    for _ in range(100):
+        middle = (low + high) / 2
+        low, high = (low, middle) if rising(middle) > 0.0 else (middle, high)
+    return (low + high) / 2

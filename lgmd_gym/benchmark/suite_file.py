@@ -1,11 +1,11 @@
-"""A user's own suite: a TOML file, strictly read.
+"""Suite files: a user's own suite as TOML, strictly checked.
 
 name = "mine"
 about = "dark cars, by day"
 
 [[cases]]
 family = "CCRs"
-speeds_kmh = [10, 20, 30]           # cases mine/CCRs/v10/dark …; arguments are SI
+speeds_kmh = [10, 20, 30]           # cases mine/CCRs/v10/dark, ...; arguments in SI units
 name = "dark"
 arguments = { shade = 40 }
 
@@ -23,68 +23,73 @@ from typing import Any
 
 import tomli_w
 
-from lgmd_gym.benchmark.case import Case, metres
-from lgmd_gym.benchmark.suites import SUITES, Suite, find_suite
+from lgmd_gym.benchmark.case import Case, to_mps
+from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, Suite, find_suite
 from lgmd_gym.errors import check_keys
 
 SUITE_KEYS = ("name", "about", "cases")
 CASE_KEYS = ("family", "name", "speeds_kmh", "fcw_driver", "arguments")
-NAME = re.compile(r"[\w.+-]+(/[\w.+-]+)*")  # file names and case names are made of it
+NAME = re.compile(r"[\w.+-]+(/[\w.+-]+)*")  # names become parts of file names
 
 
 def get_suite(text: str) -> Suite:
-    """Return the suite of a name, or of a path that ends in ".toml".
+    """Return the suite of a name, or of a file if the text ends in ".toml".
 
     Raises:
-        ValueError: For an unknown name (the nearest is named) or a file that is no suite.
+        ValueError: If the name is unknown or the file is not a valid suite.
     """
     return load_suite(Path(text)) if text.endswith(".toml") else find_suite(text)
 
 
 def load_suite(path: Path) -> Suite:
-    """Read a suite; every case is built once, so that a bad value is found before anything is played.
+    """Read a suite and build every case once, to find invalid values before the first episode.
 
     Raises:
-        ValueError: For a file that cannot be read, an unknown key, family or argument (the nearest is
-            named), a value out of its range, or a case that comes twice.
+        ValueError: If the file cannot be read, a key, family or argument is unknown, a value is out of
+            range, or a case is defined twice.
     """
     values = read_toml(path, "suite file")
     try:
         check_keys("key of a suite", values, SUITE_KEYS)
         name = _text(values, "name")
-        if name in SUITES or name == "traffic":
-            raise ValueError(f"name {name!r} is a shipped suite's; choose another")
-        given = values.get("cases")
-        if not isinstance(given, list) or not given:
-            raise ValueError("cases needs at least one [[cases]] table")
-        cases = tuple(case for table in given for case in _cases(name, table))
-        seen: set[str] = set()
+        if name in SUITES or name == TRAFFIC:
+            raise ValueError(f"name {name!r} is the name of a shipped suite; choose another")
+        tables = values.get("cases")
+        if not isinstance(tables, list) or not tables:
+            raise ValueError("cases must hold at least one [[cases]] table")
+        cases = tuple(case for table in tables for case in _cases(name, table))
+        names: set[str] = set()
         for case in cases:
-            if case.name in seen:
-                raise ValueError(f"case {case.name!r} comes twice; give one another name")
-            seen.add(case.name)
+            if case.name in names:
+                raise ValueError(f"case {case.name!r} is defined twice; rename one of them")
+            names.add(case.name)
             _ = case.scenario
     except (TypeError, ValueError) as error:
         raise ValueError(f"suite file {str(path)!r}: {error}") from None
-    return Suite(name, cases, str(values.get("about", "a user's own")))
+    return Suite(name, cases, str(values.get("about", "user suite")))
 
 
-def save_suite(suite: Suite, path: Path) -> None:
-    """Write a suite so that `load_suite` reads the same cases back."""
+def copy_suite(source: Path, target: Path) -> None:
+    """Write the cases of a suite file to another, one table each."""
+    suite = load_suite(source)
     tables = []
     for case in suite.cases:
-        what = case.name.split("/", 2)[2]
-        table: dict[str, Any] = {"family": case.family, "name": what, "arguments": dict(case.arguments)}
+        variant = case.name.split("/", 2)[2]
+        table: dict[str, Any] = {"family": case.family, "name": variant, "arguments": dict(case.arguments)}
         tables.append(table | ({"fcw_driver": True} if case.fcw_driver else {}))
     text = tomli_w.dumps({"name": suite.name, "about": suite.about, "cases": tables})
-    path.write_text(text, encoding="utf-8")
+    target.write_text(text, encoding="utf-8")
 
 
 def read_toml(path: Path, kind: str) -> dict[str, Any]:
-    """Return a TOML file's values.
+    """Return the values of a TOML file.
+
+    Args:
+        path: File to read.
+        kind: Kind of file, for the message.
 
     Raises:
-        ValueError: If it cannot be read or is no TOML.
+        ValueError: If it cannot be read or is not TOML.
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
@@ -100,25 +105,26 @@ def _cases(suite: str, table: Any) -> list[Case]:
         raise ValueError(f"cases must be [[cases]] tables, got {table!r}")
     check_keys("key of a case", table, CASE_KEYS)
     family, arguments = _text(table, "family"), table.get("arguments", {})
-    warned = table.get("fcw_driver", False)
+    fcw_driver = table.get("fcw_driver", False)
     if not isinstance(arguments, dict):
         raise ValueError(f"arguments must be a table, got {arguments!r}")
-    if not isinstance(warned, bool):
-        raise ValueError(f"fcw_driver must be true or false, got {warned!r}")
+    if not isinstance(fcw_driver, bool):
+        raise ValueError(f"fcw_driver must be true or false, got {fcw_driver!r}")
     speeds = table.get("speeds_kmh")
     if speeds is None:
-        return [Case(f"{suite}/{family}/{_text(table, 'name')}", family, tuple(arguments.items()), warned)]
+        name = f"{suite}/{family}/{_text(table, 'name')}"
+        return [Case(name, family, tuple(arguments.items()), fcw_driver)]
     if not isinstance(speeds, list) or not speeds or not all(_is_speed(speed) for speed in speeds):
         raise ValueError(f"speeds_kmh must be a list of numbers > 0, got {speeds!r}")
     if "ego_speed" in arguments:
-        raise ValueError("give either speeds_kmh or arguments.ego_speed")
+        raise ValueError("speeds_kmh and arguments.ego_speed exclude each other; remove one of them")
     tail = f"/{_text(table, 'name')}" if "name" in table else ""
     return [
         Case(
             f"{suite}/{family}/v{speed:g}{tail}",
             family,
-            tuple((arguments | {"ego_speed": metres(speed)}).items()),
-            warned,
+            tuple((arguments | {"ego_speed": to_mps(speed)}).items()),
+            fcw_driver,
         )
         for speed in speeds
     ]
@@ -131,5 +137,5 @@ def _is_speed(value: Any) -> bool:
 def _text(table: dict[str, Any], key: str) -> str:
     value = table.get(key)
     if not isinstance(value, str) or not NAME.fullmatch(value):
-        raise ValueError(f"{key} must be letters, digits, '.', '_', '+', '-', '/', got {value!r}")
+        raise ValueError(f"{key} must consist of letters, digits and . _ + - /, got {value!r}")
     return value

@@ -1,12 +1,14 @@
-"""Suites: named, frozen lists of cases. Case names carry km/h, arguments are SI."""
+"""Suites: named, frozen lists of cases. Case names are in km/h, arguments in SI units."""
 
 from dataclasses import dataclass
 
 from lgmd_gym.benchmark import protocols
-from lgmd_gym.benchmark.case import Case, cases, level, one
+from lgmd_gym.benchmark.case import Case, level_case, make_case, speed_cases
 from lgmd_gym.errors import unknown_name
 
+TRAFFIC = "traffic"  # the suite without cases, see `lgmd_gym.benchmark.traffic`
 RANDOM_LEVELS = 60
+SIDES = ("left", "right")
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,9 +16,9 @@ class Suite:
     """A named list of cases.
 
     Attributes:
-        name: The first part of every case's name.
-        cases: What is played.
-        about: One line on where it comes from and what it is not.
+        name: Name of the suite, the first part of every case name.
+        cases: Cases in playing order.
+        about: One line on its source and limits.
     """
 
     name: str
@@ -25,72 +27,72 @@ class Suite:
 
 
 def _quick() -> tuple[Case, ...]:
-    """A few cases of the plainest families: what a newcomer runs first."""
+    """Return a few cases of the simplest families, for a first run."""
     return (
-        *cases("quick", "CCRs", [10, 20, 30, 40, 50]),
-        *cases("quick", "CCRm", [30, 50, 70]),
+        *speed_cases("quick", "CCRs", [10, 20, 30, 40, 50]),
+        *speed_cases("quick", "CCRm", [30, 50, 70]),
         *protocols.braking_lead("quick"),
-        *cases("quick", "AdjacentPass", [50]),
-        *cases("quick", "Following", [30, 50, 80]),
-        *cases("quick", "EmptyRoad", [30, 50, 80]),
+        *speed_cases("quick", "AdjacentPass", [50]),
+        *speed_cases("quick", "Following", [30, 50, 80]),
+        *speed_cases("quick", "EmptyRoad", [30, 50, 80]),
     )
 
 
 def _speeds() -> tuple[Case, ...]:
-    """Aligned approaches and quiet driving over the whole range: where a rule stops holding."""
+    """Return aligned approaches and driving without a threat over the whole range of speeds."""
     return (
-        *cases("speeds", "CCRs", list(range(10, 85, 5))),
-        *cases("speeds", "CCRm", list(range(30, 85, 10))),
+        *speed_cases("speeds", "CCRs", list(range(10, 85, 5))),
+        *speed_cases("speeds", "CCRm", list(range(30, 85, 10))),
         *protocols.braking_lead("speeds"),
-        *cases("speeds", "AdjacentPass", list(range(30, 90, 10))),
-        *cases("speeds", "Following", list(range(30, 120, 20))),
-        *cases("speeds", "EmptyRoad", list(range(30, 120, 20))),
+        *speed_cases("speeds", "AdjacentPass", list(range(30, 90, 10))),
+        *speed_cases("speeds", "Following", list(range(30, 120, 20))),
+        *speed_cases("speeds", "EmptyRoad", list(range(30, 120, 20))),
     )
 
 
 def _false_reaction() -> tuple[Case, ...]:
-    """Driving in which braking is the fault."""
+    """Return cases in which braking is a false activation."""
     suite = "false-reaction"
     turns: list[Case] = []
     for family in ("TurnBeforeOncoming", "LeadTurnsOff", "CurveObjectOutside"):
-        for side in ("left", "right"):
-            turns.append(one(suite, family, side, left=side == "left"))
+        for side in SIDES:
+            turns.append(make_case(suite, family, side, left=side == "left"))
     return (
         *turns,
-        *(one(suite, "LaneClosure", f"v40/{side}", left=side == "left") for side in ("left", "right")),
-        *cases(suite, "PassBetween", [60, 80]),
-        *cases(suite, "SteelPlate", [60, 80]),
-        *cases(suite, "Overtaken", [50, 80, 110]),
-        *cases(suite, "Oncoming", [50, 80]),
-        *cases(suite, "AdjacentPass", [40, 60, 80], tail="/queue6", cars=6),
-        *cases(suite, "AdjacentPass", [40, 60, 80], tail="/right", lateral_offset=-3.5),
-        *cases(suite, "Following", [30, 50, 80, 100]),
-        *cases(suite, "CutOut", [50, 80]),
-        *cases(suite, "BridgeShadow", [50, 80]),
-        *cases(suite, "EmptyRoad", [30, 50, 80, 110]),
-        *(one(suite, "CurveGuardRail", f"v50/{side}", left=side == "left") for side in ("left", "right")),
+        *(make_case(suite, "LaneClosure", f"v40/{side}", left=side == "left") for side in SIDES),
+        *speed_cases(suite, "PassBetween", [60, 80]),
+        *speed_cases(suite, "SteelPlate", [60, 80]),
+        *speed_cases(suite, "Overtaken", [50, 80, 110]),
+        *speed_cases(suite, "Oncoming", [50, 80]),
+        *speed_cases(suite, "AdjacentPass", [40, 60, 80], tail="/queue6", cars=6),
+        *speed_cases(suite, "AdjacentPass", [40, 60, 80], tail="/right", lateral_offset=-3.5),
+        *speed_cases(suite, "Following", [30, 50, 80, 100]),
+        *speed_cases(suite, "CutOut", [50, 80]),
+        *speed_cases(suite, "BridgeShadow", [50, 80]),
+        *speed_cases(suite, "EmptyRoad", [30, 50, 80, 110]),
+        *(make_case(suite, "CurveGuardRail", f"v50/{side}", left=side == "left") for side in SIDES),
     )
 
 
 def _near_miss() -> tuple[Case, ...]:
-    """Close calls that resolve themselves."""
+    """Return near misses that resolve without braking."""
     suite = "near-miss"
     return (
-        *cases(suite, "BrakeRelease", [50, 80]),
-        *cases(suite, "CutIn", [50, 80]),
-        *cases(suite, "CrossingClears", [30, 40, 50], tail="/right", side="right"),
-        *cases(suite, "CrossingClears", [30, 40, 50], tail="/left", side="left"),
-        *cases(suite, "PedestrianPass", [30, 50]),
+        *speed_cases(suite, "BrakeRelease", [50, 80]),
+        *speed_cases(suite, "CutIn", [50, 80]),
+        *speed_cases(suite, "CrossingClears", [30, 40, 50], tail="/right", side="right"),
+        *speed_cases(suite, "CrossingClears", [30, 40, 50], tail="/left", side="left"),
+        *speed_cases(suite, "PedestrianPass", [30, 50]),
     )
 
 
 _ALL = (
-    Suite("quick", _quick(), "a few cases of the plainest families, for a first look"),
-    Suite("speeds", _speeds(), "aligned approaches and quiet driving over the whole range of speeds"),
+    Suite("quick", _quick(), "a few cases of the simplest families, for a first run"),
+    Suite("speeds", _speeds(), "aligned approaches and driving without a threat at all speeds"),
     Suite(
         "ncap2023",
         protocols.ncap2023(),
-        "Euro NCAP AEB Car-to-Car 2023: CCRs, CCRm, CCRb, CCCscp; CCFtap, CCFhos and CCFhol are not built",
+        "Euro NCAP AEB Car-to-Car 2023: CCRs, CCRm, CCRb, CCCscp; without CCFtap, CCFhos and CCFhol",
     ),
     Suite(
         "ncap2026",
@@ -100,33 +102,41 @@ _ALL = (
     Suite(
         "r152",
         protocols.r152(),
-        "UN R152 car-to-car tests; for the impact-speed limits of 5.2.1.4 in simulation, nothing else of it",
+        "UN R152 car-to-car tests, for the impact-speed limits of 5.2.1.4 only",
     ),
     Suite(
         "fmvss127",
         protocols.fmvss127(),
         "49 CFR 571.127 lead-vehicle tests without manual braking, without its warning requirement",
     ),
-    Suite("false-reaction", _false_reaction(), "driving in which braking is the fault"),
-    Suite("near-miss", _near_miss(), "close calls that resolve themselves"),
+    Suite("false-reaction", _false_reaction(), "driving in which braking is a false activation"),
+    Suite("near-miss", _near_miss(), "near misses that resolve without braking"),
     Suite(
         "random",
-        tuple(level("random", "test", number) for number in range(RANDOM_LEVELS)),
-        "levels of RandomBraking's test split, light and weather included; a level is fixed, take --seeds 1",
+        tuple(level_case("random", "test", number) for number in range(RANDOM_LEVELS)),
+        "test levels of RandomBraking, light and weather included; levels are fixed, so use --seeds 1",
     ),
 )
 SUITES: dict[str, Suite] = {suite.name: suite for suite in _ALL}
 
 
 def find_suite(name: str) -> Suite:
-    """Return a suite, or raise ValueError that names the nearest one."""
+    """Return the suite of a name.
+
+    Raises:
+        ValueError: If the name is unknown.
+    """
     if name not in SUITES:
-        raise unknown_name("suite", name, SUITES)
+        raise unknown_name("suite", name, (*SUITES, TRAFFIC))
     return SUITES[name]
 
 
 def find_case(name: str) -> Case:
-    """Return a case by its full name, or raise ValueError that names the nearest case."""
+    """Return the case of a full name.
+
+    Raises:
+        ValueError: If the name is unknown.
+    """
     known = {case.name: case for suite in SUITES.values() for case in suite.cases}
     if name not in known:
         raise unknown_name("case", name, known)

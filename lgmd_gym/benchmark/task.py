@@ -1,4 +1,4 @@
-"""One task: one agent in one case with one seed, played in whatever process picks it up."""
+"""One task of a run: one agent in one case with one seed, played in any process."""
 
 import traceback
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import Episode, make_env, play
 from lgmd_gym.benchmark.fcw_driver import FCWDriver
 from lgmd_gym.benchmark.metrics import Counterfactual
-from lgmd_gym.benchmark.rows import RowKey, error_row, make_row
+from lgmd_gym.benchmark.rows import KEYS, Row, RowKey, make_row, new_row
 from lgmd_gym.benchmark.sensors import CLEAR, SensorConfig
 
 NO_BRAKE = "no-brake"
@@ -19,60 +19,65 @@ NO_BRAKE = "no-brake"
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What to play.
+    """One episode to play.
 
     Attributes:
-        agent: The agent's string.
-        case: The case.
-        seed: Of the environment and the agent.
-        sensor_config: Camera and neuron parameters, or the agent's own; the condition included.
-        truth: What `no-brake` met; None for `no-brake` itself.
-        condition: Name of the camera's condition, for the row.
+        agent: Agent string.
+        case: Case to play.
+        seed: Seed of the environment and the agent.
+        sensor_config: Camera and neuron parameters under the condition.
+        counterfactual: Outcome of `no-brake`; None for `no-brake` itself.
+        condition: Name of the camera condition, for the row.
     """
 
     agent: str
     case: Case
     seed: int
     sensor_config: SensorConfig
-    truth: Counterfactual | None = None
+    counterfactual: Counterfactual | None = None
     condition: str = CLEAR
 
     @property
     def key(self) -> RowKey:
-        """What tells it from all others of its run, see `rows.key_of`."""
+        """Key of the task's row, see `rows.key_of`."""
         return self.agent, self.case.name, self.seed, self.condition
 
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What came of a task.
+    """Result of one episode.
 
     Attributes:
-        task: The task.
-        row: The row of `episodes.jsonl`.
-        series: The episode's time series; None after an error.
-        truth: The counterfactual, if the task was `no-brake`'s.
+        row: Row of `episodes.jsonl`.
+        series: Time series; None for traffic and after an error.
+        counterfactual: Counterfactual of the row; None for traffic and after an error.
     """
 
-    task: Task
-    row: dict[str, Any]
+    row: Row
     series: dict[str, np.ndarray] | None = None
-    truth: Counterfactual | None = None
+    counterfactual: Counterfactual | None = None
 
 
 def run_task(task: Task) -> Result:
-    """Play a task; whatever an agent or environment raises becomes an error row."""
+    """Play a task; an exception in the agent or the environment becomes an error row."""
     try:
         agent: Any = make_agent(task.agent)
-        sensor_config = task.sensor_config.of(agent)
+        sensor_config = task.sensor_config.for_agent(agent)
         episode = _play(task, agent, sensor_config)
-    except (Exception, SystemExit):  # an agent that calls exit() would take the worker with it
+    except (Exception, SystemExit):  # an agent that calls exit() would end the worker process
         error = traceback.format_exc()
-        return Result(task, error_row(task.agent, task.case, task.seed, error, task.condition))
-    truth = task.truth or Counterfactual.of(episode)
-    row = make_row(task.agent, task.case, task.seed, episode, truth, condition=task.condition)
-    row["camera"] = sensor_config.label
-    return Result(task, row, episode.series, truth)
+        return Result(new_row(KEYS, task.agent, task.case, task.seed, task.condition, error=error))
+    counterfactual = task.counterfactual or Counterfactual.of(episode)
+    row = make_row(
+        task.agent,
+        task.case,
+        task.seed,
+        episode,
+        counterfactual,
+        condition=task.condition,
+        camera=sensor_config.label,
+    )
+    return Result(row, episode.series, counterfactual)
 
 
 def _play(task: Task, agent: Any, sensor_config: SensorConfig) -> Episode:

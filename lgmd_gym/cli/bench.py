@@ -1,7 +1,7 @@
-"""What `lgmd-gym bench` and `lgmd-gym compare` do with their parsed options."""
+"""The `bench` command."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,190 +12,118 @@ from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.params import read_params
 
 if TYPE_CHECKING:
-    from lgmd_gym.benchmark.run_cases import Run
-    from lgmd_gym.benchmark.traffic.run import TrafficRun
-    from lgmd_gym.cli.options import Bench, Compare, Judge
-
-SUITE, SEEDS = "quick", 3
+    from lgmd_gym.benchmark.executor import Executor
+    from lgmd_gym.benchmark.runner import Run
+    from lgmd_gym.cli.options import Bench
 
 
-def bench(options: "Bench") -> int:
-    """Play a suite and report; 0 if all was played, 1 if something failed, 130 after Ctrl-C."""
+def run(options: "Bench") -> int:
+    """Play a suite and print its summary; 0 if complete, 1 if an episode failed, 130 after Ctrl-C."""
+    from lgmd_gym.benchmark.executor import Executor
+    from lgmd_gym.benchmark.runner import INTERRUPTED
+    from lgmd_gym.report.outputs import write_outputs
+
     console = make_console()
-    run = _resumed(options, console) if options.resume is not None else _new(options, console)
-    with _progress(run) as tick:
-        complete = run.play(tick)
-    failed = sum(row["error"] is not None for row in run.rows)
+    executor = Executor(options.jobs, _cluster(options))
+    benchmark = _new(options, executor) if options.resume is None else _resume(options, executor, console)
+    with _progress(benchmark) as count:
+        complete = benchmark.play(count)
+    path = benchmark.folder.path
     try:
-        _report(run, console, options)
+        if benchmark.rows:
+            _print_tables(benchmark, console)
+        for file in write_outputs(path, options.plots, options.report):
+            if file.name == "report.html":
+                console.print(f"report: {file}", soft_wrap=True)
     except OSError as error:
-        run.stopped = run.stopped or f"{error.strerror} while the report was written"
+        benchmark.stop_reason = benchmark.stop_reason or f"{error.strerror} while writing the outputs"
+    failed = sum(row["error"] is not None for row in benchmark.rows)
     if failed:
         console.print(f"{failed} episodes failed; their tracebacks are in episodes.jsonl", style="red")
-    if run.stopped:
-        kept = f"{len(run.rows)} of {run.total} episodes kept"
-        go_on = f"lgmd-gym bench --resume {run.folder.path}"
-        console.print(f"{run.stopped}: {kept}; go on with {go_on}", style="yellow", soft_wrap=True)
-    console.print(f"run folder: {run.folder.path}", soft_wrap=True)
-    if not complete and run.stopped == "interrupted":
+    if benchmark.stop_reason:
+        kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
+        resume = f"continue with lgmd-gym bench --resume {path}"
+        console.print(f"{benchmark.stop_reason}: {kept}; {resume}", style="yellow", soft_wrap=True)
+    console.print(f"run folder: {path}", soft_wrap=True)
+    if not complete and benchmark.stop_reason == INTERRUPTED:
         return 130
-    return int(bool(failed or run.stopped))
-
-
-def compare(options: "Compare") -> int:
-    """Print and draw the paired differences of two runs, or of agents within one."""
-    from lgmd_gym.benchmark.analysis import plots as plots_bench
-    from lgmd_gym.benchmark.analysis.compare import compare_runs
-    from lgmd_gym.benchmark.analysis.compare_tables import compare_table
-
-    if options.out is not None and options.out.exists():
-        raise ValueError(f"{str(options.out)!r} exists and is kept; choose another --out")
-    found = compare_runs(options.run_a, options.run_b, options.agents)
-    console = make_console()
-    for item in found:
-        console.print(compare_table(item))
-    if options.out is not None:
-        plots_bench.difference_figure(options.out, found)
-        console.print(f"figure: {options.out}", soft_wrap=True)
-    return 0
-
-
-def judge(options: "Judge") -> int:
-    """Print the arms of a run."""
-    from lgmd_gym.benchmark.analysis.trainings import judge_run
-    from lgmd_gym.benchmark.analysis.trainings_tables import judge_table
-
-    arms = judge_run(options.run, options.arms)
-    for condition in dict.fromkeys(arm.condition for arm in arms):
-        told = [arm for arm in arms if arm.condition == condition]
-        make_console().print(judge_table(told, f"{options.run.name}, {condition}"))
-    return 0
+    return int(bool(failed or benchmark.stop_reason))
 
 
 def _cluster(options: "Bench") -> str | None:
-    """Return the cluster's address that the options name, None for processes."""
+    """Return the address of the Dask scheduler, None for local processes."""
     if options.backend == "dask" and options.address is None:
-        raise ValueError("--backend dask needs --address tcp://HOST:8786, the scheduler's")
+        raise ValueError("--backend dask needs --address tcp://HOST:8786 of the scheduler")
     if options.backend != "dask" and options.address is not None:
         raise ValueError(f"--address {options.address!r} needs --backend dask")
     return options.address
 
 
-def _resumed(options: "Bench", console: Console) -> "Run | TrafficRun":
-    from lgmd_gym.benchmark.runs import resume_run
+def _resume(options: "Bench", executor: "Executor", console: Console) -> "Run":
+    from lgmd_gym.benchmark.runner import Run
 
     assert options.resume is not None
-    run = resume_run(options.resume, options.jobs, _cluster(options))
-    cut = " after a cut-off last line was taken away" if run.folder.mended else ""
-    console.print(f"resuming with {len(run.rows)} of {run.total} episodes{cut}")
-    return run
+    benchmark = Run.resume(options.resume, executor)
+    repaired = " after removal of an incomplete last line" if benchmark.folder.repaired else ""
+    console.print(f"resuming with {len(benchmark.rows)} of {benchmark.total} episodes{repaired}")
+    return benchmark
 
 
-def _new(options: "Bench", console: Console) -> "Run | TrafficRun":
+def _new(options: "Bench", executor: "Executor") -> "Run":
     from lgmd_gym.benchmark.config import RunConfig
-    from lgmd_gym.benchmark.run_cases import DEFAULT_AGENTS
-    from lgmd_gym.benchmark.runs import repeat_run
+    from lgmd_gym.benchmark.runner import Run
 
-    cluster = _cluster(options)
-    given = {
-        "suite": options.suite,
-        "agents": options.agents,
-        "seeds": options.seeds,
-        "first_seed": options.first_seed,
-        "conditions": options.conditions,
-        "camera": options.camera,
-        "params": read_params(options.params),
-    }
-    given = {name: value for name, value in given.items() if value is not None}
+    names = ("suite", "agents", "seeds", "first_seed", "conditions", "camera")
+    values: dict[str, Any] = {name: getattr(options, name) for name in names}
+    values["params"] = read_params(options.params)
+    values = {name: value for name, value in values.items() if value is not None}
     if options.config is None:
-        config = RunConfig(**({"suite": SUITE, "agents": DEFAULT_AGENTS, "seeds": SEEDS} | given))
+        config = RunConfig(**values)
+    elif values:
+        flags = ", ".join(f"--{name.replace('_', '-')}" for name in values)
+        raise ValueError(f"--config replaces {flags}; remove the options, or change the file")
     else:
-        if given:
-            names = ", ".join(f"--{name.replace('_', '-')}" for name in given)
-            raise ValueError(f"--config says what to play; leave out {names}, or change the file")
         config = RunConfig.load(options.config)
-    name = Path(config.suite).stem
-    out = options.out or Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
-    return repeat_run(config, options.jobs, out, cluster)
+    default = Path("runs") / f"{Path(config.suite).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+    return Run.new(config, options.out or default, executor)
 
 
-def _report(run: "Run | TrafficRun", console: Console, options: "Bench") -> None:
-    """Print the tables; write summary, plots and report."""
-    from lgmd_gym.benchmark.traffic.run import TrafficRun
+def _print_tables(benchmark: "Run", console: Console) -> None:
+    """Print the tables of every condition."""
+    from lgmd_gym.benchmark.analysis import tables
+    from lgmd_gym.benchmark.suites import TRAFFIC
+    from lgmd_gym.benchmark.summary import by_condition
+    from lgmd_gym.benchmark.task import NO_BRAKE
+    from lgmd_gym.benchmark.traffic.tables import traffic_table
+
+    config, suite = benchmark.config, benchmark.plan.suite
+    for condition, rows in by_condition(benchmark.rows).items():
+        title = f"{_title(benchmark)}, {condition}"
+        if suite == TRAFFIC:
+            console.print(traffic_table(rows, list(config.agents), title))
+            console.print(traffic_table(rows, list(config.agents), "by kind of traffic", by_kind=True))
+            continue
+        agents = list(dict.fromkeys([NO_BRAKE, *config.agents]))
+        for table in tables.score_tables(rows, agents, title):
+            console.print(table)
+        console.print(tables.limit_table(rows, agents, suite) or tables.case_table(rows, agents))
+
+
+def _title(benchmark: "Run") -> str:
+    """Return the suite, camera, alert level and seeds of a run."""
     from lgmd_gym.neuron import LGMDParams
 
-    rows = run.rows
-    if not rows:
-        return
-    level = LGMDParams.from_dict(run.sensor_config.params or {}).t_sf
-    fps = next((f"{row['fps']:g} Hz" for row in rows if row["fps"]), "?")
-    eye = f"camera {run.sensor_config.label} at {fps}, T_sf = {level:g} spikes/s"
-    first = f" from {run.config.first_seed} on" if run.config.first_seed else ""
-    title = f"{run.suite}: {eye}, {run.seeds} seeds{first}"
-    if isinstance(run, TrafficRun):
-        _report_traffic(run, console, f"{title} of {len(run.kinds)} kinds of traffic")
-        return
-    _report_cases(run, console, title)
-    if options.plots:
-        _draw_cases(run, level)
-    _write_curves(run.folder.path)
-    if options.report:
-        from lgmd_gym.report import write_report
-
-        console.print(f"report: {write_report(run.folder.path)}", soft_wrap=True)
-
-
-def _report_cases(run: "Run", console: Console, title: str) -> None:
-    from lgmd_gym.benchmark.analysis import tables
-    from lgmd_gym.benchmark.summary import by_condition, write_summary
-
-    agents = list(dict.fromkeys(["no-brake", *run.agents]))
-    for condition, rows in by_condition(run.rows).items():
-        for table in tables.score_tables(rows, agents, f"{title}, {condition}"):
-            console.print(table)
-        console.print(tables.verdict_table(rows, agents, run.suite) or tables.case_table(rows, agents))
-    write_summary(run.rows, run.folder.path / "summary.csv")
-
-
-def _report_traffic(run: "TrafficRun", console: Console, title: str) -> None:
-    from lgmd_gym.benchmark.traffic.tables import traffic_table, write_traffic_summary
-
-    console.print(traffic_table(run.rows, run.agents, title))
-    console.print(traffic_table(run.rows, run.agents, "by kind of traffic", by_kind=True))
-    write_traffic_summary(run.rows, run.folder.path / "summary.csv")
-
-
-def _write_curves(path: Path) -> None:
-    """Write the detector curves of a run folder as froc.csv, if any trace has been kept."""
-    from lgmd_gym.benchmark.analysis.froc import LEAD, curves, load_traces, write_curves
-
-    traces = load_traces(path)
-    if traces:
-        write_curves(path / "froc.csv", curves(traces), LEAD)
-
-
-def _draw_cases(run: "Run", alert_level: float) -> None:
-    """Draw every case's first seed, all agents in one figure."""
-    from lgmd_gym.benchmark.run_cases import trace_name
-    from lgmd_gym.plotting import figures as plots
-
-    seed = run.config.first_seed
-    folder = run.folder.path / "plots"
-    folder.mkdir(exist_ok=True)
-    for condition in run.conditions:
-        for case in run.cases:
-            names = {agent: trace_name(agent, case.name, seed, condition) for agent in run.agents}
-            found = {agent: run.folder.series(name) for agent, name in names.items()}
-            episodes = {agent: series for agent, series in found.items() if series is not None}
-            if episodes:
-                file = trace_name("", case.name, seed, condition).replace(f"____seed{seed}", "")
-                title = f"{case.name}, seed {seed}, {condition}"
-                plots.episode_figure(folder / f"{file}.png", title, episodes, alert_level)
+    config = benchmark.config
+    level = LGMDParams.make(config.params).t_sf
+    fps = next((f"{row['fps']:g} Hz" for row in benchmark.rows if row["fps"]), "?")
+    first = f" from {config.first_seed} on" if config.first_seed else ""
+    camera = f"camera {config.sensor_config.label} at {fps}"
+    return f"{benchmark.plan.suite}: {camera}, T_sf = {level:g} spikes/s, {config.seeds} seeds{first}"
 
 
 @contextmanager
-def _progress(run: "Run | TrafficRun") -> Iterator[Any]:
-    """Show done, rate, time left and running score on stderr; yield the function that moves it."""
+def _progress(benchmark: "Run") -> Iterator[Callable[[dict[str, Any]], None]]:
+    """Show a progress bar on stderr; yield the function that counts a row."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (
@@ -204,55 +132,54 @@ def _progress(run: "Run | TrafficRun") -> Iterator[Any]:
         MofNCompleteColumn(),
         TextColumn("{task.fields[rate]}"),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[score]}"),
+        TextColumn("{task.fields[tally]}"),
     )
     tally = Tally(time.perf_counter())
-    for row in run.rows:
-        tally.count(row, fresh=False)
+    for row in benchmark.rows:
+        tally.add(row, new=False)
+    done, total, suite = len(benchmark.rows), benchmark.total, benchmark.plan.suite
     with Progress(*columns, console=Console(stderr=True), speed_estimate_period=60.0) as bar:
-        shown = bar.add_task(run.suite, total=run.total, completed=len(run.rows), rate="", score="")
+        task = bar.add_task(suite, total=total, completed=done, rate="", tally="")
 
-        def tick(row: dict[str, Any]) -> None:
-            tally.count(row)
+        def count(row: dict[str, Any]) -> None:
+            tally.add(row)
             rate = f"{tally.rate(time.perf_counter()):.1f}/s"
-            bar.update(shown, advance=1, rate=rate, score=tally.score)
+            bar.update(task, advance=1, rate=rate, tally=str(tally))
 
-        yield tick
+        yield count
 
 
 class Tally:
-    """The running score of a run, over all agents that can brake.
+    """Running totals over all agents except `no-brake`.
 
     Args:
-        start: When it began [s].
+        start: Start of the run [s].
     """
 
     def __init__(self, start: float) -> None:
         self.start, self.played = start, 0
-        self.avoided = self.threats = self.false = self.quiet = self.failed = 0
+        self.avoided = self.threats = self.false = self.non_threats = self.failed = 0
 
-    def count(self, row: dict[str, Any], fresh: bool = True) -> None:
-        """Count one row; `fresh` if it was played just now."""
-        self.played += fresh
+    def add(self, row: dict[str, Any], new: bool = True) -> None:
+        """Count one row; `new` if it was played in this session."""
+        self.played += new
         if row["error"] is not None:
             self.failed += 1
-        elif row.get("fcw_driver"):
-            return  # no automatic braking
-        elif row["agent"] != "no-brake" and row["threat"]:
+        elif row["fcw_driver"] or row["agent"] == "no-brake":
+            return
+        elif row["threat"]:
             self.threats += 1
             self.avoided += bool(row["avoided"])
-        elif row["agent"] != "no-brake":
-            self.quiet += 1
+        else:
+            self.non_threats += 1
             self.false += bool(row.get("false_activation", row.get("false_activations")))
 
     def rate(self, now: float) -> float:
         """Return the episodes per second since the start [1/s]."""
         return self.played / max(now - self.start, 1e-9)
 
-    @property
-    def score(self) -> str:
-        """What stands so far."""
+    def __str__(self) -> str:
         parts = [f"avoided {self.avoided}/{self.threats}"] if self.threats else []
-        parts += [f"false {self.false}/{self.quiet}"] if self.quiet else []
+        parts += [f"false {self.false}/{self.non_threats}"] if self.non_threats else []
         parts += [f"failed {self.failed}"] if self.failed else []
         return " ".join(parts)

@@ -23,7 +23,7 @@ def run(options: Drive) -> int:
         video=options.video,
         live=options.live,
         overlays=options.overlays,
-        **SensorConfig(options.camera, read_params(options.params)).of(agent).arguments,
+        **SensorConfig(options.camera, read_params(options.params)).for_agent(agent).arguments,
     )
     if result.stopped:
         print(f"window closed after {result.duration:.2f} s")

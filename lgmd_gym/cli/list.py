@@ -6,9 +6,9 @@ from collections.abc import Callable
 from rich.table import Table
 
 from lgmd_gym.agents import AGENTS
-from lgmd_gym.agents.policies.policy import find_policy, read_card, shipped
+from lgmd_gym.agents.policies.policy import find_policy, read_card, shipped_policies
 from lgmd_gym.benchmark.suites import SUITES
-from lgmd_gym.benchmark.traffic.rows import SUITE as TRAFFIC
+from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.camera.params import PRESETS
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import List
@@ -47,7 +47,7 @@ def agents() -> Table:
     for name, cls in AGENTS.items():
         options = ", ".join(f"{option}={default:g}" for option, default in cls.options().items())
         table.add_row(name, options, _summary(cls))
-    for name in shipped():
+    for name in shipped_policies():
         algo = read_card(find_policy(name))["algo"].upper()
         description = f'Policy trained with {algo}; requires the extra "train". Loading it unpickles code.'
         table.add_row(f"policy:{name}", "", description)

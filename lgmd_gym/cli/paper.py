@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from lgmd_gym.benchmark.new_folder import new_folder
+from lgmd_gym.benchmark.folder import new_folder
 from lgmd_gym.cli.console import make_console
 
 if TYPE_CHECKING:

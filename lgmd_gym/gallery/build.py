@@ -8,8 +8,8 @@ from PIL import Image
 
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.new_folder import new_folder
-from lgmd_gym.benchmark.run_cases import DEFAULT_AGENTS
+from lgmd_gym.benchmark.folder import new_folder
+from lgmd_gym.benchmark.config import DEFAULT_AGENTS
 from lgmd_gym.camera.params import CONDITIONS
 from lgmd_gym.gallery.page import page
 from lgmd_gym.gallery.scenes import film, find_scenes, judge

@@ -14,8 +14,8 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
 from lgmd_gym.envs import FAMILIES, env_id
 from lgmd_gym.envs.random_braking import RandomBrakingEnv
-from lgmd_gym.envs.registration import IDS, RANDOM
-from lgmd_gym.envs.traffic.registration import KINDS
+from lgmd_gym.envs.registration import RANDOM
+from lgmd_gym.envs.traffic.registration import KINDS, find_kind
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.gallery.docstrings import About, read
 from lgmd_gym.rendering.playback import make_target
@@ -51,10 +51,10 @@ def find_scenes(names: tuple[str, ...] = ()) -> list[Scene]:
     Raises:
         ValueError: For an unknown name; the nearest is named.
     """
-    everything = {name: Scene(name, env_id(name), read(FAMILIES[name])) for name in IDS}
+    everything = {name: Scene(name, env_id(name), read(FAMILIES[name])) for name in FAMILIES}
     everything[RANDOM] = Scene(RANDOM, env_id(RANDOM), read(RandomBrakingEnv))
-    for kind, cls in KINDS.items():
-        everything[kind] = Scene(kind, f"traffic/{kind}", read(cls), judged=False)
+    for kind in KINDS:
+        everything[kind] = Scene(kind, f"traffic/{kind}", read(find_kind(kind)), judged=False)
     for name in names:
         if name not in everything:
             raise unknown_name("scenario family or kind of traffic", name, everything)
@@ -101,7 +101,7 @@ def judge(scene: Scene, agents: list[str], seeds: int) -> dict[str, str]:
     for agent in agents:
         if agent != NO_BRAKE:
             tasks = [
-                Task(agent, case, seed, SensorConfig(), truth.truth) for seed, truth in enumerate(truths)
+                Task(agent, case, seed, SensorConfig(), truth.counterfactual) for seed, truth in enumerate(truths)
             ]
             words[agent] = say([run_task(task).row for task in tasks])
     return words

@@ -10,9 +10,9 @@ import gymnasium as gym
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import Agent
 from lgmd_gym.benchmark.suites import SUITES, find_case
-from lgmd_gym.benchmark.traffic.rows import SUITE as TRAFFIC
-from lgmd_gym.envs import env_id
-from lgmd_gym.envs.registration import IDS, RANDOM
+from lgmd_gym.benchmark.suites import TRAFFIC
+from lgmd_gym.envs import FAMILIES, env_id
+from lgmd_gym.envs.registration import RANDOM
 from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.rendering.dashboard import SIZE
@@ -55,7 +55,7 @@ def make_target(target: str, arguments: dict[str, Any], **options: Any) -> gym.E
     Raises:
         ValueError: For an unknown target (the nearest is named) or argument.
     """
-    ids = [env_id(family) for family in (*IDS, RANDOM)]
+    ids = [env_id(family) for family in (*FAMILIES, RANDOM)]
     if target in ids:
         return gym.make(target, **options, **arguments)
     kinds = [f"{TRAFFIC}/{kind}" for kind in KINDS]

@@ -130,7 +130,7 @@ def test_no_truth_reaches_an_agent_that_is_no_oracle(text):
     actions = []
     for spoil in (False, True):
         agent = make_agent(text)
-        env = gym.make("LGMD/CCRs-v0", ego_speed=8.0, trace=True, **SensorConfig().of(agent).arguments)
+        env = gym.make("LGMD/CCRs-v0", ego_speed=8.0, trace=True, **SensorConfig().for_agent(agent).arguments)
         observation, info = env.reset(seed=1)
         agent.reset(1)
         taken = []

@@ -157,12 +157,12 @@ def test_defaults_lie_in_what_tuning_searches(name):
 
 def test_the_agents_eye_is_used_where_the_user_names_none():
     agent = make_agent("stopping-zone")
-    own = SensorConfig().of(agent)
+    own = SensorConfig().for_agent(agent)
     assert own.camera == agent.camera
     assert own.label.startswith("ground10+ground20+")
-    assert SensorConfig("tele").of(agent).camera == "tele"
-    assert SensorConfig().of(make_agent("no-brake")).camera == "fovea"
-    assert SensorConfig().of(make_agent("frame-difference")).include_frame
+    assert SensorConfig("tele").for_agent(agent).camera == "tele"
+    assert SensorConfig().for_agent(make_agent("no-brake")).camera == "fovea"
+    assert SensorConfig().for_agent(make_agent("frame-difference")).include_frame
 
 
 def test_a_condition_is_laid_over_every_camera():
@@ -185,7 +185,7 @@ def test_a_condition_is_laid_over_every_camera():
 )
 def test_the_stopping_zone_in_closed_loop(name, brakes):
     case = find_case(name)
-    truth = run_task(Task(NO_BRAKE, case, 0, SensorConfig())).truth
+    truth = run_task(Task(NO_BRAKE, case, 0, SensorConfig())).counterfactual
     row = run_task(Task("stopping-zone", case, 0, SensorConfig(), truth)).row
     assert row["error"] is None
     assert row["camera"].startswith("ground10+")
@@ -197,5 +197,5 @@ def test_the_stopping_zone_in_closed_loop(name, brakes):
 def test_danger_zone_brakes_for_a_steel_plate():
     """What the upright fields are for: the ground fields alone brake for what lies flat."""
     case = find_case("false-reaction/SteelPlate/v60")
-    truth = run_task(Task(NO_BRAKE, case, 0, SensorConfig())).truth
+    truth = run_task(Task(NO_BRAKE, case, 0, SensorConfig())).counterfactual
     assert run_task(Task("danger-zone", case, 0, SensorConfig(), truth)).row["false_activation"]

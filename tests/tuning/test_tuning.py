@@ -123,11 +123,11 @@ def test_a_recorded_drive_tells_what_the_closed_loop_does(agent, levels, seeds):
     ground.score("spike-threshold")  # an eye before this one leaves nothing behind
     assert tuning_ground.latches(made)
     open_loop = ground.score(agent)
-    rows = ground._closed_loop(agent, SensorConfig().of(made))
+    rows = ground._closed_loop(agent, SensorConfig().for_agent(made))
     assert open_loop == tuning_ground.Score.of(rows)
     assert open_loop.threats
     assert open_loop.quiet
-    found = [tuning_ground.onset(made, drive) for drive in ground._seen_through(SensorConfig().of(made))]
+    found = [tuning_ground.onset(made, drive) for drive in ground._seen_through(SensorConfig().for_agent(made))]
     assert {index is None for index in found} == {True, False}  # it brakes in some and not in all
     for key, row in zip(enumerate(found), rows, strict=True):
         recorded = ground._outcomes[key]

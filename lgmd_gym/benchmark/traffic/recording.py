@@ -1,58 +1,53 @@
-"""One drive through traffic without an agent, kept so that any agent can look at it and leave it anywhere."""
+"""Recordings of traffic without an agent, from which any agent can branch off at any decision."""
 
 import copy
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
-from lgmd_gym.agents import HOLD, to_action
+from lgmd_gym.agents import HOLD, make_agent, to_action
+from lgmd_gym.benchmark.episode import Step, rollout
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.envs.traffic.emergencies import HARD, HORIZON, Emergencies, drive_on
-from lgmd_gym.envs.traffic.registration import make_traffic
+from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.envs.traffic.emergencies import HARD_BRAKING, HORIZON, Emergencies, simulate_driver
+from lgmd_gym.envs.traffic.registration import traffic_id
 
-EVERY = 300  # decisions between two kept states: copying one takes as long as some 20 decisions
-
-
-class Seen(NamedTuple):
-    """What an agent is shown at one decision."""
-
-    observation: dict[str, Any]
-    info: dict[str, Any]
+SNAPSHOT_EVERY = 300  # decisions between two snapshots; one snapshot takes as long as some 20 decisions
 
 
 @dataclass(frozen=True, slots=True)
-class Trace:
-    """A recorded drive.
+class TrafficRecording:
+    """One episode of traffic without an agent.
 
     Attributes:
-        kind: Of the traffic.
-        seed: Of the traffic.
-        seen: What is to be seen at every decision; the last one has no next.
-        kept: States at every `EVERY`-th decision, never to be stepped themselves.
-        emergencies: Of the drive and `HORIZON` beyond its end.
-        policy_hz: Decisions per second.
-        fps: Camera frames per second.
+        kind: Kind of traffic.
+        seed: Seed of the traffic.
+        steps: Step of every decision.
+        snapshots: Environment at every `SNAPSHOT_EVERY`-th decision; copied before use, never stepped.
+        emergencies: Emergencies up to `HORIZON` beyond the end.
+        policy_hz: Decision rate [Hz].
+        fps: Camera frame rate [Hz].
     """
 
     kind: str
     seed: int
-    seen: tuple[Seen, ...]
-    kept: tuple[gym.Env, ...]
+    steps: tuple[Step, ...]
+    snapshots: tuple[gym.Env, ...]
     emergencies: Emergencies
     policy_hz: float
     fps: float
 
     def fork(self, decision: int) -> gym.Env:
-        """Return an environment in the state of a decision, bit for bit, to go on with.
+        """Return an environment in the exact state of a decision.
 
         Raises:
-            RuntimeError: If what is seen there is not what was recorded; nothing could be compared then.
+            RuntimeError: If its observation differs from the recorded one.
         """
-        env = fork(self.kept[decision // EVERY])
-        recorded = observation = self.seen[decision].observation
-        for _ in range(decision % EVERY):
+        env = fork(self.snapshots[decision // SNAPSHOT_EVERY])
+        recorded = observation = self.steps[decision].observation
+        for _ in range(decision % SNAPSHOT_EVERY):
             observation = env.step(to_action(HOLD))[0]
         if not all(np.array_equal(observation[key], recorded[key]) for key in recorded):
             raise RuntimeError(
@@ -61,57 +56,59 @@ class Trace:
         return env
 
 
-def record(kind: str, seed: int, sensor_config: SensorConfig, config: dict[str, Any] | None = None) -> Trace:
-    """Drive once without an agent and keep what is needed.
+def record_traffic(
+    kind: str, seed: int, sensor_config: SensorConfig, config: dict[str, Any] | None = None
+) -> TrafficRecording:
+    """Record one episode of traffic without an agent.
 
     Args:
-        kind: A name in `lgmd_gym.envs.traffic.registration.KINDS`.
-        seed: Of the traffic.
+        kind: Kind of traffic, a name in `lgmd_gym.envs.traffic.registration.KINDS`.
+        seed: Seed of the traffic.
         sensor_config: Camera and neuron parameters.
         config: Configuration of `TrafficEnv`.
     """
-    env = make_traffic(kind, **sensor_config.of().arguments, trace=True, config=config)
+    env = gym.make(traffic_id(kind), **sensor_config.for_agent().arguments, trace=True, config=config)
     base: Any = env.unwrapped
     policy_hz = base.config["policy_frequency"]
-    seen, kept = [Seen(*env.reset(seed=seed))], []
-    while True:
-        if (len(seen) - 1) % EVERY == 0:
-            kept.append(fork(env))
-        observation, _, terminated, truncated, info = env.step(to_action(HOLD))
-        seen.append(Seen(observation, info))
-        if terminated or truncated:
-            break
-    hard = [k / policy_hz for k, item in enumerate(seen) if item.info["driver_acceleration"] <= -HARD]
-    beyond = look_ahead(env, (len(seen) - 1) / policy_hz)
+    steps: list[Step] = []
+    snapshots: list[gym.Env] = []
+    for step, _ in rollout(env, make_agent(NO_BRAKE), seed):
+        if len(steps) % SNAPSHOT_EVERY == 0 and not step.done:
+            snapshots.append(fork(env))
+        steps.append(step)
+    driver = [step.info["driver_acceleration"] for step in steps]
+    hard = [index / policy_hz for index, value in enumerate(driver) if value <= -HARD_BRAKING]
+    beyond = look_ahead(env, (len(steps) - 1) / policy_hz)
     emergencies = Emergencies(beyond.contact, (*hard, *beyond.hard))
-    return Trace(kind, seed, tuple(seen), tuple(kept), emergencies, policy_hz, env.get_wrapper_attr("fps"))
+    fps = env.get_wrapper_attr("fps")
+    return TrafficRecording(kind, seed, tuple(steps), tuple(snapshots), emergencies, policy_hz, fps)
 
 
-def fork(env: gym.Env, blind: bool = False) -> gym.Env:
-    """Return a copy of traffic inside `LGMDObservation`, in the same state, that goes its own way.
+def fork(env: gym.Env, share_cameras: bool = False) -> gym.Env:
+    """Return an independent copy of a traffic environment inside `LGMDObservation`, in the same state.
 
-    The lanes are shared, they never change. Cameras are copied with what their last frame has left in them,
-    but for those that hold resources (the view from above).
+    The lanes are shared because they never change. Cameras are copied with their state, except those that
+    hold resources (the bird's-eye view).
 
     Args:
-        env: What to copy.
-        blind: Share the cameras, for a branch that nobody looks at.
+        env: Environment to copy.
+        share_cameras: Share all cameras, for a copy that renders no frames.
     """
     base: Any = env.unwrapped
     network = base.road.network
     shared = [network, *network.lanes_list()]
     for cameras in env.get_wrapper_attr("sensors").sets:
-        shared += [camera for camera in cameras.values() if blind or hasattr(camera, "close")]
+        shared += [camera for camera in cameras.values() if share_cameras or hasattr(camera, "close")]
     return copy.deepcopy(env, {id(item): item for item in shared})
 
 
 def look_ahead(env: gym.Env, time: float, horizon: float = HORIZON) -> Emergencies:
-    """Return the emergencies that come if nobody brakes but the driver; `env` stays as it is.
+    """Return the emergencies without braking by the agent, leaving `env` unchanged.
 
     Args:
-        env: Traffic inside `LGMDObservation`.
-        time: At present [s].
-        horizon: How far to look [s].
+        env: Traffic environment inside `LGMDObservation`.
+        time: Present time [s].
+        horizon: Time ahead [s].
     """
-    base: Any = fork(env, blind=True).unwrapped
-    return drive_on(base, time, horizon)
+    base: Any = fork(env, share_cameras=True).unwrapped
+    return simulate_driver(base, time, horizon)

@@ -1,103 +1,106 @@
-"""One agent through one recorded drive: it watches until it first brakes, then goes its own way."""
+"""Replay of one agent on a recording of traffic, live from its first braking on."""
 
 import gymnasium as gym
 
 from lgmd_gym.agents import HOLD, Agent, to_action
-from lgmd_gym.benchmark.traffic.recording import Seen, Trace, look_ahead
-from lgmd_gym.benchmark.traffic.rows import Braking, Log
+from lgmd_gym.benchmark.episode import Step
+from lgmd_gym.benchmark.traffic.recording import TrafficRecording, look_ahead
+from lgmd_gym.benchmark.traffic.rows import BrakingEvent, EpisodeLog
 
-RELEASE = 1.0  # [s] without a demand after which braking is over, and without an alert for the next to count
-HANDOVER = 3.0  # [s] after a standstill in which the driver is left alone
-RESEED = 1_000_003  # an agent that has come to a standstill draws anew
+RELEASE = 1.0  # [s] without a demand that ends a braking event, and without an alert before the next one
+HANDOVER = 3.0  # [s] after a standstill during which only the driver acts
+RESEED = 1_000_003  # seed offset of the agent's reset after each standstill
+NEVER = -1e9  # [s]
 
 
-class Ride:
-    """Plays one agent on one trace.
+class Replay:
+    """Plays one agent on one recording.
 
-    While the agent does not brake it is shown the recording. At its first demand the recorded state is
-    forked: the branch without braking is the recording itself, the other one goes on live. Every further
-    braking is judged by a fork of the live state, driven on without braking.
+    Until the agent brakes, it receives the recorded steps. At its first demand the recorded state is forked:
+    the recording is the branch without braking, and the fork is stepped live. For every later braking event,
+    a fork of the live state is stepped without braking.
 
-    A braking lasts until the agent has asked for none for `RELEASE`, or to a standstill. After a standstill
-    the driver is left alone for `HANDOVER`, then the agent is reset (with a seed of its own for every
-    standstill), so that an agent that keeps braking still drives on.
+    A braking event ends after `RELEASE` without a demand, or at a standstill. After a standstill only the
+    driver acts for `HANDOVER`; then the agent is reset, with another seed each time, so that an agent that
+    always brakes still makes progress.
 
     Args:
-        trace: The recording.
-        agent: Who brakes.
-        live: Leave the recording at once, to check that this changes nothing.
+        recording: Recording to replay.
+        agent: Agent to play.
+        live: Whether to step live from the start, to verify that the result is the same.
     """
 
-    def __init__(self, trace: Trace, agent: Agent, live: bool = False) -> None:
-        self.trace, self.agent = trace, agent
-        self.log = Log()
-        self.env: gym.Env | None = trace.fork(0) if live else None
-        self._open: Braking | None = None
-        self._alone_until = self._last_alert = -1e9
-        self._resets = 0
+    def __init__(self, recording: TrafficRecording, agent: Agent, live: bool = False) -> None:
+        self.recording, self.agent = recording, agent
+        self.log = EpisodeLog()
+        self.env: gym.Env | None = recording.fork(0) if live else None
+        self._event: BrakingEvent | None = None
+        self._handover_until = self._last_alert = NEVER
+        self._standstills = 0
         self._done = False
 
-    def play(self) -> Log:
-        """Play to the end of the drive."""
-        self.agent.reset(self.trace.seed)
-        seen, decision = self.trace.seen[0], 0
+    def play(self) -> EpisodeLog:
+        """Play to the end of the episode."""
+        self.agent.reset(self.recording.seed)
+        step, decision = self.recording.steps[0], 0
         while True:
-            time = decision / self.trace.policy_hz
-            wish = self._ask(seen, time)
-            self._note(seen, time, wish)
+            time = decision / self.recording.policy_hz
+            demand = self._demand(step, time)
+            self._update_event(step, time, demand)
             if self._done:
                 break
-            seen = self._go(decision, wish)
+            step = self._advance(decision, demand)
             decision += 1
-        self.log.end, self.log.duration = seen, time
+        self.log.end, self.log.duration = step, time
         return self.log
 
-    def _ask(self, seen: Seen, time: float) -> float:
+    def _demand(self, step: Step, time: float) -> float:
         """Return the agent's demand in [-1, 0]."""
-        if time < self._alone_until:
+        if time < self._handover_until:
             return HOLD
-        if self._alone_until > 0.0:
-            self.agent.reset(self.trace.seed + RESEED * self._resets)
-            self._alone_until = -1e9
-        wish = min(float(self.agent.act(*seen)[0]), HOLD)
+        if self._handover_until > 0.0:
+            self.agent.reset(self.recording.seed + RESEED * self._standstills)
+            self._handover_until = NEVER
+        demand = min(float(self.agent.act(step.observation, step.info)[0]), HOLD)
         if self.agent.alert:
             self.log.alerts += time - self._last_alert > RELEASE
             self._last_alert = time
-        return wish
+        return demand
 
-    def _note(self, seen: Seen, time: float, wish: float) -> None:
-        """Open, continue or close the present braking."""
-        now = self._open
-        if now is None and wish < HOLD:
-            now = self._open = Braking(time, self._need(time), time)
-            self.log.brakings.append(now)
-        if now is None:
+    def _update_event(self, step: Step, time: float, demand: float) -> None:
+        """Begin, continue or end the present braking event."""
+        event = self._event
+        if event is None and demand < HOLD:
+            event = self._event = BrakingEvent(time, self._time_to_emergency(time), time)
+            self.log.events.append(event)
+        if event is None:
             return
-        if wish < HOLD:
-            now.last = time
-        now.peak = max(now.peak, seen.info["deceleration"])
-        self.log.peak = max(self.log.peak, now.peak)
-        stopped = seen.info["ego_speed"] == 0.0 and time > now.start
-        if stopped:
-            self.log.stops += now.felt  # if not, the driver has stopped by himself
-            self._resets += 1
-            self._alone_until = time + HANDOVER
-        if stopped or time - now.last > RELEASE:
-            self._open = None
+        if demand < HOLD:
+            event.last = time
+        event.peak = max(event.peak, step.info["deceleration"])
+        self.log.peak = max(self.log.peak, event.peak)
+        standstill = step.info["ego_speed"] == 0.0 and time > event.start
+        if standstill:
+            self.log.stops += event.counts  # otherwise the driver has stopped
+            self._standstills += 1
+            self._handover_until = time + HANDOVER
+        if standstill or time - event.last > RELEASE:
+            self._event = None
 
-    def _need(self, time: float) -> float | None:
+    def _time_to_emergency(self, time: float) -> float | None:
         """Return the time to the next emergency without braking [s], None for none."""
         if self.env is None:
-            return self.trace.emergencies.need(time)
-        return look_ahead(self.env, time).need(time)
+            return self.recording.emergencies.time_until(time)
+        return look_ahead(self.env, time).time_until(time)
 
-    def _go(self, decision: int, wish: float) -> Seen:
+    def _advance(self, decision: int, demand: float) -> Step:
         """Advance by one decision."""
-        if self.env is None and wish < HOLD:
-            self.env = self.trace.fork(decision)
+        if self.env is None and demand < HOLD:
+            self.env = self.recording.fork(decision)
         if self.env is None:
-            self._done = decision + 2 == len(self.trace.seen)
-            return self.trace.seen[decision + 1]
-        observation, _, terminated, truncated, info = self.env.step(to_action(wish))
-        self._done = terminated or truncated
-        return Seen(observation, info)
+            step = self.recording.steps[decision + 1]
+        else:
+            observation, reward, terminated, truncated, info = self.env.step(to_action(demand))
+            step = Step(observation, info, float(reward), terminated or truncated)
+        self._done = step.done
+        return step

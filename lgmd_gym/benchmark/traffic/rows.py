@@ -1,21 +1,20 @@
-"""What is kept of a drive through traffic, and its row."""
+"""Rows of the traffic suite."""
 
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
 
+from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.metrics import NUISANCE, PREMATURE
-from lgmd_gym.benchmark.traffic.recording import Seen, Trace
+from lgmd_gym.benchmark.rows import ID_KEYS
+from lgmd_gym.benchmark.suites import TRAFFIC
+from lgmd_gym.benchmark.traffic.recording import TrafficRecording
 
-SUITE = "traffic"
-
-# Every key of a row in its order; null where undefined. SI units.
+# Every key of a row, in order; null where undefined. SI units.
 KEYS = (
-    "agent",
+    *ID_KEYS,
     "camera",
-    "suite",
-    "case",
-    "seed",
     "threat",
     "collision",
     "avoided",
@@ -36,105 +35,91 @@ KEYS = (
 
 
 @dataclass(slots=True)
-class Braking:
-    """One time that an agent brakes.
+class BrakingEvent:
+    """One braking event of an agent.
 
     Attributes:
-        start: Of the first demand [s].
-        need: From the start to the emergency that comes without it [s]; None for no emergency.
+        start: Time of the first demand [s].
+        time_to_emergency: Time from the start to the emergency without it [s]; None for no emergency.
         last: Time of the last demand [s].
         peak: Highest deceleration beyond the driver's [m/s²].
     """
 
     start: float
-    need: float | None
+    time_to_emergency: float | None
     last: float
     peak: float = 0.0
 
     @property
-    def felt(self) -> bool:
-        """Whether it counts: beyond 0.25 g (49 CFR 571.127 S5.3)."""
+    def counts(self) -> bool:
+        """Whether the deceleration exceeds 0.25 g (49 CFR 571.127 S5.3)."""
         return self.peak > NUISANCE
 
     @property
     def false(self) -> bool:
-        """Whether it counts and nothing made it necessary."""
-        return self.felt and self.need is None
+        """Whether it counts and no emergency follows without it."""
+        return self.counts and self.time_to_emergency is None
 
     @property
     def premature(self) -> bool:
-        """Whether it counts and was necessary, but more than 4 s later."""
-        return self.felt and self.need is not None and self.need > PREMATURE
+        """Whether it counts and the emergency is more than 4 s away."""
+        return self.counts and self.time_to_emergency is not None and self.time_to_emergency > PREMATURE
 
 
 @dataclass(slots=True)
-class Log:
-    """What happened on a drive.
+class EpisodeLog:
+    """Events of one agent in one episode.
 
     Attributes:
-        brakings: In their order.
-        alerts: Number of them.
-        stops: Standstills brought about by braking.
-        end: What was seen last.
-        duration: Of the drive [s].
+        events: Braking events in order.
+        alerts: Number of alerts.
+        stops: Number of standstills caused by braking events that count.
+        end: Last step.
+        duration: Duration of the episode [s].
         peak: Highest deceleration beyond the driver's [m/s²].
     """
 
-    brakings: list[Braking] = field(default_factory=list)
+    events: list[BrakingEvent] = field(default_factory=list)
     alerts: int = 0
     stops: int = 0
-    end: Seen | None = None
+    end: Step | None = None
     duration: float = 0.0
     peak: float = 0.0
 
 
-def make_row(name: str, trace: Trace, log: Log) -> dict[str, Any]:
-    """Return the row of one drive.
+def traffic_case(kind: str, seed: int) -> Case:
+    """Return the case of one seed of a kind of traffic, such as "traffic/highway/s3"."""
+    return Case(f"{TRAFFIC}/{kind}/s{seed}", kind)
+
+
+def measure(recording: TrafficRecording, log: EpisodeLog) -> dict[str, Any]:
+    """Return the measured values of a row.
 
     Args:
-        name: The agent's string.
-        trace: The recording.
-        log: What happened.
+        recording: Recording without braking, which defines a threat.
+        log: Events of the agent.
     """
     assert log.end is not None
-    info, without = log.end.info, trace.seen[-1].info
-    threat, collision = bool(without["collision"]), bool(info["collision"])
-    return (
-        dict.fromkeys(KEYS)
-        | _named(name, trace.kind, trace.seed)
-        | {
-            "threat": threat,
-            "collision": collision,
-            "avoided": not collision if threat else None,
-            "side": info["side"] or None,
-            "impact_speed": _number(info["impact_speed"]),
-            "relative_impact_speed": _number(info["relative_impact_speed"]),
-            "alerts": int(log.alerts),
-            "brakes": sum(braking.felt for braking in log.brakings),
-            "false_activations": sum(braking.false for braking in log.brakings),
-            "premature_brakes": sum(braking.premature for braking in log.brakings),
-            "stops": log.stops,
-            "peak_deceleration": float(log.peak),
-            "distance": float(info["distance"]),
-            "duration": log.duration,
-            "fps": trace.fps,
-        }
-    )
+    info = log.end.info
+    threat, collision = bool(recording.steps[-1].info["collision"]), bool(info["collision"])
+    return {
+        "threat": threat,
+        "collision": collision,
+        "avoided": not collision if threat else None,
+        "side": info["side"] or None,
+        "impact_speed": _finite(info["impact_speed"]),
+        "relative_impact_speed": _finite(info["relative_impact_speed"]),
+        "alerts": int(log.alerts),
+        "brakes": sum(event.counts for event in log.events),
+        "false_activations": sum(event.false for event in log.events),
+        "premature_brakes": sum(event.premature for event in log.events),
+        "stops": log.stops,
+        "peak_deceleration": float(log.peak),
+        "distance": float(info["distance"]),
+        "duration": log.duration,
+        "fps": recording.fps,
+    }
 
 
-def error_row(name: str, kind: str, seed: int, error: str) -> dict[str, Any]:
-    """Return the row of a drive that could not be played to its end."""
-    return dict.fromkeys(KEYS) | _named(name, kind, seed) | {"error": error}
-
-
-def case_name(kind: str, seed: int) -> str:
-    """Return the name of one seed's traffic, such as "traffic/highway/s3"."""
-    return f"{SUITE}/{kind}/s{seed}"
-
-
-def _named(name: str, kind: str, seed: int) -> dict[str, Any]:
-    return {"agent": name, "suite": SUITE, "case": case_name(kind, seed), "seed": seed}
-
-
-def _number(value: float) -> float | None:
+def _finite(value: float) -> float | None:
     return float(value) if isfinite(value) else None

@@ -1,74 +1,53 @@
-"""What the rows of the traffic suite sum up to: needless brakes per 100 km, with an exact interval."""
+"""Summaries of the traffic suite: false activations per 100 km, with an exact interval."""
 
-from collections.abc import Callable
 from math import inf
+from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
+from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.statistics import Rate, poisson_interval
+from lgmd_gym.benchmark.summary import by_agent, by_condition, write_csv
 
-from lgmd_gym.benchmark.summary import Rate
-
-Row = dict[str, Any]
-PER = 100_000.0  # [m] to which rates refer
-
-
-def poisson_interval(count: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Return the exact two-sided interval of a Poisson mean after `count` events (Garwood 1936).
-
-    The low end is the mean for which that many or more have the chance (1 − confidence)/2, the high end
-    that for which that many or fewer have it; both are quantiles of χ², found here by bisection.
-
-    Args:
-        count: Events seen, >= 0.
-        confidence: In (0, 1).
-
-    Example:
-        >>> [round(bound, 3) for bound in poisson_interval(0)]
-        [0.0, 3.689]
-    """
-    if count < 0 or not 0.0 < confidence < 1.0:
-        raise ValueError(f"count must be >= 0 and confidence in (0, 1), got {count!r} and {confidence!r}")
-    tail = (1.0 - confidence) / 2
-    top = count + 20.0 * (count + 4.0) ** 0.5 + 40.0
-    low = 0.0 if count == 0 else _bisect(lambda mean: 1.0 - _at_most(count - 1, mean) - tail, top)
-    return low, _bisect(lambda mean: tail - _at_most(count, mean), top)
+PER = 100_000.0  # [m], reference distance of the rates
+COLUMNS = (
+    "agent",
+    "condition",
+    "kind",
+    "drives",
+    "distance_km",
+    "brakes",
+    "false_activations",
+    "false_per_100km",
+    "false_low",
+    "false_high",
+    "premature_brakes",
+    "alerts_per_100km",
+    "threats",
+    "avoided",
+    "contacts",
+    "rear_ended",
+    "peak_deceleration",
+    "errors",
+)
 
 
-def _at_most(count: int, mean: float) -> float:
-    """Return the chance of `count` events or fewer at a Poisson mean."""
-    if mean <= 0.0:
-        return 1.0
-    numbers = np.arange(count + 1)
-    factorials = np.concatenate(([0.0], np.cumsum(np.log(numbers[1:]))))
-    return float(np.exp(numbers * np.log(mean) - mean - factorials).sum())
-
-
-def _bisect(rising: Callable[[float], float], top: float) -> float:
-    """Return where a rising function crosses zero in [0, top]."""
-    low, high = 0.0, top
-    for _ in range(100):
-        middle = (low + high) / 2
-        low, high = (low, middle) if rising(middle) > 0.0 else (middle, high)
-    return (low + high) / 2
-
-
-class TrafficScore(NamedTuple):
-    """One agent over a set of drives.
+class TrafficSummary(NamedTuple):
+    """Summary of one agent over a group of episodes in traffic.
 
     Attributes:
-        agent: The agent's string.
-        kind: Of the traffic; "" for all.
-        drives: Number of drives played.
-        distance: All of them together [m].
+        agent: Agent string.
+        kind: Kind of traffic; "" for all.
+        drives: Number of episodes played.
+        distance: Total distance [m].
         alerts: Number of alerts.
-        brakes: Number of brakes beyond 0.25 g.
-        false_activations: Those that nothing made necessary.
-        premature: Those that were necessary, but more than 4 s later.
-        avoided: Of the drives with a contact without braking, those without one.
-        contacts: Drives that ended in contact.
-        rear_ended: Those in which another car ran into the ego's rear.
+        brakes: Number of braking events beyond 0.25 g.
+        false_activations: Number of these without an emergency.
+        premature: Number of these with an emergency more than 4 s away.
+        avoided: Episodes without contact among those with contact without braking.
+        contacts: Number of episodes with contact.
+        rear_ended: Number of episodes in which another car hit the ego's rear.
         peak: Highest deceleration beyond the driver's [m/s²].
-        errors: Drives that could not be played.
+        errors: Number of episodes that failed.
     """
 
     agent: str
@@ -86,20 +65,20 @@ class TrafficScore(NamedTuple):
     errors: int
 
     def per_100km(self, count: float) -> float:
-        """Return a count as a rate per 100 km; infinite if nothing was driven."""
+        """Return a count as a rate [1/100 km]; infinite without distance."""
         return count * PER / self.distance if self.distance > 0.0 else inf
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The 95 % interval of the false brakes per 100 km."""
+        """95 % interval of the false activations [1/100 km]."""
         low, high = poisson_interval(self.false_activations)
         return (self.per_100km(low) if low else 0.0), self.per_100km(high)
 
 
-def traffic_score(agent: str, kind: str, rows: list[Row]) -> TrafficScore:
-    """Sum up one agent's rows."""
+def summarise_traffic(agent: str, kind: str, rows: list[Row]) -> TrafficSummary:
+    """Return the summary of one agent's rows."""
     played = [row for row in rows if row["error"] is None]
-    return TrafficScore(
+    return TrafficSummary(
         agent,
         kind,
         drives=len(played),
@@ -116,10 +95,43 @@ def traffic_score(agent: str, kind: str, rows: list[Row]) -> TrafficScore:
     )
 
 
-def traffic_scores(rows: list[Row], by_kind: bool = False) -> list[TrafficScore]:
-    """Return one score per agent, or per agent and kind, in the order in which they first come."""
-    groups: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        kind = row["case"].split("/")[1] if by_kind else ""
-        groups.setdefault((row["agent"], kind), []).append(row)
-    return [traffic_score(agent, kind, group) for (agent, kind), group in groups.items()]
+def traffic_summaries(rows: list[Row], by_kind: bool = False) -> list[TrafficSummary]:
+    """Return one summary per agent, or per agent and kind of traffic."""
+    parts = by_agent(rows, (lambda row: row["case"].split("/")[1]) if by_kind else (lambda row: ""))
+    return [summarise_traffic(agent, kind, part) for (agent, kind), part in parts.items()]
+
+
+def write_traffic_summary(rows: list[Row], path: Path) -> None:
+    """Write a CSV file with one line per condition, agent and kind of traffic, and one for all kinds."""
+    conditions = sorted(by_condition(rows).items())
+    lines = [
+        _line(item, condition)
+        for by_kind in (False, True)
+        for condition, part in conditions
+        for item in traffic_summaries(part, by_kind)
+    ]
+    write_csv(path, COLUMNS, lines)
+
+
+def _line(item: TrafficSummary, condition: str) -> list[Any]:
+    """Return the values of `COLUMNS`; rates are empty without distance."""
+    counts = (item.false_activations, *poisson_interval(item.false_activations))
+    driven = item.distance > 0.0
+    return [
+        item.agent,
+        condition,
+        item.kind or "all",
+        item.drives,
+        f"{item.distance / 1000:.4f}",
+        item.brakes,
+        item.false_activations,
+        *(f"{item.per_100km(count):.4f}" if driven else "" for count in counts),
+        item.premature,
+        f"{item.per_100km(item.alerts):.4f}" if driven else "",
+        item.avoided.n,
+        item.avoided.k,
+        item.contacts,
+        item.rear_ended,
+        f"{item.peak:.4f}",
+        item.errors,
+    ]

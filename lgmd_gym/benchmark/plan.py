@@ -1,0 +1,108 @@
+"""The episodes of a run and their order."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import gymnasium as gym
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.episode import make_env
+from lgmd_gym.benchmark.executor import TaskMap
+from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.rows import Row, key_of
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.suite_file import get_suite
+from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task, run_task
+
+
+class Plan(ABC):
+    """The episodes of a run.
+
+    Args:
+        config: Configuration of the run.
+
+    Attributes:
+        suite: Name of the suite.
+        sensor_configs: Camera and neuron parameters by condition.
+
+    Raises:
+        ValueError: If the suite is unknown or a camera does not support a condition.
+    """
+
+    suite: str
+
+    def __init__(self, config: RunConfig) -> None:
+        self.config = config
+        self.sensor_configs = {name: config.sensor_config.with_condition(name) for name in config.conditions}
+
+    @property
+    @abstractmethod
+    def total(self) -> int:
+        """Number of episodes."""
+
+    @abstractmethod
+    def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
+        """Play the episodes that are not among `rows`, and yield their results as they finish."""
+
+    @abstractmethod
+    def _make_env(self, sensor_config: SensorConfig) -> gym.Env:
+        """Return an environment of the suite."""
+
+    def check(self) -> None:
+        """Build every agent, and an environment with each agent's sensors.
+
+        Raises:
+            ValueError: If an agent, camera or parameter is invalid.
+        """
+        agents = [make_agent(agent) for agent in self.config.agents]
+        for sensor_config in self.sensor_configs.values():
+            for agent in agents:
+                self._make_env(sensor_config.for_agent(agent)).close()
+
+
+class CasePlan(Plan):
+    """The episodes of a suite of cases.
+
+    `no-brake` is played first, even if it is not among the agents: it defines the counterfactual.
+    """
+
+    def __init__(self, config: RunConfig) -> None:
+        super().__init__(config)
+        suite = get_suite(config.suite)
+        self.suite, self.cases = suite.name, suite.cases
+
+    @property
+    def total(self) -> int:
+        """Number of episodes, those of `no-brake` included."""
+        agents = {NO_BRAKE, *self.config.agents}
+        return len(self.cases) * self.config.seeds * len(self.config.conditions) * len(agents)
+
+    def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
+        """Play the missing episodes, `no-brake` first, and yield their results as they finish."""
+        done = {key_of(row): row for row in rows}
+        counterfactuals = {
+            key[1:]: Counterfactual.of_row(row) for key, row in done.items() if key[0] == NO_BRAKE
+        }
+        first = [
+            Task(NO_BRAKE, case, seed, sensor_config, condition=condition)
+            for condition, sensor_config in self.sensor_configs.items()
+            for case in self.cases
+            for seed in self.config.seed_range
+        ]
+        for result in run_tasks(run_task, [task for task in first if task.key not in done]):
+            if result.counterfactual is not None:
+                counterfactuals[key_of(result.row)[1:]] = result.counterfactual
+            yield result
+        others = [
+            replace(task, agent=agent, counterfactual=counterfactuals[task.key[1:]])
+            for agent in self.config.agents
+            if agent != NO_BRAKE
+            for task in first
+            if task.key[1:] in counterfactuals
+        ]
+        yield from run_tasks(run_task, [task for task in others if task.key not in done])
+
+    def _make_env(self, sensor_config: SensorConfig) -> gym.Env:
+        return make_env(self.cases[0], sensor_config)

@@ -1,0 +1,131 @@
+"""A benchmark run: its rows are written as episodes finish, whatever stops it."""
+
+import contextlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
+from lgmd_gym.benchmark.executor import SERIAL, Executor, PoolLostError
+from lgmd_gym.benchmark.folder import RunFolder
+from lgmd_gym.benchmark.plan import CasePlan, Plan
+from lgmd_gym.benchmark.rows import Row, key_of, series_name
+from lgmd_gym.benchmark.suites import TRAFFIC
+from lgmd_gym.benchmark.task import NO_BRAKE, Result
+from lgmd_gym.benchmark.traffic.plan import TrafficPlan
+
+INTERRUPTED = "interrupted"
+
+
+class Run:
+    """One benchmark run; use `new` or `resume` to create one.
+
+    Args:
+        config: Configuration.
+        folder: Open run folder, whose episodes are not played again.
+        executor: Processes to play on.
+
+    Attributes:
+        plan: The episodes of the run.
+        rows: Rows so far.
+        stop_reason: Why the last `play` stopped early; "" if it did not.
+    """
+
+    def __init__(self, config: RunConfig, folder: RunFolder, executor: Executor = SERIAL) -> None:
+        self.config, self.folder, self.executor = config, folder, executor
+        self.plan = make_plan(config)
+        self.rows = list(folder.rows)
+        self.stop_reason = ""
+
+    @classmethod
+    def new(cls, config: RunConfig, path: Path, executor: Executor = SERIAL) -> "Run":
+        """Return a run in a new folder, which receives the configuration as `run.toml`.
+
+        Raises:
+            ValueError: If the configuration is invalid, the cluster is not reachable, or the folder exists
+                or cannot be made.
+        """
+        _check(config, executor)
+        folder = RunFolder.create(path)
+        return cls(RunConfig.load(config.save(path)), folder, executor)
+
+    @classmethod
+    def resume(cls, path: Path, executor: Executor = SERIAL) -> "Run":
+        """Return the incomplete run of a folder.
+
+        Raises:
+            ValueError: If the folder holds no run, a damaged one, or one of another version, or if the
+                cluster is not reachable.
+        """
+        folder = RunFolder.reopen(path)
+        config = RunConfig.load(path / RUN_FILE)
+        _check(config, executor)
+        return cls(config, folder, executor)
+
+    @property
+    def total(self) -> int:
+        """Number of episodes of the complete run."""
+        return self.plan.total
+
+    def play(self, progress: Callable[[Row], None] | None = None) -> bool:
+        """Play the missing episodes and write every row as it finishes.
+
+        Args:
+            progress: Called with each new row.
+
+        Returns:
+            Whether the run is complete; if not, `stop_reason` holds the reason.
+        """
+        started, complete, self.stop_reason = time.perf_counter(), False, ""
+        try:
+            self._describe(False, 0.0)
+            with self.executor.open() as run_tasks:
+                for result in self.plan.play(run_tasks, list(self.rows)):
+                    self._add(result)
+                    if progress is not None:
+                        progress(result.row)
+            complete = True
+        except KeyboardInterrupt:
+            self.stop_reason = INTERRUPTED
+        except PoolLostError as error:
+            self.stop_reason = str(error)
+        except OSError as error:
+            self.stop_reason = f"{error.strerror or error} in run folder {str(self.folder.path)!r}"
+        finally:
+            with contextlib.suppress(OSError):  # of a full disk
+                self._describe(complete, time.perf_counter() - started)
+            self.folder.close()
+        return complete
+
+    def _add(self, result: Result) -> None:
+        """Write a result; time series of `no-brake` and of the first seed are kept."""
+        key = key_of(result.row)
+        kept = key[0] == NO_BRAKE or key[2] == self.config.first_seed
+        # Before the row, because an episode with a row is not played again.
+        if kept and result.series is not None:
+            self.folder.add_series(series_name(key), result.series)
+        self.folder.add(result.row)
+        self.rows.append(result.row)
+
+    def _describe(self, complete: bool, wall_time: float) -> None:
+        """Write `run.json`."""
+        self.folder.describe(
+            {
+                **self.config.to_dict(),
+                "jobs": self.executor.jobs,
+                "cluster": self.executor.cluster,
+                "complete": complete,
+                "episodes": len(self.rows),
+                "wall_time": round(wall_time, 3),
+            }
+        )
+
+
+def make_plan(config: RunConfig) -> Plan:
+    """Return the plan of a configuration."""
+    return TrafficPlan(config) if config.suite == TRAFFIC else CasePlan(config)
+
+
+def _check(config: RunConfig, executor: Executor) -> None:
+    make_plan(config).check()
+    executor.check()

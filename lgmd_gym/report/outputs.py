@@ -1,0 +1,66 @@
+"""All files that a run folder receives after its episodes."""
+
+from pathlib import Path
+
+from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, load_traces, write_froc
+from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
+from lgmd_gym.benchmark.folder import read_rows, read_series
+from lgmd_gym.benchmark.rows import series_name
+from lgmd_gym.benchmark.suite_file import get_suite
+from lgmd_gym.benchmark.suites import TRAFFIC
+from lgmd_gym.benchmark.summary import write_summary
+from lgmd_gym.benchmark.traffic.summary import write_traffic_summary
+from lgmd_gym.neuron import LGMDParams
+from lgmd_gym.plotting.figures import episode_figure
+from lgmd_gym.report.page import write_report
+
+
+def write_outputs(path: Path, plots: bool = True, report: bool = True) -> list[Path]:
+    """Write summary.csv, and for a suite of cases plots/, froc.csv and report.html, into a run folder.
+
+    Args:
+        path: Run folder; a run without rows gets no files.
+        plots: Whether to draw one PNG per case.
+        report: Whether to write report.html.
+
+    Returns:
+        The files written.
+
+    Raises:
+        ValueError: If the folder holds no run, or a damaged one.
+    """
+    config, rows = RunConfig.load(path / RUN_FILE), read_rows(path)[0]
+    if not rows:
+        return []
+    files = [path / "summary.csv"]
+    if config.suite == TRAFFIC:
+        write_traffic_summary(rows, files[0])
+        return files
+    write_summary(rows, files[0])
+    if plots:
+        files += _plot_cases(path, config)
+    traces = load_traces(path)
+    if traces:
+        files.append(path / "froc.csv")
+        write_froc(files[-1], froc_curves(traces), LEAD_TIME)
+    if report:
+        files.append(write_report(path))
+    return files
+
+
+def _plot_cases(path: Path, config: RunConfig) -> list[Path]:
+    """Draw the first seed of every case, all agents in one figure."""
+    alert_level = LGMDParams.make(config.params).t_sf
+    folder, seed, files = path / "plots", config.first_seed, []
+    folder.mkdir(exist_ok=True)
+    for condition in config.conditions:
+        for case in get_suite(config.suite).cases:
+            names = {agent: series_name((agent, case.name, seed, condition)) for agent in config.agents}
+            loaded = {agent: read_series(path, name) for agent, name in names.items()}
+            episodes = {agent: series for agent, series in loaded.items() if series is not None}
+            if episodes:
+                stem = series_name(("", case.name, seed, condition)).replace(f"____seed{seed}", "")
+                files.append(folder / f"{stem}.png")
+                title = f"{case.name}, seed {seed}, {condition}"
+                episode_figure(files[-1], title, episodes, alert_level)
+    return files

@@ -1,0 +1,43 @@
+"""Intervals against published values, and the cluster bootstrap."""
+
+import numpy as np
+import pytest
+
+from lgmd_gym.benchmark.statistics import Rate, binomial_tail, poisson_interval, wilson
+
+
+def test_wilson_interval_matches_newcombe_1998():
+    # Table I: 81 of 263, and 0 of 20.
+    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
+    assert wilson(0, 20) == pytest.approx((0.0, 0.1611), abs=5e-5)
+    assert wilson(0, 0) == (0.0, 1.0)
+    assert Rate.of([True, False]) == (1, 2, *wilson(1, 2))
+
+
+@pytest.mark.parametrize(
+    ("count", "low", "high"),
+    [(0, 0.0, 3.689), (1, 0.0253, 5.572), (5, 1.623, 11.668), (10, 4.795, 18.390), (100, 81.364, 121.627)],
+)
+def test_poisson_interval_matches_garwood(count, low, high):
+    assert poisson_interval(count) == (pytest.approx(low, abs=6e-4), pytest.approx(high, abs=6e-4))
+
+
+def test_poisson_interval_of_a_large_count_is_nearly_normal():
+    low, high = poisson_interval(10_000)
+    assert (low, high) == (pytest.approx(10_000 - 195, abs=2), pytest.approx(10_000 + 198, abs=2))
+
+
+def test_poisson_interval_of_zero_is_the_one_sided_bound():
+    assert poisson_interval(0, confidence=0.9)[1] == pytest.approx(-np.log(0.05))
+
+
+@pytest.mark.parametrize(("count", "confidence"), [(-1, 0.95), (3, 1.0)])
+def test_poisson_interval_refuses_invalid_arguments(count, confidence):
+    with pytest.raises(ValueError, match=r"count must be >= 0 and confidence in \(0, 1\)"):
+        poisson_interval(count, confidence)
+
+
+def test_binomial_tail_sums_the_upper_probabilities():
+    assert binomial_tail(0, 5, 0.3) == pytest.approx(1.0)
+    assert binomial_tail(2, 3, 0.5) == pytest.approx(0.5)
+    assert binomial_tail(4, 3, 0.5) == 0.0

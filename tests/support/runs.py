@@ -1,0 +1,30 @@
+"""Benchmark runs and rows for several test files."""
+
+import json
+
+from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.executor import Executor
+from lgmd_gym.benchmark.rows import key_of
+from lgmd_gym.benchmark.runner import Run
+
+
+def new_run(folder, jobs=1, **values):
+    """Return a new run of a `RunConfig`."""
+    return Run.new(RunConfig(**values), folder, Executor(jobs))
+
+
+def read_rows(folder):
+    return [json.loads(line) for line in (folder / "episodes.jsonl").read_text().splitlines()]
+
+
+def sorted_rows(rows):
+    return sorted(rows, key=key_of)
+
+
+def sorted_keys(rows):
+    return sorted(map(key_of, rows))
+
+
+def interrupt(row):
+    """Progress callback that interrupts the run after one row."""
+    raise KeyboardInterrupt
