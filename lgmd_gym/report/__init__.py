@@ -1,4 +1,4 @@
-"""One self-contained HTML page per run: scores, grids, detector curves, traces beside what the camera saw."""
+"""Self-contained HTML report of a benchmark run."""
 
 from lgmd_gym.report.page import write_report
 

@@ -1,4 +1,4 @@
-"""Comparisons, detector curves, points and the report, against cases worked out by hand and a small run."""
+"""Paired comparisons, detection curves and the report, on hand-made rows and on a small run."""
 
 import json
 import re
@@ -6,22 +6,22 @@ from math import inf
 
 import numpy as np
 import pytest
+from support.rows import suite_rows, threat_row
 
-from lgmd_gym.benchmark.analysis import plots as plots_bench
+from lgmd_gym import benchmark
 from lgmd_gym.benchmark.analysis.compare import compare_rows, compare_runs
-from lgmd_gym.benchmark.analysis.froc import Trace, curves, load_traces, onsets
-from lgmd_gym.benchmark.analysis.ncap_points import points_2023, points_2026
-from lgmd_gym.benchmark.episode import SERIES
-from lgmd_gym.benchmark.rows import KEYS
-from lgmd_gym.benchmark.run_cases import Run
-from lgmd_gym.benchmark.statistics import cluster_mean
-from lgmd_gym.benchmark.suites import SUITES
+from lgmd_gym.benchmark.analysis.compare_tables import change_text
+from lgmd_gym.benchmark.analysis.froc import OpenLoopTrace, alarm_onsets, froc_curves, load_traces
+from lgmd_gym.benchmark.analysis.plots import difference_figure, froc_figure, trace_figure
+from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.cli import main as cli
-from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.report import write_report
+from lgmd_gym.report.case_grids import case_grids
+from lgmd_gym.report.selection import extreme_episodes, hardest_false_activations, illustrated_agent
 
+AGENTS = ("spike-threshold", "ttc-oracle")
 SUITE = """
-name = "mine"
+name = "three-cases"
 [[cases]]
 family = "CCRs"
 speeds_kmh = [10, 30]
@@ -31,192 +31,282 @@ speeds_kmh = [60]
 """
 
 
-def row(agent, case, seed=0, **values):
-    base = {"agent": agent, "case": case, "seed": seed, "condition": "clear", "threat": True}
-    return dict.fromkeys(KEYS) | base | values
+def by_name(comparison):
+    return {item.name: item for item in comparison.differences}
 
 
-def test_cluster_bootstrap():
-    """Ten copies of each of four values know no more than the four."""
-    values, clusters = [0.0, 1.0, 2.0, 9.0], list("abcd")
-    once = cluster_mean(values, clusters)
-    copies = cluster_mean(values * 10, clusters * 10)
-    assert once.value == copies.value == 3.0
-    assert (once.low, once.high) == pytest.approx((copies.low, copies.high))
-    loose = cluster_mean(values * 10, range(40))
-    assert loose.high - loose.low < 0.5 * (copies.high - copies.low)
-    assert cluster_mean(values[::-1], clusters[::-1]) == once
-    # Mean of n normal values: the interval has the textbook's width.
-    drawn = np.random.default_rng(1).normal(size=400)
-    found = cluster_mean(list(drawn), range(400))
-    assert found.high - found.low == pytest.approx(2 * 1.96 * drawn.std() / 20, rel=0.05)
-    assert cluster_mean([], []).value is None
-
-
-def test_paired_differences_use_only_pairs():
-    a = [row("a", f"s/F/v{n}", avoided=n < 2, speed_reduction=float(n)) for n in range(6)]
-    b = [row("b", f"s/F/v{n}", avoided=n < 4, speed_reduction=n + 1.0) for n in range(1, 7)]
-    found = compare_rows(a, b, ("a", "b"))
-    assert (found.pairs, found.alone) == (5, 2)
-    by_name = {line.name: line for line in found.differences}
-    avoided, speed = by_name["avoided"], by_name["speed reduction"]
-    assert (avoided.a, avoided.b, avoided.change.value) == pytest.approx((20.0, 60.0, 40.0))
-    assert (avoided.better, avoided.worse) == (2, 0)
+def test_differences_are_over_common_episodes():
+    a = [threat_row("a", f"s/F/v{n}", avoided=n < 2, speed_reduction=float(n)) for n in range(6)]
+    b = [threat_row("b", f"s/F/v{n}", avoided=n < 4, speed_reduction=n + 1.0) for n in range(1, 7)]
+    comparison = compare_rows(a, b, ("a", "b"))
+    assert (comparison.pairs, comparison.unpaired) == (5, 2)
+    avoided, speed = by_name(comparison)["avoided"], by_name(comparison)["speed reduction"]
+    assert (avoided.mean_a, avoided.mean_b, avoided.change.value) == pytest.approx((20.0, 60.0, 40.0))
+    assert (avoided.higher, avoided.lower, avoided.change.n) == (2, 0, 5)
     assert speed.change[:3] == pytest.approx((3.6, 3.6, 3.6))  # every pair differs by 1 m/s
-    same = compare_rows(a, a, ("a", "a"))
-    assert {line.name: line for line in same.differences}["avoided"].other_high == pytest.approx(
-        0.39, abs=0.01
+
+
+def test_pairs_with_equal_differences_have_a_wilson_bound():
+    rows = [threat_row("a", f"s/F/v{n}", avoided=True) for n in range(6)]
+    (avoided,) = compare_rows(rows, rows, ("a", "a")).differences
+    assert avoided.deviating_high == pytest.approx(0.39, abs=0.01)
+    assert change_text(avoided) == "+0.00 in all pairs (95 %: at most 39 % of pairs differ)"
+
+
+def test_one_case_has_no_interval():
+    a, b = (
+        [threat_row("a", seed=seed, speed_reduction=x + seed * y) for seed in (0, 1)]
+        for x, y in ((0, 0), (1, 1))
     )
+    (speed,) = compare_rows(a, b, ("a", "b")).differences
+    assert change_text(speed) == "+5.40 (one case, no interval)"
 
 
-def series(levels, fps=10):
-    values = {name: np.zeros(len(levels)) for name in SERIES}
-    values["time"], values["ego_speed"] = np.arange(len(levels)) / fps, np.full(len(levels), 10.0)
-    values["spike_frequency"] = np.asarray(levels, float)
-    return values
+def test_episodes_that_are_a_threat_to_one_agent_only_are_unpaired():
+    a, b = threat_row("a", avoided=True), threat_row("b", threat=False, false_activation=False)
+    comparison = compare_rows([a], [b], ("a", "b"))
+    assert (comparison.pairs, comparison.unpaired, comparison.differences) == (0, 1, ())
+
+
+def make_series(levels, fps=10):
+    """Time series of an ego at 10 m/s with the given spike frequencies."""
+    levels = np.asarray(levels, float)
+    return {
+        "time": np.arange(levels.size) / fps,
+        "ego_speed": np.full(levels.size, 10.0),
+        "spike_frequency": levels,
+    }
 
 
 def test_alarms_are_events():
     levels = np.zeros(100)
-    levels[[10, 11, 15, 40]] = 50  # one from 1.0 to 1.5 s, another at 4.0 s
-    assert onsets(series(levels), "spike_frequency", 30) == pytest.approx([1.0, 4.0])
-    assert onsets(series(levels), "spike_frequency", 60).size == 0
+    levels[[10, 11, 15, 40]] = 50  # one alarm from 1.0 to 1.5 s, another at 4.0 s
+    assert alarm_onsets(make_series(levels), "spike_frequency", 30) == pytest.approx([1.0, 4.0])
+    assert alarm_onsets(make_series(levels), "spike_frequency", 60).size == 0
 
 
-def test_detector_curve_by_hand():
-    early, good, late, quiet = (np.zeros(101) for _ in range(4))
-    early[20:] = 40  # contact at 10 s: before 6 s an alarm is false, and then it is no detection
-    good[80] = 60
+@pytest.fixture
+def curves():
+    """Curves of three threats with contact at 10 s and of one non-threat, at two thresholds."""
+    early, timely, late, non_threat = (np.zeros(101) for _ in range(4))
+    early[20:] = 40
+    timely[80] = 60
     late[95] = 60
-    quiet[[10, 50]] = 35
-    threats = [
-        Trace("clear", shade, 10.0, series(levels))
-        for shade, levels in ((40, early), (100, good), (200, late))
-    ]
-    found = curves([*threats, Trace("clear", None, inf, series(quiet))], 1.0, (30.0, 50.0))["clear"]
-    assert [curve.group for curve in found] == ["all", "dark", "like asphalt", "light"]
-    low, high = found[0].points
-    assert (low.detected.k, low.detected.n, low.false) == (1, 3, 3)
-    assert (high.detected.k, high.false) == (1, 0)
+    non_threat[[10, 50]] = 35
+    threats = ((40, early), (100, timely), (200, late))
+    traces = [OpenLoopTrace("clear", shade, 10.0, make_series(levels)) for shade, levels in threats]
+    traces.append(OpenLoopTrace("clear", None, inf, make_series(non_threat)))
+    return froc_curves(traces, 1.0, (50.0, 30.0))
+
+
+def test_detection_curve_of_hand_made_traces(curves):
+    every, dark, asphalt, light = curves["clear"]
+    assert [curve.contrast for curve in curves["clear"]] == ["all", "dark", "like asphalt", "light"]
+    low, high = every.points
+    assert (low.threshold, low.detected.k, low.detected.n, low.false_alarms) == (30.0, 1, 3, 3)
+    assert (high.threshold, high.detected.k, high.false_alarms) == (50.0, 1, 0)
     assert low.distance == pytest.approx(3 * 59 + 100)
     assert low.false_per_km == pytest.approx(3000 / 277)
     assert high.false_low == 0.0
-    assert high.false_high == pytest.approx(1000 * 3.689 / 277, rel=1e-3)  # 0 events: Poisson's upper bound
-    assert [curve.points[0].detected[:2] for curve in found[1:]] == [(0, 1), (1, 1), (0, 1)]
+    assert high.false_high == pytest.approx(1000 * 3.689 / 277, rel=1e-3)  # Poisson bound of 0 events
+    assert [curve.points[0].detected[:2] for curve in (dark, asphalt, light)] == [(0, 1), (1, 1), (0, 1)]
     assert 0.0 < low.chance < 1.0
     assert high.chance == 0.0
 
 
-def ncap(suite, agent, contact):
-    rows = []
-    for case in SUITES[suite].cases:
-        speed = case.scenario.ego_speed
-        hit = contact(case, round(speed / KMH))
-        speeds = {"impact_speed": speed, "relative_impact_speed": speed} if hit else {}
-        rows.append(row(agent, case.name, ego_speed=speed, target_speed=0.0, collision=hit, **speeds))
-    return rows
+def test_lead_time_of_4_seconds_is_rejected():
+    with pytest.raises(ValueError, match=r"lead_time must be in \[0, 4\) s, got 4.0"):
+        froc_curves([], lead_time=4.0)
 
 
-def test_points_of_the_perfect_and_the_gated():
-    perfect = points_2023(ncap("ncap2023", "a", lambda case, speed: False), "a")
-    assert [(item.earned, item.of) for item in perfect] == [(14, 14), (6, 6), (15, 15), (4, 4)]
-    assert sum(
-        item.earned for item in points_2026(ncap("ncap2026", "a", lambda *_: False), "a")
-    ) == pytest.approx(5.2)
-    gated = points_2023(ncap("ncap2023", "a", lambda case, speed: speed == 10), "a")
-    assert gated[0].earned == 0.0
-    assert "no points" in gated[0].note
-    # Contact at 40 km/h, aligned: 2 of the row's 6 parts of its 1 point.
-    one = points_2023(
-        ncap("ncap2023", "a", lambda case, speed: case.name.endswith("CCRs/v40/overlap100")), "a"
+def test_froc_figure_plots_detections_and_chance(curves, tmp_path):
+    figure = froc_figure(tmp_path / "froc.svg", curves, lead_time=1.0)
+    (axis,) = figure.axes
+    assert axis.get_title() == "clear; 0.28 km without threat"
+    labels = [text.get_text() for text in axis.get_legend().get_texts()]
+    assert labels == [
+        "all (n = 3)",
+        "chance: random windows",
+        "dark (n = 1)",
+        "like asphalt (n = 1)",
+        "light (n = 1)",
+    ]
+    np.testing.assert_allclose(axis.lines[0].get_xydata(), [[3000 / 277, 1 / 3], [0.0, 1 / 3]])
+    assert [text.get_text() for text in axis.texts] == ["30"]
+    assert (tmp_path / "froc.svg").read_text().startswith("<?xml")
+
+
+def test_difference_figure_plots_every_quantity(tmp_path):
+    a = [threat_row("a", f"s/F/v{n}", avoided=n < 2, speed_reduction=float(n)) for n in range(6)]
+    b = [threat_row("b", f"s/F/v{n}", avoided=n < 4, speed_reduction=n + 1.0) for n in range(6)]
+    comparison = compare_rows(a, b, ("a", "b"))
+    figure = difference_figure(tmp_path / "d.png", [comparison])
+    assert [axis.get_title() for axis in figure.axes] == ["avoided", "speed reduction"]
+    assert [axis.get_xlabel() for axis in figure.axes] == ["B − A [% of threats]", "B − A [km/h]"]
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["b\n− a"]
+    zero, interval, mean = figure.axes[0].lines
+    change = by_name(comparison)["avoided"].change
+    assert list(interval.get_xdata()) == [change.low, change.high]
+    assert list(mean.get_xdata()) == [change.value]
+    assert list(zero.get_xdata()) == [0.0, 0.0]
+
+
+def test_trace_figure_plots_frequency_and_speed(tmp_path):
+    figure = trace_figure(
+        tmp_path / "t.svg", {"a": make_series([0, 40, 80]), "b": make_series([0, 0, 0])}, 30.0
     )
-    assert one[0].earned == pytest.approx(14 - 2 / 6)
-    # A red cell of CCRs' 40 in the standard range, of 1.2 points.
-    red = points_2026(
-        ncap("ncap2026", "a", lambda case, speed: case.name.endswith("CCRs/v50/location50")), "a"
+    frequency, speed = figure.axes
+    assert list(frequency.lines[0].get_ydata()) == [0, 40, 80]
+    assert list(frequency.lines[2].get_ydata()) == [30.0, 30.0]
+    assert speed.lines[1].get_ydata() == pytest.approx(36.0)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["a", "b"]
+
+
+def test_case_grids_of_ncap2023():
+    rows = suite_rows(
+        "ncap2023", lambda case, _: case.endswith(("CCRs/v50/overlap75", "CCRs/v40/overlap100"))
     )
-    assert red[0].earned == pytest.approx(1.2 * 39 / 40)
+    rows = [row | {"premature_brake": row["case"].endswith("CCRs/v10/overlap-50")} for row in rows]
+    crossing, moving, standing = case_grids(rows, "a", "ncap2023")
+    assert [grid.title for grid in (crossing, moving, standing)] == ["CCCscp: a", "CCRm: a", "CCRs: a"]
+    assert standing.columns == [-50, -75, 100, 75, 50]
+    assert standing.axis == "overlap [%]"
+    assert crossing.lines[0][0] == "from stop"
+    cells = dict(standing.lines)
+    assert [(cell.colour, cell.text) for cell in cells["40"]] == [
+        ("green", "0"),
+        ("green", "0"),
+        ("contact", "40"),
+        ("green", "0"),
+        ("green", "0"),
+    ]
+    assert (cells["50"][3].colour, cells["50"][3].text) == ("red", "50")
+    assert cells["10"][0].text == "0*"
+    assert case_grids(rows, "a", "quick") == []
+
+
+def test_illustrated_agent_is_the_first_with_a_neuron():
+    assert (
+        illustrated_agent(["no-brake", "ttc-oracle", "spike-threshold:threshold=9"])
+        == "spike-threshold:threshold=9"
+    )
+    assert illustrated_agent(["no-brake", "ttc-oracle"]) == "ttc-oracle"
+    assert illustrated_agent(["no-brake"]) == "no-brake"
+
+
+def test_extreme_episodes_are_of_one_agent_and_seed():
+    rows = [
+        threat_row(case="s/F/v1", avoided=True, stopping_margin=1.0, ego_speed=5.0),
+        threat_row(case="s/F/v2", avoided=True, stopping_margin=2.0, ego_speed=9.0),
+        threat_row(case="s/F/v3", collision=True, relative_impact_speed=3.0),
+        threat_row(case="s/F/v4", collision=True, relative_impact_speed=4.0),
+        threat_row(case="s/F/v5", threat=False, ego_speed=7.0),
+        threat_row(case="s/F/v6", seed=1, collision=True, relative_impact_speed=9.0),
+        threat_row("b", case="s/F/v7", collision=True, relative_impact_speed=9.0),
+        threat_row(case="s/F/v8", error="Traceback", collision=True, relative_impact_speed=9.0),
+    ]
+    cases = {name: row["case"] for name, row in extreme_episodes(rows, "a", seed=0).items()}
+    assert cases == {
+        "smallest stopping margin": "s/F/v1",
+        "fastest avoided threat": "s/F/v2",
+        "hardest contact": "s/F/v4",
+        "fastest non-threat without false activation": "s/F/v5",
+    }
+
+
+def test_false_activations_are_ordered_by_deceleration():
+    rows = [
+        threat_row(agent, f"s/F/v{peak}", seed, threat=False, false_activation=True, peak_deceleration=peak)
+        for agent, seed, peak in (("rule", 0, 4), ("rule", 0, 6), ("rule", 1, 8), ("always-brake", 0, 9))
+    ]
+    hardest = hardest_false_activations(rows, ["no-brake", "rule", "always-brake"], seed=0)
+    assert [row["peak_deceleration"] for row in hardest] == [6, 4]
+    assert len(hardest_false_activations(rows * 10, ["rule"], seed=0)) == 12
 
 
 @pytest.fixture(scope="module")
-def small_run(tmp_path_factory):
+def run_folder(tmp_path_factory):
+    """Run of two agents, two seeds and two conditions on three cases."""
     folder = tmp_path_factory.mktemp("report")
-    (folder / "mine.toml").write_text(SUITE)
-    run = Run(
-        str(folder / "mine.toml"),
-        ["spike-threshold", "ttc-oracle"],
-        2,
-        1,
-        folder / "run",
-        conditions=["clear", "degraded"],
+    (folder / "three-cases.toml").write_text(SUITE)
+    config = benchmark.RunConfig(
+        suite=str(folder / "three-cases.toml"), agents=AGENTS, seeds=2, conditions=("clear", "degraded")
     )
-    assert run.play()
+    benchmark.run(config, folder / "run", plots=False)
     return folder / "run"
 
 
-def test_traces_answer_what_the_run_did(small_run):
-    """The open-loop alarm at T_sf = 30 begins where the neuron's own alert began in the rows."""
-    traces = load_traces(small_run)
+def test_open_loop_alarms_match_the_alerts_in_the_rows(run_folder):
+    """The alarm at T_sf = 30 begins at the alert of `no-brake`, which the neuron raises."""
+    traces = load_traces(run_folder)
     assert len(traces) == 3 * 2 * 2
-    rows = [json.loads(line) for line in (small_run / "episodes.jsonl").read_text().splitlines()]
-    ahead = [trace for trace in traces if trace.contact < inf]
-    rows = [item for item in rows if item["agent"] == "no-brake" and item["threat"]]
-    rows.sort(key=lambda item: (item["condition"], item["case"], item["seed"]))
-    alerts = [item["ttc_at_alert"] for item in rows]
-    for trace, ttc in zip(ahead, alerts, strict=True):
-        first = onsets(trace.series, "spike_frequency", 30.0)[0]
-        assert trace.contact - first == pytest.approx(ttc, abs=0.04)
+    rows = [json.loads(line) for line in (run_folder / "episodes.jsonl").read_text().splitlines()]
+    threats = [row for row in rows if row["agent"] == "no-brake" and row["threat"]]
+    threats.sort(key=lambda row: (row["condition"], row["case"], row["seed"]))
+    for trace, row in zip([trace for trace in traces if trace.contact_time < inf], threats, strict=True):
+        first = alarm_onsets(trace.series, "spike_frequency", 30.0)[0]
+        assert trace.contact_time - first == pytest.approx(row["ttc_at_alert"], abs=0.04)
 
 
-def test_report_is_one_page_that_needs_no_network(small_run):
-    page = write_report(small_run).read_text()
+def test_report_is_one_page_without_external_files(run_folder):
+    page = (run_folder / "report.html").read_text()
     assert re.findall(r'(?:src|href)="(?!data:)[^"]*"', page) == []
     assert "url(" not in page
-    for words in (
-        "<h3>clear</h3>",
-        "<h3>degraded</h3>",
-        "The neuron as a detector",
-        "Agents compared",
-        "narrowest stop",
-    ):
-        assert words in page
+    assert "{{" not in page
+    assert re.findall(r"<h2>(.*?)</h2>", page) == [
+        "Scores",
+        "Open-loop detection",
+        "Paired differences",
+        "Selected episodes",
+        "False activations",
+        "Results per case",
+        "Configuration",
+    ]
+    scores = page.split("<h2>")[1]
+    assert re.findall(r"<h3>(.*?)</h3>", scores) == ["clear", "degraded"]
+    assert scores.count("<tr><td>ttc-oracle</td>") == 2
+    assert "<h3>smallest stopping margin: three-cases/CCRs/v" in page
     assert page.count("data:image/png") >= 4
-    assert "ttc-oracle" in page
-    escaped = re.sub(r"<[^>]*>", "", page)
-    assert "{{" not in escaped
 
 
-def test_compare_on_the_command_line(small_run, tmp_path, capsys):
-    assert cli.run(["compare", str(small_run), "--out", str(tmp_path / "d.png")]) == 0
-    assert "A = spike-threshold   B = ttc-oracle   6 pairs degraded" in capsys.readouterr().out
-    assert (tmp_path / "d.png").stat().st_size > 5000
-    assert cli.run(["compare", str(small_run), str(small_run)]) == 0
-    assert "in all pairs" in capsys.readouterr().out
-    for arguments, words in [
-        ([str(small_run), "--out", str(tmp_path / "d.png")], "exists and is kept"),
-        ([str(tmp_path)], "holds no run"),
-        ([str(small_run), "--agents", "ttc-oracl", "no-brake"], "did you mean 'ttc-oracle'"),
-        ([str(small_run), "--agents", "ttc-oracle"], "takes two"),
-    ]:
-        assert cli.run(["compare", *arguments]) == 2
-        assert words in capsys.readouterr().err
+def test_report_of_an_interrupted_run_states_that_it_is_incomplete(tmp_path):
+    (tmp_path / "three-cases.toml").write_text(SUITE)
 
-
-def test_figures_have_a_file_format(small_run, tmp_path):
-    found = compare_runs(small_run, None)
-    plots_bench.difference_figure(tmp_path / "d.svg", found)
-    assert (tmp_path / "d.svg").read_text().startswith("<?xml")
-
-
-def test_a_run_broken_off_at_once_still_has_its_report(tmp_path):
-    (tmp_path / "mine.toml").write_text(SUITE)
-
-    def stop(row):
+    def interrupt(row):
         raise KeyboardInterrupt
 
-    agents = ["spike-threshold", "ttc-oracle"]
-    broken = Run(str(tmp_path / "mine.toml"), agents, 1, 1, tmp_path / "run")
-    assert not broken.play(stop)
-    text = write_report(tmp_path / "run").read_text()
-    assert "no-brake" in text
-    assert "Agents compared" not in text
+    config = benchmark.RunConfig(suite=str(tmp_path / "three-cases.toml"), agents=AGENTS, seeds=1)
+    run = Run.new(config, tmp_path / "run")
+    assert not run.play(interrupt)
+    page = write_report(tmp_path / "run").read_text()
+    assert "The run is incomplete." in page
+    assert "Episodes: 1; agents: 3; seeds: 1; camera:" in page
+    assert "Paired differences" not in page
+
+
+def test_command_compares_agents_within_a_run(run_folder, tmp_path, capsys):
+    assert cli.run(["compare", str(run_folder), "--out", str(tmp_path / "d.png")]) == 0
+    text = capsys.readouterr().out
+    assert "A = spike-threshold   B = ttc-oracle   6 pairs degraded" in text
+    assert re.search(r"TTC at braking \[s\] .* of \d", text)
+    assert (tmp_path / "d.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_command_compares_two_runs(run_folder, capsys):
+    assert cli.run(["compare", str(run_folder), str(run_folder)]) == 0
+    text = capsys.readouterr().out
+    assert "A = run: ttc-oracle   B = run: ttc-oracle" in text
+    assert "+0.00 in all pairs" in text
+    assert {item.pairs for item in compare_runs(run_folder, run_folder)} == {6}
+
+
+def test_command_rejects_invalid_options(run_folder, tmp_path, capsys):
+    (tmp_path / "d.png").touch()
+    for arguments, message in [
+        ([str(run_folder), "--out", str(tmp_path / "d.png")], "exists; choose another"),
+        ([str(tmp_path)], "no run"),
+        ([str(run_folder), "--agents", "ttc-oracl", "no-brake"], "did you mean 'ttc-oracle'"),
+        ([str(run_folder), "--agents", "ttc-oracle"], "agents must be two, one of A and one of B, got 1"),
+    ]:
+        assert cli.run(["compare", *arguments]) == 2
+        assert message in capsys.readouterr().err

@@ -1,92 +1,133 @@
-"""Protocol-derived scores against the documents' tables, and against the official calculator if installed."""
+"""Limits, colours and points of the protocols, compared with the tables of the documents."""
 
 import csv
+from types import SimpleNamespace
 
 import pytest
+from support.rows import suite_rows, threat_row
 
 from lgmd_gym.benchmark.analysis.compare import compare_rows
+from lgmd_gym.benchmark.analysis.ncap_points import points_2023, points_2026, row_colour_2023
 from lgmd_gym.benchmark.analysis.protocol_limits import (
+    check_green,
+    check_no_contact,
+    check_r152,
     colour_2026,
-    judge_r152,
+    limit_results,
     meets_r152,
     r152_limit,
-    verdicts,
 )
-from lgmd_gym.benchmark.analysis.tables import score_tables, verdict_table
-from lgmd_gym.benchmark.rows import KEYS
+from lgmd_gym.benchmark.analysis.tables import limit_table, score_tables
 from lgmd_gym.benchmark.summary import write_summary
 from lgmd_gym.envs.dynamics.units import KMH
 
-
-def row(case, ego, target, impact, agent="a"):
-    values = {"agent": agent, "case": f"r152/{case}", "ego_speed": ego * KMH, "target_speed": target * KMH}
-    values |= {"relative_impact_speed": impact * KMH if impact else None, "collision": bool(impact)}
-    return dict.fromkeys(KEYS) | values | {"threat": True}
-
-
-@pytest.mark.parametrize(
-    ("relative", "laden", "unladen"),
-    [
-        (10, 0, 0),
-        (40, 0, 0),
-        (41, 10, 0),
-        (42, 10, 0),
-        (43, 15, 15),
-        (45, 15, 15),
-        (50, 25, 25),
-        (60, 35, 35),
-    ],
-)
-def test_r152_limits_are_the_regulations(relative, laden, unladen):
-    assert (r152_limit(relative, "laden"), r152_limit(relative, "unladen")) == (laden, unladen)
+# UN R152 Rev.2, 5.2.1.4, M1: relative speed, limits laden and unladen [km/h].
+R152_TABLE = [
+    (10, 0, 0),
+    (40, 0, 0),
+    (41, 10, 0),
+    (42, 10, 0),
+    (43, 15, 15),
+    (45, 15, 15),
+    (50, 25, 25),
+    (60, 35, 35),
+]
 
 
-def test_r152_ends_at_sixty():
-    with pytest.raises(ValueError, match="no limit at 61 km/h"):
+def impact_row(case, ego, target, impact, **values):
+    """Return a row with speeds in km/h; an impact speed of 0 is no contact."""
+    speeds = {"ego_speed": ego * KMH, "target_speed": target * KMH}
+    speeds |= {"relative_impact_speed": impact * KMH if impact else None, "collision": bool(impact)}
+    return threat_row(case=f"r152/{case}", **(speeds | values))
+
+
+def test_r152_limits_match_the_regulation():
+    computed = [(speed, r152_limit(speed, "laden"), r152_limit(speed, "unladen")) for speed, *_ in R152_TABLE]
+    assert computed == R152_TABLE
+
+
+def test_r152_has_no_limit_above_60_kmh():
+    with pytest.raises(ValueError, match=r"at most 60, .* got 61"):
         r152_limit(61, "laden")
 
 
 @pytest.mark.parametrize(
-    ("case", "ego", "target", "impact", "met"),
+    ("case", "ego", "target", "impact", "met", "limit"),
     [
-        ("CCRs/v40", 40, 0, 0, True),
-        ("CCRs/v40", 40, 0, 1, False),
-        ("CCRs/v42", 42, 0, 1, False),
-        ("CCRs/v60", 60, 0, 35, True),
-        ("CCRs/v60", 60, 0, 35.1, False),
-        ("CCRm/v60", 60, 20, 0.5, False),  # 40 km/h relative: no contact allowed
+        ("CCRs/v40", 40, 0, 0, True, "≤ 0 km/h laden"),
+        ("CCRs/v40", 40, 0, 1, False, "≤ 0 km/h laden"),
+        ("CCRs/v42", 42, 0, 1, False, "≤ 0 km/h unladen"),
+        ("CCRs/v60", 60, 0, 35, True, "≤ 35 km/h unladen"),
+        ("CCRs/v60", 60, 0, 35.1, False, "≤ 35 km/h unladen"),
+        ("CCRm/v60", 60, 20, 0.5, False, "≤ 0 km/h unladen"),  # 40 km/h relative speed
     ],
 )
-def test_r152_rows(case, ego, target, impact, met):
-    assert judge_r152(row(case, ego, target, impact))[0] is met
+def test_check_r152_uses_relative_speed_and_load(case, ego, target, impact, met, limit):
+    assert check_r152(impact_row(case, ego, target, impact)) == (met, limit)
 
 
-def test_braking_before_the_test_begins_meets_nothing():
-    early = row("CCRs/v20", 20, 0, 0) | {"premature_brake": True}
-    assert judge_r152(early)[0] is False
-    assert not meets_r152([early], "a")
+def test_premature_braking_fails_r152():
+    premature = impact_row("CCRs/v20", 20, 0, 0, premature_brake=True)
+    assert not check_r152(premature).met
+    assert not meets_r152([premature], "a")
 
 
 @pytest.mark.parametrize(("failed", "met"), [(0, True), (1, True), (2, False)])
-def test_a_tenth_of_the_runs_may_fail(failed, met):
-    rows = [row("CCRs/v20", 20, 0, 5 if number < failed else 0) for number in range(10)]
+def test_r152_allows_a_tenth_of_the_runs_to_fail(failed, met):
+    rows = [impact_row("CCRs/v20", 20, 0, 5 if seed < failed else 0, seed=seed) for seed in range(10)]
     assert meets_r152(rows, "a") is met
-    (item,) = verdicts(rows, "a", judge_r152)
-    assert (item.met.k, item.met.n) == (10 - failed, 10)
-    assert item.worst == pytest.approx(5 * KMH if failed else 0)
-    assert ("simulation: a" in verdict_table(rows, ["a"], "r152").caption) is met
+    (result,) = limit_results(rows, "a", check_r152)
+    assert (result.case, result.met.k, result.met.n) == ("r152/CCRs/v20", 10 - failed, 10)
+    assert result.worst == pytest.approx(5 * KMH if failed else 0)
+    table = limit_table(rows, ["a"], "r152")
+    assert table.caption.endswith("in simulation: a" if met else "in simulation: none")
+    assert [list(column.cells) for column in table.columns] == [
+        ["CCRs/v20"],
+        ["≤ 0 km/h unladen"],
+        [f"{10 - failed}/10 (5)" if failed else "10/10"],
+    ]
 
 
-def test_no_run_meets_nothing():
+def test_limit_results_leave_out_errors_and_non_threats():
+    rows = [
+        impact_row("CCRs/v20", 20, 0, 0),
+        impact_row("CCRs/v20", 20, 0, 9, error="Traceback"),
+        impact_row("CCRs/v20", 20, 0, 9, threat=False),
+    ]
+    (result,) = limit_results(rows, "a", check_r152)
+    assert (result.met.k, result.met.n) == (1, 1)
+    assert limit_results(rows, "other agent", check_r152) == []
+
+
+def test_agent_without_runs_does_not_meet_r152():
     assert not meets_r152([], "a")
-    assert verdict_table([], ["a"], "quick") is None
 
 
-def test_colours_against_the_official_calculator():
-    """Every band and edge, through the calculator's own logic."""
+def test_suite_without_limits_has_no_limit_table():
+    assert limit_table([impact_row("CCRs/v20", 20, 0, 0)], ["a"], "quick") is None
+
+
+def test_contact_and_colour_checks():
+    contact, avoided = impact_row("CCRs/v50", 50, 0, 5), impact_row("CCRs/v50", 50, 0, 0)
+    assert (check_no_contact(contact).met, check_no_contact(avoided).met) == (False, True)
+    assert (check_green(contact).met, check_green(avoided).met) == (False, True)
+
+
+def test_colours_2026_match_the_published_bands():
+    """Euro NCAP Frontal Collisions 2026, 5.3.1; an edge belongs to the worse colour."""
+    expected = {
+        10: "green red red red red red",
+        30: "green brown red red red red",
+        40: "green orange brown brown red red",
+        50: "green yellow orange orange brown red",
+        80: "green yellow orange orange brown red",
+    }
+    impacts = (0, 9.99, 10, 19.99, 20, 30)
+    assert {ego: " ".join(colour_2026(ego, impact) for impact in impacts) for ego in expected} == expected
+
+
+def test_colours_2026_match_the_official_calculator():
     processing = pytest.importorskip("euroncap_rating_2026.crash_avoidance.matrix_processing")
-    from types import SimpleNamespace
-
     for ego in (10, 20, 30, 40, 50, 60, 70, 80):
         for impact in (0.0, 0.1, 5.0, 9.99, 10.0, 15.0, 19.99, 20.0, 29.99, 30.0, 60.0):
             point = SimpleNamespace(
@@ -98,20 +139,62 @@ def test_colours_against_the_official_calculator():
             assert getattr(official, "value", official).lower() == colour_2026(ego, impact), (ego, impact)
 
 
-def test_a_warned_driver_is_no_part_of_the_totals(tmp_path):
-    def told(case, warned, avoided):
-        given = {"agent": "a", "case": case, "fcw_driver": warned, "threat": True, "avoided": avoided}
-        return dict.fromkeys(KEYS) | given | {"premature_brake": False, "speed_reduction": 3.0}
+def test_colours_2023_are_known_for_50_kmh_only():
+    def colour(case, ego, impact):
+        speeds = {"ego_speed": ego * KMH, "impact_speed": impact * KMH, "collision": impact > 0}
+        return row_colour_2023(threat_row(case=f"ncap2023/{case}", **speeds))
 
-    rows = [told("s/CCRs/v50", False, True), told("s/CCRs/v60-warned", True, False)]
-    automatic, warned = score_tables(rows, ["a"], "all")
-    assert [list(table.columns[1].cells) for table in (automatic, warned)] == [
-        ["1/1 [21–100]"],
-        ["0/1 [0–79]"],
+    impacts = (0, 4.9, 5, 15, 30, 40)
+    assert [colour("CCRs/v50/overlap100", 50, impact) for impact in impacts] == [
+        "green",
+        "green",
+        "yellow",
+        "orange",
+        "brown",
+        "red",
     ]
+    assert colour("CCRs/v40/overlap100", 40, 4.9) == "contact"
+    assert colour("CCRm/v50/overlap100", 50, 4.9) == "contact"
+
+
+def test_perfect_agent_earns_all_points():
+    points = points_2023(suite_rows("ncap2023", lambda case, speed: False), "a")
+    assert [(item.scenario, item.earned, item.maximum) for item in points] == [
+        ("CCRs", 14, 14),
+        ("CCRs, warned driver", 6, 6),
+        ("CCRm", 15, 15),
+        ("CCRb", 4, 4),
+    ]
+    points = points_2026(suite_rows("ncap2026", lambda case, speed: False), "a")
+    assert sum(item.earned for item in points) == pytest.approx(1.2 + 2.4 + 1.6)
+
+
+def test_contact_at_10_kmh_earns_no_points_in_ccrs():
+    points = points_2023(suite_rows("ncap2023", lambda case, speed: speed == 10), "a")
+    assert [item.earned for item in points] == [0.0, 0.0, 15.0, 4.0]
+    assert "no points" in points[0].note
+
+
+def test_one_contact_costs_the_weight_of_its_cell():
+    # Overlap 100 % has the weight 2 of 6 in the row of 40 km/h, which has 1 point.
+    points = points_2023(suite_rows("ncap2023", lambda case, _: case.endswith("CCRs/v40/overlap100")), "a")
+    assert points[0].earned == pytest.approx(14 - 2 / 6)
+    # One of the 40 cells of CCRs, which has 1.2 points.
+    points = points_2026(suite_rows("ncap2026", lambda case, _: case.endswith("CCRs/v50/location50")), "a")
+    assert points[0].earned == pytest.approx(1.2 * 39 / 40)
+
+
+def test_totals_leave_out_cases_with_a_warned_driver(tmp_path):
+    def scored(case, fcw_driver, avoided):
+        values = {"avoided": avoided, "premature_brake": False, "speed_reduction": 3.0}
+        return threat_row(case=case, fcw_driver=fcw_driver, **values)
+
+    rows = [scored("s/CCRs/v50", False, True), scored("s/CCRs/v60-warned", True, False)]
+    automatic, warned = score_tables(rows, ["a"], "all")
+    assert list(automatic.columns[1].cells) == ["1/1 [21–100]"]
+    assert list(warned.columns[1].cells) == ["0/1 [0–79]"]
     assert len(score_tables(rows[:1], ["a"], "all")) == 1
-    write_summary([item | {"condition": "clear"} for item in rows], tmp_path / "summary.csv")
+    write_summary(rows, tmp_path / "summary.csv")
     lines = list(csv.DictReader((tmp_path / "summary.csv").open()))
     assert [(line["case"], line["threats"]) for line in lines][-1] == ("all", "1")
-    paired = [item | {"agent": "b", "seed": 0, "condition": "clear"} for item in rows]
-    assert compare_rows(paired, paired, ("b", "b")).pairs == 1
+    assert compare_rows(rows, rows, ("A", "B")).pairs == 1

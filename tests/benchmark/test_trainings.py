@@ -1,116 +1,187 @@
-"""Arms of a run: what is averaged over trainings, and how sure one can be."""
+"""Comparison of arms: interquartile mean, bootstrap intervals, and `lgmd-gym compare --arms`."""
 
 import json
 import re
 
 import numpy as np
 import pytest
+from support.rows import threat_row
 
-from lgmd_gym.benchmark.analysis.trainings import RETURN, interquartile_mean, judge_rows, judge_run
+from lgmd_gym import benchmark
+from lgmd_gym.benchmark.analysis.bootstrap import interquartile_mean
+from lgmd_gym.benchmark.analysis.trainings import Arm, arm_results, compare_arms, parse_arm
 from lgmd_gym.cli import main as cli
 
+AGENTS = ("spike-threshold", "spike-threshold:frames=2", "ttc-oracle")
+SUITE = """
+name = "two-cases"
+[[cases]]
+family = "CCRs"
+speeds_kmh = [20]
+[[cases]]
+family = "EmptyRoad"
+speeds_kmh = [20]
+"""
 
-def row(agent, number, value, threat=True, **more):
-    told = {"avoided": True if threat else None, "premature_brake": False, "false_activation": False}
-    named = {"agent": agent, "case": f"c/{number}", "seed": 0, "condition": "clear", "threat": threat}
-    return named | told | {"episode_return": value} | more
+
+def return_row(agent, number, episode_return, threat=True, **values):
+    """Return a row of case `number` with a return, avoided if it is a threat."""
+    flags = {"avoided": True if threat else None, "premature_brake": False, "false_activation": False}
+    flags |= {"threat": threat, "episode_return": episode_return}
+    return threat_row(agent, f"suite/case{number}", **(flags | values))
 
 
-def test_interquartile_mean_leaves_out_the_outer_quarters():
+def results_of(rows, *arms):
+    return arm_results(rows, [Arm(name, list(agents)) for name, *agents in arms], "clear")
+
+
+def test_interquartile_mean_drops_the_outer_quarters():
     assert interquartile_mean([5.0, -100.0, 1.0, 100.0, 3.0]) == 3.0
-    assert interquartile_mean([1.0, 2.0, 6.0]) == 3.0  # too few to leave any out
+    assert interquartile_mean([1.0, 2.0, 6.0]) == 3.0
     assert interquartile_mean([[0, 1, 3, 9], [9, 5, 5, 0]]).tolist() == [2.0, 5.0]
 
 
-def test_arms_of_hand_worked_rows():
+def test_results_of_one_and_two_trainings():
     rows = [
-        row("a", 0, 4.0),
-        row("a", 1, -2.0, avoided=False),
-        row("a", 2, 1.0, False, false_activation=True),
+        return_row("a", 0, 4.0),
+        return_row("a", 1, -2.0, avoided=False),
+        return_row("a", 2, 1.0, threat=False, false_activation=True),
+        return_row("b", 0, 6.0),
+        return_row("b", 1, 6.0),
+        return_row("b", 2, 3.0, threat=False),
     ]
-    rows += [row("b", 0, 6.0), row("b", 1, 6.0), row("b", 2, 3.0, False)]
-    one, both = judge_rows(rows, [("one", ["a"]), ("both", ["a", "b"])], "clear")
-    assert (one.trainings, one.returned.value, one.less_first) == (1, 1.0, None)
-    assert one.returned.low < 1.0 < one.returned.high
-    assert (both.name, both.trainings, both.returned, both.spread) == (
-        "both",
-        2,
-        (3.0, None, None, 3),
-        (1.0, 5.0),
-    )
-    assert both.less_first == (2.0, None, None, 3)
-    assert both.shares["avoided"] == (0.75, None, None, 2)
-    assert both.shares["false_activation"] == (0.5, None, None, 1)
+    one, two = results_of(rows, ("one", "a"), ("two", "a", "b"))
+    assert (one.name, one.condition, one.trainings, one.difference) == ("one", "clear", 1, None)
+    assert one.mean_return.value == 1.0
+    assert one.mean_return.low < 1.0 < one.mean_return.high
     assert one.shares["avoided"].low < 0.5 < one.shares["avoided"].high
-    quiet = judge_rows([row("a", 2, 1.0, False)], [("quiet", ["a"])], "clear")[0]
-    assert list(quiet.shares) == ["false_activation"]
+    # Two trainings are too few for an interval.
+    assert (two.trainings, two.mean_return, two.return_range) == (2, (3.0, None, None, 3), (1.0, 5.0))
+    assert two.difference == (2.0, None, None, 3)
+    assert two.shares["avoided"] == (0.75, None, None, 2)
+    assert two.shares["premature_brake"] == (0.0, None, None, 2)
+    assert two.shares["false_activation"] == (0.5, None, None, 1)
 
 
-def test_copies_of_cases_know_no_more_than_the_cases():
-    rng = np.random.default_rng(0)
-    values = rng.normal(size=30)
-    rows = [row("a", k, float(value), avoided=value > 0) for k, value in enumerate(values)]
-    copies = [item | {"seed": seed} for item in rows for seed in range(10)]
-    once, often = (judge_rows(item, [("a", ["a"])], "clear")[0] for item in (rows, copies))
-    assert often.returned == pytest.approx(once.returned)
-    assert often.shares["avoided"] == pytest.approx(once.shares["avoided"])
+def test_shares_without_a_case_are_left_out():
+    (result,) = results_of([return_row("a", 2, 1.0, threat=False)], ("only", "a"))
+    assert list(result.shares) == ["false_activation"]
 
 
-def test_the_interval_holds_the_truth_nearly_as_often_as_it_says():
-    """And for few trainings it gives none."""
-    rng = np.random.default_rng(5)
+def test_further_seeds_of_a_case_do_not_narrow_the_interval():
+    values = np.random.default_rng(0).normal(size=30)
+    rows = [return_row("a", k, float(value), avoided=bool(value > 0)) for k, value in enumerate(values)]
+    copies = [row | {"seed": seed} for row in rows for seed in range(10)]
+    (once,), (repeated,) = results_of(rows, ("arm", "a")), results_of(copies, ("arm", "a"))
+    assert repeated.mean_return == pytest.approx(once.mean_return)
+    assert repeated.shares["avoided"] == pytest.approx(once.shares["avoided"])
+
+
+def test_interval_contains_the_true_return_with_its_nominal_frequency():
+    rng, trainings = np.random.default_rng(5), [f"p{index}" for index in range(8)]
     hits = 0
     for _ in range(60):
         level, skill = 5.0 + rng.normal(0, 3, 40), rng.normal(0, 0.7, 8)
         rows = [
-            row(f"p{t}", k, float(level[k] + skill[t] + rng.normal())) for t in range(8) for k in range(40)
+            return_row(agent, k, float(level[k] + skill[index] + rng.normal()))
+            for index, agent in enumerate(trainings)
+            for k in range(40)
         ]
-        arm = judge_rows(rows, [("p", [f"p{t}" for t in range(8)])], "clear")[0]
-        hits += arm.returned.low <= 5.0 <= arm.returned.high
-    assert 53 <= hits <= 60
-    assert judge_rows(rows, [("p", ["p0", "p1", "p2"])], "clear")[0].returned.low is None
+        (result,) = results_of(rows, ("policy", *trainings))
+        hits += result.mean_return.low <= 5.0 <= result.mean_return.high
+    assert 53 <= hits <= 60  # 57 expected, standard deviation 1.7
 
 
-def test_differences_are_paired():
-    """Two arms over very different cases, one always better by a little: the difference is sure."""
-    rows = [row("a", k, 10.0 * k) for k in range(20)] + [row("b", k, 10.0 * k + 1 + k % 2) for k in range(20)]
-    _, better = judge_rows(rows, [("a", ["a"]), ("b", ["b"])], "clear")
-    assert better.less_first.value == 1.5
-    assert 1.0 <= better.less_first.low < better.less_first.high <= 2.0
-    assert better.returned.high - better.returned.low > 20
+@pytest.mark.parametrize(("trainings", "has_interval"), [(1, True), (2, False), (4, False), (5, True)])
+def test_two_to_four_trainings_have_no_interval(trainings, has_interval):
+    agents = [f"p{index}" for index in range(trainings)]
+    rows = [return_row(agent, k, float(k)) for agent in agents for k in range(3)]
+    (result,) = results_of(rows, ("policy", *agents))
+    assert (result.mean_return.low is not None) is has_interval
+    assert (result.shares["avoided"].high is not None) is has_interval
 
 
-def test_arms_whose_agents_played_different_roads_are_refused():
-    rows = [row("a", 0, 1.0), row("b", 1, 1.0)]
-    for members in ([("x", ["a", "b"])], [("a", ["a"]), ("b", ["b"])]):
-        with pytest.raises(ValueError, match="agent 'b' has not played all that 'a' has; resume the run"):
-            judge_rows(rows, members, "clear")
+def test_differences_are_paired_by_case():
+    """A small but constant gain has a narrow interval although the cases vary widely."""
+    rows = [return_row("a", k, 10.0 * k) for k in range(20)]
+    rows += [return_row("b", k, 10.0 * k + 1 + k % 2) for k in range(20)]
+    _, better = results_of(rows, ("a", "a"), ("b", "b"))
+    assert better.difference.value == 1.5
+    assert 1.0 <= better.difference.low < better.difference.high <= 2.0
+    assert better.mean_return.high - better.mean_return.low > 20
 
 
-def test_judge_on_the_command_line(tmp_path, capsys):
-    out = tmp_path / "run"
-    agents = ["spike-threshold", "spike-threshold:frames=2", "ttc-oracle"]
-    suite = tmp_path / "mine.toml"
-    suite.write_text('name = "mine"\n[[cases]]\nfamily = "CCRs"\nspeeds_kmh = [20]\n'
-                     '[[cases]]\nfamily = "EmptyRoad"\nspeeds_kmh = [20]\n')  # fmt: skip
-    flags = ["--suite", str(suite), "--seeds", "1", "--jobs", "1", "--no-plots", "--no-report"]
-    assert cli.run(["bench", *flags, "--out", str(out), "--agents", *agents]) == 0
-    capsys.readouterr()
-    assert cli.run(["judge", str(out), "--arms", "rule=spike-threshold*", "ttc-oracle"]) == 0
+@pytest.mark.parametrize("arms", [[("x", "a", "b")], [("a", "a"), ("b", "b")]])
+def test_agents_with_different_episodes_are_rejected(arms):
+    rows = [return_row("a", 0, 1.0), return_row("b", 1, 1.0)]
+    with pytest.raises(ValueError, match="agents 'b' and 'a' have different episodes; resume the run"):
+        results_of(rows, *arms)
+
+
+def test_arm_of_names_patterns_and_single_agents():
+    agents = ["rule:a=1,b=2", "policy:x0.zip", "policy:x1.zip", "oracle"]
+    assert parse_arm("oracle", agents) == ("oracle", ["oracle"])
+    assert parse_arm("rule:a=1,b=2", agents) == ("rule:a=1,b=2", ["rule:a=1,b=2"])
+    assert parse_arm("rule=rule:a=1,b=?", agents) == ("rule", ["rule:a=1,b=2"])
+    assert parse_arm("lgmd=policy:*", agents) == ("lgmd", ["policy:x0.zip", "policy:x1.zip"])
+    assert parse_arm("both=oracle,policy:x0.zip", agents) == ("both", ["policy:x0.zip", "oracle"])
+    for text in ("oracel", "=oracle", "arm=", "arm=oracle,policy:y*"):
+        with pytest.raises(
+            ValueError,
+            match=re.escape(f"unknown arm (an agent of the run, or NAME=AGENT,AGENT,...) {text!r}"),
+        ):
+            parse_arm(text, agents)
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("arms")
+    suite = folder / "two-cases.toml"
+    suite.write_text(SUITE)
+    config = benchmark.RunConfig(suite=str(suite), agents=AGENTS, seeds=1)
+    benchmark.run(config, folder / "run", plots=False, report=False)
+    return folder / "run"
+
+
+def test_command_prints_one_line_per_arm(run_folder, capsys):
+    assert cli.run(["compare", str(run_folder), "--arms", "rule=spike-threshold*", "ttc-oracle"]) == 0
     text = capsys.readouterr().out
     assert re.search(r"^ +rule +2 ", text, re.MULTILINE)
     assert re.search(r"ttc-oracle +1 .* 100 \[21, 100\]", text)
-    assert [arm.name for arm in judge_run(out)] == ["no-brake", *agents]
-    assert cli.run(["judge", str(out), "--arms", "rule=spike-treshold"]) == 2
-    assert "did you mean 'spike-threshold'?" in capsys.readouterr().err
-    assert cli.run(["judge", str(out), "--arms", "spike-threshold:frames=3"]) == 2
-    assert "'spike-threshold:frames=3'; did you mean 'spike-threshold:frames=2'?" in capsys.readouterr().err
-    rows = [json.loads(line) for line in (out / "episodes.jsonl").read_text().splitlines()]
-    for spoilt, words in (
-        ({"error": "oh"}, "1 episodes failed; go on with"),
-        ({RETURN: None}, "older version"),
-    ):
-        lines = [json.dumps(item | (spoilt if k == 3 else {})) for k, item in enumerate(rows)]
-        (out / "episodes.jsonl").write_text("".join(line + "\n" for line in lines))
-        assert cli.run(["judge", str(out)]) == 2
-        assert words in capsys.readouterr().err
+
+
+def test_command_makes_every_agent_an_arm_by_default(run_folder, capsys):
+    assert cli.run(["compare", str(run_folder), "--arms"]) == 0
+    text = capsys.readouterr().out
+    assert all(agent.split(":")[0] in text for agent in ("no-brake", *AGENTS))
+    assert [result.name for result in compare_arms(run_folder)] == ["no-brake", *AGENTS]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--arms", "rule=spike-treshold"], "did you mean 'spike-threshold'?"),
+        (["--arms", "spike-threshold:frames=3"], "did you mean 'spike-threshold:frames=2'?"),
+        (["--arms", "ttc-oracle", "--agents", "a", "b"], "--agents cannot be combined with --arms"),
+        (["--arms", "ttc-oracle", "--out", "a.png"], "--out cannot be combined with --arms"),
+    ],
+)
+def test_command_rejects_invalid_arms(run_folder, capsys, arguments, message):
+    assert cli.run(["compare", str(run_folder), *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"error": "Traceback"}, "1 episodes failed; resume it with lgmd-gym bench --resume"),
+        ({"episode_return": None}, "an older version"),
+    ],
+)
+def test_rows_without_a_return_are_rejected(run_folder, tmp_path, changed, message):
+    rows = [json.loads(line) for line in (run_folder / "episodes.jsonl").read_text().splitlines()]
+    rows[3] |= changed
+    (tmp_path / "episodes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    (tmp_path / "run.json").write_text((run_folder / "run.json").read_text())
+    with pytest.raises(ValueError, match=message):
+        compare_arms(tmp_path)

@@ -1,183 +1,202 @@
-"""Two agents on the same episodes: paired differences, with intervals from a bootstrap that draws cases."""
+"""Paired differences between two agents on the same episodes, with cluster bootstrap intervals."""
 
+from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from lgmd_gym.benchmark.folder import read_rows, read_settings
-from lgmd_gym.benchmark.rows import key_of
-from lgmd_gym.benchmark.statistics import Mean, cluster_mean
-from lgmd_gym.benchmark.summary import automatic, wilson
+from lgmd_gym.benchmark.rows import Row, RowKey, key_of
+from lgmd_gym.benchmark.statistics import Mean, cluster_mean, wilson
+from lgmd_gym.benchmark.suites import TRAFFIC
+from lgmd_gym.benchmark.summary import without_fcw_driver
 from lgmd_gym.benchmark.task import NO_BRAKE
-from lgmd_gym.benchmark.traffic.rows import SUITE as TRAFFIC
 from lgmd_gym.errors import unknown_name
 
-Row = dict[str, Any]
-# What is compared -> its key in the rows, unit, and factor from SI.
-QUANTITIES = {
-    "avoided": ("avoided", "% of threats", 100.0),
-    "speed reduction": ("speed_reduction", "km/h", 3.6),
-    "premature braking": ("premature_brake", "% of threats", 100.0),
-    "false braking": ("false_activation", "% of quiet episodes", 100.0),
-    "TTC at braking": ("ttc_at_brake", "s", 1.0),
-    "least distance": ("stopping_margin", "m", 1.0),
-}
-OVER_THREATS = ("avoided", "speed_reduction", "premature_brake", "ttc_at_brake", "stopping_margin")
+
+class Quantity(NamedTuple):
+    """Quantity that is compared.
+
+    Attributes:
+        name: Name in tables and figures.
+        key: Key of the row.
+        unit: Unit in tables and figures.
+        scale: Factor from SI units to `unit`.
+        threats: Whether it is defined for threats or for non-threats.
+    """
+
+    name: str
+    key: str
+    unit: str
+    scale: float = 1.0
+    threats: bool = True
+
+
+QUANTITIES = (
+    Quantity("avoided", "avoided", "% of threats", 100.0),
+    Quantity("speed reduction", "speed_reduction", "km/h", 3.6),
+    Quantity("premature braking", "premature_brake", "% of threats", 100.0),
+    Quantity("false activation", "false_activation", "% of non-threats", 100.0, threats=False),
+    Quantity("TTC at braking", "ttc_at_brake", "s"),
+    Quantity("stopping margin", "stopping_margin", "m"),
+)
 
 
 class Difference(NamedTuple):
-    """One quantity, B less A, over the episodes in which both have it.
+    """Paired difference B - A of one quantity.
 
     Attributes:
-        name: Of the quantity.
-        unit: Of everything below.
-        a: Mean of A.
-        b: Mean of B.
-        change: Mean of B less A, with its interval.
-        better: Pairs in which B is higher.
-        worse: Pairs in which B is lower.
-        other_high: If all pairs differ by the same: the Wilson bound of the share of pairs that might not,
-            which is all that n like pairs can exclude (a bootstrap of them has no width); None otherwise.
+        name: Name of the quantity.
+        unit: Unit of all values.
+        mean_a: Mean of A over the pairs.
+        mean_b: Mean of B over the pairs.
+        change: Mean of B - A with its 95 % interval.
+        higher: Number of pairs in which B is higher.
+        lower: Number of pairs in which B is lower.
+        deviating_high: Upper Wilson bound of the share of pairs with another difference, if all observed
+            pairs differ by the same value (their bootstrap interval has no width); else None.
     """
 
     name: str
     unit: str
-    a: float
-    b: float
+    mean_a: float
+    mean_b: float
     change: Mean
-    better: int
-    worse: int
-    other_high: float | None
+    higher: int
+    lower: int
+    deviating_high: float | None
 
 
 class Comparison(NamedTuple):
-    """Two agents over their common episodes.
+    """Paired differences between two agents under one camera condition.
 
     Attributes:
-        a: What A is called.
-        b: What B is called.
-        condition: The camera's, if the run has several; else "".
-        pairs: Number of common episodes.
-        alone: Episodes that only one of them has, or has without an error.
-        differences: One per quantity that any pair has.
+        name_a: Name of A.
+        name_b: Name of B.
+        condition: Camera condition; "" if the run has only one.
+        pairs: Number of episodes that both completed.
+        unpaired: Number of other episodes of either.
+        differences: One per quantity that is defined for any pair.
     """
 
-    a: str
-    b: str
+    name_a: str
+    name_b: str
     condition: str
     pairs: int
-    alone: int
+    unpaired: int
     differences: tuple[Difference, ...]
 
 
-def compare_runs(run_a: Path, run_b: Path | None, agents: tuple[str, ...] | None = None) -> list[Comparison]:
-    """Compare the agents of two run folders, or within one.
+def compare_runs(run_a: Path, run_b: Path | None, agents: Sequence[str] | None = None) -> list[Comparison]:
+    """Compare agents of two run folders, or of one.
 
     Args:
-        run_a: Run folder.
-        run_b: Another; None for agents within the first.
-        agents: A's agent and B's; None for every agent that both runs hold (within one run: all pairs).
+        run_a: Run folder of A.
+        run_b: Run folder of B; None compares agents within `run_a`.
+        agents: Agent of A and agent of B. None compares every agent with itself in the other run, or all
+            pairs of agents within one run.
 
     Raises:
-        ValueError: For a folder without a run, a traffic run, an agent that a run does not hold, or nothing
-            in common.
+        ValueError: For a folder without a run, a traffic run, an unknown agent, or no common episode.
     """
-    rows_a = _rows(run_a)
-    rows_b = rows_a if run_b is None else _rows(run_b)
-    pairs = _pairs(rows_a, rows_b, agents, run_b is None)
-    names = ("", "") if run_b is None else (f"{run_a.name}: ", f"{run_b.name}: ")
+    rows_a = _read_case_rows(run_a)
+    rows_b = rows_a if run_b is None else _read_case_rows(run_b)
+    pairs = _agent_pairs(rows_a, rows_b, agents, run_b is None)
+    prefixes = ("", "") if run_b is None else (f"{run_a.name}: ", f"{run_b.name}: ")
     conditions = list(dict.fromkeys(row["condition"] for row in rows_a))
-    found = [
+    comparisons = [
         compare_rows(
             [row for row in rows_a if row["agent"] == a and row["condition"] == condition],
             [row for row in rows_b if row["agent"] == b and row["condition"] == condition],
-            (names[0] + a, names[1] + b),
+            (prefixes[0] + a, prefixes[1] + b),
             condition if len(conditions) > 1 else "",
         )
         for a, b in pairs
-        for condition in conditions  # apart: the mean over a steady and a shaken lens says nothing of either
+        for condition in conditions
     ]
-    if not any(item.pairs for item in found):
-        raise ValueError(f"{str(run_a)!r} and {str(run_b)!r} have no episode in common; nothing to compare")
-    return found
+    if not any(item.pairs for item in comparisons):
+        raise ValueError(f"{str(run_a)!r} and {str(run_b)!r} have no episode in common")
+    return comparisons
 
 
 def compare_rows(
     rows_a: list[Row], rows_b: list[Row], names: tuple[str, str], condition: str = ""
 ) -> Comparison:
-    """Compare one agent's rows with another's: same case, seed and condition make a pair.
+    """Compare the rows of two agents; rows of the same case, seed and condition are a pair.
 
-    Cases in which a warned driver brakes are left out, as they are of all totals.
+    Cases with a warned driver are left out, as in all totals.
     """
-    rows_a, rows_b = automatic(rows_a), automatic(rows_b)
-    played_a, played_b = _by_key(rows_a), _by_key(rows_b)
-    common = sorted(played_a.keys() & played_b.keys())
-    pairs = [(played_a[key], played_b[key]) for key in common]
+    rows_a, rows_b = without_fcw_driver(rows_a), without_fcw_driver(rows_b)
+    by_key_a, by_key_b = _completed_by_key(rows_a), _completed_by_key(rows_b)
+    common = sorted(by_key_a.keys() & by_key_b.keys())
+    pairs = [(by_key_a[key], by_key_b[key]) for key in common]
     pairs = [(a, b) for a, b in pairs if a["threat"] == b["threat"]]
-    alone = len(_keys(rows_a) | _keys(rows_b)) - len(pairs)
-    found = (difference(name, pairs) for name in QUANTITIES)
-    return Comparison(*names, condition, len(pairs), alone, tuple(item for item in found if item is not None))
+    unpaired = len({_episode_key(row) for row in (*rows_a, *rows_b)}) - len(pairs)
+    differences = (paired_difference(quantity, pairs) for quantity in QUANTITIES)
+    return Comparison(*names, condition, len(pairs), unpaired, tuple(filter(None, differences)))
 
 
-def difference(name: str, pairs: list[tuple[Row, Row]]) -> Difference | None:
-    """Return the paired difference of one of `QUANTITIES`; None if no pair has it."""
-    key, unit, factor = QUANTITIES[name]
-    wanted = [
+def paired_difference(quantity: Quantity, pairs: list[tuple[Row, Row]]) -> Difference | None:
+    """Return the paired difference of a quantity; None if it is undefined for every pair."""
+    key, scale = quantity.key, quantity.scale
+    defined = [
         (a, b)
         for a, b in pairs
-        if a["threat"] is (key in OVER_THREATS) and a.get(key) is not None and b.get(key) is not None
+        if a["threat"] is quantity.threats and a.get(key) is not None and b.get(key) is not None
     ]
-    if not wanted:
+    if not defined:
         return None
-    values = [(factor * a[key], factor * b[key]) for a, b in wanted]
-    changes = [b - a for a, b in values]
-    n, better, worse = len(values), sum(x > 0 for x in changes), sum(x < 0 for x in changes)
+    values = [(scale * a[key], scale * b[key]) for a, b in defined]
+    changes, n = [b - a for a, b in values], len(values)
     return Difference(
-        name,
-        unit,
+        quantity.name,
+        quantity.unit,
         sum(a for a, _ in values) / n,
         sum(b for _, b in values) / n,
-        cluster_mean(changes, [a["case"] for a, _ in wanted]),
-        better,
-        worse,
+        cluster_mean(changes, [a["case"] for a, _ in defined]),
+        sum(change > 0 for change in changes),
+        sum(change < 0 for change in changes),
         wilson(0, n)[1] if len(set(changes)) == 1 else None,
     )
 
 
-def _rows(path: Path) -> list[Row]:
+def _read_case_rows(path: Path) -> list[Row]:
     rows, _ = read_rows(path)
     if read_settings(path)["suite"] == TRAFFIC:
-        raise ValueError(f"{str(path)!r} is a traffic run; its rates per 100 km are in its summary.csv")
+        raise ValueError(
+            f"{str(path)!r} is a traffic run, which has no pairs; see the rates per 100 km in its summary.csv"
+        )
     return rows
 
 
-def _pairs(
-    rows_a: list[Row], rows_b: list[Row], agents: tuple[str, ...] | None, within: bool
+def _agent_pairs(
+    rows_a: list[Row], rows_b: list[Row], agents: Sequence[str] | None, within: bool
 ) -> list[tuple[str, str]]:
     """Return the pairs of agents to compare."""
-    of_a = list(dict.fromkeys(row["agent"] for row in rows_a))
-    of_b = list(dict.fromkeys(row["agent"] for row in rows_b))
+    agents_a = list(dict.fromkeys(row["agent"] for row in rows_a))
+    agents_b = list(dict.fromkeys(row["agent"] for row in rows_b))
     if agents is not None:
         if len(agents) != 2:
-            raise ValueError(f"--agents takes two, A's and B's, got {len(agents)}")
-        for agent, known in zip(agents, (of_a, of_b), strict=True):
+            raise ValueError(f"agents must be two, one of A and one of B, got {len(agents)}")
+        for agent, known in zip(agents, (agents_a, agents_b), strict=True):
             if agent not in known:
                 raise unknown_name("agent of the run", agent, known)
         return [(agents[0], agents[1])]
     if within:
-        pairs = list(combinations([agent for agent in of_a if agent != NO_BRAKE], 2))
+        pairs = list(combinations([agent for agent in agents_a if agent != NO_BRAKE], 2))
     else:
-        pairs = [(agent, agent) for agent in of_a if agent in of_b and agent != NO_BRAKE]
+        pairs = [(agent, agent) for agent in agents_a if agent in agents_b and agent != NO_BRAKE]
     if not pairs:
         raise ValueError(
-            f"no agents to pair among {', '.join(of_a)} and {', '.join(of_b)}; name two: --agents"
+            f"no pair of agents in {', '.join(agents_a)} and {', '.join(agents_b)}; name two with --agents"
         )
     return pairs
 
 
-def _by_key(rows: list[Row]) -> dict[tuple[Any, ...], Row]:
-    return {key_of(row)[1:]: row for row in rows if row["error"] is None}
+def _completed_by_key(rows: list[Row]) -> dict[RowKey, Row]:
+    return {_episode_key(row): row for row in rows if row["error"] is None}
 
 
-def _keys(rows: list[Row]) -> set[tuple[Any, ...]]:
-    return {key_of(row)[1:] for row in rows}
+def _episode_key(row: Row) -> RowKey:
+    """Return the key of a row without the agent."""
+    return "", *key_of(row)[1:]

@@ -1,33 +1,83 @@
-"""A comparison on the terminal."""
+"""Terminal tables of paired differences and of arms."""
+
+from collections.abc import Sequence
 
 from rich.box import SIMPLE_HEAD
+from rich.markup import escape
 from rich.table import Table
 
 from lgmd_gym.benchmark.analysis.compare import Comparison, Difference
+from lgmd_gym.benchmark.analysis.trainings import ArmResult, Estimate
+
+DIFFERENCE_CAPTION = (
+    "B − A [95 % interval, bootstrap over cases]; number of pairs in which B is higher / lower, of n"
+)
+ARM_CAPTION = (
+    "return: interquartile mean over trainings [95 % interval, bootstrap over trainings and cases; of one "
+    "training over cases only, of two to four none], below it the lowest and highest training; difference: "
+    "to the first arm, paired by case; shares: means over trainings"
+)
+SHARE_HEADINGS = {"avoided": "avoided", "premature_brake": "premature", "false_activation": "false"}
 
 
-def compare_table(item: Comparison) -> Table:
-    """Return one line per quantity: A, B, their difference and interval, and how many pairs differ."""
-    caption = "B less A; [95 %, paired bootstrap that draws cases]; pairs in which B is higher / lower, of n"
-    if item.alone:
-        caption += f"; {item.alone} episodes have no partner (not played, failed, or no threat to the other)"
-    title = f"A = {item.a}   B = {item.b}   {item.pairs} pairs {item.condition}".rstrip()
-    table = Table(title=title, caption=caption, box=SIMPLE_HEAD)
+def comparison_table(comparison: Comparison) -> Table:
+    """Return a table with one line per quantity: A, B, their difference, and how many pairs differ."""
+    caption = DIFFERENCE_CAPTION
+    if comparison.unpaired:
+        caption += f"; {comparison.unpaired} episodes without a pair (missing, failed, or threat to one only)"
+    title = f"A = {comparison.name_a}   B = {comparison.name_b}   {comparison.pairs} pairs"
+    table = Table(title=f"{title} {comparison.condition}".rstrip(), caption=escape(caption), box=SIMPLE_HEAD)
     table.add_column("quantity")
     for heading in ("A", "B", "B − A", "higher / lower of n"):
         table.add_column(heading, justify="right")
-    for line in item.differences:
-        pairs = f"{line.better} / {line.worse} of {line.change.n}"
-        table.add_row(f"{line.name} [{line.unit}]".replace("[", "\\["), f"{line.a:.2f}", f"{line.b:.2f}",
-                      change_text(line).replace("[", "\\["), pairs)  # fmt: skip
+    for item in comparison.differences:
+        pairs = f"{item.higher} / {item.lower} of {item.change.n}"
+        cells = (
+            f"{item.name} [{item.unit}]",
+            f"{item.mean_a:.2f}",
+            f"{item.mean_b:.2f}",
+            change_text(item),
+            pairs,
+        )
+        table.add_row(*map(escape, cells))
     return table
 
 
-def change_text(line: Difference) -> str:
-    """Return a difference with its interval; for pairs that are all alike, how many might yet not be."""
-    change = line.change
-    if line.other_high is not None:
-        return f"{change.value:+.2f} in all pairs (≤ {100 * line.other_high:.0f} % might differ from that)"
+def change_text(item: Difference) -> str:
+    """Return a difference with its interval, or with the share of pairs that may differ if all are equal."""
+    change = item.change
+    if item.deviating_high is not None:
+        share = f"{100 * item.deviating_high:.0f} %"
+        return f"{change.value:+.2f} in all pairs (95 %: at most {share} of pairs differ)"
     if change.low is None or change.high is None:
-        return f"{change.value:+.2f} (one case: no interval)"
+        return f"{change.value:+.2f} (one case, no interval)"
     return f"{change.value:+.2f} [{change.low:+.2f}, {change.high:+.2f}]"
+
+
+def arm_table(results: Sequence[ArmResult], title: str) -> Table:
+    """Return a table with one line per arm; all arms have the same condition."""
+    keys = [key for key in SHARE_HEADINGS if key in results[0].shares]
+    table = Table(title=title, caption=escape(ARM_CAPTION), box=SIMPLE_HEAD)
+    table.add_column("arm", min_width=15, overflow="fold")
+    for heading in ("train-\nings", "return", "difference\nto the first"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for key in keys:
+        heading = f"{SHARE_HEADINGS[key]},\n% of {results[0].shares[key].n}"
+        table.add_column(heading, justify="right", no_wrap=True)
+    for result in results:
+        mean_return = _estimate_text(result.mean_return, ".1f")
+        if result.trainings > 1:
+            low, high = result.return_range
+            mean_return += f"\n{low:.1f} to {high:.1f}"
+        difference = "–" if result.difference is None else _estimate_text(result.difference, "+.1f")
+        shares = (_estimate_text(result.shares[key], ".0f", 100.0) for key in keys)
+        cells = (result.name, str(result.trainings), mean_return, difference, *shares)
+        table.add_row(*map(escape, cells))
+    return table
+
+
+def _estimate_text(estimate: Estimate, style: str, scale: float = 1.0) -> str:
+    value = f"{scale * estimate.value:{style}}"
+    if estimate.low is None or estimate.high is None:
+        return value
+    return f"{value} [{scale * estimate.low:{style}}, {scale * estimate.high:{style}}]"

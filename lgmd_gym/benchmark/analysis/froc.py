@@ -1,77 +1,100 @@
-"""The neuron as a detector, from open-loop traces: detection against false alarms per km, per event.
+"""Free-response detection curve (FROC) of the neuron: detection rate against false alarms per km.
 
-The traces are `no-brake`'s, recorded once with the eye on; a threshold is swept over them without playing
-anything again. An alarm is an event, not a frame (frames are autocorrelated): it begins where the signal
-reaches the threshold after `QUIET` below it. With contact at t_c a threat is detected if an alarm begins
-between t_c − 4 s and t_c − lead; an alarm that begins earlier, or in an episode without a threat, is false.
-What begins after t_c − lead is too late, and neither.
+The input is the open-loop traces of a run: the time series of `no-brake`. A threshold is swept over the
+recorded signal, so no episode is simulated again. Consecutive frames are correlated, so alarms are counted
+as events: an alarm begins where the signal reaches the threshold after more than `REARM_TIME` below it. For
+a contact at time t_c, an alarm that begins in [t_c - 4 s, t_c - lead time] is a detection. An earlier alarm,
+and any alarm in an episode without contact, is false. A later alarm is neither.
 """
 
-import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from lgmd_gym.benchmark.folder import read_rows, read_series
 from lgmd_gym.benchmark.metrics import PREMATURE
-from lgmd_gym.benchmark.run_cases import trace_name
-from lgmd_gym.benchmark.summary import Rate
+from lgmd_gym.benchmark.rows import key_of, series_name
+from lgmd_gym.benchmark.statistics import Rate, poisson_interval
+from lgmd_gym.benchmark.summary import write_csv
 from lgmd_gym.benchmark.task import NO_BRAKE
-from lgmd_gym.benchmark.traffic.summary import poisson_interval
 
-QUIET = 1.0  # [s] below the threshold, after which the next alarm is a new one
-LEAD = 1.0  # [s] before contact
-THRESHOLDS = tuple(float(level) for level in range(5, 305, 5))  # [spikes/s]: the steps of six frames at 30 Hz
-ASPHALT = 104.0  # mean grey of the asphalt by day
-LOW_CONTRAST = 0.35  # |grey − asphalt| / asphalt
+REARM_TIME = 1.0  # time below the threshold after which the next alarm is a new event [s]
+LEAD_TIME = 1.0  # latest start of a detection before contact [s]
+THRESHOLDS = tuple(
+    float(level) for level in range(5, 305, 5)
+)  # [spikes/s]; 5 is the step of a 6-frame window
+ASPHALT = 104.0  # mean grey level of the asphalt by day
+LOW_CONTRAST = 0.35  # Weber contrast |grey - asphalt| / asphalt
+CONTRASTS = ("dark", "like asphalt", "light")
+COLUMNS = (
+    "condition",
+    "contrast",
+    "lead",
+    "threshold",
+    "threats",
+    "detected",
+    "detected_low",
+    "detected_high",
+    "false_alarms",
+    "km",
+    "false_per_km",
+    "false_low",
+    "false_high",
+    "chance",
+)
 
 
 @dataclass(frozen=True, slots=True)
-class Trace:
-    """One open-loop episode.
+class OpenLoopTrace:
+    """Time series of one `no-brake` episode.
 
     Attributes:
-        condition: The camera's condition.
-        shade: The first actor's body grey; None for none.
-        contact: Time of contact [s]; infinity for none.
-        series: Its time series.
+        condition: Camera condition.
+        shade: Body grey level of the first actor; None on an empty road.
+        contact_time: Time of contact [s]; inf without contact.
+        series: Time series by name (keys: `lgmd_gym.benchmark.episode.SERIES`).
     """
 
     condition: str
     shade: float | None
-    contact: float
+    contact_time: float
     series: dict[str, np.ndarray]
 
     @property
+    def false_alarm_end(self) -> float:
+        """Time before which every alarm is false [s]."""
+        return self.contact_time - PREMATURE
+
+    @property
     def contrast(self) -> str:
-        """Whether the first actor's body is darker or lighter than asphalt, or much the same; or none."""
+        """Contrast of the first actor with the asphalt, one of `CONTRASTS`; "none" on an empty road."""
         if self.shade is None:
             return "none"
         weber = (self.shade - ASPHALT) / ASPHALT
         return "like asphalt" if abs(weber) < LOW_CONTRAST else "dark" if weber < 0 else "light"
 
 
-class Point(NamedTuple):
-    """What one threshold gives.
+class FrocPoint(NamedTuple):
+    """Detections and false alarms at one threshold.
 
     Attributes:
-        threshold: Of the signal.
-        detected: Threats detected, of all.
-        false: False alarms.
-        distance: Driven where an alarm would be false [m].
-        false_per_km: Their rate [1/km]; infinite if nothing was driven.
+        threshold: Threshold of the signal.
+        detected: Detected threats of all threats.
+        false_alarms: Number of false alarms.
+        distance: Distance driven while an alarm is false [m].
+        false_per_km: False alarms per distance [1/km]; inf for no distance.
         false_low: Lower end of its exact Poisson 95 % interval [1/km].
-        false_high: Upper end [1/km].
-        chance: Share of random windows, as long as a threat's, that an alarm begins in.
+        false_high: Upper end of its exact Poisson 95 % interval [1/km].
+        chance: Share of random windows, as long as a detection window, in which an alarm begins.
     """
 
     threshold: float
     detected: Rate
-    false: int
+    false_alarms: int
     distance: float
     false_per_km: float
     false_low: float
@@ -79,144 +102,145 @@ class Point(NamedTuple):
     chance: float
 
 
-class Curve(NamedTuple):
-    """The points of one group of traces.
+class FrocCurve(NamedTuple):
+    """Detection curve of the threats of one contrast.
 
     Attributes:
-        condition: The camera's condition.
-        group: "all", or a contrast; the false alarms are those of all.
-        points: By rising threshold.
+        condition: Camera condition.
+        contrast: "all", or one of `CONTRASTS`. The false alarms are those of all traces in both cases.
+        points: One point per threshold, in rising order.
     """
 
     condition: str
-    group: str
-    points: tuple[Point, ...]
+    contrast: str
+    points: tuple[FrocPoint, ...]
 
 
-def load_traces(path: Path) -> list[Trace]:
-    """Return the open-loop traces of a run folder, in the order of condition, case and seed.
+def load_traces(path: Path) -> list[OpenLoopTrace]:
+    """Return the open-loop traces of a run folder, ordered by condition, case and seed.
 
     Raises:
-        ValueError: If it holds no run, or a damaged one.
+        ValueError: If the folder holds no run, or a damaged one.
     """
     rows = [row for row in read_rows(path)[0] if row["agent"] == NO_BRAKE and row["error"] is None]
-    found = []
+    traces = []
     for row in sorted(rows, key=lambda row: (row["condition"], row["case"], row["seed"])):
-        series = read_series(path, trace_name(NO_BRAKE, row["case"], row["seed"], row["condition"]))
+        series = read_series(path, series_name(key_of(row)))
         if series is not None:
-            contact = row["duration"] if row["collision"] else inf
-            found.append(Trace(row["condition"], row["target_shade"], contact, series))
-    return found
+            contact_time = row["duration"] if row["collision"] else inf
+            traces.append(OpenLoopTrace(row["condition"], row["target_shade"], contact_time, series))
+    return traces
 
 
-def curves(
-    traces: list[Trace],
-    lead: float = LEAD,
+def froc_curves(
+    traces: list[OpenLoopTrace],
+    lead_time: float = LEAD_TIME,
     thresholds: Iterable[float] = THRESHOLDS,
     signal: str = "spike_frequency",
-) -> dict[str, list[Curve]]:
-    """Return each condition's curve over all threats, and over those of each contrast.
+) -> dict[str, list[FrocCurve]]:
+    """Return the curves of each condition: one over all threats, then one per contrast.
 
     Args:
-        traces: Open-loop episodes.
-        lead: Before contact, in [0, 4) [s].
-        thresholds: To be swept.
-        signal: Which series: "spike_frequency", "membrane_potential" or "ffi".
+        traces: Open-loop traces.
+        lead_time: Latest start of a detection before contact, in [0, 4) [s].
+        thresholds: Thresholds of the signal.
+        signal: Name of the series: "spike_frequency", "membrane_potential" or "ffi".
 
     Raises:
-        ValueError: For a lead outside its range.
+        ValueError: For a lead time outside its range.
     """
-    if not 0.0 <= lead < PREMATURE:
-        raise ValueError(f"lead must be in [0, {PREMATURE:g}) s, got {lead!r}")
+    if not 0.0 <= lead_time < PREMATURE:
+        raise ValueError(f"lead_time must be in [0, {PREMATURE:g}) s, got {lead_time!r}")
     levels = sorted(thresholds)
-    found: dict[str, list[Curve]] = {}
+    curves: dict[str, list[FrocCurve]] = {}
     for condition in dict.fromkeys(trace.condition for trace in traces):
         chosen = [trace for trace in traces if trace.condition == condition]
-        begun = [[onsets(trace.series, signal, level) for trace in chosen] for level in levels]
-        contrasts = [trace.contrast for trace in chosen if trace.contact < inf]
-        groups = ["all", *(name for name in ("dark", "like asphalt", "light") if name in contrasts)]
-        found[condition] = [
-            Curve(condition, group, tuple(_points(chosen, begun, levels, lead, group))) for group in groups
+        onsets = {level: [alarm_onsets(trace.series, signal, level) for trace in chosen] for level in levels}
+        present = {trace.contrast for trace in chosen if trace.contact_time < inf}
+        curves[condition] = [
+            FrocCurve(condition, contrast, tuple(_points(chosen, onsets, lead_time, contrast)))
+            for contrast in ("all", *(name for name in CONTRASTS if name in present))
         ]
-    return found
+    return curves
 
 
-def onsets(series: dict[str, np.ndarray], signal: str, level: float) -> np.ndarray:
+def alarm_onsets(series: dict[str, np.ndarray], signal: str, threshold: float) -> np.ndarray:
     """Return the times at which alarms begin [s]."""
-    times = series["time"][series[signal] >= level]
+    times = series["time"][series[signal] >= threshold]
     if times.size == 0:
         return times
-    # A frame later than `QUIET` after the last one at the level begins a new alarm.
-    return times[np.concatenate(([True], np.diff(times) > QUIET))]
+    return times[np.concatenate(([True], np.diff(times) > REARM_TIME))]
 
 
 def _points(
-    traces: list[Trace], begun: list[list[np.ndarray]], levels: list[float], lead: float, group: str
-) -> Iterable[Point]:
-    ends = [trace.contact - PREMATURE for trace in traces]  # up to which an alarm is false
-    metres = sum(_driven(trace, end) for trace, end in zip(traces, ends, strict=True))
-    for level, starts in zip(levels, begun, strict=True):
-        hits = [
-            bool(np.any((times >= trace.contact - PREMATURE) & (times <= trace.contact - lead)))
+    traces: list[OpenLoopTrace], onsets: dict[float, list[np.ndarray]], lead_time: float, contrast: str
+) -> Iterator[FrocPoint]:
+    distance = sum(_distance(trace) for trace in traces)
+    for threshold, starts in onsets.items():
+        detections = [
+            bool(np.any((times >= trace.false_alarm_end) & (times <= trace.contact_time - lead_time)))
             for trace, times in zip(traces, starts, strict=True)
-            if trace.contact < inf and group in ("all", trace.contrast)
+            if trace.contact_time < inf and contrast in ("all", trace.contrast)
         ]
-        false = sum(int(np.sum(times < end)) for times, end in zip(starts, ends, strict=True))
-        low, high = (_per_km(bound, metres) for bound in poisson_interval(false))
-        chance = _chance(traces, starts, ends, PREMATURE - lead)
-        rate = _per_km(false, metres)
-        yield Point(level, Rate.of(hits), false, metres, rate, low, high, chance)
+        false_alarms = sum(
+            int(np.sum(times < trace.false_alarm_end)) for trace, times in zip(traces, starts, strict=True)
+        )
+        yield FrocPoint(
+            threshold,
+            Rate.of(detections),
+            false_alarms,
+            distance,
+            *(_per_km(count, distance) for count in (false_alarms, *poisson_interval(false_alarms))),
+            chance=_chance(traces, starts, PREMATURE - lead_time),
+        )
 
 
-def _driven(trace: Trace, end: float) -> float:
-    """Return the distance driven up to a time [m]."""
+def _distance(trace: OpenLoopTrace) -> float:
+    """Return the distance driven while an alarm is false [m]."""
     time, speed = trace.series["time"], trace.series["ego_speed"]
-    before = time < end
+    before = time < trace.false_alarm_end
     return float(np.trapezoid(speed[before], time[before]))
 
 
-def _per_km(count: float, metres: float) -> float:
-    return 1000.0 * count / metres if metres > 0.0 else inf
+def _per_km(count: float, distance: float) -> float:
+    return 1000.0 * count / distance if distance > 0.0 else inf
 
 
-def _chance(traces: list[Trace], starts: list[np.ndarray], ends: list[float], length: float) -> float:
-    """Return the share of all windows of a length, before `ends`, in which an alarm begins; NaN for none."""
+def _chance(traces: list[OpenLoopTrace], starts: list[np.ndarray], length: float) -> float:
+    """Return the share of windows of a length, before any detection window, in which an alarm begins.
+
+    The result is NaN if no trace is long enough for a window.
+    """
     windows = hits = 0
-    for trace, times, end in zip(traces, starts, ends, strict=True):
-        clock = trace.series["time"]
-        opened = clock[clock + length <= min(end, float(clock[-1]))]
+    for trace, times in zip(traces, starts, strict=True):
+        time = trace.series["time"]
+        opened = time[time + length <= min(trace.false_alarm_end, float(time[-1]))]
         windows += opened.size
-        after = np.searchsorted(times, opened, side="left")
-        reached = np.append(times, inf)[after]
-        hits += int(np.sum(reached <= opened + length))
+        next_alarm = np.append(times, inf)[np.searchsorted(times, opened, side="left")]
+        hits += int(np.sum(next_alarm <= opened + length))
     return hits / windows if windows else float("nan")
 
 
-def write_curves(path: Path, found: dict[str, list[Curve]], lead: float) -> None:
+def write_froc(path: Path, curves: dict[str, list[FrocCurve]], lead_time: float) -> None:
     """Write the curves to a CSV file, one line per point."""
     lines = [
-        _line(curve, point, lead) for items in found.values() for curve in items for point in curve.points
+        (curve.condition, curve.contrast, lead_time, *_csv_values(point))
+        for of_condition in curves.values()
+        for curve in of_condition
+        for point in curve.points
     ]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(lines[0]))
-        writer.writeheader()
-        writer.writerows(lines)
+    write_csv(path, COLUMNS, lines)
 
 
-def _line(curve: Curve, point: Point, lead: float) -> dict[str, Any]:
-    return {
-        "condition": curve.condition,
-        "contrast": curve.group,
-        "lead": lead,
-        "threshold": point.threshold,
-        "threats": point.detected.n,
-        "detected": point.detected.k,
-        "detected_low": round(point.detected.low, 4),
-        "detected_high": round(point.detected.high, 4),
-        "false_alarms": point.false,
-        "km": round(point.distance / 1000.0, 4),
-        "false_per_km": round(point.false_per_km, 4),
-        "false_low": round(point.false_low, 4),
-        "false_high": round(point.false_high, 4),
-        "chance": round(point.chance, 4),
-    }
+def _csv_values(point: FrocPoint) -> tuple[float, ...]:
+    detected, rates = point.detected, (point.false_per_km, point.false_low, point.false_high, point.chance)
+    return (
+        point.threshold,
+        detected.n,
+        detected.k,
+        round(detected.low, 4),
+        round(detected.high, 4),
+        point.false_alarms,
+        round(point.distance / 1000.0, 4),
+        *(round(rate, 4) for rate in rates),
+    )

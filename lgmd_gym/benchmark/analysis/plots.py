@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from lgmd_gym.benchmark.analysis.compare import Comparison
-    from lgmd_gym.benchmark.analysis.froc import FrocCurve
+    from lgmd_gym.benchmark.analysis.froc import FrocCurve, FrocPoint
 
 FALSE_PER_KM_TICKS = (0.0, 0.5, 1.0, 3.0, 10.0, 30.0, 100.0)  # linear below 1, logarithmic above
 LABELLED_THRESHOLDS = (15.0, 30.0, 60.0, 120.0)  # [spikes/s]
@@ -79,7 +79,7 @@ def froc_figure(file: FigureFile, curves: "dict[str, list[FrocCurve]]", lead_tim
             axis.set_xticks([], minor=True)
             top = next((x for x in FALSE_PER_KM_TICKS if x >= max(highest, 1.0)), FALSE_PER_KM_TICKS[-1])
             axis.set(xlim=(-0.05, 1.05 * top), ylim=(-0.02, 1.02), xlabel="false alarms per km")
-            axis.legend(fontsize=7, loc="lower right")
+            axis.legend(fontsize=7, loc="lower right", frameon=True, framealpha=0.9, edgecolor="none")
         axes[0][0].set_ylabel(f"threats with an alarm 4 to {lead_time:g} s before contact")
     return figure
 
@@ -90,13 +90,23 @@ def _plot_froc(axis: Any, curve: "FrocCurve", colour: str) -> None:
     detected = [point.detected.k / max(point.detected.n, 1) for point in points]
     label = f"{curve.contrast} (n = {points[0].detected.n})"
     axis.plot(false_per_km, detected, "o-", color=colour, markersize=2.5, linewidth=1.2, label=label)
-    for point, x, y in zip(points, false_per_km, detected, strict=True):
-        if point.threshold in LABELLED_THRESHOLDS:
-            axis.annotate(f"{point.threshold:g}", (x, y), fontsize=7, color=colour, xytext=(3, -8),
-                          textcoords="offset points")  # fmt: skip
     if curve.contrast == "all":
         chance = [point.chance for point in points]
         axis.plot(false_per_km, chance, ":", color="0.5", linewidth=1.2, label="chance: random windows")
+        _label_thresholds(axis, points, list(zip(false_per_km, detected, strict=True)))
+
+
+def _label_thresholds(
+    axis: Any, points: "tuple[FrocPoint, ...]", positions: list[tuple[float, float]]
+) -> None:
+    """Write some thresholds next to their points; equal points share a label."""
+    labels: dict[tuple[float, float], list[str]] = {}
+    for point, position in zip(points, positions, strict=True):
+        if point.threshold in LABELLED_THRESHOLDS:
+            labels.setdefault(position, []).append(f"{point.threshold:g}")
+    for position, texts in labels.items():
+        offset = {"xytext": (3, -8), "textcoords": "offset points"}
+        axis.annotate(", ".join(texts), position, fontsize=7, **offset)
 
 
 def trace_figure(file: FigureFile, episodes: dict[str, dict[str, Any]], alert_level: float) -> "Figure":
@@ -107,12 +117,13 @@ def trace_figure(file: FigureFile, episodes: dict[str, dict[str, Any]], alert_le
         episodes: Time series by agent (keys: `lgmd_gym.benchmark.episode.SERIES`).
         alert_level: The neuron's T_sf, drawn as a horizontal line [spikes/s].
     """
-    with saved_figure(file, 2, 1, sharex=True, figsize=(6.4, 2.9)) as (figure, (frequency, speed)):
+    with saved_figure(file, 2, 1, sharex=True, figsize=(6.4, 3.2)) as (figure, (frequency, speed)):
         for colour, (agent, series) in zip(COLOURS, episodes.items(), strict=False):
             frequency.plot(series["time"], series["spike_frequency"], color=colour, label=agent)
             speed.plot(series["time"], series["ego_speed"] / KMH, color=colour, label=agent)
         frequency.axhline(alert_level, color="0.5", linestyle="--", linewidth=1.0)
         frequency.set(ylabel="spikes/s", ylim=(0, None))
         speed.set(ylabel="speed [km/h]", xlabel="time [s]", ylim=(0, None))
-        speed.legend(fontsize=7, ncols=2)
+        handles, agents = speed.get_legend_handles_labels()
+        figure.legend(handles, agents, loc="outside upper center", fontsize=7, ncols=4)
     return figure

@@ -1,51 +1,62 @@
-"""What the protocols would make of a row: limits, colours, contact. Protocol-derived, and no rating."""
+"""Limits of UN R152, FMVSS 127 and Euro NCAP 2026, applied to rows; derived from the protocols, no rating."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from lgmd_gym.benchmark.summary import Rate, case_order
+from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.statistics import Rate
+from lgmd_gym.benchmark.summary import case_order
 from lgmd_gym.envs.dynamics.units import KMH
 
-Row = dict[str, Any]
-
-# UN R152 Rev.2, 5.2.1.4, M1: relative speed -> highest relative impact speed, both in km/h; between two rows
-# the higher one's limit holds.
+# UN R152 Rev.2, 5.2.1.4, M1: relative speed -> highest relative impact speed, both in km/h. Between two
+# columns the limit of the higher speed holds.
 R152_SPEEDS = (40, 42, 45, 50, 55, 60)
 R152_LIMITS = {"laden": (0, 10, 15, 25, 30, 35), "unladen": (0, 0, 15, 25, 30, 35)}
-R152_SHARE = 0.10  # of the runs may fail (6.10.1)
+R152_FAILURES = 0.10  # highest share of failed runs (6.10.1)
 
-# Euro NCAP Frontal Collisions 2026, 5.3.1: upper edges of the colours, relative impact speed in km/h, by the
-# ego's test speed; an edge belongs to the worse colour.
-COLOURS = ("green", "yellow", "orange", "brown", "red")
+# Euro NCAP Frontal Collisions 2026, 5.3.1: ego speed -> upper edges of the colours, relative impact speed,
+# both in km/h. An edge belongs to the worse colour.
 BANDS_2026 = {
     20: (("green", 0.0),),
     30: (("green", 0.0), ("brown", 10.0)),
     40: (("green", 0.0), ("orange", 10.0), ("brown", 20.0)),
     50: (("green", 0.0), ("yellow", 10.0), ("orange", 20.0), ("brown", 30.0)),
 }
-WEIGHTS = {"green": 1.0, "yellow": 0.75, "orange": 0.5, "brown": 0.25, "red": 0.0}
+COLOUR_WEIGHTS = {"green": 1.0, "yellow": 0.75, "orange": 0.5, "brown": 0.25, "red": 0.0}
 
 
-class Verdict(NamedTuple):
-    """One agent in one case of a protocol.
+class LimitCheck(NamedTuple):
+    """Result of one row against its limit.
 
     Attributes:
-        agent: The agent's string.
-        case: The case's name.
-        demand: What the protocol asks, in words.
-        met: Runs that meet it.
+        met: Whether the row meets the limit.
+        limit: The limit in words.
+    """
+
+    met: bool
+    limit: str
+
+
+class LimitResult(NamedTuple):
+    """Runs of one agent in one case against the limit.
+
+    Attributes:
+        agent: Agent string.
+        case: Name of the case.
+        limit: The limit in words.
+        met: Runs that meet the limit.
         worst: Highest relative impact speed [m/s].
     """
 
     agent: str
     case: str
-    demand: str
+    limit: str
     met: Rate
     worst: float
 
 
-def impact(row: Row) -> float:
-    """Return a row's relative impact speed [m/s]; 0 without contact."""
+def relative_impact(row: Row) -> float:
+    """Return the relative impact speed of a row [m/s]; 0 without contact."""
     return row["relative_impact_speed"] or 0.0
 
 
@@ -57,79 +68,85 @@ def r152_limit(relative_kmh: float, load: str) -> float:
         load: "laden" (maximum mass) or "unladen" (running order).
 
     Raises:
-        ValueError: Beyond 60 km/h, where the regulation sets no limit.
+        ValueError: Above 60 km/h, where the regulation sets no limit.
     """
     for speed, limit in zip(R152_SPEEDS, R152_LIMITS[load], strict=True):
         if relative_kmh <= speed + 1e-6:
             return float(limit)
-    raise ValueError(f"UN R152 sets no limit at {relative_kmh:g} km/h relative speed; it ends at 60")
+    raise ValueError(f"relative_kmh must be at most 60, the highest speed in UN R152, got {relative_kmh:g}")
 
 
 def r152_load(case: str) -> str:
-    """Return the load state a case of suite r152 is judged by: 40 km/h is driven laden, the rest in both."""
+    """Return the load state whose limit holds for a case of suite r152.
+
+    The regulation tests 40 km/h laden only and the other speeds in both states; unladen is the stricter one.
+    """
     return "laden" if case.endswith("CCRs/v40") else "unladen"
 
 
 def colour_2026(ego_kmh: float, impact_kmh: float) -> str:
-    """Return the colour of a relative impact speed under Euro NCAP 2026.
+    """Return the Euro NCAP 2026 colour of a relative impact speed.
+
+    Args:
+        ego_kmh: Ego speed of the test [km/h].
+        impact_kmh: Relative impact speed [km/h]; 0 without contact.
 
     Example:
         >>> [colour_2026(50, speed) for speed in (0, 9.9, 10, 35)]
         ['green', 'yellow', 'orange', 'red']
     """
-    row = min(max(10 * int(ego_kmh / 10 + 1e-6), 20), 50)
     if impact_kmh <= 0.0:
         return "green"
-    for colour, edge in BANDS_2026[row]:
-        if impact_kmh < edge:
-            return colour
-    return "red"
+    bands = BANDS_2026[min(max(10 * int(ego_kmh / 10 + 1e-6), 20), 50)]
+    return next((colour for colour, edge in bands if impact_kmh < edge), "red")
 
 
-def verdicts(rows: list[Row], agent: str, judge: Callable[[Row], tuple[bool, str]]) -> list[Verdict]:
-    """Return one verdict per case of an agent; `judge` says of a row whether it meets what demand."""
-    found = []
-    played = [row for row in rows if row["agent"] == agent and row["error"] is None and row["threat"]]
-    for case in sorted({row["case"] for row in played}, key=case_order):
-        of_case = [row for row in played if row["case"] == case]
-        demands = {judge(row)[1] for row in of_case}
-        met = Rate.of(judge(row)[0] for row in of_case)
-        found.append(Verdict(agent, case, " / ".join(sorted(demands)), met, max(map(impact, of_case))))
-    return found
+def check_r152(row: Row) -> LimitCheck:
+    """Compare a row of suite r152 with the impact speed limit of its relative speed and load.
 
-
-def judge_r152(row: Row) -> tuple[bool, str]:
-    """Judge a row of suite r152 by the impact-speed limit of its relative speed and load."""
-    relative = round((row["ego_speed"] - row["target_speed"]) / KMH, 3)
+    Premature braking fails, because it begins before the start of the test (T0).
+    """
     load = r152_load(row["case"])
-    limit = r152_limit(relative, load)
-    good = impact(row) / KMH <= limit + 1e-9
-    # Who brakes before the test has begun (T0) has not been tested.
-    return good and not row["premature_brake"], f"≤ {limit:g} km/h {load}"
+    limit = r152_limit(round((row["ego_speed"] - row["target_speed"]) / KMH, 3), load)
+    met = relative_impact(row) / KMH <= limit + 1e-9 and not row["premature_brake"]
+    return LimitCheck(met, f"≤ {limit:g} km/h {load}")
 
 
-def judge_contact(row: Row) -> tuple[bool, str]:
-    """Judge a row of suite fmvss127: no contact (49 CFR 571.127 S5.1.3)."""
-    return not row["collision"], "no contact"
+def check_no_contact(row: Row) -> LimitCheck:
+    """Check a row of suite fmvss127 for contact (49 CFR 571.127 S5.1.3)."""
+    return LimitCheck(not row["collision"], "no contact")
 
 
-def judge_colour(row: Row) -> tuple[bool, str]:
-    """Judge a row of suite ncap2026: green."""
-    return colour_2026(row["ego_speed"] / KMH, impact(row) / KMH) == "green", "green"
+def check_green(row: Row) -> LimitCheck:
+    """Check a row of suite ncap2026 for the colour green."""
+    return LimitCheck(colour_2026(row["ego_speed"] / KMH, relative_impact(row) / KMH) == "green", "green")
 
 
-JUDGES: dict[str, Callable[[Row], tuple[bool, str]]] = {
-    "r152": judge_r152,
-    "fmvss127": judge_contact,
-    "ncap2026": judge_colour,
+LIMIT_CHECKS: dict[str, Callable[[Row], LimitCheck]] = {
+    "r152": check_r152,
+    "fmvss127": check_no_contact,
+    "ncap2026": check_green,
 }
 
 
-def meets_r152(rows: list[Row], agent: str) -> bool:
-    """Return whether an agent meets the impact-speed limits of UN R152 5.2.1.4 in simulation.
+def limit_results(rows: list[Row], agent: str, check: Callable[[Row], LimitCheck]) -> list[LimitResult]:
+    """Return the result of an agent per case, over its threats without an error."""
+    threats = [row for row in rows if row["agent"] == agent and row["error"] is None and row["threat"]]
+    results = []
+    for case in sorted({row["case"] for row in threats}, key=case_order):
+        of_case = [row for row in threats if row["case"] == case]
+        checks = [check(row) for row in of_case]
+        limit = " / ".join(sorted({item.limit for item in checks}))
+        met = Rate.of(item.met for item in checks)
+        results.append(LimitResult(agent, case, limit, met, max(map(relative_impact, of_case))))
+    return results
 
-    Judged as 6.10.1 counts runs: at most 10 % of all failed.
+
+def meets_r152(rows: list[Row], agent: str) -> bool:
+    """Return whether an agent meets the impact speed limits of UN R152 5.2.1.4 in simulation.
+
+    As in 6.10.1, at most 10 % of all runs may fail.
     """
-    found = verdicts(rows, agent, judge_r152)
-    runs, met = sum(item.met.n for item in found), sum(item.met.k for item in found)
-    return runs > 0 and runs - met <= R152_SHARE * runs
+    results = limit_results(rows, agent, check_r152)
+    runs, met = sum(item.met.n for item in results), sum(item.met.k for item in results)
+    return runs > 0 and runs - met <= R152_FAILURES * runs

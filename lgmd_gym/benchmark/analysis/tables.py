@@ -1,41 +1,121 @@
-"""A run's scores as tables on the terminal."""
+"""Terminal tables of a run, and the per-case results that they share with the report."""
 
-from typing import Any
+from typing import NamedTuple
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from lgmd_gym.benchmark.analysis.protocol_limits import JUDGES, Verdict, meets_r152, verdicts
-from lgmd_gym.benchmark.statistics import Mean
-from lgmd_gym.benchmark.summary import Rate, Score, automatic, case_order, scores
+from lgmd_gym.benchmark.analysis.protocol_limits import LIMIT_CHECKS, limit_results, meets_r152
+from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.statistics import Mean, Rate
+from lgmd_gym.benchmark.summary import AgentSummary, case_order, summaries, without_fcw_driver
 from lgmd_gym.envs.dynamics.units import KMH
 
-Row = dict[str, Any]
-RATE_NOTE = (
-    "k/n [Wilson 95 % interval in %]; speed cut [95 %, bootstrapped by case]; premature: more than 4 s "
-    "before contact, no success"
+SCORE_CAPTION = (
+    "k/n [Wilson 95 % interval in %]; speed reduction [95 %, bootstrap over cases]; premature: more than 4 s "
+    "before contact, does not count as avoided"
+)
+LIMIT_CAPTION = (
+    "runs that meet the limit, of n (highest relative impact speed in km/h); derived from the protocol, "
+    "no rating"
 )
 
 
-def score_tables(rows: list[Row], agents: list[str], title: str) -> list[Table]:
-    """Return the agents' scores; cases in which a warned driver brakes have a table of their own.
+class CaseCell(NamedTuple):
+    """Result of one agent in one case.
 
-    What a driver does on a warning is no automatic braking, and no part of its totals.
+    Attributes:
+        text: Text of a table cell; "" without an episode.
+        share: Share of successful episodes; None without an episode.
     """
+
+    text: str = ""
+    share: float | None = None
+
+
+class CaseLine(NamedTuple):
+    """Results of all agents in one case.
+
+    Attributes:
+        case: Name of the case without the suite.
+        limit: Limit of the protocol in words, or "".
+        cells: One cell per agent.
+    """
+
+    case: str
+    limit: str
+    cells: list[CaseCell]
+
+
+def limit_lines(rows: list[Row], agents: list[str], suite: str) -> list[CaseLine]:
+    """Return the runs that meet the protocol's limit, per case; empty for suites without limits."""
+    if suite not in LIMIT_CHECKS:
+        return []
+    check = LIMIT_CHECKS[suite]
+    by_agent = {agent: {item.case: item for item in limit_results(rows, agent, check)} for agent in agents}
+    limits = {case: item.limit for results in by_agent.values() for case, item in results.items()}
+    lines = []
+    for case in sorted(limits, key=case_order):
+        line = CaseLine(_short(case), limits[case], [])
+        for results in by_agent.values():
+            if (item := results.get(case)) is None:
+                line.cells.append(CaseCell())
+            else:
+                worst = f" ({item.worst / KMH:.0f})" if item.worst else ""
+                line.cells.append(CaseCell(f"{item.met.k}/{item.met.n}{worst}", item.met.k / item.met.n))
+        lines.append(line)
+    return lines
+
+
+def success_lines(rows: list[Row], agents: list[str]) -> list[CaseLine]:
+    """Return threats avoided plus non-threats without a false activation, of n, per case."""
+    by_cell = {(item.agent, item.group): item for item in summaries(rows, lambda row: row["case"])}
+    return [
+        CaseLine(_short(case), "", [_success(by_cell.get((agent, case))) for agent in agents])
+        for case in sorted({row["case"] for row in rows}, key=case_order)
+    ]
+
+
+def _success(item: AgentSummary | None) -> CaseCell:
+    n = item.avoided.n + item.false_activations.n if item else 0
+    if item is None or n == 0:
+        return CaseCell()
+    k = item.avoided.k + item.false_activations.n - item.false_activations.k
+    return CaseCell(f"{k}/{n}", k / n)
+
+
+def _short(case: str) -> str:
+    """Return the name of a case without the suite."""
+    return case.split("/", 1)[1]
+
+
+def agent_summaries(rows: list[Row], agents: list[str]) -> list[AgentSummary]:
+    """Return one summary per agent over all rows, in the order of `agents`."""
+    by_agent = {item.agent: item for item in summaries(rows, lambda row: "")}
+    return [by_agent[agent] for agent in agents if agent in by_agent]
+
+
+def score_tables(rows: list[Row], agents: list[str], title: str) -> list[Table]:
+    """Return the scores of the agents; cases with a warned driver have a separate table."""
     parts = {
-        title: automatic(rows),
-        "with a driver who brakes 1.2 s after the alert": [row for row in rows if row["fcw_driver"]],
+        title: without_fcw_driver(rows),
+        "cases with a driver who brakes 1.2 s after the alert": [row for row in rows if row["fcw_driver"]],
     }
     return [_score_table(part, agents, name) for name, part in parts.items() if part]
 
 
 def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
-    """Return one line per agent over all episodes."""
-    table = Table(title=title, caption=RATE_NOTE, box=SIMPLE_HEAD)
+    table = Table(title=title, caption=SCORE_CAPTION, box=SIMPLE_HEAD)
     table.add_column("agent", overflow="fold", min_width=15)
-    for heading in ("avoided", "speed\ncut km/h", "TTC at\nbraking s", "premature", "false braking"):
+    for heading in (
+        "avoided",
+        "speed reduc-\ntion km/h",
+        "TTC at\nbraking s",
+        "premature",
+        "false\nactivation",
+    ):
         table.add_column(heading, justify="right")
-    for item in _by_agent(scores(rows, lambda row: ""), agents):
+    for item in agent_summaries(rows, agents):
         table.add_row(
             item.agent + (f" ({item.errors} errors)" if item.errors else ""),
             rate_text(item.avoided),
@@ -48,48 +128,41 @@ def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
 
 
 def case_table(rows: list[Row], agents: list[str]) -> Table:
-    """Return one line per case: threats avoided, or quiet episodes without false braking, of n."""
-    title = "per case: avoided, or not braked where nothing threatened, of n"
-    table = Table(title=title, box=SIMPLE_HEAD)
+    """Return a table of the successful episodes per case."""
+    present = {row["agent"] for row in rows}
+    shown = [agent for agent in agents if agent in present]
+    table = Table(
+        title="per case: threats avoided, or non-threats without false activation, of n", box=SIMPLE_HEAD
+    )
     table.add_column("case", overflow="fold")
-    shown = [agent for agent in agents if any(row["agent"] == agent for row in rows)]
-    for agent in shown:
-        table.add_column(agent.replace("-", "-\n", 1), justify="right", overflow="fold")
-    cells = {(item.agent, item.group): item for item in scores(rows, lambda row: row["case"])}
-    for case in sorted({row["case"] for row in rows}, key=case_order):
-        values = [_good(cells.get((agent, case))) for agent in shown]
-        table.add_row(case.split("/", 1)[1], *values)
+    _add_agent_columns(table, shown)
+    for line in success_lines(rows, shown):
+        table.add_row(line.case, *(cell.text for cell in line.cells))
     return table
 
 
-def verdict_table(rows: list[Row], agents: list[str], suite: str) -> Table | None:
-    """Return what a protocol would make of each case, runs that meet it of n; None for other suites."""
-    if suite not in JUDGES:
+def limit_table(rows: list[Row], agents: list[str], suite: str) -> Table | None:
+    """Return a table of the runs that meet the protocol's limit per case; None for suites without limits."""
+    if suite not in LIMIT_CHECKS:
         return None
-    by_agent = {agent: {item.case: item for item in verdicts(rows, agent, JUDGES[suite])} for agent in agents}
-    shown = [agent for agent in agents if by_agent[agent]]
-    demands = {case: item.demand for cells in by_agent.values() for case, item in cells.items()}
-    caption = "runs that meet it of n, (highest relative impact speed in km/h); protocol-derived, no rating"
+    threatened = {row["agent"] for row in rows if row["threat"] and row["error"] is None}
+    shown = [agent for agent in agents if agent in threatened]
+    caption = LIMIT_CAPTION
     if suite == "r152":
-        met = [agent for agent in shown if meets_r152(rows, agent)]
-        caption += (
-            f"\nmeets the impact-speed limits of UN R152 5.2.1.4 in simulation: {', '.join(met) or 'none'}"
-        )
-    table = Table(title=f"{suite}: what the protocol asks", caption=caption, box=SIMPLE_HEAD)
+        met = ", ".join(agent for agent in shown if meets_r152(rows, agent)) or "none"
+        caption += f"\nmeets the impact speed limits of UN R152 5.2.1.4 in simulation: {met}"
+    table = Table(title=f"{suite}: limits of the protocol", caption=caption, box=SIMPLE_HEAD)
     table.add_column("case", overflow="fold")
-    table.add_column("asked")
-    for agent in shown:
-        table.add_column(agent.replace("-", "-\n", 1), justify="right", overflow="fold")
-    for case in sorted(demands, key=case_order):
-        cells = [_verdict(by_agent[agent].get(case)) for agent in shown]
-        table.add_row(case.split("/", 1)[1], demands[case], *cells)
+    table.add_column("limit")
+    _add_agent_columns(table, shown)
+    for line in limit_lines(rows, shown, suite):
+        table.add_row(line.case, line.limit, *(cell.text for cell in line.cells))
     return table
 
 
-def _verdict(item: Verdict | None) -> str:
-    if item is None:
-        return ""
-    return f"{item.met.k}/{item.met.n}" + (f" ({item.worst / KMH:.0f})" if item.worst else "")
+def _add_agent_columns(table: Table, agents: list[str]) -> None:
+    for agent in agents:
+        table.add_column(agent.replace("-", "-\n", 1), justify="right", overflow="fold")
 
 
 def mean_kmh(mean: Mean) -> str:
@@ -106,17 +179,3 @@ def rate_text(rate: Rate) -> str:
     if rate.n == 0:
         return "–"
     return f"{rate.k}/{rate.n} [{100 * rate.low:.0f}–{100 * rate.high:.0f}]"
-
-
-def _good(item: Score | None) -> str:
-    """Return how many episodes went as they should."""
-    if item is None:
-        return ""
-    good = item.avoided.k + item.false_activations.n - item.false_activations.k
-    return f"{good}/{item.avoided.n + item.false_activations.n}"
-
-
-def _by_agent(items: list[Score], agents: list[str]) -> list[Score]:
-    """Return the scores in the order the agents were given in."""
-    order = {agent: index for index, agent in enumerate(agents)}
-    return sorted(items, key=lambda item: order.get(item.agent, len(order)))

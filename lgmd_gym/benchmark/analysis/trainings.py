@@ -1,36 +1,37 @@
-"""Arms over the same episodes: several trainings of one kind of policy, or a rule, which is an arm of one.
+"""Comparison of arms: groups of agents over the same episodes, such as several trainings of one recipe.
 
-The mean return of an arm is the interquartile mean over its trainings; not over episodes, whose worst quarter
-is the contacts. Intervals come from a stratified bootstrap that draws trainings and, among threats and among
-quiet cases apart, whole cases: the same cases for all arms, so that their differences are paired.
+The mean return of an arm is the interquartile mean over its trainings of the mean over cases. Intervals are
+from a stratified bootstrap that draws trainings, and cases from threats and non-threats separately. All arms
+have the same case samples, so their differences are paired by case.
 """
 
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from lgmd_gym.benchmark.analysis.bootstrap import StratifiedBootstrap, interquartile_mean
 from lgmd_gym.benchmark.folder import read_rows, read_settings
-from lgmd_gym.benchmark.statistics import DRAWS
-from lgmd_gym.benchmark.summary import automatic, wilson
-from lgmd_gym.benchmark.traffic.rows import SUITE as TRAFFIC
+from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.statistics import wilson
+from lgmd_gym.benchmark.suites import TRAFFIC
+from lgmd_gym.benchmark.summary import without_fcw_driver
 from lgmd_gym.errors import unknown_name
 
-Row = dict[str, Any]
 RETURN = "episode_return"
-SHARES = ("avoided", "premature_brake", "false_activation")
-ENOUGH = 5  # trainings; a bootstrap over fewer says less than it seems to
+SHARES = {"avoided": True, "premature_brake": True, "false_activation": False}  # row key -> over threats?
+MIN_TRAININGS = 5  # fewest trainings, apart from one, for which intervals are given
 
 
 class Estimate(NamedTuple):
-    """A value with its 95 % interval.
+    """Value with its 95 % interval.
 
     Attributes:
         value: The value.
-        low: Lower end; None for an arm of two to four trainings.
-        high: Upper end; None likewise.
+        low: Lower bound; None for an arm of two to four trainings.
+        high: Upper bound; None for an arm of two to four trainings.
         n: Number of cases.
     """
 
@@ -41,202 +42,194 @@ class Estimate(NamedTuple):
 
 
 class Arm(NamedTuple):
-    """What an arm did under one condition.
+    """Group of agents.
 
     Attributes:
-        name: The arm's.
-        condition: The camera's.
-        trainings: Agents in it. With one, intervals speak of the cases alone.
-        returned: Interquartile mean, over the trainings, of the mean return.
-        spread: Lowest and highest mean return of a training.
-        less_first: Return less that of the first arm; None for the first itself.
-        shares: Of `SHARES`, means over the trainings; without those that no case has.
+        name: Name of the arm.
+        agents: Agent strings.
+    """
+
+    name: str
+    agents: list[str]
+
+
+class ArmResult(NamedTuple):
+    """Result of an arm under one camera condition.
+
+    Attributes:
+        name: Name of the arm.
+        condition: Camera condition.
+        trainings: Number of agents. The intervals of a single one include the variation over cases only.
+        mean_return: Interquartile mean over trainings of the mean return.
+        return_range: Lowest and highest mean return of a training.
+        difference: Mean return minus that of the first arm; None for the first arm.
+        shares: Mean over trainings by key of `SHARES`; keys without a case are left out.
     """
 
     name: str
     condition: str
     trainings: int
-    returned: Estimate
-    spread: tuple[float, float]
-    less_first: Estimate | None
+    mean_return: Estimate
+    return_range: tuple[float, float]
+    difference: Estimate | None
     shares: dict[str, Estimate]
 
 
-def judge_run(path: Path, arms: Sequence[str] = ()) -> list[Arm]:
-    """Judge the arms of a run, under each of its conditions.
+def compare_arms(path: Path, arms: Sequence[str] = ()) -> list[ArmResult]:
+    """Compare arms of a run under each of its conditions.
 
     Args:
         path: Run folder.
-        arms: "name=pattern", where the pattern matches the agents' strings as a shell's does (`*`, `?`), or
-            an agent's string alone; none for one arm per agent.
+        arms: Arms as "NAME=AGENT,AGENT,..." with shell patterns (`*`, `?`) allowed for agents, or single
+            agent strings. Empty for one arm per agent.
 
     Raises:
-        ValueError: For a folder without such a run, failed or missing episodes, or an arm of nobody.
+        ValueError: For a folder without a run, a traffic run, failed or missing episodes, or an arm without
+            an agent.
     """
     rows, _ = read_rows(path)
     if read_settings(path)["suite"] == TRAFFIC:
         raise ValueError(f"{str(path)!r} is a traffic run, which has no returns")
     failed = sum(row["error"] is not None for row in rows)
     if failed or not rows:
-        what = f"{failed} episodes failed" if failed else "no episode has been played"
-        raise ValueError(f"{what}; go on with lgmd-gym bench --resume {path}")
+        problem = f"{failed} episodes failed" if failed else "the run has no episode"
+        raise ValueError(f"{problem}; resume it with lgmd-gym bench --resume {path}")
     if any(row.get(RETURN) is None for row in rows):
-        raise ValueError("the run has no returns: an older version made it; play it again")
+        raise ValueError(f"rows have no {RETURN} because an older version wrote them; repeat the run")
     agents = list(dict.fromkeys(row["agent"] for row in rows))
-    members = _members(arms or agents, agents)
+    parsed = [parse_arm(arm, agents) for arm in arms or agents]
     conditions = dict.fromkeys(row["condition"] for row in rows)
-    return [arm for name in conditions for arm in judge_rows(automatic(rows), members, name)]
+    return [result for name in conditions for result in arm_results(without_fcw_driver(rows), parsed, name)]
 
 
-def judge_rows(rows: Sequence[Row], members: Sequence[tuple[str, list[str]]], condition: str) -> list[Arm]:
-    """Judge arms on rows of one condition.
-
-    Args:
-        rows: Rows of all of them.
-        members: Each arm's name and agents.
-        condition: Which rows count.
+def parse_arm(text: str, agents: Sequence[str]) -> Arm:
+    """Return the arm that a string describes, see `compare_arms`.
 
     Raises:
-        ValueError: If an agent lacks an episode of another's.
+        ValueError: If no agent matches.
+    """
+    if text in agents:
+        return Arm(text, [text])
+    name, _, patterns = text.partition("=")
+    # Agent strings may contain commas, so the whole text is tried as one pattern first.
+    members = _matching(agents, [patterns]) or _matching(agents, patterns.split(","))
+    if not name or not members:
+        raise unknown_name("arm (an agent of the run, or NAME=AGENT,AGENT,...)", text, agents)
+    return Arm(name, members)
+
+
+def _matching(agents: Sequence[str], patterns: list[str]) -> list[str]:
+    """Return the agents that match any pattern; none if a pattern matches no agent."""
+    if not all(any(fnmatchcase(agent, pattern) for agent in agents) for pattern in patterns):
+        return []
+    return [agent for agent in agents if any(fnmatchcase(agent, pattern) for pattern in patterns)]
+
+
+def arm_results(rows: Sequence[Row], arms: Sequence[Arm], condition: str) -> list[ArmResult]:
+    """Return the results of arms on the rows of one condition.
+
+    Raises:
+        ValueError: If the agents do not have the same episodes.
     """
     rows = [row for row in rows if row["condition"] == condition]
-    first_agent = members[0][1][0]
-    keys = sorted(_key(row) for row in rows if row["agent"] == first_agent)
-    for agent in dict.fromkeys(agent for _, agents in members for agent in agents):
-        if sorted(_key(row) for row in rows if row["agent"] == agent) != keys:
-            raise ValueError(f"agent {agent!r} has not played all that {first_agent!r} has; resume the run")
-    drawn = Draws(rows, first_agent)
-    found: list[Arm] = []
-    first: np.ndarray | None = None
-    for name, agents in members:
-        arm, returns = _judge(name, condition, agents, rows, drawn)
-        if first is not None:
-            arm = arm._replace(less_first=_difference(arm, returns, found[0], first))
+    by_agent = {
+        agent: [row for row in rows if row["agent"] == agent]
+        for agent in dict.fromkeys(agent for arm in arms for agent in arm.agents)
+    }
+    first_agent = arms[0].agents[0]
+    episodes = _episodes(by_agent[first_agent])
+    for agent, of_agent in by_agent.items():
+        if _episodes(of_agent) != episodes:
+            raise ValueError(f"agents {agent!r} and {first_agent!r} have different episodes; resume the run")
+    bootstrap = StratifiedBootstrap({row["case"]: bool(row["threat"]) for row in by_agent[first_agent]})
+    results: list[ArmResult] = []
+    first_samples: np.ndarray | None = None
+    for arm in arms:
+        result, samples = _arm_result(arm, condition, by_agent, bootstrap)
+        if first_samples is None:
+            first_samples = samples
         else:
-            first = returns
-        found.append(arm)
-    return found
+            result = result._replace(difference=_difference(result, samples, results[0], first_samples))
+        results.append(result)
+    return results
 
 
-def interquartile_mean(values: Any) -> Any:
-    """Return the mean of the middle half along the last axis; of fewer than four values, of all.
-
-    Example:
-        >>> float(interquartile_mean([0.0, 1.0, 2.0, 3.0, 100.0]))
-        2.0
-    """
-    ordered = np.sort(np.asarray(values, dtype=np.float64), axis=-1)
-    cut = ordered.shape[-1] // 4
-    return ordered[..., cut : ordered.shape[-1] - cut].mean(axis=-1)
-
-
-class Draws:
-    """Bootstrap samples of cases, the same for all arms.
-
-    Args:
-        rows: Rows of one condition.
-        agent: Whose rows say which cases are threats.
-        count: Number of samples.
-    """
-
-    def __init__(self, rows: Sequence[Row], agent: str, count: int = DRAWS) -> None:
-        threat = {row["case"]: bool(row["threat"]) for row in rows if row["agent"] == agent}
-        self.cases = sorted(threat)
-        self.count = count
-        self._weights = np.zeros((count, len(self.cases)))
-        rng = np.random.default_rng(0)
-        for kind in (True, False):
-            chosen = np.array([threat[case] is kind for case in self.cases])
-            n = int(chosen.sum())
-            if n:
-                self._weights[:, chosen] = rng.multinomial(n, np.full(n, 1.0 / n), size=count)
-
-    def means(self, table: np.ndarray, seed: int) -> np.ndarray:
-        """Return means of sampled cases for sampled trainings, shape (samples, trainings).
-
-        Args:
-            table: A value per training and case, NaN where a case has none.
-            seed: Of the trainings' sampling.
-        """
-        has = np.isfinite(table[0])
-        weights = self._weights[:, has]
-        means = (weights @ table[:, has].T) / weights.sum(axis=1, keepdims=True)
-        picks = np.random.default_rng(seed).integers(len(table), size=means.shape)
-        return np.take_along_axis(means, picks, axis=1)
-
-
-def _judge(
-    name: str, condition: str, agents: list[str], rows: Sequence[Row], drawn: Draws
-) -> tuple[Arm, np.ndarray]:
-    """Return an arm and the samples of its return."""
-    told = {agent: [row for row in rows if row["agent"] == agent] for agent in agents}
-    table = _table(told, drawn.cases, RETURN)
-    means = table.mean(axis=1)
-    samples = interquartile_mean(drawn.means(table, seed=len(name)))
-    n = len(drawn.cases)
-    value = Estimate(float(interquartile_mean(means)), *_bounds(samples, len(agents)), n)
+def _arm_result(
+    arm: Arm, condition: str, by_agent: dict[str, list[Row]], bootstrap: StratifiedBootstrap
+) -> tuple[ArmResult, np.ndarray]:
+    """Return the result of an arm without its difference, and the bootstrap samples of its mean return."""
+    groups, seed = [by_agent[agent] for agent in arm.agents], len(arm.name)
+    returns = _case_means(groups, bootstrap.cases, RETURN)
+    means = returns.mean(axis=1)
+    samples = interquartile_mean(bootstrap.means(returns, seed))
+    bounds = _bounds(samples, len(groups))
     shares = {}
-    for key in SHARES:
-        table = _table(told, drawn.cases, key, threat=key != "false_activation")
-        if np.isfinite(table).any():
-            shares[key] = _share(table, drawn.means(table, seed=len(name)).mean(axis=1))
-    spread = (float(means.min()), float(means.max()))
-    return Arm(name, condition, len(agents), value, spread, None, shares), samples
+    for key, threats in SHARES.items():
+        values = _case_means(groups, bootstrap.cases, key, threats)
+        if np.isfinite(values).any():
+            shares[key] = _share(values, bootstrap.means(values, seed).mean(axis=1))
+    mean_return = Estimate(float(interquartile_mean(means)), *bounds, len(bootstrap.cases))
+    return_range = (float(means.min()), float(means.max()))
+    return ArmResult(arm.name, condition, len(groups), mean_return, return_range, None, shares), samples
 
 
-def _share(table: np.ndarray, samples: np.ndarray) -> Estimate:
-    """Return a share with the wider of its bootstrap and Wilson's interval, each case counted once.
+def _share(values: np.ndarray, samples: np.ndarray) -> Estimate:
+    """Return a share with the union of its bootstrap and Wilson intervals, one trial per case.
 
-    A bootstrap of shares that are all 0 or all 1 has no width; Wilson's knows nothing of trainings.
+    The bootstrap of shares that are all 0 or all 1 has no width. Wilson's interval does not include the
+    variation over trainings.
     """
-    n = int(np.isfinite(table[0]).sum())
-    value = float(np.nanmean(table))
-    low, high = _bounds(samples, len(table))
+    n = int(np.isfinite(values[0]).sum())
+    value = float(np.nanmean(values))
+    low, high = _bounds(samples, len(values))
     if low is None or high is None:
         return Estimate(value, None, None, n)
-    least, most = wilson(value * n, n)
-    return Estimate(value, min(low, least), max(high, most), n)
+    wilson_low, wilson_high = wilson(value * n, n)
+    return Estimate(value, min(low, wilson_low), max(high, wilson_high), n)
 
 
-def _difference(arm: Arm, samples: np.ndarray, first: Arm, others: np.ndarray) -> Estimate:
-    fewest = min((arm.trainings, first.trainings), key=lambda count: (not 1 < count < ENOUGH, count))
-    change = arm.returned.value - first.returned.value
-    return Estimate(change, *_bounds(samples - others, fewest), arm.returned.n)
+def _difference(
+    result: ArmResult, samples: np.ndarray, first: ArmResult, first_samples: np.ndarray
+) -> Estimate:
+    counts = (result.trainings, first.trainings)
+    fewest = min(counts, key=lambda count: (_has_interval(count), count))
+    value = result.mean_return.value - first.mean_return.value
+    return Estimate(value, *_bounds(samples - first_samples, fewest), result.mean_return.n)
+
+
+def _has_interval(trainings: int) -> bool:
+    return not 1 < trainings < MIN_TRAININGS
 
 
 def _bounds(samples: np.ndarray, trainings: int) -> tuple[float | None, float | None]:
-    if 1 < trainings < ENOUGH:
+    """Return the 95 % percentile interval; (None, None) for two to four trainings."""
+    if not _has_interval(trainings):
         return None, None
     low, high = np.percentile(samples, (2.5, 97.5))
     return float(low), float(high)
 
 
-def _table(told: dict[str, list[Row]], cases: list[str], key: str, threat: bool | None = None) -> np.ndarray:
-    """Return the mean of a key per agent and case, NaN for none; of threats or quiet episodes if asked."""
-    table = np.full((len(told), len(cases)), np.nan)
-    for line, rows in zip(table, told.values(), strict=True):
+def _case_means(
+    groups: Sequence[Sequence[Row]], cases: Sequence[str], key: str, threats: bool | None = None
+) -> np.ndarray:
+    """Return the mean of a row key per agent and case; NaN without a value.
+
+    Args:
+        groups: Rows of each agent.
+        cases: Names of the cases.
+        key: Key of the rows.
+        threats: Restricts the rows to threats or to non-threats; None for all.
+    """
+    means = np.full((len(groups), len(cases)), np.nan)
+    for line, rows in zip(means, groups, strict=True):
         values: dict[str, list[float]] = {}
         for row in rows:
-            if row[key] is not None and threat in (None, row["threat"]):
+            if row[key] is not None and threats in (None, row["threat"]):
                 values.setdefault(row["case"], []).append(float(row[key]))
-        for case, found in values.items():
-            line[cases.index(case)] = np.mean(found)
-    return table
+        for case, of_case in values.items():
+            line[cases.index(case)] = np.mean(of_case)
+    return means
 
 
-def _key(row: Row) -> tuple[str, int]:
-    return row["case"], row["seed"]
-
-
-def _members(arms: Sequence[str], agents: list[str]) -> list[tuple[str, list[str]]]:
-    """Return each arm's name and agents."""
-    found = []
-    for arm in arms:
-        name, _, pattern = arm.partition("=")
-        members = [agent for agent in agents if name and fnmatchcase(agent, pattern)]
-        if arm in agents:
-            name, members = arm, [arm]
-        if not members:
-            raise unknown_name("arm (an agent of the run, or name=pattern)", arm, agents)
-        found.append((name, members))
-    return found
+def _episodes(rows: Sequence[Row]) -> list[tuple[str, int]]:
+    return sorted((row["case"], row["seed"]) for row in rows)

@@ -1,0 +1,95 @@
+"""Coloured grids of the Euro NCAP suites: ego speed by overlap, or by target speed."""
+
+import re
+from typing import NamedTuple
+
+from lgmd_gym.benchmark.analysis.ncap_points import OVERLAP_WEIGHTS, REAR_CASE, ROW_COLOURS
+from lgmd_gym.benchmark.analysis.protocol_limits import relative_impact
+from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.envs.dynamics.units import KMH
+
+CROSSING_CASE = re.compile(r"/CCCscp/(?:v(?P<speed>\d+)|from-stop)/target(?P<target>\d+)$")
+AXES = {"overlap": "overlap [%]", "location": "impact location [%]", "target": "target speed [km/h]"}
+OVERLAPS = tuple(OVERLAP_WEIGHTS)
+
+
+class GridCell(NamedTuple):
+    """Cell of a grid.
+
+    Attributes:
+        colour: CSS class of the colour.
+        text: Highest relative impact speed [km/h]; "*" marks premature braking.
+        tooltip: Name of the case and number of contacts.
+    """
+
+    colour: str
+    text: str
+    tooltip: str
+
+
+class CaseGrid(NamedTuple):
+    """Grid of one scenario family and one agent.
+
+    Attributes:
+        title: Family and agent.
+        axis: Quantity of the columns.
+        columns: Column headings.
+        lines: Row heading and one cell per column; None where the suite has no case.
+    """
+
+    title: str
+    axis: str
+    columns: list[int]
+    lines: list[tuple[str, list[GridCell | None]]]
+
+
+def case_grids(rows: list[Row], agent: str, suite: str) -> list[CaseGrid]:
+    """Return the grids of an agent in a Euro NCAP suite; none for other suites."""
+    if suite not in ROW_COLOURS:
+        return []
+    grids: dict[tuple[str, str], dict[tuple[str, int], list[Row]]] = {}
+    for row in rows:
+        position = _position(row["case"])
+        if row["agent"] == agent and row["error"] is None and position is not None:
+            family, axis, head, column = position
+            grids.setdefault((family, axis), {}).setdefault((head, column), []).append(row)
+    return [_grid(agent, family, axis, cells, suite) for (family, axis), cells in sorted(grids.items())]
+
+
+def _position(case: str) -> tuple[str, str, str, int] | None:
+    """Return family, axis, row heading and column of a case; None for a case without a grid."""
+    if rear := REAR_CASE.search(case):
+        head = rear["speed"] + (" warned" if rear["warned"] else "")
+        return rear["family"], rear["axis"], head, int(rear["place"])
+    if crossing := CROSSING_CASE.search(case):
+        return "CCCscp", "target", crossing["speed"] or "from stop", int(crossing["target"])
+    return None
+
+
+def _grid(
+    agent: str, family: str, axis: str, cells: dict[tuple[str, int], list[Row]], suite: str
+) -> CaseGrid:
+    heads = sorted({head for head, _ in cells}, key=_head_speed)
+    columns = sorted({column for _, column in cells})
+    if axis == "overlap":
+        columns.sort(key=OVERLAPS.index)
+    lines = [(head, [_cell(cells.get((head, column)), suite) for column in columns]) for head in heads]
+    return CaseGrid(f"{family}: {agent}", AXES[axis], columns, lines)
+
+
+def _cell(rows: list[Row] | None, suite: str) -> GridCell | None:
+    """Return the cell of one case, with the colour of its worst seed."""
+    if rows is None:
+        return None
+    worst = max(rows, key=relative_impact)
+    contacts = sum(bool(row["collision"]) for row in rows)
+    premature = sum(bool(row["premature_brake"]) for row in rows)
+    text = f"{relative_impact(worst) / KMH:.0f}" if contacts else "0" + ("*" if premature else "")
+    tooltip = f"{worst['case']}: contact in {contacts} of {len(rows)} seeds, premature braking in {premature}"
+    return GridCell(ROW_COLOURS[suite](worst), text, tooltip)
+
+
+def _head_speed(head: str) -> int:
+    """Return the speed in a row heading [km/h]; 0 from stop."""
+    digits = head.split()[0]
+    return int(digits) if digits.isdigit() else 0

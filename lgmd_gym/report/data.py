@@ -1,0 +1,60 @@
+"""Contents of a run folder, as the report reads them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
+from lgmd_gym.benchmark.folder import read_rows, read_series, read_settings
+from lgmd_gym.benchmark.rows import Row, key_of, series_name
+from lgmd_gym.benchmark.suite_file import get_suite
+from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.report.images import CapturedFrame, capture_frames
+
+
+@dataclass(frozen=True)
+class ReportData:
+    """Contents of a run folder.
+
+    Attributes:
+        path: The folder.
+        config: Configuration of the run.
+        settings: Contents of `run.json`.
+        suite: Name of the suite.
+        rows: Rows of the run.
+        agents: `no-brake` and the agents of the configuration.
+        cases: Cases of the suite by name.
+    """
+
+    path: Path
+    config: RunConfig
+    settings: dict[str, Any]
+    suite: str
+    rows: list[Row]
+    agents: list[str]
+    cases: dict[str, Case]
+
+    @classmethod
+    def load(cls, path: Path) -> "ReportData":
+        """Read a run folder.
+
+        Raises:
+            ValueError: If the folder holds no run, or a damaged one.
+        """
+        rows, config = read_rows(path)[0], RunConfig.load(path / RUN_FILE)
+        suite = get_suite(config.suite)
+        agents = list(dict.fromkeys([NO_BRAKE, *config.agents]))
+        cases = {case.name: case for case in suite.cases}
+        return cls(path, config, read_settings(path), suite.name, rows, agents, cases)
+
+    def series(self, row: Row) -> dict[str, np.ndarray] | None:
+        """Return the time series of a row; None if they are not stored."""
+        return read_series(self.path, series_name(key_of(row)))
+
+    def frames(self, row: Row, decisions: dict[str, int]) -> list[CapturedFrame]:
+        """Return camera frames of a row's episode, see `capture_frames`."""
+        sensor_config = self.config.sensor_config.with_condition(row["condition"])
+        return capture_frames(self.cases[row["case"]], row["agent"], row["seed"], sensor_config, decisions)

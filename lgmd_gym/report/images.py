@@ -1,0 +1,82 @@
+"""Images as data URIs: figures, and camera frames of an episode."""
+
+import base64
+import io
+from collections.abc import Callable, Mapping
+from typing import Any, BinaryIO, NamedTuple
+
+import numpy as np
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.episode import make_env, rollout
+from lgmd_gym.benchmark.metrics import brake_onset
+from lgmd_gym.benchmark.sensors import SensorConfig
+
+
+class CapturedFrame(NamedTuple):
+    """Camera frame as a data URI, and its caption."""
+
+    uri: str
+    caption: str
+
+
+def figure_uri(draw: Callable[[BinaryIO], Any]) -> str:
+    """Return the SVG that a function writes to a file, as a data URI."""
+    file = io.BytesIO()
+    draw(file)
+    return f"data:image/svg+xml;base64,{base64.b64encode(file.getvalue()).decode()}"
+
+
+def frame_uri(frame: np.ndarray) -> str:
+    """Return a grey frame as the data URI of a PNG.
+
+    Args:
+        frame: uint8, shape (height, width).
+    """
+    from PIL import Image
+
+    file = io.BytesIO()
+    Image.fromarray(frame).save(file, "PNG", optimize=True)
+    return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
+
+
+def key_decisions(series: Mapping[str, np.ndarray]) -> dict[str, int]:
+    """Return the indices of the start, the first alert, the onset of braking and the end, by caption."""
+    alerts = np.flatnonzero(series["alert"])
+    onset = brake_onset(series["deceleration"])
+    decisions = {"start": 0}
+    if alerts.size:
+        decisions["first alert"] = int(alerts[0])
+    if onset is not None:
+        decisions["braking begins"] = onset
+    return decisions | {"end": len(series["time"]) - 1}
+
+
+def capture_frames(
+    case: Case, agent: str, seed: int, sensor_config: SensorConfig, decisions: Mapping[str, int]
+) -> list[CapturedFrame]:
+    """Repeat an episode and return frames of the first camera.
+
+    Args:
+        case: Case without a warned driver.
+        agent: Agent string.
+        seed: Seed of the environment and the agent.
+        sensor_config: Camera and neuron parameters.
+        decisions: Index of the decision of each frame, by caption.
+    """
+    actor = make_agent(agent)
+    env = make_env(case, sensor_config.for_agent(actor))
+    frames, last = [], max(decisions.values())
+    try:
+        for decision, (step, _) in enumerate(rollout(env, actor, seed)):
+            if labels := [label for label, index in decisions.items() if index == decision]:
+                time = decision / env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
+                gap = f", gap {step.info['gap']:.1f} m" if np.isfinite(step.info["gap"]) else ""
+                frame = next(iter(env.get_wrapper_attr("frames").values()))
+                frames.append(CapturedFrame(frame_uri(frame), f"{' / '.join(labels)}: {time:.2f} s{gap}"))
+            if decision == last:
+                break
+    finally:
+        env.close()
+    return frames
