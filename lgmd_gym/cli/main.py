@@ -28,7 +28,6 @@ Arguments are in SI units; case names contain speeds in km/h. Every command has 
 COMMANDS: dict[str, type] = {
     "bench": options.Bench,
     "compare": options.Compare,
-    "judge": options.Judge,
     "drive": options.Drive,
     "video": options.Video,
     "paper": options.Paper,
@@ -39,7 +38,7 @@ COMMANDS: dict[str, type] = {
     "doctor": options.Doctor,
 }
 
-_MODULES = {"compare": "bench", "judge": "bench", "video": "paper"}
+_MODULES = {"video": "paper"}
 
 
 def main(argv: list[str] | None = None) -> None:
