@@ -26,6 +26,7 @@ from lgmd_gym.cli import main as cli
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.random_braking import RandomBrakingEnv
 from lgmd_gym.envs.traffic.env import TrafficEnv
+from lgmd_gym.envs.traffic.registration import traffic_id
 from lgmd_gym.gallery.docstrings import About
 from lgmd_gym.gallery.scenes import Scene, film, find_scenes
 
@@ -65,7 +66,7 @@ def environment_page(scene: Scene) -> str:
     if scene.judged:
         example = f'gym.make("lgmd_gym:{scene.target}")'
     else:
-        example = f'lgmd_gym.envs.traffic.registration.make_traffic("{scene.name}")'
+        example = f'gym.make("lgmd_gym:{traffic_id(scene.name)}")'
     parts = [
         f"# {scene.target}",
         scene.about.lead,

@@ -1,6 +1,6 @@
-"""Braking scenarios on highway-env, imported as `lgmd_gym.envs`.
+"""Braking and traffic environments on highway-env, imported as `lgmd_gym.envs`.
 
-Importing this package registers nothing and loads no highway-env; `import lgmd_gym` registers the ids.
+`import lgmd_gym` registers the environment ids. Importing this package does not load highway-env.
 """
 
 from importlib import import_module
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from lgmd_gym.envs.dynamics.path import Bend
     from lgmd_gym.envs.dynamics.speed_profile import Segment
     from lgmd_gym.envs.registration import env_id, register_envs
-    from lgmd_gym.envs.scenarios.catalogue import FAMILIES, make_scenario
+    from lgmd_gym.envs.scenarios import FAMILIES, make_scenario
     from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
 
 __all__ = [
@@ -27,10 +27,10 @@ __all__ = [
     "register_envs",
 ]
 
-_HOMES = {
+_MODULES = {
     "BrakingEnv": "braking",
-    "FAMILIES": "scenarios.catalogue",
-    "make_scenario": "scenarios.catalogue",
+    "FAMILIES": "scenarios",
+    "make_scenario": "scenarios",
     "env_id": "registration",
     "register_envs": "registration",
     "Actor": "scenarios.scenario",
@@ -42,6 +42,6 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

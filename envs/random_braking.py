@@ -1,4 +1,4 @@
-"""`RandomBrakingEnv`: a new scenario at every reset, out of a split of numbered levels."""
+"""`RandomBrakingEnv`: a random scenario at every reset, from numbered levels."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,35 +8,35 @@ from lgmd_gym.envs.scenarios.distribution import (
     CONDITIONS,
     LEVELS,
     check_levels,
+    draw_camera_fields,
     draw_scenario,
-    draw_view,
     level_generator,
 )
 
 
 class RandomBrakingEnv(BrakingEnv):
-    """A braking environment whose scenario is drawn at every reset.
+    """A braking environment that draws a random scenario at every reset.
 
     ## Description
 
-    Half of the levels are threats (CCRs, CCRm, CCRb, CCCscp), the others driving in which braking is the
-    fault (all other families); speed, gap, offset, side and shade are drawn with them, and for the eye a
-    condition (night, fog, …) and how grainy the ground is. A level number fixes everything, in any process.
-    Resets without a seed draw levels of the split only, so that training never sees a level of validation
-    or test; `info["level"]` and `info["condition"]` tell what was drawn.
+    A level is a random scenario with a number. Half of the levels are threats (CCRs, CCRm, CCRb, CCCscp),
+    half are non-threats (all other families). A level fixes the family and its arguments, the body greys, the
+    camera condition (night, fog, …) and the contrast of the road texture, in every process. The splits are
+    disjoint: training never uses a level of validation or test. The environment's seed selects the levels;
+    `info` adds `level` (the number) and `condition` (the camera condition).
 
     ## Arguments
 
     Args:
-        split: "train", "validation" or "test": a million levels each.
+        split: Set of levels: "train", "validation" or "test", with 1,000,000 levels each.
         start_level: First level in use.
-        num_levels: How many from there on; 0 for all that are left.
-        conditions: Camera conditions to draw from, each as likely: "clear", "night", "fog", "degraded".
+        num_levels: Number of levels in use; 0 for all from `start_level` on.
+        conditions: Camera conditions, drawn with equal probability: "clear", "night", "fog", "degraded".
         config: See `BrakingEnv`.
         render_mode: See `BrakingEnv`.
 
     Raises:
-        ValueError: For an unknown split or condition, or levels beyond the split.
+        ValueError: If the split or a condition is unknown, or levels are outside the split.
     """
 
     def __init__(
@@ -56,15 +56,12 @@ class RandomBrakingEnv(BrakingEnv):
         super().__init__(first, config=config, render_mode=render_mode)
 
     def _reset(self) -> None:
-        """Draw a level and build its scene."""
         self.level = self.start_level + int(self.np_random.integers(self.num_levels))
         rng = level_generator(self.split, self.level)
         self.scenario = draw_scenario(rng)
-        self.camera_fields = draw_view(self.split, self.level, self.conditions)
+        self.camera_fields = draw_camera_fields(self.split, self.level, self.conditions)
         self._build(rng)
 
     def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
-        return super()._info(obs, action) | {
-            "level": self.level,
-            "condition": self.camera_fields["condition"],
-        }
+        info = super()._info(obs, action)
+        return info | {"level": self.level, "condition": self.camera_fields["condition"]}

@@ -1,35 +1,15 @@
-"""The ids `LGMD/<family>-v0`, each registered to a factory that returns the environment already wrapped."""
+"""Registration of the braking environments with Gymnasium."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 
-FACTORY = "lgmd_gym.envs.registration:make_observed"
-# Named here so that registering imports neither highway-env nor its pandas; a test holds it against FAMILIES.
-IDS = (
-    "CCRs",
-    "CCRm",
-    "CCRb",
-    "CCCscp",
-    "Following",
-    "BrakeRelease",
-    "AdjacentPass",
-    "PassBetween",
-    "Overtaken",
-    "Oncoming",
-    "CutIn",
-    "CutOut",
-    "EmptyRoad",
-    "SteelPlate",
-    "BridgeShadow",
-    "PedestrianPass",
-    "CurveGuardRail",
-    "CrossingClears",
-    "TurnBeforeOncoming",
-    "LeadTurnsOff",
-    "CurveObjectOutside",
-    "LaneClosure",
-)
+from lgmd_gym.envs.scenarios import FAMILIES, make_scenario
+
+if TYPE_CHECKING:
+    from lgmd_gym.camera import CameraSpec
+    from lgmd_gym.neuron import NeuronSpec
+
 RANDOM = "RandomBraking"
 
 
@@ -39,16 +19,17 @@ def env_id(family: str) -> str:
 
 
 def register_envs() -> None:
-    """Register every id with Gymnasium; calling it again changes nothing."""
-    for family in (*IDS, RANDOM):
+    """Register `LGMD/<family>-v0` for every scenario family and `LGMD/RandomBraking-v0`; idempotent."""
+    for family in (*FAMILIES, RANDOM):
         if env_id(family) not in gym.registry:
-            gym.register(env_id(family), entry_point=FACTORY, kwargs={"family": family})
+            entry_point = f"{__name__}:make_braking"
+            gym.register(env_id(family), entry_point=entry_point, kwargs={"family": family})
 
 
-def make_observed(
+def make_braking(
     family: str,
-    camera: Any = "fovea",
-    params: Any = None,
+    camera: "CameraSpec | None" = "fovea",
+    params: "NeuronSpec | None" = None,
     fps: float | None = None,
     include_frame: bool = False,
     include_base: bool = False,
@@ -57,12 +38,12 @@ def make_observed(
     render_mode: str | None = None,
     **arguments: Any,
 ) -> gym.Env:
-    """Return a braking environment inside `LGMDObservation`, or bare for `camera=None`.
+    """Return a braking environment inside `LGMDObservation`, or without it for `camera=None`.
 
     Args:
-        family: A name in `FAMILIES` for `BrakingEnv`, or "RandomBraking" for `RandomBrakingEnv`.
-        camera: See `LGMDObservation`; plain values, so that an `EnvSpec` survives JSON. None for no eye,
-            as for `lgmd_gym.wrappers.vector.LGMDObservation`, which brings one for the whole batch.
+        family: A scenario family for `BrakingEnv`, or "RandomBraking" for `RandomBrakingEnv`.
+        camera: See `LGMDObservation`; None for no camera, as required by the vectorized
+            `lgmd_gym.wrappers.vector.LGMDObservation`.
         params: See `LGMDObservation`.
         fps: See `LGMDObservation`.
         include_frame: See `LGMDObservation`.
@@ -70,15 +51,14 @@ def make_observed(
         trace: See `LGMDObservation`.
         config: Configuration of `BrakingEnv`.
         render_mode: None, "rgb_array" or "human".
-        **arguments: The family's own arguments, in SI units, and `condition`, the light and weather by name,
-            laid over the camera: "clear", "night", "fog" or "degraded"; or those of `RandomBrakingEnv`.
+        **arguments: Arguments of the family in SI units, and `condition`, the camera condition: "clear",
+            "night", "fog" or "degraded". For "RandomBraking", arguments of `RandomBrakingEnv`.
 
     Raises:
-        ValueError: For an unknown argument, key or name (the nearest is named), or a value out of its range.
+        ValueError: If an argument, key or name is unknown, or a value is out of range.
     """
     from lgmd_gym.envs.braking import BrakingEnv
     from lgmd_gym.envs.random_braking import RandomBrakingEnv
-    from lgmd_gym.envs.scenarios.catalogue import make_scenario
     from lgmd_gym.envs.scenarios.distribution import CLEAR, check_conditions
     from lgmd_gym.errors import check_keys
 
@@ -86,21 +66,18 @@ def make_observed(
         check_keys(f"argument of {RANDOM}", arguments, ("split", "start_level", "num_levels", "conditions"))
         env = RandomBrakingEnv(**arguments, config=config, render_mode=render_mode)
     else:
-        condition = arguments.pop("condition", "clear")
+        condition = arguments.pop("condition", CLEAR)
         check_conditions([condition])
         env = BrakingEnv(make_scenario(family, **arguments), config=config, render_mode=render_mode)
-        if condition != CLEAR:  # which would only build the same cameras again
+        if condition != CLEAR:
             env.camera_fields["condition"] = condition
+    return with_camera(env, camera, params, fps, include_frame, include_base, trace)
+
+
+def with_camera(env: gym.Env, camera: "CameraSpec | None", *observation: Any) -> gym.Env:
+    """Return `env` inside `LGMDObservation` with the remaining arguments, or `env` for `camera=None`."""
     if camera is None:
         return env
     from lgmd_gym.wrappers.observation import LGMDObservation
 
-    return LGMDObservation(
-        env,
-        camera=camera,
-        params=params,
-        fps=fps,
-        include_frame=include_frame,
-        include_base=include_base,
-        trace=trace,
-    )
+    return LGMDObservation(env, camera, *observation)

@@ -1,10 +1,10 @@
-"""The reward: get along, do not touch, do not brake or jerk without need."""
+"""Reward of the braking environments: progress, minus contact, needless braking and jerk."""
 
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
-from lgmd_gym.envs import surrogate_safety as measures
 from lgmd_gym.envs.dynamics.units import check_within
+from lgmd_gym.envs.surrogate_safety import time_to_contact
 
 if TYPE_CHECKING:
     from lgmd_gym.envs.braking import BrakingEnv
@@ -12,16 +12,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RewardParams:
-    """Weights of the reward, each >= 0.
+    """Weights of the reward, each >= 0; see `BrakingEnv` for the formula.
 
     Attributes:
-        contact: Cost of touching at all.
-        impact: Further cost of a contact at the ego's scripted speed; falls with the square of the
-            relative impact speed, as the energy does.
-        progress: Gain per second at the scripted speed.
-        brake: Cost per second of full braking while no contact is within `need_ttc`.
-        jerk: Cost per change of the acceleration by its full range.
-        need_ttc: Time to contact below which braking is free [s]; the protocols' T0.
+        contact: Cost of a contact.
+        impact: Additional cost of a contact at a relative impact speed equal to the scripted speed;
+            proportional to the square of the relative impact speed, as the energy is.
+        progress: Gain per second at the scripted speed [1/s].
+        brake: Cost of full braking while no contact is within `need_ttc` [1/s].
+        jerk: Cost of a change of the acceleration by `max_deceleration`.
+        need_ttc: Time to contact below which braking has no cost [s]; T0 of the protocols.
     """
 
     contact: float = 10.0
@@ -37,13 +37,13 @@ class RewardParams:
 
 
 def step_reward(env: "BrakingEnv", params: RewardParams, speed: float, acceleration: float) -> float:
-    """Return the reward of the decision that has just been played.
+    """Return the reward of the last decision.
 
     Args:
-        env: After the step.
-        params: The weights.
-        speed: The ego's speed before the step [m/s].
-        acceleration: The ego's acceleration before the step [m/s²].
+        env: The environment after the step.
+        params: Weights.
+        speed: Ego speed before the step [m/s].
+        acceleration: Ego acceleration before the step [m/s²].
     """
     ego, contact = env.ego, env.road.contact
     scripted = env.scenario.top_speed
@@ -52,8 +52,6 @@ def step_reward(env: "BrakingEnv", params: RewardParams, speed: float, accelerat
     reward -= params.jerk * abs(ego.acceleration - acceleration) / ego.brake.max_deceleration
     if contact is not None:
         return reward - params.contact - params.impact * (contact.relative_impact_speed / scripted) ** 2
-    if ego.braking > 0.0:
-        ttc = measures.time_to_contact(ego, env.road.obstacles)
-        if not ttc < params.need_ttc:
-            reward -= params.brake * dt * ego.braking / ego.brake.max_deceleration
+    if ego.braking > 0.0 and time_to_contact(ego, env.road.obstacles) >= params.need_ttc:
+        reward -= params.brake * dt * ego.braking / ego.brake.max_deceleration
     return reward

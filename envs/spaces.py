@@ -1,6 +1,6 @@
-"""What goes in and out of `BrakingEnv`: a longitudinal demand, and the ego's own state."""
+"""Action and observation types of `BrakingEnv`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -17,69 +17,69 @@ if TYPE_CHECKING:
 
 
 class ContinuousDemand(ActionType):
-    """One number in [-1, 1]: −1 full brake, 0 hold the scripted speed, +1 full throttle."""
+    """A longitudinal demand in [-1, 1]: −1 full brake, 0 hold the scripted speed, +1 full throttle."""
 
-    def space(self) -> spaces.Box:
+    def space(self) -> spaces.Space:
         """Return Box(-1, 1, (1,), float32)."""
         return spaces.Box(-1.0, 1.0, shape=(1,), dtype=np.float32)
 
     @property
     def vehicle_class(self) -> Callable:
-        """The class of the car that takes the demand."""
+        """Class of the controlled car."""
         return EgoCar
 
     def act(self, action: Any) -> None:
-        """Pass the demand on to the ego; what lies beyond [-1, 1] is clipped.
+        """Set the demand of the ego, clipped to [-1, 1].
 
         Raises:
-            ValueError: For an action that is not one finite number.
+            ValueError: If the action is not one finite number.
         """
         values = np.asarray(action, dtype=np.float64).reshape(-1)
         if values.size != 1 or not np.isfinite(values[0]):
-            raise ValueError(f"an action is one finite number in [-1, 1], got {action!r}")
+            raise ValueError(f"action must be one finite number in [-1, 1], got {action!r}")
         cast(EgoCar, self.controlled_vehicle).demand(min(max(float(values[0]), -1.0), 1.0))
 
 
-class DiscreteDemand(ActionType):
-    """An index into `levels`, each a longitudinal demand in [-1, 1]."""
+class DiscreteDemand(ContinuousDemand):
+    """An index into a list of longitudinal demands.
 
-    def __init__(self, env: "BrakingEnv", levels: tuple[float, ...] = (0.0, -0.5, -1.0)) -> None:
+    Args:
+        env: The environment.
+        demands: Demands in [-1, 1], one per action.
+    """
+
+    def __init__(self, env: "BrakingEnv", demands: Sequence[float] = (0.0, -0.5, -1.0)) -> None:
         super().__init__(env)
-        if not levels:
-            raise ValueError("levels needs at least one demand in [-1, 1], got none")
-        self.levels = tuple(check_within("levels", level, -1.0, 1.0) for level in levels)
+        if not demands:
+            raise ValueError("demands must hold at least one number in [-1, 1], got none")
+        self.demands = tuple(check_within("demands", demand, -1.0, 1.0) for demand in demands)
 
-    def space(self) -> spaces.Discrete:
-        """Return Discrete(len(levels))."""
-        return spaces.Discrete(len(self.levels))
-
-    @property
-    def vehicle_class(self) -> Callable:
-        """The class of the car that takes the demand."""
-        return EgoCar
+    def space(self) -> spaces.Space:
+        """Return Discrete(len(demands))."""
+        return spaces.Discrete(len(self.demands))
 
     def act(self, action: Any) -> None:
-        """Pass the chosen level on to the ego.
+        """Set the demand of the ego.
 
         Raises:
-            ValueError: For an index outside the levels.
+            ValueError: If the index is out of range.
         """
-        if not 0 <= int(action) < len(self.levels):
-            raise ValueError(f"a discrete action is an index in [0, {len(self.levels) - 1}], got {action!r}")
-        cast(EgoCar, self.controlled_vehicle).demand(self.levels[int(action)])
+        if not 0 <= int(action) < len(self.demands):
+            raise ValueError(f"action must be an index in [0, {len(self.demands) - 1}], got {action!r}")
+        cast(EgoCar, self.controlled_vehicle).demand(self.demands[int(action)])
 
 
 class EgoState(ObservationType):
-    """What a car's own sensors tell: speed [m/s], acceleration [m/s²], yaw rate [rad/s, + right]."""
+    """Ego speed [m/s], acceleration [m/s²] and yaw rate [rad/s, + right]."""
 
-    def space(self) -> spaces.Box:
-        """Return a Box of shape (3,), float32, with the true bounds."""
+    def space(self) -> spaces.Space:
+        """Return a float32 Box of shape (3,) with the exact bounds."""
         high = np.array([MAX_SPEED + 1.0, 12.0, np.pi], dtype=np.float32)
         low = np.array([0.0, -12.0, -np.pi], dtype=np.float32)
         return spaces.Box(low, high, dtype=np.float32)
 
     def observe(self) -> np.ndarray:
-        """Return the present state."""
+        """Return the current state, float32, shape (3,)."""
         if self.env.vehicle is None:
             return np.zeros(3, dtype=np.float32)
         ego = cast(EgoCar, self.env.vehicle)
@@ -90,11 +90,15 @@ ACTIONS = {"ContinuousDemand": ContinuousDemand, "DiscreteDemand": DiscreteDeman
 
 
 def make_action(env: "BrakingEnv", config: dict[str, Any]) -> ActionType:
-    """Return the action type that `config["action"]` names, with its own keys checked."""
+    """Return the action type for `config["action"]`.
+
+    Raises:
+        ValueError: If the type or a key is unknown, or a value is out of range.
+    """
     arguments = dict(config)
     name = arguments.pop("type", None)
     if name not in ACTIONS:
         raise unknown_name("action type", name, ACTIONS)
-    known = {"levels"} if name == "DiscreteDemand" else set()
+    known = {"demands"} if name == "DiscreteDemand" else set()
     check_keys(f"key of config['action'] for {name}", arguments, known)
     return ACTIONS[name](env, **arguments)

@@ -1,6 +1,6 @@
 """Gymnasium environments where a highway-env car brakes on the spike frequency of a locust looming neuron.
 
-Importing this package registers the `LGMD/…` ids and loads nothing heavy; names load on first use.
+Importing this package registers the `LGMD/…` ids. Heavy modules are imported on first use of a name.
 """
 
 from importlib import import_module
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from lgmd_gym._version import __version__
 from lgmd_gym.envs.registration import register_envs
+from lgmd_gym.envs.traffic.registration import register_traffic
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import BirdsEye, CameraParams, EgoCamera
@@ -27,7 +28,7 @@ __all__ = [
     "__version__",
 ]
 
-_HOMES = {
+_MODULES = {
     "LGMD": "neuron",
     "LGMDParams": "neuron",
     "Response": "neuron",
@@ -39,9 +40,10 @@ _HOMES = {
 }
 
 register_envs()
+register_traffic()
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

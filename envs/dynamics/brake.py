@@ -1,4 +1,4 @@
-"""The ego's brake: a demand waits out the latency and dead time, then the deceleration builds up."""
+"""The ego's brake: latency and dead time, then a linear build-up of the deceleration."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -9,15 +9,17 @@ from lgmd_gym.envs.dynamics.units import check_within
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BrakeParams:
-    """How the ego answers a demand; defaults as in the project's scenario contract.
+    """Response of the ego to a longitudinal demand.
 
     Attributes:
-        max_deceleration: Full braking [m/s²]; 9.0 is what a dry road with PBC 0.9 gives.
+        max_deceleration: Full braking [m/s²]; 9.0 is typical of a dry road with a peak braking coefficient
+            of 0.9.
         max_acceleration: Full throttle [m/s²].
-        latency: From the end of a camera frame to the demand at the brake [s]; one frame at 30 Hz.
-        dead_time: From the demand to the first deceleration [s].
-        build_up: From the first to the full deceleration, a linear ramp [s].
-        regain_acceleration: The scripted driver regains the scripted speed at most this hard [m/s²].
+        latency: Time from the end of a camera frame to the demand at the brake [s]; one frame at 30 Hz.
+        dead_time: Time from the demand to the first deceleration [s].
+        build_up: Time from the first to the full deceleration, a linear ramp [s].
+        regain_acceleration: Limit of the acceleration with which the driver regains the scripted speed
+            [m/s²].
     """
 
     max_deceleration: float = 9.0
@@ -42,37 +44,41 @@ class BrakeParams:
 
     @property
     def delay(self) -> float:
-        """From a demand to the first change of acceleration [s]."""
+        """Time from a demand to the first change of acceleration [s]."""
         return self.latency + self.dead_time
 
 
 class DelayLine:
-    """Holds demands until their time has come, to the exact moment inside a simulation step."""
+    """A queue that delays demands by a constant time, which need not be a multiple of the simulation step.
+
+    Args:
+        delay: Delay of every demand [s].
+    """
 
     def __init__(self, delay: float) -> None:
         self.delay = delay
         self.time = 0.0
         self.demand = 0.0
         self._last_put = 0.0
-        self._waiting: deque[tuple[float, float]] = deque()
+        self._pending: deque[tuple[float, float]] = deque()
 
     def put(self, demand: float) -> None:
-        """Take a demand in [-1, 1] at the present time."""
+        """Add a demand in [-1, 1] at the current time."""
         if demand != self._last_put:
             self._last_put = demand
-            self._waiting.append((self.time + self.delay, demand))
+            self._pending.append((self.time + self.delay, demand))
 
-    def pieces(self, dt: float) -> list[tuple[float, float]]:
-        """Advance by `dt` and return the (duration, demand) pieces in force meanwhile."""
+    def advance(self, dt: float) -> list[tuple[float, float]]:
+        """Advance by `dt` [s] and return (duration [s], active demand) for each part of that time."""
         end = self.time + dt
-        pieces = []
+        parts = []
         # A demand due within a nanosecond of the step's end belongs to the next step.
-        while self._waiting and self._waiting[0][0] < end - 1e-9:
-            due, demand = self._waiting.popleft()
+        while self._pending and self._pending[0][0] < end - 1e-9:
+            due, demand = self._pending.popleft()
             if due > self.time:
-                pieces.append((due - self.time, self.demand))
+                parts.append((due - self.time, self.demand))
                 self.time = due
             self.demand = demand
-        pieces.append((end - self.time, self.demand))
+        parts.append((end - self.time, self.demand))
         self.time = end
-        return pieces
+        return parts

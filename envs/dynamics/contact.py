@@ -1,15 +1,19 @@
-"""When do two rectangles touch? A swept separating-axis test, exact for straight relative motion.
+"""Contact of rectangles: a swept separating-axis test, exact for straight relative motion.
 
-highway-env tests the polygons after the step (and looks one step ahead), so it sees the contact speed up to
-one step late and flags cars that stop a millimetre short. Here the first touch is found inside the step.
+highway-env tests polygons after each step and looks one step ahead. It reports contact speeds up to one step
+late and flags cars that stop a millimetre short. These functions find the first touch inside the step.
 """
 
+from collections.abc import Sequence
 from math import cos, hypot, inf, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+END = 0.25  # [m] from an end of the ego within which a touch belongs to that end
+TOLERANCE = 0.02  # [m] by which a corner may be farther away than the nearest one and still touch
 
 
 class Rectangle(NamedTuple):
-    """A box seen from above, in highway-env's axes (y to the right of a car that heads along x)."""
+    """The outline of a road object from above, in highway-env's axes (y to the right of a car along x)."""
 
     x: float  # centre [m]
     y: float  # centre [m]
@@ -17,27 +21,58 @@ class Rectangle(NamedTuple):
     length: float  # [m]
     width: float  # [m]
 
-    @property
-    def reach(self) -> float:
-        """From the centre to a corner [m]."""
-        return hypot(self.length, self.width) / 2
+
+class Contact(NamedTuple):
+    """The ego's first contact.
+
+    Attributes:
+        other: Vehicle or obstacle in contact with the ego.
+        side: Part of the ego in contact: "front" (bumper with its corners), "rear" or "side".
+        impact_speed: Ego speed at the contact [m/s].
+        relative_impact_speed: Ego speed minus the other's speed along the ego's heading [m/s].
+    """
+
+    other: Any
+    side: str
+    impact_speed: float
+    relative_impact_speed: float
+
+    @classmethod
+    def between(cls, ego: Any, other: Any) -> "Contact":
+        """Return the contact of two road objects that touch now."""
+        side = touched_side(outline(ego), outline(other))
+        return cls(other, side, float(ego.speed), float(ego.speed) - speed_along(ego, other))
 
 
-def first_touch(moving: Rectangle, standing: Rectangle, dx: float, dy: float) -> float | None:
-    """Return the fraction of the way at which `moving` first touches `standing`.
+def outline(item: Any) -> Rectangle:
+    """Return the outline of a highway-env vehicle or road object."""
+    x, y = item.position
+    return Rectangle(float(x), float(y), float(item.heading), item.LENGTH, item.WIDTH)
+
+
+def speed_along(ego: Any, other: Any) -> float:
+    """Return the other's speed along the ego's heading [m/s]."""
+    return float(other.speed * cos(float(other.heading) - float(ego.heading)))
+
+
+def first_touch(moving: Rectangle, standing: Rectangle, dx: float, dy: float) -> float:
+    """Return the fraction of a displacement at which `moving` first touches `standing`.
+
+    `swept_contact` compiles this function for its kernels.
 
     Args:
-        moving: The rectangle that is displaced, without turning.
-        standing: The rectangle it may touch.
-        dx: Displacement along x, relative to `standing` [m].
-        dy: Displacement along y, relative to `standing` [m].
+        moving: The displaced rectangle; its heading does not change.
+        standing: The other rectangle.
+        dx: Displacement along x relative to `standing` [m].
+        dy: Displacement along y relative to `standing` [m].
 
     Returns:
-        A fraction in [0, 1], 0 if they overlap from the start, or None if they do not touch on the way.
+        A fraction in [0, 1], 0 for rectangles that overlap from the start, `inf` without a touch.
     """
     apart_x, apart_y = standing.x - moving.x, standing.y - moving.y
-    if hypot(apart_x, apart_y) > moving.reach + standing.reach + hypot(dx, dy):
-        return None
+    reach = hypot(moving.length, moving.width) / 2 + hypot(standing.length, standing.width) / 2
+    if hypot(apart_x, apart_y) > reach + hypot(dx, dy):
+        return inf
     cos_a, sin_a = cos(moving.heading), sin(moving.heading)
     cos_b, sin_b = cos(standing.heading), sin(standing.heading)
     enter, leave = 0.0, 1.0
@@ -48,16 +83,71 @@ def first_touch(moving: Rectangle, standing: Rectangle, dx: float, dy: float) ->
             + standing.length * abs(ax * cos_b + ay * sin_b)
             + standing.width * abs(ay * cos_b - ax * sin_b)
         )
-        first, last = _overlap(ax * apart_x + ay * apart_y, ax * dx + ay * dy, reach)
+        apart, travel = ax * apart_x + ay * apart_y, ax * dx + ay * dy
+        if travel == 0.0:
+            if abs(apart) >= reach:
+                return inf
+            continue
+        first, last = (apart - reach) / travel, (apart + reach) / travel
+        if first > last:
+            first, last = last, first
         enter, leave = max(enter, first), min(leave, last)
         if enter > leave:
-            return None
+            return inf
     return enter
 
 
-def _overlap(apart: float, travel: float, reach: float) -> tuple[float, float]:
-    """Return the fractions of the way between which |apart − fraction·travel| < reach."""
-    if travel == 0.0:
-        return (-inf, inf) if abs(apart) < reach else (inf, -inf)
-    one, two = (apart - reach) / travel, (apart + reach) / travel
-    return (one, two) if one < two else (two, one)
+def first_contact(before: Sequence[Rectangle], after: Sequence[Rectangle]) -> tuple[float, int]:
+    """Return when the first rectangle touches another one within a step.
+
+    Args:
+        before: Outlines at the start of the step, the ego's first.
+        after: The same outlines at its end.
+
+    Returns:
+        The fraction of the step, `inf` without contact, and the index of the touched rectangle.
+    """
+    start, end = before[0], after[0]
+    ego_dx, ego_dy = end.x - start.x, end.y - start.y
+    found, index = inf, 0
+    for number in range(1, len(before)):
+        old, new = before[number], after[number]
+        fraction = first_touch(start, old, ego_dx - (new.x - old.x), ego_dy - (new.y - old.y))
+        if fraction < found:
+            found, index = fraction, number
+    return found, index
+
+
+def touched_side(ego: Rectangle, other: Rectangle) -> str:
+    """Return the part of the ego at which two touching rectangles meet: "front", "rear" or "side".
+
+    The contact point is the mean of the corners of either rectangle that are nearest to the other one. A
+    corner of the ego belongs to its front or rear.
+    """
+    corners = [(_distance(other, x, y), _local(ego, x, y)[0]) for x, y in _corners(ego)]
+    corners += [(_distance(ego, x, y), _local(ego, x, y)[0]) for x, y in _corners(other)]
+    nearest = min(distance for distance, _ in corners)
+    touching = [along for distance, along in corners if distance <= nearest + TOLERANCE]
+    along = sum(touching) / len(touching)
+    if abs(along) < ego.length / 2 - END:
+        return "side"
+    return "front" if along > 0.0 else "rear"
+
+
+def _corners(box: Rectangle) -> list[tuple[float, float]]:
+    c, s = cos(box.heading), sin(box.heading)
+    ends = [(x * box.length / 2, y * box.width / 2) for x in (1, -1) for y in (1, -1)]
+    return [(box.x + x * c - y * s, box.y + x * s + y * c) for x, y in ends]
+
+
+def _local(box: Rectangle, x: float, y: float) -> tuple[float, float]:
+    """Return a point in the axes of a rectangle, relative to its centre [m]."""
+    dx, dy = x - box.x, y - box.y
+    c, s = cos(box.heading), sin(box.heading)
+    return dx * c + dy * s, dy * c - dx * s
+
+
+def _distance(box: Rectangle, x: float, y: float) -> float:
+    """Return the distance of a point from a rectangle [m]; 0 inside."""
+    along, across = _local(box, x, y)
+    return hypot(max(abs(along) - box.length / 2, 0.0), max(abs(across) - box.width / 2, 0.0))

@@ -1,8 +1,8 @@
-"""Exact longitudinal motion: acceleration that ramps at a bounded jerk, and a car that stops at zero.
+"""Exact longitudinal motion: acceleration with bounded jerk, and cars that stop at zero speed.
 
-highway-env integrates with explicit Euler (position with the old speed), which is off by 0.9 m at 50 km/h
-and 15 Hz, and brakes through zero into reverse. Within one step our acceleration is piecewise linear in
-time, so speed and distance have a closed form and no step size is visible in a stopping distance.
+highway-env integrates with explicit Euler, an error of 0.9 m at 50 km/h and 15 Hz, and brakes through zero
+into reverse. Here the acceleration is piecewise linear in time within one step. Speed and distance have a
+closed form, and stopping distances do not depend on the step size.
 """
 
 from math import copysign, inf, sqrt
@@ -16,13 +16,13 @@ def advance(
     Args:
         speed: Speed at the start, >= 0 [m/s].
         acceleration: Acceleration at the start [m/s²].
-        target: Acceleration the ramp leads to [m/s²].
+        target: Acceleration at the end of the ramp [m/s²].
         jerk: Slope of the ramp, > 0; `math.inf` for a jump [m/s³].
-        dt: Time to advance, >= 0 [s].
+        dt: Duration, >= 0 [s].
 
     Returns:
-        Distance travelled [m], speed [m/s] and acceleration [m/s²] at the end. A car that reaches zero
-        speed while not accelerating stays there, with acceleration 0.
+        Distance travelled [m], speed [m/s] and acceleration [m/s²] at the end. A car that reaches zero speed
+        while not accelerating stays there with acceleration 0.
     """
     if jerk == inf:
         acceleration = target
@@ -52,7 +52,7 @@ def time_to_stop(speed: float, acceleration: float, jerk: float) -> float:
     if under_root < 0.0 or (acceleration >= 0.0 and jerk > 0.0):
         return inf
     root = sqrt(under_root)
-    # Of the two forms of the first root, the one in which nothing cancels.
+    # The form of the first root without cancellation.
     if acceleration >= 0.0:
         return (acceleration + root) / -jerk
     return 2.0 * speed / (root - acceleration)

@@ -1,4 +1,4 @@
-"""Where a car drives: straights, arcs and clothoids one after the other, followed exactly."""
+"""Vehicle paths: sequences of straights, arcs and clothoids."""
 
 from bisect import bisect_right
 from dataclasses import dataclass
@@ -10,20 +10,20 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.units import check_finite, check_within
 
-# Nodes and weights of three-point Gauss-Legendre quadrature on [0, 1]; over cells this short it integrates
-# the direction of travel to about 1e-12 m.
+# Nodes and weights of three-point Gauss-Legendre quadrature on [0, 1]. Over cells of this length its error is
+# about 1e-12 m.
 GAUSS = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 8 / 18), (0.5 + 0.15**0.5, 5 / 18))
 _CELL = 0.5  # [m]
 
 
 @dataclass(frozen=True, slots=True)
 class Bend:
-    """A piece of a path whose curvature changes linearly: a straight, an arc or a clothoid.
+    """A section of a path with linearly changing curvature: a straight, an arc or a clothoid.
 
     Attributes:
-        length: > 0 [m].
-        curvature: At its start, + to the left [1/m].
-        end_curvature: At its end; None for the same, which makes it an arc [1/m].
+        length: Length along the path, > 0 [m].
+        curvature: Curvature at the start, + to the left, in [-1, 1] [1/m].
+        end_curvature: Curvature at the end [1/m]; None for constant curvature.
     """
 
     length: float
@@ -43,12 +43,12 @@ class Bend:
 
     @property
     def turn(self) -> float:
-        """Angle between start and end, + to the left [rad]."""
+        """Change of heading from start to end, + to the left [rad]."""
         return self.length * (self.curvature + self.last_curvature) / 2
 
 
 class Pose(NamedTuple):
-    """A place on the road in highway-env's axes: y and heading grow to the right of a car along x."""
+    """Position and heading in highway-env's axes: for a car along x, + is to the right for y and heading."""
 
     x: float  # [m]
     y: float  # [m]
@@ -56,15 +56,15 @@ class Pose(NamedTuple):
 
 
 class Path:
-    """A way along bends, straight before and after them.
+    """A path along bends, straight before and after them.
 
     Args:
-        start: Where distance 0 is.
-        bends: In the order they are driven.
+        start: Pose at distance 0.
+        bends: Bends in driving order.
 
     Attributes:
-        stations: Distances at which cells begin, rising [m].
-        cells: x, y, heading, curvature and its slope at each.
+        stations: Ascending distances at which cells begin [m].
+        cells: x, y, heading, curvature and slope of the curvature at the start of each cell.
     """
 
     def __init__(self, start: Pose, bends: tuple[Bend, ...] = ()) -> None:
@@ -73,45 +73,54 @@ class Path:
         self.stations, self.cells = _integrate(start, bends)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Path":
-        """A path never changes, so that copies of an environment share it."""
+        """Return the path itself: it is immutable, and copies of an environment share it."""
         return self
 
     @cached_property
     def table(self) -> np.ndarray:
-        """Stations and cells for the kernels of `sweep`, shape (cells, 6)."""
+        """Stations and cells for the kernels of `swept_contact`, shape (cells, 6)."""
         return np.column_stack([np.array(self.stations), np.array(self.cells)])
 
     @property
     def straight(self) -> bool:
-        """Whether the path never turns."""
+        """Whether the path has no bends."""
         return not self.bends
 
     def pose(self, distance: float) -> Pose:
-        """Return the place `distance` metres along the path; negative is before its start."""
+        """Return the pose at a distance along the path [m]; negative distances are before its start."""
         index = bisect_right(self.stations, distance) - 1
         if index < 0:
             x, y, heading, _, _ = self.cells[0]
             return Pose(x + distance * cos(heading), y + distance * sin(heading), heading)
         x, y, heading, curvature, slope = self.cells[index]
-        return _advance(x, y, heading, curvature, slope, distance - self.stations[index])
+        return advance_pose(x, y, heading, curvature, slope, distance - self.stations[index])
 
 
-def _advance(x: float, y: float, heading: float, curvature: float, slope: float, way: float) -> Pose:
-    """Return the pose `way` metres on, curvature in highway-env's sense (+ to the right)."""
+def advance_pose(x: float, y: float, heading: float, curvature: float, slope: float, distance: float) -> Pose:
+    """Return the pose after a distance on a clothoid; `swept_contact` compiles this function for its kernels.
+
+    Args:
+        x: Initial position [m].
+        y: Initial position [m].
+        heading: Initial heading [rad].
+        curvature: Initial curvature, + to the right [1/m].
+        slope: Change of the curvature per distance [1/m²].
+        distance: Distance along the clothoid [m].
+    """
     if curvature == 0.0 and slope == 0.0:
-        return Pose(x + way * cos(heading), y + way * sin(heading), heading)
+        return Pose(x + distance * cos(heading), y + distance * sin(heading), heading)
     for node, weight in GAUSS:
-        part = node * way
+        part = node * distance
         angle = heading + part * (curvature + part * slope / 2)
-        x += weight * way * cos(angle)
-        y += weight * way * sin(angle)
-    return Pose(x, y, heading + way * (curvature + way * slope / 2))
+        x += weight * distance * cos(angle)
+        y += weight * distance * sin(angle)
+    return Pose(x, y, heading + distance * (curvature + distance * slope / 2))
 
 
 def _integrate(
     start: Pose, bends: tuple[Bend, ...]
 ) -> tuple[list[float], list[tuple[float, float, float, float, float]]]:
-    """Return stations and the state (x, y, heading, curvature, its slope) from each one on."""
+    """Return the stations and cells of a path."""
     stations, cells = [], []
     station, pose = 0.0, start
     for bend in bends:
@@ -122,7 +131,7 @@ def _integrate(
             curvature = -bend.curvature + slope * cell * number
             stations.append(station)
             cells.append((pose.x, pose.y, pose.heading, curvature, slope))
-            pose = _advance(pose.x, pose.y, pose.heading, curvature, slope, cell)
+            pose = advance_pose(pose.x, pose.y, pose.heading, curvature, slope, cell)
             station += cell
     stations.append(station)
     cells.append((pose.x, pose.y, pose.heading, 0.0, 0.0))
@@ -130,14 +139,14 @@ def _integrate(
 
 
 def lane_change(length: float, offset: float) -> tuple[Bend, ...]:
-    """Return four clothoids that shift a path sideways and leave it in its old direction.
+    """Return four clothoids that shift a path sideways and restore its heading.
 
     Args:
-        length: Along the path, > 0 [m].
-        offset: Sideways, + to the left [m].
+        length: Length along the path, > 0 [m].
+        offset: Lateral shift, + to the left [m].
     """
     quarter = length / 4
-    curvature = 8.0 * offset / length**2  # of a shallow shift; the loop takes up the rest
+    curvature = 8.0 * offset / length**2  # exact for shallow shifts; the loop corrects it
     for _ in range(8):
         reached = -Path(Pose(0.0, 0.0, 0.0), _shift(quarter, curvature)).pose(length).y
         if abs(reached - offset) < 1e-10:
@@ -164,9 +173,9 @@ def turn(angle: float, radius: float, easing: float) -> tuple[Bend, ...]:
     """Return clothoid, arc and clothoid that turn by `angle`.
 
     Args:
-        angle: + to the left, |angle| <= π [rad].
-        radius: Of the arc [m].
-        easing: Length of each clothoid [m]; shortened where both alone would turn further.
+        angle: Change of heading, + to the left, |angle| <= π [rad].
+        radius: Radius of the arc [m].
+        easing: Length of each clothoid [m]; shortened where the clothoids alone exceed the angle.
     """
     sign = 1.0 if angle > 0 else -1.0
     easing = min(easing, abs(angle) * radius)

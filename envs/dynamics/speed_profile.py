@@ -1,4 +1,4 @@
-"""A scripted speed: phases of acceleration, followed exactly."""
+"""Scripted speed: segments of acceleration, followed exactly."""
 
 from dataclasses import dataclass
 from math import copysign, inf
@@ -9,13 +9,13 @@ from lgmd_gym.envs.dynamics.units import check_speed, check_within
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
-    """From `start` on, accelerate until `final_speed` is reached.
+    """A scripted change of speed: acceleration from `start` until `final_speed` is reached.
 
     Attributes:
-        start: Time of the onset [s].
-        acceleration: Acceleration once built up, negative for braking [m/s²].
-        build_up: Time from the onset to the full acceleration, a linear ramp [s].
-        final_speed: Speed at which the phase ends [m/s].
+        start: Time at which the acceleration begins, in [0, 10000] [s].
+        acceleration: Full acceleration, negative for braking, in [-12, 12] [m/s²].
+        build_up: Time from `start` to the full acceleration, a linear ramp, in [0, 10] [s].
+        final_speed: Speed at the end of the segment, in [0, 40] [m/s].
     """
 
     start: float
@@ -31,47 +31,48 @@ class Segment:
 
 
 class SpeedProfile:
-    """A speed that changes by phases.
+    """A speed that follows scripted segments and is constant between them.
 
     Args:
-        speed: At the start [m/s].
-        phases: In order of their start; one that starts before the last has ended waits for it.
+        speed: Initial speed [m/s].
+        segments: Segments in order of their start. A segment that starts before the previous one has ended
+            is delayed until then.
 
     Attributes:
-        speed: At the present time [m/s].
-        acceleration: At the present time [m/s²].
-        time: Since the start [s].
+        speed: Current speed [m/s].
+        acceleration: Current acceleration [m/s²].
+        time: Time since the start [s].
     """
 
-    def __init__(self, speed: float, phases: tuple[Segment, ...] = ()) -> None:
+    def __init__(self, speed: float, segments: tuple[Segment, ...] = ()) -> None:
         self.speed = speed
         self.acceleration = 0.0
         self.time = 0.0
-        self._phases = list(phases)
+        self._remaining = list(segments)
 
     @property
-    def settled(self) -> bool:
-        """Whether nothing is left to change."""
-        return not self._phases
+    def finished(self) -> bool:
+        """Whether all segments have ended."""
+        return not self._remaining
 
     def step(self, dt: float) -> float:
-        """Advance by `dt` [s] and return the distance covered [m]."""
+        """Advance by `dt` [s] and return the distance travelled [m]."""
         end = self.time + dt
-        travelled = 0.0
-        while self._phases and self._phases[0].start < end:
-            phase = self._phases[0]
-            travelled += self._advance(0.0, inf, phase.start - self.time)
-            jerk = abs(phase.acceleration) / phase.build_up if phase.build_up > 0.0 else inf
-            travelled += self._advance(phase.acceleration, jerk, end - self.time)
-            left = (phase.final_speed - self.speed) * copysign(1.0, phase.acceleration)
-            if left > 0.0:
+        distance = 0.0
+        while self._remaining and self._remaining[0].start < end:
+            segment = self._remaining[0]
+            distance += self._advance(0.0, inf, segment.start - self.time)
+            jerk = abs(segment.acceleration) / segment.build_up if segment.build_up > 0.0 else inf
+            distance += self._advance(segment.acceleration, jerk, end - self.time)
+            remaining = (segment.final_speed - self.speed) * copysign(1.0, segment.acceleration)
+            if remaining > 0.0:
                 break
-            self._phases.pop(0)
-            self.speed, self.acceleration = phase.final_speed, 0.0
-        return travelled + self._advance(0.0, inf, end - self.time)
+            self._remaining.pop(0)
+            self.speed, self.acceleration = segment.final_speed, 0.0
+        return distance + self._advance(0.0, inf, end - self.time)
 
     def _advance(self, target: float, jerk: float, duration: float) -> float:
-        """Advance speed and clock, and return the distance [m]."""
+        """Advance speed and time, and return the distance travelled [m]."""
         if duration <= 0.0:
             return 0.0
         distance, self.speed, self.acceleration = advance(

@@ -1,14 +1,15 @@
-"""Other cars in the next lane or leaving and entering ours: nothing calls for braking."""
+"""Cars in adjacent lanes, cut-ins and cut-outs: driving without a threat."""
 
 from math import pi
 
 from lgmd_gym.envs.dynamics.path import Bend, lane_change
 from lgmd_gym.envs.dynamics.units import KMH, MAX_SPEED, check_speed, check_within
-from lgmd_gym.envs.scenarios.registry import START_TTC, family
+from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (
     EGO_LENGTH,
     EGO_WIDTH,
     LANE_WIDTH,
+    START_TTC,
     TARGET_LENGTH,
     TARGET_WIDTH,
     Actor,
@@ -16,9 +17,9 @@ from lgmd_gym.envs.scenarios.scenario import (
     Scenario,
 )
 
-CLEAR = (EGO_WIDTH + TARGET_WIDTH) / 2  # lateral offset at which the two just miss each other [m]
+CONTACT_OFFSET = (EGO_WIDTH + TARGET_WIDTH) / 2  # [m], lateral offset up to which the cars touch
 QUEUE_SPACING = 2.0  # [m] between the cars of a queue
-SIGHT = 2.0  # [s] more after the last car is passed
+AFTER_PASSING = 2.0  # [s] of driving after the last car
 
 
 @family("AdjacentPass")
@@ -28,19 +29,20 @@ def pass_standing(
     cars: int = 1,
     shade: int | None = None,
 ) -> Scenario:
-    """Drive past a car, or a queue of cars, that stands in the next lane.
+    """The ego passes a stationary car or a queue of cars in the adjacent lane; not a threat.
 
     Args:
-        ego_speed: In (0, 40] [m/s].
-        lateral_offset: The standing cars' centreline minus the ego's, + left; beyond touch [m].
-        cars: Number of standing cars in a row, in [1, 20].
-        shade: Body grey of the standing cars in [0, 255]; None draws each from the seed.
+        ego_speed: Ego speed, in (0, 40] [m/s].
+        lateral_offset: Centreline of the stationary cars minus ego centreline, + left, in [-20, 20] and far
+            enough to avoid contact [m].
+        cars: Number of stationary cars in the queue, in [1, 20].
+        shade: Body grey of the stationary cars in [0, 255]; None draws each from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
-    if abs(check_within("lateral_offset", lateral_offset, -20.0, 20.0, "m")) <= CLEAR:
+    if abs(check_within("lateral_offset", lateral_offset, -20.0, 20.0, "m")) <= CONTACT_OFFSET:
         raise ValueError(
-            f"lateral_offset must exceed {CLEAR:g} m to either side in AdjacentPass, got {lateral_offset!r}; "
-            "for a car in the way use CCRs"
+            f"lateral_offset must exceed {CONTACT_OFFSET:g} m to either side in AdjacentPass, "
+            f"got {lateral_offset!r}; for a car in the ego's path use CCRs"
         )
     count = int(check_within("cars", cars, 1, 20))
     pitch = TARGET_LENGTH + QUEUE_SPACING
@@ -49,23 +51,27 @@ def pass_standing(
         for number in range(count)
     )
     length = START_TTC * speed + count * pitch + EGO_LENGTH
-    return Scenario(family="AdjacentPass", ego_speed=speed, duration=length / speed + SIGHT, actors=queue)
+    return Scenario(
+        family="AdjacentPass", ego_speed=speed, duration=length / speed + AFTER_PASSING, actors=queue
+    )
 
 
 @family("PassBetween")
 def pass_between(ego_speed: float = 80 * KMH, inner_gap: float = 4.5, shade: int | None = None) -> Scenario:
-    """Drive between two parked cars, tails aligned (49 CFR 571.127 S9.3 at 80, GB 39901 at 60 km/h).
+    """The ego drives between two parked cars with aligned rears; not a threat.
+
+    Source: 49 CFR 571.127 S9.3 at 80 km/h, GB 39901-2025 at 60 km/h.
 
     Args:
-        ego_speed: In (0, 40] [m/s].
-        inner_gap: Between the cars' sides, in [2, 10] [m].
+        ego_speed: Ego speed, in (0, 40] [m/s].
+        inner_gap: Distance between the inner sides of the parked cars, in [2, 10] [m].
         shade: Body grey of the parked cars in [0, 255]; None draws each from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     aside = check_within("inner_gap", inner_gap, 2.0, 10.0, "m") / 2 + TARGET_WIDTH / 2
     gap = max(START_TTC * speed, 50.0)
     parked = tuple(Actor(gap=gap, lateral_offset=side * aside, shade=shade) for side in (1, -1))
-    duration = (gap + TARGET_LENGTH + EGO_LENGTH) / speed + SIGHT
+    duration = (gap + TARGET_LENGTH + EGO_LENGTH) / speed + AFTER_PASSING
     return Scenario(family="PassBetween", ego_speed=speed, duration=duration, actors=parked)
 
 
@@ -73,16 +79,16 @@ def pass_between(ego_speed: float = 80 * KMH, inner_gap: float = 4.5, shade: int
 def being_overtaken(
     ego_speed: float = 80 * KMH, excess: float = 30 * KMH, shade: int | None = None
 ) -> Scenario:
-    """Be overtaken in the lane to the left by a faster car, which appears in the picture from the side.
+    """A faster car overtakes the ego in the left lane and enters the image from the side; not a threat.
 
     Args:
-        ego_speed: In (0, 40) [m/s].
-        excess: By how much the other car is faster, > 0 [m/s].
+        ego_speed: Ego speed, in (0, 40) [m/s].
+        excess: Speed of the other car minus ego speed, >= 0.1 [m/s].
         shade: Body grey of the other car in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     faster = check_speed("ego_speed + excess", speed + check_within("excess", excess, 0.1, MAX_SPEED, "m/s"))
-    behind = -(EGO_LENGTH + TARGET_LENGTH) - 3.0 * excess  # alongside after three seconds
+    behind = -(EGO_LENGTH + TARGET_LENGTH) - 3.0 * excess  # next to the ego after 3 s
     other = Actor(gap=behind, lateral_offset=LANE_WIDTH, speed=faster, shade=shade)
     return Scenario(family="Overtaken", ego_speed=speed, duration=10.0, actors=(other,))
 
@@ -91,20 +97,20 @@ def being_overtaken(
 def meet_oncoming(
     ego_speed: float = 80 * KMH, oncoming_speed: float = 80 * KMH, shade: int | None = None
 ) -> Scenario:
-    """Meet a car in the next lane of a two-way road.
+    """The ego meets an oncoming car in the adjacent lane of a two-way road; not a threat.
 
     Args:
-        ego_speed: In (0, 40] [m/s].
-        oncoming_speed: In (0, 40] [m/s].
+        ego_speed: Ego speed, in (0, 40] [m/s].
+        oncoming_speed: Speed of the oncoming car, in (0, 40] [m/s].
         shade: Body grey of the other car in [0, 255]; None draws it from the seed.
     """
-    speed, towards = check_speed("ego_speed", ego_speed), check_speed("oncoming_speed", oncoming_speed)
-    gap = START_TTC * (speed + towards)
-    other = Actor(gap=gap, lateral_offset=LANE_WIDTH, heading=pi, speed=towards, shade=shade)
+    speed, oncoming = check_speed("ego_speed", ego_speed), check_speed("oncoming_speed", oncoming_speed)
+    gap = START_TTC * (speed + oncoming)
+    other = Actor(gap=gap, lateral_offset=LANE_WIDTH, heading=pi, speed=oncoming, shade=shade)
     return Scenario(
         family="Oncoming",
         ego_speed=speed,
-        duration=START_TTC + SIGHT,
+        duration=START_TTC + AFTER_PASSING,
         actors=(other,),
         road=RoadPlan(kind="two-way"),
     )
@@ -118,23 +124,23 @@ def cut_in(
     change_length: float = 44.0,
     shade: int | None = None,
 ) -> Scenario:
-    """A car changes from the left lane into ours, no slower than we are, and leaves a safe gap.
+    """A car that is not slower than the ego changes from the left lane into the ego's lane; not a threat.
 
     Args:
-        ego_speed: In (0, 40) [m/s].
-        gap: Bumper to bumper when the lane change begins, in [2, 200] [m].
-        excess: By how much the other car is faster, >= 0 [m/s].
-        change_length: Of the lane change along the road, in [10, 200] [m].
+        ego_speed: Ego speed, in (0, 40] [m/s].
+        gap: Bumper-to-bumper distance at the start of the lane change, in [2, 200] [m].
+        excess: Speed of the other car minus ego speed, >= 0 [m/s].
+        change_length: Length of the lane change along the road, in [10, 200] [m].
         shade: Body grey of the other car in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     faster = check_speed("ego_speed + excess", speed + check_within("excess", excess, 0.0, MAX_SPEED, "m/s"))
-    before = 2.0  # [s] beside each other
+    before = 2.0  # [s] in adjacent lanes
     other = Actor(
         gap=check_within("gap", gap, 2.0, 200.0, "m") - before * excess,
         lateral_offset=LANE_WIDTH,
         speed=faster,
-        path=_changing_lane(before * faster, change_length, -LANE_WIDTH),
+        path=_straight_then_change(before * faster, change_length, -LANE_WIDTH),
         shade=shade,
     )
     return Scenario(family="CutIn", ego_speed=speed, duration=9.0, actors=(other,))
@@ -144,25 +150,25 @@ def cut_in(
 def cut_out(
     ego_speed: float = 50 * KMH, headway: float = 1.5, change_length: float = 44.0, shade: int | None = None
 ) -> Scenario:
-    """The car ahead changes into the left lane; the road behind it is free.
+    """The lead car changes into the left lane and leaves a free road; not a threat.
 
     Args:
         ego_speed: Speed of both cars, in (0, 40] [m/s].
-        headway: Time the ego needs to cover the gap, in [0.3, 10] [s].
-        change_length: Of the lane change along the road, in [10, 200] [m].
+        headway: Time headway, in [0.3, 10] [s].
+        change_length: Length of the lane change along the road, in [10, 200] [m].
         shade: Body grey of the other car in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     lead = Actor(
         gap=speed * check_within("headway", headway, 0.3, 10.0, "s"),
         speed=speed,
-        path=_changing_lane(3.0 * speed, change_length, LANE_WIDTH),
+        path=_straight_then_change(3.0 * speed, change_length, LANE_WIDTH),
         shade=shade,
     )
     return Scenario(family="CutOut", ego_speed=speed, duration=9.0, actors=(lead,))
 
 
-def _changing_lane(before: float, length: float, offset: float) -> tuple[Bend, ...]:
-    """Return a straight and then a lane change."""
+def _straight_then_change(before: float, length: float, offset: float) -> tuple[Bend, ...]:
+    """Return a straight followed by a lane change."""
     shift = lane_change(check_within("change_length", length, 10.0, 200.0, "m"), offset)
     return (Bend(before), *shift)

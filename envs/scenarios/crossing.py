@@ -1,13 +1,15 @@
-"""A car crosses our way: Euro NCAP's CCCscp, and one that clears in time."""
+"""Crossing scenarios: Euro NCAP's CCCscp, and a crossing car that clears in time."""
 
 from math import pi
 
 from lgmd_gym.envs.dynamics.speed_profile import Segment, SpeedProfile
 from lgmd_gym.envs.dynamics.units import KMH, check_speed, check_within
-from lgmd_gym.envs.scenarios.registry import AFTERMATH, START_TTC, family
+from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (
+    AFTERMATH,
     EGO_LENGTH,
     LANE_WIDTH,
+    START_TTC,
     TARGET_LENGTH,
     TARGET_WIDTH,
     Actor,
@@ -17,8 +19,8 @@ from lgmd_gym.envs.scenarios.scenario import (
 from lgmd_gym.errors import unknown_name
 
 SIDES = {"right": 1.0, "left": -1.0}
-START_GAP = 2.9  # [m] to the target's path when starting from a stop (N1 8.2.5)
-WAITING, PULL_AWAY = 4.5, 1.5  # [s] at the line, [m/s²]; both our choice, the protocol names neither
+START_GAP = 2.9  # [m] from a stopped ego to the target's path (AEB C2C v4.3.1, 8.2.5)
+WAITING, PULL_AWAY = 4.5, 1.5  # [s], [m/s²], not specified by the protocol
 
 
 @family("CCCscp")
@@ -29,22 +31,22 @@ def cross_straight(
     from_stop: bool = False,
     shade: int | None = None,
 ) -> Scenario:
-    """A car crosses straight, timed so that the ego's front would strike its side.
+    """A car crosses the ego's path and is struck in its side (Car-to-Car Crossing straight crossing path).
 
-    The ego's centreline meets the target's side a quarter of its length behind its front (Car-to-Car
-    Crossing straight crossing path, N1 8.2.5).
+    Without braking, the ego's centreline meets the target's side a quarter of its length behind its front.
+    Source: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.5.
 
     Args:
-        ego_speed: Scripted speed, in (0, 40] [m/s].
-        target_speed: In (0, 40] [m/s].
-        side: Where the target comes from, "right" or "left".
-        from_stop: Whether the ego waits 2.9 m before the target's path and pulls away to `ego_speed`.
+        ego_speed: Scripted ego speed, in (0, 40] [m/s].
+        target_speed: Target speed, in (0, 40] [m/s].
+        side: Side from which the target comes, "right" or "left".
+        from_stop: Whether the ego waits 2.9 m before the target's path and then accelerates to `ego_speed`.
         shade: Body grey of the target in [0, 255]; None draws it from the seed.
     """
     speed, across = check_speed("ego_speed", ego_speed), check_speed("target_speed", target_speed)
     if from_stop:
         distance, profile = START_GAP, (Segment(start=WAITING, acceleration=PULL_AWAY, final_speed=speed),)
-        contact = _time_over(distance, profile)
+        contact = _time_to_cover(distance, profile)
     else:
         distance, profile = START_TTC * speed, ()
         contact = START_TTC
@@ -66,20 +68,21 @@ def cross_and_clear(
     side: str = "right",
     shade: int | None = None,
 ) -> Scenario:
-    """A car crosses and has left the ego's lane before the ego gets there; nothing calls for braking.
+    """A car crosses the ego's path and clears it before the ego arrives; not a threat.
 
     Args:
-        ego_speed: In (0, 40] [m/s].
-        target_speed: In (0, 40] [m/s].
-        clear_by: From the target's rear leaving the ego's lane to the ego's arrival, in [0.5, 4] [s].
-        side: Where the target comes from, "right" or "left".
+        ego_speed: Ego speed, in (0, 40] [m/s].
+        target_speed: Target speed, in (0, 40] [m/s].
+        clear_by: Time between the target's rear leaving the ego's lane and the ego's arrival, in [0.5, 4]
+            [s].
+        side: Side from which the target comes, "right" or "left".
         shade: Body grey of the target in [0, 255]; None draws it from the seed.
     """
     speed, across = check_speed("ego_speed", ego_speed), check_speed("target_speed", target_speed)
     distance = START_TTC * speed
-    gone = START_TTC - check_within("clear_by", clear_by, 0.5, 4.0, "s")
-    # At `gone` the rear is a lane's half beyond the ego's centreline.
-    before = gone * across - LANE_WIDTH / 2 - TARGET_LENGTH / 2
+    clear_time = START_TTC - check_within("clear_by", clear_by, 0.5, 4.0, "s")
+    # At that time the target's rear is half a lane beyond the ego's centreline.
+    before = clear_time * across - LANE_WIDTH / 2 - TARGET_LENGTH / 2
     return Scenario(
         family="CrossingClears",
         ego_speed=speed,
@@ -90,14 +93,14 @@ def cross_and_clear(
 
 
 def _crossing_car(distance: float, before: float, speed: float, side: str, shade: int | None) -> Actor:
-    """Return a car that drives across.
+    """Return a car that crosses the ego's path.
 
     Args:
-        distance: From the ego's front to the car's nearer flank, along the road [m].
-        before: From the car's centre to the ego's centreline, along its way [m].
-        speed: [m/s].
-        side: Where it comes from.
-        shade: Body grey.
+        distance: Distance from the ego's front to the nearer side of the car, along the road [m].
+        before: Distance from the car's centre to the ego's centreline, along the car's path [m].
+        speed: Speed [m/s].
+        side: Side from which the car comes.
+        shade: Body grey; None draws it from the seed.
     """
     if side not in SIDES:
         raise unknown_name("side", side, SIDES)
@@ -112,13 +115,13 @@ def _crossing_car(distance: float, before: float, speed: float, side: str, shade
 
 
 def _road(distance: float, side: str) -> RoadPlan:
-    """Return a crossing whose lane for that side is where the car drives."""
+    """Return a crossing whose lane for traffic from that side contains the crossing car."""
     lane = LANE_WIDTH / 2 * SIDES.get(side, 1.0)
-    return RoadPlan(kind="crossing", at=EGO_LENGTH / 2 + distance + TARGET_WIDTH / 2 - lane)
+    return RoadPlan(kind="crossing", distance=EGO_LENGTH / 2 + distance + TARGET_WIDTH / 2 - lane)
 
 
-def _time_over(distance: float, profile: tuple[Segment, ...]) -> float:
-    """Return when a car that stands at first has covered a distance [s]."""
+def _time_to_cover(distance: float, profile: tuple[Segment, ...]) -> float:
+    """Return the time that a car needs for a distance from a standstill [s]."""
     script, covered, step = SpeedProfile(0.0, profile), 0.0, 1e-3
     while covered < distance:
         covered += script.step(step)

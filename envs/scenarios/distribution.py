@@ -1,4 +1,4 @@
-"""A distribution over the scenario families, cut into numbered levels for training and tuning."""
+"""Random distribution over the scenario families, divided into numbered levels for training and tuning."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,24 +6,29 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.envs.scenarios.catalogue import make_scenario
+from lgmd_gym.envs.scenarios.registry import make_scenario
 from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.errors import unknown_name
 
 SPLITS = ("train", "validation", "test")
 LEVELS = 1_000_000  # per split
 CLEAR = "clear"
-CONDITIONS = (CLEAR, "night", "fog", "degraded")  # the camera's, by name; a test holds them together
+CONDITIONS = (
+    CLEAR,
+    "night",
+    "fog",
+    "degraded",
+)  # names of the camera's conditions; a test compares both lists
 THREAT_SHARE = 0.5
 SPEED_KMH = (10.0, 80.0)
-HEADWAY = (0.5, 3.0)  # [s]; FMVSS 127 has a lead brake 12 m ahead at 80 km/h, which is 0.54 s
+HEADWAY = (0.5, 3.0)  # [s]; in FMVSS 127 a lead car brakes 12 m ahead at 80 km/h, a headway of 0.54 s
 
 
 def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> None:
-    """Refuse an unknown split or condition, or levels beyond the split.
+    """Check the arguments of `RandomBrakingEnv`.
 
     Raises:
-        ValueError: Names the value and the bound.
+        ValueError: If the split or a condition is unknown, or levels are outside the split.
     """
     if split not in SPLITS:
         raise unknown_name("split", split, SPLITS)
@@ -35,7 +40,7 @@ def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequ
 
 
 def check_conditions(conditions: Sequence[str]) -> None:
-    """Refuse an unknown camera condition, or none at all."""
+    """Raise ValueError for an unknown camera condition or an empty sequence."""
     if not conditions:
         raise ValueError("conditions needs at least one name, got none")
     for condition in conditions:
@@ -44,14 +49,14 @@ def check_conditions(conditions: Sequence[str]) -> None:
 
 
 def level_generator(split: str, level: int, part: int = 0) -> np.random.Generator:
-    """Return the random numbers of a part of a level; no two levels of any splits share them."""
+    """Return the random generator of a level; `part` selects one of its independent streams."""
     return np.random.default_rng([SPLITS.index(split), level, *([part] if part else [])])
 
 
-def draw_view(split: str, level: int, conditions: Sequence[str]) -> dict[str, Any]:
-    """Return what a level does to cameras: one of the conditions, and how strong the ground's grain is.
+def draw_camera_fields(split: str, level: int, conditions: Sequence[str]) -> dict[str, Any]:
+    """Return the camera fields of a level: a condition, and the contrast of the ground texture in [0.5, 1.5].
 
-    They have random numbers of their own, so that the scenario is the same whatever conditions are in use.
+    They are drawn from a separate random stream, so that the scenario does not depend on `conditions`.
     """
     rng = level_generator(split, level, part=1)
     texture = float(rng.uniform(0.5, 1.5))
@@ -59,11 +64,11 @@ def draw_view(split: str, level: int, conditions: Sequence[str]) -> dict[str, An
 
 
 def draw_scenario(rng: np.random.Generator) -> Scenario:
-    """Return a scenario: half of them threats, the others driving in which braking is the fault."""
-    drawers = THREATS if rng.random() < THREAT_SHARE else QUIET
-    names = list(drawers)
+    """Return a random scenario: a threat with probability `THREAT_SHARE`, otherwise a non-threat."""
+    families = THREATS if rng.random() < THREAT_SHARE else NON_THREATS
+    names = list(families)
     name = names[int(rng.integers(len(names)))]
-    return make_scenario(name, **drawers[name](rng))
+    return make_scenario(name, **families[name](rng))
 
 
 def _speed(rng: np.random.Generator, low: float = SPEED_KMH[0], high: float = SPEED_KMH[1]) -> float:
@@ -79,7 +84,7 @@ def _side(rng: np.random.Generator) -> str:
 
 
 def _overlap(rng: np.random.Generator) -> float:
-    """Aligned in half of the cases, else a share of 0.4 to 1 on either side."""
+    """Return 1 (aligned) with probability 0.5, otherwise an overlap of 0.4 to 1 on either side."""
     if _flag(rng):
         return 1.0
     return float(rng.uniform(0.4, 1.0)) * (1.0 if _flag(rng) else -1.0)
@@ -105,8 +110,8 @@ def _braking(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _adjacent(rng: np.random.Generator) -> dict[str, Any]:
-    aside = float(rng.uniform(3.0, 3.7)) * (1.0 if _flag(rng) else -1.0)
-    return {"ego_speed": _speed(rng), "lateral_offset": aside, "cars": int(rng.integers(1, 7))}
+    offset = float(rng.uniform(3.0, 3.7)) * (1.0 if _flag(rng) else -1.0)
+    return {"ego_speed": _speed(rng), "lateral_offset": offset, "cars": int(rng.integers(1, 7))}
 
 
 def _rail(rng: np.random.Generator) -> dict[str, Any]:
@@ -115,7 +120,7 @@ def _rail(rng: np.random.Generator) -> dict[str, Any]:
     return {"ego_speed": _speed(rng, 20.0, top), "radius": radius, "left": _flag(rng)}
 
 
-# Family -> what is drawn for it, as the family's keyword arguments.
+# Functions that draw the arguments of each family.
 THREATS: dict[str, Any] = {
     "CCRs": lambda rng: {"ego_speed": _speed(rng), "overlap": _overlap(rng)},
     "CCRm": _moving,
@@ -126,7 +131,7 @@ THREATS: dict[str, Any] = {
         "side": _side(rng),
     },
 }
-QUIET: dict[str, Any] = {
+NON_THREATS: dict[str, Any] = {
     "Following": lambda rng: {"ego_speed": _speed(rng), "headway": float(rng.uniform(*HEADWAY))},
     "BrakeRelease": lambda rng: {
         "ego_speed": _speed(rng, 40.0),

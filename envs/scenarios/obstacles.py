@@ -1,32 +1,43 @@
-"""What lies on or stands beside the road and is no car: nothing calls for braking."""
+"""Objects on and next to the road that are not cars: driving without a threat."""
 
 from math import atan2, cos, hypot, pi, sin
 
 from lgmd_gym.envs.dynamics.path import Bend, Path, Pose, arc
 from lgmd_gym.envs.dynamics.units import KMH, check_speed, check_within
-from lgmd_gym.envs.scenarios.registry import START_TTC, family
-from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, EGO_WIDTH, LANE_WIDTH, Actor, RoadPlan, Scenario
+from lgmd_gym.envs.scenarios.registry import family
+from lgmd_gym.envs.scenarios.scenario import (
+    EGO_LENGTH,
+    EGO_WIDTH,
+    LANE_WIDTH,
+    START_TTC,
+    Actor,
+    RoadPlan,
+    Scenario,
+)
 
 STEEL, SHADOW, RAIL = 150, 30, 175  # body greys
-RAIL_PIECE, RAIL_HEIGHT, RAIL_DEPTH, RAIL_LENGTH = 4.0, 0.75, 0.3, 120.0  # [m], the last of the curve
+RAIL_PIECE, RAIL_HEIGHT, RAIL_DEPTH = 4.0, 0.75, 0.3  # [m]
+CURVE_LENGTH = 120.0  # [m], limit of the length of a curve with a guard rail
 
 
 @family("EmptyRoad")
 def drive_alone(ego_speed: float = 50 * KMH) -> Scenario:
-    """Drive along an empty road: only its lines and its surface move.
+    """The ego drives on an empty road; only lane lines and road texture move; not a threat.
 
     Args:
-        ego_speed: In (0, 40] [m/s].
+        ego_speed: Ego speed, in (0, 40] [m/s].
     """
     return Scenario(family="EmptyRoad", ego_speed=check_speed("ego_speed", ego_speed), duration=10.0)
 
 
 @family("SteelPlate")
 def drive_over_plate(ego_speed: float = 80 * KMH, shade: int = STEEL) -> Scenario:
-    """Drive over a steel plate of 2.4 × 3.7 m (49 CFR 571.127 S9.2 at 80, GB 39901 at 60 km/h).
+    """The ego drives over a steel plate of 2.4 × 3.7 m; not a threat.
+
+    Source: 49 CFR 571.127 S9.2 at 80 km/h, GB 39901-2025 at 60 km/h.
 
     Args:
-        ego_speed: In (0, 40] [m/s].
+        ego_speed: Ego speed, in (0, 40] [m/s].
         shade: Grey of the plate in [0, 255].
     """
     speed = check_speed("ego_speed", ego_speed)
@@ -38,19 +49,19 @@ def drive_over_plate(ego_speed: float = 80 * KMH, shade: int = STEEL) -> Scenari
 
 @family("BridgeShadow")
 def drive_through_shadow(ego_speed: float = 80 * KMH, length: float = 12.0, shade: int = SHADOW) -> Scenario:
-    """Drive through the shadow of a bridge across the road.
+    """The ego drives through the shadow of a bridge; not a threat.
 
     Args:
-        ego_speed: In (0, 40] [m/s].
-        length: Of the shadow along the road, in [1, 100] [m].
+        ego_speed: Ego speed, in (0, 40] [m/s].
+        length: Length of the shadow along the road, in [1, 100] [m].
         shade: Grey of the shadow in [0, 255].
     """
     speed = check_speed("ego_speed", ego_speed)
-    deep = check_within("length", length, 1.0, 100.0, "m")
+    shadow_length = check_within("length", length, 1.0, 100.0, "m")
     shadow = Actor(
-        gap=START_TTC * speed, kind="road_marking", shade=shade, length=deep, width=40.0, height=0.0
+        gap=START_TTC * speed, kind="road_marking", shade=shade, length=shadow_length, width=40.0, height=0.0
     )
-    duration = START_TTC + deep / speed + 2.0
+    duration = START_TTC + shadow_length / speed + 2.0
     return Scenario(family="BridgeShadow", ego_speed=speed, duration=duration, actors=(shadow,))
 
 
@@ -61,12 +72,14 @@ def pass_pedestrian(
     walking_speed: float = 5 * KMH,
     shade: int | None = None,
 ) -> Scenario:
-    """Pass a walker on the right who goes the same way (GB 39901: 1.0 m, 30 km/h).
+    """The ego passes a pedestrian on its right who walks in the same direction; not a threat.
+
+    Source: GB 39901-2025, with a clearance of 1.0 m at 30 km/h.
 
     Args:
-        ego_speed: In (0, 40] [m/s].
-        clearance: Between the ego's side and the walker's, in [0.2, 10] [m].
-        walking_speed: In [0, ego_speed) [m/s].
+        ego_speed: Ego speed, in (0, 40] [m/s].
+        clearance: Distance between the sides of ego and pedestrian, in [0.2, 10] [m].
+        walking_speed: Pedestrian speed, in [0, ego_speed) [m/s].
         shade: Grey of the clothes in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
@@ -91,49 +104,50 @@ def pass_pedestrian(
 
 @family("CurveGuardRail")
 def drive_along_rail(ego_speed: float = 50 * KMH, radius: float = 60.0, left: bool = True) -> Scenario:
-    """Drive a curve with a guard rail along its outside.
+    """The ego drives a curve with a guard rail along its outside; not a threat.
 
     Args:
-        ego_speed: In (0, 40]; the lateral acceleration v²/radius must stay within 4 m/s² [m/s].
-        radius: Of the ego's path, in [15, 500] [m].
-        left: Whether the curve turns left.
+        ego_speed: Ego speed, in (0, 40] [m/s]; the lateral acceleration v²/radius is limited to 4 m/s².
+        radius: Radius of the ego's path, in [15, 500] [m].
+        left: Whether the curve turns left; otherwise right.
     """
     speed = check_speed("ego_speed", ego_speed)
     bend_radius = check_within("radius", radius, 15.0, 500.0, "m")
     if speed**2 / bend_radius > 4.0:
         raise ValueError(
-            f"{speed:g} m/s on a radius of {bend_radius:g} m is {speed**2 / bend_radius:.1f} m/s² sideways, "
-            f"beyond 4; drive below {(4.0 * bend_radius) ** 0.5:.1f} m/s"
+            f"ego_speed {speed:g} m/s on a radius of {bend_radius:g} m has a lateral acceleration of "
+            f"{speed**2 / bend_radius:.1f} m/s², beyond 4 m/s²; "
+            f"pass at most {(4.0 * bend_radius) ** 0.5:.1f} m/s"
         )
     side = 1.0 if left else -1.0
     entry = 3.0 * speed
-    curve = arc(bend_radius, side * min(pi / 2, RAIL_LENGTH / bend_radius))
-    # Outside is to the right of a left curve: the ego's own side; else beyond the other lane.
+    curve = arc(bend_radius, side * min(pi / 2, CURVE_LENGTH / bend_radius))
+    # The outside of a left curve is next to the ego's lane; of a right curve, beyond the oncoming lane.
     outside = LANE_WIDTH / 2 + 1.0 + (0.0 if left else LANE_WIDTH)
-    way = Path(Pose(0.0, 0.0, 0.0), (Bend(entry), curve))
-    rails = _rail(way, entry - 15.0, entry + curve.length + 15.0, side * outside)
+    path = Path(Pose(0.0, 0.0, 0.0), (Bend(entry), curve))
+    rails = _rail(path, entry - 15.0, entry + curve.length + 15.0, side * outside)
     return Scenario(
         family="CurveGuardRail",
         ego_speed=speed,
         duration=(entry + curve.length) / speed + 2.0,
         actors=rails,
         ego_path=(Bend(entry), curve),
-        road=RoadPlan(kind="curve", at=entry, bends=(curve,)),
+        road=RoadPlan(kind="curve", distance=entry, bends=(curve,)),
     )
 
 
-def _rail(way: Path, start: float, end: float, to_right: float) -> tuple[Actor, ...]:
-    """Return boxes end to end along a path, `to_right` metres beside it."""
+def _rail(path: Path, start: float, end: float, to_right: float) -> tuple[Actor, ...]:
+    """Return boxes in a row along a path, shifted to its right by `to_right` [m]."""
 
-    def beside(distance: float) -> tuple[float, float]:
-        pose = way.pose(distance)
+    def shifted(distance: float) -> tuple[float, float]:
+        pose = path.pose(distance)
         return pose.x - to_right * sin(pose.heading), pose.y + to_right * cos(pose.heading)
 
     pieces = []
     count = int((end - start) / RAIL_PIECE)
     for number in range(count):
-        x0, y0 = beside(start + number * RAIL_PIECE)
-        x1, y1 = beside(start + (number + 1) * RAIL_PIECE)
+        x0, y0 = shifted(start + number * RAIL_PIECE)
+        x1, y1 = shifted(start + (number + 1) * RAIL_PIECE)
         length = hypot(x1 - x0, y1 - y0)
         pieces.append(
             Actor(

@@ -1,15 +1,25 @@
-"""Approaches from behind: Euro NCAP's CCRs, CCRm and CCRb, and following that needs no brake."""
+"""Rear scenarios: Euro NCAP's CCRs, CCRm and CCRb, and car following without a threat."""
 
 from dataclasses import replace
-from math import pi
+from math import copysign, pi
 
 from lgmd_gym.envs.dynamics.speed_profile import Segment
-from lgmd_gym.envs.dynamics.units import KMH, check_speed, check_within, offset_from_overlap
-from lgmd_gym.envs.scenarios.registry import AFTERMATH, START_TTC, family
-from lgmd_gym.envs.scenarios.scenario import EGO_WIDTH, LANE_WIDTH, TARGET_WIDTH, Actor, Scenario
+from lgmd_gym.envs.dynamics.units import KMH, check_speed, check_within
+from lgmd_gym.envs.scenarios.registry import family
+from lgmd_gym.envs.scenarios.scenario import (
+    AFTERMATH,
+    EGO_WIDTH,
+    LANE_WIDTH,
+    START_TTC,
+    TARGET_WIDTH,
+    Actor,
+    Scenario,
+)
 
-LEAD_IN = 3.0  # [s] at constant distance before a lead car brakes (T0 is 1 s before: N1 8.2.2.3)
-RELEASE = 2.5  # [m/s²], of a lead car that brakes and releases
+LEAD_IN = (
+    3.0  # [s] at constant distance before the lead car brakes; T0 is 1 s before (AEB C2C v4.3.1, 8.2.2.3)
+)
+RELEASE = 2.5  # [m/s²], deceleration and acceleration of a lead car that brakes and releases
 
 
 @family("CCRs")
@@ -22,16 +32,21 @@ def approach_standing(
     beside: bool = False,
     shade: int | None = None,
 ) -> Scenario:
-    """Approach a standing car (Car-to-Car Rear stationary).
+    """The ego approaches a stationary car from behind (Car-to-Car Rear stationary).
+
+    Source: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.2; impact locations: Euro NCAP 2026. At most one of
+    `lateral_offset`, `overlap` and `impact_location` can be given.
 
     Args:
-        ego_speed: In (0, 40] [m/s].
-        lateral_offset: The target's centreline minus the ego's, + left [m].
-        overlap: Instead of it: share of the ego's width in [-1, 1], the sign says the side (2023).
-        impact_location: Instead of both: where on the ego's width the target's centre strikes, in
-            [-0.25, 1.25], 0.5 is aligned, more is to the left (2026).
-        target_heading: Of the target against the ego's, in [-π/2, π/2], + left [rad].
-        beside: Whether another car stands beside the target, in the lane to the left.
+        ego_speed: Ego speed, in (0, 40] [m/s].
+        lateral_offset: Target centreline minus ego centreline, + left, in [-20, 20] [m]; 0 if no position
+            is given.
+        overlap: Overlapped share of the ego's width, in [-1, 1]; the sign is the side, + left, and ±1 is
+            aligned (2023).
+        impact_location: Position of the target's centre across the ego's width, in [-0.25, 1.25]; 0.5 is
+            aligned, larger values are to the left (2026).
+        target_heading: Target heading relative to the ego's, + left, in [-π/2, π/2] [rad].
+        beside: Whether a second stationary car is next to the target, in the lane to the left.
         shade: Body grey of the target in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
@@ -42,7 +57,9 @@ def approach_standing(
         shade=shade,
     )
     duration = START_TTC + AFTERMATH
-    return Scenario(family="CCRs", ego_speed=speed, duration=duration, actors=_with_clutter(target, beside))
+    return Scenario(
+        family="CCRs", ego_speed=speed, duration=duration, actors=_with_second_car(target, beside)
+    )
 
 
 @family("CCRm")
@@ -55,15 +72,17 @@ def approach_slower(
     beside: bool = False,
     shade: int | None = None,
 ) -> Scenario:
-    """Approach a slower car (Car-to-Car Rear moving).
+    """The ego approaches a slower car from behind (Car-to-Car Rear moving).
+
+    Source: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.2, with a target speed of 20 km/h.
 
     Args:
-        ego_speed: In (0, 40] [m/s].
-        target_speed: In (0, ego_speed) [m/s]; the protocols use 20 km/h.
-        lateral_offset: The target's centreline minus the ego's, + left [m].
-        overlap: Instead of it, see CCRs.
-        impact_location: Instead of both, see CCRs.
-        beside: Whether another car drives beside the target, in the lane to the left.
+        ego_speed: Ego speed, in (0, 40] [m/s].
+        target_speed: Target speed, in (0, ego_speed) [m/s].
+        lateral_offset: Target centreline minus ego centreline, + left, in [-20, 20] [m].
+        overlap: Alternative to `lateral_offset`, as in CCRs.
+        impact_location: Alternative to `lateral_offset`, as in CCRs.
+        beside: Whether a second car drives next to the target, in the lane to the left.
         shade: Body grey of the target in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
@@ -77,7 +96,9 @@ def approach_slower(
         shade=shade,
     )
     duration = START_TTC + AFTERMATH
-    return Scenario(family="CCRm", ego_speed=speed, duration=duration, actors=_with_clutter(target, beside))
+    return Scenario(
+        family="CCRm", ego_speed=speed, duration=duration, actors=_with_second_car(target, beside)
+    )
 
 
 @family("CCRb")
@@ -93,18 +114,20 @@ def follow_braking(
     beside: bool = False,
     shade: int | None = None,
 ) -> Scenario:
-    """Follow a car that brakes to a standstill (Car-to-Car Rear braking).
+    """The ego follows a car that brakes to a standstill (Car-to-Car Rear braking).
+
+    Source: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.2.3, at 50 km/h with 2 or 6 m/s² and gaps of 12 or 40 m.
 
     Args:
-        ego_speed: Speed of both cars, in (0, 40] [m/s].
-        gap: Bumper to bumper while both hold their speed, in [1, 200]; 40 if no headway is given [m].
-        headway: Instead of `gap`: time the ego needs to cover it, in [0.3, 10] [s].
-        deceleration: Of the target, in [0.5, 10] [m/s²].
-        build_up: From its onset to the full deceleration, in [0, 5] [s].
-        lateral_offset: The target's centreline minus the ego's, + left [m].
-        overlap: Instead of it, see CCRs.
-        impact_location: Instead of both, see CCRs.
-        beside: Whether another car brakes beside the target, in the lane to the left.
+        ego_speed: Initial speed of both cars, in (0, 40] [m/s].
+        gap: Initial bumper-to-bumper distance, in [1, 200] [m]; 40 m without `gap` and `headway`.
+        headway: Alternative to `gap`: initial time headway, in [0.3, 10] [s].
+        deceleration: Full deceleration of the target, in [0.5, 10] [m/s²].
+        build_up: Time from the onset to the full deceleration, in [0, 5] [s].
+        lateral_offset: Target centreline minus ego centreline, + left, in [-20, 20] [m].
+        overlap: Alternative to `lateral_offset`, as in CCRs.
+        impact_location: Alternative to `lateral_offset`, as in CCRs.
+        beside: Whether a second car brakes next to the target, in the lane to the left.
         shade: Body grey of the target in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
@@ -120,23 +143,23 @@ def follow_braking(
         profile=(braking,),
         shade=shade,
     )
-    # The ego covers the gap and the lead car's way to standstill at its scripted speed.
+    # At its scripted speed the ego covers the gap and the lead car's stopping distance.
     contact = LEAD_IN + build_up / 2 + speed / (2 * strength) + distance / speed
     return Scenario(
         family="CCRb",
         ego_speed=speed,
         duration=contact + AFTERMATH,
-        actors=_with_clutter(target, beside),
+        actors=_with_second_car(target, beside),
     )
 
 
 @family("Following")
 def follow_steadily(ego_speed: float = 50 * KMH, headway: float = 2.0, shade: int | None = None) -> Scenario:
-    """Follow a car at constant distance; nothing calls for braking.
+    """The ego follows a car at a constant distance; not a threat.
 
     Args:
         ego_speed: Speed of both cars, in (0, 40] [m/s].
-        headway: Time the ego needs to cover the gap, in [0.3, 10] [s].
+        headway: Time headway, in [0.3, 10] [s].
         shade: Body grey of the lead car in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
@@ -149,46 +172,47 @@ def follow_steadily(ego_speed: float = 50 * KMH, headway: float = 2.0, shade: in
 def lead_brakes_and_releases(
     ego_speed: float = 50 * KMH, headway: float = 1.5, speed_drop: float = 5.0, shade: int | None = None
 ) -> Scenario:
-    """Follow a car that brakes and gets away again before it would be hit; nothing calls for braking.
+    """The ego follows a car that brakes briefly and regains its speed without contact; not a threat.
 
     Args:
-        ego_speed: Speed of both cars, in (0, 40] [m/s].
-        headway: Time the ego needs to cover the gap at first, in [0.3, 10] [s].
-        speed_drop: By how much the lead car slows down, at 2.5 m/s² there and back [m/s].
+        ego_speed: Initial speed of both cars, in (0, 40] [m/s].
+        headway: Initial time headway, in [0.3, 10] [s].
+        speed_drop: Speed that the lead car loses and regains at 2.5 m/s², in [0.1, ego_speed] [m/s].
         shade: Body grey of the lead car in [0, 255]; None draws it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     gap = speed * check_within("headway", headway, 0.3, 10.0, "s")
     drop = check_within("speed_drop", speed_drop, 0.1, speed, "m/s")
-    lost = drop**2 / RELEASE  # half of it while braking, half while regaining
+    lost = drop**2 / RELEASE  # half while braking, half while accelerating
     if lost >= gap:
         raise ValueError(
-            f"speed_drop {drop:g} m/s costs {lost:.1f} m of a gap of {gap:.1f} m; lower it or raise headway"
+            f"speed_drop {drop:g} m/s reduces the gap of {gap:.1f} m by {lost:.1f} m; "
+            "lower it or raise headway"
         )
-    slows = Segment(start=LEAD_IN, acceleration=-RELEASE, final_speed=speed - drop)
-    regains = Segment(start=LEAD_IN, acceleration=RELEASE, final_speed=speed)
-    lead = Actor(gap=gap, speed=speed, profile=(slows, regains), shade=shade)
+    braking = Segment(start=LEAD_IN, acceleration=-RELEASE, final_speed=speed - drop)
+    accelerating = Segment(start=LEAD_IN, acceleration=RELEASE, final_speed=speed)
+    lead = Actor(gap=gap, speed=speed, profile=(braking, accelerating), shade=shade)
     return Scenario(family="BrakeRelease", ego_speed=speed, duration=10.0, actors=(lead,))
 
 
 def _gap(speed: float, gap: float | None, headway: float | None) -> float:
-    """Return the gap [m] from the one of the two arguments that was given; 40 m for neither."""
+    """Return the gap [m] from `gap` or `headway`; 40 m if both are None."""
     if headway is None:
         return check_within("gap", 40.0 if gap is None else gap, 1.0, 200.0, "m")
     if gap is not None:
-        raise ValueError(f"gap={gap!r} and headway={headway!r} say the same thing twice; pass one")
+        raise ValueError(f"gap={gap!r} and headway={headway!r} both set the distance; pass one")
     return speed * check_within("headway", headway, 0.3, 10.0, "s")
 
 
-def _with_clutter(target: Actor, beside: bool) -> tuple[Actor, ...]:
-    """Return the target, and its twin in the lane to the left if asked for."""
+def _with_second_car(target: Actor, beside: bool) -> tuple[Actor, ...]:
+    """Return the target, with a copy of it in the lane to the left if `beside`."""
     if not beside:
         return (target,)
     return target, replace(target, lateral_offset=LANE_WIDTH, heading=0.0, shade=None)
 
 
 def _offset(lateral_offset: float | None, overlap: float | None, impact_location: float | None) -> float:
-    """Return the lateral offset [m] from the one of the three arguments that was given; 0 for none."""
+    """Return the lateral offset [m] from one of the three arguments; 0 if all are None."""
     names = ("lateral_offset", "overlap", "impact_location")
     given = {
         name: value
@@ -196,11 +220,19 @@ def _offset(lateral_offset: float | None, overlap: float | None, impact_location
         if value is not None
     }
     if len(given) > 1:
-        said = " and ".join(f"{name}={value!r}" for name, value in given.items())
-        raise ValueError(f"{said} say the same thing twice; pass one")
+        text = " and ".join(f"{name}={value!r}" for name, value in given.items())
+        raise ValueError(f"{text} both set the lateral position; pass one")
     if overlap is not None:
-        return offset_from_overlap(overlap, EGO_WIDTH, TARGET_WIDTH)
+        return _offset_from_overlap(overlap)
     if impact_location is not None:
-        # As in the OpenSCENARIO files for Euro NCAP 2026: the share of the ego's width, 0.5 in its middle.
+        # As in the OpenSCENARIO files of Euro NCAP 2026: 0 and 1 are the ego's sides, 0.5 its centreline.
         return (check_within("impact_location", impact_location, -0.25, 1.25) - 0.5) * EGO_WIDTH
     return check_within("lateral_offset", lateral_offset or 0.0, -20.0, 20.0, "m")
+
+
+def _offset_from_overlap(overlap: float) -> float:
+    """Return the lateral offset [m] for an overlap as defined in Euro NCAP AEB C2C v4.3.1, 3.4."""
+    share = check_within("overlap", overlap, -1.0, 1.0)
+    if abs(share) == 1.0:
+        return 0.0
+    return copysign((EGO_WIDTH + TARGET_WIDTH) / 2 - abs(share) * EGO_WIDTH, share)

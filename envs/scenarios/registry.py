@@ -1,26 +1,44 @@
-"""The register of scenario families, and what they share. The families are in the modules beside."""
+"""Registry of the scenario families."""
 
+import inspect
 from collections.abc import Callable
 
 from lgmd_gym.envs.scenarios.scenario import Scenario
-
-START_TTC = 5.0
-"""A run starts this long before the first possible contact at the scripted speeds: 1 s of undisturbed
-driving before the protocols' T0 at 4 s time to contact, so that braking at once counts as premature [s]."""
-AFTERMATH = 6.0
-"""A run may last this long past the scripted contact, for a slow stop to be seen to its end [s]."""
+from lgmd_gym.errors import check_keys, unknown_name
 
 Family = Callable[..., Scenario]
 FAMILIES: dict[str, Family] = {}
+"""Scenario functions by family name; importing `lgmd_gym.envs.scenarios` fills it."""
 
 
 def family(name: str) -> Callable[[Family], Family]:
-    """Enter a scenario function into `FAMILIES`; a name is given once."""
+    """Register a scenario function under a family name; its environment id is `LGMD/<name>-v0`.
 
-    def enter(function: Family) -> Family:
+    Raises:
+        ValueError: If the name is taken.
+    """
+
+    def register(function: Family) -> Family:
         if name in FAMILIES:
-            raise ValueError(f"scenario family {name!r} is defined twice")
+            raise ValueError(f"scenario family {name!r} is defined twice; choose another name")
         FAMILIES[name] = function
         return function
 
-    return enter
+    return register
+
+
+def make_scenario(name: str, **arguments: object) -> Scenario:
+    """Return the scenario of a family.
+
+    Args:
+        name: A key of `FAMILIES`.
+        **arguments: Arguments of the family's function.
+
+    Raises:
+        ValueError: If the family or an argument is unknown, or a value is out of range.
+    """
+    if name not in FAMILIES:
+        raise unknown_name("scenario", name, FAMILIES)
+    function = FAMILIES[name]
+    check_keys(f"argument of {name}", arguments, inspect.signature(function).parameters)
+    return function(**arguments)

@@ -1,4 +1,4 @@
-"""What happens, as plain data: a road, the ego's script, and who else is there."""
+"""Scenarios as plain data: the road, the ego's script, and the other actors."""
 
 from dataclasses import dataclass, field
 
@@ -8,30 +8,36 @@ from lgmd_gym.envs.dynamics.units import check_finite, check_speed, check_within
 from lgmd_gym.errors import unknown_name
 
 EGO_LENGTH, EGO_WIDTH = 4.3, 1.8  # [m]
-# The Global Vehicle Target of ISO 19206-3, box of the OpenSCENARIO catalogue for Euro NCAP.
+# Global Vehicle Target of ISO 19206-3, bounding box of Euro NCAP's OpenSCENARIO catalogue.
 TARGET_LENGTH, TARGET_WIDTH, TARGET_HEIGHT = 4.023, 1.712, 1.427  # [m]
 LANE_WIDTH = 3.5  # [m], Euro NCAP AEB C2C v4.3.1, 7.1
 ACTOR_KINDS = ("car", "box", "road_marking")
 ROAD_KINDS = ("straight", "two-way", "curve", "crossing")
+START_TTC = 5.0
+"""Time from the start to the first possible contact at the scripted speeds [s]: 1 s more than the protocols'
+T0 of 4 s, so that braking from the start counts as premature."""
+AFTERMATH = 6.0
+"""Maximum duration of an episode after the scripted contact [s], enough for a slow stop."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actor:
-    """Somebody or something else, placed relative to the ego at the start.
+    """Another road user or object, placed relative to the ego at the start.
 
     Attributes:
-        gap: Along the ego's heading, from its front bumper to half a length before this one's centre: its
-            rear if both look the same way; negative if beside or behind [m].
-        lateral_offset: Centre minus the ego's centreline, + left [m].
-        heading: Where it looks, against the ego's heading, + left [rad].
-        speed: Along its path at the start [m/s].
-        profile: Changes of speed, in order of their start.
-        path: Bends it drives from its start on; straight for none.
-        kind: "car"; "box", solid; or "road_marking", flat, which one drives over.
+        gap: Distance along the ego's heading from its front bumper to the point half a length before the
+            actor's centre, which is the actor's rear if it has the ego's heading; negative for actors next
+            to or behind the ego [m].
+        lateral_offset: Actor centre minus ego centreline, + left [m].
+        heading: Heading relative to the ego's, + left [rad].
+        speed: Initial speed along its path, in [0, 40] [m/s].
+        profile: Scripted changes of speed, in order of their start.
+        path: Bends driven from the start on; empty for a straight path.
+        kind: "car"; "box", a solid object; or "road_marking", a flat object that the ego drives over.
         shade: Body grey in [0, 255]; None draws it from the environment's seed.
-        length: [m].
-        width: [m].
-        height: [m].
+        length: Length [m].
+        width: Width [m].
+        height: Height [m].
     """
 
     gap: float
@@ -62,22 +68,22 @@ class Actor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoadPlan:
-    """The road under the ego.
+    """Layout of the road.
 
     Attributes:
-        kind: "straight", all lanes one way; "two-way", the ego's lane and one towards it on the left;
-            "curve", along `bends`; "crossing", two-way with a road across.
+        kind: "straight", parallel lanes in one direction; "two-way", the ego's lane and an oncoming lane on
+            its left; "curve", a two-way road along `bends`; "crossing", a two-way road crossed by another.
         lanes: Number of lanes of a straight road.
-        ego_lane: The ego's lane, 0 the leftmost.
-        at: Where the curve begins, or the middle of the road across, ahead of the ego's centre at the
-            start [m].
+        ego_lane: Lane of the ego on a straight road, 0 the leftmost.
+        distance: Distance from the ego's initial centre to the start of the curve or to the centre of the
+            crossing road [m].
         bends: Arcs of the curve.
     """
 
     kind: str = "straight"
     lanes: int = 3
     ego_lane: int = 1
-    at: float = 0.0
+    distance: float = 0.0
     bends: tuple[Bend, ...] = ()
 
     def __post_init__(self) -> None:
@@ -87,23 +93,23 @@ class RoadPlan:
             raise ValueError(f"ego_lane must be in [0, {self.lanes - 1}], got {self.ego_lane!r}")
 
     @property
-    def placed(self) -> bool:
-        """Whether the road lies relative to where the ego starts."""
+    def relative_to_ego(self) -> bool:
+        """Whether the road is placed relative to the ego's initial position."""
         return self.kind in ("curve", "crossing")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """One test case, in SI units.
+    """One test case in SI units.
 
     Attributes:
-        family: The scenario family, as in the environment's id ("CCRs").
-        ego_speed: The ego's speed at the start [m/s]; 0 only if the profile sets it going.
-        duration: The episode is truncated after this time [s].
-        actors: Everybody else; the first one is the target that rows speak of.
-        ego_profile: The ego's scripted changes of speed.
-        ego_path: Bends the ego drives from its start on; straight for none.
-        road: The road.
+        family: Scenario family, as in the environment id ("CCRs").
+        ego_speed: Initial ego speed, in (0, 40] [m/s]; 0 is allowed with an `ego_profile`.
+        duration: Time after which the episode is truncated [s].
+        actors: Other road users and objects; benchmark rows refer to the first one as the target.
+        ego_profile: Scripted changes of the ego's speed, in order of their start.
+        ego_path: Bends that the ego drives from the start on; empty for a straight path.
+        road: Layout of the road.
     """
 
     family: str
@@ -122,11 +128,11 @@ class Scenario:
 
     @property
     def top_speed(self) -> float:
-        """The highest scripted speed of the ego [m/s]."""
-        return max(self.ego_speed, *(phase.final_speed for phase in self.ego_profile), 0.0)
+        """Highest scripted speed of the ego [m/s]."""
+        return max(self.ego_speed, *(segment.final_speed for segment in self.ego_profile), 0.0)
 
 
 def _check_profile(profile: tuple[Segment, ...]) -> None:
-    starts = [phase.start for phase in profile]
+    starts = [segment.start for segment in profile]
     if starts != sorted(starts):
-        raise ValueError(f"profile phases must be in order of their start, got starts {starts}")
+        raise ValueError(f"profile segments must be in order of their start, got starts {starts}")

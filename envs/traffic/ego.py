@@ -1,4 +1,4 @@
-"""The car under test in traffic: an IDM driver at the wheel, and an agent that may add braking."""
+"""The car under test in traffic: an IDM driver, and an agent that can add braking."""
 
 from math import atan, cos, sin, tan
 from typing import Any, cast
@@ -10,31 +10,31 @@ from lgmd_gym.envs.dynamics.longitudinal import advance
 from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, EGO_WIDTH
 from lgmd_gym.envs.traffic.drivers import TrafficCar
 
-EASY = 3.0  # [m/s²] the driver slows no harder than this for a speed limit or to give way
+COMFORT_DECELERATION = 3.0  # [m/s²], limit of the driver's deceleration towards its target speed
 
 
 class TrafficEgo(TrafficCar):
-    """The car under test: IDM drives and keeps its lane, an agent may add braking.
+    """The car under test: IDM drives without lane changes, an agent can add braking.
 
-    The lane is kept because the branches with and without braking shall differ by the braking alone, and
-    because MOBIL would overtake on a two-way road without a look at who is coming. The steering is
-    highway-env's; the speed follows the same brake as in `BrakingEnv`, exactly within each step.
+    Without lane changes, episodes with and without braking differ by the braking alone. MOBIL would also
+    overtake on a two-way road regardless of oncoming cars. The steering is highway-env's. The speed follows
+    the brake model of `BrakingEnv`, exactly within each step.
 
     Args:
         road: The road.
         position: Centre [m].
-        heading: [rad].
-        speed: [m/s].
-        brake: The brake.
+        heading: Heading [rad].
+        speed: Speed [m/s].
+        brake: Response to demands; None for the default.
 
     Attributes:
-        driver: Acceleration that IDM asks for [m/s²], >= −6.
-        now: Acceleration of the car [m/s²].
-        yaw_rate: Over the last step, + to the right [rad/s].
-        travelled: Distance since the reset [m].
+        driver_acceleration: Acceleration demanded by the IDM driver, >= −6 [m/s²].
+        current_acceleration: Acceleration of the car [m/s²].
+        yaw_rate: Mean yaw rate over the last step, + to the right [rad/s].
+        travelled: Distance travelled since the reset [m].
     """
 
-    color = (50, 200, 0)  # in highway-env's view from above
+    color = (50, 200, 0)  # in highway-env's top view
 
     def __init__(
         self,
@@ -47,52 +47,59 @@ class TrafficEgo(TrafficCar):
         self.LENGTH, self.WIDTH = EGO_LENGTH, EGO_WIDTH
         super().__init__(road, position, heading, speed, enable_lane_change=False)
         self.brake = brake or BrakeParams()
-        self.driver = self.now = self.yaw_rate = self.travelled = 0.0
-        self._delayed = DelayLine(self.brake.delay)
+        self.driver_acceleration = self.current_acceleration = 0.0
+        self.yaw_rate = self.travelled = 0.0
+        self._delay_line = DelayLine(self.brake.delay)
         self._by_driver = True
 
     def demand(self, value: float) -> None:
-        """Take a longitudinal demand: −1 full brake, 0 and above leave it to the driver."""
-        self._delayed.put(min(value, 0.0))
+        """Set the longitudinal demand: −1 full brake, 0 and above no braking beyond the driver's."""
+        self._delay_line.put(min(value, 0.0))
 
     @property
     def braking(self) -> float:
-        """Deceleration beyond the driver's, >= 0 [m/s²]; standing where the driver would go on is none."""
-        return 0.0 if self._by_driver else max(0.0, min(self.driver, 0.0) - self.now)
+        """Deceleration beyond the driver's, >= 0 [m/s²]; 0 at standstill."""
+        if self._by_driver:
+            return 0.0
+        return max(0.0, min(self.driver_acceleration, 0.0) - self.current_acceleration)
 
     def acceleration(self, ego_vehicle: Any, front_vehicle: Any = None, rear_vehicle: Any = None) -> float:
-        """Return IDM's acceleration [m/s²], the term for the wanted speed bounded by comfort.
+        """Return the IDM acceleration with a limited free-road term [m/s²].
 
-        IDM's own term falls with the fourth power of speed over wanted speed, so that a car told to give way
-        (a wanted speed of 0) would always do so by emergency braking.
+        The free-road term of IDM falls with the fourth power of speed over target speed. Without the limit, a
+        car that has to give way (target speed 0) would always brake with an emergency deceleration.
         """
         free = super().acceleration(ego_vehicle)
-        whole = super().acceleration(ego_vehicle, front_vehicle, rear_vehicle)
-        return max(free, -EASY) + (whole - free)
+        total = super().acceleration(ego_vehicle, front_vehicle, rear_vehicle)
+        return max(free, -COMFORT_DECELERATION) + (total - free)
 
     def act(self, action: Any = None) -> None:
-        """Have the driver decide."""
+        """Update the driver's steering and acceleration."""
         super().act()
-        self.driver = float(cast(dict[str, float], self.action)["acceleration"])
+        self.driver_acceleration = float(cast(dict[str, float], self.action)["acceleration"])
 
     def step(self, dt: float) -> None:
-        """Advance by `dt` [s] under the demands that have become due."""
+        """Advance by `dt` [s] under the delayed demands."""
         self.timer += dt
         action = cast(dict[str, float], self.action)
         slip = atan(tan(action["steering"]) / 2)
-        distance = sum(self._advance(duration, demand) for duration, demand in self._delayed.pieces(dt))
+        distance = sum(self._advance(duration, demand) for duration, demand in self._delay_line.advance(dt))
         course = self.heading + slip
         self.position = self.position + distance * np.array([cos(course), sin(course)])
         turned = distance * sin(slip) / (self.LENGTH / 2)
         self.heading += turned
         self.yaw_rate = turned / dt
         self.travelled += distance
-        action["acceleration"] = self.now
+        action["acceleration"] = self.current_acceleration
         self.on_state_update()
 
     def _advance(self, duration: float, demand: float) -> float:
-        """Advance the speed under one demand and return the distance [m]."""
-        target = min(demand * self.brake.max_deceleration, self.driver) if demand < 0.0 else self.driver
-        self._by_driver = demand == 0.0 and (self._by_driver or self.now >= self.driver)
-        distance, self.speed, self.now = advance(self.speed, self.now, target, self.brake.jerk, duration)
+        """Advance the speed under one demand and return the distance travelled [m]."""
+        before, target = self.current_acceleration, self.driver_acceleration
+        self._by_driver = demand == 0.0 and (self._by_driver or before >= target)
+        if demand < 0.0:
+            target = min(demand * self.brake.max_deceleration, target)
+        distance, self.speed, self.current_acceleration = advance(
+            self.speed, before, target, self.brake.jerk, duration
+        )
         return distance

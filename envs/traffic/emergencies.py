@@ -1,50 +1,50 @@
-"""What counts as an emergency in traffic, and whether one is coming."""
+"""Emergencies in traffic: contacts of the ego and hard braking of its driver."""
 
 from dataclasses import dataclass
 
 from lgmd_gym.envs.traffic.env import TrafficEnv
 
-HORIZON = 10.0  # [s] after a brake within which an emergency makes it needed; the horizon of `ttc`
-HARD = 5.0  # [m/s²], UN R152 2.1: an emergency braking demand is for 5.0 m/s² at least
+HORIZON = 10.0  # [s], an emergency within this time after a brake makes it necessary; horizon of `ttc`
+HARD_BRAKING = 5.0  # [m/s²], UN R152 2.1: minimum deceleration of an emergency braking demand
 
 
 @dataclass(frozen=True, slots=True)
 class Emergencies:
-    """The emergencies of a drive in which nobody brakes but the driver.
+    """The emergencies of an episode without braking by the agent.
 
-    An emergency is the ego's contact, with whatever part of it, or the driver himself braking by `HARD` or
-    more: whoever brakes then brakes with good reason, even if the driver alone would have managed.
+    An emergency is a contact of the ego, on any side, or braking of the driver by `HARD_BRAKING` or more. A
+    brake of the agent before an emergency is necessary even if the driver alone would have avoided contact.
 
     Attributes:
-        contact: Time of the ego's contact [s]; None without one.
-        hard: Times of the decisions after which the driver braked hard [s], ascending.
+        contact: Time of the ego's contact [s]; None without contact.
+        hard: Times of the decisions after which the driver braked hard, ascending [s].
     """
 
     contact: float | None
     hard: tuple[float, ...]
 
-    def need(self, time: float, horizon: float = HORIZON) -> float | None:
-        """Return how long after `time` [s] the next emergency is, 0 if it is one; None beyond `horizon`."""
+    def time_until(self, time: float, horizon: float = HORIZON) -> float | None:
+        """Return the time from `time` to the next emergency, 0 during one [s]; None beyond `horizon`."""
         times = [*self.hard, *([] if self.contact is None else [self.contact])]
         after = [moment - time for moment in times if -1e-9 <= moment - time <= horizon + 1e-9]
         return max(min(after), 0.0) if after else None
 
 
-def drive_on(env: TrafficEnv, time: float, horizon: float = HORIZON) -> Emergencies:
-    """Let the driver go on alone, even beyond the drive's end, and return the emergencies that come.
+def simulate_driver(env: TrafficEnv, time: float, horizon: float = HORIZON) -> Emergencies:
+    """Continue an episode without the agent, even past its end, and return the emergencies.
 
     Args:
-        env: Is left wherever that leads, and its road unwatched.
-        time: At present [s].
-        horizon: For how long [s].
+        env: The environment, left in the final state and with its road-step callback removed.
+        time: Current time [s].
+        horizon: Simulated time [s].
     """
-    vars(env.road).pop("step", None)  # an eye would go on looking
+    vars(env.road).pop("step", None)  # the callback of `on_road_step` would render camera frames
     policy_hz = env.config["policy_frequency"]
-    hard = [time] if env.ego.driver <= -HARD else []
+    hard = [time] if env.ego.driver_acceleration <= -HARD_BRAKING else []
     for step in range(1, round(horizon * policy_hz) + 1):
-        if env.road.touch is not None:
+        if env.road.contact is not None:
             return Emergencies(time + (step - 1) / policy_hz, tuple(hard))
-        env.coast()
-        if env.ego.driver <= -HARD:
+        env.step_unobserved()
+        if env.ego.driver_acceleration <= -HARD_BRAKING:
             hard.append(time + step / policy_hz)
-    return Emergencies(time + horizon if env.road.touch is not None else None, tuple(hard))
+    return Emergencies(time + horizon if env.road.contact is not None else None, tuple(hard))

@@ -1,118 +1,128 @@
-"""What the kinds of traffic have in common: an IDM driver at the wheel, and an agent that may brake."""
+"""`TrafficEnv`: base of the traffic environments, with an IDM driver and an agent that can brake."""
 
-from dataclasses import asdict, fields
 from functools import partial
-from math import cos
+from math import inf
 from typing import Any, ClassVar, cast
 
 import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.abstract import AbstractEnv
 
-from lgmd_gym.envs.dynamics.brake import BrakeParams
+from lgmd_gym.envs import surrogate_safety
+from lgmd_gym.envs.base import EgoBrakeEnv
+from lgmd_gym.envs.dynamics.contact import speed_along
 from lgmd_gym.envs.spaces import ContinuousDemand, EgoState
 from lgmd_gym.envs.traffic.ego import TrafficEgo
-from lgmd_gym.envs.traffic.geometry import ahead, time_to_contact
 from lgmd_gym.envs.traffic.road import TrafficRoad
-from lgmd_gym.envs.undefined import UNDEFINED
-from lgmd_gym.errors import check_keys
 
-# [s] below a speed [m/s] after which a drive is over: where ways cross, drivers can block each other.
-JAM, WALK = 10.0, 0.5
-CLEAR = 12.0  # [m] between centres below which a car is not let in at the start
+JAM_TIME, JAM_SPEED = 10.0, 0.5  # [s], [m/s]: the episode ends after this time below this speed
+MIN_START_DISTANCE = 12.0  # [m] between the centres of two cars at the start
 
 
 class TrafficDemand(ContinuousDemand):
-    """One number in [-1, 0]: −1 full brake, 0 (and above) leave it to the driver."""
+    """A longitudinal demand in [-1, 0]: −1 full brake, 0 and above no braking beyond the driver's."""
 
-    def space(self) -> spaces.Box:
+    def space(self) -> spaces.Space:
         """Return Box(-1, 0, (1,), float32)."""
         return spaces.Box(-1.0, 0.0, shape=(1,), dtype=np.float32)
 
     @property
     def vehicle_class(self) -> Any:
-        """What makes the car that takes the demand."""
+        """Factory of the controlled car."""
         return partial(TrafficEgo, brake=cast(TrafficEnv, self.env).brake)
 
 
 class TrafficState(EgoState):
-    """What a car's own sensors tell: speed [m/s], acceleration [m/s²], yaw rate [rad/s, + right]."""
+    """Ego speed [m/s], acceleration [m/s²] and yaw rate [rad/s, + right]."""
 
-    def space(self) -> spaces.Box:
-        """Return a Box of shape (3,), float32; a car can turn on the spot by up to a full steering lock."""
+    def space(self) -> spaces.Space:
+        """Return a float32 Box of shape (3,); the yaw rate is bounded by the full steering lock."""
         high = np.array([100.0, 12.0, 10.0 * np.pi], dtype=np.float32)
         low = np.array([0.0, -12.0, -10.0 * np.pi], dtype=np.float32)
         return spaces.Box(low, high, dtype=np.float32)
 
     def observe(self) -> np.ndarray:
-        """Return the present state, shape (3,)."""
+        """Return the current state, float32, shape (3,)."""
         if self.env.vehicle is None:
             return np.zeros(3, dtype=np.float32)
         ego = cast(TrafficEgo, self.env.vehicle)
-        return np.array([ego.speed, ego.now, ego.yaw_rate], dtype=np.float32)
+        return np.array([ego.speed, ego.current_acceleration, ego.yaw_rate], dtype=np.float32)
 
 
-class TrafficEnv(AbstractEnv):
-    """A drive through seeded traffic; mixed in before one of highway-env's own environments.
+class TrafficEnv(EgoBrakeEnv):
+    """The ego drives through random traffic with an IDM driver; the agent can add braking.
 
-    The road and the cars are highway-env's. The ego keeps its lane or route, driven by IDM; the action can
-    only add braking, through the same brake as in `BrakingEnv`. No traffic ends because of the agent: it
-    ends with the ego's first touch, in a jam, at the end of the road or of the time.
+    ## Description
 
-    The reward is −1 at the ego's first touch, else minus the braking beyond the driver's in full brakes·s.
+    Roads and cars are highway-env's: subclasses also inherit from one of its environments. The seed draws the
+    traffic. The ego keeps its lane or route, driven by IDM. The demand passes through the brake model of
+    `BrakingEnv`.
+
+    ## Action Space
+
+    `Box(-1, 0, (1,), float32)`, a longitudinal demand: −1 full brake, 0 no braking beyond the driver's.
+
+    ## Observation Space
+
+    `Box((3,), float32)`: ego speed [m/s], acceleration [m/s²], yaw rate [rad/s, + right]. The registered ids
+    wrap the environment in `LGMDObservation`.
+
+    ## Rewards
+
+    −1 at the ego's first contact; otherwise −dt · a / a_max for a decision of duration dt with a deceleration
+    a beyond the driver's.
+
+    ## Episode End
+
+    Terminated: at the ego's first contact or at the end of the road. Truncated: after 10 s below 0.5 m/s, or
+    after `config["duration"]` (60 s).
+
+    ## Info
+
+    The keys of `BrakingEnv` except `thw`, `drac` and `required_deceleration`, with these differences;
+    undefined values are `inf`.
+
+    | key | meaning | undefined |
+    |---|---|---|
+    | `deceleration` | ego deceleration beyond the driver's, >= 0 [m/s²] | |
+    | `driver_acceleration` | acceleration demanded by the driver [m/s²] | |
+    | `target_speed` | speed along the ego's heading of the first car ahead [m/s] | nothing within 300 m |
+    | `side` | part of the ego in contact: "front", "rear", "side"; "" without contact | |
+    | `distance` | distance travelled since the reset [m] | |
+
+    ## Arguments
 
     Args:
-        config: In highway-env's way; unknown keys are refused. Beside the environment's own keys: those of
-            `BrakeParams`. `simulation_frequency` and `policy_frequency` are 30 Hz: the cars decide at each
-            step, which in highway-env's own setting comes 15 times a second.
-        render_mode: None, "rgb_array" or "human" (highway-env's view from above).
+        config: The keys of the highway-env environment and the fields of `BrakeParams`. Defaults of
+            `simulation_frequency` and `policy_frequency`: 30 Hz; the other cars decide at every step, as in
+            highway-env, where the default is 15 Hz.
+        render_mode: None, "rgb_array" or "human" (highway-env's top view).
 
     Raises:
-        ValueError: For an unknown key or a value out of its range.
+        ValueError: If a configuration key is unknown or a value is out of range.
     """
 
     road: TrafficRoad
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"]}
     regulated: ClassVar[bool] = False
-    warm_up: ClassVar[float] = 4.0  # [s] before the drive begins
+    """Whether cars give way at intersections of their routes (highway-env's rules)."""
+    warm_up: ClassVar[float] = 4.0
+    """Simulated time before the episode begins [s]."""
     settings: ClassVar[dict[str, Any]] = {}
-
-    def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
-        self.metadata = {**type(self).metadata}  # type: ignore[misc]
-        super().__init__(config=config, render_mode=render_mode)  # type: ignore[arg-type]
+    """Configuration values that differ from highway-env's environment."""
 
     @classmethod
     def default_config(cls) -> dict[str, Any]:
         """Return the default configuration."""
-        config = super().default_config()
-        config.update(
-            {
-                "observation": {"type": "TrafficState"},
-                "action": {"type": "TrafficDemand"},
-                "other_vehicles_type": "lgmd_gym.envs.traffic.drivers.TrafficCar",
-                "simulation_frequency": 30,
-                "policy_frequency": 30,
-                "duration": 60,
-                # Without it drivers see nobody beyond the end of their own piece of lane.
-                "neighbour_vehicles_connected_lanes": True,
-                **asdict(BrakeParams()),
-                **cls.settings,
-            }
-        )
-        return config
-
-    def configure(self, config: dict[str, Any] | None) -> None:
-        """Take over a configuration, refusing what highway-env would swallow."""
-        config = dict(config or {})
-        check_keys("config key", config, self.config)
-        super().configure(config)
-        self.brake = BrakeParams(**{f.name: self.config[f.name] for f in fields(BrakeParams)})
-        simulation, policy = self.config["simulation_frequency"], self.config["policy_frequency"]
-        if policy <= 0 or simulation % policy:
-            raise ValueError(
-                f"policy_frequency {policy} Hz does not divide simulation_frequency {simulation} Hz; "
-                "choose one that does, such as 30 under 30"
-            )
+        return super().default_config() | {
+            "observation": {"type": "TrafficState"},
+            "action": {"type": "TrafficDemand"},
+            "other_vehicles_type": "lgmd_gym.envs.traffic.drivers.TrafficCar",
+            "simulation_frequency": 30,
+            "duration": 60,
+            # Without it, drivers ignore cars beyond the end of their own lane section.
+            "neighbour_vehicles_connected_lanes": True,
+            **cls.settings,
+        }
 
     def define_spaces(self) -> None:
         """Set the action and observation types and their spaces."""
@@ -127,57 +137,57 @@ class TrafficEnv(AbstractEnv):
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Advance by one decision; see `AbstractEnv.step`."""
-        # Not the host's own step: IntersectionEnv lets in a new car with each decision.
+        # IntersectionEnv.step would add a car at every decision.
         return AbstractEnv.step(self, action)
 
-    def coast(self) -> None:
-        """Advance by one decision under the demands made so far, without looking: no observation, no info."""
+    def step_unobserved(self) -> None:
+        """Advance by one decision with the last demand, without computing observation, reward and info."""
         self.time += 1 / self.config["policy_frequency"]
         self._simulate(None)
 
     def _simulate(self, action: Any = None) -> None:
         super()._simulate(action)
-        self._standing = self._standing + 1 if self.ego.speed < WALK else 0
-        if self.road.touch is None:
-            self._exchange()
+        self._jam_steps = self._jam_steps + 1 if self.ego.speed < JAM_SPEED else 0
+        if self.road.contact is None:
+            self._add_and_remove_cars()
 
-    def _exchange(self) -> None:
-        """Let cars leave and enter after a decision."""
+    def _add_and_remove_cars(self) -> None:
+        """Add and remove cars after a decision."""
 
     def _reset(self) -> None:
-        """Build the scene and let it run until gaps and speeds fit each other."""
-        while True:  # a warm-up in which the ego touches somebody is drawn again
-            self._standing = 0
+        """Build the scene and simulate the warm-up; repeat until the warm-up is free of ego contact."""
+        while True:
+            self._jam_steps = 0
             self._build()
             for _ in range(round(self.warm_up * self.config["policy_frequency"])):
                 self._simulate(None)
-            if self.road.touch is None:
+            if self.road.contact is None:
                 break
         self.ego.travelled = 0.0
-        self.steps = self._standing = 0
+        self.steps = self._jam_steps = 0
 
     def _build(self) -> None:
         super()._reset()
         self.road = TrafficRoad(self.road, self.ego, self.regulated)
-        self._settle()
-        kept: list[Any] = [self.ego]
+        self._modify_scene()
+        cars: list[Any] = [self.ego]
         for car in self.road.cars:
-            if car is not self.ego and all(_apart(car, other) > CLEAR for other in kept):
-                kept.append(car)
+            if car is not self.ego and all(_distance(car, other) > MIN_START_DISTANCE for other in cars):
+                cars.append(car)
             limit = float(car.lane.speed_limit)
-            # A start beyond the limit would begin every drive with an emergency brake down to it.
+            # An initial speed above the limit would begin every episode with emergency braking.
             car.speed, car.target_speed = min(car.speed, limit), min(car.target_speed, limit)
-        self.road.cars[:] = kept
+        self.road.cars[:] = cars
 
-    def _settle(self) -> None:
-        """Change highway-env's scene: more cars, other speeds."""
+    def _modify_scene(self) -> None:
+        """Change highway-env's initial scene: add cars, change speeds."""
 
     def _is_finished(self) -> bool:
-        """Return whether the ego has come to the end of the road."""
+        """Return whether the ego has reached the end of the road."""
         return False
 
     def _reward(self, action: Any) -> float:
-        if self.road.touch is not None:
+        if self.road.contact is not None:
             return -1.0
         return -self.ego.braking / self.brake.max_deceleration / self.config["policy_frequency"]
 
@@ -185,38 +195,31 @@ class TrafficEnv(AbstractEnv):
         raise NotImplementedError
 
     def _is_terminated(self) -> bool:
-        return self.road.touch is not None or self._is_finished()
+        return self.road.contact is not None or self._is_finished()
 
     def _is_truncated(self) -> bool:
-        jammed = self._standing >= JAM * self.config["policy_frequency"]
+        jammed = self._jam_steps >= JAM_TIME * self.config["policy_frequency"]
         return jammed or self.time >= self.config["duration"] - 1e-9
 
     def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
-        """Return the ground truth, with the names of `BrakingEnv`, and what the driver does."""
-        ego, touch = self.ego, self.road.touch
-        others = self.road.others
-        front, ttc = ahead(ego, others), time_to_contact(ego, others)
+        ego, contact, obstacles = self.ego, self.road.contact, self.road.obstacles
+        lead = surrogate_safety.find_lead(ego, obstacles)
         return {
             "speed": float(ego.speed),
             "crashed": bool(ego.crashed),
             "ego_speed": float(ego.speed),
-            "gap": front[0] if front else UNDEFINED,
-            "ttc": UNDEFINED if ttc is None else ttc,
-            "collision": touch is not None,
-            "side": touch.side if touch else "",
-            "impact_speed": touch.impact_speed if touch else UNDEFINED,
-            "relative_impact_speed": touch.relative_impact_speed if touch else UNDEFINED,
+            "gap": lead.gap if lead else inf,
+            "ttc": surrogate_safety.time_to_contact(ego, obstacles),
+            "collision": contact is not None,
+            "side": contact.side if contact else "",
+            "impact_speed": contact.impact_speed if contact else inf,
+            "relative_impact_speed": contact.relative_impact_speed if contact else inf,
             "deceleration": ego.braking,
-            "driver_acceleration": ego.driver,
-            "target_speed": _speed_along(ego, front[1]) if front else UNDEFINED,
+            "driver_acceleration": ego.driver_acceleration,
+            "target_speed": speed_along(ego, lead.other) if lead else inf,
             "distance": ego.travelled,
         }
 
 
-def _apart(one: Any, other: Any) -> float:
+def _distance(one: Any, other: Any) -> float:
     return float(np.hypot(*(one.position - other.position)))
-
-
-def _speed_along(ego: TrafficEgo, other: Any) -> float:
-    """Return another's speed along the ego's heading [m/s]."""
-    return float(other.speed * cos(float(other.heading) - ego.heading))

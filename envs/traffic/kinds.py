@@ -1,4 +1,4 @@
-"""The five kinds of traffic, each on a highway-env environment."""
+"""The kinds of traffic, each based on a highway-env environment."""
 
 from typing import Any, ClassVar, cast
 
@@ -13,11 +13,11 @@ from lgmd_gym.envs.traffic.env import TrafficEnv
 
 
 class HighwayTraffic(TrafficEnv, HighwayEnv):
-    """Three lanes; a dozen cars ahead, slower than the ego, and three from behind, faster: cut-ins."""
+    """A three-lane highway with slower cars ahead and three faster cars behind, which cut in."""
 
     settings: ClassVar[dict[str, Any]] = {"lanes_count": 3, "vehicles_count": 11}
 
-    def _settle(self) -> None:
+    def _modify_scene(self) -> None:
         for number in range(3):
             lane = self.road.network.get_lane(("0", "1", int(self.np_random.integers(3))))
             place = lane.local_coordinates(self.ego.position)[0] - 35.0 * (
@@ -28,14 +28,14 @@ class HighwayTraffic(TrafficEnv, HighwayEnv):
 
 
 class MergeTraffic(TrafficEnv, MergeGenericEnv):
-    """A motorway past an access ramp from which a car joins beside the ego."""
+    """A motorway with an access ramp from which a car merges next to the ego."""
 
     settings: ClassVar[dict[str, Any]] = {"vehicles_count": 8, "after_merge_length": 500}
 
-    def _settle(self) -> None:
+    def _modify_scene(self) -> None:
         for car in self.road.cars:
             if car is not self.ego and car.lane_index[0] == "a":
-                # In highway-env all of them are at the speed limit and nobody ever comes nearer.
+                # In highway-env all cars drive at the speed limit, with constant distances.
                 car.speed = car.target_speed = self.np_random.uniform(23.0, 30.0)
 
     def _is_finished(self) -> bool:
@@ -43,17 +43,17 @@ class MergeTraffic(TrafficEnv, MergeGenericEnv):
 
 
 class TwoWayTraffic(TrafficEnv, TwoWayEnv):  # type: ignore[misc]
-    """A country road: slower cars ahead, a stream of oncoming ones in the next lane."""
+    """A two-way road with slower cars ahead and oncoming cars in the adjacent lane."""
 
     LENGTH: ClassVar[float] = 1500.0
 
     def _make_road(self, length: float = LENGTH) -> None:
         super()._make_road(length)  # type: ignore[arg-type]
 
-    def _settle(self) -> None:
+    def _modify_scene(self) -> None:
         for car in self.road.cars:
-            # At the end of the road the network would turn them around into the other lane.
-            car.follows = False
+            # At the end of the road the next lane would be the opposite one.
+            car.continues_to_next_lane = False
             if car is not self.ego and car.lane_index[0] == "a":
                 car.speed = car.target_speed = self.np_random.uniform(14.0, 19.0)
         lane = self.road.network.get_lane(("b", "a", 0))
@@ -62,11 +62,11 @@ class TwoWayTraffic(TrafficEnv, TwoWayEnv):  # type: ignore[misc]
             speed = self.np_random.uniform(15.0, 20.0)
             position, heading = lane.position(place, 0.0), lane.heading_at(place)
             car = TrafficCar(self.road, position, heading, speed, ("b", "a", 0), enable_lane_change=False)
-            car.follows = False
+            car.continues_to_next_lane = False
             self.road.cars.append(car)
 
-    def _exchange(self) -> None:
-        # Who has left the road behind the ego sees nobody any more.
+    def _add_and_remove_cars(self) -> None:
+        # Cars beyond the start of the road no longer react to others.
         self.road.cars[:] = [car for car in self.road.cars if car.position[0] > 0.0]
 
     def _is_finished(self) -> bool:
@@ -85,11 +85,11 @@ class IntersectionTraffic(TrafficEnv, IntersectionEnv):
         "spawn_probability": 0.35,
     }
 
-    def _settle(self) -> None:
+    def _modify_scene(self) -> None:
         lane: Any = self.ego.lane
         self.ego.target_speed = lane.speed_limit
 
-    def _exchange(self) -> None:
+    def _add_and_remove_cars(self) -> None:
         self._clear_vehicles()
         if self.steps % self.config["simulation_frequency"] == 0:  # as in highway-env, once a second
             self._spawn_vehicle(spawn_probability=self.config["spawn_probability"])
@@ -99,7 +99,7 @@ class IntersectionTraffic(TrafficEnv, IntersectionEnv):
 
 
 class RoundaboutTraffic(TrafficEnv, RoundaboutEnv):
-    """A roundabout with two lanes and four arms; who is in it has the right of way."""
+    """A two-lane roundabout with four arms; cars inside it have the right of way."""
 
     regulated: ClassVar[bool] = True
     warm_up: ClassVar[float] = 2.0
@@ -108,12 +108,12 @@ class RoundaboutTraffic(TrafficEnv, RoundaboutEnv):
         super()._make_road()
         for lane in cast(list[Any], self.road.network.lanes_list()):
             lane.priority = int(hasattr(lane, "radius"))
-            # At highway-env's 16 to 20 m/s a bend of 20 m would take 1.3 g and more.
+            # At highway-env's limits of 16 to 20 m/s the lateral acceleration would exceed 1.3 g.
             lane.speed_limit = 12.0
 
-    def _settle(self) -> None:
+    def _modify_scene(self) -> None:
         lane = self.road.network.get_lane(("ser", "ses", 0))
-        place = self.np_random.uniform(20.0, 70.0)  # highway-env puts it right at the entry
+        place = self.np_random.uniform(20.0, 70.0)  # highway-env places the ego directly at the entry
         self.ego.position, self.ego.heading = lane.position(place, 0.0), lane.heading_at(place)
         self.ego.plan_route_to(str(self.np_random.choice(["exr", "nxr", "wxr"])))
         for arm in ("eer", "ner", "wer"):

@@ -1,39 +1,55 @@
-"""Traffic for counting needless brakes: highway-env's roads and cars, an IDM driver, and an agent's brake."""
+"""Registration of the traffic environments with Gymnasium."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
+from gymnasium.envs.registration import load_env_creator
 
-from lgmd_gym.envs.traffic.env import TrafficEnv
-from lgmd_gym.envs.traffic.kinds import (
-    HighwayTraffic,
-    IntersectionTraffic,
-    MergeTraffic,
-    RoundaboutTraffic,
-    TwoWayTraffic,
-)
+from lgmd_gym.envs.registration import env_id, with_camera
 from lgmd_gym.errors import unknown_name
 
-KINDS: dict[str, type[TrafficEnv]] = {
-    "highway": HighwayTraffic,
-    "merge": MergeTraffic,
-    "two-way": TwoWayTraffic,
-    "intersection": IntersectionTraffic,
-    "roundabout": RoundaboutTraffic,
+if TYPE_CHECKING:
+    from lgmd_gym.camera import CameraSpec
+    from lgmd_gym.envs.traffic.env import TrafficEnv
+    from lgmd_gym.neuron import NeuronSpec
+
+# Entry points rather than classes, so that registering the ids does not import highway-env.
+KINDS: dict[str, str] = {
+    "highway": "lgmd_gym.envs.traffic.kinds:HighwayTraffic",
+    "merge": "lgmd_gym.envs.traffic.kinds:MergeTraffic",
+    "two-way": "lgmd_gym.envs.traffic.kinds:TwoWayTraffic",
+    "intersection": "lgmd_gym.envs.traffic.kinds:IntersectionTraffic",
+    "roundabout": "lgmd_gym.envs.traffic.kinds:RoundaboutTraffic",
 }
 
 
-def find_kind(kind: str) -> type[TrafficEnv]:
-    """Return the environment of a kind of traffic, or raise ValueError that names the nearest kind."""
+def traffic_id(kind: str) -> str:
+    """Return the Gymnasium id of a kind of traffic, `LGMD/Traffic-TwoWay-v0` for "two-way"."""
+    return env_id(f"Traffic-{kind.title().replace('-', '')}")
+
+
+def register_traffic() -> None:
+    """Register the id of every kind of traffic; idempotent."""
+    for kind in KINDS:
+        if traffic_id(kind) not in gym.registry:
+            gym.register(traffic_id(kind), entry_point=f"{__name__}:make_traffic", kwargs={"kind": kind})
+
+
+def find_kind(kind: str) -> "type[TrafficEnv]":
+    """Return the environment class of a kind of traffic.
+
+    Raises:
+        ValueError: If the kind is unknown.
+    """
     if kind not in KINDS:
         raise unknown_name("kind of traffic", kind, KINDS)
-    return KINDS[kind]
+    return load_env_creator(KINDS[kind])  # type: ignore[return-value]
 
 
 def make_traffic(
-    kind: str = "highway",
-    camera: Any = "fovea",
-    params: Any = None,
+    kind: str,
+    camera: "CameraSpec | None" = "fovea",
+    params: "NeuronSpec | None" = None,
     fps: float | None = None,
     include_frame: bool = False,
     include_base: bool = False,
@@ -41,11 +57,13 @@ def make_traffic(
     config: dict[str, Any] | None = None,
     render_mode: str | None = None,
 ) -> gym.Env:
-    """Return traffic of a kind inside `LGMDObservation`, or bare for `camera=None`.
+    """Return a traffic environment inside `LGMDObservation`, or without it for `camera=None`.
+
+    This is the entry point of the registered ids: prefer `gym.make(traffic_id(kind), ...)`.
 
     Args:
-        kind: A name in `KINDS`.
-        camera: See `LGMDObservation`; None for no eye.
+        kind: A key of `KINDS`.
+        camera: See `LGMDObservation`; None for no camera.
         params: See `LGMDObservation`.
         fps: See `LGMDObservation`.
         include_frame: See `LGMDObservation`.
@@ -55,19 +73,7 @@ def make_traffic(
         render_mode: None, "rgb_array" or "human".
 
     Raises:
-        ValueError: For an unknown kind, key or name (the nearest is named), or a value out of its range.
+        ValueError: If a kind, key or name is unknown, or a value is out of range.
     """
     env = find_kind(kind)(config=config, render_mode=render_mode)
-    if camera is None:
-        return env
-    from lgmd_gym.wrappers.observation import LGMDObservation
-
-    return LGMDObservation(
-        env,
-        camera=camera,
-        params=params,
-        fps=fps,
-        include_frame=include_frame,
-        include_base=include_base,
-        trace=trace,
-    )
+    return with_camera(env, camera, params, fps, include_frame, include_base, trace)

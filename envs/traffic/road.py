@@ -1,48 +1,32 @@
-"""The road of the traffic suite: contact with the ego found inside the step, wrecks, and quick look-ups."""
+"""The road of the traffic environments: contact detection inside each step, and fast neighbour searches."""
 
-from math import cos, hypot
-from typing import Any, NamedTuple
+from math import hypot
+from typing import Any
 
 from highway_env.road.regulation import RegulatedRoad
 from highway_env.road.road import Road
 from highway_env.vehicle.objects import Landmark
 
-from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
+from lgmd_gym.envs.dynamics.contact import Contact, first_contact, first_touch, outline
 from lgmd_gym.envs.traffic.ego import TrafficEgo
-from lgmd_gym.envs.traffic.geometry import outline, touched_side
 
-SLOPE = 0.8  # highway-env measures past the end of a bent lane along its chord, the box is up to this nearer
-
-
-class Touch(NamedTuple):
-    """The ego's first touch of somebody.
-
-    Attributes:
-        other: Who or what was touched.
-        side: The part of the ego that was touched: "front" (bumper with its corners), "rear" or "side".
-        impact_speed: The ego's speed at the touch [m/s].
-        relative_impact_speed: The ego's speed less the other's along the ego's heading [m/s].
-    """
-
-    other: Any
-    side: str
-    impact_speed: float
-    relative_impact_speed: float
+# Lower bound of highway-env's distance past the end of a curved lane, relative to that of its bounding box.
+BOX_FACTOR = 0.8
 
 
 class TrafficRoad(RegulatedRoad):
-    """A road taken over from a highway-env environment, with its cars.
+    """A highway-env road that finds the ego's first contact within each step.
 
-    Cars that touch each other are wrecks and stop, as in highway-env, but are not pushed apart. At the ego's
-    first touch everything stands still, with the speeds of that moment.
+    Other cars that touch each other stop, as in highway-env, but are not pushed apart. After the ego's first
+    contact the road does not advance: all cars keep the positions and speeds of that moment.
 
     Args:
-        road: The road to take over; its cars move here.
+        road: The original road; its cars and objects are assigned to the new road.
         ego: The car under test.
-        regulated: Whether cars give way where their ways cross (highway-env's rules).
+        regulated: Whether cars give way at intersections of their routes (highway-env's rules).
 
     Attributes:
-        touch: The ego's first touch, or None so far.
+        contact: First contact of the ego, or None.
     """
 
     def __init__(self, road: Road, ego: TrafficEgo, regulated: bool) -> None:
@@ -57,87 +41,69 @@ class TrafficRoad(RegulatedRoad):
         for item in (*self.vehicles, *self.objects):
             item.road = self
         self.ego, self.regulated = ego, regulated
-        self.touch: Touch | None = None
+        self.contact: Contact | None = None
         self._places: dict[int, list[float | None]] | None = None
         self._boxes = [(index, lane, *_box(lane)) for index, lane in self.network.lanes_dict().items()]
 
     @property
     def cars(self) -> list[Any]:
-        """Everybody who drives, the ego included."""
+        """All cars, including the ego."""
         return self.vehicles
 
     @property
-    def others(self) -> list[Any]:
-        """Everybody and everything that the ego can touch."""
+    def obstacles(self) -> list[Any]:
+        """Cars and solid objects that the ego can touch."""
         items = (*self.vehicles, *self.objects)
         return [item for item in items if item is not self.ego and not isinstance(item, Landmark)]
 
     def act(self) -> None:
-        """Have every driver decide."""
-        if self.touch is None:
-            self._places = {}  # nobody moves meanwhile
+        """Update the decisions of all drivers."""
+        if self.contact is None:
+            self._places = {}  # valid while no car moves
             super().act()
             self._places = None
 
     def step(self, dt: float) -> None:
-        """Advance everybody by `dt` [s], or up to the ego's first touch within it."""
-        if self.touch is not None:
+        """Advance all cars by `dt` [s], or up to the ego's first contact."""
+        if self.contact is not None:
             return
         self.steps += 1
         if self.regulated and self.steps % int(1 / dt / self.REGULATION_FREQUENCY) == 0:
             self.enforce_road_rules()
-        before = [(car, outline(car), car.speed) for car in self.vehicles]
+        items = [self.ego, *self.obstacles]
+        before = [outline(item) for item in items]
+        speeds = [item.speed for item in items]
         travelled = self.ego.travelled
         for car in self.vehicles:
             car.step(dt)
-        fraction = self._find_touch(before)
-        self.ego.travelled = (1 - fraction) * travelled + fraction * self.ego.travelled
-        self._find_wrecks()
+        fraction, index = first_contact(before, [outline(item) for item in items])
+        if index:
+            for car, place, speed in zip(items[: len(self.vehicles)], before, speeds, strict=False):
+                for axis in (0, 1):
+                    car.position[axis] = (1 - fraction) * place[axis] + fraction * car.position[axis]
+                car.speed = (1 - fraction) * speed + fraction * car.speed
+            self.ego.travelled = (1 - fraction) * travelled + fraction * self.ego.travelled
+            self.contact = Contact.between(self.ego, items[index])
+            self.ego.crashed = items[index].crashed = True
+        self._mark_collisions()
 
-    def _find_touch(self, before: list[tuple[Any, Rectangle, float]]) -> float:
-        """Find the ego's first touch in the step just made, go back to it, and return the share gone."""
-        was = {id(car): place for car, place, _ in before}
-        start, end = was[id(self.ego)], outline(self.ego)
-        first: tuple[float, Any] | None = None
-        for other in self.others:
-            now = outline(other)
-            if abs(now.x - end.x) + abs(now.y - end.y) > 30.0:
-                continue
-            place = was.get(id(other), now)
-            dx, dy = end.x - start.x - (now.x - place.x), end.y - start.y - (now.y - place.y)
-            fraction = first_touch(start, place, dx, dy)
-            if fraction is not None and (first is None or fraction < first[0]):
-                first = fraction, other
-        if first is None:
-            return 1.0
-        fraction, other = first
-        for car, place, speed in before:
-            for axis in (0, 1):
-                car.position[axis] = (1 - fraction) * place[axis] + fraction * car.position[axis]
-            car.speed = (1 - fraction) * speed + fraction * car.speed
-        self.ego.crashed = other.crashed = True
-        along = other.speed * cos(float(other.heading) - self.ego.heading)
-        side = touched_side(outline(self.ego), outline(other))
-        self.touch = Touch(other, side, float(self.ego.speed), float(self.ego.speed - along))
-        return fraction
-
-    def _find_wrecks(self) -> None:
-        """Mark the cars that touch each other."""
+    def _mark_collisions(self) -> None:
+        """Mark the other cars that touch each other as crashed."""
         cars = [car for car in self.vehicles if car is not self.ego]
         places = [(float(car.position[0]), float(car.position[1])) for car in cars]
         for i, (x, y) in enumerate(places):
             for j in range(i):
                 if abs(places[j][0] - x) + abs(places[j][1] - y) > 8.0:
                     continue
-                if first_touch(outline(cars[i]), outline(cars[j]), 0.0, 0.0) is not None:
+                if first_touch(outline(cars[i]), outline(cars[j]), 0.0, 0.0) == 0.0:
                     cars[i].crashed = cars[j].crashed = True
 
     def neighbour_vehicles(self, vehicle: Any, lane_index: Any = None) -> tuple[Any, Any]:
-        """Return who is ahead and who behind on a lane; as in highway-env, each place looked up once.
+        """Return the preceding and the following vehicle on a lane, as `Road.neighbour_vehicles` does.
 
         Args:
-            vehicle: Who asks.
-            lane_index: The lane; its own if None.
+            vehicle: The reference vehicle.
+            lane_index: The lane; None for the lane of the vehicle.
         """
         lane_index = lane_index or vehicle.lane_index
         if not lane_index:
@@ -163,13 +129,13 @@ class TrafficRoad(RegulatedRoad):
         return front, rear
 
     def closest_lane(self, position: Any, heading: float, hint: Any) -> Any:
-        """Return the index of the lane closest to a place, as `RoadNetwork.get_closest_lane_index` does.
+        """Return the index of the closest lane, as `RoadNetwork.get_closest_lane_index` does.
 
-        Lanes whose bounding box is farther away than `hint` are not looked at.
+        Lanes whose bounding box is farther away than the hint are skipped.
 
         Args:
-            position: Where [m].
-            heading: [rad].
+            position: Position [m].
+            heading: Heading [rad].
             hint: Index of a lane that is probably close.
         """
         x, y = float(position[0]), float(position[1])
@@ -177,16 +143,16 @@ class TrafficRoad(RegulatedRoad):
         closest = None
         for index, lane, left, top, right, bottom in self._boxes:
             away = max(left - x, x - right, top - y, y - bottom)
-            if away * SLOPE > best:
+            if away * BOX_FACTOR > best:
                 continue
             distance = float(lane.distance_with_heading(position, heading))
-            # The first of equals wins, so the hint's own turn has to come.
+            # Among lanes at equal distance, the first one in the network is returned.
             if distance < best or (closest is None and distance == best):
                 best, closest = distance, index
         return hint if closest is None else closest
 
     def _pieces(self, lane_index: Any, lane: Any) -> list[tuple[Any, float]]:
-        """Return a lane and those before and after it, with where they begin along it [m]."""
+        """Return a lane, the previous and the next lanes, each with its start along the lane [m]."""
         start, end, number = lane_index
         pieces = [(lane, 0.0)]
         if not self.neighbour_vehicles_connected_lanes:
@@ -202,7 +168,7 @@ class TrafficRoad(RegulatedRoad):
         return pieces
 
     def _along(self, lane: Any) -> list[float | None]:
-        """Return everybody's place along a lane [m], None for who is not on it."""
+        """Return the position of every vehicle and object along a lane [m]; None if it is not on the lane."""
         if self._places is not None and id(lane) in self._places:
             return self._places[id(lane)]
         places: list[float | None] = []
@@ -217,7 +183,7 @@ class TrafficRoad(RegulatedRoad):
 
     @staticmethod
     def is_conflict_possible(v1: Any, v2: Any, horizon: int = 3, step: float = 0.25) -> bool:
-        """Return whether two cars' ways may cross soon; who is too far away to meet is not looked at."""
+        """Return whether the routes of two cars may conflict; skips cars that are too far apart to meet."""
         apart = hypot(float(v2.position[0] - v1.position[0]), float(v2.position[1] - v1.position[1]))
         if apart > (v1.speed + v2.speed) * horizon + v1.LENGTH + v2.LENGTH:
             return False
@@ -225,7 +191,7 @@ class TrafficRoad(RegulatedRoad):
 
 
 def _box(lane: Any) -> tuple[float, float, float, float]:
-    """Return left, top, right and bottom of a lane's centre line [m], a little too wide."""
+    """Return left, top, right and bottom of a lane's centreline with a small margin [m]."""
     pieces = max(2, int(lane.length / 2.0) + 1)
     points = [lane.position(lane.length * number / (pieces - 1), 0.0) for number in range(pieces)]
     xs, ys = [float(point[0]) for point in points], [float(point[1]) for point in points]

@@ -1,7 +1,7 @@
 """What the lamps and bars of the composed picture show, for our environments and highway-env's own."""
 
 from dataclasses import dataclass
-from math import nan
+from math import inf
 from typing import Any
 
 BRAKES = 0.1  # [m/s²] of deceleration from which the brake lamp is lit
@@ -9,7 +9,7 @@ BRAKES = 0.1  # [m/s²] of deceleration from which the brake lamp is lit
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The state of a drive after a decision; SI units, NaN where undefined.
+    """The state of a drive after a decision; SI units, inf where undefined.
 
     Attributes:
         time: Since the reset [s].
@@ -24,12 +24,12 @@ class Moment:
 
     time: float
     speed: float
-    gap: float = nan
-    ttc: float = nan
+    gap: float = inf
+    ttc: float = inf
     deceleration: float = 0.0
     alert: bool = False
     contact: bool = False
-    impact_speed: float = nan
+    impact_speed: float = inf
 
     @property
     def braking(self) -> bool:
@@ -50,10 +50,10 @@ class Moment:
         return cls(
             time=float(host.time),
             speed=float(info.get("ego_speed", ego.speed)),
-            gap=float(info.get("gap", nan)),
-            ttc=float(info.get("ttc", nan)),
+            gap=float(info.get("gap", inf)),
+            ttc=float(info.get("ttc", inf)),
             deceleration=float(info.get("deceleration", max(0.0, -float(action.get("acceleration", 0.0))))),
             alert=bool(info.get("lgmd/alert", False)) if alert is None else alert,
             contact=bool(info.get("collision", ego.crashed)),
-            impact_speed=float(info.get("relative_impact_speed", nan)),
+            impact_speed=float(info.get("relative_impact_speed", inf)),
         )

@@ -1,17 +1,19 @@
-"""The braking environments without an eye: scripts, contact, arguments, determinism."""
+"""Braking environments without a camera: scripts, contact, arguments, determinism."""
+
+import copy
+from math import inf
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
-from lgmd_gym.envs import FAMILIES, BrakingEnv, make_scenario
+from lgmd_gym.envs import BrakingEnv, make_scenario
 from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.envs.registration import IDS
 
 HOLD, BRAKE = np.array([0.0], np.float32), np.array([-1.0], np.float32)
 
 
-def play(env, action, seed=0):
+def run_episode(env, action, seed=0):
     _, info = env.reset(seed=seed)
     infos, rewards = [info], []
     while True:
@@ -22,47 +24,43 @@ def play(env, action, seed=0):
             return infos, rewards, terminated
 
 
-def test_ids_are_the_families():
-    assert set(IDS) == set(FAMILIES)
-
-
 @pytest.mark.parametrize("family", ["CCRs", "CCRm", "CCRb"])
 def test_approach_ends_in_contact_unless_braked(family):
     env = BrakingEnv(make_scenario(family))
-    infos, rewards, terminated = play(env, HOLD)
+    infos, rewards, terminated = run_episode(env, HOLD)
     assert terminated
     assert infos[-1]["collision"]
     assert infos[-1]["gap"] == pytest.approx(0, abs=1e-9)
-    braked, braked_rewards, _ = play(env, BRAKE)
+    braked, braked_rewards, _ = run_episode(env, BRAKE)
     assert not braked[-1]["collision"]
     assert sum(braked_rewards) > sum(rewards)
 
 
 @pytest.mark.parametrize("family", ["AdjacentPass", "Following", "EmptyRoad"])
-def test_quiet_families_need_no_brake_and_pay_for_braking(family):
+def test_braking_costs_reward_in_non_threats(family):
     env = BrakingEnv(make_scenario(family))
-    infos, rewards, _ = play(env, HOLD)
+    infos, rewards, _ = run_episode(env, HOLD)
     assert not infos[-1]["collision"]
-    assert all(np.isnan(info["ttc"]) for info in infos)
+    assert {info["ttc"] for info in infos} == {inf}
     assert min(rewards) > 0
-    braked, braked_rewards, _ = play(env, BRAKE)
+    braked, braked_rewards, _ = run_episode(env, BRAKE)
     assert sum(braked_rewards) < sum(rewards)
     assert max(info["deceleration"] for info in braked) == pytest.approx(9.0)
     assert braked[-1]["ego_speed"] == 0.0
 
 
 @pytest.mark.parametrize("kmh", [10, 35, 50, 80])
-def test_impact_speed_and_time_are_exact(kmh):
+def test_impact_speed_and_contact_time_are_exact(kmh):
     env = BrakingEnv(make_scenario("CCRs", ego_speed=kmh * KMH))
-    infos, _, _ = play(env, HOLD)
+    infos, _, _ = run_episode(env, HOLD)
     assert infos[0]["ttc"] == pytest.approx(5.0)
     assert infos[-1]["impact_speed"] == pytest.approx(kmh * KMH, abs=0.01 * KMH)
-    assert len(infos) - 1 in (150, 151)  # the touch falls on the edge of a decision
+    assert len(infos) - 1 in (150, 151)  # the contact coincides with a decision
 
 
 @pytest.mark.parametrize("start", [40, 100, 140])
-def test_impact_speed_after_late_braking_is_the_closed_form(start):
-    """From a demand at a decision: delay, ramp, then constant deceleration up to the gap."""
+def test_impact_speed_after_late_braking_equals_the_closed_form(start):
+    """Delay, linear build-up, then constant deceleration over the remaining gap."""
     speed = 50 * KMH
     env = BrakingEnv(make_scenario("CCRs", ego_speed=speed))
     env.reset(seed=0)
@@ -72,26 +70,28 @@ def test_impact_speed_after_late_braking_is_the_closed_form(start):
         if terminated:
             break
     gap = 5 * speed - speed * (start / 30 + 1 / 30 + 0.1)
-    ramp_way, after = speed * 0.2 - 9 * 0.2**2 / 6, speed - 0.9
-    left = gap - ramp_way
-    if left > after**2 / 18:
+    ramp_distance, after = speed * 0.2 - 9 * 0.2**2 / 6, speed - 0.9
+    remaining = gap - ramp_distance
+    if remaining > after**2 / 18:
         assert not info["collision"]
-        assert info["gap"] == pytest.approx(left - after**2 / 18, abs=0.01)
-    elif left > 0:
-        assert info["impact_speed"] == pytest.approx((after**2 - 18 * left) ** 0.5, abs=0.1 * KMH)
+        assert info["gap"] == pytest.approx(remaining - after**2 / 18, abs=0.01)
+    elif remaining > 0:
+        assert info["impact_speed"] == pytest.approx((after**2 - 18 * remaining) ** 0.5, abs=0.1 * KMH)
     else:
         assert info["collision"]
 
 
 def test_relative_impact_speed_is_against_the_target():
-    infos, _, _ = play(BrakingEnv(make_scenario("CCRm", ego_speed=50 * KMH, target_speed=20 * KMH)), HOLD)
+    infos, _, _ = run_episode(
+        BrakingEnv(make_scenario("CCRm", ego_speed=50 * KMH, target_speed=20 * KMH)), HOLD
+    )
     assert infos[-1]["relative_impact_speed"] == pytest.approx(30 * KMH)
     assert infos[-1]["impact_speed"] == pytest.approx(50 * KMH)
 
 
 def test_braking_lead_follows_its_script():
     env = BrakingEnv(make_scenario("CCRb", ego_speed=50 * KMH, gap=40.0, deceleration=6.0))
-    infos, _, _ = play(env, HOLD)
+    infos, _, _ = run_episode(env, HOLD)
     speeds = np.array([info["target_speed"] for info in infos])
     assert speeds[90] == pytest.approx(50 * KMH)
     assert speeds[120] == pytest.approx(50 * KMH - 3.0)  # the ramp of 1 s to 6 m/s²
@@ -101,7 +101,7 @@ def test_braking_lead_follows_its_script():
 
 
 @pytest.mark.parametrize("overlap", [1.0, 0.75, 0.5, -0.5, -1.0])
-def test_overlap_covers_its_share_of_the_ego(overlap):
+def test_overlap_is_the_covered_share_of_the_ego(overlap):
     env = BrakingEnv(make_scenario("CCRs", overlap=overlap))
     env.reset(seed=0)
     ego, target = env.road.vehicles
@@ -109,36 +109,45 @@ def test_overlap_covers_its_share_of_the_ego(overlap):
     right = min(ego.position[1] + 0.9, target.position[1] + target.WIDTH / 2)
     full = target.WIDTH / 1.8 if abs(overlap) == 1 else abs(overlap)
     assert (right - left) / 1.8 == pytest.approx(full)
-    if abs(overlap) < 1:  # + is left, and y grows to the right
+    if abs(overlap) < 1:  # + is left, y increases to the right
         assert np.sign(target.position[1] - ego.position[1]) == -np.sign(overlap)
 
 
-def test_gap_and_ttc_of_an_overlapping_target_in_the_next_lane():
+def test_undefined_values_are_inf_and_info_is_deterministic():
     env = BrakingEnv(make_scenario("AdjacentPass", lateral_offset=-3.5))
     _, info = env.reset(seed=0)
-    assert np.isnan(info["gap"])
-    assert np.isnan(info["ttc"])
-    assert "action" not in info
+    undefined = {name for name, value in info.items() if value == inf}
+    assert undefined == {
+        "gap", "ttc", "thw", "drac", "required_deceleration", "impact_speed", "relative_impact_speed"
+    }  # fmt: skip
+    assert not any(np.isnan(value) for value in info.values())
+    assert "action" not in info  # highway-env adds an unseeded random action
+    assert BrakingEnv(make_scenario("EmptyRoad")).reset(seed=0)[1]["target_speed"] == inf
 
 
-def test_same_seed_same_everything_other_seed_other_scene():
+def test_drac_and_required_deceleration_are_undefined_at_contact():
+    infos, _, _ = run_episode(BrakingEnv(make_scenario("CCRs")), HOLD)
+    assert infos[-1]["collision"]
+    assert infos[-1]["drac"] == infos[-1]["required_deceleration"] == inf
+    assert all(np.isfinite(info["drac"]) for info in infos[:-1])
+
+
+def test_episodes_are_reproducible_and_seeds_vary_the_scene():
     first, second = (BrakingEnv(make_scenario("CCRs")) for _ in range(2))
-    one, other = play(first, HOLD, seed=3), play(second, HOLD, seed=3)
-    assert one[1:] == other[1:]
-    np.testing.assert_equal(one[0], other[0])
+    assert run_episode(first, HOLD, seed=3) == run_episode(second, HOLD, seed=3)
     assert first.road.vehicles[1].shade == second.road.vehicles[1].shade
-    place = first.road.vehicles[0].position[0]
+    start = first.road.vehicles[0].position[0]
     first.reset(seed=4)
-    assert first.road.vehicles[0].position[0] != pytest.approx(place)
+    assert first.road.vehicles[0].position[0] != pytest.approx(start)
 
 
-def test_shade_is_kept_when_given():
+def test_shade_argument_sets_the_body_grey():
     env = BrakingEnv(make_scenario("CCRs", shade=77))
     env.reset(seed=1)
     assert env.road.vehicles[1].shade == 77
 
 
-def test_released_brake_regains_the_scripted_speed():
+def test_ego_regains_the_scripted_speed_after_braking():
     env = BrakingEnv(make_scenario("EmptyRoad", ego_speed=10.0))
     env.reset(seed=0)
     for _ in range(20):
@@ -150,7 +159,7 @@ def test_released_brake_regains_the_scripted_speed():
     assert info["ego_speed"] == pytest.approx(10.0, abs=0.05)
 
 
-def test_throttle_counts_only_where_allowed():
+def test_throttle_has_an_effect_only_if_configured():
     speeds = {}
     for throttle in (False, True):
         env = BrakingEnv(make_scenario("EmptyRoad", ego_speed=10.0), config={"throttle": throttle})
@@ -162,8 +171,8 @@ def test_throttle_counts_only_where_allowed():
     assert speeds[True] > 14.0
 
 
-def test_discrete_actions():
-    config = {"action": {"type": "DiscreteDemand", "levels": [0.0, -1.0]}}
+def test_discrete_action_is_an_index_into_demands():
+    config = {"action": {"type": "DiscreteDemand", "demands": [0.0, -1.0]}}
     env = BrakingEnv(make_scenario("EmptyRoad", ego_speed=5.0), config=config)
     assert env.action_space == gym.spaces.Discrete(2)
     env.reset(seed=0)
@@ -173,7 +182,7 @@ def test_discrete_actions():
     assert info["ego_speed"] == 0.0
 
 
-def test_metadata_is_not_shared():
+def test_metadata_is_not_shared_between_instances():
     slow = BrakingEnv(make_scenario("EmptyRoad"), config={"policy_frequency": 10})
     fast = BrakingEnv(make_scenario("EmptyRoad"))
     assert (slow.metadata["render_fps"], fast.metadata["render_fps"]) == (10, 30)
@@ -200,7 +209,7 @@ def test_metadata_is_not_shared():
         ),
         (lambda: make_scenario("CCRb", gap=20.0, headway=1.0), "pass one"),
         (lambda: make_scenario("CCRm", ego_speed=5.0), "target_speed must be below ego_speed 5"),
-        (lambda: make_scenario("AdjacentPass", lateral_offset=1.0), "for a car in the way use CCRs"),
+        (lambda: make_scenario("AdjacentPass", lateral_offset=1.0), "for a car in the ego's path use CCRs"),
         (lambda: make_scenario("CCRs", shade=300), r"shade must be in \[0, 255\], got 300"),
         (lambda: BrakingEnv(make_scenario("CCRs"), config={"simulation_freq": 60}), "'simulation_frequency'"),
         (lambda: BrakingEnv(make_scenario("CCRs"), config={"policy_frequency": 7}), "7 Hz does not divide"),
@@ -215,22 +224,20 @@ def test_metadata_is_not_shared():
         ),
     ],
 )
-def test_bad_input_names_the_value_and_the_mend(call, words):
+def test_errors_state_the_value_and_suggest_a_fix(call, words):
     with pytest.raises(ValueError, match=words) as caught:
         call()
     assert "\n" not in str(caught.value)
 
 
-def test_nan_action_is_refused():
+def test_nan_action_raises():
     env = BrakingEnv(make_scenario("CCRs"))
     env.reset(seed=0)
-    with pytest.raises(ValueError, match="finite number"):
+    with pytest.raises(ValueError, match=r"action must be one finite number in \[-1, 1\], got"):
         env.step(np.array([np.nan]))
 
 
-def test_deep_copy_goes_its_own_way():
-    import copy
-
+def test_deep_copies_are_independent():
     env = BrakingEnv(make_scenario("CCRs"))
     env.reset(seed=0)
     fork = copy.deepcopy(env)

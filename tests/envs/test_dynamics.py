@@ -1,8 +1,10 @@
-"""Exact motion and contact, against closed forms."""
+"""Longitudinal motion, brake delay and contact against closed forms."""
 
 from math import inf, pi
 
+import numpy as np
 import pytest
+from highway_env import utils
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -11,7 +13,7 @@ from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.longitudinal import advance, time_to_stop
 
 
-def roll(speed, target, jerk, dt, steps):
+def drive(speed, target, jerk, dt, steps):
     distance, acceleration = 0.0, 0.0
     for _ in range(steps):
         moved, speed, acceleration = advance(speed, acceleration, target, jerk, dt)
@@ -22,23 +24,23 @@ def roll(speed, target, jerk, dt, steps):
 @pytest.mark.parametrize("kmh", [10, 37, 50, 80, 130])
 @pytest.mark.parametrize("deceleration", [2.0, 6.0, 9.0])
 @pytest.mark.parametrize("hz", [15, 60, 97])
-def test_stopping_distance_is_the_closed_form(kmh, deceleration, hz):
+def test_stopping_distance_equals_the_closed_form(kmh, deceleration, hz):
     speed = kmh / 3.6
-    distance, end, _ = roll(speed, -deceleration, inf, 1 / hz, 20 * hz)
+    distance, end, _ = drive(speed, -deceleration, inf, 1 / hz, 20 * hz)
     assert end == 0.0
     assert distance == pytest.approx(speed**2 / (2 * deceleration), abs=1e-9)
 
 
-def test_build_up_adds_its_closed_form():
+def test_stopping_distance_with_build_up_equals_the_closed_form():
     speed, jerk, full = 50 / 3.6, 45.0, 9.0
     ramp = full / jerk
     after = speed - full * ramp / 2
     expected = speed * ramp - full * ramp**2 / 6 + after**2 / (2 * full)
-    assert roll(speed, -full, jerk, 1 / 60, 600)[0] == pytest.approx(expected, abs=1e-9)
+    assert drive(speed, -full, jerk, 1 / 60, 600)[0] == pytest.approx(expected, abs=1e-9)
 
 
-def test_no_step_size_is_visible():
-    coarse, fine = roll(20.0, -7.0, 30.0, 0.1, 60), roll(20.0, -7.0, 30.0, 0.001, 6000)
+def test_motion_does_not_depend_on_the_step_size():
+    coarse, fine = drive(20.0, -7.0, 30.0, 0.1, 60), drive(20.0, -7.0, 30.0, 0.001, 6000)
     assert coarse == pytest.approx(fine, abs=1e-9)
 
 
@@ -49,7 +51,7 @@ def test_no_step_size_is_visible():
     jerk=st.floats(0.5, 500) | st.just(inf),
     dt=st.floats(0, 0.5),
 )
-def test_never_reverses_and_speed_fits_distance(speed, acceleration, target, jerk, dt):
+def test_cars_never_reverse_and_distance_is_bounded(speed, acceleration, target, jerk, dt):
     distance, end, _ = advance(speed, acceleration, target, jerk, dt)
     assert distance >= -1e-9
     assert end >= 0.0
@@ -66,23 +68,23 @@ def test_time_to_stop_is_a_root(speed, acceleration, jerk):
             assert speed + acceleration * part + jerk * part**2 / 2 >= -1e-6
 
 
-def test_standing_car_that_accelerates_moves():
+def test_stationary_car_moves_only_if_it_accelerates():
     distance, speed, _ = advance(0.0, 0.0, 2.0, inf, 1.0)
     assert (distance, speed) == pytest.approx((1.0, 2.0))
     assert advance(0.0, 0.0, -9.0, 45.0, 1.0) == (0.0, 0.0, 0.0)
 
 
-def test_demand_waits_out_the_delay_inside_a_step():
+def test_demands_are_delayed_by_fractions_of_a_step():
     line = DelayLine(0.05)
     line.put(-1.0)
-    assert line.pieces(0.04) == [(pytest.approx(0.04), 0.0)]
-    assert line.pieces(0.04) == [(pytest.approx(0.01), 0.0), (pytest.approx(0.03), -1.0)]
+    assert line.advance(0.04) == [(pytest.approx(0.04), 0.0)]
+    assert line.advance(0.04) == [(pytest.approx(0.01), 0.0), (pytest.approx(0.03), -1.0)]
     line.put(0.0)
     line.put(0.0)
-    assert [demand for _, demand in line.pieces(0.1)] == [-1.0, 0.0]
+    assert [demand for _, demand in line.advance(0.1)] == [-1.0, 0.0]
 
 
-def test_brake_params_refuse_by_name():
+def test_brake_params_error_states_the_range():
     with pytest.raises(ValueError, match=r"max_deceleration must be in \[0.1, 12\] m/s², got 20"):
         BrakeParams(max_deceleration=20)
 
@@ -90,26 +92,26 @@ def test_brake_params_refuse_by_name():
 CAR = Rectangle(0.0, 0.0, 0.0, 4.3, 1.8)
 
 
-def test_touch_straight_ahead():
+def test_first_touch_straight_ahead():
     other = Rectangle(10.0, 0.0, 0.0, 4.0, 1.7)
     gap = 10.0 - (4.3 + 4.0) / 2
     assert first_touch(CAR, other, 20.0, 0.0) == pytest.approx(gap / 20.0)
-    assert first_touch(CAR, other, gap - 0.001, 0.0) is None  # one millimetre short
-    assert first_touch(CAR, other, -20.0, 0.0) is None
+    assert first_touch(CAR, other, gap - 0.001, 0.0) == inf  # one millimetre short
+    assert first_touch(CAR, other, -20.0, 0.0) == inf
 
 
-def test_passing_beside_does_not_touch():
-    assert first_touch(CAR, Rectangle(10.0, 1.76, 0.0, 4.0, 1.7), 20.0, 0.0) is None
-    assert first_touch(CAR, Rectangle(10.0, 1.74, 0.0, 4.0, 1.7), 20.0, 0.0) is not None
+def test_passing_with_clearance_does_not_touch():
+    assert first_touch(CAR, Rectangle(10.0, 1.76, 0.0, 4.0, 1.7), 20.0, 0.0) == inf
+    assert first_touch(CAR, Rectangle(10.0, 1.74, 0.0, 4.0, 1.7), 20.0, 0.0) < 1.0
 
 
-def test_overlap_from_the_start_is_touched_at_zero():
+def test_initial_overlap_is_a_touch_at_zero():
     assert first_touch(CAR, Rectangle(1.0, 0.0, 0.3, 4.0, 1.7), 0.0, 0.0) == 0.0
-    assert first_touch(CAR, Rectangle(8.0, 0.0, 0.3, 4.0, 1.7), 0.0, 0.0) is None
+    assert first_touch(CAR, Rectangle(8.0, 0.0, 0.3, 4.0, 1.7), 0.0, 0.0) == inf
 
 
-def test_touch_of_a_corner():
-    # A square on its corner reaches half its diagonal towards us.
+def test_first_touch_of_a_corner():
+    # A square turned by 45° extends by half its diagonal.
     square = Rectangle(10.0, 0.0, pi / 4, 2.0, 2.0)
     assert first_touch(CAR, square, 20.0, 0.0) == pytest.approx((10.0 - 2.15 - 2.0**0.5) / 20.0)
 
@@ -119,11 +121,8 @@ def test_touch_of_a_corner():
     x=st.floats(-20, 20), y=st.floats(-20, 20), heading=st.floats(-4, 4), turn=st.floats(-4, 4),
     dx=st.floats(-30, 30), dy=st.floats(-30, 30),
 )  # fmt: skip
-def test_touch_agrees_with_sampled_polygons(x, y, heading, turn, dx, dy):
-    """Against highway-env's own polygon test, sampled along the way."""
-    import numpy as np
-    from highway_env import utils
-
+def test_first_touch_agrees_with_highway_env(x, y, heading, turn, dx, dy):
+    """Sample highway-env's polygon test along the displacement."""
     moving, standing = Rectangle(0, 0, turn, 4.3, 1.8), Rectangle(x, y, heading, 4.0, 1.7)
 
     def polygon(box, shift_x=0.0, shift_y=0.0):
@@ -132,10 +131,10 @@ def test_touch_agrees_with_sampled_polygons(x, y, heading, turn, dx, dy):
         return corners @ np.array([[cos, sin], [-sin, cos]]) + [box.x + shift_x, box.y + shift_y]
 
     zero = np.zeros(2)
-    still = polygon(standing)
+    target = polygon(standing)
     touch = first_touch(moving, standing, dx, dy)
     for fraction in np.linspace(0, 1, 21):
         moved = polygon(moving, fraction * dx, fraction * dy)
-        sampled = utils.are_polygons_intersecting(moved, still, zero, zero)[0]
-        if touch is None or fraction < touch - 1e-6:
+        sampled = utils.are_polygons_intersecting(moved, target, zero, zero)[0]
+        if fraction < touch - 1e-6:
             assert not sampled

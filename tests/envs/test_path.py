@@ -1,4 +1,4 @@
-"""Paths against circles, closed forms and fine sums."""
+"""Paths against circles, closed forms and numerical integrals."""
 
 from math import cos, pi, sin
 
@@ -10,30 +10,30 @@ from lgmd_gym.envs.dynamics.path import Bend, Path, Pose, arc, lane_change, turn
 ORIGIN = Pose(0.0, 0.0, 0.0)
 
 
-def test_straight_is_straight_both_ways():
+def test_straight_path_extends_in_both_directions():
     path = Path(Pose(1.0, 2.0, 0.3))
     for distance in (-5.0, 0.0, 7.5):
         assert path.pose(distance) == pytest.approx((1 + distance * cos(0.3), 2 + distance * sin(0.3), 0.3))
 
 
 @pytest.mark.parametrize("left", [1, -1])
-def test_an_arc_is_a_circle(left):
+def test_arc_is_part_of_a_circle(left):
     radius = 12.0
     path = Path(ORIGIN, (arc(radius, left * pi / 2),))
     for share in (0.1, 0.37, 0.5, 1.0):
         angle = share * pi / 2
         x, y, heading = path.pose(radius * angle)
-        # + left is -y and a falling heading in highway-env's axes.
+        # A left turn has decreasing y and heading in highway-env's axes.
         assert (x, y) == pytest.approx((radius * sin(angle), -left * radius * (1 - cos(angle))), abs=1e-10)
         assert heading == pytest.approx(-left * angle)
     end = path.pose(radius * pi / 2 + 3.0)
     assert (end.x, end.y) == pytest.approx((radius, -left * (radius + 3.0)), abs=1e-10)
 
 
-def test_a_clothoid_is_its_fresnel_sum():
+def test_clothoid_equals_its_numerical_integral():
     bend = Bend(20.0, 0.0, 0.08)
     path = Path(ORIGIN, (bend,))
-    s = (np.arange(2_000_00) + 0.5) * 1e-4
+    s = (np.arange(200_000) + 0.5) * 1e-4
     heading = -(0.08 / 20.0) * s**2 / 2
     assert path.pose(20.0).x == pytest.approx(np.cos(heading).sum() * 1e-4, abs=1e-7)
     assert path.pose(20.0).y == pytest.approx(np.sin(heading).sum() * 1e-4, abs=1e-7)
@@ -41,7 +41,7 @@ def test_a_clothoid_is_its_fresnel_sum():
 
 
 @pytest.mark.parametrize("offset", [3.5, -3.5, 1.0])
-def test_lane_change_ends_beside_and_parallel(offset):
+def test_lane_change_shifts_the_path_and_restores_its_heading(offset):
     path = Path(ORIGIN, lane_change(40.0, offset))
     end = path.pose(40.0)
     assert end.y == pytest.approx(-offset, abs=1e-8)
@@ -51,13 +51,13 @@ def test_lane_change_ends_beside_and_parallel(offset):
 
 
 @pytest.mark.parametrize("angle", [pi / 2, -pi / 2, 0.3])
-def test_turn_turns_by_its_angle(angle):
+def test_turn_changes_the_heading_by_its_angle(angle):
     bends = turn(angle, 10.0, 4.0)
     assert sum(bend.turn for bend in bends) == pytest.approx(angle)
     assert all(abs(bend.curvature) <= 0.1 + 1e-12 for bend in bends)
 
 
-def test_path_is_smooth_across_cells():
+def test_path_is_continuous_across_cells():
     path = Path(ORIGIN, (*turn(1.2, 9.0, 5.0), *lane_change(30.0, 2.0)))
     s = np.linspace(-2, 60, 6201)
     poses = np.array([path.pose(value) for value in s])
@@ -66,7 +66,7 @@ def test_path_is_smooth_across_cells():
     assert np.abs(np.diff(poses[:, 2])).max() < 0.01 / 8.9
 
 
-def test_bad_bends_are_refused():
+def test_invalid_bends_raise():
     with pytest.raises(ValueError, match="length of a Bend must be > 0 m, got 0"):
         Bend(0)
     with pytest.raises(ValueError, match=r"curvature must be in \[-1, 1\] 1/m, got 3"):

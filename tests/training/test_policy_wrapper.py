@@ -36,7 +36,7 @@ def test_actions_are_repeated_and_rewards_summed():
 
 
 def test_hard_braking_latches_until_the_episode_ends():
-    config = {"action": {"type": "DiscreteDemand", "levels": [0.0, -0.4, -1.0]}}
+    config = {"action": {"type": "DiscreteDemand", "demands": [0.0, -0.4, -1.0]}}
     env, inner = (gym.make("LGMD/CCRs-v0", config=config) for _ in range(2))
     wrapped = PolicyWrapper(inner, inputs=["ego_speed"], latch=True, reward_scale=0.5)
     env.reset(seed=4)

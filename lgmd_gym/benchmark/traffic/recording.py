@@ -97,7 +97,7 @@ def fork(env: gym.Env, share_cameras: bool = False) -> gym.Env:
     base: Any = env.unwrapped
     network = base.road.network
     shared = [network, *network.lanes_list()]
-    for cameras in env.get_wrapper_attr("sensors").sets:
+    for cameras in env.get_wrapper_attr("sensors").cameras:
         shared += [camera for camera in cameras.values() if share_cameras or hasattr(camera, "close")]
     return copy.deepcopy(env, {id(item): item for item in shared})
 
