@@ -1,4 +1,4 @@
-"""`RandomBraking`: levels, splits, and what is drawn."""
+"""`RandomBrakingEnv`: levels, splits and the random distribution."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from lgmd_gym.envs.random_braking import RandomBrakingEnv
 from lgmd_gym.envs.scenarios.distribution import (
     CONDITIONS,
     LEVELS,
-    QUIET,
+    NON_THREATS,
     THREATS,
     draw_scenario,
     level_generator,
@@ -23,7 +23,7 @@ from lgmd_gym.wrappers.vector import LGMDObservation as LGMDVector
 HOLD = np.zeros(1, np.float32)
 
 
-def outcome(env, seed=None):
+def run_episode(env, seed=None):
     _, info = env.reset(seed=seed)
     level, steps = info["level"], 0
     while True:
@@ -35,50 +35,50 @@ def outcome(env, seed=None):
 
 
 def test_every_family_is_drawn():
-    assert set(THREATS) | set(QUIET) == set(FAMILIES)
-    assert not set(THREATS) & set(QUIET)
+    assert set(THREATS) | set(NON_THREATS) == set(FAMILIES)
+    assert not set(THREATS) & set(NON_THREATS)
     drawn = [draw_scenario(level_generator("train", level)).family for level in range(600)]
     assert set(drawn) == set(FAMILIES)
     share = np.mean([family in THREATS for family in drawn])
     assert share == pytest.approx(0.5, abs=0.07)
 
 
-def test_levels_reach_the_protocols_headways():
-    """A braking lead of FMVSS 127 is 0.54 s ahead; who never met one so close in training brakes too late."""
-    told = [dict(case.arguments) for case in find_suite("fmvss127").cases if case.family == "CCRb"]
-    asked = min(item["gap"] / item["ego_speed"] for item in told)
-    for draw in THREATS["CCRb"], QUIET["Following"]:
+def test_levels_include_the_headways_of_fmvss127():
+    """In FMVSS 127 a lead car brakes at a headway of 0.54 s."""
+    cases = [dict(case.arguments) for case in find_suite("fmvss127").cases if case.family == "CCRb"]
+    shortest = min(arguments["gap"] / arguments["ego_speed"] for arguments in cases)
+    for draw in THREATS["CCRb"], NON_THREATS["Following"]:
         drawn = [draw(level_generator("train", level))["headway"] for level in range(2000)]
-        assert min(drawn) < asked
+        assert min(drawn) < shortest
         assert max(drawn) > 2.5
 
 
-def test_threats_threaten_and_the_rest_does_not():
+def test_only_threats_have_contact_without_braking():
     env = RandomBrakingEnv(split="validation")
-    seen = set()
+    families = set()
     for seed in range(120):
-        _, scenario, _, collision, _ = outcome(env, seed)
+        _, scenario, _, collision, _ = run_episode(env, seed)
         assert collision is (scenario.family in THREATS), scenario
-        seen.add(scenario.family)
-    assert len(seen) > 15
+        families.add(scenario.family)
+    assert len(families) > 15
 
 
-def test_a_level_is_the_same_whoever_plays_it():
+def test_levels_do_not_depend_on_the_seed_or_the_range_in_use():
     one = RandomBrakingEnv(start_level=7, num_levels=1)
     other = RandomBrakingEnv(start_level=0, num_levels=8)
-    played = {outcome(other, seed)[0]: outcome(other, seed) for seed in range(40)}
-    assert outcome(one, seed=1) == outcome(one, seed=2) == played[7]
-    assert outcome(RandomBrakingEnv(split="test", start_level=7, num_levels=1), 1) != played[7]
+    episodes = {run_episode(other, seed)[0]: run_episode(other, seed) for seed in range(40)}
+    assert run_episode(one, seed=1) == run_episode(one, seed=2) == episodes[7]
+    assert run_episode(RandomBrakingEnv(split="test", start_level=7, num_levels=1), 1) != episodes[7]
 
 
-def test_resets_without_a_seed_stay_in_their_levels():
+def test_resets_without_a_seed_use_the_same_levels():
     env = RandomBrakingEnv(start_level=100, num_levels=5)
     env.reset(seed=0)
     levels = {env.reset()[1]["level"] for _ in range(60)}
     assert levels == {100, 101, 102, 103, 104}
 
 
-def test_the_road_follows_the_scenario():
+def test_the_road_matches_the_scenario():
     env = RandomBrakingEnv()
     env.reset(seed=0)
     for _ in range(60):
@@ -90,27 +90,27 @@ def test_the_road_follows_the_scenario():
             assert len(lanes) == 2
 
 
-def test_conditions_are_the_cameras():
+def test_conditions_equal_those_of_the_camera():
     assert tuple(CONDITIONS) == tuple(camera.CONDITIONS)
 
 
-def test_a_level_brings_its_light_and_weather_and_grain():
+def test_levels_set_condition_and_texture_of_the_camera():
     env = gym.make("LGMD/RandomBraking-v0", camera=["fovea", "birdseye"], split="validation")
-    seen = {}
+    textures = {}
     for seed in range(40):
         _, info = env.reset(seed=seed)
-        eye = env.get_wrapper_attr("sensors").sets[0]["fovea"]
+        used = env.get_wrapper_attr("sensors").cameras[0]["fovea"]
         bare = CameraParams.preset("fovea").with_condition(info["condition"])
-        assert eye.params == replace(bare, texture=eye.params.texture)
-        assert np.array_equal(env.get_wrapper_attr("frames")["fovea"], EgoCamera(eye.params).render(env))
-        seen.setdefault(info["condition"], []).append(eye.params.texture)
-    assert set(seen) == set(CONDITIONS)
-    grains = np.concatenate(list(seen.values()))
-    assert 0.5 <= grains.min() < 0.7 < 1.3 < grains.max() <= 1.5
+        assert used.params == replace(bare, texture=used.params.texture)
+        assert np.array_equal(env.get_wrapper_attr("frames")["fovea"], EgoCamera(used.params).render(env))
+        textures.setdefault(info["condition"], []).append(used.params.texture)
+    assert set(textures) == set(CONDITIONS)
+    values = np.concatenate(list(textures.values()))
+    assert 0.5 <= values.min() < 0.7 < 1.3 < values.max() <= 1.5
     env.close()
 
 
-def test_conditions_leave_the_scenario_alone():
+def test_the_scenario_does_not_depend_on_the_conditions():
     clear = RandomBrakingEnv(conditions=["clear"])
     mixed = RandomBrakingEnv()
     for seed in range(20):
@@ -120,7 +120,7 @@ def test_conditions_leave_the_scenario_alone():
         assert clear.camera_fields["texture"] == mixed.camera_fields["texture"]
 
 
-def test_a_vector_of_levels_sees_what_each_alone_sees():
+def test_vector_environment_equals_single_environments():
     kind, count = "LGMD/RandomBraking-v0", 6
     vector = LGMDVector(gym.make_vec(kind, num_envs=count, vectorization_mode="sync", camera=None))
     vector.reset(seed=list(range(count)))
@@ -148,6 +148,6 @@ def test_a_vector_of_levels_sees_what_each_alone_sees():
         ({"ego_speed": 3.0}, "unknown argument of RandomBraking 'ego_speed'"),
     ],
 )
-def test_bad_levels_are_refused(arguments, words):
+def test_errors_state_the_value_and_suggest_a_fix(arguments, words):
     with pytest.raises(ValueError, match=words):
         gym.make("LGMD/RandomBraking-v0", **arguments)

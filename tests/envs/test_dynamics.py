@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lgmd_gym.envs.dynamics.brake import BrakeParams, DelayLine
-from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
+from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch, touched_side
 from lgmd_gym.envs.dynamics.longitudinal import advance, time_to_stop
 
 
@@ -138,3 +138,20 @@ def test_first_touch_agrees_with_highway_env(x, y, heading, turn, dx, dy):
         sampled = utils.are_polygons_intersecting(moved, target, zero, zero)[0]
         if fraction < touch - 1e-6:
             assert not sampled
+
+
+@pytest.mark.parametrize(
+    ("other", "side"),
+    [
+        (Rectangle(4.65, 0.0, 0.0, 5.0, 2.0), "front"),
+        (Rectangle(4.65, 1.7, 0.0, 5.0, 2.0), "front"),
+        (Rectangle(-4.65, 0.4, 0.0, 5.0, 2.0), "rear"),
+        (Rectangle(0.5, 1.9, 0.0, 5.0, 2.0), "side"),
+        (Rectangle(0.2, -3.4, pi / 2, 5.0, 2.0), "side"),
+        (Rectangle(3.15, 1.0, pi / 2, 5.0, 2.0), "front"),
+    ],
+)
+def test_touched_side(other, side):
+    assert touched_side(CAR, other) == side
+    turned = [Rectangle(-box.x, -box.y, box.heading + pi, box.length, box.width) for box in (CAR, other)]
+    assert touched_side(*turned) == side

@@ -1,4 +1,4 @@
-"""Traffic environments and helpers that several test files share."""
+"""Traffic environments and helpers shared by test files."""
 
 import numpy as np
 
@@ -7,28 +7,31 @@ from lgmd_gym.envs.traffic.kinds import HighwayTraffic
 from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
 
 HOLD, BRAKE = np.array([0.0], np.float32), np.array([-1.0], np.float32)
-KIND_NAMES = list(KINDS)
 
 
-class Wall(HighwayTraffic):
-    """An empty road, with a car standing `ahead` metres ahead."""
+class EmptyHighway(HighwayTraffic):
+    """A highway without other cars, or with one stationary car at a distance [m] between centres."""
 
-    ahead: float | None = None
+    stationary_car_at: float | None = None
     warm_up = 0.0
 
-    def _settle(self):
+    def _modify_scene(self):
         road = self.road
         road.vehicles[:] = [self.ego]
-        if self.ahead is not None:
-            road.vehicles.append(TrafficCar(road, self.ego.position + np.array([self.ahead, 0.0]), speed=0.0))
+        if self.stationary_car_at is not None:
+            position = self.ego.position + np.array([self.stationary_car_at, 0.0])
+            road.vehicles.append(TrafficCar(road, position, speed=0.0))
             road.vehicles[-1].crashed = True
 
 
-class NearWall(Wall):
-    ahead = 50.0
+class BlockedHighway(EmptyHighway):
+    """A highway with a stationary car 50 m ahead."""
+
+    stationary_car_at = 50.0
 
 
-def drive(env, seconds, action=HOLD):
+def run_for(env, seconds, action=HOLD):
+    """Return the infos of an episode that repeats one action, up to its end or a time limit [s]."""
     infos = []
     for _ in range(round(seconds * 30)):
         _, _, terminated, truncated, info = env.step(action)
@@ -38,12 +41,16 @@ def drive(env, seconds, action=HOLD):
     return infos
 
 
-def digest(kinds=KIND_NAMES):
-    """Return where everybody is after three seconds, in full precision."""
+def car_states(kinds=tuple(KINDS)):
+    """Return positions and speeds of all cars after three seconds as strings in full precision."""
     lines = []
     for kind in kinds:
         env = make_traffic(kind, camera=None)
         env.reset(seed=5)
-        drive(env, 3)
+        run_for(env, 3)
         lines += [repr([kind, *car.position.tolist(), float(car.speed)]) for car in env.road.vehicles]
     return lines
+
+
+if __name__ == "__main__":
+    print(*car_states(), sep="\n")
