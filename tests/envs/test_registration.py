@@ -72,18 +72,14 @@ def test_traffic_ids_take_the_arguments_of_the_observation_wrapper():
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize(
-    "name",
-    [
-        "LGMD/EmptyRoad-v0",
-        "LGMD/RandomBraking-v0",
-        "LGMD/Traffic-Merge-v0",
-        *(
-            pytest.param(name, marks=pytest.mark.slow)
-            for name in sorted(TRAFFIC_IDS - {"LGMD/Traffic-Merge-v0"})
-        ),
-    ],
-)
+@pytest.mark.parametrize("name", ["LGMD/EmptyRoad-v0", "LGMD/RandomBraking-v0", "LGMD/Traffic-Merge-v0"])
 def test_gymnasium_env_checker(name):
     """The checker compares infos with ==, so undefined values must equal themselves."""
     check_env(gym.make(name, camera=None).unwrapped, skip_render_check=True)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", sorted(TRAFFIC_IDS - {"LGMD/Traffic-Merge-v0"}))
+def test_gymnasium_env_checker_on_all_traffic(name):
+    test_gymnasium_env_checker(name)
