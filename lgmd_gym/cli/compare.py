@@ -15,7 +15,7 @@ def run(options: Compare) -> int:
     if options.arms is None:
         _compare_pairs(options, make_console())
     else:
-        _compare_arms(options, options.arms, make_console())
+        _compare_arms(options, options.arms, make_console(width=120))
     return 0
 
 
@@ -31,10 +31,9 @@ def _compare_pairs(options: Compare, console: Console) -> None:
 
 
 def _compare_arms(options: Compare, arms: tuple[str, ...], console: Console) -> None:
-    for name in ("run_b", "agents", "out"):
-        if getattr(options, name) is not None:
-            option = name.replace("_", "-").upper() if name == "run_b" else f"--{name}"
-            raise ValueError(f"{option} cannot be combined with --arms, which compares agents of one run")
+    others = {"a second run": options.run_b, "--agents": options.agents, "--out": options.out}
+    if given := [name for name, value in others.items() if value is not None]:
+        raise ValueError(f"--arms compares agents of one run; remove {', '.join(given)}")
     results = compare_arms(options.run_a, arms)
     for condition in dict.fromkeys(result.condition for result in results):
         of_condition = [result for result in results if result.condition == condition]

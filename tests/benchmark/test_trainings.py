@@ -162,8 +162,11 @@ def test_command_makes_every_agent_an_arm_by_default(run_folder, capsys):
     [
         (["--arms", "rule=spike-treshold"], "did you mean 'spike-threshold'?"),
         (["--arms", "spike-threshold:frames=3"], "did you mean 'spike-threshold:frames=2'?"),
-        (["--arms", "ttc-oracle", "--agents", "a", "b"], "--agents cannot be combined with --arms"),
-        (["--arms", "ttc-oracle", "--out", "a.png"], "--out cannot be combined with --arms"),
+        (
+            ["--arms", "ttc-oracle", "--agents", "a", "b"],
+            "--arms compares agents of one run; remove --agents",
+        ),
+        (["--arms", "ttc-oracle", "--out", "a.png"], "remove --out"),
     ],
 )
 def test_command_rejects_invalid_arms(run_folder, capsys, arguments, message):

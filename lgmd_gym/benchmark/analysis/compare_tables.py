@@ -60,10 +60,10 @@ def arm_table(results: Sequence[ArmResult], title: str) -> Table:
     table = Table(title=title, caption=escape(ARM_CAPTION), box=SIMPLE_HEAD)
     table.add_column("arm", min_width=15, overflow="fold")
     for heading in ("train-\nings", "return", "difference\nto the first"):
-        table.add_column(heading, justify="right", no_wrap=True)
+        table.add_column(heading, justify="right")
     for key in keys:
         heading = f"{SHARE_HEADINGS[key]},\n% of {results[0].shares[key].n}"
-        table.add_column(heading, justify="right", no_wrap=True)
+        table.add_column(heading, justify="right")
     for result in results:
         mean_return = _estimate_text(result.mean_return, ".1f")
         if result.trainings > 1:
