@@ -1,77 +1,89 @@
-"""A user's own agent: any class with `act`, named as "module:Class"."""
+"""Agents of the user: classes with a method `act`, given as "module:Class"."""
 
 import os
 import sys
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgmd_gym.agents.base import Agent
+from lgmd_gym.agents.options import check_options, parse_agent
+
+if TYPE_CHECKING:
+    from lgmd_gym.camera import CameraSpec
+    from lgmd_gym.neuron import NeuronSpec
 
 
 class AgentAdapter(Agent):
-    """Gives a user's agent what it leaves out: a name, a reset, and the neuron's alert.
+    """Adapt a user's object to the interface of `Agent`.
+
+    Optional attributes of the object (`reset`, `alert`, `camera`, `neuron`, `include_frame`) replace the
+    defaults of `Agent`.
 
     Args:
-        name: What it is called in rows and tables.
-        agent: An object with `act(observation, info)`, which returns a number or an array of one.
+        name: Name in rows and tables.
+        agent: Object with `act(observation, info)`, which returns a number or an array of one number.
     """
 
     def __init__(self, name: str, agent: Any) -> None:
-        super().__init__()
         self.name = name
         self.agent = agent
         self.include_frame = bool(getattr(agent, "include_frame", False))
 
     @property
-    def camera(self) -> Any:
-        """The eye it wants, if it says so."""
+    def camera(self) -> "CameraSpec | None":
+        """Cameras of the object; None without the attribute."""
         return getattr(self.agent, "camera", None)
 
     @property
-    def neuron(self) -> dict[str, Any] | None:
-        """The neurons' parameters it wants behind its own eye, if it says so."""
+    def neuron(self) -> "NeuronSpec":
+        """Neuron parameters of the object; None without the attribute."""
         return getattr(self.agent, "neuron", None)
 
     @property
     def alert(self) -> bool:
-        """Whether the agent warns; the neuron's alert if it does not say."""
+        """Alert of the object; the neuron's alert without the attribute."""
         return bool(getattr(self.agent, "alert", self._alert))
 
     def reset(self, seed: int | None = None) -> None:
-        """Reset the agent, if it knows how."""
+        """Call the object's `reset(seed)`, if it has one."""
         super().reset(seed)
         reset = getattr(self.agent, "reset", None)
         if reset is not None:
             reset(seed)
 
     def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
-        """Return the agent's action as an array of shape (1,), float32.
+        """Return the object's action as an array of shape (1,), float32.
 
         Raises:
-            ValueError: If it is not one finite number.
+            ValueError: If the action is not one finite number.
         """
         self._alert = bool(info.get("lgmd/alert", False))
         action = np.asarray(self.agent.act(observation, info), dtype=np.float32).reshape(-1)
         if action.size != 1 or not np.isfinite(action[0]):
-            raise ValueError(f"agent {self.name!r} must act with one finite number, got {action.tolist()}")
+            raise ValueError(f"agent {self.name!r} must return one finite number, got {action.tolist()}")
         return action
 
 
-def import_agent(text: str) -> type:
-    """Return the class that "package.module:Class" names; the working folder is searched, too.
+def make_user_agent(text: str) -> AgentAdapter:
+    """Return the agent for "module:Class" or "module:Class:option=value,…".
+
+    The working directory is on the search path for modules.
 
     Raises:
-        ValueError: If the module or the class cannot be found, or has no `act`.
+        ValueError: If the class cannot be imported, has no `act`, or does not accept an option.
     """
-    module_name, _, class_name = text.partition(":")
+    module, class_name, *rest = text.split(":", 2)
+    name = f"{module}:{class_name}"
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
     try:
-        found = getattr(import_module(module_name), class_name)
+        agent_class = getattr(import_module(module), class_name)
     except (ImportError, AttributeError) as error:
-        raise ValueError(f"agent {text!r} cannot be imported ({error}); write module:Class") from None
-    if not hasattr(found, "act"):
-        raise ValueError(f"agent {text!r} has no method act(observation, info)")
-    return found
+        raise ValueError(f"agent {name!r} cannot be imported ({error}); write module:Class") from None
+    if not hasattr(agent_class, "act"):
+        raise ValueError(f"agent {name!r} has no method act(observation, info)")
+    options = parse_agent(f"{module}:{''.join(rest)}")[1]
+    check_options(name, agent_class, options)
+    return AgentAdapter(name, agent_class(**options))

@@ -1,61 +1,93 @@
-"""What an agent is: it sees observations and the `lgmd/` keys of `info`, and answers with a demand."""
+"""Base class of all agents, and the two demands of an agent that only brakes."""
 
 import inspect
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-BRAKE = -1.0  # full braking, see `BrakingEnv`
-HOLD = 0.0  # the scripted speed
+if TYPE_CHECKING:
+    from lgmd_gym.camera import CameraSpec
+    from lgmd_gym.neuron import NeuronSpec
+
+BRAKE = -1.0  # demand for full braking
+HOLD = 0.0  # demand for the scripted speed
+FPS = 30.0  # frame and decision rate for which all agents are tuned [Hz]
 
 
 def to_action(demand: float) -> np.ndarray:
-    """Return a longitudinal demand in [-1, 1] as an action of `ContinuousDemand`, shape (1,), float32."""
+    """Return a longitudinal demand in [-1, 1] as an action of `ContinuousDemand`: float32, shape (1,)."""
     return np.array([demand], dtype=np.float32)
 
 
 class Agent:
-    """Base of all agents; any object with the same methods will do.
+    """Base class: maps an observation to a longitudinal demand.
 
-    An agent reads the observation and the `info` keys under `lgmd/`. Everything else in `info` is ground
-    truth, for oracles alone.
+    An agent reads the observation and the `info` keys under `lgmd/`. All other keys of `info` are ground
+    truth, which only oracles read. Subclasses implement `demand`.
+
+    Attributes:
+        name: Name in agent strings, rows and tables.
+        include_frame: Whether the observation must contain the camera frames.
     """
 
     name = "agent"
-    include_frame = False  # whether it needs the frames themselves in the observation
-
-    def __init__(self) -> None:
-        self._alert = False
+    include_frame = False
+    _alert = False
 
     @property
-    def camera(self) -> Any:
-        """The eye it wants where the user names none, as `LGMDObservation` takes it; None for no wish."""
+    def camera(self) -> "CameraSpec | None":
+        """Cameras of the agent, used unless the user specifies others; None for no preference."""
         return None
 
     @property
-    def neuron(self) -> dict[str, Any] | None:
-        """The `params` of `LGMDObservation` that it wants behind its own eye; None for the paper's."""
+    def neuron(self) -> "NeuronSpec":
+        """Neuron parameters for the agent's own cameras; None for those of the paper."""
         return None
 
     @classmethod
     def options(cls) -> dict[str, Any]:
-        """Return what its string may set, with the defaults."""
+        """Return the options of the agent's string with their defaults."""
         return {item.name: item.default for item in inspect.signature(cls).parameters.values()}
 
     @property
     def alert(self) -> bool:
-        """Whether the agent warns at present; by default the neuron's own alert."""
+        """Whether the agent warns; by default the alert of the neuron."""
         return self._alert
 
     def reset(self, seed: int | None = None) -> None:
-        """Forget the last episode; `seed` feeds whatever the agent draws."""
+        """Start a new episode; `seed` seeds random agents."""
         self._alert = False
 
     def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
-        """Return the action for an observation: an array of shape (1,) in [-1, 1]."""
+        """Return the action for an observation: float32, shape (1,), in [-1, 1]."""
         self._alert = bool(info.get("lgmd/alert", False))
         return to_action(self.demand(observation, info))
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Return the longitudinal demand in [-1, 1]; what a subclass defines."""
+        """Return the longitudinal demand in [-1, 1]."""
+        raise NotImplementedError
+
+
+class LatchingAgent(Agent):
+    """Base class: brakes fully once `brake_condition` returns True, and latches until the episode ends."""
+
+    _latched = False
+
+    @property
+    def alert(self) -> bool:
+        """Whether the agent brakes."""
+        return self._latched
+
+    def reset(self, seed: int | None = None) -> None:
+        """Release the brake and clear all state."""
+        super().reset(seed)
+        self._latched = False
+
+    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+        """Return `BRAKE` once the agent has latched, else `HOLD`."""
+        self._latched = self.brake_condition(observation, info) or self._latched
+        return BRAKE if self._latched else HOLD
+
+    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
+        """Return whether to begin braking; called at every decision in order."""
         raise NotImplementedError

@@ -1,57 +1,56 @@
-"""Agents that do not look: the counterfactual, and two bounds that no sensible rule should come near."""
+"""Agents that ignore the observation: the counterfactual without braking and two lower bounds."""
 
 from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.base import BRAKE, HOLD, Agent
+from lgmd_gym.agents.base import BRAKE, FPS, HOLD, Agent
 from lgmd_gym.agents.options import positive
 
 
 class NoBrake(Agent):
-    """Never brakes; whether it touches decides what counts as a threat."""
+    """Never brakes. A contact of this agent defines a threat."""
 
     name = "no-brake"
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Hold the scripted speed."""
+        """Return `HOLD`."""
         return HOLD
 
 
 class AlwaysBrake(Agent):
-    """Brakes fully from the first moment: it avoids every contact and succeeds at nothing."""
+    """Brakes fully from the first decision: avoids every contact and brakes prematurely in every episode."""
 
     name = "always-brake"
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Brake fully."""
+        """Return `BRAKE`."""
         return BRAKE
 
 
 class RandomBrake(Agent):
-    """Brakes fully, and keeps braking, from a random moment on: the chance level.
+    """Brakes fully from a random time: the chance level. The onset time T ~ Exp(rate).
 
     Args:
-        rate: Mean number of onsets per second of simulated time, > 0.
-        fps: Decisions per second, > 0 [Hz].
+        rate: Mean number of onsets per second, > 0 [1/s].
+        fps: Decision rate, > 0 [Hz].
     """
 
     name = "random-brake"
 
-    def __init__(self, rate: float = 0.2, fps: float = 30.0) -> None:
-        super().__init__()
+    def __init__(self, rate: float = 0.2, fps: float = FPS) -> None:
         self.rate = positive("rate", rate)
         self.fps = positive("fps", fps)
         self.reset()
 
     def reset(self, seed: int | None = None) -> None:
-        """Draw a new moment from `seed`."""
+        """Draw a new onset time from `seed`."""
         super().reset(seed)
         self._onset = np.random.default_rng(seed).exponential(1.0 / self.rate)
         self._decisions = 0
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Brake fully once the moment has come."""
+        """Return `BRAKE` from the onset time on, `HOLD` before."""
         time = self._decisions / self.fps
         self._decisions += 1
         return BRAKE if time >= self._onset else HOLD

@@ -1,4 +1,4 @@
-"""Rules on several fields: a pyramid of nested ones, and the ground the car needs for stopping."""
+"""Rules on the excitation of several camera fields, without the upright fields of `StoppingZone`."""
 
 from dataclasses import dataclass
 from math import atan, degrees
@@ -6,18 +6,50 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.params import RuleParams, above_zero, count
-from lgmd_gym.agents.rule import Rule, SensorReading, SteeringGate, Streak
-from lgmd_gym.agents.stopping_zone import (
+from lgmd_gym.agents.filters import ConsecutiveFrames, YawRateGate
+from lgmd_gym.agents.params import RuleParams, parameter
+from lgmd_gym.agents.rule import Rule, SensorReading, excitation
+from lgmd_gym.agents.zones import (
+    FULL_DECELERATION,
     LENS_SETBACK,
-    SPEEDS_KMH,
-    excitation,
+    NUM_ZONES,
     stopping_distance,
     zone_cameras,
-    zone_of,
+    zone_ends,
+    zone_index,
 )
 
-NESTED_DEG = (5.0, 7.0, 10.0, 14.0, 20.0, 40.0)  # fields of the pyramid, narrowest first
+NESTED_DEG = (5.0, 7.0, 10.0, 14.0, 20.0, 40.0)  # horizontal fields of view, narrowest first
+
+
+class FieldRule(Rule):
+    """Base class: brakes fully when the excitation of the field for the ego speed reaches a level.
+
+    Condition: excitation ≥ `level` in `frames` consecutive camera frames, while the yaw rate has not exceeded
+    `yaw_rate` in the last `settle` frames.
+    """
+
+    num_fields: int
+
+    def reset(self, seed: int | None = None) -> None:
+        """Release the brake and clear all state."""
+        super().reset(seed)
+        p = self.params
+        self._streaks = [ConsecutiveFrames(p.frames) for _ in range(self.num_fields)]
+        self._gate = YawRateGate(p.yaw_rate, p.settle)
+
+    def should_brake(self, reading: SensorReading) -> bool:
+        """Return whether the field for the ego speed has reached the level for the required frames."""
+        self.require_cameras(reading, self.num_fields)
+        reached = [
+            streak.update(level >= self.params.level)
+            for streak, level in zip(self._streaks, excitation(reading.membrane_potential), strict=True)
+        ]
+        return self._gate.update(reading.yaw_rate) and reached[self.field_index(reading.speed)]
+
+    def field_index(self, speed: float) -> int:
+        """Return the index of the field for an ego speed [m/s]."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,58 +57,48 @@ class NestedFieldsParams(RuleParams):
     """Parameters of `NestedFields`.
 
     Attributes:
-        level: Excitation of the chosen field from which a frame counts; see `excitation`.
-        frames: Consecutive frames at the level that start braking.
-        half_width: Half the width that the field spans where the car would come to a stop [m].
-        reaction: Of the stopping distance [s].
-        yaw_rate: Own yaw rate beyond which it does not judge [rad/s].
-        settle: Frames for which it does not judge after that.
+        level: Excitation threshold, > 0; see `lgmd_gym.agents.rule.excitation`.
+        frames: Number of consecutive camera frames at or above the level, >= 1.
+        half_width: Half the lane width that the field covers at the stopping distance, > 0 [m].
+        reaction: Reaction time of the stopping distance, > 0 [s].
+        yaw_rate: Absolute yaw rate above which the rule is inactive, > 0 [rad/s].
+        settle: Number of latest camera frames that must be free of such yaw rates, >= 1.
     """
 
-    level: float = above_zero(1.5, 0.5, 5.0)
-    frames: int = count(6, 1, 20)
-    half_width: float = above_zero(1.4, 0.6, 2.5)
-    reaction: float = above_zero(0.5, 0.2, 1.0)
-    yaw_rate: float = above_zero(0.03, 0.01, 0.3)
-    settle: int = count(15, 1, 60)
+    level: float = parameter(1.5, 0.5, 5.0)
+    frames: int = parameter(6, 1, 20)
+    half_width: float = parameter(1.4, 0.6, 2.5)
+    reaction: float = parameter(0.5, 0.2, 1.0)
+    yaw_rate: float = parameter(0.03, 0.01, 0.3)
+    settle: int = parameter(15, 1, 60)
 
 
-class NestedFields(Rule):
-    """A pyramid of nested central fields along the path; own speed chooses the one that matters.
+class NestedFields(FieldRule):
+    """Brakes fully on the excitation of one of six nested fields along the path, chosen by the ego speed.
 
-    That is the narrowest which still spans the lane where the car would come to a stop: narrow and far at
-    speed, wide and near in town.
+    The field for the ego speed v is the narrowest one that covers the lane at the stopping distance d: its
+    angle is at least 2·atan(`half_width` / (d + 1.7 m)), with d = v² / (2 · 9 m/s²) + `reaction` · v.
+    Condition: see `FieldRule`.
 
-    Args:
-        params: `NestedFieldsParams`; None for those of `options`.
-        options: Fields of it.
+    Observes `membrane_potential`, `ego_speed`, `ego_yaw_rate`. Parameters: `NestedFieldsParams`.
     """
 
     name = "nested-fields"
     Params = NestedFieldsParams
+    num_fields = len(NESTED_DEG)
 
     @property
     def camera(self) -> list[dict[str, Any]]:
-        """The eye: nested fields, narrowest first."""
-        look = {"gaze": "path", "shape": [90, 160]}
-        return [{"name": f"nested{field:g}", "hfov_deg": field, **look} for field in NESTED_DEG]
+        """Nested fields, narrowest first."""
+        shared = {"gaze": "path", "shape": [90, 160]}
+        return [{"name": f"nested{angle:g}", "hfov_deg": angle, **shared} for angle in NESTED_DEG]
 
-    def reset(self, seed: int | None = None) -> None:
-        """Release the brake."""
-        super().reset(seed)
+    def field_index(self, speed: float) -> int:
+        """Return the index of the narrowest field that covers the lane at the stopping distance."""
         p = self.params
-        self._streaks = [Streak(p.frames) for _ in NESTED_DEG]
-        self._gate = SteeringGate(p.yaw_rate, p.settle)
-
-    def should_brake(self, sight: SensorReading) -> bool:
-        """Return whether the field of the present speed has stood at the level."""
-        p = self.params
-        levels = excitation(sight.membrane_potential)
-        stood = [streak.add(level >= p.level) for streak, level in zip(self._streaks, levels, strict=True)]
-        distance = stopping_distance(max(sight.speed, 0.0), 9.0, p.reaction) + LENS_SETBACK
-        wanted = 2 * degrees(atan(p.half_width / distance))
-        field = min(int(np.searchsorted(NESTED_DEG, wanted)), len(NESTED_DEG) - 1)
-        return self._gate.open(sight.yaw_rate) and stood[field]
+        distance = stopping_distance(max(speed, 0.0), FULL_DECELERATION, p.reaction) + LENS_SETBACK
+        angle = 2 * degrees(atan(p.half_width / distance))
+        return min(int(np.searchsorted(NESTED_DEG, angle)), self.num_fields - 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,46 +106,38 @@ class DangerZoneParams(RuleParams):
     """Parameters of `DangerZone`.
 
     Attributes:
-        level: Excitation of the ground field from which a frame counts; see `excitation`.
-        frames: Consecutive frames at the level that start braking.
-        reaction: Of the stopping distance that places the zones [s].
-        yaw_rate: Own yaw rate beyond which it does not judge [rad/s].
-        settle: Frames for which it does not judge after that.
+        level: Excitation threshold, > 0; see `lgmd_gym.agents.rule.excitation`.
+        frames: Number of consecutive camera frames at or above the level, >= 1.
+        reaction: Reaction time of the stopping distance, > 0 [s]; determines the zones.
+        yaw_rate: Absolute yaw rate above which the rule is inactive, > 0 [rad/s].
+        settle: Number of latest camera frames that must be free of such yaw rates, >= 1.
     """
 
-    level: float = above_zero(4.0, 2.0, 9.0)
-    frames: int = count(3, 1, 12)
-    reaction: float = above_zero(0.4, 0.25, 0.6, places_eye=True)
-    yaw_rate: float = above_zero(0.03, 0.01, 0.3)
-    settle: int = count(15, 1, 60)
+    level: float = parameter(4.0, 2.0, 9.0)
+    frames: int = parameter(3, 1, 12)
+    reaction: float = parameter(0.4, 0.25, 0.6, affects_camera=True)
+    yaw_rate: float = parameter(0.03, 0.01, 0.3)
+    settle: int = parameter(15, 1, 60)
 
 
-class DangerZone(Rule):
-    """The ground fields of `StoppingZone` alone: what its upright fields add shows in shadows and plates.
+class DangerZone(FieldRule):
+    """Brakes fully on the excitation of the ground field for the ego speed.
 
-    Args:
-        params: `DangerZoneParams`; None for those of `options`.
-        options: Fields of it.
+    This is `StoppingZone` without upright fields: the ground field belongs to the zone with the next higher
+    design speed. Condition: see `FieldRule`. Shadows and steel plates cause false activations.
+
+    Observes `membrane_potential`, `ego_speed`, `ego_yaw_rate`. Parameters: `DangerZoneParams`.
     """
 
     name = "danger-zone"
     Params = DangerZoneParams
+    num_fields = NUM_ZONES
 
     @property
     def camera(self) -> list[dict[str, Any]]:
-        """The eye: ground fields by rising speed."""
-        ends = stopping_distance(np.array(SPEEDS_KMH) / 3.6, 9.0, self.params.reaction)
-        return zone_cameras(ends)[: len(SPEEDS_KMH)]
+        """Ground fields in order of design speed."""
+        return zone_cameras(zone_ends(FULL_DECELERATION, self.params.reaction))[:NUM_ZONES]
 
-    def reset(self, seed: int | None = None) -> None:
-        """Release the brake."""
-        super().reset(seed)
-        p = self.params
-        self._streaks = [Streak(p.frames) for _ in SPEEDS_KMH]
-        self._gate = SteeringGate(p.yaw_rate, p.settle)
-
-    def should_brake(self, sight: SensorReading) -> bool:
-        """Return whether something has entered the zone of the present speed."""
-        told = excitation(sight.membrane_potential)
-        entered = [s.add(level >= self.params.level) for s, level in zip(self._streaks, told, strict=True)]
-        return self._gate.open(sight.yaw_rate) and entered[zone_of(sight.speed)]
+    def field_index(self, speed: float) -> int:
+        """Return the index of the zone for the ego speed."""
+        return zone_index(speed)

@@ -1,7 +1,7 @@
-"""Baselines on the frames themselves, without a neuron: what simpler measures reach through one fovea.
+"""Baseline rules on camera frames, without a neuron.
 
-Their defaults were found by `lgmd-gym tune --cameras fovea tele wide` (60 trials, of the flow 24) on the
-splits train and validation, as rules on the neuron are tuned; `docs/benchmark.md` compares them.
+The defaults come from `lgmd-gym tune --cameras fovea tele wide` on the splits train and validation (60 trials
+for `FrameDifference`, 24 for `FlowDivergence`); docs/benchmark.md compares them with rules on the neuron.
 """
 
 from dataclasses import dataclass
@@ -9,124 +9,106 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.base import BRAKE, HOLD
-from lgmd_gym.agents.params import RuleParams, above_zero, count
-from lgmd_gym.agents.rule import Rule, SensorReading, SteeringGate, Streak, sensor_readings
-
-FPS = 30.0  # [Hz]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ImageParams(RuleParams):
-    """Parameters of a rule on one image measure.
-
-    Attributes:
-        level: Of the measure.
-        frames: Consecutive frames at the level that start braking.
-        yaw_rate: Own yaw rate beyond which it does not judge [rad/s].
-        settle: Frames for which it does not judge after that.
-    """
-
-    level: float = above_zero(1.0, 0.1, 10.0)
-    frames: int = count(4, 1, 12)
-    yaw_rate: float = above_zero(0.03, 0.01, 0.3)
-    settle: int = count(15, 1, 60)
+from lgmd_gym.agents.base import FPS
+from lgmd_gym.agents.filters import ConsecutiveFrames, YawRateGate
+from lgmd_gym.agents.params import RuleParams, parameter
+from lgmd_gym.agents.rule import Rule, SensorReading, sensor_readings
 
 
 class ImageRule(Rule):
-    """Brakes fully once a measure of two successive frames has stood at a level; not while turning.
+    """Base class: brakes fully when a measure of two successive frames reaches a level.
 
-    It sees through one 10° fovea along the path and reads a frame per decision.
+    Condition: measure ≥ `level` in `frames` consecutive camera frames. A frame does not count if the yaw rate
+    has exceeded `yaw_rate` in the last `settle` frames. The rule uses one 10° camera along the path and one
+    frame per decision.
     """
 
-    Params = ImageParams
     include_frame = True
 
     @property
     def camera(self) -> dict[str, Any]:
-        """The eye."""
+        """The preset `fovea`, turned along the path."""
         return {"name": "fovea", "gaze": "path"}
 
     def reset(self, seed: int | None = None) -> None:
-        """Release the brake and forget the last frame."""
+        """Release the brake and clear all state."""
         super().reset(seed)
-        self._streak, self._before = Streak(self.params.frames), None
-        self._gate = SteeringGate(self.params.yaw_rate, self.params.settle)
+        self._streak, self._previous = ConsecutiveFrames(self.params.frames), None
+        self._gate = YawRateGate(self.params.yaw_rate, self.params.settle)
 
-    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Measure, then brake fully if latched."""
+    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
+        """Measure the latest two frames; return whether the rule's condition holds."""
         frame = np.ascontiguousarray(observation["frame"][:, :, 0])
-        self._value = 0.0 if self._before is None else self.measure(self._before, frame)
-        self._before = frame
-        last = tuple(sensor_readings(observation, info))[-1:]  # none if the decision brought no new frame
-        self._latched = any(map(self.should_brake, last)) or self._latched
-        return BRAKE if self._latched else HOLD
+        self._value = 0.0 if self._previous is None else self.measure(self._previous, frame)
+        self._previous = frame
+        latest = tuple(sensor_readings(observation, info))[-1:]  # empty if the decision has no new frame
+        return any(map(self.should_brake, latest))
 
-    def should_brake(self, sight: SensorReading) -> bool:
-        """Return whether the measure has stood at the level long enough."""
-        return self._streak.add(self._gate.open(sight.yaw_rate) and self._value >= self.params.level)
+    def should_brake(self, reading: SensorReading) -> bool:
+        """Return whether the measure has reached the level for the required number of frames."""
+        return self._streak.update(self._gate.update(reading.yaw_rate) and self._value >= self.params.level)
 
-    def measure(self, before: np.ndarray, now: np.ndarray) -> float:
-        """Return the measure of two frames, uint8 (height, width)."""
+    def measure(self, previous: np.ndarray, frame: np.ndarray) -> float:
+        """Return the measure of two successive frames, uint8 (height, width)."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FrameDifferenceParams(ImageParams):
+class FrameDifferenceParams(RuleParams):
     """Parameters of `FrameDifference`.
 
     Attributes:
-        level: Mean absolute change of grey per frame that counts [grey levels].
-        frames: See `ImageParams`.
-        yaw_rate: See `ImageParams`.
-        settle: See `ImageParams`.
+        level: Threshold of the mean absolute frame difference, > 0 [grey levels].
+        frames: Number of consecutive camera frames at or above the level, >= 1.
+        yaw_rate: Absolute yaw rate above which the rule is inactive, > 0 [rad/s].
+        settle: Number of latest camera frames that must be free of such yaw rates, >= 1.
     """
 
-    level: float = above_zero(4.78, 0.5, 20.0)
-    frames: int = count(8, 1, 12)
-    yaw_rate: float = above_zero(0.0384, 0.01, 0.3)
-    settle: int = count(60, 1, 60)
+    level: float = parameter(4.78, 0.5, 20.0)
+    frames: int = parameter(8, 1, 12)
+    yaw_rate: float = parameter(0.0384, 0.01, 0.3)
+    settle: int = parameter(60, 1, 60)
 
 
 class FrameDifference(ImageRule):
-    """Brakes on the energy of the frame difference: mean `|L(t) − L(t − 1)|` over one fovea.
+    """Brakes fully on the mean absolute frame difference, mean |L(t) − L(t − 1)| [grey levels].
 
-    Args:
-        params: `FrameDifferenceParams`; None for those of `options`.
-        options: Fields of it.
+    Condition: see `ImageRule`.
+
+    Observes `frame`, `ego_yaw_rate`. Parameters: `FrameDifferenceParams`.
     """
 
     name = "frame-difference"
     Params = FrameDifferenceParams
 
-    def measure(self, before: np.ndarray, now: np.ndarray) -> float:
-        """Return the mean absolute change [grey levels]."""
-        return float(np.abs(now.astype(np.int16) - before).mean())
+    def measure(self, previous: np.ndarray, frame: np.ndarray) -> float:
+        """Return the mean absolute difference [grey levels]."""
+        return float(np.abs(frame.astype(np.int16) - previous).mean())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FlowDivergenceParams(ImageParams):
+class FlowDivergenceParams(RuleParams):
     """Parameters of `FlowDivergence`.
 
     Attributes:
-        level: Mean divergence that counts, 2/τ for a plane that fills the field [1/s].
-        frames: See `ImageParams`.
-        yaw_rate: See `ImageParams`.
-        settle: See `ImageParams`.
+        level: Threshold of the mean divergence, > 0 [1/s]; 2/τ for a plane that fills the field of view.
+        frames: Number of consecutive camera frames at or above the level, >= 1.
+        yaw_rate: Absolute yaw rate above which the rule is inactive, > 0 [rad/s].
+        settle: Number of latest camera frames that must be free of such yaw rates, >= 1.
     """
 
-    level: float = above_zero(0.454, 0.05, 3.0)
-    frames: int = count(4, 1, 12)
-    yaw_rate: float = above_zero(0.0713, 0.01, 0.3)
-    settle: int = count(25, 1, 60)
+    level: float = parameter(0.454, 0.05, 3.0)
+    frames: int = parameter(4, 1, 12)
+    yaw_rate: float = parameter(0.0713, 0.01, 0.3)
+    settle: int = parameter(25, 1, 60)
 
 
 class FlowDivergence(ImageRule):
-    """Brakes on the divergence of dense optical flow (Farnebäck) over one fovea; needs OpenCV.
+    """Brakes fully on the mean divergence of dense optical flow (Farnebäck), mean(∂u/∂x + ∂v/∂y) [1/s].
 
-    Args:
-        params: `FlowDivergenceParams`; None for those of `options`.
-        options: Fields of it.
+    Condition: see `ImageRule`. Requires OpenCV.
+
+    Observes `frame`, `ego_yaw_rate`. Parameters: `FlowDivergenceParams`.
 
     Raises:
         ValueError: If OpenCV is not installed.
@@ -135,17 +117,17 @@ class FlowDivergence(ImageRule):
     name = "flow-divergence"
     Params = FlowDivergenceParams
 
-    def __init__(self, params: Any = None, **options: Any) -> None:
+    def __init__(self, params: FlowDivergenceParams | None = None, **options: Any) -> None:
         try:
             import cv2
         except ImportError:
-            raise ValueError(f"agent {self.name} needs OpenCV; pip install 'lgmd-gym[flow]'") from None
+            raise ValueError(f"agent {self.name} requires OpenCV; pip install 'lgmd-gym[flow]'") from None
         self._cv2 = cv2
         super().__init__(params, **options)
 
-    def measure(self, before: np.ndarray, now: np.ndarray) -> float:
-        """Return the mean divergence ∂u/∂x + ∂v/∂y [1/s]."""
-        flow: Any = np.zeros((*now.shape, 2), np.float32)
-        flow = self._cv2.calcOpticalFlowFarneback(before, now, flow, 0.5, 3, 15, 3, 5, 1.2, 0)
-        spread = np.gradient(flow[:, :, 0], axis=1) + np.gradient(flow[:, :, 1], axis=0)
-        return float(spread.mean()) * FPS
+    def measure(self, previous: np.ndarray, frame: np.ndarray) -> float:
+        """Return the mean divergence [1/s]."""
+        flow: Any = np.zeros((*frame.shape, 2), np.float32)
+        flow = self._cv2.calcOpticalFlowFarneback(previous, frame, flow, 0.5, 3, 15, 3, 5, 1.2, 0)
+        divergence = np.gradient(flow[:, :, 0], axis=1) + np.gradient(flow[:, :, 1], axis=0)
+        return float(divergence.mean()) * FPS

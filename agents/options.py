@@ -1,4 +1,4 @@
-"""Agents from strings, and the checks of their options."""
+"""Parsing of agent strings and validation of agent options."""
 
 import inspect
 from math import isfinite
@@ -15,17 +15,17 @@ def positive(name: str, value: Any) -> float:
 
 
 def whole(name: str, value: Any, low: int) -> int:
-    """Return `value` as an int >= low, or raise ValueError."""
+    """Return `value` as an int >= `low`, or raise ValueError."""
     if isinstance(value, bool) or not isinstance(value, int | float) or value != int(value) or value < low:
         raise ValueError(f"{name} must be a whole number >= {low}, got {value!r}")
     return int(value)
 
 
-def parse(text: str) -> tuple[str, dict[str, Any]]:
-    """Split "name:key=value,key=value" into the name and its options.
+def parse_agent(text: str) -> tuple[str, dict[str, Any]]:
+    """Split "name:option=value,option=value" into the name and the options.
 
     Example:
-        >>> parse("spike-threshold:threshold=45,frames=2")
+        >>> parse_agent("spike-threshold:threshold=45,frames=2")
         ('spike-threshold', {'threshold': 45, 'frames': 2})
     """
     name, _, rest = text.partition(":")
@@ -33,20 +33,21 @@ def parse(text: str) -> tuple[str, dict[str, Any]]:
     for part in filter(None, rest.split(",")):
         key, equals, value = part.partition("=")
         if not equals:
-            raise ValueError(f"agent option {part!r} in {text!r} needs a value; write {key}=VALUE")
-        options[key.strip()] = _number(value.strip())
+            raise ValueError(f"agent option {part!r} in {text!r} has no value; write {key}=VALUE")
+        options[key.strip()] = _parse_value(value.strip())
     return name.strip(), options
 
 
 def check_options(name: str, cls: type, options: dict[str, Any]) -> None:
-    """Refuse an option that the agent's constructor does not take, naming the nearest."""
+    """Raise ValueError for an option that the constructor of an agent does not accept."""
     check_keys(f"option of agent {name}", options, inspect.signature(cls).parameters)
 
 
-def _number(text: str) -> int | float | str:
-    for kind in (int, float):
+def _parse_value(text: str) -> int | float | str:
+    """Return an int or float if `text` is a number, else `text`."""
+    for number in (int, float):
         try:
-            return kind(text)
+            return number(text)
         except ValueError:
             continue
     return text

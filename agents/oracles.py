@@ -1,147 +1,124 @@
-"""Agents that are told the truth: bounds of what any eye could reach, and of what looming models could."""
+"""Oracles: agents on ground truth, as upper bounds for any camera and for looming models."""
 
-from math import exp, hypot, isfinite, nan
-from typing import Any, NamedTuple
+from math import exp, hypot, inf, isfinite
+from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.base import BRAKE, HOLD, Agent
+from lgmd_gym.agents.base import FPS, LatchingAgent
 from lgmd_gym.agents.options import positive
-from lgmd_gym.agents.stopping_zone import stopping_distance
+from lgmd_gym.agents.zones import FULL_DECELERATION, LENS_SETBACK, stopping_distance
 
-TARGET_WIDTH = 1.712  # [m], ISO 19206-3: the truth holds no width
-DECISION = 1 / 30  # [s]
-
-
-class Oracle(Agent):
-    """Base of the oracles: brakes fully once `due`, and keeps braking."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._latched = False
-
-    @property
-    def alert(self) -> bool:
-        """Whether it has begun to brake."""
-        return self._latched
-
-    def reset(self, seed: int | None = None) -> None:
-        """Release the brake."""
-        super().reset(seed)
-        self._latched = False
-
-    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Brake fully if latched."""
-        self._latched = self.due(info) or self._latched
-        return BRAKE if self._latched else HOLD
-
-    def due(self, info: dict[str, Any]) -> bool:
-        """Return whether the present moment gives reason to brake."""
-        raise NotImplementedError
+TARGET_WIDTH = 1.712  # ISO 19206-3 [m]; `info` has no width
+DECISION_INTERVAL = 1 / FPS  # [s]
 
 
-class TTCOracle(Oracle):
-    """Brakes fully once the true time to contact falls to a threshold, and keeps braking.
+class TTCOracle(LatchingAgent):
+    """Brakes fully when the true time to contact falls to a threshold: TTC ≤ `ttc`.
+
+    Observes `info["ttc"]`.
 
     Args:
-        ttc: Threshold, > 0 [s]. The default holds for all the protocol suites with the default brake; the
-            hardest is a lead car that brakes at 0.5 g from 80 km/h 40 m ahead (1.8 s is too late there).
+        ttc: Threshold, > 0 [s]. The default avoids all contacts of the protocol suites with the default
+            brake. The critical case is a lead car 40 m ahead that brakes at 0.5 g from 80 km/h, in which
+            1.8 s is too late.
     """
 
     name = "ttc-oracle"
 
     def __init__(self, ttc: float = 2.0) -> None:
-        super().__init__()
         self.ttc = positive("ttc", ttc)
 
-    def due(self, info: dict[str, Any]) -> bool:
-        """Compare; NaN (no contact ahead) is never due."""
+    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
+        """Return whether the time to contact is at or below the threshold; False without a contact ahead."""
         return bool(info["ttc"] <= self.ttc)
 
 
-class StoppingDistanceOracle(Oracle):
-    """Brakes fully at the last moment at which stopping behind the car in the way is still possible.
+class StoppingDistanceOracle(LatchingAgent):
+    """Brakes fully at the latest time at which the ego can stop behind the car ahead.
 
-    The other is taken to keep its deceleration, which is told by its last two speeds. Only what lies on the
-    ego's path counts, so what crosses from the side is seen late.
+    Condition: gap ≤ d(v − w) + `margin`, with ego speed v, target speed w < v and the stopping distance
+    d(u) = u² / (2 · `deceleration`) + u · `reaction`. If the target decelerates by a > 1 m/s², the right side
+    is at least d(v) − w² / (2a) + `margin`; a is the difference of the last two target speeds. Only targets
+    on the ego's path count, so that braking for crossing traffic begins late.
+
+    Observes `info["gap"]`, `info["ego_speed"]`, `info["target_speed"]`.
 
     Args:
-        deceleration: Of full braking, > 0 [m/s²].
-        reaction: From the demand to full braking, > 0 [s].
-        margin: Distance to spare, > 0 [m].
+        deceleration: Deceleration of full braking, > 0 [m/s²].
+        reaction: Time from the demand to full braking, > 0 [s].
+        margin: Remaining distance to the target, > 0 [m].
     """
 
     name = "stopping-distance-oracle"
 
-    def __init__(self, deceleration: float = 9.0, reaction: float = 0.4, margin: float = 1.5) -> None:
-        super().__init__()
+    def __init__(
+        self, deceleration: float = FULL_DECELERATION, reaction: float = 0.4, margin: float = 1.5
+    ) -> None:
         self.deceleration = positive("deceleration", deceleration)
         self.reaction = positive("reaction", reaction)
         self.margin = positive("margin", margin)
-        self._before = nan
+        self._previous_target_speed = inf
 
     def reset(self, seed: int | None = None) -> None:
-        """Release the brake and forget the other's speed."""
+        """Release the brake and clear all state."""
         super().reset(seed)
-        self._before = nan
+        self._previous_target_speed = inf
 
-    def due(self, info: dict[str, Any]) -> bool:
-        """Return whether the gap is down to what stopping takes."""
-        speed, other, gap = info["ego_speed"], info["target_speed"], info["gap"]
-        slowing = (self._before - other) / DECISION
-        self._before = other
-        if not (isfinite(gap) and isfinite(other)) or speed <= other:
+    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
+        """Return whether the gap is at or below the required distance."""
+        speed, target_speed, gap = info["ego_speed"], info["target_speed"], info["gap"]
+        target_deceleration = (self._previous_target_speed - target_speed) / DECISION_INTERVAL
+        self._previous_target_speed = target_speed
+        if not (isfinite(gap) and isfinite(target_speed)) or speed <= target_speed:
             return False
-        closing = speed - other
-        needed = stopping_distance(closing, self.deceleration, self.reaction)
-        if slowing > 1.0:  # it stops first: both ways to standstill count
-            stop = stopping_distance(speed, self.deceleration, self.reaction)
-            needed = max(needed, stop - other**2 / (2 * slowing))
-        return bool(gap <= needed + self.margin)
+        required = stopping_distance(speed - target_speed, self.deceleration, self.reaction)
+        if 1.0 < target_deceleration < inf:  # both cars come to a standstill
+            ego_distance = stopping_distance(speed, self.deceleration, self.reaction)
+            required = max(required, ego_distance - target_speed**2 / (2 * target_deceleration))
+        return bool(gap <= required + self.margin)
 
 
-class _Angle(NamedTuple):
-    """Angle under which what is ahead is seen from the lens [rad], and its rate of growth [rad/s]."""
-
-    size: float
-    growth: float
-
-
-def _seen_angle(info: dict[str, Any], setback: float = 1.7) -> _Angle | None:
-    """Return the angle of what lies on the ego's path; None if nothing does."""
+def _visual_angle(info: dict[str, Any]) -> tuple[float, float]:
+    """Return the target's visual angle θ at the lens [rad] and θ′ [rad/s]; zeros without a target."""
     if not (isfinite(info["gap"]) and isfinite(info["target_speed"])):
-        return None
-    distance, half = info["gap"] + setback, TARGET_WIDTH / 2
-    closing = info["ego_speed"] - info["target_speed"]
-    size = 2 * float(np.arctan2(half, distance))
-    return _Angle(size=size, growth=2 * half * closing / hypot(distance, half) ** 2)
+        return 0.0, 0.0
+    distance, half_width = info["gap"] + LENS_SETBACK, TARGET_WIDTH / 2
+    closing_speed = info["ego_speed"] - info["target_speed"]
+    theta = 2 * float(np.arctan2(half_width, distance))
+    return theta, 2 * half_width * closing_speed / hypot(distance, half_width) ** 2
 
 
-class EtaOracle(Oracle):
-    """The looming model η = θ′ · e^(−αθ) of Gabbiani et al. on the true angle θ of what is ahead.
+class EtaOracle(LatchingAgent):
+    """Brakes fully when the looming model η = θ′ · e^(−αθ) reaches a threshold (Gabbiani et al.).
 
-    The locust's DCMD peaks at a fixed angular size, 2·atan(1/α), whatever the speed. It brakes once η reaches
-    a threshold, so that what it misses the model misses, and no eye.
+    θ is the true visual angle of the target on the ego's path. η peaks at the angular size 2·atan(1/α) for
+    every approach speed, as the locust's DCMD neuron does.
+
+    Observes `info["gap"]`, `info["ego_speed"]`, `info["target_speed"]`.
 
     Args:
-        threshold: Of η, > 0 [rad/s].
-        alpha: Weight of the inhibition by size, > 0 [1/rad].
+        threshold: Threshold of η, > 0 [rad/s].
+        alpha: Weight α of the size-dependent inhibition, > 0 [1/rad].
     """
 
     name = "eta-oracle"
 
     def __init__(self, threshold: float = 0.03, alpha: float = 2.0) -> None:
-        super().__init__()
         self.threshold, self.alpha = positive("threshold", threshold), positive("alpha", alpha)
 
-    def due(self, info: dict[str, Any]) -> bool:
-        """Compare η with the threshold."""
-        seen = _seen_angle(info)
-        return seen is not None and seen.growth * exp(-self.alpha * seen.size) >= self.threshold
+    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
+        """Return whether η is at or above the threshold."""
+        theta, rate = _visual_angle(info)
+        return rate * exp(-self.alpha * theta) >= self.threshold
 
 
-class TauOracle(Oracle):
-    """The looming model τ = θ/θ′ (Lee) on the true angle θ of what is ahead: time to contact by optics.
+class TauOracle(LatchingAgent):
+    """Brakes fully when the optical time to contact τ = θ/θ′ (Lee) falls to a threshold: τ ≤ `tau`.
+
+    θ is the true visual angle of the target on the ego's path.
+
+    Observes `info["gap"]`, `info["ego_speed"]`, `info["target_speed"]`.
 
     Args:
         tau: Threshold, > 0 [s].
@@ -150,10 +127,9 @@ class TauOracle(Oracle):
     name = "tau-oracle"
 
     def __init__(self, tau: float = 1.8) -> None:
-        super().__init__()
         self.tau = positive("tau", tau)
 
-    def due(self, info: dict[str, Any]) -> bool:
-        """Compare τ with the threshold; what does not grow is never due."""
-        seen = _seen_angle(info)
-        return seen is not None and seen.growth > 0.0 and seen.size / seen.growth <= self.tau
+    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
+        """Return whether τ is at or below the threshold; False unless θ grows."""
+        theta, rate = _visual_angle(info)
+        return rate > 0.0 and theta / rate <= self.tau

@@ -1,4 +1,4 @@
-"""Parameters of rules: frozen dataclasses whose fields know their bounds, made from strings or TOML."""
+"""Parameters of rules: frozen dataclasses with bounds and search ranges, built from strings or TOML files."""
 
 import tomllib
 from collections.abc import Mapping
@@ -10,56 +10,49 @@ from lgmd_gym.agents.options import positive, whole
 from lgmd_gym.errors import check_keys
 
 
-def above_zero(default: float, low: float, high: float, *, places_eye: bool = False) -> Any:
-    """Return a field for a number > 0; `low` to `high` is what tuning searches.
+def parameter(default: float, low: float, high: float, *, affects_camera: bool = False) -> Any:
+    """Return a dataclass field for a number > 0, or for a whole number >= 1 if the default is an int.
 
     Args:
-        default: The default.
-        low: Lowest value that tuning tries.
-        high: Highest one.
-        places_eye: Whether the rule's cameras depend on it; tuning then leaves it alone, since all that was
-            seen would have to be seen anew.
+        default: Default value.
+        low: Lower end of the search range of tuning.
+        high: Upper end of the search range of tuning.
+        affects_camera: Whether the rule's cameras depend on the value. Tuning searches such a parameter only
+            on request, because each value requires new recordings.
     """
-    metadata = {"check": positive, "range": (low, high), "places_eye": places_eye}
-    return field(default=default, metadata=metadata)
-
-
-def count(default: int, low: int, high: int) -> Any:
-    """Return a field for a whole number >= 1; `low` to `high` is what tuning searches."""
-    return field(
-        default=default, metadata={"check": lambda name, value: whole(name, value, 1), "range": (low, high)}
-    )
+    return field(default=default, metadata={"search_range": (low, high), "affects_camera": affects_camera})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RuleParams:
-    """Base of the parameters of all rules; every field is made by `above_zero` or `count`."""
+    """Base class of rule parameters; every field is a `parameter`."""
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            checked = item.metadata["check"](item.name, getattr(self, item.name))
-            object.__setattr__(self, item.name, checked)
+            name, value = item.name, getattr(self, item.name)
+            checked = whole(name, value, 1) if isinstance(item.default, int) else positive(name, value)
+            object.__setattr__(self, name, checked)
 
     @classmethod
     def from_options(cls, agent: str, options: Mapping[str, Any]) -> Self:
-        """Build from options as in an agent's string; `toml` names a file of further ones.
+        """Return parameters for the options of an agent string.
 
         Args:
-            agent: The agent's name, for the message.
-            options: By name; they go over those of the file, and what is missing keeps its default.
+            agent: Agent name, for error messages.
+            options: Values by field name. The key `toml` names a file with further values; values in
+                `options` take precedence. Missing fields keep their defaults.
 
         Raises:
-            ValueError: For an unknown option, naming the nearest, a value out of bounds, or a file that
-                cannot be read.
+            ValueError: For an unknown option, a value out of bounds, or an unreadable file.
         """
-        given = dict(options)
-        if "toml" in given:
-            given = {**_read(given.pop("toml")), **given}
-        check_keys(f"option of agent {agent}", given, [*(item.name for item in fields(cls)), "toml"])
-        return cls(**given)
+        values = dict(options)
+        if "toml" in values:
+            values = {**_read_toml(values.pop("toml")), **values}
+        check_keys(f"option of agent {agent}", values, [*(item.name for item in fields(cls)), "toml"])
+        return cls(**values)
 
 
-def _read(path: Any) -> dict[str, Any]:
+def _read_toml(path: Any) -> dict[str, Any]:
     try:
         return tomllib.loads(Path(str(path)).read_text(encoding="utf-8"))
     except OSError as error:

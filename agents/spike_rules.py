@@ -1,16 +1,30 @@
-"""Rules on the highest spike frequency of any camera."""
+"""Rules on the highest spike frequency f of all cameras [spikes/s]."""
 
 from dataclasses import dataclass
 from math import inf
 from typing import Any
 
-import numpy as np
+from lgmd_gym.agents.base import FPS, HOLD
+from lgmd_gym.agents.filters import ConsecutiveFrames, YawRateGate
+from lgmd_gym.agents.params import RuleParams, parameter
+from lgmd_gym.agents.rule import Rule, SensorReading, sensor_readings
 
-from lgmd_gym.agents.base import HOLD
-from lgmd_gym.agents.params import RuleParams, above_zero, count
-from lgmd_gym.agents.rule import Rule, SensorReading, SteeringGate, Streak, sensor_readings
 
-FPS = 30.0  # [Hz] the frame rate all of these rules were chosen at
+class FrequencyRule(Rule):
+    """Base class: brakes fully when f reaches a threshold in `frames` consecutive camera frames."""
+
+    def reset(self, seed: int | None = None) -> None:
+        """Release the brake and clear all state."""
+        super().reset(seed)
+        self._streak = ConsecutiveFrames(self.params.frames)
+
+    def should_brake(self, reading: SensorReading) -> bool:
+        """Return whether f has reached the threshold in the required number of frames."""
+        return self._streak.update(reading.max_frequency >= self.threshold(reading))
+
+    def threshold(self, reading: SensorReading) -> float:
+        """Return the threshold for one camera frame [spikes/s]; called for every frame in order."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,23 +32,20 @@ class SpikeThresholdParams(RuleParams):
     """Parameters of `SpikeThreshold`.
 
     Attributes:
-        threshold: Spike frequency from which a camera frame counts [spikes/s]; read it with the frame rate,
-            it was chosen at 30 Hz.
-        frames: Number of consecutive camera frames at the threshold that start braking.
+        threshold: Spike frequency threshold, > 0 [spikes/s]. The default is tuned for 30 Hz.
+        frames: Number of consecutive camera frames at or above the threshold, >= 1.
     """
 
-    threshold: float = above_zero(30.0, 15.0, 250.0)
-    frames: int = count(1, 1, 12)
+    threshold: float = parameter(30.0, 15.0, 250.0)
+    frames: int = parameter(1, 1, 12)
 
 
-class SpikeThreshold(Rule):
-    """Brakes fully once the spike frequency has stood at a threshold, and keeps braking to a standstill.
+class SpikeThreshold(FrequencyRule):
+    """Brakes fully when the spike frequency reaches a threshold.
 
-    Any camera's frequency counts. It warns with the neuron's own alert.
+    Condition: f ≥ `threshold` in `frames` consecutive camera frames. The alert is the alert of the neuron.
 
-    Args:
-        params: `SpikeThresholdParams`; None for those of `options`.
-        options: Fields of it.
+    Observes `spike_frequency`. Parameters: `SpikeThresholdParams`.
     """
 
     name = "spike-threshold"
@@ -42,17 +53,12 @@ class SpikeThreshold(Rule):
 
     @property
     def alert(self) -> bool:
-        """The neuron's own alert."""
+        """Alert of the neuron."""
         return self._alert
 
-    def reset(self, seed: int | None = None) -> None:
-        """Release the brake."""
-        super().reset(seed)
-        self._streak = Streak(self.params.frames)
-
-    def should_brake(self, sight: SensorReading) -> bool:
-        """Return whether the frequency has stood at the threshold long enough."""
-        return self._streak.add(float(np.max(sight.spike_frequency)) >= self.params.threshold)
+    def threshold(self, reading: SensorReading) -> float:
+        """Return the constant threshold [spikes/s]."""
+        return self.params.threshold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,42 +66,41 @@ class AdaptiveThresholdParams(RuleParams):
     """Parameters of `AdaptiveThreshold`.
 
     Attributes:
-        threshold: Least alert level [spikes/s].
-        gain: How many times the scene's own activity the level is.
-        memory: Frames over which that activity is averaged (first-order low-pass).
-        frames: Consecutive frames at the level that start braking.
+        threshold: Minimum threshold, > 0 [spikes/s].
+        gain: Ratio of the threshold to the mean frequency, > 0.
+        memory: Time constant of the mean, >= 1 [camera frames].
+        frames: Number of consecutive camera frames at or above the threshold, >= 1.
     """
 
-    threshold: float = above_zero(30.0, 15.0, 250.0)
-    gain: float = above_zero(3.0, 1.0, 10.0)
-    memory: int = count(60, 10, 200)
-    frames: int = count(2, 1, 12)
+    threshold: float = parameter(30.0, 15.0, 250.0)
+    gain: float = parameter(3.0, 1.0, 10.0)
+    memory: int = parameter(60, 10, 200)
+    frames: int = parameter(2, 1, 12)
 
 
-class AdaptiveThreshold(Rule):
-    """Brakes where the spike frequency stands out of the scene's own activity of the last seconds.
+class AdaptiveThreshold(FrequencyRule):
+    """Brakes fully when the spike frequency exceeds a multiple of its running mean.
 
-    The paper names such a level as open work. The mean is that of the frames before the present one.
+    Condition: f(t) ≥ max(`threshold`, `gain` · m(t − 1)) in `frames` consecutive camera frames, with the
+    first-order low-pass m(t) = m(t − 1) + (f(t) − m(t − 1)) / `memory`. The paper proposes an adaptive
+    threshold as future work.
 
-    Args:
-        params: `AdaptiveThresholdParams`; None for those of `options`.
-        options: Fields of it.
+    Observes `spike_frequency`. Parameters: `AdaptiveThresholdParams`.
     """
 
     name = "adaptive-threshold"
     Params = AdaptiveThresholdParams
 
     def reset(self, seed: int | None = None) -> None:
-        """Release the brake and forget the scene."""
+        """Release the brake and clear all state."""
         super().reset(seed)
-        self._streak, self._mean = Streak(self.params.frames), 0.0
+        self._mean = 0.0
 
-    def should_brake(self, sight: SensorReading) -> bool:
-        """Return whether the frequency has stood out long enough."""
-        p, frequency = self.params, float(np.max(sight.spike_frequency))
-        level = max(p.threshold, p.gain * self._mean)
-        self._mean += (frequency - self._mean) / p.memory
-        return self._streak.add(frequency >= level)
+    def threshold(self, reading: SensorReading) -> float:
+        """Return the threshold from the mean of the frames before, and update the mean."""
+        threshold = max(self.params.threshold, self.params.gain * self._mean)
+        self._mean += (reading.max_frequency - self._mean) / self.params.memory
+        return threshold
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,27 +108,28 @@ class GradedParams(RuleParams):
     """Parameters of `Graded`.
 
     Attributes:
-        low: Frequency from which it brakes [spikes/s].
-        span: By how much more it brakes fully [spikes/s].
-        lead: How far ahead the frequency's slope is followed [s].
-        fall: Seconds in which full braking fades once the frequency is gone [s].
+        low: Predicted frequency at which braking begins, > 0 [spikes/s].
+        span: Increase of the frequency from no braking to full braking, > 0 [spikes/s].
+        lead: Prediction horizon, > 0 [s].
+        fall: Time in which full braking decays to zero, > 0 [s].
     """
 
-    low: float = above_zero(30.0, 15.0, 250.0)
-    span: float = above_zero(120.0, 10.0, 270.0)
-    lead: float = above_zero(0.1, 0.01, 0.5)
-    fall: float = above_zero(2.0, 0.2, 6.0)
+    low: float = parameter(30.0, 15.0, 250.0)
+    span: float = parameter(120.0, 10.0, 270.0)
+    lead: float = parameter(0.1, 0.01, 0.5)
+    fall: float = parameter(2.0, 0.2, 6.0)
 
 
 class Graded(Rule):
-    """Brakes the harder the higher the spike frequency is and the faster it rises; eases off slowly.
+    """Brakes in proportion to the predicted spike frequency and releases slowly, without a latch.
 
-    Easing off slowly rather than latching: it never brakes to a standstill on a passing stir, and pays for
-    it where the neuron falls silent before contact.
+    Demand: −b(t) with b(t) = max(u(t), b(t − 1) − Δt / `fall`), u(t) = clip((f̂(t) − `low`) / `span`, 0, 1)
+    and the prediction f̂(t) = f(t) + `lead` · (f(t) − f(t − 1)) / Δt, where Δt = 1/30 s.
 
-    Args:
-        params: `GradedParams`; None for those of `options`.
-        options: Fields of it.
+    Without the latch, a short activation does not stop the car. The brake can release before contact if the
+    neuron stops spiking.
+
+    Observes `spike_frequency`. Parameters: `GradedParams`.
     """
 
     name = "graded"
@@ -132,24 +138,24 @@ class Graded(Rule):
 
     @property
     def alert(self) -> bool:
-        """Whether it brakes."""
-        return self._level > 0.0
+        """Whether the rule brakes."""
+        return self._braking > 0.0
 
     def reset(self, seed: int | None = None) -> None:
-        """Release the brake."""
+        """Release the brake and clear all state."""
         super().reset(seed)
-        self._level, self._before = 0.0, 0.0
+        self._braking, self._previous = 0.0, 0.0
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Return the present level of braking, in [-1, 0]."""
+        """Return the demand in [-1, 0]."""
         p = self.params
-        for sight in sensor_readings(observation, info):
-            frequency = float(np.max(sight.spike_frequency))
-            coming = frequency + (frequency - self._before) * FPS * p.lead
-            wish = min(max((coming - p.low) / p.span, 0.0), 1.0)
-            self._level = max(wish, self._level - 1.0 / (p.fall * FPS))
-            self._before = frequency
-        return -self._level if self._level > 0.0 else HOLD
+        for reading in sensor_readings(observation, info):
+            frequency = reading.max_frequency
+            predicted = frequency + (frequency - self._previous) * FPS * p.lead
+            proportional = min(max((predicted - p.low) / p.span, 0.0), 1.0)
+            self._braking = max(proportional, self._braking - 1.0 / (p.fall * FPS))
+            self._previous = frequency
+        return -self._braking if self._braking > 0.0 else HOLD
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,39 +163,39 @@ class SpeedGatedParams(RuleParams):
     """Parameters of `SpeedGated`.
 
     Attributes:
-        threshold: Level at standstill [spikes/s].
-        per_speed: Rise of the level with own speed [spikes/s per m/s].
-        frames: Consecutive frames at the level that start braking.
-        yaw_rate: Own yaw rate beyond which it does not judge [rad/s].
-        settle: Frames for which it does not judge after that.
+        threshold: Threshold at standstill, > 0 [spikes/s].
+        per_speed: Increase of the threshold with the ego speed, > 0 [spikes/s per m/s].
+        frames: Number of consecutive camera frames at or above the threshold, >= 1.
+        yaw_rate: Absolute yaw rate above which the rule is inactive, > 0 [rad/s].
+        settle: Number of latest camera frames that must be free of such yaw rates, >= 1.
     """
 
-    threshold: float = above_zero(30.0, 15.0, 150.0)
-    per_speed: float = above_zero(1.0, 0.1, 8.0)
-    frames: int = count(3, 1, 12)
-    yaw_rate: float = above_zero(0.03, 0.01, 0.3)
-    settle: int = count(15, 1, 60)
+    threshold: float = parameter(30.0, 15.0, 150.0)
+    per_speed: float = parameter(1.0, 0.1, 8.0)
+    frames: int = parameter(3, 1, 12)
+    yaw_rate: float = parameter(0.03, 0.01, 0.3)
+    settle: int = parameter(15, 1, 60)
 
 
-class SpeedGated(Rule):
-    """Brakes at a spike frequency that rises with own speed, as own-motion flow does; not while turning.
+class SpeedGated(FrequencyRule):
+    """Brakes fully when the spike frequency reaches a threshold that rises with the ego speed v.
 
-    Args:
-        params: `SpeedGatedParams`; None for those of `options`.
-        options: Fields of it.
+    Condition: f ≥ `threshold` + `per_speed` · v in `frames` consecutive camera frames. A frame does not count
+    if the yaw rate has exceeded `yaw_rate` in the last `settle` frames. Optic flow from ego motion rises with
+    speed and yaw rate.
+
+    Observes `spike_frequency`, `ego_speed`, `ego_yaw_rate`. Parameters: `SpeedGatedParams`.
     """
 
     name = "speed-gated"
     Params = SpeedGatedParams
 
     def reset(self, seed: int | None = None) -> None:
-        """Release the brake."""
+        """Release the brake and clear all state."""
         super().reset(seed)
-        self._streak = Streak(self.params.frames)
-        self._gate = SteeringGate(self.params.yaw_rate, self.params.settle)
+        self._gate = YawRateGate(self.params.yaw_rate, self.params.settle)
 
-    def should_brake(self, sight: SensorReading) -> bool:
-        """Return whether the frequency has stood at the present speed's level."""
-        p = self.params
-        level = p.threshold + p.per_speed * max(sight.speed, 0.0) if self._gate.open(sight.yaw_rate) else inf
-        return self._streak.add(float(np.max(sight.spike_frequency)) >= level)
+    def threshold(self, reading: SensorReading) -> float:
+        """Return the threshold for the ego speed; infinity while the gate is closed."""
+        p, active = self.params, self._gate.update(reading.yaw_rate)
+        return p.threshold + p.per_speed * max(reading.speed, 0.0) if active else inf

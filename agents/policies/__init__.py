@@ -1,1 +1,1 @@
-"""Learned policies: the agent, its features, and the shipped policy files."""
+"""Learned policies: the agent, its input features, and the policy files of this package."""

@@ -1,4 +1,4 @@
-"""What a learned policy is shown of an observation: scaled, and with a memory of the last decisions."""
+"""Inputs of learned policies: scaled observations with a history."""
 
 from collections import deque
 from dataclasses import asdict, dataclass
@@ -7,48 +7,51 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.agents.options import positive, whole
-from lgmd_gym.agents.policies.zone_memory import TOLD, ZONED, ZoneMemory, check_zones
+from lgmd_gym.agents.policies.zone_features import (
+    NUM_ZONE_FEATURES,
+    ZONE_INPUTS,
+    ZoneFeatures,
+    check_zone_shape,
+)
 from lgmd_gym.errors import check_keys, unknown_name
 
-# Where each observation is brought near [-1, 1] from: (value - offset) / scale.
+# Offset and scale of each observation: (value - offset) / scale is near [-1, 1].
 SCALES = {
-    "spike_frequency": (0.0, 100.0),  # [spikes/s]; ten spikes a frame at 30 Hz are 300
-    "membrane_potential": (0.5, 0.5),  # K starts at 0.5 and ends at 1
+    "spike_frequency": (0.0, 100.0),  # [spikes/s]; ten spikes per frame at 30 Hz are 300
+    "membrane_potential": (0.5, 0.5),  # K is in [0.5, 1]
     "ffi": (0.0, 20.0),  # [grey levels]; roads give 1 to 9
     "ego_speed": (0.0, 20.0),  # [m/s]
     "ego_yaw_rate": (0.0, 0.5),  # [rad/s]
 }
-# What is made of one observation over time: which one, and how it is scaled.
-DERIVED = {
-    "speed_change": ("ego_speed", 1.0),  # since the last decision [m/s]; full braking takes 0.9 in 0.1 s
-    "spike_peak": ("spike_frequency", 100.0),  # fades by FADE a frame: silence is not clearance
+# Inputs computed over time: the observation they are computed from, and their scale.
+DERIVED_INPUTS = {
+    "speed_change": ("ego_speed", 1.0),  # since the last decision [m/s]; full braking changes 0.9 in 0.1 s
+    "spike_peak": ("spike_frequency", 100.0),  # decays by PEAK_DECAY per frame
 }
-FADE = 0.955  # half is left after half a second
-LATCH_DEMAND = -0.5  # a demand of this or less is hard braking, which may latch
-LIMIT = 5.0  # beyond this, scaled values are clipped
-FRAME = "frame"  # passed on as it is; `shrink` pixels become one
-INPUTS = (*SCALES, *DERIVED, *ZONED, FRAME)
+PEAK_DECAY = 0.955  # halves a peak in half a second at 30 Hz
+LATCH_DEMAND = -0.5  # demands up to this value may latch
+CLIP = 5.0  # limit of scaled values
+FRAME = "frame"  # not scaled; reduced by `shrink`
+INPUTS = (*SCALES, *DERIVED_INPUTS, *ZONE_INPUTS, FRAME)
 
 
 @dataclass(frozen=True)
 class FeatureConfig:
-    """What a policy sees.
+    """Inputs, decision rate and latch of a learned policy.
 
     Attributes:
-        inputs: Observation keys, or what is derived from them over time: `speed_change` and `spike_peak`, the
-            highest spike frequency lately; with the eye of `stopping-zone` also `zones`, `zones_spikes` and
-            `zones_ffi`, its fields sorted by own speed (`ZoneMemory`).
-        history: Number of decisions remembered, the present one included, >= 1.
-        repeat: Environment decisions that one decision of the policy holds for, >= 1; at 30 Hz, 3 let it
-            decide at 10 Hz.
-        shrink: Side of the squares of pixels whose mean a frame keeps, >= 1 [px].
-        latch: Whether the first hard braking (a demand of -0.5 or less) is held to the episode's end, as
-            rules hold theirs; what is learned is then when to brake.
-        reward_scale: What rewards are multiplied by in training; contacts cost up to 20, and DQN's loss is
-            no longer quadratic beyond 1.
+        inputs: Observation keys and inputs derived from them: `speed_change`, the change since the last
+            decision; `spike_peak`, the decaying peak of the spike frequency; and, with the cameras of
+            `stopping-zone`, `zones`, `zones_spikes` and `zones_ffi` (see `ZoneFeatures`).
+        history: Number of decisions in the history, including the present one, >= 1.
+        repeat: Number of environment decisions per decision of the policy, >= 1. At 30 Hz, 3 gives 10 Hz.
+        shrink: Side of the pixel blocks that frames are averaged over, >= 1 [px].
+        latch: Whether the first demand of -0.5 or less is held until the episode ends.
+        reward_scale: Factor on training rewards, > 0. Contacts cost up to 20, and the loss of DQN is linear
+            beyond 1.
     """
 
-    inputs: tuple[str, ...] = (*SCALES, *DERIVED)
+    inputs: tuple[str, ...] = (*SCALES, *DERIVED_INPUTS)
     history: int = 6
     repeat: int = 3
     shrink: int = 2
@@ -58,7 +61,7 @@ class FeatureConfig:
     def __post_init__(self) -> None:
         object.__setattr__(self, "inputs", tuple(self.inputs))
         if not self.inputs:
-            raise ValueError("inputs needs at least one observation key, got none")
+            raise ValueError("inputs must contain at least one policy input, got none")
         for name in self.inputs:
             if name not in INPUTS:
                 raise unknown_name("policy input", name, INPUTS)
@@ -70,7 +73,7 @@ class FeatureConfig:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "FeatureConfig":
-        """Return features from plain values; unknown keys are refused."""
+        """Return the configuration for plain values; unknown keys raise ValueError."""
         check_keys("policy feature", values, cls.__dataclass_fields__)
         return cls(**values)
 
@@ -79,92 +82,99 @@ class FeatureConfig:
         return asdict(self) | {"inputs": list(self.inputs)}
 
     def latches(self, demand: float) -> bool:
-        """Return whether a demand in [-1, 1] is to be held to the episode's end."""
+        """Return whether a demand in [-1, 1] is held until the episode ends."""
         return self.latch and demand <= LATCH_DEMAND
 
-    def box_arguments(
-        self, shapes: dict[str, tuple[int, ...]]
-    ) -> dict[str, tuple[Any, Any, tuple[int, ...], Any]]:
-        """Return lowest value, highest value, shape and dtype of each input, given the observation's shapes.
+    def box_arguments(self, shapes: dict[str, tuple[int, ...]]) -> dict[str, tuple[Any, ...]]:
+        """Return low, high, shape and dtype of a Gymnasium `Box` for each input.
 
-        Signals are (history · n,), oldest first; frames (height, width, channels · history).
+        Vectors have shape (history · n,), oldest first; frames (height, width, channels · history).
+
+        Args:
+            shapes: Shape of each observation.
 
         Raises:
-            ValueError: If the eye is not the one that an input needs.
+            ValueError: If an input requires other cameras.
         """
-        spaces = {}
+        boxes = {}
         for name in self.inputs:
             shape = shapes[source_observation(name)]
             if name == FRAME:
                 height, width, channels = shape
                 shape = (height // self.shrink, width // self.shrink, channels * self.history)
-                spaces[name] = (0, 255, shape, np.uint8)
-            else:
-                if name in ZONED:
-                    check_zones(name, shape)
-                size = TOLD if name in ZONED else shape[0]
-                spaces[name] = (-LIMIT, LIMIT, (self.history * size,), np.float32)
-        return spaces
+                boxes[name] = (0, 255, shape, np.uint8)
+                continue
+            size = shape[0]
+            if name in ZONE_INPUTS:
+                check_zone_shape(name, shape)
+                size = NUM_ZONE_FEATURES
+            boxes[name] = (-CLIP, CLIP, (self.history * size,), np.float32)
+        return boxes
 
 
 def source_observation(name: str) -> str:
-    """Return the observation that an input is made of."""
-    return (DERIVED | ZONED)[name][0] if name in DERIVED or name in ZONED else name
+    """Return the observation that an input is computed from."""
+    derived = DERIVED_INPUTS | ZONE_INPUTS
+    return derived[name][0] if name in derived else name
 
 
 class FeatureHistory:
-    """What a policy is shown: it takes in every observation, and tells at the policy's own pace.
+    """Features of a policy over its last decisions.
+
+    Call `update` at every decision of the environment and `stack` at every decision of the policy.
 
     Args:
-        features: What is kept.
+        features: Configuration of the policy.
     """
 
     def __init__(self, features: FeatureConfig) -> None:
         self.features = features
-        self._needed = {source_observation(name) for name in features.inputs}
-        if any(name in ZONED for name in features.inputs):
-            self._needed |= {"ego_speed", "ego_yaw_rate"}
-        self._needed.discard(FRAME)  # only the one at the decision counts
+        self._required = {source_observation(name) for name in features.inputs}
+        if any(name in ZONE_INPUTS for name in features.inputs):
+            self._required |= {"ego_speed", "ego_yaw_rate"}
+        self._required.discard(FRAME)  # `update` does not process frames
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything; the next thing told then fills the whole history."""
-        self._kept: dict[str, deque[np.ndarray]] = {}
+        """Clear the history; the first features of the next episode fill it."""
+        self._history: dict[str, deque[np.ndarray]] = {}
         self._observation: dict[str, Any] = {}
         self._speed: np.ndarray | None = None
         self._peak: np.ndarray | None = None
-        self._zones = {name: ZoneMemory(name, FADE) for name in self.features.inputs if name in ZONED}
+        names = [name for name in self.features.inputs if name in ZONE_INPUTS]
+        self._zones = {name: ZoneFeatures(name, PEAK_DECAY) for name in names}
 
     def update(self, observation: dict[str, Any]) -> None:
-        """Take in an observation of `LGMDObservation`; to be called at every decision of the environment.
+        """Process an observation of `LGMDObservation`.
 
         Raises:
-            ValueError: If the observation lacks an input, or the eye is not the one it needs.
+            ValueError: If an observation is missing, or comes from other cameras than an input requires.
         """
-        for name in self._needed:
+        for name in self._required:
             if name not in observation:
-                raise ValueError(f"the policy needs the observation {name!r}, which this eye does not give")
+                raise ValueError(f"the policy requires the observation {name!r}, got {sorted(observation)}")
         self._observation = observation
         if "spike_peak" in self.features.inputs:
-            now = np.asarray(observation["spike_frequency"])
-            self._peak = now if self._peak is None else np.maximum(now, FADE * self._peak)
+            frequency = np.asarray(observation["spike_frequency"])
+            self._peak = frequency if self._peak is None else np.maximum(frequency, PEAK_DECAY * self._peak)
         for zones in self._zones.values():
             speed, yaw_rate = (float(observation[name][0]) for name in ("ego_speed", "ego_yaw_rate"))
-            zones.see(observation[zones.source], speed, yaw_rate)
+            zones.update(observation[zones.source], speed, yaw_rate)
 
     def stack(self) -> dict[str, np.ndarray]:
-        """Return what the policy is shown; to be called at each of its decisions, after `see`."""
-        shown = {}
+        """Append the present features to the history and return the history of each input."""
+        stacked = {}
         for name in self.features.inputs:
-            value = self._prepared(name)
-            kept = self._kept.setdefault(name, deque([value] * self.features.history, self.features.history))
-            kept.append(value)
-            shown[name] = np.concatenate(kept, axis=-1)
-        return shown
+            value = self._feature(name)
+            filled = deque([value] * self.features.history, self.features.history)
+            history = self._history.setdefault(name, filled)
+            history.append(value)
+            stacked[name] = np.concatenate(history, axis=-1)
+        return stacked
 
-    def _prepared(self, name: str) -> np.ndarray:
-        if name in ZONED:
-            return self._zones[name].told().astype(np.float32)
+    def _feature(self, name: str) -> np.ndarray:
+        if name in ZONE_INPUTS:
+            return self._zones[name].collect().astype(np.float32)
         value = np.asarray(self._observation[source_observation(name)])
         if name == FRAME:
             return shrink_frame(value, self.features.shrink)
@@ -172,12 +182,12 @@ class FeatureHistory:
             value, self._speed = value - (value if self._speed is None else self._speed), value
         elif name == "spike_peak":
             value = np.asarray(self._peak)
-        offset, scale = SCALES.get(name) or (0.0, DERIVED[name][1])
-        return np.clip((value - offset) / scale, -LIMIT, LIMIT).astype(np.float32)
+        offset, scale = SCALES.get(name) or (0.0, DERIVED_INPUTS[name][1])
+        return np.clip((value - offset) / scale, -CLIP, CLIP).astype(np.float32)
 
 
 def shrink_frame(frame: np.ndarray, side: int) -> np.ndarray:
-    """Return a frame, uint8 (height, width, channels), with each square of `side` px as its mean."""
+    """Return a frame, uint8 (height, width, channels), with each block of `side` × `side` px averaged."""
     if side == 1:
         return frame
     height, width, channels = frame.shape

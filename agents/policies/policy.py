@@ -1,9 +1,9 @@
-"""A learned policy as an agent: a stable-baselines3 model and what it needs to see."""
+"""`Policy`: a stable-baselines3 model as an agent, and the card in its file."""
 
 import json
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,89 +11,92 @@ from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.policies.features import FRAME, FeatureConfig, FeatureHistory
 from lgmd_gym.errors import unknown_name
 
-CARD = "lgmd_gym.json"  # beside the model, in the same zip
-SHIPPED = Path(__file__).parent  # those that come with this package
+if TYPE_CHECKING:
+    from lgmd_gym.camera import CameraSpec
+
+CARD = "lgmd_gym.json"  # member of the model's zip file
+SHIPPED = Path(__file__).parent  # folder of the policies in this package
 ALGORITHMS = ("ppo", "sac", "dqn")
 
 
 class Policy(Agent):
-    """Acts as a stable-baselines3 model does, without its exploration.
+    """Brakes as a trained stable-baselines3 model decides, without exploration.
 
-    The file is a model as `lgmd-gym train` writes it, with a card of what it sees. Loading one runs what its
-    author pickled into it, as stable-baselines3's files do: load only files you trust.
+    The file is a model of `lgmd-gym train` with a card: a JSON member with the cameras, features and demands.
+    Loading a policy unpickles its file and can run arbitrary code, as with all stable-baselines3 files.
+    Load only files from sources you trust.
 
     Args:
-        path: The zip file, or the name of a policy that comes with this package (`shipped`).
+        path: Zip file, or name of a policy in this package.
 
     Raises:
-        ValueError: If it cannot be read or is no policy of this package, or stable-baselines3 is missing.
+        ValueError: If the file cannot be read or has no card, or if stable-baselines3 is not installed.
     """
 
     name = "policy"
 
     def __init__(self, path: str) -> None:
-        super().__init__()
         self.name = f"policy:{path}"
         file = find_policy(path)
         self.card = read_card(file)
-        self._memory = FeatureHistory(FeatureConfig.from_dict(self.card["features"]))
-        self._levels = self.card["demands"]
-        self._model = _load(file, self.card["algo"])
+        self._features = FeatureConfig.from_dict(self.card["features"])
+        self._history = FeatureHistory(self._features)
+        self._model = _load_model(file, self.card["algo"])
         self.reset()
 
     @property
-    def camera(self) -> Any:
-        """What it was trained to look through."""
+    def camera(self) -> "CameraSpec":
+        """Cameras of the training."""
         return self.card["camera"]
 
     @property
     def include_frame(self) -> bool:  # type: ignore[override]
-        """Whether it was trained on frames."""
-        return FRAME in self._memory.features.inputs
+        """Whether camera frames are among the inputs."""
+        return FRAME in self._features.inputs
 
     @property
     def alert(self) -> bool:
-        """Whether it brakes: that some neuron of many is excited is no warning of the policy's."""
+        """Whether the policy brakes; the alert of any one of many neurons is not a warning of the policy."""
         return self._demand < 0.0
 
     def reset(self, seed: int | None = None) -> None:
-        """Forget the last episode."""
+        """Clear the history and release the brake."""
         super().reset(seed)
-        self._memory.reset()
-        self._decision = 0
+        self._history.reset()
+        self._decisions = 0
         self._demand = 0.0
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Decide anew at every `repeat`-th call, else hold; once latched, hold to the end."""
-        features = self._memory.features
-        if features.latches(self._demand):
+        """Return a new demand at every `repeat`-th call, else the last one; hold a latched demand."""
+        if self._features.latches(self._demand):
             return self._demand
-        self._memory.update(observation)
-        if self._decision % features.repeat == 0:
-            action, _ = self._model.predict(self._memory.stack(), deterministic=True)
-            self._demand = self._levels[int(action)] if self._levels else float(np.reshape(action, -1)[0])
-        self._decision += 1
+        self._history.update(observation)
+        if self._decisions % self._features.repeat == 0:
+            action, _ = self._model.predict(self._history.stack(), deterministic=True)
+            demands = self.card["demands"]
+            self._demand = demands[int(action)] if demands else float(np.reshape(action, -1)[0])
+        self._decisions += 1
         return self._demand
 
 
-def shipped() -> list[str]:
-    """Return the names of the policies that come with this package."""
+def shipped_policies() -> list[str]:
+    """Return the names of the policies in this package."""
     return sorted(path.stem for path in SHIPPED.glob("*.zip"))
 
 
 def find_policy(text: str) -> Path:
-    """Return the file of a policy: of a shipped one by its name, else the path that is given.
+    """Return the file of a policy: a name in this package, or a path.
 
     Raises:
-        ValueError: For a training's folder, or a bare name that is neither shipped nor a file.
+        ValueError: For a training folder, or a name without suffix that is not a policy.
     """
-    if text in shipped():
+    if text in shipped_policies():
         return SHIPPED / f"{text}.zip"
     path = Path(text)
     if (path / "policy.zip").is_file():
         raise ValueError(f"policy {text!r} is a folder; did you mean 'policy:{path / 'policy.zip'}'?")
     if not path.suffix and not path.is_file():
-        raise unknown_name("policy (neither a file nor shipped)", text, shipped())
+        raise unknown_name("policy", text, shipped_policies())
     return path
 
 
@@ -101,7 +104,7 @@ def read_card(path: Path) -> dict[str, Any]:
     """Return the card of a policy file.
 
     Raises:
-        ValueError: If there is no such file, or it holds no card.
+        ValueError: If the file does not exist or has no card.
     """
     try:
         with zipfile.ZipFile(path) as file:
@@ -109,20 +112,20 @@ def read_card(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise ValueError(f"policy {str(path)!r} cannot be read: {error.strerror or error}") from None
     except (zipfile.BadZipFile, KeyError, ValueError):
-        raise ValueError(f"{str(path)!r} is no policy of lgmd-gym train (no {CARD} in it)") from None
+        raise ValueError(f"{str(path)!r} is not a policy file: it contains no {CARD}") from None
 
 
 def write_card(path: Path, card: dict[str, Any]) -> None:
-    """Add a card to a stable-baselines3 model's zip file."""
+    """Add a card to the zip file of a stable-baselines3 model."""
     with zipfile.ZipFile(path, "a") as file:
         file.writestr(CARD, json.dumps(card, indent=1))
 
 
-def _load(path: Path, algo: str) -> Any:
+def _load_model(path: Path, algo: str) -> Any:
     try:
         import stable_baselines3
         import torch
     except ImportError:
-        raise ValueError('a policy needs stable-baselines3: pip install "lgmd-gym[train]"') from None
-    torch.set_num_threads(1)  # the network is small, and episodes run side by side
+        raise ValueError('a policy requires stable-baselines3; pip install "lgmd-gym[train]"') from None
+    torch.set_num_threads(1)  # small network; episodes run in parallel processes
     return getattr(stable_baselines3, algo.upper()).load(path, device="cpu")

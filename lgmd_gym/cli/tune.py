@@ -1,90 +1,83 @@
-"""What `lgmd-gym tune` does with its parsed options."""
+"""The `tune` command: search a rule's parameters or print their sensitivity."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.table import Table
 
-if TYPE_CHECKING:
-    from lgmd_gym.cli.options import Tune
-    from lgmd_gym.tuning.objective import Ground
-    from lgmd_gym.tuning.space import Proposal, Space
+from lgmd_gym.cli.console import make_console
+from lgmd_gym.cli.options import Tune
+from lgmd_gym.tuning.objective import Objective
+from lgmd_gym.tuning.search import evaluate, sensitivity, tune
+from lgmd_gym.tuning.space import CAMERA_KEY, Proposal, SearchSpace, neuron_params, rule_options
 
 
-def tune(options: "Tune") -> int:
-    """Search or, with `--sensitivity`, shift a rule's parameters; print and keep what comes out."""
-    from lgmd_gym.tuning import search as tuning
-    from lgmd_gym.tuning.objective import Ground
-    from lgmd_gym.tuning.space import Space
-
-    space = Space(
-        agent=options.agent, cameras=options.cameras, placing=options.placing, neuron=options.neuron
+def run(options: Tune) -> int:
+    """Search the parameters and write the result, or print the sensitivity table; return 0."""
+    space = SearchSpace(
+        agent=options.agent,
+        cameras=options.cameras,
+        camera_geometry=options.camera_geometry,
+        neuron=options.neuron,
     )
-    for name, value, low in (
-        ("trials", options.trials, 1),
-        ("levels", options.levels, 1),
-        ("seeds", options.seeds, 0),
-        ("jobs", options.jobs, 1),
-    ):
-        if value < low:
-            raise ValueError(f"{name} must be >= {low}, got {value!r}")
-    if not options.false_cost > 0.0:
-        raise ValueError(f"false_cost must be > 0, got {options.false_cost!r}")
-    console = Console()
-    validation = Ground("validation", options.levels, options.seeds, options.jobs)
+    _check(options)
+    console = make_console()
+    validation = Objective("validation", options.levels, options.seeds, options.jobs)
     if options.sensitivity:
-        _sensitivity(space, validation, console)
+        console.print(_sensitivity_table(space, validation))
         return 0
-    for path in (options.best, _beside(options.best)):
+    for path in (options.best, _neuron_file(options.best)):
         if path.exists():
-            raise ValueError(f"{str(path)!r} exists and is kept; choose another --best")
-    train = Ground("train", options.levels, options.seeds, options.jobs)
-    found = tuning.tune(
+            raise ValueError(f"{str(path)!r} exists; choose another --best")
+    train = Objective("train", options.levels, options.seeds, options.jobs)
+    best = tune(
         space,
         options.study,
         options.trials,
         train,
         validation,
         options.false_cost,
-        tell=lambda line: console.print(line, soft_wrap=True),
+        log=lambda line: console.print(line, soft_wrap=True),
     )
-    console.print(f"chosen on validation levels: {_kept(options.agent, found, options.best)}", soft_wrap=True)
+    arguments = _save(options.agent, best, options.best)
+    console.print(f"options of lgmd-gym bench for the best parameters: {arguments}", soft_wrap=True)
     return 0
 
 
-def _beside(best: Path) -> Path:
-    """Return the file for the neuron's parameters."""
+def _check(options: Tune) -> None:
+    for name, low in (("trials", 1), ("levels", 1), ("seeds", 0), ("jobs", 1)):
+        if getattr(options, name) < low:
+            raise ValueError(f"{name} must be >= {low}, got {getattr(options, name)!r}")
+    if not options.false_cost > 0.0:
+        raise ValueError(f"false_cost must be > 0, got {options.false_cost!r}")
+
+
+def _neuron_file(best: Path) -> Path:
+    """Return the file for the parameters of the neuron."""
     return best.with_name(f"{best.stem}-neuron{best.suffix}")
 
 
-def _kept(agent: str, found: "Proposal", best: Path) -> str:
-    """Write what was found into files, and return the options of `lgmd-gym bench` that use them."""
-    from lgmd_gym.tuning.space import CAMERA, neuron_params, rule_options
-
-    told = f"--agents {agent}:toml={best}"
-    _write(best, rule_options(found))
-    if CAMERA in found:
-        told += f" --camera {found[CAMERA]}"
-    if neuron_params(found):
-        _write(_beside(best), neuron_params(found))
-        told += f" --params {_beside(best)}"
-    return told
+def _save(agent: str, proposal: Proposal, best: Path) -> str:
+    """Write a proposal to TOML files; return the options of `lgmd-gym bench` that use them."""
+    arguments = f"--agents {agent}:toml={best}"
+    _write_toml(best, rule_options(proposal))
+    if CAMERA_KEY in proposal:
+        arguments += f" --camera {proposal[CAMERA_KEY]}"
+    if neuron_params(proposal):
+        _write_toml(_neuron_file(best), neuron_params(proposal))
+        arguments += f" --params {_neuron_file(best)}"
+    return arguments
 
 
-def _write(path: Path, values: "Proposal") -> None:
+def _write_toml(path: Path, values: Proposal) -> None:
     path.write_text("".join(f"{name} = {value!r}\n" for name, value in values.items()), "utf-8")
 
 
-def _sensitivity(space: "Space", ground: "Ground", console: Console) -> None:
-    from lgmd_gym.tuning import search as tuning
-
-    base = tuning.scored(space, {}, ground)
+def _sensitivity_table(space: SearchSpace, objective: Objective) -> Table:
     title = f"{space.agent}: each parameter 20 % lower and higher, on validation levels"
     table = Table("parameter", "value", "energy avoided", "false", title=title)
-    rows = [("defaults", "", base)]
-    rows += [(name, f"{value:.4g}", score) for name, value, score in tuning.sensitivity(space, ground)]
-    for name, value, score in rows:
-        false = f"{round(score.false_rate * score.quiet)}/{score.quiet}"
-        table.add_row(name, value, f"{score.avoided_energy:.3f} (n = {score.threats})", false)
-    console.print(table)
+    rows = [("defaults", "", evaluate(space, {}, objective))]
+    rows += [(name, f"{value:.4g}", result) for name, value, result in sensitivity(space, objective)]
+    for name, value, result in rows:
+        false = f"{round(result.false_rate * result.non_threats)}/{result.non_threats}"
+        table.add_row(name, value, f"{result.avoided_energy:.3f} (n = {result.threats})", false)
+    return table

@@ -1,1 +1,1 @@
-"""Parameter search for rules on training levels."""
+"""Parameter search for rules: search space, objective on training levels, and search with Optuna."""

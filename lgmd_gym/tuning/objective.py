@@ -1,7 +1,9 @@
-"""What rules are scored on: drives without braking, recorded once, and what braking would make of them.
+"""Objective of the parameter search: impact energy avoided in threats, and false activations elsewhere.
 
-A rule that latches drives as `no-brake` does until it brakes, and then brakes to a standstill. So what its
-eye sees can be recorded once, and the rule be asked on the record when it brakes; the outcome needs no eye.
+A latching rule drives as `no-brake` does until it brakes, and then brakes to a standstill. Episodes without
+braking are therefore recorded once for each sensor configuration. Replaying the rule on a recording gives the
+decision at which it brakes. The episode that brakes from this decision on is simulated with a minimal camera.
+Rules without a latch are simulated in closed loop.
 """
 
 import json
@@ -13,231 +15,221 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from lgmd_gym.agents import BRAKE, HOLD, Agent, Rule, make_agent
-from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.case import Case, level_case
 from lgmd_gym.benchmark.episode import Episode, make_env, play
 from lgmd_gym.benchmark.metrics import Counterfactual
-from lgmd_gym.benchmark.rows import make_row
+from lgmd_gym.benchmark.rows import Row, make_row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.task import Task, run_task
 
-SEEDS_FROM = 1000  # of the false-reaction suite: reports count from 0
-EYES = 4  # whose drives are kept: enough for a choice of lenses
-TEXTURES = (0.5, 1.6)  # contrast of the asphalt, times the natural one
-OWN = SensorConfig()  # each agent's own
-BLIND = SensorConfig(camera={"name": "wide", "shape": [8, 8]})  # where nobody looks
-
-Row = dict[str, Any]
+FIRST_SEED = {"train": 1000, "validation": 2000}  # of the false-reaction suite; reports use seeds from 0
+MAX_CACHED = 4  # sensor configurations whose recordings are kept
+TEXTURE_RANGE = (0.5, 1.6)  # asphalt contrast, relative to the natural one
+AGENT_SENSORS = SensorConfig()  # each agent's own cameras
+MINIMAL_SENSORS = SensorConfig(camera={"name": "wide", "shape": [8, 8]})  # for agents without sensors
 
 
 @dataclass(frozen=True, slots=True)
-class Score:
-    """How well parameters do.
+class ObjectiveValue:
+    """Performance of a rule with certain parameters.
 
     Attributes:
-        avoided_energy: Mean share of the impact energy that is avoided where there is a threat; none of it
-            where the brake is premature.
-        false_rate: Share of the quiet episodes with a false brake.
+        avoided_energy: Mean share of the impact energy that is avoided in threats; 0 for premature braking.
+        false_rate: Share of the other episodes with a false activation.
         threats: Number of episodes with a threat.
-        quiet: Number of episodes without.
+        non_threats: Number of episodes without a threat.
     """
 
     avoided_energy: float
     false_rate: float
     threats: int
-    quiet: int
+    non_threats: int
 
-    def value(self, false_cost: float) -> float:
-        """Return what tuning maximises, with a false brake as dear as so many contacts at full speed."""
+    def total(self, false_cost: float) -> float:
+        """Return the value that tuning maximises: avoided_energy − false_cost · false_rate."""
         return self.avoided_energy - false_cost * self.false_rate
 
     @classmethod
-    def of(cls, rows: Iterable[Row]) -> "Score":
-        """Return the score of episodes."""
+    def from_rows(cls, rows: Iterable[Row]) -> "ObjectiveValue":
+        """Return the value for the rows of all episodes."""
         rows = list(rows)
         energy = [avoided_energy(row) for row in rows if row["threat"]]
-        quiet = [float(row["false_activation"]) for row in rows if not row["threat"]]
-        return cls(_mean(energy), _mean(quiet), len(energy), len(quiet))
+        false = [float(row["false_activation"]) for row in rows if not row["threat"]]
+        return cls(_mean(energy), _mean(false), len(energy), len(false))
+
+
+def avoided_energy(row: Row) -> float:
+    """Return the share of the relative impact energy that braking avoided; 0 for premature braking."""
+    if row["premature_brake"]:
+        return 0.0
+    impact_speed = row["relative_impact_speed"] or 0.0
+    unbraked_speed = row["speed_reduction"] + impact_speed
+    return 1.0 - (impact_speed / unbraked_speed) ** 2 if unbraked_speed > 0.0 else 1.0
+
+
+def _mean(values: list[float]) -> float:
+    return float(np.mean(values)) if values else 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
-    """A drive without braking, as an eye saw it.
+class NoBrakeRecording:
+    """Recording of one episode without braking through one sensor configuration.
 
     Attributes:
-        case: The case.
-        seed: The seed.
-        truth: What it met.
-        moments: Observation and the `lgmd/` keys of `info` at every decision, the last one included.
+        seed: Seed of the episode.
+        counterfactual: Outcome of the episode.
+        steps: Observation and `lgmd/` keys of `info` at every decision, including the last one.
     """
 
-    case: Case
     seed: int
-    truth: Counterfactual
-    moments: list[tuple[dict[str, Any], dict[str, Any]]]
+    counterfactual: Counterfactual
+    steps: list[tuple[dict[str, Any], dict[str, Any]]]
 
 
-class Recorder(Agent):
-    """Never brakes, and keeps what it is shown."""
+class ObservationRecorder(Agent):
+    """Agent that never brakes and records its observations."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self.moments: list[tuple[dict[str, Any], dict[str, Any]]] = []
+        self.steps: list[tuple[dict[str, Any], dict[str, Any]]] = []
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Keep it, and hold the speed."""
-        told = {key: value for key, value in info.items() if key.startswith("lgmd/")}
-        self.moments.append((observation, told))
+        """Record the observation and return `HOLD`."""
+        sensor_info = {key: value for key, value in info.items() if key.startswith("lgmd/")}
+        self.steps.append((observation, sensor_info))
         return HOLD
 
 
-class BrakeFrom(Agent):
-    """Brakes fully from a decision on.
+class FixedOnsetBrake(Agent):
+    """Agent that brakes fully from a given decision on.
 
     Args:
         onset: Index of the decision; None for never.
     """
 
     def __init__(self, onset: int | None) -> None:
-        super().__init__()
-        self._left = onset
+        self._remaining = onset
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Count down."""
-        if self._left is None:
+        """Return `BRAKE` from the onset on, `HOLD` before."""
+        if self._remaining is None:
             return HOLD
-        self._left -= 1
-        return BRAKE if self._left < 0 else HOLD
+        self._remaining -= 1
+        return BRAKE if self._remaining < 0 else HOLD
 
 
-class Ground:
-    """Numbered levels and false-reaction cases, each with a texture of its own.
+class Objective:
+    """Evaluation of rules on random levels and false-reaction cases, each with its own road texture.
 
     Args:
         split: "train" or "validation".
-        levels: Number of levels, from 0 on.
-        seeds: Number of seeds of the false-reaction suite; 0 for none.
-        jobs: Processes; 1 plays in this one.
+        levels: Number of levels of the split, starting at 0.
+        seeds: Number of seeds of the false-reaction suite; 0 to omit the suite.
+        jobs: Number of processes; 1 runs in this process.
     """
 
     def __init__(self, split: str, levels: int, seeds: int, jobs: int = 1) -> None:
         self.jobs = jobs
-        self.places = [(_level(split, number), number) for number in range(levels)]
-        quiet = find_suite("false-reaction").cases
-        offset = SEEDS_FROM + (0 if split == "train" else SEEDS_FROM)
-        self.places += [(case, offset + seed) for seed in range(seeds) for case in quiet]
-        self._drives: dict[str, list[Drive]] = {}  # by eye, the last ones used
-        self._outcomes: dict[tuple[int, int | None], Row] = {}
+        self.episodes = [(level_case(split, split, number), number) for number in range(levels)]
+        cases = find_suite("false-reaction").cases
+        first = FIRST_SEED[split]
+        self.episodes += [(case, seed) for seed in range(first, first + seeds) for case in cases]
+        self._cache: dict[str, list[NoBrakeRecording]] = {}  # by sensor configuration, latest used last
+        self._rows: dict[tuple[int, int | None], Row] = {}  # by episode and onset of braking
 
-    def score(self, agent: str, sensor_config: SensorConfig = OWN) -> Score:
-        """Score an agent's string on all of it.
+    def evaluate(self, agent: str, sensor_config: SensorConfig = AGENT_SENSORS) -> ObjectiveValue:
+        """Return the value for an agent.
 
         Args:
-            agent: The string.
-            sensor_config: What it sees through, where that is not left to the agent.
+            agent: Agent string.
+            sensor_config: Sensors in place of the agent's own.
 
         Raises:
-            RuntimeError: If an episode of an agent that does not latch fails; with its traceback.
+            RuntimeError: If an episode in closed loop fails; the message is the traceback.
         """
-        made = make_agent(agent)
-        if not latches(made):
-            return Score.of(self._closed_loop(agent, sensor_config.of(made)))
-        drives = self._seen_through(sensor_config.of(made))
-        onsets = [onset(made, drive) for drive in drives]
-        new = [key for key in enumerate(onsets) if key not in self._outcomes]
-        told = ((*self.places[index], drives[index].truth, found) for index, found in new)
-        rows = self._run(outcome, told)
-        self._outcomes.update(zip(new, rows, strict=True))
-        return Score.of(self._outcomes[key] for key in enumerate(onsets))
+        rule = make_agent(agent)
+        sensors = sensor_config.for_agent(rule)
+        if not is_latching(rule):
+            return ObjectiveValue.from_rows(self.closed_loop_rows(agent, sensors))
+        recordings = self.recordings(sensors)
+        keys = list(enumerate(find_onset(rule, recording) for recording in recordings))
+        missing = [key for key in keys if key not in self._rows]
+        arguments = ((*self.episodes[i], recordings[i].counterfactual, onset) for i, onset in missing)
+        self._rows.update(zip(missing, self._map(simulate_onset, arguments), strict=True))
+        return ObjectiveValue.from_rows(self._rows[key] for key in keys)
 
-    def _seen_through(self, eye: SensorConfig) -> list[Drive]:
-        """Return the drives through an eye, recorded anew if it is none of the last few."""
-        told = json.dumps(asdict(eye.plain))
-        drives = self._drives.pop(told, None)
-        if drives is None:
-            worn = ((*place, textured(eye, place[1])) for place in self.places)
-            drives = self._run(record, worn)
-        self._drives = dict([*self._drives.items(), (told, drives)][-EYES:])
-        return drives
+    def recordings(self, sensors: SensorConfig) -> list[NoBrakeRecording]:
+        """Return the recordings for a sensor configuration, from the cache if present."""
+        key = json.dumps(asdict(sensors.plain))
+        recordings = self._cache.pop(key, None)
+        if recordings is None:
+            arguments = ((case, seed, with_texture(sensors, seed)) for case, seed in self.episodes)
+            recordings = self._map(record, arguments)
+        self._cache = dict([*self._cache.items(), (key, recordings)][-MAX_CACHED:])
+        return recordings
 
-    def _closed_loop(self, agent: str, eye: SensorConfig) -> list[Row]:
-        truths = self._run(blind_truth, self.places)
+    def closed_loop_rows(self, agent: str, sensors: SensorConfig) -> list[Row]:
+        """Simulate an agent in closed loop and return one row for each episode."""
+        counterfactuals = self._map(simulate_no_brake, self.episodes)
         tasks = (
-            (Task(agent, case, seed, textured(eye, seed), truth),)
-            for (case, seed), truth in zip(self.places, truths, strict=True)
+            (Task(agent, case, seed, with_texture(sensors, seed), counterfactual),)
+            for (case, seed), counterfactual in zip(self.episodes, counterfactuals, strict=True)
         )
-        rows = [result.row for result in self._run(run_task, tasks)]
-        failed = next((row["error"] for row in rows if row["error"] is not None), None)
-        if failed is not None:
-            raise RuntimeError(failed)
+        rows = [result.row for result in self._map(run_task, tasks)]
+        error = next((row["error"] for row in rows if row["error"] is not None), None)
+        if error is not None:
+            raise RuntimeError(error)
         return rows
 
-    def _run(self, function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]]) -> list[Any]:
+    def _map(self, function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]]) -> list[Any]:
         results: Any = Parallel(n_jobs=self.jobs)(delayed(function)(*each) for each in arguments)
         return list(results)
 
 
-def latches(agent: Any) -> bool:
-    """Return whether an agent that has begun to brake will do so fully to the end."""
+def is_latching(agent: Agent) -> bool:
+    """Return whether an agent brakes fully to the end of the episode once it brakes."""
     return isinstance(agent, Rule) and agent.latching
 
 
-def record(case: Case, seed: int, eye: SensorConfig) -> Drive:
-    """Drive without braking and keep what an eye sees."""
-    recorder = Recorder()
-    episode = _played(case, seed, eye, recorder)
-    return Drive(case, seed, Counterfactual.of(episode), recorder.moments)
+def record(case: Case, seed: int, sensors: SensorConfig) -> NoBrakeRecording:
+    """Simulate an episode without braking and return its recording."""
+    recorder = ObservationRecorder()
+    episode = _simulate(case, seed, sensors, recorder)
+    return NoBrakeRecording(seed, Counterfactual.of(episode), recorder.steps)
 
 
-def onset(rule: Any, drive: Drive) -> int | None:
-    """Return the decision at which a rule that latches begins to brake; None for never."""
-    rule.reset(drive.seed)
-    for index, (observation, info) in enumerate(drive.moments):
+def find_onset(rule: Agent, recording: NoBrakeRecording) -> int | None:
+    """Replay a latching rule; return the index of the decision at which it brakes, None for never."""
+    rule.reset(recording.seed)
+    for index, (observation, info) in enumerate(recording.steps):
         if float(rule.act(observation, info)[0]) < HOLD:
             return index
     return None
 
 
-def outcome(case: Case, seed: int, truth: Counterfactual, found: int | None) -> Row:
-    """Return the row of braking fully from a decision on."""
-    return make_row("", case, seed, _played(case, seed, BLIND, BrakeFrom(found)), truth)
+def simulate_onset(case: Case, seed: int, counterfactual: Counterfactual, onset: int | None) -> Row:
+    """Return the row of an episode with full braking from a decision on."""
+    episode = _simulate(case, seed, MINIMAL_SENSORS, FixedOnsetBrake(onset))
+    return make_row("", case, seed, episode, counterfactual)
 
 
-def blind_truth(case: Case, seed: int) -> Counterfactual:
-    """Return what driving without braking meets."""
-    return Counterfactual.of(_played(case, seed, BLIND, BrakeFrom(None)))
+def simulate_no_brake(case: Case, seed: int) -> Counterfactual:
+    """Return the outcome of an episode without braking."""
+    return Counterfactual.of(_simulate(case, seed, MINIMAL_SENSORS, FixedOnsetBrake(None)))
 
 
-def textured(eye: SensorConfig, seed: int) -> SensorConfig:
-    """Return an agent's eye with the texture that belongs to a seed."""
+def with_texture(sensors: SensorConfig, seed: int) -> SensorConfig:
+    """Return a sensor configuration with the road texture of a seed."""
     rng = np.random.default_rng([7, seed])
-    look = {"seed": 10_000 + seed, "texture": round(float(rng.uniform(*TEXTURES)), 3)}
-    cameras = eye.camera if isinstance(eye.camera, list) else [eye.camera]
-    worn = [{**({"name": item} if isinstance(item, str) else item), **look} for item in cameras]
-    return replace(eye, camera=worn)
+    texture = {"seed": 10_000 + seed, "texture": round(float(rng.uniform(*TEXTURE_RANGE)), 3)}
+    cameras: Any = sensors.camera if isinstance(sensors.camera, list) else [sensors.camera]
+    textured = [{**({"name": item} if isinstance(item, str) else item), **texture} for item in cameras]
+    return replace(sensors, camera=textured)
 
 
-def avoided_energy(row: Row) -> float:
-    """Return the share of the energy of the relative impact that braking took away; 0 if it was premature."""
-    if row["premature_brake"]:
-        return 0.0
-    left = row["relative_impact_speed"] or 0.0
-    without = row["speed_reduction"] + left
-    return 1.0 - (left / without) ** 2 if without > 0.0 else 1.0
-
-
-def _played(case: Case, seed: int, eye: SensorConfig, agent: Agent) -> Episode:
-    env = make_env(case, eye)
+def _simulate(case: Case, seed: int, sensors: SensorConfig, agent: Agent) -> Episode:
+    env = make_env(case, sensors)
     try:
         return play(env, agent, seed)
     finally:
         env.close()
-
-
-def _level(split: str, number: int) -> Case:
-    arguments = (("split", split), ("start_level", number), ("num_levels", 1))
-    return Case(f"{split}/RandomBraking/{number}", "RandomBraking", arguments)
-
-
-def _mean(values: list[float]) -> float:
-    return float(np.mean(values)) if values else 0.0

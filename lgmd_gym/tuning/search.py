@@ -1,42 +1,40 @@
-"""Tuning of a rule's parameters on training levels, chosen on validation levels, kept in a study on disk.
+"""Search of a rule's parameters with Optuna, and their sensitivity.
 
-Optuna proposes parameters within the ranges that a rule's fields state and, on demand, a lens, what places
-the rule's own cameras, and parameters of the neuron. A trial is scored on numbered levels of
-`LGMD/RandomBraking-v0` and on the false-reaction suite with seeds that reports never use, each with a texture
-of its own. The protocol suites and the test split are never touched.
+Trials are evaluated on training levels and false-reaction cases, and the result is chosen on validation
+levels. Test levels and the protocol suites are not used.
 """
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from lgmd_gym.tuning.objective import Ground, Score
-from lgmd_gym.tuning.space import Proposal, Space, rule_options, sensor_config, spelled
+from lgmd_gym.tuning.objective import Objective, ObjectiveValue
+from lgmd_gym.tuning.space import Proposal, SearchSpace, agent_string, rule_options, sensor_config
 
-FALSE_COST = 1.0  # a false brake weighs as much as a contact at full speed
+FALSE_COST = 1.0  # cost of a false activation, relative to a contact at full speed
 
 
 def tune(
-    space: Space,
+    space: SearchSpace,
     study: Path,
     trials: int,
-    train: Ground,
-    validation: Ground,
+    train: Objective,
+    validation: Objective,
     false_cost: float = FALSE_COST,
     best_of: int = 3,
-    tell: Callable[[str], None] = print,
+    log: Callable[[str], None] = print,
 ) -> Proposal:
-    """Search a space and return what validation chooses; a known study is gone on with.
+    """Search a space and return the proposal with the highest value on the validation objective.
 
     Args:
-        space: What is searched.
-        study: SQLite file of the study; made if missing.
-        trials: How many to add.
-        train: What trials are scored on.
-        validation: What chooses among the best.
-        false_cost: What a false brake costs, in contacts at full speed; a study has one.
-        best_of: How many of the best trials, beside the defaults, go to validation.
-        tell: Called with a line per result.
+        space: Search space.
+        study: SQLite file of the study; an existing study is resumed.
+        trials: Number of trials to add.
+        train: Objective of the trials.
+        validation: Objective that chooses between the defaults and the best trials.
+        false_cost: Cost of a false activation, relative to a contact at full speed.
+        best_of: Number of best trials to evaluate on `validation`, in addition to the defaults.
+        log: Function that receives one line per result.
 
     Raises:
         ValueError: If Optuna is not installed.
@@ -44,7 +42,7 @@ def tune(
     try:
         import optuna
     except ImportError:
-        raise ValueError("tune needs Optuna; pip install 'lgmd-gym[train]'") from None
+        raise ValueError("tune requires Optuna; pip install 'lgmd-gym[train]'") from None
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     search = optuna.create_study(
         study_name=f"{space.label} at {false_cost:g}",
@@ -56,38 +54,38 @@ def tune(
     if not search.trials:
         search.enqueue_trial(space.defaults())
 
-    def objective(trial: Any) -> float:
-        score = scored(space, space.propose(trial), train)
-        tell(f"trial {trial.number}: {_told(score, false_cost)}")
-        return score.value(false_cost)
+    def run_trial(trial: Any) -> float:
+        value = evaluate(space, space.propose(trial), train)
+        log(f"trial {trial.number}: {_format_value(value, false_cost)}")
+        return value.total(false_cost)
 
-    search.optimize(objective, n_trials=trials)
-    done = [trial for trial in search.trials if trial.value is not None]
-    ranked = sorted(done, key=lambda trial: trial.value or 0.0, reverse=True)[:best_of]
-    found = [space.defaults(), *(dict(trial.params) for trial in ranked)]
-    judged = [(scored(space, item, validation), item) for item in found]
-    for score, item in judged:
-        tell(f"validation: {_told(score, false_cost)}  {_named(space, item)}")
-    return max(judged, key=lambda pair: pair[0].value(false_cost))[1]
-
-
-def sensitivity(space: Space, ground: Ground) -> list[tuple[str, float | int, Score]]:
-    """Return the score with each parameter lowered and raised by a fifth, the others at their defaults."""
-    return [(name, value, scored(space, shifted, ground)) for name, value, shifted in space.shifts()]
+    search.optimize(run_trial, n_trials=trials)
+    finished = [trial for trial in search.trials if trial.value is not None]
+    best = sorted(finished, key=lambda trial: trial.value or 0.0, reverse=True)[:best_of]
+    candidates = [space.defaults(), *(dict(trial.params) for trial in best)]
+    evaluated = [(evaluate(space, proposal, validation), proposal) for proposal in candidates]
+    for value, proposal in evaluated:
+        log(f"validation: {_format_value(value, false_cost)}  {_format_proposal(space, proposal)}")
+    return max(evaluated, key=lambda pair: pair[0].total(false_cost))[1]
 
 
-def scored(space: Space, proposal: Proposal, ground: Ground) -> Score:
-    """Return the score of a proposal."""
-    return ground.score(spelled(space.agent, proposal), sensor_config(proposal))
+def sensitivity(space: SearchSpace, objective: Objective) -> list[tuple[str, float | int, ObjectiveValue]]:
+    """Return name, value and result for each parameter shifted by 20 % down and up, one at a time."""
+    return [(name, value, evaluate(space, shifted, objective)) for name, value, shifted in space.shifts()]
 
 
-def _named(space: Space, proposal: Proposal) -> str:
-    eye = {name: value for name, value in proposal.items() if name not in rule_options(proposal)}
-    return " ".join([spelled(space.agent, proposal), *(f"{name}={value!r}" for name, value in eye.items())])
+def evaluate(space: SearchSpace, proposal: Proposal, objective: Objective) -> ObjectiveValue:
+    """Return the value of a proposal."""
+    return objective.evaluate(agent_string(space.agent, proposal), sensor_config(proposal))
 
 
-def _told(score: Score, false_cost: float) -> str:
+def _format_proposal(space: SearchSpace, proposal: Proposal) -> str:
+    others = {name: value for name, value in proposal.items() if name not in rule_options(proposal)}
+    return " ".join([agent_string(space.agent, proposal), *(f"{name}={others[name]!r}" for name in others)])
+
+
+def _format_value(value: ObjectiveValue, false_cost: float) -> str:
     return (
-        f"{score.value(false_cost):.3f} = {score.avoided_energy:.3f} energy avoided (n = {score.threats}) "
-        f"- {false_cost:g} * {score.false_rate:.3f} false (n = {score.quiet})"
+        f"{value.total(false_cost):.3f} = {value.avoided_energy:.3f} energy avoided (n = {value.threats}) "
+        f"- {false_cost:g} * {value.false_rate:.3f} false (n = {value.non_threats})"
     )

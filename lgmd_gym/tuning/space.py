@@ -1,6 +1,7 @@
-"""What tuning may change: a rule's parameters, on demand its lens, what places its cameras, its neuron."""
+"""Search space: a rule's parameters and, on request, its camera, camera geometry and neuron parameters."""
 
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import Field, dataclass, fields
+from math import inf
 from typing import Any
 
 from lgmd_gym.agents import AGENTS, Rule, make_agent
@@ -9,144 +10,135 @@ from lgmd_gym.camera import PRESETS
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.neuron import LGMDParams
 
-CAMERA, NEURON = "camera", "neuron."  # the name of the lens in a proposal, and how those of the neuron begin
-FACTOR = 2.0  # the neuron's parameters are searched from half their default to twice
-SHIFT = 0.2  # of each parameter in the sensitivity table
+CAMERA_KEY, NEURON_PREFIX = "camera", "neuron."  # keys of a proposal in addition to the rule's parameters
+NEURON_FACTOR = 2.0  # neuron parameters are searched from default / factor to default * factor
+SHIFT = 0.2  # relative shift of each parameter in the sensitivity table
 
+# A flat dict: the rule's parameters by name, the camera preset as "camera" and neuron parameters as in
+# "neuron.sigma_3". Missing parameters keep their defaults.
 Proposal = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Space:
-    """What a search may change. A proposal out of it is a flat dict.
-
-    It holds the rule's parameters under their names, the lens as "camera", and the neuron's parameters as
-    in "neuron.sigma_3"; what it lacks stays at its default.
+class SearchSpace:
+    """Search space of one rule.
 
     Attributes:
         agent: Name of a rule.
-        cameras: Camera presets to choose among, for a rule with one camera; empty for the one it has.
-        placing: Whether those parameters are searched, too, on which the rule's own cameras depend.
-        neuron: Parameters of the neuron (`LGMDParams`) that are searched.
+        cameras: Camera presets to choose from, for a rule with one camera; empty to keep the rule's camera.
+        camera_geometry: Whether to search the parameters that determine the rule's own cameras.
+        neuron: Names of the neuron parameters (`LGMDParams`) to search.
 
     Raises:
-        ValueError: For an unknown name (the nearest is named), cameras for a rule that needs several, or a
-            parameter of the neuron that is no finite number above 0.
+        ValueError: For an unknown name, cameras for a rule with several cameras, or a neuron parameter whose
+            default is not a finite number > 0.
     """
 
     agent: str
     cameras: tuple[str, ...] = ()
-    placing: bool = False
+    camera_geometry: bool = False
     neuron: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        tunable(self.agent)
+        rule_class(self.agent)
         for camera in self.cameras:
             if camera not in PRESETS:
                 raise unknown_name("camera", camera, PRESETS)
         if self.cameras and isinstance(make_agent(self.agent).camera, list):
             raise ValueError(
-                f"{self.agent} needs the cameras of its own eye; search with placing, not cameras"
+                f"{self.agent} has several cameras of its own, got cameras {list(self.cameras)}; "
+                "use camera_geometry instead"
             )
         for name in self.neuron:
-            if name not in scales_of_the_neuron():
-                raise unknown_name("number of the neuron", name, scales_of_the_neuron())
-
-    @property
-    def rule(self) -> type[Rule]:
-        """The rule's class."""
-        return tunable(self.agent)
+            if name not in neuron_defaults():
+                raise unknown_name("neuron parameter", name, neuron_defaults())
 
     @property
     def label(self) -> str:
-        """What tells one study's space from another's."""
-        parts = (*self.cameras, *(["placing"] if self.placing else []), *self.neuron)
+        """Name that distinguishes studies of different spaces."""
+        geometry = ["camera geometry"] if self.camera_geometry else []
+        parts = (*self.cameras, *geometry, *self.neuron)
         return " ".join((self.agent, *(["with", *parts] if parts else [])))
 
     def defaults(self) -> Proposal:
-        """Return all that is searched at its default."""
-        known = defaults(self.rule)
-        found: Proposal = {name: known[name] for name in searched(self.rule, self.placing)}
+        """Return the default of everything that is searched."""
+        proposal: Proposal = {item.name: item.default for item in self._searched_fields()}
         if self.cameras:
-            found[CAMERA] = self.cameras[0]
-        return found | {NEURON + name: scales_of_the_neuron()[name] for name in self.neuron}
+            proposal[CAMERA_KEY] = self.cameras[0]
+        return proposal | {NEURON_PREFIX + name: neuron_defaults()[name] for name in self.neuron}
 
     def propose(self, trial: Any) -> Proposal:
-        """Return a proposal drawn by an Optuna trial."""
-        found: Proposal = {}
-        for item in fields(self.rule.Params):
-            if item.name in searched(self.rule, self.placing):
-                low, high = item.metadata["range"]
-                draw = trial.suggest_int if isinstance(item.default, int) else trial.suggest_float
-                found[item.name] = draw(item.name, low, high)
+        """Return the proposal that an Optuna trial suggests."""
+        proposal: Proposal = {}
+        for item in self._searched_fields():
+            low, high = item.metadata["search_range"]
+            suggest = trial.suggest_int if isinstance(item.default, int) else trial.suggest_float
+            proposal[item.name] = suggest(item.name, low, high)
         if self.cameras:
-            found[CAMERA] = trial.suggest_categorical(CAMERA, self.cameras)
+            proposal[CAMERA_KEY] = trial.suggest_categorical(CAMERA_KEY, self.cameras)
         for name in self.neuron:
-            value = scales_of_the_neuron()[name]
-            low, high = value / FACTOR, value * FACTOR
-            found[NEURON + name] = trial.suggest_float(NEURON + name, low, high, log=True)
-        return found
+            key, default = NEURON_PREFIX + name, neuron_defaults()[name]
+            low, high = default / NEURON_FACTOR, default * NEURON_FACTOR
+            proposal[key] = trial.suggest_float(key, low, high, log=True)
+        return proposal
 
     def shifts(self) -> list[tuple[str, float | int, Proposal]]:
-        """Return each parameter lowered and raised by a fifth: its name, its value, and the proposal.
+        """Return name, value and proposal for each parameter shifted by 20 % down and up.
 
-        Whole numbers move by at least one. What places the cameras is among them, the lens is not.
+        Whole numbers shift by at least 1. The camera preset is not shifted; the parameters of the camera
+        geometry are.
         """
-        moved: list[tuple[str, float | int, Proposal]] = []
-        plain = {name: value for name, value in self.defaults().items() if name != CAMERA}
-        for name, value in (defaults(self.rule) | plain).items():
+        shifts: list[tuple[str, float | int, Proposal]] = []
+        values = {name: value for name, value in self.defaults().items() if name != CAMERA_KEY}
+        for name, value in (rule_class(self.agent).options() | values).items():
             for sign in (-1, 1):
                 shifted: float | int = float(f"{value * (1 + sign * SHIFT):.6g}")
                 if isinstance(value, int):
                     shifted = max(1, value + sign * max(1, round(SHIFT * value)))
-                moved.append((name, shifted, {name: shifted}))
-        return moved
+                shifts.append((name, shifted, {name: shifted}))
+        return shifts
+
+    def _searched_fields(self) -> list[Field[Any]]:
+        items = fields(rule_class(self.agent).Params)
+        return [item for item in items if self.camera_geometry or not item.metadata["affects_camera"]]
 
 
 def rule_options(proposal: Proposal) -> Proposal:
-    """Return what a proposal says to the rule."""
-    return {name: value for name, value in proposal.items() if name != CAMERA and not name.startswith(NEURON)}
+    """Return the parameters of the rule in a proposal."""
+    names = (name for name in proposal if name != CAMERA_KEY and not name.startswith(NEURON_PREFIX))
+    return {name: proposal[name] for name in names}
 
 
 def neuron_params(proposal: Proposal) -> Proposal:
-    """Return what a proposal says to the neuron."""
-    return {name.removeprefix(NEURON): value for name, value in proposal.items() if name.startswith(NEURON)}
+    """Return the parameters of the neuron in a proposal, without their prefix."""
+    names = [name for name in proposal if name.startswith(NEURON_PREFIX)]
+    return {name.removeprefix(NEURON_PREFIX): proposal[name] for name in names}
 
 
 def sensor_config(proposal: Proposal) -> SensorConfig:
-    """Return what a proposal has its agent see through."""
-    return SensorConfig(proposal.get(CAMERA), neuron_params(proposal) or None)
+    """Return the sensor configuration of a proposal."""
+    return SensorConfig(proposal.get(CAMERA_KEY), neuron_params(proposal) or None)
 
 
-def spelled(agent: str, proposal: Proposal) -> str:
-    """Return the string of an agent with a proposal's options."""
+def agent_string(agent: str, proposal: Proposal) -> str:
+    """Return the agent string for a rule with a proposal's parameters."""
     options = rule_options(proposal)
     return agent + ":" * bool(options) + ",".join(f"{name}={value!r}" for name, value in options.items())
 
 
-def tunable(agent: str) -> type[Rule]:
-    """Return the class of a rule, or raise ValueError that names the nearest rule."""
+def rule_class(agent: str) -> type[Rule]:
+    """Return the class of a rule.
+
+    Raises:
+        ValueError: If there is no rule with this name.
+    """
     rules = {name: cls for name, cls in AGENTS.items() if issubclass(cls, Rule)}
     if agent not in rules:
         raise unknown_name("rule", agent, rules)
     return rules[agent]
 
 
-def searched(rule: type[Rule], placing: bool = False) -> list[str]:
-    """Return the names of the parameters that tuning searches; with `placing` also those of its cameras."""
-    return [item.name for item in fields(rule.Params) if placing or not item.metadata.get("places_eye")]
-
-
-def defaults(rule: type[Rule]) -> Proposal:
-    """Return a rule's parameters at their defaults."""
-    return {item.name: item.default for item in fields(rule.Params)}
-
-
-def scales_of_the_neuron() -> dict[str, float]:
-    """Return the neuron's parameters that can be halved and doubled, with their defaults."""
-    known = {item.name: item.default for item in fields(LGMDParams) if item.default is not MISSING}
-    return {
-        name: value
-        for name, value in known.items()
-        if isinstance(value, float) and 0.0 < value < float("inf")
-    }
+def neuron_defaults() -> dict[str, float]:
+    """Return the neuron parameters that can be scaled (finite floats > 0) with their defaults."""
+    defaults = {item.name: item.default for item in fields(LGMDParams)}
+    return {name: x for name, x in defaults.items() if isinstance(x, float) and 0.0 < x < inf}

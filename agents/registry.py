@@ -1,0 +1,72 @@
+"""Registry of agents: `AGENTS` maps names to classes, `make_agent` builds an agent from a string."""
+
+from typing import Any
+
+from lgmd_gym.agents.adapter import make_user_agent
+from lgmd_gym.agents.base import Agent
+from lgmd_gym.agents.baselines import AlwaysBrake, NoBrake, RandomBrake
+from lgmd_gym.agents.field_rules import DangerZone, NestedFields
+from lgmd_gym.agents.image_rules import FlowDivergence, FrameDifference
+from lgmd_gym.agents.options import check_options, parse_agent
+from lgmd_gym.agents.oracles import EtaOracle, StoppingDistanceOracle, TauOracle, TTCOracle
+from lgmd_gym.agents.policies.policy import Policy
+from lgmd_gym.agents.rule import Rule
+from lgmd_gym.agents.spike_rules import AdaptiveThreshold, Graded, SpeedGated, SpikeThreshold
+from lgmd_gym.agents.stopping_zone import StoppingZone
+from lgmd_gym.errors import unknown_name
+
+AGENTS: dict[str, type[Agent]] = {}
+
+
+def register_agent(agent: type[Agent]) -> type[Agent]:
+    """Add an agent class to `AGENTS` under its `name`; usable as a class decorator.
+
+    Raises:
+        ValueError: If the name is taken.
+    """
+    if agent.name in AGENTS:
+        raise ValueError(f"agent {agent.name!r} is already registered; choose another name")
+    AGENTS[agent.name] = agent
+    return agent
+
+
+for _group in (
+    (NoBrake, AlwaysBrake, RandomBrake),
+    (SpikeThreshold, AdaptiveThreshold, Graded, SpeedGated),
+    (NestedFields, DangerZone, StoppingZone),
+    (FrameDifference, FlowDivergence),
+    (TTCOracle, StoppingDistanceOracle, EtaOracle, TauOracle),
+):
+    for _agent in _group:
+        register_agent(_agent)
+
+
+def make_agent(text: str) -> Agent:
+    """Return the agent for a string.
+
+    Args:
+        text: One of four forms.
+            "NAME" or "NAME:OPTION=VALUE,…" is a registered agent, for example
+            "spike-threshold:threshold=45,frames=2".
+            "RULE:toml=FILE" reads a rule's options from a TOML file.
+            "MODULE:CLASS" or "MODULE:CLASS:OPTION=VALUE,…" is a class of the user with a method `act`.
+            "policy:NAME" or "policy:FILE.zip" is a learned policy. Loading a policy unpickles its file and
+            can run arbitrary code.
+
+    Raises:
+        ValueError: For an unknown agent or option, or a value out of bounds.
+    """
+    name, _, rest = text.partition(":")
+    if "," in name:
+        raise ValueError(f"agent {text!r} contains a comma before its options; separate agents by spaces")
+    if name == Policy.name:
+        return Policy(rest)
+    if name not in AGENTS and rest.partition(":")[0].isidentifier():
+        return make_user_agent(text)
+    name, options = parse_agent(text)
+    if name not in AGENTS:
+        raise unknown_name("agent", name, AGENTS)
+    agent: Any = AGENTS[name]
+    if not issubclass(agent, Rule):  # the parameters of a rule check their own names
+        check_options(name, agent, options)
+    return agent(**options)

@@ -1,0 +1,97 @@
+"""Agent strings, the registry, and agents of the user."""
+
+import pytest
+from support.agents import make_step, run_agent
+
+from lgmd_gym.agents import AGENTS, Agent, make_agent, register_agent
+from lgmd_gym.agents.options import parse_agent
+
+USER_AGENT = f"{__name__}:Threshold"
+
+
+class Threshold:
+    """A user's agent with nothing but `act`."""
+
+    def __init__(self, level=20.0):
+        self.level = level
+
+    def act(self, observation, info):
+        return -0.5 if observation["spike_frequency"].max() > self.level else 0.0
+
+
+def test_parse_agent_returns_name_and_typed_options():
+    assert parse_agent("no-brake") == ("no-brake", {})
+    assert parse_agent("a:b=1e2,c=3,d=x.toml") == ("a", {"b": 100.0, "c": 3, "d": "x.toml"})
+
+
+def test_options_are_passed_to_the_agent():
+    agent = make_agent("spike-threshold:threshold=45.5,frames=2")
+    assert (agent.params.threshold, agent.params.frames) == (45.5, 2)
+    assert make_agent("ttc-oracle:ttc=2.5").ttc == 2.5
+
+
+def test_options_from_a_file_are_overridden_by_the_string(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text("ground = 2.5\nframes = 4\n")
+    agent = make_agent(f"stopping-zone:toml={file},frames=5")
+    assert (agent.params.ground, agent.params.frames, agent.params.upright) == (2.5, 5, 0.5)
+    for text, message in (("grund = 2.5\n", "did you mean 'ground'"), ("ground =\n", "is not TOML")):
+        file.write_text(text)
+        with pytest.raises(ValueError, match=message):
+            make_agent(f"stopping-zone:toml={file}")
+    with pytest.raises(ValueError, match="cannot be read"):
+        make_agent(f"stopping-zone:toml={tmp_path / 'none.toml'}")
+
+
+def test_registered_names_are_the_names_of_the_agents():
+    assert [name for name, cls in AGENTS.items() if make_agent(name).name != name or cls.name != name] == []
+
+
+def test_a_duplicate_name_is_refused():
+    class Duplicate(Agent):
+        name = "no-brake"
+
+    with pytest.raises(ValueError, match="agent 'no-brake' is already registered"):
+        register_agent(Duplicate)
+    assert AGENTS["no-brake"] is not Duplicate
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("spike-treshold", "unknown agent 'spike-treshold'; did you mean 'spike-threshold'"),
+        ("", "unknown agent ''; known: adaptive-threshold"),
+        ("no-brake,ttc-oracle", "contains a comma before its options; separate agents by spaces"),
+        ("spike-threshold:treshold=3", "did you mean 'threshold'"),
+        ("spike-threshold:threshold", "write threshold=VALUE"),
+        ("spike-threshold:threshold=high", "threshold must be a number > 0, got 'high'"),
+        ("spike-threshold:threshold=-1", "threshold must be a number > 0, got -1"),
+        ("spike-threshold:frames=1.5", "frames must be a whole number >= 1, got 1.5"),
+        ("random-brake:rate=0", "rate must be a number > 0, got 0"),
+        ("no-brake:x=1", "unknown option of agent no-brake 'x'"),
+        ("nowhere.at_all:Agent", "cannot be imported"),
+        ("math:Agent", "cannot be imported"),
+        ("collections:OrderedDict", "has no method act"),
+        (f"{USER_AGENT}:levle=3", "did you mean 'level'"),
+    ],
+)
+def test_an_invalid_string_is_refused(text, message):
+    with pytest.raises(ValueError, match=message):
+        make_agent(text)
+
+
+def test_a_user_agent_acts_with_its_options_and_the_alert_of_the_neuron():
+    agent = make_agent(f"{USER_AGENT}:level=35")
+    agent.reset(0)
+    assert agent.name == USER_AGENT
+    assert run_agent(agent, make_step(30.0)) == [0.0]
+    assert agent.alert
+    assert run_agent(agent, make_step(40.0)) == [-0.5]
+
+
+@pytest.mark.parametrize("action", [float("nan"), [0.0, 1.0], []])
+def test_a_user_agent_with_an_invalid_action_is_refused(action):
+    agent = make_agent(USER_AGENT)
+    agent.agent.act = lambda observation, info: action
+    with pytest.raises(ValueError, match="must return one finite number"):
+        agent.act(*make_step(0.0))

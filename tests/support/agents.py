@@ -1,0 +1,73 @@
+"""Observations, `info` and sensor readings for tests of agents, without an environment."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lgmd_gym.agents.rule import SensorReading
+from lgmd_gym.agents.zones import NUM_ZONES, zone_index
+
+
+class TraceFrame(NamedTuple):
+    response: Any
+    ego_speed: float
+
+
+class NeuronResponse(NamedTuple):
+    spike_frequency: Any
+    membrane_potential: Any
+
+
+def make_step(*frequencies, trace=False, cameras=1, potential=0.5, speed=8.0, yaw_rate=0.0, **truth):
+    """Return observation and `info` after camera frames with these spike frequencies [spikes/s].
+
+    With `trace`, `info` contains every frame; ground truth is NaN unless given.
+    """
+    observation = {
+        "spike_frequency": np.full(cameras, frequencies[-1], np.float32),
+        "membrane_potential": np.full(cameras, potential, np.float32),
+        "ego_speed": np.array([speed], np.float32),
+        "ego_yaw_rate": np.array([yaw_rate], np.float32),
+        "frame": np.zeros((90, 160, cameras), np.uint8),
+    }
+    keys = ("ttc", "gap", "target_speed", "ego_speed")
+    info = {"lgmd/alert": frequencies[-1] >= 30} | dict.fromkeys(keys, float("nan")) | truth
+    if trace:
+        potentials = observation["membrane_potential"]
+        responses = [NeuronResponse(np.full(cameras, value), potentials) for value in frequencies]
+        info["lgmd/trace"] = [TraceFrame(response, speed) for response in responses]
+    return observation, info
+
+
+def run_agent(agent, *steps):
+    """Return the demand for each step."""
+    return [float(agent.act(observation, info)[0]) for observation, info in steps]
+
+
+def to_potential(excitation):
+    """Return membrane potentials for excitations: eq. 10."""
+    return 1.0 / (1.0 + np.exp(-np.asarray(excitation, float)))
+
+
+def frequency_reading(frequency, speed=8.0, yaw_rate=0.0):
+    """Return the reading of one camera with a spike frequency [spikes/s]."""
+    return SensorReading(np.array([frequency]), np.full(1, 0.5), speed, yaw_rate)
+
+
+def zone_reading(speed=13.0, yaw_rate=0.0, ground=None, upright=None):
+    """Return the reading of the cameras of `stopping-zone`.
+
+    `ground` and `upright` are excitations of the zone for `speed`, or dicts of excitations by zone index.
+    """
+    excitation = np.zeros(2 * NUM_ZONES)
+    for offset, value in ((0, ground), (NUM_ZONES, upright)):
+        values = {zone_index(speed): value} if np.isscalar(value) else value or {}
+        for zone, level in values.items():
+            excitation[offset + zone] = level
+    return SensorReading(np.zeros(2 * NUM_ZONES), to_potential(excitation), speed, yaw_rate)
+
+
+def any_brake(rule, readings):
+    """Pass all readings to a rule; return whether its condition held for any of them."""
+    conditions = [rule.should_brake(reading) for reading in readings]  # the rule counts frames
+    return any(conditions)
