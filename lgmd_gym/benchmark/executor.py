@@ -9,11 +9,12 @@ from _thread import interrupt_main
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from typing import Any
-
-from joblib import Parallel, delayed, parallel_config
+from typing import TYPE_CHECKING, Any
 
 from lgmd_gym._version import __version__
+
+if TYPE_CHECKING:
+    from joblib import Parallel
 
 CONNECT = 5.0  # [s] limit for reaching the scheduler
 WORKERS = 10.0  # [s] limit for the first worker
@@ -65,6 +66,8 @@ class Executor:
             PoolLostError: If a worker process or the cluster dies.
             ValueError: If the cluster cannot be reached.
         """
+        from joblib import delayed
+
         with _local(self.jobs) if self.cluster is None else _dask(self.cluster) as parallel:
             yield lambda function, tasks: parallel(delayed(function)(task) for task in tasks)  # type: ignore[return-value]
 
@@ -73,7 +76,9 @@ SERIAL = Executor()
 
 
 @contextlib.contextmanager
-def _local(jobs: int) -> Iterator[Parallel]:
+def _local(jobs: int) -> "Iterator[Parallel]":
+    from joblib import Parallel
+
     # joblib replaces a worker that has grown by 300 MB, as it does by loading PyTorch, and warns of a leak.
     warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
     try:
@@ -84,7 +89,9 @@ def _local(jobs: int) -> Iterator[Parallel]:
 
 
 @contextlib.contextmanager
-def _dask(address: str) -> Iterator[Parallel]:
+def _dask(address: str) -> "Iterator[Parallel]":
+    from joblib import Parallel, parallel_config
+
     with contextlib.closing(_connect(address)) as client, _ClusterMonitor(client) as monitor:
         try:
             with (

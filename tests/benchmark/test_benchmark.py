@@ -340,7 +340,7 @@ def test_python_function_and_command_write_the_same_folder(tmp_path):
         ({"seeds": 1.5}, "seeds must be a whole number >= 1, got 1.5"),
         ({"first_seed": -1}, "first_seed must be a whole number >= 0, got -1"),
         ({"camera": "fova"}, "did you mean 'fovea'"),
-        ({"params": {"t_fs": 1.0}}, "did you mean 't_sf'"),
+        ({"params": {"sigma_33": 1.0}}, "did you mean 'sigma_3'"),
     ],
 )
 def test_invalid_configuration_is_refused_before_the_folder_is_made(tmp_path, values, message):
