@@ -18,7 +18,7 @@ import numpy as np
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.training import TrainConfig
-from lgmd_gym.training.offline.episodes import EpisodeRecorder, RecordedEpisode
+from lgmd_gym.training.offline.episodes import EpisodeRecorder, RecordedEpisode, record_parallel
 
 RESAMPLES = 2000
 
@@ -27,7 +27,7 @@ def record(agent: str, count: int, jobs: int = 2) -> list[RecordedEpisode]:
     """Return episodes on levels of the test split, recorded through an agent's cameras."""
     config = TrainConfig.from_hyperparams("offline", sensors_of=agent, inputs=("ego_speed",))
     recorder = EpisodeRecorder(partial(config.make_env, "test"), hold=0, brake=1)
-    return recorder.record(range(count), jobs)
+    return [episode for (episode,) in record_parallel(recorder.record, range(count), jobs)]
 
 
 def evaluate(agent: str, episodes: list[RecordedEpisode]) -> np.ndarray:

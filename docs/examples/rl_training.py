@@ -1,9 +1,9 @@
-"""RL training: stable-baselines3's PPO learns when to brake from spike frequency and own speed.
+"""RL training: PPO of stable-baselines3 with spike frequency and own speed as inputs.
 
     pip install -c constraints.txt ".[train]"
     python docs/examples/rl_training.py 100000 docs/tutorials/rl_training.png
 
-Two thousand steps show that everything fits together; a policy worth showing takes far more.
+Two thousand steps only show that the parts work together.
 """
 
 import sys
@@ -24,31 +24,31 @@ from lgmd_gym.plotting.style import COLOURS
 ENV = "LGMD/RandomBraking-v0"
 
 
-def main(steps: int = 2000, picture: Path | None = None, episodes: int = 2) -> PPO:
-    """Train on levels of the training split, by clear day, then play `episodes` levels of the test split."""
-    torch.set_num_threads(1)  # a network this small only loses time on several
+def main(steps: int = 2000, figure_path: Path | None = None, episodes: int = 2) -> PPO:
+    """Train on the training split in clear weather and test on `episodes` levels of the test split."""
+    torch.set_num_threads(1)  # several threads slow down a network this small
     envs = make_vec_env(ENV, n_envs=2, seed=0, env_kwargs={"split": "train", "conditions": ["clear"]})
-    # Spike frequencies reach 300, potentials 1: scale both before a network sees them.
+    # Spike frequencies reach 300 and membrane potentials 1, so the observations are normalised.
     envs = VecNormalize(envs, norm_reward=False)
     model = PPO("MultiInputPolicy", envs, n_steps=256, batch_size=128, seed=0, device="cpu")
     model.learn(steps)
     envs.training = False
 
-    learned = [play(model, envs, seed) for seed in range(episodes)]
-    threats = [play(None, envs, seed)[0] for seed in range(episodes)]
-    contacts = [hit for (hit, _), threat in zip(learned, threats, strict=True) if threat]
-    needless = [braked for (_, braked), threat in zip(learned, threats, strict=True) if not threat]
+    results = [run_episode(model, envs, seed) for seed in range(episodes)]
+    threats = [run_episode(None, envs, seed)[0] for seed in range(episodes)]
+    contacts = [contact for (contact, _), threat in zip(results, threats, strict=True) if threat]
+    false = [braked for (_, braked), threat in zip(results, threats, strict=True) if not threat]
     print(
         f"{steps} steps: contact in {sum(contacts)} of {len(contacts)} threats (all of them without braking)"
     )
-    print(f"and needless braking in {sum(needless)} of {len(needless)} quiet levels")
-    if picture is not None:
-        draw([np.array(env.get_episode_rewards()) for env in envs.venv.envs], picture)
+    print(f"and false activations in {sum(false)} of {len(false)} non-threats")
+    if figure_path is not None:
+        draw([np.array(env.get_episode_rewards()) for env in envs.venv.envs], figure_path)
     return model
 
 
-def play(model: PPO | None, envs: VecNormalize, seed: int) -> tuple[bool, bool]:
-    """Play a level of the test split, without a model never braking; return whether it touched and braked."""
+def run_episode(model: PPO | None, envs: VecNormalize, seed: int) -> tuple[bool, bool]:
+    """Run a level of the test split, without braking if there is no model; return contact and braking."""
     env = gym.make(ENV, split="test", conditions=["clear"])
     observation, info = env.reset(seed=seed)
     done = braked = False
@@ -63,8 +63,8 @@ def play(model: PPO | None, envs: VecNormalize, seed: int) -> tuple[bool, bool]:
     return info["collision"], braked
 
 
-def draw(rewards: list[np.ndarray], picture: Path) -> None:
-    """Draw the sum of rewards of each training episode, and its mean over twenty."""
+def draw(rewards: list[np.ndarray], path: Path) -> None:
+    """Plot the sum of rewards of each training episode and its moving average over 20 episodes."""
     figure = Figure(figsize=(7.0, 3.0), layout="constrained")
     axis = figure.subplots()
     for index, values in enumerate(rewards):
@@ -74,7 +74,7 @@ def draw(rewards: list[np.ndarray], picture: Path) -> None:
     axis.set(xlabel="training episode", ylabel="sum of rewards")
     axis.grid(alpha=0.3)
     axis.legend(frameon=False)
-    figure.savefig(picture, dpi=110)
+    figure.savefig(path, dpi=110)
 
 
 if __name__ == "__main__":

@@ -160,7 +160,7 @@ class TrainConfig:
         if self.env_id == RANDOM_ID:
             arguments.setdefault("split", split)
         if self.demands:
-            action = {"type": "DiscreteDemand", "levels": list(self.demands)}
+            action = {"type": "DiscreteDemand", "demands": list(self.demands)}
             arguments["config"] = {**(arguments.get("config") or {}), "action": action}
         if FRAME in self.features.inputs:
             arguments["include_frame"] = True

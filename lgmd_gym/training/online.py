@@ -14,16 +14,7 @@ if TYPE_CHECKING:
 
 
 def train_online(config: TrainConfig, folder: Path, progress: bool) -> "BaseAlgorithm":
-    """Train from the last checkpoint in the folder, if any, to the end.
-
-    Args:
-        config: Configuration of the training.
-        folder: Training folder.
-        progress: Whether to show a progress bar.
-
-    Returns:
-        Model with the best mean return on the validation split.
-    """
+    """Train from the last checkpoint in the folder, if any; return the best model on the validation split."""
     import torch
     from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
@@ -61,14 +52,14 @@ def algorithm_class(algo: str) -> "type[BaseAlgorithm]":
 
 def _make_model(config: TrainConfig, folder: Path, envs: "VecEnv") -> Any:
     """Return the newest checkpoint in a folder, or a new model."""
-    checkpoint = newest_checkpoint(folder)
+    algorithm, checkpoint = algorithm_class(config.algo), newest_checkpoint(folder)
     if checkpoint is not None:
-        model: Any = algorithm_class(config.algo).load(checkpoint, envs, device="cpu")
+        model: Any = algorithm.load(checkpoint, envs, device="cpu")
         buffer = checkpoint.with_name(checkpoint.name.replace("model_", "model_replay_buffer_"))
         if buffer.with_suffix(".pkl").exists():
             model.load_replay_buffer(buffer.with_suffix(".pkl"))
         return model
-    return algorithm_class(config.algo)(
+    return algorithm(
         config.policy,
         envs,
         seed=config.seed,

@@ -78,5 +78,5 @@ class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
 
     def _demand(self, action: Any) -> float:
         """Return the longitudinal demand of an action."""
-        demands = getattr(getattr(self.env.unwrapped, "action_type", None), "levels", None)
+        demands = getattr(getattr(self.env.unwrapped, "action_type", None), "demands", None)
         return float(np.reshape(action, -1)[0]) if demands is None else demands[int(action)]

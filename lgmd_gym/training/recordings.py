@@ -1,6 +1,5 @@
 """Recorded episodes of an offline training: recorded once, or reused from another training."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from json import dumps, loads
@@ -11,7 +10,7 @@ import lgmd_gym
 from lgmd_gym.agents import HOLD
 from lgmd_gym.agents.policies.features import FRAME
 from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
-from lgmd_gym.training.offline.episodes import EpisodeRecorder, RecordedEpisode
+from lgmd_gym.training.offline.episodes import EpisodeRecorder, Record, RecordedEpisode, record_parallel
 from lgmd_gym.training.offline.storage import check_file, load, save
 from lgmd_gym.training.offline.traffic import TrafficRecorder
 
@@ -27,12 +26,12 @@ class RecordingSet:
     Attributes:
         name: Name of the folder: "train", "validation", "traffic-train" or "traffic-validation".
         seeds: Seeds of the environment.
-        record: Returns the episodes of some seeds, by seed; arguments as in `TrafficRecorder.record`.
+        record: Returns the episodes of each seed.
     """
 
     name: str
     seeds: range
-    record: Callable[..., list[list[RecordedEpisode]]]
+    record: Record
 
 
 def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
@@ -47,7 +46,7 @@ def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
         brake=config.demands.index(min(config.demands)),
         shrink=shrink,
     )
-    sets = [RecordingSet(split, range(first, first + count), partial(_record_levels, levels))]
+    sets = [RecordingSet(split, range(first, first + count), levels.record)]
     if config.traffic_episodes:
         # The traffic suite of the benchmark uses the seeds from 0 on.
         first = SEED_STRIDE * (config.seed + 1) if train else VALIDATION_SEED
@@ -55,10 +54,6 @@ def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
         traffic = TrafficRecorder(split, config.camera, shrink)
         sets.append(RecordingSet(f"traffic-{split}", range(first, first + count), traffic.record))
     return sets
-
-
-def _record_levels(recorder: EpisodeRecorder, *arguments: Any) -> list[list[RecordedEpisode]]:
-    return [[episode] for episode in recorder.record(*arguments)]
 
 
 def _frame_shrink(config: TrainConfig) -> int | None:
@@ -82,16 +77,9 @@ def origin_of(config: TrainConfig) -> dict[str, Any]:
 def load_or_record(
     config: TrainConfig, split: str, folder: Path, progress: bool = False, jobs: int = 1
 ) -> list[RecordedEpisode]:
-    """Return the recorded episodes of a training; record those that are missing in its folder.
+    """Return the episodes of a split: reused if `config.recordings` is set, else recorded in the folder.
 
-    An interrupted recording resumes at the first missing file.
-
-    Args:
-        config: Configuration of the training; its `recordings` are used instead of new ones.
-        split: "train" or "validation".
-        folder: Training folder.
-        progress: Whether to show a progress bar.
-        jobs: Number of processes.
+    Files that exist are kept, so that an interrupted recording resumes at the first missing file.
     """
     episodes: list[RecordedEpisode] = []
     for recordings in recording_sets(config, split):
@@ -148,5 +136,9 @@ def _record_missing(
             part, file = seeds[start : start + FILE_SIZE], files / f"{start:06d}.npz"
             if file.exists():
                 bar.update(len(part))
-            else:
-                save(recordings.record(part, jobs, bar.update), file, origin)
+                continue
+            by_seed = []
+            for episodes in record_parallel(recordings.record, part, jobs):
+                by_seed.append(episodes)
+                bar.update()
+            save(by_seed, file, origin)

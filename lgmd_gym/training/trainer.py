@@ -4,7 +4,7 @@ import inspect
 import json
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import lgmd_gym
 from lgmd_gym.agents.options import whole
@@ -100,14 +100,23 @@ def check_config(config: TrainConfig) -> None:
 def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path:
     start = time.perf_counter()
     if config.algo == OFFLINE:
-        model, model_class = _train_offline(config, folder, progress, jobs), "ppo"
+        model = _train_offline(config, folder, progress, jobs)
     else:
         from lgmd_gym.training.online import train_online
 
-        model, model_class = train_online(config, folder, progress), config.algo
+        model = train_online(config, folder, progress)
     path = folder / "policy.zip"
     model.save(path, exclude=EXCLUDED)
-    write_card(path, _card(config, model_class, time.perf_counter() - start))
+    card = {
+        "lgmd_gym": lgmd_gym.__version__,
+        "algo": type(model).__name__.lower(),  # stable-baselines3 class that reads the file
+        "camera": config.camera,
+        "features": config.features.to_dict(),
+        "demands": list(config.demands) or None,
+        "config": {**config.to_dict(), "recordings": None},  # a path on the machine of the training
+        "wall_time": round(time.perf_counter() - start, 1),
+    }
+    write_card(path, card)
     return path
 
 
@@ -147,16 +156,3 @@ def _make_learner(config: TrainConfig, env: PolicyWrapper) -> "OfflineLearner":
 
     check_keys("hyperparameter of offline", config.algo_kwargs, inspect.signature(OfflineLearner).parameters)
     return OfflineLearner(config.policy, env, config.demands, seed=config.seed, **config.algo_kwargs)
-
-
-def _card(config: TrainConfig, model_class: str, wall_time: float) -> dict[str, Any]:
-    """Return the description of a policy that is written into its file."""
-    return {
-        "lgmd_gym": lgmd_gym.__version__,
-        "algo": model_class,  # stable-baselines3 class that reads the file
-        "camera": config.camera,
-        "features": config.features.to_dict(),
-        "demands": list(config.demands) or None,
-        "config": {**config.to_dict(), "recordings": None},  # a path on the machine of the training
-        "wall_time": round(wall_time, 1),
-    }

@@ -39,7 +39,8 @@ def synthetic_episode(length=4, seed=0, threat=True, traffic=False, frames=False
     rng = np.random.default_rng(seed)
     names = ("ego_speed", "ego_yaw_rate", "spike_frequency")
     observations = {name: rng.random((length, 1), dtype=np.float32) * 20 for name in names}
-    images = rng.integers(0, 255, (length, 40, 40, 2), dtype=np.uint8) if frames else None
+    if frames:
+        observations["frame"] = rng.integers(0, 255, (length, 40, 40, 2), dtype=np.uint8)
     contacts = np.arange(length) > length // 2 if threat else np.zeros(length, bool)
     rewards, braking_returns = rng.normal(size=(2, length)).astype(np.float32)
-    return RecordedEpisode(observations, images, rewards, braking_returns, contacts, threat, traffic)
+    return RecordedEpisode(observations, rewards, braking_returns, contacts, threat, traffic)

@@ -7,14 +7,15 @@ from support.recordings import offline_config
 
 from lgmd_gym.training import PolicyWrapper
 from lgmd_gym.training.offline.braking_outcomes import TOLERANCE, BrakingOutcome, braking_outcomes
-from lgmd_gym.training.offline.episodes import EpisodeRecorder
+from lgmd_gym.training.offline.episodes import EpisodeRecorder, record_parallel
 
 
 @pytest.mark.parametrize("demands", [(0.0, -1.0), (-0.6, 0.0)])
 def test_recorded_outcomes_equal_closed_loop_episodes(tmp_path, demands):
     config = offline_config(tmp_path, demands=demands)
     hold, brake = demands.index(0.0), demands.index(min(demands))
-    episodes = EpisodeRecorder(partial(config.make_env, "train"), hold, brake).record(range(3, 6))
+    recorder = EpisodeRecorder(partial(config.make_env, "train"), hold, brake)
+    episodes = [episode for (episode,) in recorder.record(range(3, 6))]
     assert {episode.threat for episode in episodes} == {False, True}
     features = config.features.to_dict() | {"repeat": 1, "reward_scale": 1.0}
     env = PolicyWrapper(config.make_env("train"), **features)
@@ -31,10 +32,8 @@ def test_recorded_outcomes_equal_closed_loop_episodes(tmp_path, demands):
 @pytest.mark.slow
 def test_number_of_processes_does_not_change_the_episodes(tmp_path):
     recorder = EpisodeRecorder(partial(offline_config(tmp_path).make_env, "validation"), hold=0, brake=1)
-    counts = []
-    serial, parallel = recorder.record(range(4)), recorder.record(range(4), 2, counts.append)
-    assert sum(counts) == 4
-    for left, right in zip(serial, parallel, strict=True):
+    parallel = record_parallel(recorder.record, range(6), jobs=2)
+    for (left,), (right,) in zip(recorder.record(range(6)), parallel, strict=True):
         assert left.braking_returns.tobytes() == right.braking_returns.tobytes()
         for name in left.observations:
             assert left.observations[name].tobytes() == right.observations[name].tobytes()

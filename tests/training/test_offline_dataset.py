@@ -13,7 +13,8 @@ from lgmd_gym.training.offline.episodes import EpisodeRecorder
 
 def test_batches_equal_the_observations_of_the_policy_wrapper(tmp_path):
     config = offline_config(tmp_path)
-    episodes = EpisodeRecorder(partial(config.make_env, "train"), hold=0, brake=1).record(range(2))
+    recorder = EpisodeRecorder(partial(config.make_env, "train"), hold=0, brake=1)
+    episodes = [episode for (episode,) in recorder.record(range(2))]
     batch = OfflineDataset(episodes, config.features).batch([1, 0])
     env = config.make_policy_env("train")
     row = 0
@@ -42,7 +43,9 @@ def test_a_lower_decision_rate_uses_every_third_decision():
     assert batch.braking_contacts[0].tolist() == episode.braking_contacts[::3].tolist()
     sums = [episode.rewards[first : first + 3].sum() for first in (0, 3, 6, 9)]
     assert batch.rewards[0].tolist() == pytest.approx(sums, abs=1e-6)
-    assert np.array_equal(np.moveaxis(batch.inputs["frame"].numpy(), 1, -1), episode.frames[::3])
+    assert np.array_equal(
+        np.moveaxis(batch.inputs["frame"].numpy(), 1, -1), episode.observations["frame"][::3]
+    )
 
 
 def test_frames_have_their_history_in_the_channels():
@@ -50,5 +53,5 @@ def test_frames_have_their_history_in_the_channels():
     episodes = [synthetic_episode(2, frames=True), synthetic_episode(4, seed=1, frames=True)]
     frames = OfflineDataset(episodes, features).batch([1]).inputs["frame"]
     assert frames.shape == (4, 6, 40, 40)
-    expected = np.concatenate([episodes[1].frames[index] for index in (1, 2, 3)], axis=-1)
+    expected = np.concatenate([episodes[1].observations["frame"][index] for index in (1, 2, 3)], axis=-1)
     assert np.array_equal(frames[3].numpy(), np.moveaxis(expected, -1, 0))

@@ -47,7 +47,7 @@ def spike_episodes(count, seed):
         contacts = np.arange(length) != spike if threat else np.zeros(length, bool)
         observations = {**episode.observations, "spike_frequency": spikes}
         rewards = np.full(length, -0.1, np.float32)
-        episodes.append(RecordedEpisode(observations, None, rewards, braking_returns, contacts, threat))
+        episodes.append(RecordedEpisode(observations, rewards, braking_returns, contacts, threat))
     return episodes
 
 
@@ -156,7 +156,7 @@ def test_evaluation_equals_closed_loop_returns(tmp_path):
     features = FeatureConfig(inputs=("spike_peak", "ffi", "ego_speed"), history=3, repeat=5, latch=True)
     config, seeds = replace(offline_config(tmp_path), features=features), range(5)
     recorder = EpisodeRecorder(partial(config.make_env, "validation"), hold=0, brake=1)
-    recorded = dataset(recorder.record(seeds), features)
+    recorded = dataset([episode for (episode,) in recorder.record(seeds)], features)
     offline = learner(tmp_path, features, batch_size=5)
     model = offline.learn(recorded, recorded)
     env, returns, onsets = config.make_policy_env("validation"), [], []

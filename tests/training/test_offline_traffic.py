@@ -7,10 +7,10 @@ import pytest
 from support.recordings import offline_config
 
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.traffic.recording import record as record_trace
+from lgmd_gym.benchmark.traffic.recording import record_traffic
 from lgmd_gym.envs.traffic.emergencies import Emergencies
 from lgmd_gym.training.offline import traffic
-from lgmd_gym.training.offline.episodes import EpisodeRecorder, ObservationBuffer
+from lgmd_gym.training.offline.episodes import EpisodeRecorder
 from lgmd_gym.training.offline.traffic import (
     TrafficRecorder,
     non_threat_episode,
@@ -19,14 +19,13 @@ from lgmd_gym.training.offline.traffic import (
 )
 
 HIGHWAY, INTERSECTION = 0, 3  # seeds of these kinds of traffic
-NAMES = ("spike_frequency", "membrane_potential", "ffi", "ego_speed", "ego_yaw_rate")
 
 
 @pytest.mark.parametrize(("env_id", "speed"), [("LGMD/EmptyRoad-v0", 12.0), ("LGMD/Following-v0", 20.0)])
 def test_computed_returns_equal_replays_in_braking_env(tmp_path, env_id, speed):
     config = offline_config(tmp_path, env_id, env_kwargs={"ego_speed": speed})
-    (replayed,) = EpisodeRecorder(partial(config.make_env, "train"), hold=0, brake=1).record(range(1))
-    computed = non_threat_episode(replayed.observations, None, 30.0)
+    ((replayed,),) = EpisodeRecorder(partial(config.make_env, "train"), hold=0, brake=1).record(range(1))
+    computed = non_threat_episode(replayed.observations, 30.0)
     assert not replayed.threat
     assert replayed.observations["ego_speed"] == pytest.approx(speed)
     assert computed.rewards == pytest.approx(replayed.rewards, abs=1e-3)
@@ -35,13 +34,13 @@ def test_computed_returns_equal_replays_in_braking_env(tmp_path, env_id, speed):
 
 
 def test_braking_at_standstill_costs_nothing():
-    episode = non_threat_episode({"ego_speed": np.zeros((60, 1), np.float32)}, None, 30.0)
+    episode = non_threat_episode({"ego_speed": np.zeros((60, 1), np.float32)}, 30.0)
     assert not episode.rewards.any()
     assert not episode.braking_returns.any()
 
 
 def test_braking_near_the_end_costs_the_remaining_time():
-    episode = non_threat_episode({"ego_speed": np.full((60, 1), 20.0, np.float32)}, None, 30.0)
+    episode = non_threat_episode({"ego_speed": np.full((60, 1), 20.0, np.float32)}, 30.0)
     assert episode.braking_returns[-1] == pytest.approx(episode.rewards[-1])  # within the brake's dead time
     # With 1 s left: 0.233 s dead time and build-up, 0.767 s at 9 m/s², which cost 2 per second, over 17.36 m.
     assert episode.braking_returns[-30] == pytest.approx(17.355 / 20.0 - 2.0 * 0.7667, abs=1e-3)
@@ -66,38 +65,33 @@ def test_long_stretches_are_divided_evenly():
     ],
 )
 def test_segments_exclude_the_ten_seconds_before_an_emergency(monkeypatch, emergencies, expected_starts):
-    def run(env, seed, buffer):
-        for decision in range(900):
-            buffer.add({name: np.array([decision / 30.0], np.float32) for name in NAMES})
-        return emergencies
-
-    monkeypatch.setattr(traffic, "run_episode", run)
+    observations = [{"ego_speed": np.array([decision / 30.0], np.float32)} for decision in range(900)]
+    monkeypatch.setattr(traffic, "run_episode", lambda *_: (observations, emergencies))
     (segments,) = TrafficRecorder("train", "fovea").record(range(1))
     times = [segment.observations["ego_speed"][:, 0] for segment in segments]
     assert [float(part[0]) for part in times] == pytest.approx(expected_starts, abs=0.01)
     for time in np.concatenate(times):
-        assert emergencies.need(float(round(time * 30) / 30)) is None
+        assert emergencies.time_until(float(round(time * 30) / 30)) is None
 
 
 @pytest.mark.parametrize("seed", [HIGHWAY, INTERSECTION])
 def test_observations_equal_those_of_the_benchmark(monkeypatch, seed):
     config = {"duration": 12}
     monkeypatch.setattr(traffic, "make_traffic", partial(traffic.make_traffic, config=config))
-    monkeypatch.setattr(traffic, "draw_view", lambda *_: {"condition": "fog"})
+    monkeypatch.setattr(traffic, "draw_camera_fields", lambda *_: {"condition": "fog"})
     monkeypatch.setattr(traffic, "segment_bounds", lambda non_threat, policy_hz: [(0, len(non_threat))])
-    counts = []
-    ((whole,),) = TrafficRecorder("train", "fovea").record(range(seed, seed + 1), 1, counts.append)
-    trace = record_trace(list(traffic.KINDS)[seed], seed, SensorConfig(camera="fovea").under("fog"), config)
-    assert counts == [1]
-    assert len(whole) == len(trace.seen) - 1  # no action follows the last observation
+    ((whole,),) = TrafficRecorder("train", "fovea").record(range(seed, seed + 1))
+    sensor_config = SensorConfig(camera="fovea").with_condition("fog")
+    recording = record_traffic(list(traffic.KINDS)[seed], seed, sensor_config, config)
+    assert len(whole) == len(recording.steps) - 1  # no action follows the last observation
     for name, array in whole.observations.items():
-        assert np.array_equal(array, np.stack([item.observation[name] for item in trace.seen[:-1]]))
+        assert np.array_equal(array, np.stack([step.observation[name] for step in recording.steps[:-1]]))
 
 
 def test_emergencies_equal_those_of_the_benchmark():
     """The episode has emergencies before and after its end."""
     kind, config = list(traffic.KINDS)[INTERSECTION], {"duration": 8}
-    trace = record_trace(kind, INTERSECTION, SensorConfig(camera="fovea"), config)
-    assert min(trace.emergencies.hard) < 8.0 < max(trace.emergencies.hard)
+    recording = record_traffic(kind, INTERSECTION, SensorConfig(camera="fovea"), config)
+    assert min(recording.emergencies.hard) < 8.0 < max(recording.emergencies.hard)
     env = traffic.make_traffic(kind, camera="fovea", config=config)
-    assert run_episode(env, INTERSECTION, ObservationBuffer(None)) == trace.emergencies
+    assert run_episode(env, INTERSECTION)[1] == recording.emergencies

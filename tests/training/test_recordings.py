@@ -26,7 +26,7 @@ def test_files_restore_every_episode(tmp_path):
     assert empty == []
     for left, right in zip((threat, segment), restored, strict=True):
         assert (left.threat, left.traffic) == (right.threat, right.traffic)
-        for name in ("rewards", "braking_returns", "braking_contacts", "frames"):
+        for name in ("rewards", "braking_returns", "braking_contacts"):
             assert np.array_equal(getattr(left, name), getattr(right, name))
         for name in left.observations:
             assert np.array_equal(left.observations[name], right.observations[name])
@@ -64,11 +64,11 @@ def test_missing_recordings_are_rejected_before_the_folder_is_made(tmp_path):
 def test_interrupted_recording_resumes_at_the_missing_file(tmp_path, monkeypatch):
     recorded = []
 
-    def record(self, seeds, jobs, on_recorded):
+    def record(self, seeds):
         if len(recorded) == 2:
             raise KeyboardInterrupt
         recorded.append(seeds)
-        return [synthetic_episode(seed=seed) for seed in seeds]
+        return [[synthetic_episode(seed=seed)] for seed in seeds]
 
     monkeypatch.setattr(recordings, "FILE_SIZE", 2)
     monkeypatch.setattr(EpisodeRecorder, "record", record)

@@ -46,7 +46,7 @@ class OfflineDataset:
         self._starts = np.cumsum([0, *map(self._count_decisions, episodes)])
         self._inputs = {}
         if FRAME in features.inputs:
-            frames = [item.frames[:: features.repeat] for item in episodes if item.frames is not None]
+            frames = [episode.observations[FRAME][:: features.repeat] for episode in episodes]
             self._inputs[FRAME] = np.concatenate(frames)
         signals = tuple(name for name in features.inputs if name != FRAME)
         if signals:

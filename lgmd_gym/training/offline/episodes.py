@@ -5,10 +5,10 @@ therefore contains every observation a policy can get before it brakes. Replays 
 without sensors give the outcome of braking at each decision.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import gymnasium as gym
 import numpy as np
@@ -18,17 +18,17 @@ from lgmd_gym.agents.policies.features import FRAME, SCALES, shrink_frame
 from lgmd_gym.training.offline.braking_outcomes import STRIDE, BrakingOutcome, braking_outcomes
 
 MINIMAL_CAMERA = {"name": "wide", "shape": (8, 8)}  # of the environment that is copied and replayed
+CHUNK_SIZE = 4  # seeds recorded by one task of a process
+
+Observation: TypeAlias = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)
 class RecordedEpisode:
-    """One episode without braking, of T environment decisions.
-
-    Policies of any decision rate can be trained on it, because it holds every decision of the environment.
+    """One episode without braking, of T environment decisions, for policies of any decision rate.
 
     Attributes:
-        observations: Observations by name, (T, n) each.
-        frames: Shrunk camera frames, uint8 (T, height, width, channels); None without frames.
+        observations: Observations by name, (T, ...) each; `frame` is shrunk and present on request only.
         rewards: Reward of holding the speed at each decision, float32 (T,).
         braking_returns: Return of braking from each decision on, float32 (T,).
         braking_contacts: Whether braking from each decision on ends in a contact, bool (T,).
@@ -36,8 +36,7 @@ class RecordedEpisode:
         traffic: Whether the episode is a segment of a traffic episode.
     """
 
-    observations: dict[str, np.ndarray]
-    frames: np.ndarray | None
+    observations: Observation
     rewards: np.ndarray
     braking_returns: np.ndarray
     braking_contacts: np.ndarray
@@ -48,67 +47,44 @@ class RecordedEpisode:
         return len(self.rewards)
 
 
-class ObservationBuffer:
-    """Observations of one episode in recorded form.
+Record: TypeAlias = Callable[[range], list[list[RecordedEpisode]]]
+"""Method `record` of `EpisodeRecorder` and `TrafficRecorder`: the episodes of each seed."""
+
+
+def record_parallel(record: Record, seeds: range, jobs: int = 1) -> Iterator[list[RecordedEpisode]]:
+    """Yield the episodes of each seed, recorded by `jobs` processes with the method of a recorder."""
+    chunks = [seeds[start : start + CHUNK_SIZE] for start in range(0, len(seeds), CHUNK_SIZE)]
+    results: Any = Parallel(n_jobs=jobs, return_as="generator")(delayed(record)(chunk) for chunk in chunks)
+    for by_seed in results:
+        yield from by_seed
+
+
+def select_signals(observation: Observation, shrink: int | None) -> Observation:
+    """Return the recorded part of an observation.
 
     Args:
-        shrink: Side of the pixel squares that become one pixel of a recorded frame [px]; None for no frames.
+        observation: Observation of `LGMDObservation`.
+        shrink: Side of the pixel squares that become one pixel of the recorded frame [px]; None for no frame.
     """
-
-    def __init__(self, shrink: int | None) -> None:
-        self._observations: list[dict[str, np.ndarray]] = []
-        self._frames: list[np.ndarray] = []
-        self._shrink = shrink
-
-    def __len__(self) -> int:
-        return len(self._observations)
-
-    def add(self, observation: dict[str, np.ndarray]) -> None:
-        """Append an observation of `LGMDObservation`."""
-        self._observations.append({name: observation[name] for name in SCALES})
-        if self._shrink is not None:
-            self._frames.append(shrink_frame(observation[FRAME], self._shrink))
-
-    def arrays(self) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
-        """Return the observations by name, (T, n) each, and the frames or None."""
-        observations = {name: np.stack([item[name] for item in self._observations]) for name in SCALES}
-        return observations, np.stack(self._frames) if self._frames else None
+    signals = {name: observation[name] for name in SCALES}
+    return signals if shrink is None else signals | {FRAME: shrink_frame(observation[FRAME], shrink)}
 
 
-def record_chunks(
-    record_chunk: Callable[[range], list[Any]],
-    chunks: Iterable[range],
-    jobs: int,
-    on_recorded: Callable[[int], Any],
-) -> list[Any]:
-    """Return one recording per seed, recorded in parallel.
-
-    Args:
-        record_chunk: Returns the recordings of some seeds.
-        chunks: Seeds of each call.
-        jobs: Number of processes.
-        on_recorded: Called with the number of recordings added.
-    """
-    results: Any = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(record_chunk)(chunk) for chunk in chunks
-    )
-    recordings: list[Any] = []
-    for recorded in results:
-        recordings += recorded
-        on_recorded(len(recorded))
-    return recordings
+def stack(observations: list[Observation]) -> Observation:
+    """Return the observations of an episode by name, (T, ...) each."""
+    return {name: np.stack([item[name] for item in observations]) for name in observations[0]}
 
 
 @dataclass(frozen=True)
 class EpisodeRecorder:
-    """Records episodes of an environment with a discrete demand and a latching brake.
+    """Records episodes of an environment with a discrete demand and a latching brake, one per seed.
 
     Attributes:
-        make_env: Returns a new environment with `LGMDObservation`; the argument `camera` replaces its
-            cameras. Must be picklable.
+        make_env: Picklable function that returns a new environment with `LGMDObservation`; its argument
+            `camera` replaces the cameras.
         hold: Action that holds the speed.
         brake: Action that brakes.
-        shrink: See `ObservationBuffer`.
+        shrink: See `select_signals`.
     """
 
     make_env: Callable[..., gym.Env]
@@ -116,37 +92,24 @@ class EpisodeRecorder:
     brake: int
     shrink: int | None = None
 
-    def record(
-        self, seeds: range, jobs: int = 1, on_recorded: Callable[[int], Any] = lambda count: None
-    ) -> list[RecordedEpisode]:
-        """Record one episode per seed.
-
-        Args:
-            seeds: Seeds of the environment.
-            jobs: Number of processes.
-            on_recorded: Called with the number of episodes added.
-        """
-        size = max(min(len(seeds) // (4 * jobs), 20), 1)
-        chunks = [seeds[start : start + size] for start in range(0, len(seeds), size)]
-        return record_chunks(self._record_chunk, chunks, jobs, on_recorded)
-
-    def _record_chunk(self, seeds: range) -> list[RecordedEpisode]:
+    def record(self, seeds: range) -> list[list[RecordedEpisode]]:
+        """Return a list with one episode for each seed."""
         env, twin = self.make_env(), self.make_env(camera=MINIMAL_CAMERA)
         try:
-            return [self._record_episode(env, twin.unwrapped, seed) for seed in seeds]
+            return [[self._record_episode(env, twin.unwrapped, seed)] for seed in seeds]
         finally:
             env.close()
             twin.close()
 
     def _record_episode(self, env: gym.Env, twin: Any, seed: int) -> RecordedEpisode:
         """Record `env` and replay braking in copies of `twin`, the same environment without sensors."""
-        buffer, copies, rewards, done = ObservationBuffer(self.shrink), [], [], False
+        observations, copies, rewards, done = [], [], [], False
         observation, info = env.reset(seed=seed)
         twin.reset(seed=seed)
         while not done:
-            if len(buffer) % STRIDE == 0:
+            if len(observations) % STRIDE == 0:
                 copies.append(deepcopy(twin))
-            buffer.add(observation)
+            observations.append(select_signals(observation, self.shrink))
             observation, reward, terminated, truncated, info = env.step(self.hold)
             twin.step(self.hold)
             rewards.append(float(reward))
@@ -158,9 +121,9 @@ class EpisodeRecorder:
                 copy.step(self.hold)
             return _brake_to_end(copy, self.brake)
 
-        outcomes = braking_outcomes(len(buffer), replay)
+        outcomes = braking_outcomes(len(observations), replay)
         return RecordedEpisode(
-            *buffer.arrays(),
+            stack(observations),
             rewards=np.array(rewards, np.float32),
             braking_returns=np.array([item.episode_return for item in outcomes], np.float32),
             braking_contacts=np.array([item.contact for item in outcomes]),

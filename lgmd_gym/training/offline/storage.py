@@ -30,20 +30,15 @@ def save(by_seed: list[list[RecordedEpisode]], file: Path, origin: dict[str, Any
         "threats": np.array([episode.threat for episode in episodes], bool),
         "traffic": np.array([episode.traffic for episode in episodes], bool),
     }
-    arrays |= _concatenated(episodes) if episodes else {}
+    if episodes:
+        for name in PER_DECISION:
+            arrays[name] = np.concatenate([getattr(episode, name) for episode in episodes])
+        for name in episodes[0].observations:
+            arrays[PREFIX + name] = np.concatenate([episode.observations[name] for episode in episodes])
     unfinished = file.with_suffix(".part")
     with unfinished.open("wb") as out:
         np.savez_compressed(out, **arrays)
     unfinished.rename(file)
-
-
-def _concatenated(episodes: list[RecordedEpisode]) -> dict[str, np.ndarray]:
-    arrays = {name: np.concatenate([getattr(episode, name) for episode in episodes]) for name in PER_DECISION}
-    if episodes[0].frames is not None:
-        arrays["frames"] = np.concatenate([item.frames for item in episodes if item.frames is not None])
-    for name in episodes[0].observations:
-        arrays[PREFIX + name] = np.concatenate([item.observations[name] for item in episodes])
-    return arrays
 
 
 def load(file: Path) -> list[list[RecordedEpisode]]:
@@ -99,13 +94,11 @@ def _episodes(archive: Any) -> Iterator[RecordedEpisode]:
     observations = {
         name.removeprefix(PREFIX): array for name, array in arrays.items() if name.startswith(PREFIX)
     }
-    frames = arrays.get("frames")
     bounds = np.cumsum([0, *arrays["lengths"]])
     for index in range(len(arrays["lengths"])):
         part = slice(*bounds[index : index + 2])
         yield RecordedEpisode(
             {name: array[part] for name, array in observations.items()},
-            None if frames is None else frames[part],
             *(arrays[name][part] for name in PER_DECISION),
             threat=bool(arrays["threats"][index]),
             traffic=bool(arrays["traffic"][index]),
