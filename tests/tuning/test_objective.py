@@ -1,0 +1,80 @@
+"""The objective: values of rows, replay on recordings against closed loop, and the cache of recordings."""
+
+import pytest
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.tuning import objective as objective_module
+from lgmd_gym.tuning.objective import Objective, ObjectiveValue, find_onset, is_latching
+
+
+def threat_row(impact_speed, premature=False):
+    return {
+        "threat": True,
+        "premature_brake": premature,
+        "relative_impact_speed": impact_speed,
+        "speed_reduction": 10.0 - (impact_speed or 0.0),
+        "false_activation": False,
+    }
+
+
+def test_the_value_is_avoided_energy_minus_the_cost_of_false_activations():
+    """Impact at 0, 5 and 10 of 10 m/s, and premature braking: (1 + 0.75 + 0 + 0) / 4."""
+    threats = [threat_row(None), threat_row(5.0), threat_row(10.0), threat_row(None, premature=True)]
+    others = [{"threat": False, "false_activation": item} for item in (True, False)]
+    value = ObjectiveValue.from_rows(threats + others)
+    assert value == ObjectiveValue(0.4375, 0.5, 4, 2)
+    assert value.total(2.0) == 0.4375 - 1.0
+
+
+@pytest.mark.parametrize(
+    ("agent", "levels", "seeds"),
+    [
+        ("spike-threshold:threshold=60", 8, 0),
+        ("frame-difference:level=2", 8, 0),
+        pytest.param("stopping-zone", 20, 1, marks=pytest.mark.slow),
+    ],
+)
+def test_replay_on_recordings_equals_closed_loop(agent, levels, seeds):
+    objective, rule = Objective("train", levels, seeds), make_agent(agent)
+    objective.evaluate("no-brake")
+    objective.evaluate("spike-threshold")  # recordings of other sensors must not interfere
+    sensors = SensorConfig().for_agent(rule)
+    value, rows = objective.evaluate(agent), objective.closed_loop_rows(agent, sensors)
+    assert value == ObjectiveValue.from_rows(rows)
+    assert value.threats > 0
+    assert value.non_threats > 0
+    onsets = [find_onset(rule, recording) for recording in objective.recordings(sensors)]
+    assert {onset is None for onset in onsets} == {True, False}  # it brakes in some episodes and not in all
+    keys = ("collision", "relative_impact_speed", "ttc_at_brake", "duration", "episode_return")
+    replayed = [objective._rows[key] for key in enumerate(onsets)]
+    assert [[row[key] for key in keys] for row in replayed] == [[row[key] for key in keys] for row in rows]
+
+
+def test_recordings_of_the_latest_four_sensors_are_cached(monkeypatch):
+    objective, recorded = Objective("train", 1, 0), []
+    monkeypatch.setattr(objective_module, "record", lambda *args: recorded.append(args[-1]) or args[-1])
+    wide, tele, fovea, standard, paper = (
+        SensorConfig(camera=name) for name in ("wide", "tele", "fovea", "standard", "paper")
+    )
+    for sensors in (wide, tele, fovea, standard, wide, paper, wide, tele):
+        assert objective.recordings(sensors)[0].camera[0]["name"] == sensors.camera
+    assert [item.camera[0]["name"] for item in recorded] == [
+        *("wide", "tele", "fovea", "standard", "paper"),
+        "tele",  # the least recently used when paper was recorded
+    ]
+
+
+def test_only_latching_rules_are_replayed():
+    assert is_latching(make_agent("spike-threshold"))
+    assert not is_latching(make_agent("graded"))
+    assert not is_latching(make_agent("ttc-oracle"))
+
+
+@pytest.mark.slow
+def test_the_values_of_no_brake_and_always_brake_are_the_bounds():
+    objective = Objective("train", 12, 0)
+    never, always = objective.evaluate("no-brake"), objective.evaluate("always-brake")
+    assert never.threats + never.non_threats == 12
+    assert (never.avoided_energy, never.false_rate) == (0.0, 0.0)
+    assert always.false_rate == 1.0

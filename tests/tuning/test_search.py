@@ -1,0 +1,112 @@
+"""Search with Optuna on objectives with a known maximum, and the `tune` command."""
+
+import pytest
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.cli import main as cli
+from lgmd_gym.tuning.objective import ObjectiveValue
+from lgmd_gym.tuning.search import sensitivity, tune
+from lgmd_gym.tuning.space import SearchSpace, agent_string
+
+
+class ThresholdObjective:
+    """Objective of `spike-threshold` with its maximum at a threshold of 100."""
+
+    def __init__(self):
+        self.evaluated = []
+
+    def evaluate(self, agent, sensor_config):
+        self.evaluated.append((agent, sensor_config))
+        threshold = make_agent(agent).params.threshold
+        return ObjectiveValue(1.0 - abs(threshold - 100.0) / 300.0, 0.0, 10, 10)
+
+
+class SensorObjective:
+    """Objective with its maximum at the camera tele and sigma_3 = 1.5."""
+
+    def evaluate(self, agent, sensor_config):
+        distance = abs(sensor_config.params["sigma_3"] - 1.5)
+        return ObjectiveValue(0.5 * (sensor_config.camera == "tele") - 0.3 * distance, 0.0, 10, 10)
+
+
+def test_a_study_starts_at_the_defaults_finds_the_maximum_and_resumes(tmp_path):
+    pytest.importorskip("optuna")
+    space, study, lines = SearchSpace(agent="spike-threshold"), tmp_path / "study.db", []
+    train = ThresholdObjective()
+    tune(space, study, 3, train, ThresholdObjective(), log=lines.append)
+    assert len(train.evaluated) == 3
+    assert "threshold=30.0" in train.evaluated[0][0]
+    best = tune(space, study, 20, train, ThresholdObjective(), log=lines.append)
+    assert len(train.evaluated) == 23
+    assert any(line.startswith("trial 22:") for line in lines)
+    assert abs(best["threshold"] - 100.0) < 35.0
+    assert make_agent(agent_string("spike-threshold", best)).params.threshold == best["threshold"]
+
+
+def test_validation_chooses_between_the_defaults_and_the_best_trials(tmp_path):
+    """The training objective prefers a threshold of 100, the validation objective one of 30."""
+    pytest.importorskip("optuna")
+
+    class DefaultIsBest(ThresholdObjective):
+        def evaluate(self, agent, sensor_config):
+            self.evaluated.append(agent)
+            threshold = make_agent(agent).params.threshold
+            return ObjectiveValue(1.0 - abs(threshold - 30.0) / 300.0, 0.0, 10, 10)
+
+    validation, space = DefaultIsBest(), SearchSpace(agent="spike-threshold")
+    best = tune(space, tmp_path / "study.db", 8, ThresholdObjective(), validation, log=lambda line: None)
+    assert len(validation.evaluated) == 4  # the defaults and the best three
+    assert best == space.defaults()
+
+
+def test_camera_and_neuron_are_searched_on_request(tmp_path):
+    pytest.importorskip("optuna")
+    space = SearchSpace(agent="spike-threshold", cameras=("fovea", "tele"), neuron=("sigma_3",))
+    study = tmp_path / "study.db"
+    best = tune(space, study, 30, SensorObjective(), SensorObjective(), log=lambda line: None)
+    assert best["camera"] == "tele"
+    assert abs(best["neuron.sigma_3"] - 1.5) < 0.3
+
+
+def test_sensitivity_evaluates_every_shift():
+    objective = ThresholdObjective()
+    rows = sensitivity(SearchSpace(agent="spike-threshold", neuron=("sigma_3",)), objective)
+    assert [name for name, _, _ in rows] == ["threshold"] * 2 + ["frames"] * 2 + ["neuron.sigma_3"] * 2
+    assert objective.evaluated[0] == ("spike-threshold:threshold=24.0", SensorConfig())
+    assert objective.evaluated[-1] == ("spike-threshold", SensorConfig(params={"sigma_3": 1.2}))
+    assert rows[1][2].avoided_energy == pytest.approx(1.0 - 64.0 / 300.0)
+
+
+def test_bench_accepts_the_options_that_tune_prints(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("optuna")
+    monkeypatch.chdir(tmp_path)
+    small = ["--levels", "2", "--seeds", "0", "--trials", "2", "--jobs", "1"]
+    space = ["--agent", "spike-threshold", "--cameras", "tele", "fovea", "--neuron", "sigma_3"]
+    assert cli.run(["tune", *small, *space]) == 0
+    printed = capsys.readouterr().out.splitlines()[-1].split(": ", 1)[1].split()
+    assert printed[0] == "--agents"
+    assert "--params" in printed
+    assert cli.run(["bench", *printed, "--suite", "r152", "--seeds", "1", "--jobs", "1"]) == 0
+    assert cli.run(["tune", *small, *space]) == 2
+    assert "'best.toml' exists; choose another --best" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("option", "message"),
+    [
+        (("--trials", "0"), "trials must be >= 1, got 0"),
+        (("--seeds", "-1"), "seeds must be >= 0, got -1"),
+        (("--false-cost", "0"), "false_cost must be > 0, got 0.0"),
+    ],
+)
+def test_invalid_options_are_refused(option, message, capsys):
+    assert cli.run(["tune", *option]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_the_command_prints_a_sensitivity_table(capsys):
+    sizes = ["--levels", "2", "--seeds", "0", "--jobs", "1"]
+    assert cli.run(["tune", "--agent", "spike-threshold", "--sensitivity", *sizes]) == 0
+    output = capsys.readouterr().out
+    assert [output.count(word) for word in ("defaults", "threshold ", "frames ")] == [1, 2, 2]
