@@ -7,7 +7,7 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.cli.options import Drive
 from lgmd_gym.cli.params import read_params
-from lgmd_gym.rendering.playback import drive
+from lgmd_gym.rendering.playback import play_episode
 
 KMH = 3.6  # km/h per m/s
 
@@ -15,7 +15,7 @@ KMH = 3.6  # km/h per m/s
 def run(options: Drive) -> int:
     """Run one episode and print how it ended."""
     agent = make_agent(options.agent)
-    result = drive(
+    result = play_episode(
         options.target,
         agent,
         options.seed,
@@ -23,7 +23,7 @@ def run(options: Drive) -> int:
         video=options.video,
         live=options.live,
         overlays=options.overlays,
-        **SensorConfig(options.camera, read_params(options.params)).for_agent(agent).arguments,
+        sensors=SensorConfig(options.camera, read_params(options.params)),
     )
     if result.stopped:
         print(f"window closed after {result.duration:.2f} s")

@@ -1,1 +1,1 @@
-"""The composed picture of camera frame, neuron layers and road, its window and its recording."""
+"""The composed picture of camera frame, neuron layers and road: drawing, playback, window and recording."""

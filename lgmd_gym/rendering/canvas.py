@@ -1,4 +1,4 @@
-"""A picture to draw on fast: pygame's shapes and text that is drawn once, straight into one array."""
+"""Canvas: a picture in one array, with pygame shapes and cached text."""
 
 from functools import lru_cache
 from typing import Any
@@ -10,8 +10,8 @@ from PIL import ImageFont
 Colour = tuple[int, int, int]
 Box = tuple[int, int, int, int]  # left, top, right, bottom [px]
 
-# Okabe & Ito's palette, told apart by colour-blind readers, on a dark ground.
-INK, FAINT, UNLIT, GROUND = (236, 236, 236), (158, 163, 172), (46, 49, 56), (20, 22, 26)
+# The palette of Okabe & Ito, which colour-blind readers can distinguish, on a dark background.
+INK, FAINT, UNLIT, BACKGROUND = (236, 236, 236), (158, 163, 172), (46, 49, 56), (20, 22, 26)
 SKY, RED, GREEN = (86, 180, 233), (229, 100, 20), (0, 130, 90)
 PINK, YELLOW, PURPLE = (222, 138, 184), (240, 228, 66), (180, 90, 160)
 
@@ -19,56 +19,56 @@ PINK, YELLOW, PURPLE = (222, 138, 184), (240, 228, 66), (180, 90, 160)
 class Canvas:
     """A picture of a fixed size.
 
-    Text is blended from masks that are made once: it needs no `pygame.font`, which any closed highway-env
-    window would take away.
+    Text is blended from cached masks instead of `pygame.font`, which closing any highway-env window would
+    shut down.
 
     Args:
         size: (width, height) [px].
 
     Attributes:
         pixels: The picture, uint8, shape (height, width, 3).
-        surface: The same memory for pygame.
+        surface: A pygame surface on the same memory.
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
         width, height = size
         self.pixels = np.zeros((height, width, 3), np.uint8)
         self.surface = pygame.image.frombuffer(self.pixels, size, "RGB")  # type: ignore[arg-type]
-        self._background: np.ndarray | None = None
+        self._saved: np.ndarray | None = None
 
     def clear(self) -> None:
-        """Go back to what `keep` kept."""
-        self.pixels[...] = GROUND if self._background is None else self._background
+        """Restore the saved background, or fill with the background colour."""
+        self.pixels[...] = BACKGROUND if self._saved is None else self._saved
 
-    def keep(self) -> None:
-        """Have `clear` go back to the present picture."""
-        self._background = self.pixels.copy()
+    def save_background(self) -> None:
+        """Save the current picture as the background that `clear` restores."""
+        self._saved = self.pixels.copy()
 
     def text(
         self, at: tuple[float, float], text: str, size: int, colour: Colour = INK, anchor: str = "la"
     ) -> None:
-        """Write one line of text.
+        """Draw one line of text.
 
         Args:
-            at: Where its anchor lies [px].
-            text: What to write.
-            size: Of the font [px].
-            colour: RGB.
-            anchor: PIL's: l, m or r, then a (ascender) or m (middle).
+            at: Position (x, y) of the anchor [px].
+            text: Text to draw.
+            size: Font size [px].
+            colour: RGB colour.
+            anchor: Anchor as in PIL: l, m or r, then a (ascender) or m (middle).
         """
         mask = _mask(text, size)
         height, width = mask.shape[:2]
         left = round(at[0] - {"l": 0.0, "m": 0.5, "r": 1.0}[anchor[0]] * width)
         top = round(at[1] - {"a": 0.0, "m": 0.5}[anchor[1]] * height)
-        room = self.pixels[max(top, 0) : top + height, max(left, 0) : left + width]
-        alpha = mask[: room.shape[0], : room.shape[1]]
-        room[...] = room + (np.array(colour, np.float32) - room) * alpha
+        area = self.pixels[max(top, 0) : top + height, max(left, 0) : left + width]
+        alpha = mask[: area.shape[0], : area.shape[1]]
+        area[...] = area + (np.array(colour, np.float32) - area) * alpha
 
     def tag(self, at: tuple[float, float], text: str, size: int) -> None:
-        """Write one line of text on a dark plate, centred, over whatever is there."""
+        """Draw one line of text, centred on a dark plate."""
         height, width = _mask(text, size).shape[:2]
         left, top = round(at[0] - width / 2), round(at[1] - height / 2)
-        self.pill((left - 5, top, left + width + 5, top + height), GROUND)
+        self.pill((left - 5, top, left + width + 5, top + height), BACKGROUND)
         self.text(at, text, size, INK, "mm")
 
     def rectangle(self, box: Box, colour: Colour) -> None:
@@ -77,7 +77,7 @@ class Canvas:
         self.pixels[max(top, 0) : bottom, max(left, 0) : right] = colour
 
     def pill(self, box: Box, colour: Colour) -> None:
-        """Fill a rectangle with round corners."""
+        """Fill a rectangle with rounded corners."""
         pygame.draw.rect(self.surface, colour, _rect(box), border_radius=8)
 
     def frame(self, box: Box, colour: Colour) -> None:
@@ -85,43 +85,43 @@ class Canvas:
         pygame.draw.rect(self.surface, colour, _rect(box), width=1)
 
     def lines(self, points: list[tuple[float, float]], colour: Colour, width: int = 1) -> None:
-        """Draw straight lines from point to point."""
+        """Draw a polyline."""
         if len(points) > 1:
             pygame.draw.lines(self.surface, colour, False, points, width)
 
-    def within(self, box: Box | None) -> None:
-        """Have shapes (not text) stay inside a box; None ends that."""
+    def clip(self, box: Box | None) -> None:
+        """Clip shapes, but not text, to a box; None removes the clipping."""
         self.surface.set_clip(None if box is None else _rect(box))
 
     def paste(self, pixels: np.ndarray, box: Box) -> Box:
-        """Paste an RGB picture, as large as fits, centred; with hard pixels if it is enlarged.
+        """Paste an RGB image, centred and scaled to fit a box; enlarged images are not smoothed.
 
         Args:
-            pixels: uint8, shape (height, width, 3), contiguous.
-            box: Where.
+            pixels: Contiguous image, uint8, shape (height, width, 3).
+            box: Box to fit.
 
         Returns:
-            The box that it fills.
+            The box of the scaled image.
         """
         height, width = pixels.shape[:2]
-        placed = fit((width, height), box)
+        placed = fit_box((width, height), box)
         size = placed[2] - placed[0], placed[3] - placed[1]
-        small = pygame.image.frombuffer(pixels, (width, height), "RGB")  # type: ignore[arg-type]
+        source = pygame.image.frombuffer(pixels, (width, height), "RGB")  # type: ignore[arg-type]
         scale = pygame.transform.scale if size[0] >= width else pygame.transform.smoothscale
-        scale(small, size, self.surface.subsurface(_rect(placed)))
+        scale(source, size, self.surface.subsurface(_rect(placed)))
         return placed
 
     def blit(self, surface: Any, at: tuple[int, int]) -> None:
-        """Copy one of pygame's surfaces as it is."""
+        """Copy a pygame surface without scaling."""
         self.surface.blit(surface, at)
 
 
-def fit(size: tuple[int, int], box: Box) -> Box:
-    """Return the largest centred box of the shape of `size` (width, height) inside a box."""
-    room = box[2] - box[0], box[3] - box[1]
-    scale = min(room[0] / size[0], room[1] / size[1])
+def fit_box(size: tuple[int, int], box: Box) -> Box:
+    """Return the largest centred box with the aspect ratio of `size` (width, height) inside a box."""
+    available = box[2] - box[0], box[3] - box[1]
+    scale = min(available[0] / size[0], available[1] / size[1])
     width, height = max(round(size[0] * scale), 1), max(round(size[1] * scale), 1)
-    left, top = box[0] + (room[0] - width) // 2, box[1] + (room[1] - height) // 2
+    left, top = box[0] + (available[0] - width) // 2, box[1] + (available[1] - height) // 2
     return left, top, left + width, top + height
 
 
@@ -131,20 +131,20 @@ def _rect(box: Box) -> pygame.Rect:
 
 @lru_cache(maxsize=2048)
 def _mask(text: str, size: int) -> np.ndarray:
-    """Return how much ink each pixel of a line of text has, float32, shape (height, width, 1), in [0, 1]."""
+    """Return the coverage of a line of text, float32, shape (height, width, 1), in [0, 1]."""
     font = _font(size)
     ascent, descent = font.getmetrics()
-    mask, (dx, dy) = font.getmask2(text, mode="L")
-    width, height = mask.size
-    room = np.zeros((ascent + descent, max(dx + width, 1), 1), np.float32)
-    ink = np.asarray(list(mask), np.float32).reshape(height, width)[: ascent + descent - dy]
-    room[dy : dy + ink.shape[0], dx : dx + width, 0] = ink / 255.0
-    return room
+    bitmap, (dx, dy) = font.getmask2(text, mode="L")
+    width, height = bitmap.size
+    mask = np.zeros((ascent + descent, max(dx + width, 1), 1), np.float32)
+    coverage = np.asarray(list(bitmap), np.float32).reshape(height, width)[: ascent + descent - dy]
+    mask[dy : dy + coverage.shape[0], dx : dx + width, 0] = coverage / 255.0
+    return mask
 
 
 @lru_cache
 def _font(size: int) -> Any:
-    """Return DejaVu Sans, which matplotlib carries and which has the signs that units need."""
+    """Return DejaVu Sans, which matplotlib ships and which contains the characters of units."""
     import matplotlib as mpl
 
     return ImageFont.truetype(f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf", size)

@@ -1,4 +1,4 @@
-"""Play one case, and show or record the composed picture of it."""
+"""Playback of one episode, with the composed picture in a window or a video file."""
 
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -9,31 +9,30 @@ import gymnasium as gym
 
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import Agent
-from lgmd_gym.benchmark.suites import SUITES, find_case
-from lgmd_gym.benchmark.suites import TRAFFIC
-from lgmd_gym.envs import FAMILIES, env_id
-from lgmd_gym.envs.registration import RANDOM
-from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, find_case
+from lgmd_gym.envs import env_id
+from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.rendering.dashboard import SIZE
 from lgmd_gym.rendering.view import LGMDView
 from lgmd_gym.rendering.window import Window
 from lgmd_gym.video import VideoWriter
 
-LINGER = 1.0  # [s] for which the last picture stays
+FINAL_SECONDS = 1.0  # [s], for which the last picture stays
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
-    """How a drive ended.
+class PlaybackResult:
+    """Result of a played episode; undefined values are infinite.
 
     Attributes:
-        collision: Whether the ego touched anybody.
-        impact_speed: Relative, NaN without contact [m/s].
-        ego_speed: At the end [m/s].
-        gap: At the end; NaN with nothing ahead [m].
+        collision: Whether the ego had contact.
+        impact_speed: Relative speed at contact [m/s].
+        ego_speed: Ego speed at the end [m/s].
+        gap: Free distance ahead at the end [m].
         duration: Simulated time [s].
-        stopped: Whether the window was closed before the end.
+        stopped: Whether the window was closed before the end of the episode.
     """
 
     collision: bool
@@ -45,32 +44,31 @@ class Drive:
 
 
 def make_target(target: str, arguments: dict[str, Any], **options: Any) -> gym.Env:
-    """Return the environment of an id, a case's name, or a kind of traffic.
+    """Return the environment of an id, a benchmark case or a kind of traffic.
 
     Args:
-        target: As "LGMD/CCRs-v0", "quick/CCRs/v30" or "traffic/merge".
-        arguments: The scenario's arguments, over those of the case; traffic takes none.
-        **options: `camera`, `params` and `render_mode`.
+        target: For example "LGMD/CCRs-v0", "quick/CCRs/v30" or "traffic/merge".
+        arguments: Scenario arguments, which override those of the case; not for traffic.
+        **options: Further arguments of `gym.make`, for example `camera`, `params` or `render_mode`.
 
     Raises:
-        ValueError: For an unknown target (the nearest is named) or argument.
+        ValueError: For an unknown target or argument.
     """
-    ids = [env_id(family) for family in (*FAMILIES, RANDOM)]
+    traffic = {f"{TRAFFIC}/{kind}": traffic_id(kind) for kind in KINDS}
+    target = traffic.get(target, target)
+    if target in traffic.values() and arguments:
+        raise ValueError(f"{target} must have no scenario arguments, got {', '.join(arguments)}; remove them")
+    ids = [name for name in gym.registry if name.startswith("LGMD/")]
     if target in ids:
         return gym.make(target, **options, **arguments)
-    kinds = [f"{TRAFFIC}/{kind}" for kind in KINDS]
-    if target in kinds:
-        if arguments:
-            raise ValueError(f"{target} takes no scenario arguments, got {', '.join(arguments)}")
-        return make_traffic(target.removeprefix(f"{TRAFFIC}/"), **options)
     cases = [case.name for suite in SUITES.values() for case in suite.cases]
     if target not in cases:
-        raise unknown_name("environment or case", target, [*ids, *cases, *kinds])
+        raise unknown_name("environment or case", target, [*ids, *cases, *traffic])
     case = find_case(target)
     return gym.make(env_id(case.family), **options, **{**dict(case.arguments), **arguments})
 
 
-def drive(
+def play_episode(
     target: str,
     agent: Agent,
     seed: int,
@@ -78,25 +76,26 @@ def drive(
     video: Path | None = None,
     live: bool = False,
     overlays: tuple[str, ...] = (),
-    **sensor_config: Any,
-) -> Drive:
-    """Play one episode, and show or write the composed picture if asked to.
+    sensors: SensorConfig | None = None,
+) -> PlaybackResult:
+    """Play one episode, and optionally show or record the composed picture.
 
     Args:
         target: See `make_target`.
-        agent: Who brakes.
-        seed: Of the environment and the agent.
-        arguments: The scenario's arguments, over those of the case.
-        video: The file to write, which must not exist; None to write none.
-        live: Whether to show a window, in real time.
+        agent: The agent that controls the ego.
+        seed: Seed of the environment and the agent.
+        arguments: Scenario arguments, which override those of the case.
+        video: Path of the video file, which must not exist; None for no video.
+        live: Whether to open a window, in real time.
         overlays: See `LGMDView`.
-        **sensor_config: `camera` and `params` of `LGMDObservation`.
+        sensors: Cameras and neurons; None for those of the agent.
 
     Raises:
-        ValueError: For an unknown name, a video that cannot be written, or no display.
+        ValueError: For an unknown name, a video that cannot be written, or a missing display.
     """
+    sensors = (sensors or SensorConfig()).for_agent(agent)
     with ExitStack() as stack:
-        env = make_target(target, arguments, **sensor_config)
+        env = make_target(target, arguments, **sensors.arguments)
         stack.callback(env.close)
         if video is None and not live:
             return _play(env, agent, seed, None)
@@ -104,43 +103,55 @@ def drive(
         rate = float(view.metadata["render_fps"])
         writer = stack.enter_context(VideoWriter(video, rate)) if video is not None else None
         window = stack.enter_context(Window(target, SIZE, rate)) if live else None
-        return _play(view, agent, seed, Screen(view, writer, window))
+        return _play(view, agent, seed, PictureOutput(view, writer, window))
 
 
-class Screen:
-    """Where the pictures of a view go: a file, a window, or both."""
+class PictureOutput:
+    """Output of pictures to a video file, a window, or both.
+
+    Args:
+        view: The view that renders the pictures.
+        writer: Writer of the video file; None for no file.
+        window: The window; None for no window.
+    """
 
     def __init__(self, view: LGMDView, writer: VideoWriter | None, window: Window | None) -> None:
         self._view, self._writer, self._window = view, writer, window
 
     def show(self, alert: bool) -> bool:
-        """Draw the present picture and pass it on; return whether anybody still watches."""
+        """Render the current picture with the agent's alert; return False if the window was closed."""
         self._view.agent_alert = alert
         picture = self._view.render()
+        assert picture is not None  # mode "rgb_array"
         if self._writer is not None:
             self._writer.write(picture)
         return self._window is None or self._window.show(picture)
 
 
-def _play(env: gym.Env, agent: Agent, seed: int, screen: Screen | None) -> Drive:
+def _play(env: gym.Env, agent: Agent, seed: int, output: PictureOutput | None) -> PlaybackResult:
     observation, info = env.reset(seed=seed)
     agent.reset(seed)
     rate = env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
-    done, watched, decisions = False, True, 0
+    done, is_open, decisions = False, True, 0
     while True:
-        # The agent judges what it has seen before the picture is drawn, so that its alert belongs to it.
+        # The agent acts before the picture is drawn, because the picture shows its alert.
         action = agent.act(observation, info)
-        if screen is not None:
-            watched = screen.show(agent.alert)
-        if done or not watched:
+        if output is not None:
+            is_open = output.show(agent.alert)
+        if done or not is_open:
             break
         observation, _, terminated, truncated, info = env.step(action)
         done = terminated or truncated
         decisions += 1
-    for _ in range(round(LINGER * rate)):
-        if screen is None or not watched:
+    for _ in range(round(FINAL_SECONDS * rate)):
+        if output is None or not is_open:
             break
-        watched = screen.show(agent.alert)
-    impact = info["relative_impact_speed"]
-    ended = bool(info["collision"]), impact, info["ego_speed"], info["gap"], decisions / rate
-    return Drive(*ended, stopped=not done)
+        is_open = output.show(agent.alert)
+    return PlaybackResult(
+        collision=bool(info["collision"]),
+        impact_speed=info["relative_impact_speed"],
+        ego_speed=info["ego_speed"],
+        gap=info["gap"],
+        duration=decisions / rate,
+        stopped=not done,
+    )

@@ -1,25 +1,26 @@
-"""What the lamps and bars of the composed picture show, for our environments and highway-env's own."""
+"""DisplayState: the quantities that the lamps and bars of the composed picture show."""
 
 from dataclasses import dataclass
 from math import inf
 from typing import Any
 
-BRAKES = 0.1  # [m/s²] of deceleration from which the brake lamp is lit
+BRAKING_THRESHOLD = 0.1  # [m/s²], deceleration above which the brake lamp is lit
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
-    """The state of a drive after a decision; SI units, inf where undefined.
+class DisplayState:
+    """State of an episode after a decision; undefined values are infinite.
 
     Attributes:
-        time: Since the reset [s].
-        speed: Of the ego [m/s].
+        time: Time since the reset [s].
+        speed: Ego speed [m/s].
         gap: Free distance along the ego's path [m].
         ttc: Time to contact [s].
-        deceleration: Of the ego; in our environments what is beyond its script, >= 0 [m/s²].
-        alert: Whether the neuron, or the agent if it told, warns.
-        contact: Whether the ego has touched anybody.
-        impact_speed: Relative, at the touch [m/s].
+        deceleration: Ego deceleration, >= 0 [m/s²]; in environments of this package, only the part beyond
+            the script.
+        alert: Whether the neuron, or the agent if it reports alerts, is in alert.
+        contact: Whether the ego has had contact.
+        impact_speed: Relative speed at contact [m/s].
     """
 
     time: float
@@ -34,21 +35,22 @@ class Moment:
     @property
     def braking(self) -> bool:
         """Whether the ego brakes."""
-        return self.deceleration > BRAKES
+        return self.deceleration > BRAKING_THRESHOLD
 
     @classmethod
-    def of(cls, host: Any, info: dict[str, Any], alert: bool | None = None) -> "Moment":
-        """Return the present moment.
+    def from_info(cls, env: Any, info: dict[str, Any], alert: bool | None = None) -> "DisplayState":
+        """Return the current state.
 
         Args:
-            host: The highway-env environment itself.
-            info: Of its last step; what highway-env's own environments do not tell stays undefined.
-            alert: What the agent says; None for the neuron's alert.
+            env: The unwrapped highway-env environment.
+            info: Info of its last step. Quantities that it lacks, as in stock highway-env environments, are
+                taken from the vehicle or stay undefined.
+            alert: Alert of the agent; None for that of the neuron.
         """
-        ego = host.vehicle
+        ego = env.vehicle
         action = getattr(ego, "action", None) or {}
         return cls(
-            time=float(host.time),
+            time=float(env.time),
             speed=float(info.get("ego_speed", ego.speed)),
             gap=float(info.get("gap", inf)),
             ttc=float(info.get("ttc", inf)),

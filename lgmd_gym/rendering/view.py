@@ -1,4 +1,4 @@
-"""`LGMDView`: the composed picture of eye, neuron and road as a Gymnasium wrapper."""
+"""LGMDView: wrapper that renders camera, neuron and road in one picture."""
 
 from typing import Any
 
@@ -7,34 +7,38 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from lgmd_gym.errors import unknown_name
-from lgmd_gym.rendering.overlays import OVERLAYS, check_overlays
-from lgmd_gym.rendering.state import Moment
+from lgmd_gym.rendering.overlays import OVERLAYS, checked_overlays
+from lgmd_gym.rendering.state import DisplayState
 from lgmd_gym.wrappers.observation import LGMDObservation
 
 MODES = ("rgb_array", "human")
 
 
 class LGMDView(gym.Wrapper, RecordConstructorArgs):
-    """Render what the eye sees, what its neuron says and where the cars are, in one 1280×720 picture.
+    """Render camera frame, neuron and road in one picture of 1280×720 pixels.
 
-    The picture has the eye's frame, the layers P, I, S and G, the spikes and the spike frequency of the last
-    5 s with the alert level, highway-env's view from above, bars for speed, gap, time to contact and braking,
-    and lamps for alert, braking and contact. It works on any highway-env environment inside
-    `LGMDObservation`, whatever that environment's own render mode; what highway-env's own environments do not
-    tell (gap, time to contact) is left blank. Observations, rewards and infos pass unchanged.
+    The picture shows the camera frame with overlays; the layers P, I, S and G; spikes and spike frequency of
+    the last 5 s with the alert level; highway-env's top view; bars for speed, gap, time to contact and
+    deceleration; and lamps for alert, braking and contact. Quantities that stock highway-env environments do
+    not provide (gap, time to contact) are left blank. Observations, rewards and infos are unchanged, and the
+    render mode of the wrapped environment does not matter.
 
     Args:
         env: An environment with `LGMDObservation` among its wrappers.
-        render_mode: "rgb_array": `render` returns the picture, so that Gymnasium's `RecordVideo` works
-            outside this wrapper. "human": every reset and step shows it in a window, in real time.
-        title: Shown at the top; None for the environment's id.
-        overlays: Drawn over the eye's frame: "zone", the lane of `danger_zone`; "targets", boxes around
-            who is ahead. Only an `EgoCamera` has them.
-        camera: Name of the camera shown large, with its layers; None for the first. Others are insets.
+        render_mode: "rgb_array": `render` returns the picture, for example for Gymnasium's `RecordVideo`.
+            "human": `reset` and `step` show the picture in a window, in real time.
+        title: Title at the top; None for the id of the environment.
+        overlays: Overlays on the camera frame: "zone", the edges of `danger_zone`, and "targets", boxes
+            around bodies ahead. They require an `EgoCamera`.
+        camera: Name of the camera to enlarge, with its layers; None for the first one. Other cameras are
+            insets. Of more than four cameras, None enlarges the one with the highest spike frequency.
+
+    Attributes:
+        agent_alert: Alert of the agent for the lamp; None for the alert of the neuron.
 
     Raises:
-        ValueError: For an environment without an eye or with a window of its own, an unknown mode, overlay
-            or camera, or "human" on a machine without a display.
+        ValueError: If `env` has no `LGMDObservation` or has a window of its own, a mode, overlay or camera
+            is unknown, or mode "human" has no display.
 
     Example:
         >>> import gymnasium as gym, lgmd_gym
@@ -60,61 +64,61 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
             raise unknown_name("render mode", render_mode, MODES)
         if env.render_mode == "human":
             raise ValueError(
-                "the environment shows a window of its own; make it without render_mode='human' and pass "
-                "that to LGMDView"
+                "env must not have render_mode 'human', which opens a second window; pass "
+                "render_mode='human' to LGMDView only"
             )
-        self._observer = find_observer(env)
+        self._observer = find_observation_wrapper(env)
         if camera is not None and camera not in self._observer.sensors.names:
             raise unknown_name("camera", camera, self._observer.sensors.names)
         self._mode, self._camera = render_mode, camera
-        self._overlays = check_overlays(overlays)
+        self._overlays = checked_overlays(overlays)
         self._title = title if title is not None else (env.spec.id if env.spec is not None else str(env))
-        self._picture: Any = None
+        self._dashboard: Any = None
         self._window: Any = None
         self._info: dict[str, Any] = {}
-        self._traced = self._observer.trace
-        self._observer.trace = True  # every camera frame belongs into the raster, also between decisions
-        self.metadata = {"render_modes": list(MODES), "render_fps": self._host.config["policy_frequency"]}
+        self._trace_requested = self._observer.trace
+        self._observer.trace = True  # the spike raster needs every camera frame, also within decisions
+        self.metadata = {"render_modes": list(MODES), "render_fps": env.unwrapped.config["policy_frequency"]}  # type: ignore[attr-defined]
         self.agent_alert: bool | None = None
-        """What the agent says about an alert; None shows the neuron's."""
 
     @property
     def render_mode(self) -> str:
-        """The mode of this wrapper, not of the environment inside."""
+        """Render mode of this wrapper, not of the wrapped environment."""
         return self._mode
 
     @property
     def window(self) -> Any:
-        """The `Window` of mode "human" once something was shown; None before."""
+        """The `Window` of mode "human"; None before the first picture."""
         return self._window
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Reset the environment and forget the last episode's trace."""
+        """Reset the environment and the trace; in mode "human", show the picture."""
         observation, info = self.env.reset(seed=seed, options=options)
         self.agent_alert = None
-        if self._picture is None:
-            from lgmd_gym.rendering.dashboard import Picture
+        if self._dashboard is None:
+            from lgmd_gym.rendering.dashboard import Dashboard
 
-            self._picture = Picture(self._observer, self._title, self._overlays, self._camera)
-        self._picture.clear()
-        return observation, self._took(info)
+            self._dashboard = Dashboard(self._observer, self._title, self._overlays, self._camera)
+        self._dashboard.clear()
+        return observation, self._update(info)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Step the environment; in mode "human", show the picture."""
         observation, reward, terminated, truncated, info = self.env.step(action)
-        return observation, reward, terminated, truncated, self._took(info)
+        return observation, reward, terminated, truncated, self._update(info)
 
-    def render(self) -> Any:
-        """Return the present picture, uint8, shape (720, 1280, 3); in mode "human" show it.
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        """Return the current picture, uint8, shape (720, 1280, 3); in mode "human", show it instead.
 
         Raises:
             RuntimeError: Before the first reset.
         """
-        if self._picture is None:
-            raise RuntimeError("nothing to draw yet; call reset first")
-        picture: np.ndarray = self._picture.draw(Moment.of(self._host, self._info, self.agent_alert))
+        if self._dashboard is None:
+            raise RuntimeError("reset must be called before render")
+        state = DisplayState.from_info(self.env.unwrapped, self._info, self.agent_alert)
+        picture: np.ndarray = self._dashboard.draw(state)
         if self._mode == "rgb_array":
             return picture
         self._show(picture)
@@ -126,16 +130,11 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
             self._window.close()
         super().close()
 
-    @property
-    def _host(self) -> Any:
-        """The highway-env environment underneath."""
-        return self.env.unwrapped
-
-    def _took(self, info: dict[str, Any]) -> dict[str, Any]:
-        """Take over the neurons' answers, and hand on the info as it would be without this wrapper."""
+    def _update(self, info: dict[str, Any]) -> dict[str, Any]:
+        """Add the outputs of the neurons to the trace; return the info as without this wrapper."""
         self._info = info
-        self._picture.take(info["lgmd/trace"])
-        if not self._traced:
+        self._dashboard.add(info["lgmd/trace"])
+        if not self._trace_requested:
             info = {key: value for key, value in info.items() if key != "lgmd/trace"}
         if self._mode == "human":
             self.render()
@@ -150,11 +149,15 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
         self._window.show(picture)
 
 
-def find_observer(env: gym.Env) -> LGMDObservation:
-    """Return the `LGMDObservation` among an environment's wrappers, or raise ValueError."""
+def find_observation_wrapper(env: gym.Env) -> LGMDObservation:
+    """Return the `LGMDObservation` among the wrappers of an environment.
+
+    Raises:
+        ValueError: If there is none.
+    """
     layer: Any = env
     while isinstance(layer, gym.Wrapper):
         if isinstance(layer, LGMDObservation):
             return layer
         layer = layer.env
-    raise ValueError(f"{env} has no LGMDObservation among its wrappers; wrap it first")
+    raise ValueError(f"env must have an LGMDObservation among its wrappers, got {env}; wrap it first")

@@ -1,4 +1,8 @@
-"""A window for pictures, at a steady pace; or a clear word where there is no display."""
+"""Live window for pictures.
+
+Gymnasium's `HumanRendering` has no title, ignores the close button and Escape, shuts down pygame for all
+other viewers of the process, and silently runs without a display.
+"""
 
 import os
 import sys
@@ -8,19 +12,20 @@ from contextlib import contextmanager
 import numpy as np
 import pygame
 
-NO_SCREEN = ("dummy", "offscreen", "evdev")  # SDL's drivers that show nothing
+INVISIBLE_DRIVERS = ("dummy", "offscreen", "evdev")  # SDL video drivers without a visible window
+DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
 
 
 class Window:
-    """A pygame window that shows RGB pictures in real time. Escape or its close button ends it.
+    """Pygame window that shows RGB pictures in real time; Escape or the close button closes it.
 
     Args:
-        title: In its bar.
+        title: Title of the window.
         size: (width, height) [px].
-        fps: Pictures per second; `show` waits for the next one's time [Hz].
+        fps: Pictures per second [Hz].
 
     Raises:
-        ValueError: If there is no display, naming the mend.
+        ValueError: If there is no display.
     """
 
     def __init__(self, title: str, size: tuple[int, int], fps: float) -> None:
@@ -32,10 +37,10 @@ class Window:
         self._clock = pygame.time.Clock()
 
     def show(self, picture: np.ndarray) -> bool:
-        """Show a picture and wait for the next one's time.
+        """Show a picture, then wait until the next one is due.
 
         Args:
-            picture: uint8, shape (height, width, 3), contiguous.
+            picture: Contiguous image, uint8, shape (height, width, 3).
 
         Returns:
             Whether the window is still open.
@@ -47,7 +52,7 @@ class Window:
             if event.type == pygame.QUIT or escape:
                 self.close()
                 return False
-        if self._title is not None:  # here, since a highway-env viewer writes its own name when it is made
+        if self._title is not None:  # not earlier, because new highway-env viewers set their own title
             pygame.display.set_caption(self._title)
             self._title = None
         height, width = picture.shape[:2]
@@ -63,45 +68,44 @@ class Window:
         self.close()
 
     def close(self) -> None:
-        """Close the window; pictures may still be drawn."""
+        """Close the window; pictures can still be drawn afterwards."""
         if self.open:
             self.open = False
-            # Not pygame.display.quit(): highway-env's viewers in this process need the display module.
+            # Not pygame.display.quit(), because highway-env viewers of this process need the display module.
             if pygame.display.get_init():
                 pygame.display.set_mode((1, 1), pygame.HIDDEN)
 
 
 def check_display() -> str:
-    """Return SDL's display driver.
+    """Return the name of SDL's video driver.
 
     Raises:
-        ValueError: If it shows nothing, and SDL_VIDEODRIVER does not ask for such a one.
+        ValueError: If there is no display, unless SDL_VIDEODRIVER selects an invisible driver.
     """
-    mend = "write a file with --video"
+    fix = "write a file with --video"
     if sys.platform.startswith("linux"):
-        mend += ", set DISPLAY, or start it under xvfb-run"
-    if headless():
-        raise ValueError(f"a window needs a display, and neither DISPLAY nor WAYLAND_DISPLAY is set; {mend}")
+        fix += ", set DISPLAY, or use xvfb-run"
+    if is_headless():
+        raise ValueError(f"a window needs a display, got neither DISPLAY nor WAYLAND_DISPLAY; {fix}")
     try:
         pygame.display.init()
         driver = pygame.display.get_driver()
     except pygame.error as error:
-        raise ValueError(f"a window needs a display and there is none ({error}); {mend}") from None
-    if driver in NO_SCREEN and os.environ.get("SDL_VIDEODRIVER") not in NO_SCREEN:
-        raise ValueError(f"a window needs a display and there is none (SDL's driver is {driver!r}); {mend}")
+        raise ValueError(f"a window needs a display, got the error {str(error)!r}; {fix}") from None
+    if driver in INVISIBLE_DRIVERS and os.environ.get("SDL_VIDEODRIVER") not in INVISIBLE_DRIVERS:
+        raise ValueError(f"a window needs a display, got the SDL driver {driver!r}; {fix}")
     return driver
 
 
-def headless() -> bool:
-    """Return whether this is a Linux machine on which nobody named a display."""
-    named = ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
-    return sys.platform.startswith("linux") and not any(os.environ.get(name) for name in named)
+def is_headless() -> bool:
+    """Return whether this is Linux and no environment variable names a display."""
+    return sys.platform.startswith("linux") and not any(map(os.environ.get, DISPLAY_VARIABLES))
 
 
 @contextmanager
-def quiet_start() -> Iterator[None]:
-    """Have SDL start without a display where there is none; it would complain on stderr while it looks."""
-    if not headless():
+def dummy_display() -> Iterator[None]:
+    """Select SDL's dummy driver on a headless machine, to prevent its warnings on stderr."""
+    if not is_headless():
         yield
         return
     os.environ["SDL_VIDEODRIVER"] = "dummy"

@@ -1,1 +1,1 @@
-"""Cameras and neurons as one sensor: sensor arrays, observation spaces, frame rates and frame buffers."""
+"""Cameras and neurons combined: sensor arrays, observation spaces, frame rates and frame buffers."""

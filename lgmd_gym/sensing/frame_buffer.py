@@ -1,94 +1,98 @@
-"""A wrapper that queues what an environment's cameras see, for neurons that are stepped elsewhere."""
+"""Frame buffers for batches of environments whose neurons are stepped together."""
 
 from typing import Any, NamedTuple
 
 import gymnasium as gym
+import numpy as np
 
 from lgmd_gym.sensing.road_hook import on_road_step
 from lgmd_gym.sensing.sensor_array import SensorArray
 from lgmd_gym.sensing.spaces import yaw_rate
 
 
-class Motion(NamedTuple):
-    """The ego's own motion at the end of a decision: speed [m/s] and mean yaw rate [rad/s]."""
+class EgoMotion(NamedTuple):
+    """Motion of the ego at the end of a decision: speed [m/s] and mean yaw rate [rad/s]."""
 
     speed: float
     yaw_rate: float
 
 
 class FrameBuffer:
-    """The frames of one decision of a batch of environments.
+    """Frames of a batch of environments during one decision.
+
+    Args:
+        sensors: The cameras and neurons of all environments.
 
     Attributes:
-        first: The frame of each environment's reset.
-        shown: The last frame of each environment, kept over decisions.
+        reset_frames: First frames after the last reset, see `SensorArray.empty_frames`.
+        last_frames: Last processed frames; they persist over decisions.
     """
 
     def __init__(self, sensors: SensorArray) -> None:
         self.sensors = sensors
-        self.first = sensors.empty_frames()
-        self.shown = sensors.empty_frames()
-        self._turns: list[Any] = []
+        self.reset_frames = sensors.empty_frames()
+        self.last_frames = sensors.empty_frames()
+        self._slots: list[list[np.ndarray]] = []
 
-    def turn(self, number: int) -> Any:
-        """Return the buffers of frame `number` of the decision, made when first needed."""
-        while len(self._turns) <= number:
-            self._turns.append(self.sensors.empty_frames())
-        return self._turns[number]
+    def slot(self, index: int) -> list[np.ndarray]:
+        """Return the buffers of the frames with this index in the decision; allocated on first use."""
+        while len(self._slots) <= index:
+            self._slots.append(self.sensors.empty_frames())
+        return self._slots[index]
 
 
 class FrameRecorder(gym.Wrapper):
-    """Renders one environment of a batch into a queue, frame after frame.
+    """Render every camera frame of one environment of a batch into a frame buffer.
 
     Args:
         env: A highway-env environment.
-        queue: Where frames go.
-        index: The environment's number in the batch.
+        buffer: Buffer for the frames.
+        index: Index of the environment in the batch.
         stride: Simulation steps per camera frame.
 
     Attributes:
-        frames: Frames queued in this decision before a reset, if there was one.
-        was_reset: Whether there was a reset in this decision.
-        motion: At the end of the decision.
-        final: At the end of the episode that the last reset ended.
+        frame_count: Number of frames recorded in this decision, before a reset.
+        was_reset: Whether the environment was reset in this decision.
+        motion: Ego motion at the end of the decision.
+        final_motion: Ego motion at the end of the last episode.
     """
 
-    def __init__(self, env: gym.Env, queue: FrameBuffer, index: int, stride: int) -> None:
+    def __init__(self, env: gym.Env, buffer: FrameBuffer, index: int, stride: int) -> None:
         super().__init__(env)
-        self.queue, self.index, self.stride = queue, index, stride
-        self.motion = self.final = Motion(0.0, 0.0)
-        self.begin()
+        self.buffer, self.index, self.stride = buffer, index, stride
+        self.motion = self.final_motion = EgoMotion(0.0, 0.0)
+        self.start_decision()
 
-    def begin(self) -> None:
-        """Start a decision: nothing is queued yet."""
-        self.frames = 0
+    def start_decision(self) -> None:
+        """Discard the frames of the last decision."""
+        self.frame_count = 0
         self.was_reset = False
 
     def reset(self, **arguments: Any) -> tuple[Any, dict[str, Any]]:
         """Reset the environment and render its first frame."""
-        observed = self.env.reset(**arguments)
+        result = self.env.reset(**arguments)
         on_road_step(self.env, self._on_substep)
         self.was_reset = True
         self._substeps = 0
-        self.queue.sensors.fit(self.env, self.index)
-        self.queue.sensors.render(self.env.unwrapped, self.queue.first, self.index)
+        self.buffer.sensors.apply_camera_fields(self.env, self.index)
+        self.buffer.sensors.render(self.env.unwrapped, self.buffer.reset_frames, self.index)
         vehicle = self.env.unwrapped.vehicle  # type: ignore[attr-defined]
-        self.final, self.motion = self.motion, Motion(float(vehicle.speed), 0.0)
+        self.final_motion, self.motion = self.motion, EgoMotion(float(vehicle.speed), 0.0)
         self._heading = float(vehicle.heading)
-        return observed
+        return result
 
     def step(self, action: Any) -> Any:
-        """Step the environment; every camera frame is queued on the way."""
+        """Step the environment and record its camera frames."""
         substeps, heading = self._substeps, self._heading
-        stepped = self.env.step(action)
+        result = self.env.step(action)
         base: Any = self.env.unwrapped
         self._heading = float(base.vehicle.heading)
         elapsed = (self._substeps - substeps) / base.config["simulation_frequency"]
-        self.motion = Motion(float(base.vehicle.speed), yaw_rate(self._heading, heading, elapsed))
-        return stepped
+        self.motion = EgoMotion(float(base.vehicle.speed), yaw_rate(self._heading, heading, elapsed))
+        return result
 
     def _on_substep(self) -> None:
         self._substeps += 1
         if self._substeps % self.stride == 0:
-            self.queue.sensors.render(self.env.unwrapped, self.queue.turn(self.frames), self.index)
-            self.frames += 1
+            self.buffer.sensors.render(self.env.unwrapped, self.buffer.slot(self.frame_count), self.index)
+            self.frame_count += 1

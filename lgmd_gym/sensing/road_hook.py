@@ -1,4 +1,4 @@
-"""The seam: being told of every simulation step of a highway-env road."""
+"""Callbacks after each simulation step of a highway-env road."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,31 +7,38 @@ import gymnasium as gym
 
 
 class HookedStep:
-    """`Road.step` of one road that also tells a watcher; a class, so that deep copies step their own road."""
+    """Replacement of `Road.step` that calls a callback afterwards.
 
-    def __init__(self, step: Callable[[float], None], tell: Callable[[], None]) -> None:
+    It is a class because a deep copy of an environment must step its own road.
+
+    Args:
+        step: The original `Road.step`.
+        callback: Bound method to call after each step.
+    """
+
+    def __init__(self, step: Callable[[float], None], callback: Callable[[], None]) -> None:
         self.step = step
-        self.tell: Any = tell
+        self.callback = callback
 
     def __call__(self, dt: float) -> None:
-        """Step the road by `dt` [s], then tell."""
+        """Step the road by `dt` [s]."""
         self.step(dt)
-        self.tell()
+        self.callback()
 
 
-def on_road_step(env: gym.Env, tell: Callable[[], None]) -> None:
-    """Have the present road of an environment call a bound method after each of its steps.
+def on_road_step(env: gym.Env, callback: Callable[[], None]) -> None:
+    """Register a bound method that the current road calls after each step.
 
-    Every reset of a highway-env environment brings a new road, so this is called after each; on a road
-    that is kept it changes nothing the second time.
+    A reset of a highway-env environment creates a new road, so call this function after each reset. A
+    repeated call for the same road has no effect.
     """
     road: Any = env.unwrapped.road  # type: ignore[attr-defined]
-    if not (isinstance(road.step, HookedStep) and road.step.tell == tell):
-        road.step = HookedStep(road.step, tell)
+    if not (isinstance(road.step, HookedStep) and road.step.callback == callback):
+        road.step = HookedStep(road.step, callback)
 
 
-def check_highway(env: gym.Env) -> None:
-    """Raise ValueError if this is no highway-env environment."""
+def check_highway_env(env: gym.Env) -> None:
+    """Raise ValueError for an environment that is not a highway-env environment."""
     base: Any = env.unwrapped
     if not hasattr(base, "road") or "simulation_frequency" not in getattr(base, "config", {}):
-        raise ValueError(f"LGMDObservation needs a highway-env environment, got {base!r}")
+        raise ValueError(f"env must be a highway-env environment, got {base!r}")

@@ -1,4 +1,4 @@
-"""Gymnasium wrappers that add the neuron to an environment."""
+"""Gymnasium wrappers that add cameras and neurons to highway-env environments."""
 
 from lgmd_gym.wrappers.observation import LGMDObservation, TraceFrame
 

@@ -1,4 +1,4 @@
-"""`LGMDObservation`: a locust looming neuron behind a camera on any highway-env car."""
+"""LGMDObservation: wrapper that adds cameras and LGMD neurons to a highway-env environment."""
 
 import json
 from dataclasses import asdict
@@ -8,21 +8,21 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from lgmd_gym.camera import CameraParams
-from lgmd_gym.neuron import LGMDParams, Response
+from lgmd_gym.camera import CameraParams, CameraSpec
+from lgmd_gym.neuron import LGMDParams, NeuronSpec, Response
 from lgmd_gym.sensing.frame_rate import camera_rate
-from lgmd_gym.sensing.road_hook import check_highway, on_road_step
+from lgmd_gym.sensing.road_hook import check_highway_env, on_road_step
 from lgmd_gym.sensing.sensor_array import SensorArray
-from lgmd_gym.sensing.spaces import make_space, signal_info, signals, yaw_rate
+from lgmd_gym.sensing.spaces import make_space, signal_arrays, signal_info, yaw_rate
 
 
 class TraceFrame(NamedTuple):
-    """What the eye told at one camera frame.
+    """Outputs of the neurons for one camera frame.
 
     Attributes:
         time: Simulated time since the reset [s].
-        ego_speed: [m/s].
-        response: The neurons' answer, each field an array of shape (cameras,).
+        ego_speed: Ego speed [m/s].
+        response: Outputs of the neurons, arrays of shape (cameras,).
     """
 
     time: float
@@ -31,49 +31,52 @@ class TraceFrame(NamedTuple):
 
 
 class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
-    """Observe the spike frequency of an LGMD that watches the road through a camera on the ego.
+    """Observe LGMD neurons, each driven by a camera on the ego vehicle of a highway-env environment.
 
-    Every camera frame inside a decision is rendered and stepped, however slowly the policy acts; a decision
-    without a new frame holds the last values. At `reset` the neuron sees its first frame.
+    Every camera frame is rendered and processed, also if the policy acts at a lower rate. In a decision
+    without a new frame, the observation keeps the last values. `reset` processes the first frame.
 
-    The observation is a `Dict`, float32 unless said otherwise:
+    **Observation space**: a `Dict` of `Box` spaces, float32 unless stated otherwise.
 
-    ==================  ===========================  ======================================================
-    key                 shape                        meaning, range
-    ==================  ===========================  ======================================================
-    spike_frequency     (cameras,)                   spikes/s over the last N_ts frames, [0, 10·fps]-ish
-    membrane_potential  (cameras,)                   K of eq. 10, [0.5, 1]
-    ffi                 (cameras,)                   F̂ of FFI-M in grey levels, [0, 255/(1 − Σa_i)]
-    ego_speed           (1,)                         [m/s]
-    ego_yaw_rate        (1,)                         mean over the decision [rad/s], + right as highway-env
-    frame               (height, width, cameras)     uint8, if `include_frame`
-    base                as the environment's         if `include_base`
-    ==================  ===========================  ======================================================
+    ======================  ==========================  =================================================
+    key                     shape                       meaning, range, unit
+    ======================  ==========================  =================================================
+    ``spike_frequency``     (cameras,)                  spikes of the last n_ts frames [spikes/s], from 0
+                                                        to about 10 · fps
+    ``membrane_potential``  (cameras,)                  K (eq. 10), 0.5 to 1
+    ``ffi``                 (cameras,)                  F̂ [grey levels], 0 to 255 / (1 − Σ a_i)
+    ``ego_speed``           (1,)                        ego speed [m/s], −100 to 100
+    ``ego_yaw_rate``        (1,)                        mean yaw rate of the decision [rad/s], positive
+                                                        to the right as in highway-env
+    ``frame``               (height, width, cameras)    grey frames, uint8, with `include_frame`
+    ``base``                as in the environment       its own observation, with `include_base`
+    ======================  ==========================  =================================================
 
-    `info` gains, as floats, `lgmd/<camera>/spike_frequency`, `lgmd/<camera>/membrane_potential`,
-    `lgmd/<camera>/ffi`, and the bool `lgmd/alert`: whether any camera's frequency is at its alert level.
+    **Info**: the floats ``lgmd/<camera>/spike_frequency``, ``lgmd/<camera>/membrane_potential`` and
+    ``lgmd/<camera>/ffi`` per camera; the bool ``lgmd/alert``, whether the spike frequency of any camera is
+    >= t_sf; with `trace`, the list ``lgmd/trace`` of a `TraceFrame` per camera frame of the step.
 
-    An environment may change the view at each reset through an attribute `camera_fields`: a dict of
-    `CameraParams` fields and `condition`, laid over the cameras.
+    An environment can change the cameras at each reset through an attribute ``camera_fields``: a dict of
+    `CameraParams` fields, and optionally ``condition``.
 
     Args:
-        env: Any highway-env environment, wrapped or not.
-        camera: A preset name ("wide", "standard", "tele", "fovea", "paper"), "birdseye", a `CameraParams`,
-            the dict of one, or a list of these.
-        params: `LGMDParams` or the dict of one; None for the paper's values.
-        fps: Camera frames per second; None for 30 where that divides `simulation_frequency`, else every
-            simulation step.
-        include_frame: Whether the frames are part of the observation; the cameras need one shape.
-        include_base: Whether the wrapped environment's own observation is.
-        trace: Whether `info["lgmd/trace"]` lists a `TraceFrame` for every camera frame of the step.
+        env: A highway-env environment, wrapped or not.
+        camera: A preset name ("wide", "standard", "tele", "fovea", "paper"), "birdseye", `CameraParams`, a
+            mapping of its fields, or a sequence of these.
+        params: `LGMDParams` or a mapping of its fields; None for the defaults.
+        fps: Camera frame rate [Hz]; None for 30 if that divides `simulation_frequency`, else
+            `simulation_frequency` itself.
+        include_frame: Whether to include the frames; all cameras must have the same shape.
+        include_base: Whether to include the observation of the wrapped environment.
+        trace: Whether to add ``lgmd/trace`` to the info.
 
     Attributes:
-        rendering_paused: Set it to have no more frames drawn until the next reset, because nobody will look: the
-            neurons' values then stand still.
+        rendering_paused: If set, skip rendering until the next reset; the outputs of the neurons are
+            constant meanwhile.
 
     Raises:
-        ValueError: For an environment that is not highway-env's, an unknown camera or parameter, a rate that
-            does not divide, or frames of different shapes with `include_frame`.
+        ValueError: If `env` is not a highway-env environment, a camera or parameter is unknown, `fps` does
+            not divide `simulation_frequency`, or `include_frame` is set for cameras of different shapes.
 
     Example:
         >>> import gymnasium as gym, lgmd_gym
@@ -86,8 +89,8 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     def __init__(
         self,
         env: gym.Env,
-        camera: Any = "fovea",
-        params: Any = None,
+        camera: CameraSpec = "fovea",
+        params: NeuronSpec = None,
         fps: float | None = None,
         include_frame: bool = False,
         include_base: bool = False,
@@ -95,75 +98,74 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     ) -> None:
         RecordConstructorArgs.__init__(
             self,
-            camera=_plain(camera),
-            params=_plain(params),
+            camera=_to_json(camera),
+            params=_to_json(params),
             fps=fps,
             include_frame=include_frame,
             include_base=include_base,
             trace=trace,
         )
         gym.Wrapper.__init__(self, env)
-        check_highway(env)
-        self.params = as_params(params)
+        check_highway_env(env)
+        self.params = LGMDParams.make(params)
         self.camera = camera
         self.include_frame, self.include_base, self.trace = include_frame, include_base, trace
-        self._fps_wish = fps
-        self._response: Response | None = None
-        self._seen: list[TraceFrame] = []
+        self._requested_fps = fps
+        self._last_response: Response | None = None
+        self._trace_frames: list[TraceFrame] = []
         self._substeps, self._heading = 0, 0.0
         self.rendering_paused = False
-        self._set_rate()
+        self._build_sensors()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Reset the environment and the neurons, and show them the first frame."""
+        """Reset the environment and the neurons, and process the first frame."""
         base, info = self.env.reset(seed=seed, options=options)
-        if self._host.config["simulation_frequency"] != self._simulation_frequency:
-            self._set_rate()
+        if self._highway_env.config["simulation_frequency"] != self._simulation_frequency:
+            self._build_sensors()
         self.sensors.reset()
-        self.sensors.fit(self._host)
+        self.sensors.apply_camera_fields(self._highway_env)
         on_road_step(self.env, self._on_substep)
-        self._substeps, self._seen, self.rendering_paused = 0, [], False
-        self._see()
-        self._heading = float(self._host.vehicle.heading)
-        return self._observation(base, 0.0), self._informed(info)
+        self._substeps, self._trace_frames, self.rendering_paused = 0, [], False
+        self._process_frame()
+        self._heading = float(self._highway_env.vehicle.heading)
+        return self._observation(base, 0.0), self._extend_info(info)
 
     def step(self, action: Any) -> tuple[dict[str, Any], Any, bool, bool, dict[str, Any]]:
-        """Step the environment; the neurons see every camera frame on the way."""
-        self._seen = []
+        """Step the environment and process its camera frames."""
+        self._trace_frames = []
         substeps, heading = self._substeps, self._heading
         base, reward, terminated, truncated, info = self.env.step(action)
-        self._heading = float(self._host.vehicle.heading)
+        self._heading = float(self._highway_env.vehicle.heading)
         rate = yaw_rate(self._heading, heading, (self._substeps - substeps) / self._simulation_frequency)
-        return self._observation(base, rate), reward, terminated, truncated, self._informed(info)
+        return self._observation(base, rate), reward, terminated, truncated, self._extend_info(info)
 
     def close(self) -> None:
-        """Close the cameras that hold resources, then the environment."""
+        """Close the cameras, then the environment."""
         self.sensors.close()
         super().close()
 
     @property
     def frames(self) -> dict[str, np.ndarray]:
-        """The last frame of each camera by name, uint8 (height, width); overwritten by the next one."""
+        """The last frame of each camera, uint8 (height, width); the next frame overwrites it."""
         return {
-            name: self.sensors.of_camera(self._frames, index) for index, name in enumerate(self.sensors.names)
+            name: self.sensors.frame_of(self._frames, index) for index, name in enumerate(self.sensors.names)
         }
 
     @property
     def response(self) -> Response:
-        """The neurons' answer to the last camera frame, arrays of shape (cameras,)."""
-        return Response(*(field[0] for field in self._answered()))
+        """Outputs of the neurons for the last camera frame, arrays of shape (cameras,)."""
+        return Response(*(field[0] for field in self._batched_response()))
 
     @property
-    def _host(self) -> Any:
-        """The highway-env environment underneath."""
+    def _highway_env(self) -> Any:
         return self.env.unwrapped
 
-    def _set_rate(self) -> None:
-        """Build sensors and space for the simulation's present frequency."""
-        self._simulation_frequency = self._host.config["simulation_frequency"]
-        self.fps = camera_rate(self._fps_wish, self._simulation_frequency)
+    def _build_sensors(self) -> None:
+        """Build the sensors and the observation space for the current simulation frequency."""
+        self._simulation_frequency = self._highway_env.config["simulation_frequency"]
+        self.fps = camera_rate(self._requested_fps, self._simulation_frequency)
         self._stride = round(self._simulation_frequency / self.fps)
         self.sensors = SensorArray(self.camera, self.fps, self.params)
         self._frames = self.sensors.empty_frames()
@@ -175,25 +177,27 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     def _on_substep(self) -> None:
         self._substeps += 1
         if self._substeps % self._stride == 0:
-            self._see()
+            self._process_frame()
 
-    def _see(self) -> None:
+    def _process_frame(self) -> None:
         if self.rendering_paused:
             return
-        self.sensors.render(self._host, self._frames)
-        self._response = self.sensors.step(self._frames)
+        self.sensors.render(self._highway_env, self._frames)
+        self._last_response = self.sensors.step(self._frames)
         if self.trace:
             time = self._substeps / self._simulation_frequency
-            self._seen.append(TraceFrame(time, float(self._host.vehicle.speed), self.response))
+            speed = float(self._highway_env.vehicle.speed)
+            self._trace_frames.append(TraceFrame(time, speed, self.response))
 
-    def _answered(self) -> Response:
-        if self._response is None:
-            raise RuntimeError("no frame was seen yet; call reset first")
-        return self._response
+    def _batched_response(self) -> Response:
+        """Return the last response, arrays of shape (1, cameras)."""
+        if self._last_response is None:
+            raise RuntimeError("reset must be called before step")
+        return self._last_response
 
     def _observation(self, base: Any, rate: float) -> dict[str, Any]:
-        observation: dict[str, Any] = dict(signals(self._answered(), 0))
-        observation["ego_speed"] = np.array([self._host.vehicle.speed], dtype=np.float32)
+        observation: dict[str, Any] = dict(signal_arrays(self._batched_response(), 0))
+        observation["ego_speed"] = np.array([self._highway_env.vehicle.speed], dtype=np.float32)
         observation["ego_yaw_rate"] = np.array([rate], dtype=np.float32)
         if self.include_frame:
             observation["frame"] = np.stack(list(self.frames.values()), axis=-1)
@@ -201,26 +205,19 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
             observation["base"] = base
         return observation
 
-    def _informed(self, info: dict[str, Any]) -> dict[str, Any]:
-        info = info | signal_info(self._answered(), 0, self.sensors.names)
+    def _extend_info(self, info: dict[str, Any]) -> dict[str, Any]:
+        info = info | signal_info(self._batched_response(), 0, self.sensors.names)
         if self.trace:
-            info["lgmd/trace"] = self._seen
+            info["lgmd/trace"] = self._trace_frames
         return info
 
 
-def as_params(params: Any) -> LGMDParams:
-    """Return neuron parameters from parameters, the dict of some, or None for the paper's."""
-    if params is None:
-        return LGMDParams()
-    return params if isinstance(params, LGMDParams) else LGMDParams.from_dict(params)
-
-
-def _plain(value: Any) -> Any:
-    """Return a camera or params argument as what JSON gives back, so that a spec survives the round trip."""
+def _to_json(value: Any) -> Any:
+    """Return a `camera` or `params` argument as plain JSON values, for `EnvSpec.to_json`."""
     if isinstance(value, CameraParams):
         value = asdict(value)
     elif isinstance(value, LGMDParams):
         value = value.to_dict()
     elif isinstance(value, list | tuple):
-        value = [_plain(item) for item in value]
+        value = [_to_json(item) for item in value]
     return json.loads(json.dumps(value))
