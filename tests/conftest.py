@@ -1,17 +1,19 @@
-"""What several test files share."""
+"""Fixtures of several test files."""
 
 import pytest
-from support.clips import store
+from support.clips import write_lossless
 
-from lgmd_gym.paper.stimuli import Looming, Plain, Screen, frames
+from lgmd_gym.paper.backgrounds import Plain, Screen
+from lgmd_gym.paper.stimuli import Looming, stimulus_frames
 
 
 @pytest.fixture(scope="session")
 def looming():
-    """A dark square that arrives at 1.4 s, held for a while."""
-    return list(frames(Screen(shape=(48, 96), px_per_m=300.0), 2.0, Plain(), Looming(contact=1.4)))
+    """Frames of a dark square with contact at 1.4 s, static from then on."""
+    return list(stimulus_frames(Screen(shape=(48, 96), px_per_m=300.0), 2.0, Plain(), Looming(contact=1.4)))
 
 
 @pytest.fixture(scope="session")
 def clip(tmp_path_factory, looming):
-    return store(tmp_path_factory.mktemp("clips") / "loom.mkv", looming)
+    """A lossless clip of `looming`."""
+    return write_lossless(tmp_path_factory.mktemp("clips") / "loom.mkv", looming)

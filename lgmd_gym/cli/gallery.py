@@ -7,6 +7,7 @@ from lgmd_gym.gallery.build import make_gallery
 
 def run(options: Gallery) -> int:
     """Write the gallery and print its path."""
-    page = make_gallery(options.out, options.families, options.agent, options.seeds, make_console().print)
+    names = options.families or ()
+    page = make_gallery(options.out, names, options.agent, options.seeds, make_console().print)
     print(f"gallery: {page}")
     return 0

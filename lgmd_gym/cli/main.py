@@ -38,8 +38,6 @@ COMMANDS: dict[str, type] = {
     "doctor": options.Doctor,
 }
 
-_MODULES = {"video": "paper"}
-
 
 def main(argv: list[str] | None = None) -> None:
     """Run the command line and exit; bad input gives one line on stderr and exit code 2."""
@@ -51,8 +49,7 @@ def run(argv: list[str] | None = None) -> int:
     try:
         command = _parse(argv)
         name = next(name for name, cls in COMMANDS.items() if isinstance(command, cls))
-        module = import_module(f"lgmd_gym.cli.{_MODULES.get(name, name)}")
-        return (getattr(module, "run", None) or getattr(module, name))(command)
+        return import_module(f"lgmd_gym.cli.{name}").run(command)
     except (ValueError, TypeError) as error:
         print(f"lgmd-gym: {' '.join(str(error).split())}", file=sys.stderr)
         return 2

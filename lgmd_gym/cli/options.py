@@ -18,6 +18,7 @@ Names = Annotated[tuple[str, ...] | None, arg(metavar="NAME [NAME ...]", help_be
 Count = Annotated[int | None, arg(metavar="N", help_behavior_hint=_default_hint)]
 Number = Annotated[float | None, arg(metavar="X", help_behavior_hint=_default_hint)]
 File = Annotated[Path | None, arg(metavar="PATH", help_behavior_hint=_default_hint)]
+SecondFile = Annotated[Path | None, arg(metavar="[PATH]", help_behavior_hint=_default_hint)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,32 +64,24 @@ class Bench:
 
 @dataclass(frozen=True, kw_only=True)
 class Compare:
-    """Say how two runs differ, pair by pair: the same case, seed and condition.
+    """Compare agents in pairs, or several trainings as arms, on the same episodes.
 
-    Differences are B less A, with 95 % intervals from a bootstrap that draws whole cases.
+    Pairs: differences B − A over episodes of the same case, seed and condition, with 95 % intervals from a
+    bootstrap over cases. Arms: mean return and shares of each arm, and the difference to the first arm. Arms
+    need one run of all agents: lgmd-gym bench --suite random --agents policy:a0.zip policy:a1.zip ttc-oracle.
     """
 
     run_a: Positional[Path]
-    """Run folder."""
-    run_b: Positional[Path | None] = None
-    """Another run folder; without it, agents within the first are compared."""
-    agents: tuple[str, ...] | None = None
-    """Two agents: A's and B's. Default: every agent that both runs hold, or all pairs within one."""
-    out: Path | None = None
-    """PNG of the differences to write; must not exist."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Judge:
-    """Judge arms of a run: trainings of one kind taken together, or rules, over the same episodes.
-
-    Play them first: lgmd-gym bench --suite random --seeds 1 --agents policy:a0.zip policy:a1.zip ttc-oracle.
-    """
-
-    run: Positional[Path]
-    """Run folder."""
-    arms: tuple[str, ...] = ()
-    """An agent of the run, or name=pattern of agents, as in lgmd=policy:*lgmd*. Default: every agent."""
+    """Run folder of A."""
+    run_b: Positional[SecondFile] = None
+    """Run folder of B. Default: compare agents within the first run."""
+    agents: Names = None
+    """Agent of A and agent of B. Default: every agent of both runs, or all pairs within one run."""
+    arms: Names = None
+    """Arms of the first run, each NAME=AGENT,AGENT,... (wildcards allowed, for example lgmd=policy:*lgmd*) or
+    a single agent. --arms without names makes every agent an arm."""
+    out: File = None
+    """PNG or SVG file for the figure of the paired differences; must not exist."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,55 +113,62 @@ class Drive:
 
 @dataclass(frozen=True, kw_only=True)
 class Video:
-    """Watch video clips with the neuron: spike traces, figures, overlay videos, a detection table.
+    """Run the neuron on video clips: spike traces, figures, overlay videos, a detection table.
 
-    For each clip the run folder gets trace.csv (one row per frame), trace.png and, if asked, overlay.mp4.
+    For each clip the run folder contains trace.csv (one row per frame), trace.png and, with --overlay,
+    overlay.mp4.
     """
 
     clips: Positional[tuple[str, ...]]
-    """Video files, or folders of them; any file that ffmpeg reads."""
-    choices: tuple[str, ...] = ("paper",)
-    """Named ways to watch, compared in one table if several: paper, calm, paper-18hz, t_sf-60, t_sp-0.78,
-    released, off-only, fixed-inhibition, yue-rind-2006; or all."""
-    crashes: Path | None = None
-    """CSV with the columns clip,crash_frame (empty for no crash): prints the detection table."""
-    crash_frame: int | None = None
-    """Crash frame of a single clip, 0-based: marked in the figure."""
-    out: Path | None = None
+    """Video files in any format that ffmpeg reads, or folders with video files."""
+    configs: tuple[str, ...] = ("paper",)
+    """Named configurations of the neuron, compared in one table if several: paper, conservative, paper-18hz,
+    t_sf-60, t_sp-0.78, released, off-only, fixed-inhibition, yue-rind-2006; or all."""
+    crashes: File = None
+    """CSV file with the columns clip,crash_frame (empty for no crash); prints the detection table."""
+    crash_frame: Count = None
+    """Crash frame of a single clip, 0-based; prints the detection table."""
+    out: File = None
     """Run folder; must not exist. Default: runs/video-DATE-TIME."""
-    params: Path | None = None
-    """TOML file of LGMD parameters, in place of the choice's."""
-    threshold: float | None = None
-    """Alarm level T_sf [spikes/s]; read it together with the frame rate."""
-    fps: float | None = None
-    """Resample to this rate [Hz]; the neuron's answer depends on it."""
-    drop_duplicates: float | None = None
-    """Hide frames that change by less than this fraction of the typical change, as 0.25; 0 shows all."""
-    size: tuple[int, int] | None = None
-    """Scale to this width and height [px]."""
-    roi: tuple[int, int, int, int] | None = None
-    """The neuron sees only this region: top left height width [px]."""
+    params: File = None
+    """TOML file of LGMD parameters; replaces those of the configuration."""
+    threshold: Number = None
+    """Alarm level T_sf [spikes/s]; it applies to one frame rate."""
+    fps: Number = None
+    """Frame rate to resample to [Hz]; the neuron's response depends on it. Default: the clip's."""
+    drop_duplicates: Number = None
+    """Skip frames whose difference is below this fraction of the typical difference, for example 0.25; 0
+    disables the filter. Default: from the configuration."""
+    size: Annotated[tuple[int, int] | None, arg(metavar="WIDTH HEIGHT", help_behavior_hint=_default_hint)] = (
+        None
+    )
+    """Size to scale to [px]. Default: the clip's."""
+    roi: Annotated[
+        tuple[int, int, int, int] | None,
+        arg(metavar="TOP LEFT HEIGHT WIDTH", help_behavior_hint=_default_hint),
+    ] = None
+    """Region of interest of the neuron [px]. Default: the whole frame."""
     overlay: bool = False
-    """Write the overlay video: picture, excitation, spikes, alert lamp."""
+    """Write the overlay video: frame, excitation, spikes and alert indicator."""
     plots: bool = True
-    """Draw the figures."""
+    """Draw one figure per clip."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Paper:
-    """Run every experiment of the paper; write the figures and a table of which claims hold.
+    """Repeat the experiments of the LGMD paper; write figures and a table of its claims.
 
-    The crash and near-miss clips of the paper are not part of the package: give a folder of your own.
+    The paper's crash and near-miss clips are not included in this package; pass a folder of your own.
     """
 
-    out: Path | None = None
+    out: File = None
     """Run folder; must not exist. Default: runs/paper-DATE-TIME."""
-    clips: Path | None = None
-    """Folder of driving clips; needs --crashes."""
-    crashes: Path | None = None
-    """CSV with the columns clip,crash_frame (empty for no crash)."""
-    picture: Path | None = None
-    """Picture for the shifting panorama; default: a random one with a natural spectrum."""
+    clips: File = None
+    """Folder of driving clips; requires --crashes."""
+    crashes: File = None
+    """CSV file with the columns clip,crash_frame (empty for no crash)."""
+    picture: File = None
+    """Image for the shifting panorama. Default: a random image with a natural spectrum."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,9 +191,9 @@ class Train:
     """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change and
     ego_yaw_rate; also frame, and with the cameras of stopping-zone zones, zones_spikes and zones_ffi.
     Default: from the hyperparameters."""
-    demands: Annotated[
-        tuple[float, ...] | None, arg(metavar="[X ...]", help_behavior_hint=_default_hint)
-    ] = None
+    demands: Annotated[tuple[float, ...] | None, arg(metavar="[X ...]", help_behavior_hint=_default_hint)] = (
+        None
+    )
     """Demands that the policy chooses from, from -1 (full braking) to 1; --demands alone for a continuous
     demand. Default: 0 -0.4 -1 for ppo and dqn, continuous for sac, 0 -1 for offline."""
     n_timesteps: Count = None
@@ -220,38 +220,39 @@ class Train:
 
 @dataclass(frozen=True, kw_only=True)
 class Tune:
-    """Tune a rule on training levels of LGMD/RandomBraking-v0 and false-reaction cases with other seeds.
+    """Search the parameters of a rule on training levels of LGMD/RandomBraking-v0 and false-reaction cases.
 
-    Validation levels choose among the best trials; test levels and the protocol suites stay unseen. What the
-    rule's eye sees is recorded once, so that a trial takes seconds. With cameras, placing or neuron the eye
-    itself is searched, too, and every trial has to see anew: about a minute. A rule that does not latch
-    (graded) is played out, which takes minutes a trial.
+    Validation levels choose between the defaults and the best trials; test levels and protocol suites are
+    not used. A trial takes seconds for a latching rule with fixed sensors, because the sensor outputs are
+    recorded once. It takes about a minute with --cameras, --camera-geometry or --neuron, and minutes for a
+    rule that does not latch (graded).
     """
 
     agent: str = "stopping-zone"
     """Name of a rule."""
     cameras: tuple[str, ...] = ()
-    """Camera presets to choose among, for a rule with one camera, as fovea tele wide."""
-    placing: bool = False
-    """Search also what places the rule's own cameras, as stopping-zone's deceleration and reaction."""
+    """Camera presets to choose from, for a rule with one camera; for example fovea tele wide."""
+    camera_geometry: bool = False
+    """Also search the parameters that determine the rule's own cameras (stopping-zone: deceleration and
+    reaction)."""
     neuron: tuple[str, ...] = ()
-    """Parameters of the neuron to search, each from half to twice the paper's, as sigma_3 t_sp."""
+    """Neuron parameters to search, each from half to twice its default; for example sigma_3 t_sp."""
     trials: int = 40
-    """Trials to add to the study."""
+    """Number of trials to add to the study."""
     levels: int = 100
-    """Levels of either split, from 0 on; half of them are threats."""
+    """Number of levels of each split; half of them are threats."""
     seeds: int = 1
-    """Seeds of the false-reaction suite, from 1000 on to search and from 2000 on to choose."""
+    """Number of seeds of the false-reaction suite, from 1000 for trials and from 2000 for validation."""
     false_cost: float = 1.0
-    """What a false brake costs, in contacts at full speed."""
+    """Cost of a false activation, relative to a contact at full speed."""
     jobs: int = 2
-    """Processes."""
+    """Number of processes."""
     study: Path = Path("tune.db")
-    """SQLite file of the study; one that exists is gone on with."""
+    """SQLite file of the study; an existing study is resumed."""
     best: Path = Path("best.toml")
-    """TOML file for the chosen parameters; must not exist. Those of the neuron go into BEST-neuron.toml."""
+    """TOML file for the best parameters; must not exist. BEST-neuron.toml gets the neuron parameters."""
     sensitivity: bool = False
-    """Do not search: shift each parameter by 20 % both ways and print the scores."""
+    """Print the sensitivity table (each parameter shifted by 20 % down and up) instead of searching."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -264,19 +265,19 @@ class List:
 
 @dataclass(frozen=True, kw_only=True)
 class Gallery:
-    """Make a page of videos of every scenario, with what each agent makes of it; a few minutes.
+    """Write an HTML page with a video of every scenario and the results of the agents; takes minutes.
 
-    The page needs no network: open index.html in the folder.
+    The folder contains index.html, which needs no network connection.
     """
 
     out: Path = Path("gallery")
     """Folder; must not exist."""
-    families: tuple[str, ...] = ()
-    """Scenario families or kinds of traffic, as CCRs merge; none for all."""
+    families: Names = None
+    """Scenario families or kinds of traffic, for example CCRs merge. Default: all."""
     agent: str = "spike-threshold"
-    """Who brakes in the videos."""
+    """Agent in the videos."""
     seeds: int = 3
-    """Seeds per scenario that the agents are judged by."""
+    """Number of seeds per scenario for the results."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,1 +1,1 @@
-"""The gallery page: one film per scenario, with the result of each agent."""
+"""The gallery page: one video per scenario, with the result of each agent."""

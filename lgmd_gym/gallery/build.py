@@ -1,4 +1,4 @@
-"""`lgmd-gym gallery`: a static page of films of every scenario, with what each agent makes of it."""
+"""Write the gallery: an HTML page with its videos and pictures."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,57 +8,62 @@ from PIL import Image
 
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.folder import new_folder
 from lgmd_gym.benchmark.config import DEFAULT_AGENTS
+from lgmd_gym.benchmark.folder import new_folder
 from lgmd_gym.camera.params import CONDITIONS
-from lgmd_gym.gallery.page import page
-from lgmd_gym.gallery.scenes import film, find_scenes, judge
+from lgmd_gym.gallery.cards import record_video, scenario_cards
+from lgmd_gym.gallery.outcomes import evaluate_agents
+from lgmd_gym.gallery.page import render_page
 from lgmd_gym.gallery.stills import ROADS, lens_sheet, road_sheet
 
 
 def make_gallery(
-    out: Path, names: tuple[str, ...], agent: str, seeds: int, tell: Callable[[str], object] = print
+    out: Path,
+    names: tuple[str, ...] = (),
+    agent: str = "spike-threshold",
+    seeds: int = 3,
+    on_progress: Callable[[str], object] = print,
 ) -> Path:
-    """Make the page and everything on it.
+    """Write the gallery.
 
     Args:
-        out: The folder, which must not exist.
-        names: Scenario families or kinds of traffic; none for all, with the sheets of lenses and roads.
-        agent: Who brakes in the films.
-        seeds: Seeds per scene that the agents are judged by.
-        tell: Called with a line about each scene.
+        out: Folder, which must not exist.
+        names: Scenario families or kinds of traffic; empty for all, and the sheets of lenses and roads.
+        agent: Agent in the videos.
+        seeds: Number of seeds per scenario for the outcomes.
+        on_progress: Function called with a line of text after each scenario.
 
     Returns:
         The path of `index.html`.
 
     Raises:
-        ValueError: For an unknown name, `seeds` below 1, or a folder that exists or cannot be made.
+        ValueError: For an unknown name, `seeds` below 1, or a folder that exists or cannot be created.
     """
-    scenes = find_scenes(names)
-    make_agent(agent)
+    cards = scenario_cards(names)
+    make_agent(agent)  # raises for an unknown agent before the folder is created
     if seeds < 1:
         raise ValueError(f"seeds must be >= 1, got {seeds}")
     media = new_folder(out, "gallery folder") / "media"
     media.mkdir()
     agents = list(dict.fromkeys([*DEFAULT_AGENTS, agent]))
-    verdicts = {}
-    for number, scene in enumerate(scenes, 1):
-        film(scene, agent, media / scene.name)
-        verdicts[scene.name] = judge(scene, agents, seeds)
-        said = verdicts[scene.name].get(agent, "traffic")
-        tell(f"{number}/{len(scenes)}  {scene.target}: {said}")
+    outcomes = {}
+    for number, card in enumerate(cards, 1):
+        record_video(card, agent, media / card.name)
+        outcomes[card.name] = evaluate_agents(card, agents, seeds)
+        text = "traffic" if card.traffic else outcomes[card.name][agent].text
+        on_progress(f"{number}/{len(cards)}  {card.target}: {text}")
     sheets = {}
     if not names:
-        tell("lenses and roads")
+        on_progress("lenses and roads")
         sheets["lenses"] = _save_sheet(media, "lens", lens_sheet())
         sheets["roads"] = _save_sheet(media, "road", road_sheet(tuple(ROADS), tuple(CONDITIONS)))
     index = out / "index.html"
-    index.write_text(page(scenes, verdicts, sheets, agent, seeds), encoding="utf-8")
+    index.write_text(render_page(cards, outcomes, sheets, agent, seeds), encoding="utf-8")
     return index
 
 
 def _save_sheet(media: Path, stem: str, sheet: dict[str, dict[str, np.ndarray]]) -> dict[str, dict[str, str]]:
-    """Save every frame of a sheet and return row to column to its file's name."""
+    """Save every frame of a sheet and return the file names by row and column."""
     files: dict[str, dict[str, str]] = {}
     for row, frames in sheet.items():
         files[row] = {column: f"{stem}-{row}-{column}.png" for column in frames}

@@ -1,4 +1,4 @@
-"""Docstrings as data: a lead, a text and arguments, for pages made from code."""
+"""Parsed docstrings, for pages that are generated from code."""
 
 import inspect
 import re
@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 from docstring_parser import DocstringStyle, parse
 
 
-class Argument(NamedTuple):
-    """One argument of something documented.
+class DocumentedArgument(NamedTuple):
+    """One argument in a docstring.
 
     Attributes:
-        name: Its name.
-        default: Its default as code; empty if it has none.
-        text: What the docstring says.
+        name: Name of the argument.
+        default: Default value as code; empty without one.
+        text: Description.
     """
 
     name: str
@@ -21,42 +21,42 @@ class Argument(NamedTuple):
     text: str
 
 
-class About(NamedTuple):
-    """What a docstring says.
+class ParsedDocstring(NamedTuple):
+    """A Google-style docstring.
 
     Attributes:
-        lead: The first line.
-        text: Paragraphs after it, Markdown.
-        arguments: In the order of the signature.
+        summary: The first line.
+        text: Following paragraphs, in Markdown.
+        arguments: Documented arguments in the order of the signature.
     """
 
-    lead: str
+    summary: str
     text: str
-    arguments: tuple[Argument, ...]
+    arguments: tuple[DocumentedArgument, ...]
 
 
-def read(item: Any) -> About:
-    """Return what the Google-style docstring of a function or class says.
+def parse_docstring(item: Any) -> ParsedDocstring:
+    """Return the parsed docstring of a function or class.
 
     Raises:
-        ValueError: If there is none.
+        ValueError: If it has no docstring.
     """
     doc = inspect.getdoc(item)
     if not doc:
         raise ValueError(f"{item!r} has no docstring; write one")
     parsed = parse(doc, DocstringStyle.GOOGLE)
-    texts = {given.arg_name: " ".join((given.description or "").split()) for given in parsed.params}
+    texts = {param.arg_name: " ".join((param.description or "").split()) for param in parsed.params}
     arguments = [
-        Argument(name, _default(parameter), texts[name])
+        DocumentedArgument(name, _default(parameter), texts[name])
         for name, parameter in inspect.signature(item).parameters.items()
         if name in texts
     ]
     text = re.sub(r"^#+ *Arguments *$", "", parsed.long_description or "", flags=re.MULTILINE)
-    return About(parsed.short_description or "", text.strip(), tuple(arguments))
+    return ParsedDocstring(parsed.short_description or "", text.strip(), tuple(arguments))
 
 
 def _default(parameter: inspect.Parameter) -> str:
-    """Return a default as it would be written, numbers shortened; empty if there is none."""
+    """Return a default value as code, with floats shortened; empty without one."""
     value = parameter.default
     if value is inspect.Parameter.empty:
         return ""

@@ -1,4 +1,4 @@
-"""What the eye sees on highway-env's own roads and under every condition: single frames."""
+"""Single camera frames of highway-env's roads, and of every lens under every condition."""
 
 import warnings
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.params import CONDITIONS, PRESETS
 
-# Road: seed and simulation steps that have something to see.
+# Environment id to a seed and a number of simulation steps after which vehicles are in view.
 ROADS = {
     "highway-v0": (1, 30),
     "merge-v0": (0, 60),
@@ -23,7 +23,7 @@ ROADS = {
     "parking-v0": (2, 10),
 }
 LENSES = ("wide", "standard", "tele", "fovea")
-APPROACH = 90  # decisions of an approach at 8 m/s after which the target is well in sight
+APPROACH = 90  # decisions of an approach at 8 m/s, after which the target is 16 m ahead
 
 
 def road_sheet(roads: tuple[str, ...], conditions: tuple[str, ...]) -> dict[str, dict[str, np.ndarray]]:
@@ -31,12 +31,12 @@ def road_sheet(roads: tuple[str, ...], conditions: tuple[str, ...]) -> dict[str,
     wide = CameraParams.preset("wide")
     cameras = {name: EgoCamera(wide.with_condition(name)) for name in conditions}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # highway-env's remarks on its own spaces and versions
+        warnings.simplefilter("ignore")  # highway-env's warnings about its own spaces and versions
         return {env_id: _road_frames(env_id, cameras) for env_id in roads}
 
 
 def lens_sheet() -> dict[str, dict[str, np.ndarray]]:
-    """Return one moment of an approach: lens to condition to frame, uint8, shape (height, width)."""
+    """Return frames of the same approach: lens to condition to frame, uint8, shape (height, width)."""
     env: Any = gym.make("LGMD/CCRs-v0", ego_speed=8.0, shade=60, camera=None)
     env.reset(seed=0)
     for _ in range(APPROACH):
@@ -48,7 +48,7 @@ def lens_sheet() -> dict[str, dict[str, np.ndarray]]:
 
 
 def _road_frames(env_id: str, cameras: dict[str, EgoCamera]) -> dict[str, np.ndarray]:
-    """Drive on for a while without steering or braking, then render one frame per camera."""
+    """Return one frame per camera after some simulation steps without steering or braking."""
     import highway_env  # noqa: F401  (registers the environments)
 
     seed, steps = ROADS[env_id]

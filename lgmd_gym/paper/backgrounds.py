@@ -1,4 +1,4 @@
-"""What lies behind the object of a synthetic stimulus: plain grey, gratings, a shifting panorama."""
+"""Backgrounds of synthetic stimuli: uniform grey, gratings and a shifting panorama."""
 
 import math
 from dataclasses import dataclass
@@ -8,10 +8,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-Map = NDArray[np.float64]
-# The sizes of the paper's synthetic and real sequences, (height, width) [px].
-SIZES = {"gratings": (334, 380), "looming": (270, 540), "video": (288, 352)}
-SPEED = 0.108  # the paper's constant linear speed [m/s]
+LuminanceMap = NDArray[np.float64]  # luminance in 0-255, shape (height, width)
+# Shapes of the paper's synthetic and real sequences, (height, width) [px].
+SHAPES = {"gratings": (334, 380), "looming": (270, 540), "video": (288, 352)}
+PAPER_SPEED = 0.108  # the paper's constant linear speed [m/s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,23 +20,23 @@ class Screen:
 
     Attributes:
         shape: (height, width) [px].
-        fps: Frames per second [Hz].
-        px_per_m: Pixels per metre on the screen; an assumption, the paper names none.
-        distance: From the eye to the screen [m].
+        fps: Frame rate [Hz].
+        px_per_m: Pixels per metre on the screen; an assumption, since the paper states none.
+        distance: Distance between eye and screen [m].
     """
 
-    shape: tuple[int, int] = SIZES["looming"]
+    shape: tuple[int, int] = SHAPES["looming"]
     fps: float = 30.0
     px_per_m: float = 1000.0
     distance: float = 0.3
 
     def __post_init__(self) -> None:
         if min(self.shape) < 1:
-            raise ValueError(f"shape {self.shape} holds no pixel")
+            raise ValueError(f"shape must be (height, width), each at least 1 px, got {self.shape}")
         for name in ("fps", "px_per_m", "distance"):
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
-                raise ValueError(f"{name} = {value:g} must be > 0 and finite")
+                raise ValueError(f"{name} must be > 0 and finite, got {value:g}")
 
     @property
     def focal(self) -> float:
@@ -46,11 +46,15 @@ class Screen:
 
 @dataclass(frozen=True, kw_only=True)
 class Plain:
-    """A background of one luminance in 0-255."""
+    """A uniform background.
+
+    Attributes:
+        luminance: Luminance in 0-255.
+    """
 
     luminance: float = 127.5
 
-    def paint(self, time: float, screen: Screen) -> Map:
+    def render(self, time: float, screen: Screen) -> LuminanceMap:
         """Return luminance in 0-255, shape (height, width)."""
         return np.full(screen.shape, self.luminance)
 
@@ -62,8 +66,8 @@ class Grating:
     Attributes:
         spatial: Spatial frequency [periods/m].
         temporal: Temporal frequency [Hz].
-        contrast: Michelson's, in [0, 1].
-        direction: In which it drifts [deg], 0 to the right, 90 up.
+        contrast: Michelson contrast in [0, 1].
+        direction: Direction of the drift [deg], 0 to the right, 90 upwards.
         mean: Mean luminance; contrast 1 around 127.5 spans 0-255.
     """
 
@@ -73,69 +77,69 @@ class Grating:
     direction: float = 0.0
     mean: float = 127.5
 
-    def paint(self, time: float, screen: Screen) -> Map:
+    def render(self, time: float, screen: Screen) -> LuminanceMap:
         """Return luminance in 0-255, shape (height, width), averaged over each pixel."""
         cycles = self.spatial / screen.px_per_m  # per px
         along_x = cycles * math.cos(math.radians(self.direction))
-        along_y = -cycles * math.sin(math.radians(self.direction))  # rows run down
+        along_y = -cycles * math.sin(math.radians(self.direction))  # row 0 is at the top
         height, width = screen.shape
         phase_x = 2.0 * math.pi * (along_x * np.arange(width) - self.temporal * time)
         phase_y = 2.0 * math.pi * along_y * np.arange(height)
         wave = np.outer(np.sin(phase_y), np.cos(phase_x)) + np.outer(np.cos(phase_y), np.sin(phase_x))
-        blur = float(np.sinc(along_x) * np.sinc(along_y))  # the mean over the pixel's square
-        return self.mean * (1.0 + self.contrast * blur * wave)
+        attenuation = float(np.sinc(along_x) * np.sinc(along_y))  # of the mean over a pixel
+        return self.mean * (1.0 + self.contrast * attenuation * wave)
 
 
 class Panorama:
-    """A panorama that shifts sideways past the eye and comes round again.
+    """A periodic panorama that shifts sideways.
 
     Args:
-        speed: Of the shift [m/s on the screen], + to the left, as when the eye turns right.
-        picture: A picture file, or grey luminance in 0-255, shape (H, W); None draws a random one with the
-            1/f amplitude spectrum of natural scenes.
-        contrast: Standard deviation over mean of the random picture.
-        seed: Of the random picture.
+        speed: Speed of the shift on the screen [m/s], + to the left, as for an eye that turns right.
+        picture: Image file, or grey luminance in 0-255, shape (H, W); None for a random image with the 1/f
+            amplitude spectrum of natural scenes.
+        contrast: Standard deviation over mean of the random image.
+        seed: Seed of the random image.
     """
 
     def __init__(
         self,
         *,
         speed: float = 0.05,
-        picture: str | Path | Map | None = None,
+        picture: str | Path | LuminanceMap | None = None,
         contrast: float = 0.15,
         seed: int = 0,
     ) -> None:
         self.speed, self.contrast, self.seed = speed, contrast, seed
         self.picture = _load(picture) if isinstance(picture, str | Path) else picture
-        self._drawn: Map | None = None
+        self._panorama: LuminanceMap | None = None
 
-    def paint(self, time: float, screen: Screen) -> Map:
+    def render(self, time: float, screen: Screen) -> LuminanceMap:
         """Return luminance in 0-255, shape (height, width)."""
         height, width = screen.shape
-        if self._drawn is None or self._drawn.shape[0] != height or self._drawn.shape[1] < width:
-            self._drawn = self._draw(screen.shape)
+        panorama = self._panorama
+        if panorama is None or panorama.shape[0] != height or panorama.shape[1] < width:
+            panorama = self._panorama = self._make_panorama(screen.shape)
         shift = self.speed * screen.px_per_m * time
         whole = math.floor(shift)
-        columns = (whole + np.arange(width + 1)) % self._drawn.shape[1]
-        seen = self._drawn[:, columns]
+        view = panorama[:, (whole + np.arange(width + 1)) % panorama.shape[1]]
         part = shift - whole
-        return (1.0 - part) * seen[:, :-1] + part * seen[:, 1:]
+        return (1.0 - part) * view[:, :-1] + part * view[:, 1:]
 
-    def _draw(self, shape: tuple[int, int]) -> Map:
+    def _make_panorama(self, shape: tuple[int, int]) -> LuminanceMap:
         """Return the whole panorama, at least twice as wide as the screen."""
         if self.picture is None:
-            return natural((shape[0], 2 * shape[1]), self.contrast, self.seed)
-        scaled = _scaled(self.picture, shape)
-        return np.hstack([scaled, scaled[:, ::-1]])  # mirrored, so that it has no seam
+            return natural_image((shape[0], 2 * shape[1]), self.contrast, self.seed)
+        scaled = _scale(self.picture, shape)
+        return np.hstack([scaled, scaled[:, ::-1]])  # the mirror image makes it continuous
 
 
-def natural(shape: tuple[int, int], contrast: float = 0.15, seed: int = 0) -> Map:
-    """Return a random picture with the 1/f amplitude spectrum of natural scenes, without a seam.
+def natural_image(shape: tuple[int, int], contrast: float = 0.15, seed: int = 0) -> LuminanceMap:
+    """Return a random periodic image with the 1/f amplitude spectrum of natural scenes.
 
     Args:
         shape: (height, width) [px].
         contrast: Standard deviation over mean.
-        seed: Of the phases.
+        seed: Seed of the phases.
 
     Returns:
         Luminance in 0-255 around 127.5, float64.
@@ -147,24 +151,24 @@ def natural(shape: tuple[int, int], contrast: float = 0.15, seed: int = 0) -> Ma
     return np.clip(127.5 * (1.0 + contrast * picture / max(float(picture.std()), 1e-12)), 0.0, 255.0)
 
 
-def _load(path: str | Path) -> Map:
-    """Return a picture file as grey luminance."""
+def _load(path: str | Path) -> LuminanceMap:
+    """Return an image file as grey luminance."""
     from PIL import Image, UnidentifiedImageError
 
     try:
         with Image.open(path) as image:
             return np.asarray(image.convert("L"), float)
     except UnidentifiedImageError:
-        raise ValueError(f"picture {str(path)!r} is no picture that pillow can read") from None
+        raise ValueError(f"picture {str(path)!r} is not an image that Pillow can read") from None
     except OSError as error:
         raise ValueError(f"picture {str(path)!r} cannot be read: {error.strerror or error}") from None
 
 
-def _scaled(picture: Map, shape: tuple[int, int]) -> Map:
-    """Return a picture scaled to a height, and wide enough for the screen."""
+def _scale(picture: LuminanceMap, shape: tuple[int, int]) -> LuminanceMap:
+    """Return an image scaled to the height of the screen and at least its width."""
     from PIL import Image
 
     scale = max(shape[0] / picture.shape[0], shape[1] / picture.shape[1])
     size = max(round(picture.shape[1] * scale), shape[1]), max(round(picture.shape[0] * scale), shape[0])
     image = Image.fromarray(picture.astype(np.float32)).resize(size, Image.Resampling.BILINEAR)
-    return cast(Map, np.asarray(image, np.float64))[: shape[0]]
+    return cast(LuminanceMap, np.asarray(image, np.float64))[: shape[0]]

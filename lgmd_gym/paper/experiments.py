@@ -1,4 +1,4 @@
-"""The paper's experiments on synthetic stimuli, each a function that returns what was seen and answered."""
+"""The paper's experiments on synthetic stimuli."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -8,25 +8,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgmd_gym.neuron import LGMD, LGMDParams
+from lgmd_gym.neuron import LGMD, LGMDParams, Response
+from lgmd_gym.paper.backgrounds import SHAPES, Grating, Panorama, Plain, Screen
 from lgmd_gym.paper.stimuli import (
-    SIZES,
     Background,
+    ForegroundObject,
     Frame,
-    Grating,
     Looming,
-    Object,
-    Panorama,
-    Plain,
     Receding,
-    Screen,
     Translating,
-    frames,
+    stimulus_frames,
 )
 
 FPS = 30.0
 DARK, LIGHT, GREY = 20.0, 235.0, 127.5
-# The paper's neuron, it without what it adds, and what came before.
+# The paper's model, an ablation and the previous model.
 MODELS = {
     "paper": LGMDParams(),
     "fixed inhibition": LGMDParams.fixed_inhibition(),
@@ -36,22 +32,23 @@ SPATIAL = (1000 / 190, 10.0, 20.0, 40.0, 60.0, 80.0)  # [periods/m]: periods of 
 TEMPORAL = (0.5, 1.0, 2.0, 7.0, 14.0)  # [Hz]
 CONTRASTS = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
 L_OVER_V = (0.01, 0.02, 0.03, 0.04, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3)  # [s]
-Params = Mapping[str, LGMDParams]
-Tick = Callable[[], object]
+CONTACT = 3.0  # time of contact of the looming object [s]
+PICTURE_TIMES = (1.0, 2.3, 2.6, 2.8, 2.93)  # [s]
+StepCallback = Callable[[], object]
 
 
 @dataclass(frozen=True)
-class Trial:
-    """One stimulus and what each model answered.
+class StimulusResponse:
+    """Responses of several models to one stimulus.
 
     Attributes:
-        name: Of the stimulus.
-        time: Of each frame [s], shape (frames,).
-        frequency: Model to spike frequency [spikes/s], shape (frames,).
-        potential: Model to membrane potential K.
-        spikes: Model to spikes of each frame.
-        ffi: Of the first model [grey levels].
-        pictures: Some (time [s], frame).
+        name: Name of the stimulus.
+        time: Time of each frame [s], shape (frames,).
+        frequency: Spike frequency of each model [spikes/s], shape (frames,).
+        potential: Membrane potential K of each model, shape (frames,).
+        spikes: Spikes per frame of each model, shape (frames,).
+        ffi: F̂ of the first model [grey levels], shape (frames,).
+        pictures: (time [s], frame) at selected times.
     """
 
     name: str
@@ -62,216 +59,272 @@ class Trial:
     ffi: np.ndarray
     pictures: list[tuple[float, Frame]]
 
-    def above(self, level: float, model: str = "paper") -> np.ndarray:
-        """Return the times at which the frequency is at or above a level [s]."""
+    def times_above(self, level: float, model: str = "paper") -> np.ndarray:
+        """Return the times at which the spike frequency is at or above a level [s]."""
         return self.time[self.frequency[model] >= level]
 
     def peak(self, model: str = "paper") -> float:
-        """Return the highest frequency [spikes/s]."""
+        """Return the highest spike frequency [spikes/s]."""
         return float(self.frequency[model].max())
 
 
-def trial(
+def run_stimulus(
     name: str,
     screen: Screen,
     seconds: float,
     background: Background,
-    thing: Object | None = None,
-    models: Params = MODELS,
-    shown: tuple[float, ...] = (),
-) -> Trial:
-    """Show a stimulus to several models at once.
+    foreground: ForegroundObject | None = None,
+    models: Mapping[str, LGMDParams] = MODELS,
+    picture_times: tuple[float, ...] = (),
+) -> StimulusResponse:
+    """Run several models on one stimulus.
 
     Args:
-        name: Of the stimulus.
-        screen: Size, rate and scale.
-        seconds: How long.
-        background: What lies behind.
-        thing: What moves in front; None for nothing.
-        models: Name to parameters.
-        shown: Times whose frames are kept [s].
+        name: Name of the stimulus.
+        screen: Size, frame rate and scale.
+        seconds: Duration [s].
+        background: Background.
+        foreground: Moving object; None for none.
+        models: Parameters of each model.
+        picture_times: Times whose frames are stored [s].
     """
     neurons = {model: LGMD(screen.shape, screen.fps, params) for model, params in models.items()}
-    answers: dict[str, list] = {model: [] for model in models}
-    wanted = {round(time * screen.fps) for time in shown}
+    responses: dict[str, list[Response]] = {model: [] for model in models}
+    picture_frames = {round(time * screen.fps) for time in picture_times}
     pictures = []
-    for number, frame in enumerate(frames(screen, seconds, background, thing)):
-        if number in wanted:
+    for number, frame in enumerate(stimulus_frames(screen, seconds, background, foreground)):
+        if number in picture_frames:
             pictures.append((number / screen.fps, frame))
         for model, neuron in neurons.items():
-            answers[model].append(neuron.step(frame))
+            responses[model].append(neuron.step(frame))
 
     def series(field: str) -> dict[str, np.ndarray]:
-        return {model: np.array([getattr(r, field) for r in rows]) for model, rows in answers.items()}
+        return {model: np.array([getattr(r, field) for r in rows]) for model, rows in responses.items()}
 
     first = next(iter(models))
-    time = np.arange(len(answers[first])) / screen.fps
+    time = np.arange(len(responses[first])) / screen.fps
     frequency, potential = series("spike_frequency"), series("membrane_potential")
-    return Trial(name, time, frequency, potential, series("spikes"), series("ffi")[first], pictures)
+    return StimulusResponse(
+        name, time, frequency, potential, series("spikes"), series("ffi")[first], pictures
+    )
 
 
-class GratingAnswer(NamedTuple):
-    """The highest K of each model on one grating, and the mean F."""
+class GratingResponse(NamedTuple):
+    """Responses to a grating without an object.
+
+    Attributes:
+        grating: The grating.
+        potential: Highest membrane potential K of each model.
+        ffi: Mean F̂ [grey levels].
+    """
 
     grating: Grating
     potential: dict[str, float]
     ffi: float
 
 
-def gratings(tick: Tick) -> list[GratingAnswer]:
-    """Thirty drifting gratings of full contrast: six periods by five temporal frequencies."""
+def gratings(on_step: StepCallback) -> list[GratingResponse]:
+    """Return the responses to 30 gratings of full contrast: 6 spatial by 5 temporal frequencies."""
     return [
-        _grating(Grating(spatial=spatial, temporal=temporal), tick)
+        grating_response(Grating(spatial=spatial, temporal=temporal), on_step)
         for spatial in SPATIAL
         for temporal in TEMPORAL
     ]
 
 
-def faint_gratings(tick: Tick) -> list[GratingAnswer]:
-    """The same at 40 periods/m and falling contrast: where the inhibition no longer grows."""
+def low_contrast_gratings(on_step: StepCallback) -> list[GratingResponse]:
+    """Return the responses to 30 gratings of 40 periods/m: 6 contrasts by 5 temporal frequencies."""
     return [
-        _grating(Grating(spatial=40.0, temporal=temporal, contrast=contrast), tick)
+        grating_response(Grating(spatial=40.0, temporal=temporal, contrast=contrast), on_step)
         for contrast in CONTRASTS
         for temporal in TEMPORAL
     ]
 
 
-def _grating(grating: Grating, tick: Tick) -> GratingAnswer:
+def grating_response(grating: Grating, on_step: StepCallback = lambda: None) -> GratingResponse:
+    """Return the responses to one grating of 1.2 s."""
     models = {
         **MODELS,
         "neither adaptation nor silencing": LGMDParams(t_f=math.inf),
         "no warm start": LGMDParams(warm_start=False),
     }
-    screen = Screen(shape=SIZES["gratings"], fps=FPS)
-    seen = trial("grating", screen, 1.2, grating, models=models)
-    tick()
-    potential = {model: float(values.max()) for model, values in seen.potential.items()}
-    return GratingAnswer(grating, potential, float(seen.ffi[1:].mean()))
+    screen = Screen(shape=SHAPES["gratings"], fps=FPS)
+    response = run_stimulus("grating", screen, 1.2, grating, models=models)
+    on_step()
+    potential = {model: float(values.max()) for model, values in response.potential.items()}
+    return GratingResponse(grating, potential, float(response.ffi[1:].mean()))
 
 
-CONTACT = 3.0  # when the looming object would touch [s]
-SHOWN = (1.0, 2.3, 2.6, 2.8, 2.93)
+class LoomingInGrating(NamedTuple):
+    """A square that looms in a grating.
+
+    Attributes:
+        contrast: Contrast of the grating.
+        spatial: Spatial frequency of the grating [periods/m].
+        luminance: Luminance of the square in 0-255.
+        response: Responses of the models.
+    """
+
+    contrast: float
+    spatial: float
+    luminance: float
+    response: StimulusResponse
 
 
-def looming_in_gratings(tick: Tick) -> list[tuple[float, float, float, Trial]]:
-    """Return (contrast, periods/m, luminance, trial) of squares that loom in gratings of 2 Hz."""
-    found = []
+def looming_in_gratings(on_step: StepCallback) -> list[LoomingInGrating]:
+    """Return the responses to squares that loom in gratings of 2 Hz."""
+    results = []
     for contrast in (0.2, 0.5, 1.0):
         for spatial in (40.0, 60.0, 80.0):
             for luminance in (DARK, LIGHT):
-                behind = Grating(spatial=spatial, temporal=2.0, contrast=contrast)
-                thing = Looming(contact=CONTACT, luminance=luminance)
-                seen = trial(f"{spatial:g}/m", Screen(fps=FPS), CONTACT, behind, thing, shown=SHOWN)
-                found.append((contrast, spatial, luminance, seen))
-                tick()
-    return found
+                grating = Grating(spatial=spatial, temporal=2.0, contrast=contrast)
+                square = Looming(contact=CONTACT, luminance=luminance)
+                response = run_stimulus(
+                    f"{spatial:g}/m", Screen(fps=FPS), CONTACT, grating, square, picture_times=PICTURE_TIMES
+                )
+                results.append(LoomingInGrating(contrast, spatial, luminance, response))
+                on_step()
+    return results
 
 
-def light_and_dark(tick: Tick) -> list[tuple[float, float, float]]:
-    """Return (background, first time at 30 spikes/s before contact of a dark, of a light square) [s]."""
-    found = []
-    for ground in (60.0, GREY, 195.0):
+class LuminanceLeads(NamedTuple):
+    """Alarm times of a dark and a light square on the same background.
+
+    Attributes:
+        background: Luminance of the background in 0-255.
+        dark: Time from the first alarm (30 spikes/s) to contact of a dark square [s].
+        light: The same of a light square [s].
+    """
+
+    background: float
+    dark: float
+    light: float
+
+
+def light_and_dark(on_step: StepCallback) -> list[LuminanceLeads]:
+    """Return the alarm times of dark and light squares on three grey backgrounds at 60 Hz."""
+    results = []
+    for background in (60.0, GREY, 195.0):
         leads = []
         for luminance in (DARK, LIGHT):
-            thing = Looming(contact=CONTACT, luminance=luminance, l_over_v=0.2)
-            seen = trial("plain", Screen(fps=60.0), CONTACT, Plain(luminance=ground), thing)
-            begins = seen.above(30.0)
-            leads.append(CONTACT - float(begins[0]) if len(begins) else math.nan)
-            tick()
-        found.append((ground, *leads))
-    return found
+            square = Looming(contact=CONTACT, luminance=luminance, l_over_v=0.2)
+            response = run_stimulus("plain", Screen(fps=60.0), CONTACT, Plain(luminance=background), square)
+            alarms = response.times_above(30.0)
+            leads.append(CONTACT - float(alarms[0]) if len(alarms) else math.nan)
+            on_step()
+        results.append(LuminanceLeads(background, *leads))
+    return results
 
 
-def panorama(tick: Tick, picture: Path | None = None) -> dict[str, Trial]:
-    """An object that approaches, recedes, or passes by, in a panorama that shifts."""
-    behind = Panorama(picture=picture)
-    variants = {**MODELS, "T_sp = 0.78": LGMDParams(t_sp=0.78), "sigma_3 = 2": LGMDParams(sigma_3=2.0)}
-    things: dict[str, tuple[Object | None, tuple[float, ...]]] = {
+def panorama(on_step: StepCallback, picture: Path | None = None) -> dict[str, StimulusResponse]:
+    """Return the responses to an object that approaches, recedes or translates in a shifting panorama."""
+    background = Panorama(picture=picture)
+    models = {**MODELS, "T_sp = 0.78": LGMDParams(t_sp=0.78), "sigma_3 = 2": LGMDParams(sigma_3=2.0)}
+    objects: dict[str, tuple[ForegroundObject | None, tuple[float, ...]]] = {
         "panorama alone": (None, (1.5,)),
-        "approaching, dark": (Looming(contact=CONTACT), SHOWN),
-        "approaching, light": (Looming(contact=CONTACT, luminance=LIGHT), SHOWN),
+        "approaching, dark": (Looming(contact=CONTACT), PICTURE_TIMES),
+        "approaching, light": (Looming(contact=CONTACT, luminance=LIGHT), PICTURE_TIMES),
         "receding": (Receding(contact=0.4), (0.4, 0.6, 0.8, 1.1, 2.0)),
         "passing at 0.108 m/s": (Translating(centred=1.5), (0.3, 0.9, 1.5, 2.1, 2.7)),
         "passing at 0.3 m/s": (Translating(speed=0.3, centred=1.5), (0.8, 1.15, 1.5, 1.85, 2.2)),
     }
-    found = {}
-    for name, (thing, shown) in things.items():
-        found[name] = trial(name, Screen(fps=FPS), CONTACT, behind, thing, variants, shown)
-        tick()
-    return found
+    responses = {}
+    for name, (foreground, times) in objects.items():
+        responses[name] = run_stimulus(name, Screen(fps=FPS), CONTACT, background, foreground, models, times)
+        on_step()
+    return responses
 
 
 class Approach(NamedTuple):
-    """One approach at some l/|v|: how long before contact the frequency peaked and first alarmed [s]."""
+    """Response to an approach.
+
+    Attributes:
+        l_over_v: Half size over speed [s].
+        peak: Time from the peak of the spike frequency to contact [s].
+        alarm: Time from the first alarm to contact [s]; NaN without alarm.
+        response: Responses of the models.
+    """
 
     l_over_v: float
     peak: float
     alarm: float
-    trial: Trial
+    response: StimulusResponse
 
 
-def approaches(tick: Tick) -> list[Approach]:
-    """A dark square on grey at ten values of l/|v|, without a largest size, as in Gabbiani et al. (1999)."""
-    found = []
+def approaches(on_step: StepCallback) -> list[Approach]:
+    """Return the responses to a dark square at ten values of l/|v|, as in Gabbiani et al. (1999)."""
+    results = []
     for l_over_v in L_OVER_V:
         contact = max(2.0, 8.0 * l_over_v)
-        thing = Looming(l_over_v=l_over_v, contact=contact, largest=85.0)
-        seen = trial(f"l/|v| {1000 * l_over_v:g} ms", Screen(fps=FPS), contact, Plain(), thing)
-        frequency = seen.frequency["paper"]
-        # The middle of a flat top: the frequency is a mean over six frames.
-        top = seen.time[frequency == frequency.max()].mean()
-        begins = seen.above(30.0)
-        alarm = contact - float(begins[0]) if len(begins) else math.nan
-        found.append(Approach(l_over_v, contact - float(top), alarm, seen))
-        tick()
-    return found
+        square = Looming(l_over_v=l_over_v, contact=contact, largest=85.0)
+        name = f"l/|v| {1000 * l_over_v:g} ms"
+        response = run_stimulus(name, Screen(fps=FPS), contact, Plain(), square)
+        frequency = response.frequency["paper"]
+        # The frequency is a mean over six frames, so its maximum spans several frames: take their middle.
+        peak = response.time[frequency == frequency.max()].mean()
+        alarms = response.times_above(30.0)
+        alarm = contact - float(alarms[0]) if len(alarms) else math.nan
+        results.append(Approach(l_over_v, contact - float(peak), alarm, response))
+        on_step()
+    return results
 
 
-def selectivity(tick: Tick) -> dict[str, dict[str, int]]:
-    """Return model to spikes in an approach, the same backwards, and passing by, on plain grey."""
+def selectivity(on_step: StepCallback) -> dict[str, dict[str, int]]:
+    """Return the number of spikes of each model by kind of motion, on a plain background."""
     half = 0.04
-    things = {
+    objects = {
         "approach": Looming(contact=CONTACT),
         "recede": Receding(contact=0.0),
         "pass at 0.108 m/s": Translating(half_size=half, centred=1.5),
         "pass at 0.3 m/s": Translating(half_size=half, speed=0.3, centred=1.5),
     }
     counts: dict[str, dict[str, int]] = {model: {} for model in MODELS}
-    for name, thing in things.items():
-        seen = trial(name, Screen(fps=FPS), CONTACT, Plain(), thing)
-        for model, spikes in seen.spikes.items():
+    for name, foreground in objects.items():
+        response = run_stimulus(name, Screen(fps=FPS), CONTACT, Plain(), foreground)
+        for model, spikes in response.spikes.items():
             counts[model][name] = int(spikes.sum())
-        tick()
+        on_step()
     return counts
 
 
 def line_fit(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
-    """Return slope, intercept and the slope's 95 % half-width of a least-squares line."""
+    """Return slope, intercept and the half-width of the slope's 95 % interval of a least-squares line."""
     slope, intercept = np.polyfit(x, y, 1)
-    rest = y - (slope * x + intercept)
-    spread = math.sqrt(float((rest**2).sum()) / max(len(x) - 2, 1) / float(((x - x.mean()) ** 2).sum()))
-    return float(slope), float(intercept), 2.31 * spread  # Student's t, 8 degrees of freedom
+    residuals = y - (slope * x + intercept)
+    variance = float((residuals**2).sum()) / max(len(x) - 2, 1)
+    error = math.sqrt(variance / float(((x - x.mean()) ** 2).sum()))
+    return float(slope), float(intercept), 2.31 * error  # Student's t, 8 degrees of freedom
 
 
 @dataclass(frozen=True)
-class Findings:
-    """Everything that the experiments on synthetic stimuli gave."""
+class ExperimentResults:
+    """Results of all experiments on synthetic stimuli."""
 
-    gratings: list[GratingAnswer]
-    faint: list[GratingAnswer]
-    looming: list[tuple[float, float, float, Trial]]
-    light_dark: list[tuple[float, float, float]]
-    panorama: dict[str, Trial]
+    gratings: list[GratingResponse]
+    low_contrast: list[GratingResponse]
+    looming: list[LoomingInGrating]
+    light_dark: list[LuminanceLeads]
+    panorama: dict[str, StimulusResponse]
     approaches: list[Approach]
     selectivity: dict[str, dict[str, int]]
 
 
-STEPS = 30 + 30 + 18 + 6 + 6 + len(L_OVER_V) + 4  # ticks of `experiments`
+STEPS = 30 + 30 + 18 + 6 + 6 + len(L_OVER_V) + 4  # calls of `on_step` in `run_experiments`
 
 
-def experiments(tick: Tick, picture: Path | None = None) -> Findings:
-    """Run every experiment on synthetic stimuli; `tick` is called `STEPS` times."""
-    return Findings(
-        gratings(tick), faint_gratings(tick), looming_in_gratings(tick), light_and_dark(tick),
-        panorama(tick, picture), approaches(tick), selectivity(tick),
-    )  # fmt: skip
+def run_experiments(on_step: StepCallback, picture: Path | None = None) -> ExperimentResults:
+    """Run all experiments on synthetic stimuli.
+
+    Args:
+        on_step: Function called `STEPS` times, for a progress bar.
+        picture: Image file for the panorama; None for a random image.
+    """
+    return ExperimentResults(
+        gratings(on_step),
+        low_contrast_gratings(on_step),
+        looming_in_gratings(on_step),
+        light_and_dark(on_step),
+        panorama(on_step, picture),
+        approaches(on_step),
+        selectivity(on_step),
+    )

@@ -1,11 +1,13 @@
-"""The figures of `lgmd-gym paper`; matplotlib is loaded on first use."""
+"""The figures of `lgmd-gym paper`; matplotlib is imported on first use."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lgmd_gym.paper.backgrounds import SHAPES, Grating, Screen
 from lgmd_gym.paper.claims import LOCUST_SLOPE
 from lgmd_gym.paper.experiments import (
     CONTACT,
@@ -16,74 +18,90 @@ from lgmd_gym.paper.experiments import (
     MODELS,
     SPATIAL,
     TEMPORAL,
-    Findings,
-    GratingAnswer,
-    Trial,
+    ExperimentResults,
+    GratingResponse,
+    StimulusResponse,
     line_fit,
 )
-from lgmd_gym.paper.stimuli import SIZES, Grating, Screen, frames
+from lgmd_gym.paper.stimuli import stimulus_frames
 from lgmd_gym.plotting.style import COLOURS, STYLE, load_pyplot
 
-LEVEL = 30.0
-LOOKS = dict(zip(MODELS, (COLOURS[0], COLOURS[1], COLOURS[2]), strict=True))
+ALARM_LEVEL = 30.0  # T_sf [spikes/s]
+MODEL_COLOURS = dict(zip(MODELS, (COLOURS[0], COLOURS[1], COLOURS[2]), strict=True))
 
 
-def paper_figures(found: Findings, folder: Path) -> list[Path]:
+def paper_figures(results: ExperimentResults, folder: Path) -> list[Path]:
     """Draw every figure into a folder and return their paths."""
     plt = load_pyplot()
-    drawn = []
-    draws = {
+    paths = []
+    figures = {
         "1-gratings": _gratings,
         "2-looming-in-gratings": _looming,
         "3-panorama": _panorama,
         "4-biology": _biology,
     }
     with plt.rc_context(STYLE):
-        for name, draw in draws.items():
+        for name, draw in figures.items():
             path = folder / f"{name}.png"
-            figure = draw(plt, found)
+            figure = draw(plt, results)
             figure.savefig(path)
             plt.close(figure)
-            drawn.append(path)
-    return drawn
+            paths.append(path)
+    return paths
 
 
-def _gratings(plt: Any, found: Findings) -> Any:
-    """Six gratings as they look, and the highest K of four models over contrast, period and frequency."""
+def _gratings(plt: Any, results: ExperimentResults) -> Any:
+    """Six gratings, and the highest K of four models over contrast, spatial and temporal frequency."""
     models = ("paper", "fixed inhibition", "neither adaptation nor silencing", "Yue & Rind 2006")
     figure = plt.figure(figsize=(11.0, 7.6), layout="constrained")
     figure.suptitle(
-        "Gratings alone: highest membrane potential K (0.5 is rest, 0.7 spikes); grey numbers: mean F̂"
+        "Gratings alone: highest membrane potential K (rest 0.5, first spike 0.7); grey numbers: mean F̂"
     )
     grid = figure.add_gridspec(3, 1, height_ratios=(0.8, 1.2, 1.2))
-    top, screen = grid[0].subgridspec(1, len(SPATIAL)), Screen(shape=SIZES["gratings"])
+    top, screen = grid[0].subgridspec(1, len(SPATIAL)), Screen(shape=SHAPES["gratings"])
     for index, spatial in enumerate(SPATIAL):
         axis = figure.add_subplot(top[index])
-        axis.imshow(next(frames(screen, 1.0, Grating(spatial=spatial))), cmap="gray", vmin=0, vmax=255)
+        axis.imshow(
+            next(stimulus_frames(screen, 1.0, Grating(spatial=spatial))), cmap="gray", vmin=0, vmax=255
+        )
         axis.set_title(f"{spatial:.3g} periods/m", fontsize=8)
         axis.set_axis_off()
     rows = (
-        (found.gratings, SPATIAL, "periods/m", lambda item: item.grating.spatial, "contrast 1"),
-        (found.faint, CONTRASTS, "contrast", lambda item: item.grating.contrast, "40 periods/m"),
+        (results.gratings, SPATIAL, "periods/m", lambda item: item.grating.spatial, "contrast 1"),
+        (results.low_contrast, CONTRASTS, "contrast", lambda item: item.grating.contrast, "40 periods/m"),
     )
     image = None
-    for row, (answers, values, label, key, about) in enumerate(rows, start=1):
-        place = grid[row].subgridspec(1, len(models))
+    for row, (responses, values, label, key, note) in enumerate(rows, start=1):
+        cell = grid[row].subgridspec(1, len(models))
         for column, model in enumerate(models):
-            axis = figure.add_subplot(place[column])
-            image = _heat(axis, answers, values, key, model)
-            axis.set_title(f"{model}\n{about}", fontsize=8)
+            axis = figure.add_subplot(cell[column])
+            image = _heat_map(axis, responses, values, key, model)
+            axis.set_title(f"{model}\n{note}", fontsize=8)
             axis.set_xlabel("temporal frequency [Hz]", fontsize=8)
             axis.set_ylabel(label if column == 0 else "")
         figure.colorbar(image, ax=figure.axes[-1], label="highest K")
     return figure
 
 
-def _heat(axis: Any, answers: list[GratingAnswer], values: tuple[float, ...], key: Any, model: str) -> Any:
-    """Draw the highest K over one value of the grating and its temporal frequency, F̂ written in."""
+def _heat_map(
+    axis: Any,
+    responses: list[GratingResponse],
+    values: tuple[float, ...],
+    key: Callable[[GratingResponse], float],
+    model: str,
+) -> Any:
+    """Draw the highest K of a model, with F̂ as text, over a property of the grating and its frequency.
+
+    Args:
+        axis: Axes to draw on.
+        responses: Responses to the gratings.
+        values: Values of the property.
+        key: Function that returns the property.
+        model: Name of the model.
+    """
     table = np.zeros((len(values), len(TEMPORAL)))
     axis.grid(visible=False)
-    for item in answers:
+    for item in responses:
         row, column = values.index(key(item)), TEMPORAL.index(item.grating.temporal)
         table[row, column] = item.potential[model]
         if model == "paper":
@@ -93,26 +111,26 @@ def _heat(axis: Any, answers: list[GratingAnswer], values: tuple[float, ...], ke
     return axis.imshow(table, vmin=0.5, vmax=1.0, cmap="OrRd", aspect="auto")
 
 
-def _looming(plt: Any, found: Findings) -> Any:
-    """A square that looms in gratings: what it looks like, and the frequency, one column per contrast."""
-    contrasts = list(dict.fromkeys(item[0] for item in found.looming))
+def _looming(plt: Any, results: ExperimentResults) -> Any:
+    """A square that looms in gratings: frames, spike frequency and F̂, one column per contrast."""
+    contrasts = list(dict.fromkeys(item.contrast for item in results.looming))
     figure = plt.figure(figsize=(11.0, 7.4), layout="constrained")
-    figure.suptitle("A square looms in a drifting grating, l/|v| = 100 ms, 30 Hz: its contrast decides")
+    figure.suptitle("A square looms in a drifting grating, l/|v| = 100 ms, 30 Hz")
     grid = figure.add_gridspec(3, len(contrasts), height_ratios=(0.9, 1.2, 0.8))
     shared: list[Any] = [None, None]
     for column, contrast in enumerate(contrasts):
-        chosen = [item for item in found.looming if item[0] == contrast]
-        _strip(figure, grid[0, column], chosen[0][3], f"grating of contrast {contrast:g}", 4)
+        items = [item for item in results.looming if item.contrast == contrast]
+        _strip(figure, grid[0, column], items[0].response, f"grating of contrast {contrast:g}")
         upper = figure.add_subplot(grid[1, column], sharey=shared[0])
         lower = figure.add_subplot(grid[2, column], sharex=upper, sharey=shared[1])
         shared = [shared[0] or upper, shared[1] or lower]
-        for (_, spatial, luminance, trial), colour in zip(chosen, np.repeat(COLOURS[:3], 2), strict=True):
-            dark = luminance == DARK
-            label = f"{'dark' if dark else 'light'}, {spatial:g}/m"
-            look = {"color": colour, "linestyle": "-" if dark else "--", "linewidth": 1.1}
-            upper.plot(trial.time - CONTACT, trial.frequency["paper"], label=label, **look)
-            lower.plot(trial.time - CONTACT, trial.ffi, **look)
-        upper.axhline(LEVEL, color=COLOURS[5], linewidth=1.2)
+        for item, colour in zip(items, np.repeat(COLOURS[:3], 2), strict=True):
+            dark, response = item.luminance == DARK, item.response
+            label = f"{'dark' if dark else 'light'}, {item.spatial:g}/m"
+            style = {"color": colour, "linestyle": "-" if dark else "--", "linewidth": 1.1}
+            upper.plot(response.time - CONTACT, response.frequency["paper"], label=label, **style)
+            lower.plot(response.time - CONTACT, response.ffi, **style)
+        upper.axhline(ALARM_LEVEL, color=COLOURS[5], linewidth=1.2)
         lower.axhline(10.0, color="0.5", linestyle=":", linewidth=1.0)
         upper.set_xlim(-1.5, 0.0)
         lower.set_xlabel("time to contact [s]")
@@ -123,30 +141,30 @@ def _looming(plt: Any, found: Findings) -> Any:
     return figure
 
 
-def _panorama(plt: Any, found: Findings) -> Any:
-    """Approaching, receding and passing in a shifting panorama, one column each."""
+def _panorama(plt: Any, results: ExperimentResults) -> Any:
+    """Objects that approach, recede and translate in a shifting panorama, one column each."""
     names = ("approaching, dark", "receding", "passing at 0.108 m/s", "passing at 0.3 m/s")
     figure = plt.figure(figsize=(12.0, 8.0), layout="constrained")
     figure.suptitle("An object in a shifting panorama, 30 Hz (orange: T_sf = 30 spikes/s)")
     grid = figure.add_gridspec(5, len(names), height_ratios=(0.9, 0.7, 0.45, 1.1, 0.7))
     for column, name in enumerate(names):
-        trial = found.panorama[name]
-        _strip(figure, grid[0, column], trial, name, 4)
+        response = results.panorama[name]
+        _strip(figure, grid[0, column], response, name)
         axes = [figure.add_subplot(grid[row, column]) for row in (1, 2, 3, 4)]
-        axes[0].plot(trial.time, trial.potential["paper"], color=COLOURS[6])
+        axes[0].plot(response.time, response.potential["paper"], color=COLOURS[6])
         axes[0].axhline(0.7, color="0.5", linestyle=":", linewidth=1.0)
         axes[0].set_ylim(0.45, 1.02)
-        axes[1].vlines(trial.time, 0.0, trial.spikes["paper"], color=COLOURS[0], linewidth=1.0)
+        axes[1].vlines(response.time, 0.0, response.spikes["paper"], color=COLOURS[0], linewidth=1.0)
         axes[1].set_ylim(0.0, 10.0)
-        for model, colour in LOOKS.items():
-            axes[2].plot(trial.time, trial.frequency[model], color=colour, label=model, linewidth=1.2)
-        axes[2].axhline(LEVEL, color=COLOURS[5], linewidth=1.2)
+        for model, colour in MODEL_COLOURS.items():
+            axes[2].plot(response.time, response.frequency[model], color=colour, label=model, linewidth=1.2)
+        axes[2].axhline(ALARM_LEVEL, color=COLOURS[5], linewidth=1.2)
         axes[2].set_ylim(0.0, 250.0)
-        axes[3].plot(trial.time, trial.ffi, color=COLOURS[2])
+        axes[3].plot(response.time, response.ffi, color=COLOURS[2])
         axes[3].axhline(10.0, color="0.5", linestyle=":", linewidth=1.0)
         axes[3].set_ylim(0.0, 40.0)
         axes[3].set_xlabel("time [s]")
-        labels = ("K (dotted: T_sp)", "spikes\na frame", "spike frequency\n[spikes/s]", "F̂")
+        labels = ("K (dotted: T_sp)", "spikes\nper frame", "spike frequency\n[spikes/s]", "F̂")
         for axis, label in zip(axes, labels, strict=True):
             axis.set_xlim(0.0, CONTACT)
             axis.set_ylabel(label if column == 0 else "")
@@ -156,25 +174,29 @@ def _panorama(plt: Any, found: Findings) -> Any:
     return figure
 
 
-def _biology(plt: Any, found: Findings) -> Any:
-    """Peak time and angle over l/|v|, approaches aligned at contact, and the spikes by kind of motion."""
+def _biology(plt: Any, results: ExperimentResults) -> Any:
+    """Peak time and angle over l/|v|, approaches aligned at contact, and spikes by kind of motion."""
     figure, axes = plt.subplots(2, 2, figsize=(10.0, 7.6), layout="constrained")
-    figure.suptitle("Against the locust (Gabbiani, Krapp & Laurent 1999): a dark square on grey, 30 Hz")
-    _draw_peaks(axes[0, 0], axes[0, 1], found)
-    for item, colour in zip(found.approaches[4::2], COLOURS, strict=False):
-        trial = item.trial
-        contact = trial.time[-1] + 1.0 / FPS
+    figure.suptitle(
+        "Comparison with the locust (Gabbiani, Krapp & Laurent 1999): a dark square on grey, 30 Hz"
+    )
+    _draw_peaks(axes[0, 0], axes[0, 1], results)
+    for item, colour in zip(results.approaches[4::2], COLOURS, strict=False):
+        response = item.response
+        contact = response.time[-1] + 1.0 / FPS
         label = f"l/|v| = {1000 * item.l_over_v:g} ms"
-        axes[1, 0].plot(trial.time - contact, trial.frequency["paper"], color=colour, label=label)
+        axes[1, 0].plot(response.time - contact, response.frequency["paper"], color=colour, label=label)
     axes[1, 0].set_xlim(-1.6, 0.0)
     axes[1, 0].set_xlabel("time to contact [s]")
     axes[1, 0].set_ylabel("spike frequency [spikes/s]")
-    axes[1, 0].axhline(LEVEL, color=COLOURS[5], linewidth=1.2)
+    axes[1, 0].axhline(ALARM_LEVEL, color=COLOURS[5], linewidth=1.2)
     axes[1, 0].legend(fontsize=8)
-    kinds = list(next(iter(found.selectivity.values())))
-    for index, (model, counts) in enumerate(found.selectivity.items()):
+    kinds = list(next(iter(results.selectivity.values())))
+    for index, (model, counts) in enumerate(results.selectivity.items()):
         at = np.arange(len(kinds)) + 0.27 * (index - 1)
-        bars = axes[1, 1].bar(at, [counts[kind] for kind in kinds], 0.25, color=LOOKS[model], label=model)
+        bars = axes[1, 1].bar(
+            at, [counts[kind] for kind in kinds], 0.25, color=MODEL_COLOURS[model], label=model
+        )
         axes[1, 1].bar_label(bars, fontsize=7)
     axes[1, 1].set_xticks(range(len(kinds)), [kind.replace(" at", "\nat") for kind in kinds])
     axes[1, 1].set_ylabel("spikes in 3 s")
@@ -182,13 +204,13 @@ def _biology(plt: Any, found: Findings) -> Any:
     return figure
 
 
-def _draw_peaks(left: Any, right: Any, found: Findings) -> None:
-    """Draw when the frequency peaks and alarms, and the angle of the square then."""
+def _draw_peaks(left: Any, right: Any, results: ExperimentResults) -> None:
+    """Draw the times of the peak and of the first alarm, and the angle of the square at these times."""
     x = np.array(L_OVER_V)
     for name, colour, marker in (("peak", COLOURS[0], "o"), ("alarm", COLOURS[1], "s")):
-        y = np.array([getattr(item, name) for item in found.approaches])
-        slope, intercept, half = line_fit(x, y)
-        label = f"{name}: slope {slope:.2f} ± {half:.2f}, intercept {1000 * intercept:.0f} ms"
+        y = np.array([getattr(item, name) for item in results.approaches])
+        slope, intercept, half_width = line_fit(x, y)
+        label = f"{name}: slope {slope:.2f} ± {half_width:.2f}, intercept {1000 * intercept:.0f} ms"
         left.plot(1000 * x, 1000 * y, marker, color=colour, label=label)
         left.plot(1000 * x, 1000 * (slope * x + intercept), color=colour, linewidth=1.0)
         angle = 2.0 * np.degrees(np.arctan(x / y))
@@ -206,7 +228,7 @@ def _draw_peaks(left: Any, right: Any, found: Findings) -> None:
         2.0 * math.degrees(math.atan(1.0 / LOCUST_SLOPE)),
         color="0.6",
         linestyle="--",
-        label="locust: 24°, 27 ms ahead of its peak",
+        label="locust: 24°, 27 ms before its peak",
     )
     right.set_ylabel("angle of the square [deg]")
     right.set_ylim(0.0, 60.0)
@@ -215,10 +237,10 @@ def _draw_peaks(left: Any, right: Any, found: Findings) -> None:
         axis.legend(fontsize=8)
 
 
-def _strip(figure: Any, place: Any, trial: Trial, title: str, most: int) -> None:
-    """Draw some frames of a trial below each other in two columns."""
-    inner = place.subgridspec(2, 2, wspace=0.03)
-    for index, (time, frame) in enumerate(trial.pictures[-most:]):
+def _strip(figure: Any, cell: Any, response: StimulusResponse, title: str) -> None:
+    """Draw the last four stored frames of a stimulus in two columns."""
+    inner = cell.subgridspec(2, 2, wspace=0.03)
+    for index, (time, frame) in enumerate(response.pictures[-4:]):
         axis = figure.add_subplot(inner[index // 2, index % 2])
         axis.imshow(frame, cmap="gray", vmin=0, vmax=255)
         axis.set_axis_off()

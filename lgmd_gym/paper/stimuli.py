@@ -1,10 +1,9 @@
-"""The paper's synthetic stimuli: gratings, and squares or discs that loom, recede, pass or grow.
+"""The paper's synthetic stimuli: gratings, and squares or discs that loom, recede, translate or grow.
 
-A scene is a background and, on it, an object; `frames` draws it as grey frames. Lengths are on a flat
-screen, which `Screen` puts at a distance from the eye: the paper names no scale, and 1000 px/m is our
-assumption (its 40, 60 and 80 units/m then have periods of 25, 17 and 12.5 px, its 10.8 cm/s are 6 px a
-frame at 18 Hz). Everything is anti-aliased: an edge that moves by a tenth of a pixel changes the pixel by
-a tenth.
+A stimulus is a background and an optional foreground object; `stimulus_frames` renders it as grey frames.
+Lengths are measured on a flat screen (`Screen`). The paper states no scale; 1000 px/m is an assumption. With
+it, the paper's 40, 60 and 80 units/m have periods of 25, 17 and 12.5 px, and its 10.8 cm/s are 6 px per frame
+at 18 Hz. Rendering is anti-aliased: an edge that moves by a tenth of a pixel changes the pixel by a tenth.
 """
 
 import math
@@ -15,25 +14,28 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from lgmd_gym.paper.backgrounds import SIZES, SPEED, Grating, Map, Panorama, Plain, Screen, natural
+from lgmd_gym.paper.backgrounds import PAPER_SPEED, LuminanceMap, Plain, Screen
 
-__all__ = [
-    "SIZES", "SPEED", "Background", "Box", "Elongating", "Frame", "Grating", "Looming", "Object", "Panorama",
-    "Plain", "Receding", "Screen", "Translating", "coverage", "frames", "natural",
-]  # fmt: skip
 Frame = NDArray[np.uint8]
 
 
 class Background(Protocol):
-    """What lies behind the object."""
+    """Background of a stimulus."""
 
-    def paint(self, time: float, screen: Screen) -> Map:
+    def render(self, time: float, screen: Screen) -> LuminanceMap:
         """Return luminance in 0-255 at a time [s], float64, shape (height, width)."""
         ...
 
 
-class Box(NamedTuple):
-    """Where an object is on the screen [px]: its centre, right and down of the screen's, and half sizes."""
+class ScreenBox(NamedTuple):
+    """Position of an object on the screen.
+
+    Attributes:
+        x: Centre, to the right of the screen's centre [px].
+        y: Centre, below the screen's centre [px].
+        half_width: Half the width [px].
+        half_height: Half the height [px].
+    """
 
     x: float
     y: float
@@ -41,34 +43,34 @@ class Box(NamedTuple):
     half_height: float
 
 
-class Object(Protocol):
-    """What moves in front of the background."""
+class ForegroundObject(Protocol):
+    """Moving object in front of the background."""
 
     @property
     def luminance(self) -> float:
-        """In 0-255."""
+        """Luminance in 0-255."""
         ...
 
     @property
     def outline(self) -> Literal["square", "disc"]:
-        """Square or disc."""
+        """Outline of the object."""
         ...
 
-    def box(self, time: float, screen: Screen) -> Box:
-        """Return where it is at a time [s]."""
+    def box(self, time: float, screen: Screen) -> ScreenBox:
+        """Return the position at a time [s]."""
         ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class Looming:
-    """An object that comes straight on at constant speed; its angle is 2·atan(l/|v| / time to contact).
+    """An object that approaches the eye at constant speed; its angle is 2·atan(l/|v| / time to contact).
 
     Attributes:
         l_over_v: Half its size over its speed [s].
-        contact: When it would touch the eye [s].
-        largest: Half size at which it stops, seen from the eye [deg].
-        luminance: In 0-255.
-        outline: Square or disc.
+        contact: Time of contact with the eye [s].
+        largest: Angular half size at which it stops [deg].
+        luminance: Luminance in 0-255.
+        outline: Outline of the object.
     """
 
     l_over_v: float = 0.1
@@ -77,126 +79,130 @@ class Looming:
     luminance: float = 20.0
     outline: Literal["square", "disc"] = "square"
 
-    def box(self, time: float, screen: Screen) -> Box:
-        """Return where it is at a time [s]."""
-        most = math.tan(math.radians(self.largest))
-        left = self.contact - time
-        half = screen.focal * (most if left * most <= self.l_over_v else self.l_over_v / left)
-        return Box(0.0, 0.0, half, half)
+    def box(self, time: float, screen: Screen) -> ScreenBox:
+        """Return the position at a time [s]."""
+        largest = math.tan(math.radians(self.largest))
+        remaining = self.contact - time
+        tangent = largest if remaining * largest <= self.l_over_v else self.l_over_v / remaining
+        half = screen.focal * tangent
+        return ScreenBox(0.0, 0.0, half, half)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Receding(Looming):
-    """An object that goes straight away at constant speed: looming, with time running backwards.
+    """An object that moves away from the eye at constant speed: `Looming` with reversed time.
 
     Attributes:
-        contact: When it was, or would have been, at the eye [s]; it stands still until it is as small as
-            `largest`.
+        contact: Time at which the object is at the eye [s]. It is static until its angular half size falls
+            below `largest`.
     """
 
     contact: float = 0.0
 
-    def box(self, time: float, screen: Screen) -> Box:
-        """Return where it is at a time [s]."""
+    def box(self, time: float, screen: Screen) -> ScreenBox:
+        """Return the position at a time [s]."""
         return Looming.box(self, 2.0 * self.contact - time, screen)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Translating:
-    """An object of constant size that passes from side to side.
+    """An object of constant size that moves sideways across the screen.
 
     Attributes:
-        half_size: On the screen [m].
-        speed: On the screen [m/s], + to the right.
-        centred: When it is in the middle [s].
-        luminance: In 0-255.
-        outline: Square or disc.
+        half_size: Half its size on the screen [m].
+        speed: Speed on the screen [m/s], + to the right.
+        centred: Time at which it is at the centre of the screen [s].
+        luminance: Luminance in 0-255.
+        outline: Outline of the object.
     """
 
     half_size: float = 0.04
-    speed: float = SPEED
+    speed: float = PAPER_SPEED
     centred: float = 2.0
     luminance: float = 20.0
     outline: Literal["square", "disc"] = "square"
 
-    def box(self, time: float, screen: Screen) -> Box:
-        """Return where it is at a time [s]."""
+    def box(self, time: float, screen: Screen) -> ScreenBox:
+        """Return the position at a time [s]."""
         half = self.half_size * screen.px_per_m
-        return Box((time - self.centred) * self.speed * screen.px_per_m, 0.0, half, half)
+        return ScreenBox((time - self.centred) * self.speed * screen.px_per_m, 0.0, half, half)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Elongating:
-    """An object whose edges grow at constant linear speed on the screen, sideways or all round.
+    """An object whose edges move outwards at constant speed on the screen.
 
     Attributes:
         start: Half size at time 0 [m].
-        speed: Of each edge [m/s].
-        all_round: Whether it also grows up and down.
-        luminance: In 0-255.
-        outline: Square or disc.
+        speed: Speed of each edge [m/s].
+        all_round: Whether the upper and lower edges move as well.
+        luminance: Luminance in 0-255.
+        outline: Outline of the object.
     """
 
     start: float = 0.01
-    speed: float = SPEED
+    speed: float = PAPER_SPEED
     all_round: bool = True
     luminance: float = 20.0
     outline: Literal["square", "disc"] = "square"
 
-    def box(self, time: float, screen: Screen) -> Box:
-        """Return where it is at a time [s]."""
+    def box(self, time: float, screen: Screen) -> ScreenBox:
+        """Return the position at a time [s]."""
         half = (self.start + self.speed * time) * screen.px_per_m
-        return Box(0.0, 0.0, half, half if self.all_round else self.start * screen.px_per_m)
+        return ScreenBox(0.0, 0.0, half, half if self.all_round else self.start * screen.px_per_m)
 
 
-def frames(
-    screen: Screen, seconds: float, background: Background | None = None, thing: Object | None = None
+def stimulus_frames(
+    screen: Screen,
+    seconds: float,
+    background: Background | None = None,
+    foreground: ForegroundObject | None = None,
 ) -> Iterator[Frame]:
-    """Yield the grey frames of a scene: uint8, shape (height, width), row 0 at the top.
+    """Yield the grey frames of a stimulus: uint8, shape (height, width), row 0 at the top.
 
     Args:
-        screen: Size, rate and scale.
-        seconds: How long.
-        background: None for plain grey.
-        thing: The object in front; None for none.
+        screen: Size, frame rate and scale.
+        seconds: Duration [s].
+        background: Background; None for uniform grey.
+        foreground: Moving object; None for none.
 
     Example:
-        >>> next(frames(Screen(shape=(4, 6)), 1.0, Grating(contrast=0.5))).shape
+        >>> next(stimulus_frames(Screen(shape=(4, 6)), 1.0, Plain(luminance=60.0))).shape
         (4, 6)
     """
-    behind = Plain() if background is None else background
+    background = Plain() if background is None else background
     for number in range(round(seconds * screen.fps)):
         time = number / screen.fps
-        picture = behind.paint(time, screen)
-        if thing is not None:
-            picture = picture + coverage(thing.box(time, screen), thing.outline, screen.shape) * (
-                thing.luminance - picture
-            )
+        picture = background.render(time, screen)
+        if foreground is not None:
+            covered = coverage(foreground.box(time, screen), foreground.outline, screen.shape)
+            picture = picture + covered * (foreground.luminance - picture)
         yield np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
 
-def coverage(box: Box, outline: str, shape: tuple[int, int]) -> Map:
-    """Return which part of each pixel an object covers, in [0, 1], shape (height, width)."""
+def coverage(box: ScreenBox, outline: str, shape: tuple[int, int]) -> LuminanceMap:
+    """Return the part of each pixel that an object covers, in [0, 1], shape (height, width)."""
     if outline == "square":
-        across = _overlap(box.x, box.half_width, shape[1])
-        return np.outer(_overlap(box.y, box.half_height, shape[0]), across)
+        columns = _overlap(box.x, box.half_width, shape[1])
+        return np.outer(_overlap(box.y, box.half_height, shape[0]), columns)
     x, y = _centres(shape[1]) - box.x, _centres(shape[0]) - box.y
     half_width, half_height = max(box.half_width, 1e-9), max(box.half_height, 1e-9)
     reach = np.hypot(x[None, :] / half_width, y[:, None] / half_height)
-    # Within half a pixel of the rim, the distance to it tells the part; a disc below a pixel keeps its area.
+    # Within half a pixel of the rim, the part is linear in the distance to the rim.
     part = np.clip((1.0 - reach) * min(half_width, half_height) + 0.5, 0.0, 1.0)
-    area, drawn = math.pi * half_width * half_height, float(part.sum())
-    scale = area / drawn if half_width < 1.0 and drawn > 0.0 else 1.0
+    # The area of a disc that is smaller than a pixel is corrected.
+    area, rendered = math.pi * half_width * half_height, float(part.sum())
+    scale = area / rendered if half_width < 1.0 and rendered > 0.0 else 1.0
     return np.asarray(part * scale, np.float64)
 
 
-def _centres(size: int) -> Map:
-    """Return the middles of the pixels along an axis, from the middle of the screen."""
+def _centres(size: int) -> LuminanceMap:
+    """Return the pixel centres along an axis, relative to the centre of the screen."""
     return np.arange(size, dtype=np.float64) + (0.5 - size / 2.0)
 
 
-def _overlap(centre: float, half: float, size: int) -> Map:
-    """Return how much of each pixel along an axis lies within centre ± half."""
+def _overlap(centre: float, half: float, size: int) -> LuminanceMap:
+    """Return the part of each pixel along an axis within centre ± half."""
     middle = _centres(size)
     return np.clip(
         np.minimum(middle + 0.5, centre + half) - np.maximum(middle - 0.5, centre - half), 0.0, 1.0

@@ -1,47 +1,50 @@
-"""What a video file holds, from one pass over its packets that decodes nothing."""
+"""Frame rate, length and completeness of a video file, without decoding it."""
 
-import heapq
-import re
-import subprocess
-import tempfile
+from array import array
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-# Time stamps come in decoding order; this many packets put them back in the order of display.
-_REORDER = 32
-# Intervals that stray from their mean by more than this fraction and by more than a tick: variable rate.
+import numpy as np
+
+if TYPE_CHECKING:
+    from av.container import InputContainer
+    from av.video.stream import VideoStream
+
+# The rate is variable if an interval deviates from the median by more than one tick and this fraction.
 _JITTER = 0.05
+_DEFAULT_FPS = 25.0  # ffmpeg's, for a file with a single frame and no rate
 
 
 class VideoInfo(NamedTuple):
-    """What a video file holds.
+    """Properties of a video file.
 
     Attributes:
         path: The file.
-        fps: Frames per second; of a variable rate, that of the usual interval.
-        frames: Number of frames in the file, as far as its packets go.
+        fps: Frame rate; if variable, that of the median interval [Hz].
+        frames: Number of frames in the file.
         variable: Whether the intervals between frames vary.
-        promised: Duration that the file's header promises [s]; None if it promises none.
+        missing: Part of the duration in the file's header for which the file has no data [s].
     """
 
     path: Path
     fps: float
     frames: int
     variable: bool
-    promised: float | None
+    missing: float
 
     @property
     def duration(self) -> float:
-        """Frames over rate [s]."""
+        """Number of frames divided by the frame rate [s]."""
         return self.frames / self.fps
 
 
 def probe(path: str | Path) -> VideoInfo:
-    """Return what a video file holds.
+    """Return the properties of a video file from one pass over its packets.
 
     Raises:
-        ValueError: For a file that is missing, empty, no video, or sound alone.
+        ValueError: For a file that is missing, empty, not a video, or without a video stream.
     """
     path = Path(path)
     if not path.exists():
@@ -50,103 +53,85 @@ def probe(path: str | Path) -> VideoInfo:
         raise ValueError(f"clip {str(path)!r} is not a file")
     if path.stat().st_size == 0:
         raise ValueError(f"clip {str(path)!r} is empty (0 bytes)")
-    with tempfile.TemporaryFile() as log:
-        listing = ["-map", "0:V:0", "-c", "copy", "-f", "framecrc", "-"]
-        with ffmpeg_reads(path, listing, log) as process:
-            assert process.stdout is not None
-            frames, intervals, tick = _intervals(process.stdout)
-        said = messages(log)
-    if not frames:
-        raise ValueError(f"clip {str(path)!r} {_trouble(said)}")
-    fps, variable = _rate(intervals, tick, said)
-    return VideoInfo(path, fps, frames, variable, _promised(said))
+    with open_video(path) as (container, stream):
+        assert stream.time_base is not None
+        frames, stamps, end, file_end = _scan(container, stream)
+        if not frames:
+            raise ValueError(f"clip {str(path)!r} is truncated before the end of its first frame")
+        tick = float(stream.time_base)
+        named = float(stream.average_rate or stream.base_rate or _DEFAULT_FPS)
+        fps, variable = _rate(stamps, tick, named)
+        missing = 0.0
+        if stream.duration and len(stamps):
+            missing = stream.duration * tick - (end - stamps[0] * tick)
+        elif container.duration:
+            missing = container.duration / 1e6 - file_end
+    return VideoInfo(path, fps, frames, variable, max(float(missing), 0.0))
 
 
-def ffmpeg_reads(path: Path, output: list[str], log: IO[bytes]) -> subprocess.Popen[bytes]:
-    """Start ffmpeg on a local file, its answer on a pipe, what it says in `log`.
+@contextmanager
+def open_video(path: Path) -> Iterator["tuple[InputContainer, VideoStream]"]:
+    """Open a local file and yield its container and first video stream, cover pictures excepted.
 
-    The file is named as one and nothing else may be opened: a playlist cannot reach out to the network.
+    Only the file itself can be opened: a playlist cannot load anything from the network.
+
+    Raises:
+        ValueError: If the file is not a video or has no video stream.
     """
-    from imageio_ffmpeg import get_ffmpeg_exe
+    import av
+    from av.error import FFmpegError
+    from av.stream import Disposition
 
-    source = ["-protocol_whitelist", "file", "-i", f"file:{path}"]
-    command = [get_ffmpeg_exe(), "-nostdin", "-hide_banner", "-nostats", *source, *output]
-    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log)
-
-
-def messages(log: IO[bytes]) -> str:
-    """Return the start and the end of what ffmpeg said; a broken file can make it say megabytes."""
-    size = log.seek(0, 2)
-    log.seek(0)
-    text = log.read(20_000)
-    if size > 40_000:
-        log.seek(size - 20_000)
-    return (text + log.read(20_000)).decode("utf-8", "replace")
-
-
-def _intervals(lines: IO[bytes]) -> tuple[int, dict[int, int], float]:
-    """Return the number of packets, how often each interval [ticks] occurs, and the length of a tick [s]."""
-    tick, packets, counts = 1.0, 0, {}
-    last: int | None = None
-
-    def shown() -> Iterator[int]:
-        nonlocal tick, packets
-        waiting: list[int] = []
-        for line in lines:
-            if line.startswith(b"#tb 0:"):
-                above, below = line.split(b":")[1].split(b"/")
-                tick = int(above) / int(below)
-            if line.startswith(b"#"):
-                continue
-            packets += 1
-            stamp = line.split(b",")[2].strip()
-            if stamp.lstrip(b"-").isdigit():
-                heapq.heappush(waiting, int(stamp))
-            if len(waiting) > _REORDER:
-                yield heapq.heappop(waiting)
-        while waiting:
-            yield heapq.heappop(waiting)
-
-    for stamp in shown():
-        # A few thousand different intervals tell the rate as well as more, and take no more room.
-        if last is not None and stamp > last and (len(counts) < 4096 or stamp - last in counts):
-            counts[stamp - last] = counts.get(stamp - last, 0) + 1
-        last = stamp
-    return packets, counts, tick
+    try:
+        container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
+    except FFmpegError as error:
+        raise ValueError(
+            f"clip {str(path)!r} is truncated or not a video: {error.strerror or 'ffmpeg cannot read it'}"
+        ) from None
+    with container:
+        for stream in container.streams.video:
+            if not stream.disposition & Disposition.attached_pic:
+                yield container, stream
+                return
+        raise ValueError(f"clip {str(path)!r} has no video stream")
 
 
-def _rate(counts: dict[int, int], tick: float, said: str) -> tuple[float, bool]:
-    """Return the rate [Hz] and whether it varies."""
-    found = re.search(r"Video:.*?([\d.]+) (?:fps|tbr)", said)
-    named = float(found[1]) if found else 0.0
-    if not counts:
-        return named or 25.0, False
-    total = sum(counts.values())
-    middle, seen = 0, 0
-    for interval in sorted(counts):
-        middle, seen = interval, seen + counts[interval]
-        if 2 * seen >= total:
-            break
-    near = {i: n for i, n in counts.items() if abs(i - middle) <= max(1, _JITTER * middle)}
-    fps = sum(near.values()) / (sum(i * n for i, n in near.items()) * tick)
-    # Stamps in whole milliseconds make a short clip's 30 Hz 29.995: then what the file says is better.
-    return (named if abs(fps - named) < 1e-3 * fps else round(fps, 4)), len(near) < len(counts)
+def _scan(container: "InputContainer", stream: "VideoStream") -> tuple[int, np.ndarray, float, float]:
+    """Read all packets of a file.
+
+    Returns:
+        Number of frames and their sorted time stamps [ticks] in the video stream; end of the last packet of
+        that stream and of any stream [s].
+    """
+    frames, stamps = 0, array("q")  # eight bytes per frame: 2 MB for two hours
+    end = file_end = 0.0
+    for packet in container.demux(container.streams.video + container.streams.audio):
+        in_video = packet.stream is stream
+        frames += in_video and packet.size > 0
+        if packet.pts is None:
+            continue
+        packet_end = float((packet.pts + (packet.duration or 0)) * packet.time_base)
+        file_end = max(file_end, packet_end)
+        if in_video:
+            stamps.append(packet.pts)
+            end = max(end, packet_end)
+    return frames, np.sort(np.frombuffer(stamps, np.int64)), end, file_end
 
 
-def _promised(said: str) -> float | None:
-    """Return the duration in the header [s]."""
-    found = re.search(r"Duration: (\d+):(\d\d):(\d\d\.\d+)", said)
-    return None if found is None else 3600.0 * int(found[1]) + 60.0 * int(found[2]) + float(found[3])
+def _rate(stamps: np.ndarray, tick: float, named: float) -> tuple[float, bool]:
+    """Return the frame rate [Hz] and whether it varies.
 
-
-def _trouble(said: str) -> str:
-    """Say why no packet came, from ffmpeg's messages."""
-    if "Audio:" in said and not re.search(r"Video: (?!.*attached pic)", said):
-        return "holds no picture: it is sound alone"
-    if "moov atom not found" in said:
-        return "is truncated, or no video: its index is missing, and no frame can be read without it"
-    if "partial file" in said or "ended prematurely" in said:
-        return "is truncated ahead of the end of its first frame"
-    if "Invalid data found" in said:
-        return "is no video that ffmpeg can read"
-    return "holds no frame that ffmpeg can read"
+    Args:
+        stamps: Sorted time stamps [ticks].
+        tick: Duration of a tick [s].
+        named: Frame rate in the file's header [Hz].
+    """
+    intervals = np.sort(np.diff(stamps))
+    intervals = intervals[intervals > 0]
+    if not len(intervals):
+        return round(named, 4), False
+    median = intervals[(len(intervals) - 1) // 2]
+    regular = intervals[np.abs(intervals - median) <= max(1.0, _JITTER * median)]
+    fps = len(regular) / (float(regular.sum()) * tick)
+    # Stamps in whole milliseconds turn 30 Hz into 29.995 Hz in a short clip; the header is then more exact.
+    return round(named if abs(fps - named) < 1e-3 * fps else fps, 4), len(regular) < len(intervals)

@@ -1,132 +1,154 @@
-"""Read video files of any length, picture by picture, with the ffmpeg that imageio-ffmpeg carries."""
+"""Read video files of any length frame by frame with PyAV."""
 
-import re
-import tempfile
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from contextlib import suppress
 from functools import cache
+from itertools import chain
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgmd_gym.video.probe import ffmpeg_reads, messages, probe
+from lgmd_gym.video.probe import open_video, probe
+
+if TYPE_CHECKING:
+    from av import VideoFrame
+    from av.container import InputContainer
+    from av.filter import Graph
+    from av.video.stream import VideoStream
 
 CLIP_SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif", ".webm", ".m4v", ".mpg", ".ts")
-SMALLEST = 3  # the neuron's neighbourhood [px]
-# What ffmpeg says of a file that ends in the middle.
-_BREAKS = re.compile(r"partial file|ended prematurely|[Tt]runcat|Packet corrupt|End of file|incomplete")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reading:
-    """How a video file is read.
-
-    Attributes:
-        fps: Rate to resample to [Hz]; None keeps the file's.
-        size: (width, height) to scale to [px]; None keeps the file's.
-    """
-
-    fps: float | None = None
-    size: tuple[int, int] | None = None
-
-    def __post_init__(self) -> None:
-        if self.fps is not None and not 0.0 < self.fps <= 1000.0:
-            raise ValueError(f"fps = {self.fps:g} must lie in (0, 1000] frames per second")
-        if self.size is not None and min(self.size) < SMALLEST:
-            raise ValueError(
-                f"size = {self.size} must be at least {SMALLEST} {SMALLEST} px, width then height"
-            )
-
-
-class VideoReader:
-    """The pictures of a video file as it is decoded, whatever its length; iterate over it, once or again.
-
-    Every decoded frame comes once, turned upright as the file asks; a file of variable rate is resampled
-    to its usual one. Pictures are RGB, uint8, shape (height, width, 3); `luma` makes them grey.
-
-    Args:
-        path: Any file that ffmpeg reads.
-        reading: Rate and size to read it in.
-
-    Attributes:
-        info: What the file holds.
-        fps: Pictures per second as they come [Hz].
-        total: Expected number of pictures.
-
-    Raises:
-        ValueError: For a file that is missing, empty, no video, or sound alone; while iterating, for
-            pictures smaller than 3×3.
-        TruncatedVideoError: While iterating, after the last picture of a file that breaks off.
-    """
-
-    def __init__(self, path: str | Path, reading: Reading | None = None) -> None:
-        self.reading = reading or Reading()
-        self.info = probe(path)
-        self.fps = self.reading.fps or self.info.fps
-        self.total = max(round(self.info.duration * self.fps), 1)
-
-    def __iter__(self) -> Iterator[np.ndarray]:
-        """Yield the pictures in order."""
-        count = 0
-        with tempfile.TemporaryFile() as log:
-            with ffmpeg_reads(self.info.path, self._output(), log) as process:
-                assert process.stdout is not None
-                try:
-                    for picture in _pictures(cast(IO[bytes], process.stdout)):
-                        if min(picture.shape[:2]) < SMALLEST:
-                            raise ValueError(self._too_small(picture))
-                        count += 1
-                        yield picture
-                finally:
-                    process.kill()  # does nothing to one that has ended
-            said = messages(log)
-        self._check_end(count, said)
-
-    def _output(self) -> list[str]:
-        """Return ffmpeg's options for what comes out."""
-        filters = []
-        if self.reading.fps is not None or self.info.variable:
-            filters.append(f"fps={self.fps:.6f}")
-        if self.reading.size is not None:
-            filters.append("scale={}:{}:flags=area".format(*self.reading.size))
-        chain = ["-vf", ",".join(filters)] if filters else []
-        # PPM says its size ahead of each picture: after rotation and cropping, only ffmpeg knows it.
-        raw = ["-f", "image2pipe", "-c:v", "ppm", "-pix_fmt", "rgb24", "-"]
-        return ["-map", "0:V:0", *chain, "-fps_mode", "passthrough", *raw]
-
-    def _too_small(self, picture: np.ndarray) -> str:
-        height, width = picture.shape[:2]
-        return (
-            f"clip {str(self.info.path)!r} is {width}×{height} px; it must be at least {SMALLEST}×{SMALLEST}"
-        )
-
-    def _check_end(self, count: int, said: str) -> None:
-        """Refuse the end of a file that came too early, or of one that never began."""
-        name = f"clip {str(self.info.path)!r}"
-        if count == 0:
-            raise ValueError(f"{name} holds no frame that ffmpeg can decode")
-        due = count if self.info.promised is None else self.info.promised * self.fps
-        if due - count > 2.0 and _BREAKS.search(said):
-            raise TruncatedVideoError(f"{name} is truncated: it breaks off after {count} of {due:.0f} frames")
+MIN_SIZE = 3  # width of the neuron's neighbourhood [px]
+_MOST_MISSING = 2.0  # a file that ends up to this many frames early counts as complete
+# Rotation in the file's metadata [deg, counterclockwise] to the filters that undo it.
+_UPRIGHT = {
+    90: ("transpose=cclock",), -90: ("transpose=clock",), 180: ("hflip", "vflip"), -180: ("hflip", "vflip")
+}  # fmt: skip
 
 
 class TruncatedVideoError(ValueError):
-    """A video file breaks off before the end that its header promises."""
+    """Raised when a video file ends before the end that its header states."""
+
+
+class VideoReader:
+    """The pictures of a video file as RGB arrays; iterate over it any number of times.
+
+    Each decoded frame gives one picture, uint8, shape (height, width, 3), rotated as the file's metadata
+    requires. A file of variable frame rate is resampled to its median rate. Memory does not depend on the
+    length of the file. `luma` converts pictures to grey.
+
+    Args:
+        path: Any video file that ffmpeg can read.
+        fps: Rate to resample to [Hz]; None for the file's.
+        size: (width, height) to scale to [px]; None for the file's.
+
+    Attributes:
+        info: Properties of the file.
+        fps: Rate of the pictures [Hz].
+        total: Expected number of pictures.
+
+    Raises:
+        ValueError: For a file that is missing, empty, not a video, or without a video stream, and for an
+            invalid `fps` or `size`; while iterating, for pictures smaller than 3×3.
+        TruncatedVideoError: While iterating, after the last picture of a truncated file.
+    """
+
+    def __init__(
+        self, path: str | Path, fps: float | None = None, size: tuple[int, int] | None = None
+    ) -> None:
+        if fps is not None and not 0.0 < fps <= 1000.0:
+            raise ValueError(f"fps must be in (0, 1000], got {fps:g}")
+        if size is not None and min(size) < MIN_SIZE:
+            raise ValueError(f"size must be (width, height), each at least {MIN_SIZE} px, got {size}")
+        self.info = probe(path)
+        self.fps = fps or self.info.fps
+        self.total = max(round(self.info.duration * self.fps), 1)
+        self._size = size
+        self._resample = fps is not None or self.info.variable
+
+    def __iter__(self) -> Iterator[np.ndarray]:
+        """Yield the pictures in order."""
+        name, count = f"clip {str(self.info.path)!r}", 0
+        with open_video(self.info.path) as (container, stream):
+            for picture in self._pictures(container, stream):
+                height, width = picture.shape[:2]
+                if min(height, width) < MIN_SIZE:
+                    raise ValueError(
+                        f"{name} is {width}×{height} px; it must be at least {MIN_SIZE}×{MIN_SIZE}"
+                    )
+                count += 1
+                yield picture
+        if not count:
+            raise ValueError(f"{name} contains no frame that can be decoded")
+        missing = self.info.missing * self.fps
+        if missing > _MOST_MISSING:
+            raise TruncatedVideoError(
+                f"{name} is truncated: it ends after {count} of {count + missing:.0f} frames"
+            )
+
+    def _pictures(self, container: "InputContainer", stream: "VideoStream") -> Iterator[np.ndarray]:
+        """Yield the decoded, rotated, resampled and scaled pictures."""
+        graph = None
+        for frame in chain(_decode(container, stream, self.info.fps), [None]):  # None ends the stream
+            if graph is None:
+                if frame is None:
+                    return
+                graph = self._filter_graph(frame, stream, (container.start_time or 0) / 1e6)
+            graph.push(frame)
+            with suppress(BlockingIOError, EOFError):
+                while True:
+                    yield graph.vpull().to_ndarray()
+
+    def _filter_graph(self, frame: "VideoFrame", stream: "VideoStream", start: float) -> "Graph":
+        """Return the filters from decoded frames like `frame` to pictures; the file starts at `start` [s]."""
+        from av.filter import Graph
+
+        filters = [*_UPRIGHT.get(frame.rotation, ())]
+        if self._resample:
+            filters += [f"setpts=PTS-{start:.6f}/TB", f"fps={self.fps:.6f}"]
+        if self._size is not None:
+            filters.append("scale={}:{}:flags=area".format(*self._size))
+        graph = Graph()
+        height, width = frame.height, frame.width
+        nodes = [graph.add_buffer(None, width, height, frame.format, time_base=stream.time_base)]
+        for item in (*filters, "format=rgb24", "buffersink"):
+            name, _, arguments = item.partition("=")
+            nodes.append(graph.add(name, arguments or None))
+        graph.link_nodes(*nodes).configure()
+        return graph
+
+
+def _decode(container: "InputContainer", stream: "VideoStream", fps: float) -> Iterator["VideoFrame"]:
+    """Yield the frames of a stream, each with a time stamp; packets that cannot be decoded are skipped."""
+    from av.error import InvalidDataError
+
+    assert stream.time_base is not None
+    count, interval = 0, 1.0 / (fps * float(stream.time_base))
+    untimed = container.format.name == "avi"  # the format has a constant rate and no time stamps
+    for packet in container.demux(stream):
+        try:
+            frames = packet.decode()
+        except InvalidDataError:
+            continue
+        for frame in frames:
+            if untimed or frame.pts is None:
+                frame.pts = round(count * interval)
+            count += 1
+            yield frame
 
 
 @cache
 def _luma_kernel() -> Any:
-    """Compile the conversion on first use: numba takes half a second to load."""
+    """Compile the conversion on first use; importing numba takes half a second."""
     from numba import njit
+
+    red, green, blue, half, total = (np.int32(weight) for weight in (299, 587, 114, 500, 1000))
 
     @njit(cache=True, nogil=True)
     def convert(pixels: np.ndarray, grey: np.ndarray) -> None:
         for i in range(grey.size):
             r, g, b = pixels[3 * i], pixels[3 * i + 1], pixels[3 * i + 2]
-            grey[i] = (np.int32(299) * r + np.int32(587) * g + np.int32(114) * b + np.int32(500)) // np.int32(
-                1000
-            )
+            grey[i] = (red * r + green * g + blue * b + half) // total
 
     return convert
 
@@ -144,7 +166,7 @@ def luma(picture: np.ndarray) -> np.ndarray:
 
 
 def find_clips(paths: Iterable[str | Path]) -> list[Path]:
-    """Return the files named and, for a folder, the video files in it by name.
+    """Return the given files, with each folder replaced by its video files in the order of their names.
 
     Raises:
         ValueError: For a path that does not exist, or a folder without a video file.
@@ -152,23 +174,12 @@ def find_clips(paths: Iterable[str | Path]) -> list[Path]:
     found: list[Path] = []
     for path in map(Path, paths):
         if path.is_dir():
-            inside = sorted(file for file in path.iterdir() if file.suffix.lower() in CLIP_SUFFIXES)
-            if not inside:
-                raise ValueError(f"folder {str(path)!r} holds no video file ({', '.join(CLIP_SUFFIXES)})")
-            found += inside
+            clips = sorted(file for file in path.iterdir() if file.suffix.lower() in CLIP_SUFFIXES)
+            if not clips:
+                raise ValueError(f"folder {str(path)!r} contains no video file ({', '.join(CLIP_SUFFIXES)})")
+            found += clips
         elif not path.exists():
             raise ValueError(f"clip {str(path)!r} does not exist")
         else:
             found.append(path)
     return found
-
-
-def _pictures(stream: IO[bytes]) -> Iterator[np.ndarray]:
-    """Yield the whole pictures of a stream of PPM images; a last one that is cut short is left out."""
-    while stream.readline() == b"P6\n":
-        width, height = map(int, stream.readline().split())
-        stream.readline()  # the largest value, 255
-        picture = np.empty((height, width, 3), np.uint8)
-        if cast(Any, stream).readinto(picture.reshape(-1).data) < picture.size:
-            return
-        yield picture

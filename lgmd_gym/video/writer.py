@@ -1,8 +1,8 @@
-"""Write video files with ffmpeg."""
+"""Write video files with PyAV."""
 
+from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -10,63 +10,85 @@ SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif")
 
 
 class VideoWriter:
-    """A video file that takes RGB pictures one after the other; use it in a `with` block.
+    """Write RGB pictures to a video file; use it in a `with` block.
+
+    The codec is H.264, or GIF for the suffix .gif.
 
     Args:
-        path: The file, which must not exist; the suffix chooses the container.
+        path: Video file, which must not exist; the suffix selects the container.
         fps: Pictures per second [Hz].
-        quality: From 0, small, to 10, fine; a GIF has none.
+        quality: Quality from 0 (small file) to 10 (lossless); ignored for a GIF.
 
     Raises:
-        ValueError: For an unknown suffix, a file that exists, or a folder that does not.
+        ValueError: For an unknown suffix, a file that exists, or a folder that does not exist.
     """
 
     def __init__(self, path: str | Path, fps: float, quality: float = 7.0) -> None:
         self.path = Path(path)
         self.fps, self.quality = fps, quality
         if self.path.suffix.lower() not in SUFFIXES:
-            raise ValueError(f"video {str(path)!r} needs a suffix among {', '.join(SUFFIXES)}")
+            raise ValueError(f"video must have a suffix among {', '.join(SUFFIXES)}, got {str(path)!r}")
         if self.path.exists():
             raise ValueError(f"video {str(path)!r} exists and is kept; choose another name")
         if not self.path.parent.is_dir():
-            raise ValueError(f"folder {str(self.path.parent)!r} of the video does not exist; make it first")
-        self._size: tuple[int, int] | None = None
-        self._sink = None
+            raise ValueError(f"folder {str(self.path.parent)!r} of the video does not exist; create it first")
+        self._container: Any = None
+        self._stream: Any = None
+        self._count = 0
 
     def write(self, picture: np.ndarray) -> None:
-        """Append a picture, uint8, shape (height, width, 3), even height and width; all of one size."""
+        """Append a picture.
+
+        Args:
+            picture: RGB, uint8, shape (height, width, 3) with even height and width, the same for all.
+
+        Raises:
+            ValueError: For a picture of odd size or of another size than the first.
+        """
+        from av import VideoFrame
+
         size = (picture.shape[1], picture.shape[0])
-        if self._sink is None:
-            self._open(size)
-        if size != self._size:
-            raise ValueError(f"picture of {size} px in a video of {self._size} px; keep one size")
-        assert self._sink is not None
-        self._sink.send(np.ascontiguousarray(picture))
+        self._stream = self._stream or self._open(size)
+        if size != (self._stream.width, self._stream.height):
+            raise ValueError(
+                f"picture must have the size of the first, {self._stream.width}×{self._stream.height} px, "
+                f"got {size[0]}×{size[1]}"
+            )
+        rgb = VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+        frame = rgb.reformat(format=self._stream.pix_fmt, interpolation="AREA")
+        frame.pts = self._count
+        self._count += 1
+        self._container.mux(self._stream.encode(frame))
 
     def close(self) -> None:
         """Finish the file."""
-        if self._sink is not None:
-            self._sink.close()
-            self._sink = None
+        if self._container is not None:
+            self._container.mux(self._stream.encode(None))
+            self._container.close()
+            self._container = None
 
     def __enter__(self) -> "VideoWriter":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _open(self, size: tuple[int, int]) -> None:
-        from imageio_ffmpeg import write_frames
+    def _open(self, size: tuple[int, int]) -> Any:
+        """Open the file and return its video stream."""
+        import av
 
-        options: dict[str, Any] = {"quality": self.quality, "macro_block_size": 2, "pix_fmt_out": "yuv420p"}
-        # Drawn pictures gain little from x264's slower presets, which would hold up whoever draws.
-        options["output_params"] = ["-preset", "veryfast"]
+        if size[0] % 2 or size[1] % 2:
+            raise ValueError(f"width and height of a picture must be even, got {size[0]}×{size[1]} px")
+        rate = Fraction(self.fps).limit_denominator(10_000)
+        self._container = av.open(str(self.path), "w")
         if self.path.suffix.lower() == ".gif":
-            options = {"codec": "gif", "pix_fmt_out": "pal8"}
-        self._size = size
-        self._sink = write_frames(
-            str(self.path), size, fps=cast(int, self.fps), pix_fmt_in="rgb24", **options
-        )
-        self._sink.send(None)
+            stream = self._container.add_stream("gif", rate=rate)
+            stream.pix_fmt = "rgb8"
+        else:
+            # Slower presets of x264 reduce the file size of rendered pictures only slightly.
+            options = {"crf": str(int(51 * (1.0 - self.quality / 10.0))), "preset": "veryfast"}
+            stream = self._container.add_stream("libx264", rate=rate, options=options)
+            stream.pix_fmt = "yuv420p"
+        stream.width, stream.height = size
+        stream.codec_context.time_base = 1 / rate
+        return stream

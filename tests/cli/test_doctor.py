@@ -1,6 +1,7 @@
 """Tests of `lgmd-gym doctor`: no fault on a working installation, and a finding for every injected fault."""
 
 import pytest
+from av.codec.codec import UnknownCodecError
 
 from lgmd_gym.cli import doctor
 from lgmd_gym.cli import main as cli
@@ -31,9 +32,13 @@ def test_an_unmet_requirement_is_a_fault(requirement, message, monkeypatch):
 
 
 def test_a_missing_codec_is_a_fault(monkeypatch):
-    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", "/nowhere/ffmpeg")
+    def unknown_encoder(*args, **kwargs):
+        raise UnknownCodecError("libx264")
+
+    monkeypatch.setattr("lgmd_gym.video.VideoWriter._open", unknown_encoder)
     (fault,) = faults(doctor.run_check("video"))
-    assert "imageio-ffmpeg" in fault.fix
+    assert "libx264" in fault.message
+    assert fault.fix == "pip install --force-reinstall av"
 
 
 def test_an_unwritable_kernel_cache_is_a_fault(monkeypatch):

@@ -1,4 +1,4 @@
-"""Clips that tests make, without loss or with whatever is wrong."""
+"""Video clips for tests, made with the ffmpeg program of imageio-ffmpeg."""
 
 import subprocess
 
@@ -10,14 +10,14 @@ def ffmpeg(*arguments):
     subprocess.run([get_ffmpeg_exe(), "-v", "error", "-y", *map(str, arguments)], check=True, timeout=60)
 
 
-def synthesize(path, *options, source="testsrc2=size=64x48:rate=30:duration=1"):
-    """Make a tiny clip of ffmpeg's own test picture."""
+def make_test_clip(path, *options, source="testsrc2=size=64x48:rate=30:duration=1"):
+    """Write a clip of one of ffmpeg's test sources."""
     ffmpeg("-f", "lavfi", "-i", source, *options, path)
     return path
 
 
-def store(path, pictures, fps=30.0, size=None):
-    """Store grey pictures without loss."""
+def write_lossless(path, pictures, fps=30.0):
+    """Write grey pictures with a lossless codec."""
     height, width = pictures[0].shape
     raw = path.with_suffix(".raw")
     raw.write_bytes(b"".join(np.ascontiguousarray(picture).tobytes() for picture in pictures))
@@ -27,8 +27,8 @@ def store(path, pictures, fps=30.0, size=None):
     return path
 
 
-def broken(path, keep):
+def truncate(path, fraction):
     """Cut a file after a fraction of its bytes."""
     data = path.read_bytes()
-    path.write_bytes(data[: int(len(data) * keep)])
+    path.write_bytes(data[: int(len(data) * fraction)])
     return path

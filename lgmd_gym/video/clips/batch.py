@@ -1,7 +1,7 @@
-"""Watch clips and leave their traces, figures and overlays in a folder."""
+"""Process clips and write their traces, figures and overlay videos to a folder."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,29 +9,28 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgmd_gym.video import TruncatedVideoError
-from lgmd_gym.video.clips.detection import Detection, detect
-from lgmd_gym.video.clips.playback import COLUMNS, Choice, TraceWriter, Watch
-from lgmd_gym.video.clips.summary import Summary
-from lgmd_gym.video.probe import VideoInfo
+from lgmd_gym.video import TruncatedVideoError, find_clips
+from lgmd_gym.video.clips.annotations import read_crashes
+from lgmd_gym.video.clips.detection import ClipDetection, detect
+from lgmd_gym.video.clips.playback import TRACE_COLUMNS, ClipRun, ClipTraceWriter, PlaybackConfig
+from lgmd_gym.video.clips.summary import ClipSummary
+from lgmd_gym.video.probe import VideoInfo, probe
 
-Tick = Callable[[int, int], None]
 
-
-class Order(NamedTuple):
-    """One clip to watch.
+class ClipJob(NamedTuple):
+    """One clip to process.
 
     Attributes:
-        clip: The file.
-        info: What it holds.
-        crash_frame: In the file's own frames; None for no crash, or none known.
-        folder: Where its files go, which exists.
+        clip: Video file.
+        info: Properties of the file.
+        annotated: Whether it is known if and when the clip has a crash.
+        crash_frame: Frame of the crash, at the frame rate of the file; None without one.
     """
 
     clip: Path
     info: VideoInfo
+    annotated: bool
     crash_frame: int | None
-    folder: Path
 
     @property
     def crash_s(self) -> float | None:
@@ -40,74 +39,107 @@ class Order(NamedTuple):
 
 
 @dataclass
-class Watched:
-    """What came of one clip.
+class ClipResult:
+    """Result of one clip.
 
     Attributes:
-        clip: The file.
-        summary: Its series and onsets.
-        dropped: Near-duplicates that were not shown to the neuron.
-        seconds: Time it took to decode and watch [s].
-        trouble: What was wrong with the file; empty if nothing was.
+        clip: Video file.
+        trace: CSV file with one row per frame.
+        summary: Time series and onsets.
+        duplicates: Number of frames skipped as duplicates.
+        seconds: Processing time, decoding included [s].
+        error: Message if the clip is truncated, else empty.
     """
 
     clip: Path
-    summary: Summary
-    dropped: int
-    seconds: float
-    trouble: str = ""
+    trace: Path
+    summary: ClipSummary
+    duplicates: int = 0
+    seconds: float = 0.0
+    error: str = ""
 
 
-def watch_clip(order: Order, choice: Choice, suffix: str, overlay: bool, figure: bool, tick: Tick) -> Watched:
-    """Watch one clip; write trace.csv, and on demand trace.png and overlay.mp4.
+def make_jobs(
+    paths: Sequence[str | Path], crashes: Path | None = None, crash_frame: int | None = None
+) -> list[ClipJob]:
+    """Return one job per clip.
 
     Args:
-        order: The clip.
-        choice: How it is watched.
-        suffix: Put behind "trace" and "overlay" in the names of the files.
+        paths: Video files, and folders with video files.
+        crashes: CSV file for `read_crashes`; None for no annotations.
+        crash_frame: Crash frame of a single clip, instead of `crashes`.
+
+    Raises:
+        ValueError: For a file that is not a readable video, or an invalid annotation.
+    """
+    clips = list(dict.fromkeys(find_clips(paths)))
+    if crash_frame is not None and (len(clips) > 1 or crashes is not None):
+        raise ValueError(
+            f"--crash-frame {crash_frame} applies to a single clip; use --crashes FILE for several"
+        )
+    annotations: dict[Path, int | None] = {}
+    if crashes is not None:
+        annotations = read_crashes(crashes, clips)
+    elif crash_frame is not None:
+        annotations = {clips[0]: crash_frame}
+    jobs = []
+    for clip in clips:
+        info, crash = probe(clip), annotations.get(clip)
+        if crash is not None and not 0 <= crash < info.frames:
+            raise ValueError(f"crash frame of {clip.name} must be in 0 to {info.frames - 1}, got {crash}")
+        jobs.append(ClipJob(clip, info, clip in annotations, crash))
+    return jobs
+
+
+def process_clip(
+    job: ClipJob, config: PlaybackConfig, folder: Path, *, suffix: str = "", overlay: bool = False,
+    figure: bool = True, on_progress: Callable[[float], object] | None = None,
+) -> ClipResult:  # fmt: skip
+    """Run the neuron on one clip and write trace.csv, and optionally trace.png and overlay.mp4.
+
+    Args:
+        job: The clip.
+        config: Neuron parameters and frame processing.
+        folder: Existing folder for the files.
+        suffix: Text after "trace" and "overlay" in the file names.
         overlay: Whether to write the overlay video.
         figure: Whether to draw the figure.
-        tick: Called with the frames so far and the frames expected.
+        on_progress: Function called after each frame with the completed fraction.
     """
-    watch = Watch(order.clip, choice)
-    reader = watch.reader
-    mark = None if order.crash_s is None else round(order.crash_s * reader.fps)
-    done = Watched(order.clip, Summary(reader.fps, mark), 0, 0.0)
-    begun = time.perf_counter()
+    run = ClipRun(job.clip, config)
+    reader = run.reader
+    crash_frame = None if job.crash_s is None else round(job.crash_s * reader.fps)
+    result = ClipResult(job.clip, folder / f"trace{suffix}.csv", ClipSummary(reader.fps, crash_frame))
+    start = time.perf_counter()
     with ExitStack() as stack:
-        trace = stack.enter_context(TraceWriter(order.folder / f"trace{suffix}.csv"))
-        painter = None
+        trace = stack.enter_context(ClipTraceWriter(result.trace))
+        overlay_writer = None
         if overlay:
-            from lgmd_gym.video.clips.overlay import Overlay
+            from lgmd_gym.video.clips.overlay import OverlayWriter
 
-            film = order.folder / f"overlay{suffix}.mp4"
-            painter = stack.enter_context(Overlay(film, order.clip.name, reader.fps, choice, order.crash_s))
+            path = folder / f"overlay{suffix}.mp4"
+            overlay_writer = OverlayWriter(path, job.clip.name, reader.fps, config, job.crash_s)
+            stack.enter_context(overlay_writer)
         try:
-            for moment in watch:
-                trace.write(moment)
-                done.summary.add(moment)
-                if painter is not None and watch.neuron is not None:
-                    painter.write(moment, watch.neuron)
-                tick(moment.frame + 1, reader.total)
+            for frame in run:
+                trace.write(frame)
+                result.summary.add(frame)
+                if overlay_writer is not None and run.neuron is not None:
+                    overlay_writer.write(frame, run.neuron)
+                if on_progress is not None:
+                    on_progress(min((frame.frame + 1) / reader.total, 1.0))
         except TruncatedVideoError as error:
-            done.trouble = str(error)
-    done.dropped, done.seconds = watch.dropped, time.perf_counter() - begun
-    if figure and done.summary.frames:
+            result.error = str(error)
+    result.duplicates, result.seconds = run.duplicates, time.perf_counter() - start
+    if figure and result.summary.frames:
         from lgmd_gym.video.clips.plots import clip_figure
 
-        picture = order.folder / f"trace{suffix}.png"
-        clip_figure(picture, order.clip.name, done.summary, choice, order.crash_s)
-    return done
+        clip_figure(folder / f"trace{suffix}.png", job.clip.name, result.summary, config, job.crash_s)
+    return result
 
 
-def detection(order: Order, trace: Path, fps: float) -> Detection:
-    """Return how a clip was answered, from its trace.
-
-    Args:
-        order: The clip.
-        trace: The file that `watch_clip` left.
-        fps: Frames per second of the trace.
-    """
-    names = [COLUMNS.index("spike_frequency"), COLUMNS.index("alert")]
-    table = np.loadtxt(trace, delimiter=",", skiprows=1, usecols=names, ndmin=2)
-    return detect(order.clip.stem, table[:, 0], table[:, 1] > 0.0, fps, order.crash_s)
+def detect_from_trace(job: ClipJob, result: ClipResult) -> ClipDetection:
+    """Return the alarms of a processed clip relative to its crash, from its trace file."""
+    columns = [TRACE_COLUMNS.index("spike_frequency"), TRACE_COLUMNS.index("alert")]
+    table = np.loadtxt(result.trace, delimiter=",", skiprows=1, usecols=columns, ndmin=2)
+    return detect(job.clip.stem, table[:, 0], table[:, 1] > 0.0, result.summary.fps, job.crash_s)

@@ -1,103 +1,103 @@
-"""What remains of a watched clip in a room that does not grow with its length."""
+"""Constant-memory summary of a processed clip."""
 
 import numpy as np
 
-from lgmd_gym.video.clips.playback import Moment
+from lgmd_gym.video.clips.playback import ClipFrame
 
 BINS = 4096
-NAMES = ("time", "spike_frequency", "spikes", "membrane_potential", "adapted_potential", "ffi")
-_PICTURE_WIDTH = 240  # [px] of the pictures kept
+SERIES = ("time", "spike_frequency", "spikes", "membrane_potential", "adapted_potential", "ffi")
+_PICTURE_WIDTH = 240  # of the stored pictures, approximate [px]
+Snapshot = tuple[float, np.ndarray]  # time [s], RGB picture
 
 
-class Summary:
-    """The series of a clip in at most `BINS` bins, its alarm onsets, and pictures of a few of them.
+class ClipSummary:
+    """Time series of a clip in at most `BINS` bins, its alarm onsets, and pictures at some of them.
 
-    Each bin holds the highest value of its frames; when all are full, neighbours are merged in pairs.
+    Each bin holds the maximum over its frames. When all bins are full, they are merged in pairs.
 
     Args:
-        fps: Frames per second.
-        mark: Number of a frame whose picture is kept, such as the crash; None for none.
+        fps: Frame rate [Hz].
+        crash_frame: Frame of the crash, of which a picture is stored; None for none.
 
     Attributes:
-        frames: Frames so far.
-        alarms: Frames in alarm.
+        frames: Number of frames.
+        alarms: Number of alarm frames.
         onsets: Number of alarm onsets.
-        first_alarm: Time of the first frame in alarm [s]; None without one.
+        first_alarm: Time of the first alarm frame [s]; None without one.
         peak: Highest spike frequency [spikes/s].
-        peak_time: When it was first reached [s].
-        marked: The picture of the frame `mark`.
     """
 
-    def __init__(self, fps: float, mark: int | None = None) -> None:
+    def __init__(self, fps: float, crash_frame: int | None = None) -> None:
         self.fps = fps
-        self.mark = mark
+        self.crash_frame = crash_frame
         self.frames = self.alarms = self.onsets = 0
         self.first_alarm: float | None = None
-        self.peak = self.peak_time = 0.0
-        self.marked: tuple[float, np.ndarray] | None = None
-        self._bins = np.full((len(NAMES), BINS), -np.inf)
-        self._width = 1
-        self._first: list[tuple[float, np.ndarray]] = []
-        self._last: list[tuple[float, np.ndarray]] = []
-        self._before: list[tuple[float, np.ndarray]] = []
-        self._at_peak: tuple[float, np.ndarray] | None = None
+        self.peak = 0.0
+        self._bins = np.full((len(SERIES), BINS), -np.inf)
+        self._frames_per_bin = 1
+        self._first_onset: list[Snapshot] = []
+        self._onset_before_crash: list[Snapshot] = []
+        self._last_onsets: list[Snapshot] = []
+        self._peak: Snapshot | None = None
+        self._crash: Snapshot | None = None
 
-    def add(self, moment: Moment) -> None:
-        """Take in the next moment."""
-        r = moment.response
-        if self.frames >= BINS * self._width:
-            self._merge()
-        slot = self.frames // self._width
-        values = (moment.time, r.spike_frequency, r.spikes, r.membrane_potential, r.adapted_potential, r.ffi)
+    def add(self, frame: ClipFrame) -> None:
+        """Add the next frame."""
+        r = frame.response
+        if self.frames >= BINS * self._frames_per_bin:
+            self._merge_bins()
+        slot = self.frames // self._frames_per_bin
+        values = (frame.time, r.spike_frequency, r.spikes, r.membrane_potential, r.adapted_potential, r.ffi)
         self._bins[:, slot] = np.maximum(self._bins[:, slot], values)
         self.frames += 1
         self.alarms += bool(r.alert)
         if r.alert and self.first_alarm is None:
-            self.first_alarm = moment.time
-        if r.spike_frequency > self.peak or self._at_peak is None:
-            self.peak, self.peak_time = r.spike_frequency, moment.time
-            self._at_peak = moment.time, _small(moment.picture)
-        if moment.onset:
+            self.first_alarm = frame.time
+        if r.spike_frequency > self.peak or self._peak is None:
+            self.peak, self._peak = r.spike_frequency, _snapshot(frame)
+        if frame.onset:
             self.onsets += 1
-            self._keep(moment.frame, (moment.time, _small(moment.picture)))
-        if moment.frame == self.mark:
-            self.marked = moment.time, _small(moment.picture)
+            self._store_onset(frame.frame, _snapshot(frame))
+        if frame.frame == self.crash_frame:
+            self._crash = _snapshot(frame)
 
     def series(self) -> dict[str, np.ndarray]:
-        """Return the series by name, shape (bins so far,); the highest value where bins hold many frames."""
-        used = -(-self.frames // self._width)
-        return dict(zip(NAMES, self._bins[:, :used], strict=True))
+        """Return the time series by name, shape (bins in use,)."""
+        used = -(-self.frames // self._frames_per_bin)
+        return dict(zip(SERIES, self._bins[:, :used], strict=True))
 
     def pictures(self) -> list[tuple[str, float, np.ndarray]]:
-        """Return (what, time [s], RGB picture) of the first and last onsets, or of the peak.
+        """Return (label, time [s], RGB picture) of selected frames, in the order of time.
 
-        With a marked frame, the last onset ahead of it is among them, and the frame itself.
+        These are the first and the last two onsets, or the peak of a clip without onsets; with a crash frame
+        also that frame and the last onset before it.
         """
-        onsets = {item[0]: item for item in (*self._first, *self._before, *self._last)}
-        kept = [("alarm begins", *item) for item in onsets.values()]
-        if not kept and self._at_peak is not None:
-            kept = [("highest frequency", *self._at_peak)]
-        if self.marked is not None:
-            kept.append(("crash", *self.marked))
-        return sorted(kept, key=lambda item: item[1])
+        onsets = {
+            item[0]: item for item in (*self._first_onset, *self._onset_before_crash, *self._last_onsets)
+        }
+        chosen = [("alarm begins", *item) for item in onsets.values()]
+        if not chosen and self._peak is not None:
+            chosen = [("highest frequency", *self._peak)]
+        if self._crash is not None:
+            chosen.append(("crash", *self._crash))
+        return sorted(chosen, key=lambda item: item[1])
 
-    def _keep(self, frame: int, item: tuple[float, np.ndarray]) -> None:
-        """Keep the picture of an onset: the first, the last ahead of the mark, the last two."""
-        if not self._first:
-            self._first = [item]
-        elif self.mark is not None and frame <= self.mark:
-            self._before = [item]
+    def _store_onset(self, frame: int, item: Snapshot) -> None:
+        """Store the picture of an onset as the first, the last before the crash, or one of the last two."""
+        if not self._first_onset:
+            self._first_onset = [item]
+        elif self.crash_frame is not None and frame <= self.crash_frame:
+            self._onset_before_crash = [item]
         else:
-            self._last = [*self._last, item][-2:]
+            self._last_onsets = [*self._last_onsets, item][-2:]
 
-    def _merge(self) -> None:
-        """Merge bins in pairs."""
+    def _merge_bins(self) -> None:
         half = np.maximum(self._bins[:, ::2], self._bins[:, 1::2])
         self._bins[:, : BINS // 2], self._bins[:, BINS // 2 :] = half, -np.inf
-        self._width *= 2
+        self._frames_per_bin *= 2
 
 
-def _small(picture: np.ndarray) -> np.ndarray:
-    """Return a copy of a picture at most `_PICTURE_WIDTH` or so wide."""
-    step = max(round(picture.shape[1] / _PICTURE_WIDTH), 1)
-    return picture[::step, ::step].copy()
+def _snapshot(frame: ClipFrame) -> Snapshot:
+    """Return the time and a reduced copy of the picture of a frame."""
+    step = max(round(frame.picture.shape[1] / _PICTURE_WIDTH), 1)
+    return frame.time, frame.picture[::step, ::step].copy()

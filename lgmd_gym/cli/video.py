@@ -1,0 +1,163 @@
+"""The `video` command."""
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from lgmd_gym.benchmark.folder import new_folder, provenance
+from lgmd_gym.cli.console import make_console
+from lgmd_gym.cli.options import Video
+from lgmd_gym.cli.params import read_params
+from lgmd_gym.neuron import LGMDParams
+from lgmd_gym.video.clips import tables
+from lgmd_gym.video.clips.batch import ClipJob, ClipResult, detect_from_trace, make_jobs, process_clip
+from lgmd_gym.video.clips.detection import ClipDetection
+from lgmd_gym.video.clips.playback import PLAYBACK_CONFIGS, ClipRun, PlaybackConfig, named_config
+
+
+def run(options: Video) -> int:
+    """Process clips and print tables; return 2 if a clip is truncated, else 0."""
+    if not options.clips:
+        raise ValueError("a clip is required: pass video files or folders, as in lgmd-gym video CLIP.mp4")
+    configs = _configs(options)
+    jobs = make_jobs(options.clips, options.crashes, options.crash_frame)
+    print_notes(jobs, options)
+    for job in jobs:  # decode the first frame of each clip before creating the folder
+        next(iter(ClipRun(job.clip, next(iter(configs.values())))))
+    out = make_run_folder(options.out, "video", {"clips": [job.clip for job in jobs], "configs": configs})
+    folders = make_clip_folders(out, jobs)
+    console, results, detections = make_console(120), [], {}
+    for name, config in configs.items():
+        suffix = f"-{name}" if len(configs) > 1 else ""
+        batch = process_clips(
+            jobs, folders, name, config, suffix, overlay=options.overlay, figure=options.plots
+        )
+        results += batch
+        rates = sorted({result.summary.fps for result in batch})
+        description = ", ".join(config.describe(rate) for rate in rates[:3])
+        console.print(f"[bold]{name}[/]: {description}", highlight=False)
+        console.print(tables.clip_table(batch))
+        detections[name] = detect_clips(jobs, batch)
+        if detections[name]:
+            console.print(tables.detection_table(f"{name}: {description}", detections[name]))
+    if len(configs) > 1 and all(detections.values()):
+        descriptions = {name: config.describe() for name, config in configs.items()}
+        console.print(tables.config_table(detections, descriptions))
+    console.print(f"traces and figures: {out}", soft_wrap=True)
+    return print_errors(results)
+
+
+def print_notes(jobs: Sequence[ClipJob], options: Video) -> None:
+    """Print which clips are resampled and which have no annotation."""
+    for job in jobs:
+        if job.info.variable and options.fps is None:
+            _note(f"{job.clip.name} has a variable frame rate; resampled to {job.info.fps:g} Hz")
+        if options.crashes is not None and not job.annotated:
+            _note(f"{job.clip.name} has no row in {options.crashes}; it is not in the detection table")
+
+
+def make_run_folder(out: Path | None, command: str, settings: dict[str, Any]) -> Path:
+    """Create the run folder with `run.json`: the settings, and the versions and machine of the run."""
+    folder = new_folder(out or Path("runs") / f"{command}-{time.strftime('%Y%m%d-%H%M%S')}", "run folder")
+    text = json.dumps(settings | provenance(), indent=2, default=str)
+    (folder / "run.json").write_text(text + "\n", encoding="utf-8")
+    return folder
+
+
+def make_clip_folders(out: Path, jobs: Sequence[ClipJob]) -> list[Path]:
+    """Create one folder per clip, numbered for clips of the same name."""
+    folders = []
+    for job in jobs:
+        folder, number = out / job.clip.stem, 1
+        while folder.exists():
+            number += 1
+            folder = out / f"{job.clip.stem}-{number}"
+        folder.mkdir()
+        folders.append(folder)
+    return folders
+
+
+def process_clips(
+    jobs: Sequence[ClipJob], folders: Sequence[Path], name: str, config: PlaybackConfig, suffix: str,
+    *, overlay: bool = False, figure: bool = True,
+) -> list[ClipResult]:  # fmt: skip
+    """Process every clip with one configuration and show a progress bar.
+
+    Args:
+        jobs: The clips.
+        folders: Existing folder of each clip.
+        name: Text of the progress bar.
+        config: Neuron parameters and frame processing.
+        suffix: Text after "trace" and "overlay" in the file names.
+        overlay: Whether to write overlay videos.
+        figure: Whether to draw figures.
+    """
+    results, frames_before = [], 0
+    with progress_bar(name, sum(job.info.frames for job in jobs)) as set_progress:
+        for job, folder in zip(jobs, folders, strict=True):
+
+            def on_progress(fraction: float, before: int = frames_before, job: ClipJob = job) -> None:
+                set_progress(before + fraction * job.info.frames)
+
+            results.append(process_clip(
+                job, config, folder, suffix=suffix, overlay=overlay, figure=figure, on_progress=on_progress
+            ))  # fmt: skip
+            frames_before += job.info.frames
+        set_progress(frames_before)
+    return results
+
+
+def detect_clips(jobs: Sequence[ClipJob], results: Sequence[ClipResult]) -> list[ClipDetection]:
+    """Return the detections of the annotated clips."""
+    return [
+        detect_from_trace(job, result) for job, result in zip(jobs, results, strict=True) if job.annotated
+    ]
+
+
+def print_errors(results: Sequence[ClipResult]) -> int:
+    """Print the errors of truncated clips; return 2 if there are any, else 0."""
+    errors = dict.fromkeys(result.error for result in results if result.error)
+    for error in errors:
+        _note(f"{error}; the trace up to that frame is kept")
+    return 2 if errors else 0
+
+
+@contextmanager
+def progress_bar(name: str, total: float) -> Iterator[Callable[[float], None]]:
+    """Show a progress bar on stderr and yield the function that sets its value."""
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(name, total=total)
+        yield lambda completed: bar.update(task, completed=completed)
+
+
+def _configs(options: Video) -> dict[str, PlaybackConfig]:
+    """Return the named configurations with the values of the other options."""
+    names = tuple(PLAYBACK_CONFIGS) if options.configs == ("all",) else dict.fromkeys(options.configs)
+    values = {
+        "fps": options.fps, "size": options.size, "drop_duplicates": options.drop_duplicates,
+        "roi": options.roi,
+    }  # fmt: skip
+    params = read_params(options.params)
+    if params is not None:
+        values["params"] = LGMDParams.from_dict(params)
+    given = {name: value for name, value in values.items() if value is not None}
+    configs = {name: replace(named_config(name), **given) for name in names}
+    if options.threshold is not None:
+        for name, config in configs.items():
+            configs[name] = replace(config, params=replace(config.params, t_sf=options.threshold))
+    return configs
+
+
+def _note(text: str) -> None:
+    """Print a line on stderr."""
+    print(f"lgmd-gym: {text}", file=sys.stderr)
