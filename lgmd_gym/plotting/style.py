@@ -41,7 +41,7 @@ def saved_figure(
     save_options: dict[str, Any] | None = None,
     **subplot_options: Any,
 ) -> Iterator[tuple[Any, Any]]:
-    """Create a figure with subplots, and save and close it at the end of the block.
+    """Create a figure with subplots and yield it with its axes; save and close it at the end of the block.
 
     Args:
         file: Destination.
@@ -50,9 +50,6 @@ def saved_figure(
         grid: Whether the axes have grid lines.
         save_options: Further arguments of `Figure.savefig`.
         **subplot_options: Further arguments of `pyplot.subplots`.
-
-    Yields:
-        The figure, and its axes as returned by `pyplot.subplots`.
     """
     plt = load_pyplot()
     file_format = (file.suffix.lstrip(".") or "png") if isinstance(file, Path) else "svg"

@@ -14,31 +14,18 @@ OVERLAPS = tuple(OVERLAP_WEIGHTS)
 
 
 class GridCell(NamedTuple):
-    """Cell of a grid.
+    """Result of one case over all seeds."""
 
-    Attributes:
-        colour: CSS class of the colour.
-        text: Highest relative impact speed [km/h]; "*" marks premature braking.
-        tooltip: Name of the case and number of contacts.
-    """
-
-    colour: str
-    text: str
+    colour: str  # CSS class
+    text: str  # highest relative impact speed [km/h]; "*" marks premature braking
     tooltip: str
 
 
 class CaseGrid(NamedTuple):
-    """Grid of one scenario family and one agent.
-
-    Attributes:
-        title: Family and agent.
-        axis: Quantity of the columns.
-        columns: Column headings.
-        lines: Row heading and one cell per column; None where the suite has no case.
-    """
+    """Grid of one scenario family and one agent; the cell is None where the suite has no case."""
 
     title: str
-    axis: str
+    axis: str  # quantity of the columns
     columns: list[int]
     lines: list[tuple[str, list[GridCell | None]]]
 

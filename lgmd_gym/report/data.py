@@ -17,24 +17,14 @@ from lgmd_gym.report.images import CapturedFrame, capture_frames
 
 @dataclass(frozen=True)
 class ReportData:
-    """Contents of a run folder.
-
-    Attributes:
-        path: The folder.
-        config: Configuration of the run.
-        settings: Contents of `run.json`.
-        suite: Name of the suite.
-        rows: Rows of the run.
-        agents: `no-brake` and the agents of the configuration.
-        cases: Cases of the suite by name.
-    """
+    """Contents of a run folder."""
 
     path: Path
     config: RunConfig
-    settings: dict[str, Any]
+    settings: dict[str, Any]  # contents of run.json
     suite: str
     rows: list[Row]
-    agents: list[str]
+    agents: list[str]  # no-brake first
     cases: dict[str, Case]
 
     @classmethod

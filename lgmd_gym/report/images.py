@@ -23,22 +23,21 @@ class CapturedFrame(NamedTuple):
 
 def figure_uri(draw: Callable[[BinaryIO], Any]) -> str:
     """Return the SVG that a function writes to a file, as a data URI."""
-    file = io.BytesIO()
-    draw(file)
-    return f"data:image/svg+xml;base64,{base64.b64encode(file.getvalue()).decode()}"
+    return _data_uri("image/svg+xml", draw)
 
 
 def frame_uri(frame: np.ndarray) -> str:
-    """Return a grey frame as the data URI of a PNG.
-
-    Args:
-        frame: uint8, shape (height, width).
-    """
+    """Return a grey frame, uint8 of shape (height, width), as the data URI of a PNG."""
     from PIL import Image
 
+    image = Image.fromarray(frame)
+    return _data_uri("image/png", lambda file: image.save(file, "PNG", optimize=True))
+
+
+def _data_uri(kind: str, write: Callable[[BinaryIO], Any]) -> str:
     file = io.BytesIO()
-    Image.fromarray(frame).save(file, "PNG", optimize=True)
-    return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
+    write(file)
+    return f"data:{kind};base64,{base64.b64encode(file.getvalue()).decode()}"
 
 
 def key_decisions(series: Mapping[str, np.ndarray]) -> dict[str, int]:

@@ -1,5 +1,7 @@
 """Selection of the episodes that a report illustrates, by fixed rules."""
 
+from collections.abc import Callable
+
 from lgmd_gym.benchmark.analysis.protocol_limits import relative_impact
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.summary import case_order
@@ -7,6 +9,22 @@ from lgmd_gym.benchmark.task import NO_BRAKE
 
 MAX_FALSE_ACTIVATIONS = 12
 AGENTS_WITHOUT_NEURON = (NO_BRAKE, "always-brake", "random-brake", "ttc-oracle")
+
+# Description -> filter of the rows, and the value that the shown row maximises (the first row of a draw).
+EXTREMES: dict[str, tuple[Callable[[Row], bool], Callable[[Row], float]]] = {
+    "smallest stopping margin": (
+        lambda row: row["avoided"] and row["stopping_margin"] is not None,
+        lambda row: -row["stopping_margin"],
+    ),
+    "fastest avoided threat": (lambda row: row["avoided"], lambda row: row["ego_speed"]),
+    "hardest contact": (lambda row: row["collision"], relative_impact),
+    "premature braking": (lambda row: row["premature_brake"], lambda row: 0.0),
+    "hardest false activation": (lambda row: row["false_activation"], lambda row: row["peak_deceleration"]),
+    "fastest non-threat without false activation": (
+        lambda row: not row["threat"] and not row["false_activation"],
+        lambda row: row["ego_speed"],
+    ),
+}
 
 
 def neuron_agents(agents: list[str]) -> list[str]:
@@ -22,33 +40,11 @@ def illustrated_agent(agents: list[str]) -> str:
 
 def extreme_episodes(rows: list[Row], agent: str, seed: int) -> dict[str, Row]:
     """Return the extreme episodes of one agent and seed, by description; absent kinds are left out."""
-    episodes = [
-        row
-        for row in sorted(rows, key=lambda row: case_order(row["case"]))
-        if row["agent"] == agent and row["seed"] == seed and row["error"] is None
-    ]
-    avoided = [row for row in episodes if row["avoided"]]
+    of_agent = [row for row in rows if row["agent"] == agent and row["seed"] == seed and row["error"] is None]
+    of_agent.sort(key=lambda row: case_order(row["case"]))
     extremes = {
-        "smallest stopping margin": min(
-            (row for row in avoided if row["stopping_margin"] is not None),
-            key=lambda row: row["stopping_margin"],
-            default=None,
-        ),
-        "fastest avoided threat": max(avoided, key=lambda row: row["ego_speed"], default=None),
-        "hardest contact": max(
-            (row for row in episodes if row["collision"]), key=relative_impact, default=None
-        ),
-        "premature braking": next((row for row in episodes if row["premature_brake"]), None),
-        "hardest false activation": max(
-            (row for row in episodes if row["false_activation"]),
-            key=lambda row: row["peak_deceleration"],
-            default=None,
-        ),
-        "fastest non-threat without false activation": max(
-            (row for row in episodes if not row["threat"] and not row["false_activation"]),
-            key=lambda row: row["ego_speed"],
-            default=None,
-        ),
+        description: max(filter(matches, of_agent), key=rank, default=None)
+        for description, (matches, rank) in EXTREMES.items()
     }
     return {description: row for description, row in extremes.items() if row is not None}
 

@@ -68,7 +68,7 @@ def test_check_r152_uses_relative_speed_and_load(case, ego, target, impact, met,
 
 def test_premature_braking_fails_r152():
     premature = impact_row("CCRs/v20", 20, 0, 0, premature_brake=True)
-    assert not check_r152(premature).met
+    assert not check_r152(premature)[0]
     assert not meets_r152([premature], "a")
 
 
@@ -109,8 +109,11 @@ def test_suite_without_limits_has_no_limit_table():
 
 def test_contact_and_colour_checks():
     contact, avoided = impact_row("CCRs/v50", 50, 0, 5), impact_row("CCRs/v50", 50, 0, 0)
-    assert (check_no_contact(contact).met, check_no_contact(avoided).met) == (False, True)
-    assert (check_green(contact).met, check_green(avoided).met) == (False, True)
+    assert (check_no_contact(contact), check_no_contact(avoided)) == (
+        (False, "no contact"),
+        (True, "no contact"),
+    )
+    assert (check_green(contact), check_green(avoided)) == ((False, "green"), (True, "green"))
 
 
 def test_colours_2026_match_the_published_bands():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lgmd_gym.benchmark.statistics import Rate, binomial_tail, poisson_interval, wilson
+from lgmd_gym.benchmark.statistics import Mean, Rate, binomial_tail, cluster_mean, poisson_interval, wilson
 
 
 def test_wilson_interval_matches_newcombe_1998():
@@ -41,3 +41,28 @@ def test_binomial_tail_sums_the_upper_probabilities():
     assert binomial_tail(0, 5, 0.3) == pytest.approx(1.0)
     assert binomial_tail(2, 3, 0.5) == pytest.approx(0.5)
     assert binomial_tail(4, 3, 0.5) == 0.0
+
+
+def test_cluster_interval_does_not_depend_on_copies_within_a_cluster():
+    values, clusters = [0.0, 1.0, 2.0, 9.0], list("abcd")
+    once = cluster_mean(values, clusters)
+    copies = cluster_mean(values * 10, clusters * 10)
+    assert once.value == copies.value == 3.0
+    assert (once.low, once.high) == pytest.approx((copies.low, copies.high))
+    independent = cluster_mean(values * 10, range(40))
+    assert independent.high - independent.low < 0.5 * (copies.high - copies.low)
+
+
+def test_cluster_mean_does_not_depend_on_the_order():
+    values, clusters = [0.0, 1.0, 2.0, 9.0], list("abac")
+    assert cluster_mean(values[::-1], clusters[::-1]) == cluster_mean(values, clusters)
+
+
+def test_cluster_interval_of_independent_values_is_nearly_normal():
+    values = np.random.default_rng(1).normal(size=400)
+    mean = cluster_mean(list(values), range(400))
+    assert mean.high - mean.low == pytest.approx(2 * 1.96 * values.std() / 20, rel=0.05)
+
+
+def test_cluster_mean_without_values():
+    assert cluster_mean([], []) == Mean(None, None, None, 0, 0)

@@ -174,17 +174,10 @@ def test_command_rejects_invalid_arms(run_folder, capsys, arguments, message):
     assert message in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"error": "Traceback"}, "1 episodes failed; resume it with lgmd-gym bench --resume"),
-        ({"episode_return": None}, "an older version"),
-    ],
-)
-def test_rows_without_a_return_are_rejected(run_folder, tmp_path, changed, message):
+def test_run_with_failed_episodes_is_rejected(run_folder, tmp_path):
     rows = [json.loads(line) for line in (run_folder / "episodes.jsonl").read_text().splitlines()]
-    rows[3] |= changed
+    rows[3]["error"] = "Traceback"
     (tmp_path / "episodes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     (tmp_path / "run.json").write_text((run_folder / "run.json").read_text())
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match="1 episodes failed; resume it with lgmd-gym bench --resume"):
         compare_arms(tmp_path)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lgmd_gym.benchmark.folder import read_rows, read_settings
-from lgmd_gym.benchmark.rows import Row, RowKey, key_of
+from lgmd_gym.benchmark.rows import Row, key_of
 from lgmd_gym.benchmark.statistics import Mean, cluster_mean, wilson
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import without_fcw_driver
@@ -15,20 +15,12 @@ from lgmd_gym.errors import unknown_name
 
 
 class Quantity(NamedTuple):
-    """Quantity that is compared.
-
-    Attributes:
-        name: Name in tables and figures.
-        key: Key of the row.
-        unit: Unit in tables and figures.
-        scale: Factor from SI units to `unit`.
-        threats: Whether it is defined for threats or for non-threats.
-    """
+    """Row value that is compared, over threats or over non-threats."""
 
     name: str
     key: str
     unit: str
-    scale: float = 1.0
+    scale: float = 1.0  # factor from SI units
     threats: bool = True
 
 
@@ -45,16 +37,8 @@ QUANTITIES = (
 class Difference(NamedTuple):
     """Paired difference B - A of one quantity.
 
-    Attributes:
-        name: Name of the quantity.
-        unit: Unit of all values.
-        mean_a: Mean of A over the pairs.
-        mean_b: Mean of B over the pairs.
-        change: Mean of B - A with its 95 % interval.
-        higher: Number of pairs in which B is higher.
-        lower: Number of pairs in which B is lower.
-        deviating_high: Upper Wilson bound of the share of pairs with another difference, if all observed
-            pairs differ by the same value (their bootstrap interval has no width); else None.
+    If all pairs differ by the same value, a bootstrap interval has no width. `deviating_high` is then the
+    upper Wilson bound of the share of pairs with another difference; else it is None.
     """
 
     name: str
@@ -62,29 +46,20 @@ class Difference(NamedTuple):
     mean_a: float
     mean_b: float
     change: Mean
-    higher: int
+    higher: int  # pairs in which B is higher
     lower: int
     deviating_high: float | None
 
 
 class Comparison(NamedTuple):
-    """Paired differences between two agents under one camera condition.
-
-    Attributes:
-        name_a: Name of A.
-        name_b: Name of B.
-        condition: Camera condition; "" if the run has only one.
-        pairs: Number of episodes that both completed.
-        unpaired: Number of other episodes of either.
-        differences: One per quantity that is defined for any pair.
-    """
+    """Paired differences between two agents under one camera condition."""
 
     name_a: str
     name_b: str
-    condition: str
-    pairs: int
-    unpaired: int
-    differences: tuple[Difference, ...]
+    condition: str  # "" if the run has only one
+    pairs: int  # episodes that both completed
+    unpaired: int  # other episodes of either
+    differences: tuple[Difference, ...]  # of the quantities that are defined for any pair
 
 
 def compare_runs(run_a: Path, run_b: Path | None, agents: Sequence[str] | None = None) -> list[Comparison]:
@@ -99,8 +74,8 @@ def compare_runs(run_a: Path, run_b: Path | None, agents: Sequence[str] | None =
     Raises:
         ValueError: For a folder without a run, a traffic run, an unknown agent, or no common episode.
     """
-    rows_a = _read_case_rows(run_a)
-    rows_b = rows_a if run_b is None else _read_case_rows(run_b)
+    rows_a = read_case_rows(run_a)
+    rows_b = rows_a if run_b is None else read_case_rows(run_b)
     pairs = _agent_pairs(rows_a, rows_b, agents, run_b is None)
     prefixes = ("", "") if run_b is None else (f"{run_a.name}: ", f"{run_b.name}: ")
     conditions = list(dict.fromkeys(row["condition"] for row in rows_a))
@@ -115,7 +90,9 @@ def compare_runs(run_a: Path, run_b: Path | None, agents: Sequence[str] | None =
         for condition in conditions
     ]
     if not any(item.pairs for item in comparisons):
-        raise ValueError(f"{str(run_a)!r} and {str(run_b)!r} have no episode in common")
+        raise ValueError(
+            f"the agents of {str(run_a)!r} and {str(run_b or run_a)!r} share no completed episode"
+        )
     return comparisons
 
 
@@ -127,11 +104,13 @@ def compare_rows(
     Cases with a warned driver are left out, as in all totals.
     """
     rows_a, rows_b = without_fcw_driver(rows_a), without_fcw_driver(rows_b)
-    by_key_a, by_key_b = _completed_by_key(rows_a), _completed_by_key(rows_b)
-    common = sorted(by_key_a.keys() & by_key_b.keys())
-    pairs = [(by_key_a[key], by_key_b[key]) for key in common]
+    completed_a, completed_b = (
+        {key_of(row)[1:]: row for row in rows if row["error"] is None} for rows in (rows_a, rows_b)
+    )
+    common = sorted(completed_a.keys() & completed_b.keys())
+    pairs = [(completed_a[key], completed_b[key]) for key in common]
     pairs = [(a, b) for a, b in pairs if a["threat"] == b["threat"]]
-    unpaired = len({_episode_key(row) for row in (*rows_a, *rows_b)}) - len(pairs)
+    unpaired = len({key_of(row)[1:] for row in (*rows_a, *rows_b)}) - len(pairs)
     differences = (paired_difference(quantity, pairs) for quantity in QUANTITIES)
     return Comparison(*names, condition, len(pairs), unpaired, tuple(filter(None, differences)))
 
@@ -160,12 +139,11 @@ def paired_difference(quantity: Quantity, pairs: list[tuple[Row, Row]]) -> Diffe
     )
 
 
-def _read_case_rows(path: Path) -> list[Row]:
+def read_case_rows(path: Path) -> list[Row]:
+    """Return the rows of a run folder; raise ValueError for a traffic run."""
     rows, _ = read_rows(path)
     if read_settings(path)["suite"] == TRAFFIC:
-        raise ValueError(
-            f"{str(path)!r} is a traffic run, which has no pairs; see the rates per 100 km in its summary.csv"
-        )
+        raise ValueError(f"{str(path)!r} is a traffic run; its summary.csv holds the rates per 100 km")
     return rows
 
 
@@ -191,12 +169,3 @@ def _agent_pairs(
             f"no pair of agents in {', '.join(agents_a)} and {', '.join(agents_b)}; name two with --agents"
         )
     return pairs
-
-
-def _completed_by_key(rows: list[Row]) -> dict[RowKey, Row]:
-    return {_episode_key(row): row for row in rows if row["error"] is None}
-
-
-def _episode_key(row: Row) -> RowKey:
-    """Return the key of a row without the agent."""
-    return "", *key_of(row)[1:]

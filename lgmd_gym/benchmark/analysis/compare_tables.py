@@ -8,6 +8,7 @@ from rich.table import Table
 
 from lgmd_gym.benchmark.analysis.compare import Comparison, Difference
 from lgmd_gym.benchmark.analysis.trainings import ArmResult, Estimate
+from lgmd_gym.benchmark.statistics import Mean
 
 DIFFERENCE_CAPTION = (
     "B − A [95 % interval, bootstrap over cases]; number of pairs in which B is higher / lower, of n"
@@ -49,9 +50,9 @@ def change_text(item: Difference) -> str:
     if item.deviating_high is not None:
         share = f"{100 * item.deviating_high:.0f} %"
         return f"{change.value:+.2f} in all pairs (95 %: at most {share} of pairs differ)"
-    if change.low is None or change.high is None:
+    if change.low is None:
         return f"{change.value:+.2f} (one case, no interval)"
-    return f"{change.value:+.2f} [{change.low:+.2f}, {change.high:+.2f}]"
+    return _interval_text(change, "+.2f")
 
 
 def arm_table(results: Sequence[ArmResult], title: str) -> Table:
@@ -65,19 +66,18 @@ def arm_table(results: Sequence[ArmResult], title: str) -> Table:
         heading = f"{SHARE_HEADINGS[key]},\n% of {results[0].shares[key].n}"
         table.add_column(heading, justify="right")
     for result in results:
-        mean_return = _estimate_text(result.mean_return, ".1f")
+        mean_return = _interval_text(result.mean_return, ".1f")
         if result.trainings > 1:
             low, high = result.return_range
             mean_return += f"\n{low:.1f} to {high:.1f}"
-        difference = "–" if result.difference is None else _estimate_text(result.difference, "+.1f")
-        shares = (_estimate_text(result.shares[key], ".0f", 100.0) for key in keys)
+        difference = "–" if result.difference is None else _interval_text(result.difference, "+.1f")
+        shares = (_interval_text(result.shares[key], ".0f", 100.0) for key in keys)
         cells = (result.name, str(result.trainings), mean_return, difference, *shares)
         table.add_row(*map(escape, cells))
     return table
 
 
-def _estimate_text(estimate: Estimate, style: str, scale: float = 1.0) -> str:
-    value = f"{scale * estimate.value:{style}}"
-    if estimate.low is None or estimate.high is None:
-        return value
-    return f"{value} [{scale * estimate.low:{style}}, {scale * estimate.high:{style}}]"
+def _interval_text(item: Estimate | Mean, style: str, scale: float = 1.0) -> str:
+    """Return a value with its interval, if it has one."""
+    value, *bounds = (f"{scale * x:{style}}" for x in item[:3] if x is not None)
+    return f"{value} [{', '.join(bounds)}]" if bounds else value

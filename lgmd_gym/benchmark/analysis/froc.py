@@ -24,45 +24,25 @@ from lgmd_gym.benchmark.task import NO_BRAKE
 
 REARM_TIME = 1.0  # time below the threshold after which the next alarm is a new event [s]
 LEAD_TIME = 1.0  # latest start of a detection before contact [s]
-THRESHOLDS = tuple(
-    float(level) for level in range(5, 305, 5)
-)  # [spikes/s]; 5 is the step of a 6-frame window
+# The spike frequency over six frames at 30 Hz is a multiple of 5 spikes/s.
+THRESHOLDS = tuple(float(level) for level in range(5, 305, 5))
 ASPHALT = 104.0  # mean grey level of the asphalt by day
 LOW_CONTRAST = 0.35  # Weber contrast |grey - asphalt| / asphalt
 CONTRASTS = ("dark", "like asphalt", "light")
 COLUMNS = (
-    "condition",
-    "contrast",
-    "lead",
-    "threshold",
-    "threats",
-    "detected",
-    "detected_low",
-    "detected_high",
-    "false_alarms",
-    "km",
-    "false_per_km",
-    "false_low",
-    "false_high",
-    "chance",
+    *("condition", "contrast", "lead", "threshold", "threats", "detected", "detected_low", "detected_high"),
+    *("false_alarms", "km", "false_per_km", "false_low", "false_high", "chance"),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class OpenLoopTrace:
-    """Time series of one `no-brake` episode.
-
-    Attributes:
-        condition: Camera condition.
-        shade: Body grey level of the first actor; None on an empty road.
-        contact_time: Time of contact [s]; inf without contact.
-        series: Time series by name (keys: `lgmd_gym.benchmark.episode.SERIES`).
-    """
+    """Time series of one `no-brake` episode."""
 
     condition: str
-    shade: float | None
-    contact_time: float
-    series: dict[str, np.ndarray]
+    shade: float | None  # body grey level of the first actor; None on an empty road
+    contact_time: float  # [s]; inf without contact
+    series: dict[str, np.ndarray]  # keys: lgmd_gym.benchmark.episode.SERIES
 
     @property
     def false_alarm_end(self) -> float:
@@ -79,40 +59,23 @@ class OpenLoopTrace:
 
 
 class FrocPoint(NamedTuple):
-    """Detections and false alarms at one threshold.
-
-    Attributes:
-        threshold: Threshold of the signal.
-        detected: Detected threats of all threats.
-        false_alarms: Number of false alarms.
-        distance: Distance driven while an alarm is false [m].
-        false_per_km: False alarms per distance [1/km]; inf for no distance.
-        false_low: Lower end of its exact Poisson 95 % interval [1/km].
-        false_high: Upper end of its exact Poisson 95 % interval [1/km].
-        chance: Share of random windows, as long as a detection window, in which an alarm begins.
-    """
+    """Detections and false alarms at one threshold."""
 
     threshold: float
-    detected: Rate
+    detected: Rate  # of all threats
     false_alarms: int
-    distance: float
-    false_per_km: float
-    false_low: float
+    distance: float  # driven while an alarm is false [m]
+    false_per_km: float  # inf for no distance
+    false_low: float  # exact Poisson 95 % interval [1/km]
     false_high: float
-    chance: float
+    chance: float  # share of random windows, as long as a detection window, in which an alarm begins
 
 
 class FrocCurve(NamedTuple):
-    """Detection curve of the threats of one contrast.
-
-    Attributes:
-        condition: Camera condition.
-        contrast: "all", or one of `CONTRASTS`. The false alarms are those of all traces in both cases.
-        points: One point per threshold, in rising order.
-    """
+    """Points by rising threshold: detections of the threats of one contrast, false alarms of all traces."""
 
     condition: str
-    contrast: str
+    contrast: str  # "all", or one of CONTRASTS
     points: tuple[FrocPoint, ...]
 
 
@@ -232,15 +195,15 @@ def write_froc(path: Path, curves: dict[str, list[FrocCurve]], lead_time: float)
     write_csv(path, COLUMNS, lines)
 
 
-def _csv_values(point: FrocPoint) -> tuple[float, ...]:
-    detected, rates = point.detected, (point.false_per_km, point.false_low, point.false_high, point.chance)
-    return (
-        point.threshold,
-        detected.n,
-        detected.k,
-        round(detected.low, 4),
-        round(detected.high, 4),
+def _csv_values(point: FrocPoint) -> list[float]:
+    """Return the values of `COLUMNS` from the threshold on."""
+    rate = point.detected
+    detected = (rate.n, rate.k, rate.low, rate.high)
+    false = (
         point.false_alarms,
-        round(point.distance / 1000.0, 4),
-        *(round(rate, 4) for rate in rates),
+        point.distance / 1000.0,
+        point.false_per_km,
+        point.false_low,
+        point.false_high,
     )
+    return [round(value, 4) for value in (point.threshold, *detected, *false, point.chance)]

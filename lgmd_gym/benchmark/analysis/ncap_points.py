@@ -32,21 +32,13 @@ UNKNOWN_COLOUR = "contact"  # contact whose colour is not published
 
 
 class ScenarioPoints(NamedTuple):
-    """Points of one scenario.
-
-    Attributes:
-        scenario: Name of the scenario.
-        earned: Mean points over seeds.
-        maximum: Highest possible points.
-        exact: False for a lower bound.
-        note: Reason for no points, or "".
-    """
+    """Points of one scenario, mean over seeds."""
 
     scenario: str
     earned: float
     maximum: float
-    exact: bool
-    note: str = ""
+    exact: bool  # False for a lower bound
+    note: str = ""  # reason for no points
 
 
 def row_colour_2023(row: Row) -> str:

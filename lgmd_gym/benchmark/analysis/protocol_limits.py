@@ -25,34 +25,18 @@ BANDS_2026 = {
 COLOUR_WEIGHTS = {"green": 1.0, "yellow": 0.75, "orange": 0.5, "brown": 0.25, "red": 0.0}
 
 
-class LimitCheck(NamedTuple):
-    """Result of one row against its limit.
-
-    Attributes:
-        met: Whether the row meets the limit.
-        limit: The limit in words.
-    """
-
-    met: bool
-    limit: str
+# Compares a row with its limit; returns whether the row meets it, and the limit in words.
+LimitCheck = Callable[[Row], tuple[bool, str]]
 
 
 class LimitResult(NamedTuple):
-    """Runs of one agent in one case against the limit.
-
-    Attributes:
-        agent: Agent string.
-        case: Name of the case.
-        limit: The limit in words.
-        met: Runs that meet the limit.
-        worst: Highest relative impact speed [m/s].
-    """
+    """Runs of one agent in one case against the limit."""
 
     agent: str
     case: str
     limit: str
     met: Rate
-    worst: float
+    worst: float  # highest relative impact speed [m/s]
 
 
 def relative_impact(row: Row) -> float:
@@ -101,7 +85,7 @@ def colour_2026(ego_kmh: float, impact_kmh: float) -> str:
     return next((colour for colour, edge in bands if impact_kmh < edge), "red")
 
 
-def check_r152(row: Row) -> LimitCheck:
+def check_r152(row: Row) -> tuple[bool, str]:
     """Compare a row of suite r152 with the impact speed limit of its relative speed and load.
 
     Premature braking fails, because it begins before the start of the test (T0).
@@ -109,36 +93,31 @@ def check_r152(row: Row) -> LimitCheck:
     load = r152_load(row["case"])
     limit = r152_limit(round((row["ego_speed"] - row["target_speed"]) / KMH, 3), load)
     met = relative_impact(row) / KMH <= limit + 1e-9 and not row["premature_brake"]
-    return LimitCheck(met, f"≤ {limit:g} km/h {load}")
+    return met, f"≤ {limit:g} km/h {load}"
 
 
-def check_no_contact(row: Row) -> LimitCheck:
+def check_no_contact(row: Row) -> tuple[bool, str]:
     """Check a row of suite fmvss127 for contact (49 CFR 571.127 S5.1.3)."""
-    return LimitCheck(not row["collision"], "no contact")
+    return not row["collision"], "no contact"
 
 
-def check_green(row: Row) -> LimitCheck:
+def check_green(row: Row) -> tuple[bool, str]:
     """Check a row of suite ncap2026 for the colour green."""
-    return LimitCheck(colour_2026(row["ego_speed"] / KMH, relative_impact(row) / KMH) == "green", "green")
+    return colour_2026(row["ego_speed"] / KMH, relative_impact(row) / KMH) == "green", "green"
 
 
-LIMIT_CHECKS: dict[str, Callable[[Row], LimitCheck]] = {
-    "r152": check_r152,
-    "fmvss127": check_no_contact,
-    "ncap2026": check_green,
-}
+LIMIT_CHECKS = {"r152": check_r152, "fmvss127": check_no_contact, "ncap2026": check_green}
 
 
-def limit_results(rows: list[Row], agent: str, check: Callable[[Row], LimitCheck]) -> list[LimitResult]:
+def limit_results(rows: list[Row], agent: str, check: LimitCheck) -> list[LimitResult]:
     """Return the result of an agent per case, over its threats without an error."""
     threats = [row for row in rows if row["agent"] == agent and row["error"] is None and row["threat"]]
     results = []
     for case in sorted({row["case"] for row in threats}, key=case_order):
         of_case = [row for row in threats if row["case"] == case]
-        checks = [check(row) for row in of_case]
-        limit = " / ".join(sorted({item.limit for item in checks}))
-        met = Rate.of(item.met for item in checks)
-        results.append(LimitResult(agent, case, limit, met, max(map(relative_impact, of_case))))
+        met, limits = zip(*map(check, of_case), strict=True)
+        limit, worst = " / ".join(sorted(set(limits))), max(map(relative_impact, of_case))
+        results.append(LimitResult(agent, case, limit, Rate.of(met), worst))
     return results
 
 

@@ -12,8 +12,8 @@ from lgmd_gym.benchmark.summary import AgentSummary, case_order, summaries, with
 from lgmd_gym.envs.dynamics.units import KMH
 
 SCORE_CAPTION = (
-    "k/n [Wilson 95 % interval in %]; speed reduction [95 %, bootstrap over cases]; premature: more than 4 s "
-    "before contact, does not count as avoided"
+    "k/n [Wilson 95 % interval in %]; mean speed reduction in km/h [95 %, bootstrap over cases]; median TTC "
+    "in s; premature: more than 4 s before contact, does not count as avoided"
 )
 LIMIT_CAPTION = (
     "runs that meet the limit, of n (highest relative impact speed in km/h); derived from the protocol, "
@@ -22,25 +22,14 @@ LIMIT_CAPTION = (
 
 
 class CaseCell(NamedTuple):
-    """Result of one agent in one case.
-
-    Attributes:
-        text: Text of a table cell; "" without an episode.
-        share: Share of successful episodes; None without an episode.
-    """
+    """Text of a table cell, and share of successful episodes; the defaults are for no episode."""
 
     text: str = ""
     share: float | None = None
 
 
 class CaseLine(NamedTuple):
-    """Results of all agents in one case.
-
-    Attributes:
-        case: Name of the case without the suite.
-        limit: Limit of the protocol in words, or "".
-        cells: One cell per agent.
-    """
+    """Results of all agents in one case; `case` lacks the suite's name, `limit` may be empty."""
 
     case: str
     limit: str
@@ -56,7 +45,7 @@ def limit_lines(rows: list[Row], agents: list[str], suite: str) -> list[CaseLine
     limits = {case: item.limit for results in by_agent.values() for case, item in results.items()}
     lines = []
     for case in sorted(limits, key=case_order):
-        line = CaseLine(_short(case), limits[case], [])
+        line = CaseLine(case.split("/", 1)[1], limits[case], [])
         for results in by_agent.values():
             if (item := results.get(case)) is None:
                 line.cells.append(CaseCell())
@@ -71,7 +60,7 @@ def success_lines(rows: list[Row], agents: list[str]) -> list[CaseLine]:
     """Return threats avoided plus non-threats without a false activation, of n, per case."""
     by_cell = {(item.agent, item.group): item for item in summaries(rows, lambda row: row["case"])}
     return [
-        CaseLine(_short(case), "", [_success(by_cell.get((agent, case))) for agent in agents])
+        CaseLine(case.split("/", 1)[1], "", [_success(by_cell.get((agent, case))) for agent in agents])
         for case in sorted({row["case"] for row in rows}, key=case_order)
     ]
 
@@ -82,11 +71,6 @@ def _success(item: AgentSummary | None) -> CaseCell:
         return CaseCell()
     k = item.avoided.k + item.false_activations.n - item.false_activations.k
     return CaseCell(f"{k}/{n}", k / n)
-
-
-def _short(case: str) -> str:
-    """Return the name of a case without the suite."""
-    return case.split("/", 1)[1]
 
 
 def agent_summaries(rows: list[Row], agents: list[str]) -> list[AgentSummary]:
@@ -107,13 +91,7 @@ def score_tables(rows: list[Row], agents: list[str], title: str) -> list[Table]:
 def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
     table = Table(title=title, caption=SCORE_CAPTION, box=SIMPLE_HEAD)
     table.add_column("agent", overflow="fold", min_width=15)
-    for heading in (
-        "avoided",
-        "speed reduc-\ntion km/h",
-        "TTC at\nbraking s",
-        "premature",
-        "false\nactivation",
-    ):
+    for heading in ("avoided", "speed\nreduction", "TTC at\nbraking", "premature", "false\nactivation"):
         table.add_column(heading, justify="right")
     for item in agent_summaries(rows, agents):
         table.add_row(

@@ -13,10 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from lgmd_gym.benchmark.analysis.bootstrap import StratifiedBootstrap, interquartile_mean
-from lgmd_gym.benchmark.folder import read_rows, read_settings
+from lgmd_gym.benchmark.analysis.compare import read_case_rows
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import wilson
-from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import without_fcw_driver
 from lgmd_gym.errors import unknown_name
 
@@ -26,14 +25,7 @@ MIN_TRAININGS = 5  # fewest trainings, apart from one, for which intervals are g
 
 
 class Estimate(NamedTuple):
-    """Value with its 95 % interval.
-
-    Attributes:
-        value: The value.
-        low: Lower bound; None for an arm of two to four trainings.
-        high: Upper bound; None for an arm of two to four trainings.
-        n: Number of cases.
-    """
+    """Value over n cases with its 95 % interval; an arm of two to four trainings has no interval."""
 
     value: float
     low: float | None
@@ -42,12 +34,7 @@ class Estimate(NamedTuple):
 
 
 class Arm(NamedTuple):
-    """Group of agents.
-
-    Attributes:
-        name: Name of the arm.
-        agents: Agent strings.
-    """
+    """Named group of agents, given by their strings."""
 
     name: str
     agents: list[str]
@@ -56,23 +43,16 @@ class Arm(NamedTuple):
 class ArmResult(NamedTuple):
     """Result of an arm under one camera condition.
 
-    Attributes:
-        name: Name of the arm.
-        condition: Camera condition.
-        trainings: Number of agents. The intervals of a single one include the variation over cases only.
-        mean_return: Interquartile mean over trainings of the mean return.
-        return_range: Lowest and highest mean return of a training.
-        difference: Mean return minus that of the first arm; None for the first arm.
-        shares: Mean over trainings by key of `SHARES`; keys without a case are left out.
+    The interval of an arm of one training includes the variation over cases only.
     """
 
     name: str
     condition: str
     trainings: int
-    mean_return: Estimate
-    return_range: tuple[float, float]
-    difference: Estimate | None
-    shares: dict[str, Estimate]
+    mean_return: Estimate  # interquartile mean over trainings of the mean return
+    return_range: tuple[float, float]  # lowest and highest mean return of a training
+    difference: Estimate | None  # mean return minus that of the first arm; None for the first arm
+    shares: dict[str, Estimate]  # mean over trainings by key of SHARES; keys without a case are left out
 
 
 def compare_arms(path: Path, arms: Sequence[str] = ()) -> list[ArmResult]:
@@ -87,15 +67,11 @@ def compare_arms(path: Path, arms: Sequence[str] = ()) -> list[ArmResult]:
         ValueError: For a folder without a run, a traffic run, failed or missing episodes, or an arm without
             an agent.
     """
-    rows, _ = read_rows(path)
-    if read_settings(path)["suite"] == TRAFFIC:
-        raise ValueError(f"{str(path)!r} is a traffic run, which has no returns")
+    rows = read_case_rows(path)
     failed = sum(row["error"] is not None for row in rows)
     if failed or not rows:
         problem = f"{failed} episodes failed" if failed else "the run has no episode"
         raise ValueError(f"{problem}; resume it with lgmd-gym bench --resume {path}")
-    if any(row.get(RETURN) is None for row in rows):
-        raise ValueError(f"rows have no {RETURN} because an older version wrote them; repeat the run")
     agents = list(dict.fromkeys(row["agent"] for row in rows))
     parsed = [parse_arm(arm, agents) for arm in arms or agents]
     conditions = dict.fromkeys(row["condition"] for row in rows)
@@ -212,13 +188,9 @@ def _bounds(samples: np.ndarray, trainings: int) -> tuple[float | None, float | 
 def _case_means(
     groups: Sequence[Sequence[Row]], cases: Sequence[str], key: str, threats: bool | None = None
 ) -> np.ndarray:
-    """Return the mean of a row key per agent and case; NaN without a value.
+    """Return the mean of a row key per group and case; NaN without a value.
 
-    Args:
-        groups: Rows of each agent.
-        cases: Names of the cases.
-        key: Key of the rows.
-        threats: Restricts the rows to threats or to non-threats; None for all.
+    `threats` restricts the rows to threats or to non-threats.
     """
     means = np.full((len(groups), len(cases)), np.nan)
     for line, rows in zip(means, groups, strict=True):
