@@ -1,4 +1,4 @@
-"""Speed of the closed loop: run with `pytest -m bench tests/bench/test_bench_env.py`."""
+"""Speed and memory of the closed loop: `pytest -m bench tests/bench/test_bench_env.py`."""
 
 import gymnasium as gym
 import numpy as np
@@ -16,7 +16,7 @@ def test_env_step(benchmark):
     assert benchmark.stats.stats.median < 500e-6  # 2,000 camera frames a second
 
 
-def test_faster_than_highway_envs_own_top_view():
+def test_faster_than_the_top_view_of_highway_env():
     ours, theirs = interleaved(closed_loop("LGMD/CCRs-v0"), top_view(), rounds=15, repeats=100)
     print(f"\nclosed loop {ours * 1e6:.0f} us, highway-env's top view {theirs * 1e6:.0f} us")
     assert ours < theirs
@@ -29,7 +29,7 @@ def test_sixty_four_environments_in_one_process():
 
 
 def test_memory_does_not_grow():
-    """100,000 steps, resets included, in one environment."""
+    """Run 100,000 steps with resets in one environment."""
     import resource
 
     env = gym.make("LGMD/CCRs-v0", ego_speed=15.0)

@@ -1,4 +1,4 @@
-"""Pictures per second of the composed view: drawn, and written to a file."""
+"""Pictures per second of `LGMDView`, drawn and written to a file."""
 
 import gymnasium as gym
 import numpy as np
@@ -7,7 +7,7 @@ import pytest
 from lgmd_gym import LGMDView
 from lgmd_gym.video import VideoWriter
 
-LIVE, WRITING = 30.0, 60.0  # pictures/s to reach
+MIN_DRAWN, MIN_WRITTEN = 30.0, 60.0  # [pictures/s]
 
 pytestmark = pytest.mark.bench
 
@@ -22,25 +22,25 @@ def view():
     env.close()
 
 
-def drive(env, take):
-    """Play 90 decisions into a sink."""
+def play(env, consume):
+    """Play 90 decisions and pass each picture to a function."""
     env.reset(seed=0)
     for _ in range(90):
         env.step(np.zeros(1, np.float32))
-        take(env.render())
+        consume(env.render())
 
 
-def test_pictures_drawn(benchmark, view):
-    benchmark.pedantic(drive, (view, lambda picture: None), rounds=5, warmup_rounds=1)
-    assert 90 / benchmark.stats["median"] > LIVE
+def test_drawing_speed(benchmark, view):
+    benchmark.pedantic(play, (view, lambda picture: None), rounds=5, warmup_rounds=1)
+    assert 90 / benchmark.stats["median"] > MIN_DRAWN
 
 
-def test_pictures_written(benchmark, view, tmp_path):
+def test_writing_speed(benchmark, view, tmp_path):
     names = iter(range(100))
 
     def write():
         with VideoWriter(tmp_path / f"{next(names)}.mp4", 30.0) as writer:
-            drive(view, writer.write)
+            play(view, writer.write)
 
     benchmark.pedantic(write, rounds=5, warmup_rounds=1)
-    assert 90 / benchmark.stats["median"] > WRITING
+    assert 90 / benchmark.stats["median"] > MIN_WRITTEN

@@ -1,8 +1,8 @@
-"""The same equations with OpenCV filters on float32 maps, the yardstick of the neuron's benchmark.
+"""The LGMD equations with OpenCV filters on float32 maps, for comparison in the benchmark of the neuron.
 
-`OpenCVLGMD` is what one writes: OpenCV's filters, NumPy's arithmetic. `TunedOpenCVLGMD` is written not to
-lose: every map is allocated once, every call is OpenCV's and writes in place. Both leave the inert
-product of the paths out, as the kernels do, and OpenCV runs on one thread.
+`OpenCVLGMD` is a straightforward implementation with OpenCV filters and NumPy arithmetic. `TunedOpenCVLGMD`
+allocates every map once and uses in-place OpenCV calls only. Both omit the product of the paths, which has no
+effect, as the kernels do. OpenCV runs on one thread.
 """
 
 import math
@@ -19,7 +19,7 @@ _BORDER = cv2.BORDER_REPLICATE
 
 
 class OpenCVLGMD:
-    """One neuron with the paper's structure; `step` returns (K, spikes)."""
+    """One neuron with the structure of the paper; `step` returns (K, spikes)."""
 
     def __init__(self, shape: tuple[int, int], fps: float = 30.0) -> None:
         cv2.setNumThreads(1)
@@ -32,11 +32,11 @@ class OpenCVLGMD:
         self.f_hat, self.k, self.k_hat, self.warm = 0.0, 0.5, 0.5, True
 
     def gain(self, tau: float) -> float:
-        """The gain of a first-order low-pass."""
+        """Return the gain of a first-order low-pass filter."""
         return self.dt / (self.dt + tau)
 
     def step(self, frame: NDArray[np.uint8]) -> tuple[float, int]:
-        """Answer one frame, uint8, shape (H, W)."""
+        """Process one frame, uint8, shape (H, W)."""
         if self.last is None:
             self.last = frame.copy()
             return self.k, 0
@@ -47,7 +47,7 @@ class OpenCVLGMD:
         return self._fire(sum_g)
 
     def _photoreceptors(self, frame: NDArray[np.uint8]) -> float:
-        """P; return the mean of |P|."""
+        """Compute P and return the mean of |P|."""
         a_1, a_2 = self.params.persistence
         self.p_1, self.p_2 = self.p, self.p_1
         self.p = np.subtract(frame, self.last, dtype=np.float32) + a_1 * self.p_1 + a_2 * self.p_2
@@ -55,7 +55,7 @@ class OpenCVLGMD:
         return float(np.abs(self.p).mean())
 
     def _summation(self, w: float) -> float:
-        """From P to the sum of G."""
+        """Compute S and G from P, and return the sum of G."""
         par, s = self.params, np.float32(0)
         on = np.maximum(self.p, 0)
         for e, delayed in zip((on, on - self.p), self.delayed, strict=True):
@@ -71,11 +71,11 @@ class OpenCVLGMD:
         return float(self.filtered.sum(dtype=np.float64))
 
     def latency_gain(self) -> float:
-        """The gain of G's latency filter."""
+        """Return the gain of the latency filter of G."""
         return self.gain(self.params.tau_g * max(self.params.sigma_2, 1.0 - self.f_hat / self.params.t_f))
 
     def _fire(self, sum_g: float) -> tuple[float, int]:
-        """K and the spikes."""
+        """Return K and the number of spikes."""
         par, keep = self.params, self.params.tau_s / (self.params.tau_s + self.dt)
         k = 1.0 / (1.0 + math.exp(-sum_g / (self.n * par.sigma_3)))
         rise = k - self.k
@@ -85,7 +85,7 @@ class OpenCVLGMD:
 
 
 class TunedOpenCVLGMD(OpenCVLGMD):
-    """The same with OpenCV alone, in place, without an allocation."""
+    """`OpenCVLGMD` with in-place OpenCV calls and without allocations."""
 
     def __init__(self, shape: tuple[int, int], fps: float = 30.0) -> None:
         super().__init__(shape, fps)
@@ -97,7 +97,7 @@ class TunedOpenCVLGMD(OpenCVLGMD):
     def _photoreceptors(self, frame: NDArray[np.uint8]) -> float:
         a_1, a_2 = self.params.persistence
         self.p, self.p_1, self.p_2 = self.p_2, self.p, self.p_1
-        # self.p holds the P of three frames ago by now: free to be written.
+        # self.p holds the P of three frames ago, which is no longer needed.
         cv2.subtract(frame, self.last, dst=self.p, dtype=cv2.CV_32F)
         cv2.scaleAdd(self.p_1, a_1, self.p, dst=self.p)
         cv2.scaleAdd(self.p_2, a_2, self.p, dst=self.p)
@@ -119,7 +119,7 @@ class TunedOpenCVLGMD(OpenCVLGMD):
         return cv2.sumElems(self.filtered)[0]
 
     def _path(self, e: NDArray, delayed: NDArray, s: NDArray, w: float) -> None:
-        """S of one path."""
+        """Compute S of one path."""
         for ring, tau in enumerate(self.params.tau_2):
             cv2.accumulateWeighted(e, delayed[ring], 1.0 if self.warm else self.gain(tau))
         cv2.filter2D(delayed[1], -1, self.kernels[0], dst=self.i, borderType=_BORDER)
