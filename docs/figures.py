@@ -1,4 +1,4 @@
-"""The figures of the page on the neuron, made by the neuron."""
+"""Generate the figures of the page on the neuron."""
 
 import math
 from pathlib import Path
@@ -9,15 +9,17 @@ import numpy as np
 
 import lgmd_gym  # noqa: F401  (registers the environments)
 from lgmd_gym import LGMD, LGMDParams
-from lgmd_gym.paper.stimuli import Grating, Looming, Receding, Screen, Translating, frames
-from lgmd_gym.plotting import figures, style
+from lgmd_gym.paper.backgrounds import Grating, Screen
+from lgmd_gym.paper.stimuli import Looming, Receding, Translating, stimulus_frames
+from lgmd_gym.plotting.figures import layers_figure
+from lgmd_gym.plotting.style import COLOURS, saved_figure
 
 SCREEN = Screen()
 SECONDS = 4.0
 STIMULI: dict[str, dict[str, Any]] = {
-    "approaches": {"thing": Looming()},
-    "recedes": {"thing": Receding()},
-    "passes": {"thing": Translating()},
+    "approaches": {"foreground": Looming()},
+    "recedes": {"foreground": Receding()},
+    "passes": {"foreground": Translating()},
     "a grating drifts": {"background": Grating()},
 }
 
@@ -26,12 +28,12 @@ def main(folder: Path) -> None:
     """Draw all figures into a folder."""
     diagram(folder / "neuron.png")
     layers(folder / "layers.png")
-    answers(folder / "answers.png")
+    responses(folder / "responses.png")
     adaptation(folder / "adaptation.png")
 
 
 def layers(path: Path) -> None:
-    """Draw the maps of a neuron shortly before contact."""
+    """Draw the layers of a neuron shortly before contact."""
     env = gym.make("LGMD/CCRs-v0", ego_speed=11.1, shade=60, include_frame=True)
     neuron = LGMD((90, 160))
     observation, info = env.reset(seed=0)
@@ -40,52 +42,41 @@ def layers(path: Path) -> None:
         observation, *_, info = env.step([0.0])
     frame = observation["frame"][:, :, 0]
     neuron.step(frame)
-    figures.layers_figure(path, neuron, frame)
+    layers_figure(path, neuron, frame)
 
 
-def answers(path: Path) -> None:
-    """Draw what the neuron says to four stimuli."""
-    plt = style.load_pyplot()
-    with plt.rc_context(style.STYLE):
-        figure, axes = plt.subplots(
-            2, 4, figsize=(10.0, 4.2), sharex=True, sharey="row", layout="constrained"
-        )
-        for column, (name, scene) in zip(axes.T, STIMULI.items(), strict=True):
+def responses(path: Path) -> None:
+    """Draw the potential and the spike frequency for four stimuli."""
+    with saved_figure(path, 2, 4, figsize=(10.0, 4.2), sharex=True, sharey="row") as (_, axes):
+        for column, (name, stimulus) in zip(axes.T, STIMULI.items(), strict=True):
             neuron = LGMD(SCREEN.shape, fps=SCREEN.fps)
-            said = [neuron.step(frame) for frame in frames(SCREEN, SECONDS, **scene)]
-            time = np.arange(len(said)) / SCREEN.fps
-            column[0].plot(time, [answer.membrane_potential for answer in said], color=style.COLOURS[2])
-            column[1].plot(time, [answer.spike_frequency for answer in said], color=style.COLOURS[1])
+            steps = [neuron.step(frame) for frame in stimulus_frames(SCREEN, SECONDS, **stimulus)]
+            time = np.arange(len(steps)) / SCREEN.fps
+            column[0].plot(time, [step.membrane_potential for step in steps], color=COLOURS[2])
+            column[1].plot(time, [step.spike_frequency for step in steps], color=COLOURS[1])
             column[1].axhline(neuron.params.t_sf, color="0.5", linestyle="--", linewidth=1.0)
             column[0].set_title(name)
             column[1].set_xlabel("time [s]")
         axes[0, 0].set_ylabel("potential K")
         axes[1, 0].set_ylabel("spike frequency\n[spikes/s]")
-        figure.savefig(path)
-        plt.close(figure)
 
 
 def adaptation(path: Path) -> None:
-    """Draw what the adaptive inhibition does to a fast grating, with and without it."""
-    plt = style.load_pyplot()
-    scene = {"background": Grating()}
+    """Draw the response to a grating with adaptive and with fixed inhibition."""
     models = {"w adapts (the paper)": LGMDParams(), "w fixed at σ1": LGMDParams(t_f=math.inf)}
-    with plt.rc_context(style.STYLE):
-        figure, axes = plt.subplots(1, 2, figsize=(8.0, 2.8), layout="constrained")
+    with saved_figure(path, 1, 2, figsize=(8.0, 2.8)) as (_, axes):
         for index, (name, params) in enumerate(models.items()):
             neuron = LGMD(SCREEN.shape, fps=SCREEN.fps, params=params)
-            said = [neuron.step(frame) for frame in frames(SCREEN, 2.0, **scene)]
-            time = np.arange(len(said)) / SCREEN.fps
-            look = {"color": style.COLOURS[2 - index], "label": name, "linestyle": ("-", "--")[index]}
-            axes[0].plot(time, [answer.inhibition_weight for answer in said], **look)
-            axes[1].plot(time, [answer.membrane_potential for answer in said], **look)
+            steps = [neuron.step(frame) for frame in stimulus_frames(SCREEN, 2.0, Grating())]
+            time = np.arange(len(steps)) / SCREEN.fps
+            line = {"color": COLOURS[2 - index], "label": name, "linestyle": ("-", "--")[index]}
+            axes[0].plot(time, [step.inhibition_weight for step in steps], **line)
+            axes[1].plot(time, [step.membrane_potential for step in steps], **line)
         axes[0].set_ylabel("inhibition weight w")
         axes[1].set_ylabel("potential K")
         for axis in axes:
             axis.set_xlabel("time [s]")
         axes[0].legend()
-        figure.savefig(path)
-        plt.close(figure)
 
 
 BOXES = {
@@ -105,25 +96,23 @@ ARROWS = (("L", "P"), ("P", "ON"), ("P", "OFF"), ("ON", "S"), ("OFF", "S"), ("S"
 
 
 def diagram(path: Path) -> None:
-    """Draw what feeds what."""
-    plt = style.load_pyplot()
-    figure, axis = plt.subplots(figsize=(10.0, 3.2), layout="constrained")
-    axis.set(xlim=(-0.7, 12.0), ylim=(-1.4, 2.2))
-    axis.axis("off")
-    for x, y, words in BOXES.values():
-        shape = {"boxstyle": "round,pad=0.35", "facecolor": "#eef4f9", "edgecolor": style.COLOURS[2]}
-        axis.text(x, y, words, ha="center", va="center", fontsize=9, bbox=shape, zorder=3)
-    for start, end in ARROWS:
-        dashed = start == "F"
-        look = {"arrowstyle": "-|>", "color": style.COLOURS[1] if dashed else "0.35"}
-        look |= {
-            "linestyle": "--" if dashed else "-",
-            "shrinkA": 24,
-            "shrinkB": 34 if end == "spikes" else 24,
-        }
-        axis.annotate("", BOXES[end][:2], BOXES[start][:2], arrowprops=look)
-    figure.savefig(path)
-    plt.close(figure)
+    """Draw the block diagram of the neuron."""
+    with saved_figure(path, 1, 1, figsize=(10.0, 3.2), grid=False) as (_, axis):
+        axis.set(xlim=(-0.7, 12.0), ylim=(-1.4, 2.2))
+        axis.axis("off")
+        for x, y, label in BOXES.values():
+            shape = {"boxstyle": "round,pad=0.35", "facecolor": "#eef4f9", "edgecolor": COLOURS[2]}
+            axis.text(x, y, label, ha="center", va="center", fontsize=9, bbox=shape, zorder=3)
+        for start, end in ARROWS:
+            control = start == "F"  # sets a parameter of its target
+            arrow = {
+                "arrowstyle": "-|>",
+                "color": COLOURS[1] if control else "0.35",
+                "linestyle": "--" if control else "-",
+                "shrinkA": 24,
+                "shrinkB": 34 if end == "spikes" else 24,
+            }
+            axis.annotate("", BOXES[end][:2], BOXES[start][:2], arrowprops=arrow)
 
 
 if __name__ == "__main__":
