@@ -24,18 +24,17 @@ class StratifiedBootstrap:
 
     Args:
         threat: Whether a case is a threat, by name.
-        count: Number of samples.
     """
 
-    def __init__(self, threat: dict[str, bool], count: int = DRAWS) -> None:
+    def __init__(self, threat: dict[str, bool]) -> None:
         self.cases = sorted(threat)
-        self._weights = np.zeros((count, len(self.cases)))
+        self._weights = np.zeros((DRAWS, len(self.cases)))
         rng = np.random.default_rng(0)
         for kind in (True, False):
             chosen = np.array([threat[case] is kind for case in self.cases])
             n = int(chosen.sum())
             if n:
-                self._weights[:, chosen] = rng.multinomial(n, np.full(n, 1.0 / n), size=count)
+                self._weights[:, chosen] = rng.multinomial(n, np.full(n, 1.0 / n), size=DRAWS)
 
     def means(self, values: np.ndarray, seed: int) -> np.ndarray:
         """Return means over sampled cases of sampled trainings, shape (samples, trainings).

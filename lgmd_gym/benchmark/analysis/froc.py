@@ -197,13 +197,7 @@ def write_froc(path: Path, curves: dict[str, list[FrocCurve]], lead_time: float)
 
 def _csv_values(point: FrocPoint) -> list[float]:
     """Return the values of `COLUMNS` from the threshold on."""
-    rate = point.detected
+    rate, km = point.detected, point.distance / 1000.0
     detected = (rate.n, rate.k, rate.low, rate.high)
-    false = (
-        point.false_alarms,
-        point.distance / 1000.0,
-        point.false_per_km,
-        point.false_low,
-        point.false_high,
-    )
+    false = (point.false_alarms, km, point.false_per_km, point.false_low, point.false_high)
     return [round(value, 4) for value in (point.threshold, *detected, *false, point.chance)]
