@@ -120,7 +120,7 @@ class TrafficCar(IDMVehicle):
             self.speed = 0.0
 
 
-class CrossingCar(TrafficCar):
+class IntersectionCar(TrafficCar):
     """A `TrafficCar` with the driver parameters of `IntersectionEnv`."""
 
     COMFORT_ACC_MAX = 6.0

@@ -20,11 +20,10 @@ class HighwayTraffic(TrafficEnv, HighwayEnv):
     def _modify_scene(self) -> None:
         for number in range(3):
             lane = self.road.network.get_lane(("0", "1", int(self.np_random.integers(3))))
-            place = lane.local_coordinates(self.ego.position)[0] - 35.0 * (
-                number + self.np_random.uniform(0.8, 1.2)
-            )
+            behind = 35.0 * (number + self.np_random.uniform(0.8, 1.2))
+            distance = lane.local_coordinates(self.ego.position)[0] - behind
             speed = self.np_random.uniform(25.0, 29.0)
-            self.road.cars.append(TrafficCar(self.road, lane.position(place, 0.0), speed=speed))
+            self.road.cars.append(TrafficCar(self.road, lane.position(distance, 0.0), speed=speed))
 
 
 class MergeTraffic(TrafficEnv, MergeGenericEnv):
@@ -58,9 +57,9 @@ class TwoWayTraffic(TrafficEnv, TwoWayEnv):  # type: ignore[misc]
                 car.speed = car.target_speed = self.np_random.uniform(14.0, 19.0)
         lane = self.road.network.get_lane(("b", "a", 0))
         for number in range(7):
-            place = 450.0 + 130.0 * number + self.np_random.uniform(-50.0, 50.0)
+            distance = 450.0 + 130.0 * number + self.np_random.uniform(-50.0, 50.0)
             speed = self.np_random.uniform(15.0, 20.0)
-            position, heading = lane.position(place, 0.0), lane.heading_at(place)
+            position, heading = lane.position(distance, 0.0), lane.heading_at(distance)
             car = TrafficCar(self.road, position, heading, speed, ("b", "a", 0), enable_lane_change=False)
             car.continues_to_next_lane = False
             self.road.cars.append(car)
@@ -74,12 +73,12 @@ class TwoWayTraffic(TrafficEnv, TwoWayEnv):  # type: ignore[misc]
 
 
 class IntersectionTraffic(TrafficEnv, IntersectionEnv):
-    """A crossing of two roads under highway-env's rules of priority; the ego turns or goes straight on."""
+    """An intersection with highway-env's priority rules, where the ego turns or drives straight on."""
 
     regulated: ClassVar[bool] = True
-    warm_up: ClassVar[float] = 0.0  # highway-env's own lasts 3 s
+    warm_up: ClassVar[float] = 0.0  # highway-env simulates 3 s before the episode
     settings: ClassVar[dict[str, Any]] = {
-        "other_vehicles_type": "lgmd_gym.envs.traffic.drivers.CrossingCar",
+        "other_vehicles_type": "lgmd_gym.envs.traffic.drivers.IntersectionCar",
         "destination": None,
         "initial_vehicle_count": 8,
         "spawn_probability": 0.35,
@@ -91,7 +90,7 @@ class IntersectionTraffic(TrafficEnv, IntersectionEnv):
 
     def _add_and_remove_cars(self) -> None:
         self._clear_vehicles()
-        if self.steps % self.config["simulation_frequency"] == 0:  # as in highway-env, once a second
+        if self.steps % self.config["simulation_frequency"] == 0:  # once per second, as in highway-env
             self._spawn_vehicle(spawn_probability=self.config["spawn_probability"])
 
     def _is_finished(self) -> bool:
@@ -113,14 +112,15 @@ class RoundaboutTraffic(TrafficEnv, RoundaboutEnv):
 
     def _modify_scene(self) -> None:
         lane = self.road.network.get_lane(("ser", "ses", 0))
-        place = self.np_random.uniform(20.0, 70.0)  # highway-env places the ego directly at the entry
-        self.ego.position, self.ego.heading = lane.position(place, 0.0), lane.heading_at(place)
+        distance = self.np_random.uniform(20.0, 70.0)  # highway-env places the ego directly at the entry
+        self.ego.position, self.ego.heading = lane.position(distance, 0.0), lane.heading_at(distance)
         self.ego.plan_route_to(str(self.np_random.choice(["exr", "nxr", "wxr"])))
         for arm in ("eer", "ner", "wer"):
             start = self.road.network.get_lane((arm, arm[:2] + "s", 0))
-            place = self.np_random.uniform(0.0, 80.0)
+            distance = self.np_random.uniform(0.0, 80.0)
             speed = self.np_random.uniform(8.0, 12.0)
-            car = TrafficCar(self.road, start.position(place, 0.0), start.heading_at(place), speed)
+            position, heading = start.position(distance, 0.0), start.heading_at(distance)
+            car = TrafficCar(self.road, position, heading, speed)
             car.plan_route_to(str(self.np_random.choice(["exr", "sxr", "nxr", "wxr"])))
             self.road.cars.append(car)
 

@@ -11,7 +11,7 @@ from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.behavior import IDMVehicle
 from support.traffic import BRAKE, HOLD, BlockedHighway, EmptyHighway, car_states, run_for
 
-from lgmd_gym.envs.traffic.drivers import CrossingCar, TrafficCar
+from lgmd_gym.envs.traffic.drivers import IntersectionCar, TrafficCar
 from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
 
 TESTS = Path(__file__).parents[1]
@@ -44,7 +44,7 @@ def test_drivers_and_neighbour_searches_equal_highway_env(kind):
     env.reset(seed=3)
     road, crossing = env.road, kind == "intersection"
     names = ("ACC_MAX", "COMFORT_ACC_MAX", "COMFORT_ACC_MIN", "DISTANCE_WANTED", "TIME_WANTED")
-    pinned = CrossingCar if crossing else TrafficCar
+    pinned = IntersectionCar if crossing else TrafficCar
     original = type("Original", (IDMVehicle,), {name: getattr(pinned, name) for name in names})
     for _ in range(6):
         run_for(env, 1)
