@@ -51,6 +51,12 @@ def ncap2026() -> tuple[Case, ...]:
         )
         fcw = speed_cases(suite, "CCRs", list(range(60, 90, 10)), f"-warned{tail}", impact_location=where)
         rows += [replace(cell, fcw_driver=True) for cell in fcw]
+    return (*rows, *_robustness(suite))
+
+
+def _robustness(suite: str) -> tuple[Case, ...]:
+    """Return the robustness layer of ncap2026, aligned."""
+    rows: list[Case] = []
     for degrees_left in (-20, -10, 10, 20):
         heading = round(radians(degrees_left), 6)
         rows += speed_cases(

@@ -319,8 +319,11 @@ def test_python_function_and_command_write_the_same_folder(tmp_path):
     assert files("python") == files("command")
     assert {"summary.csv", "froc.csv", "plots", "report.html", "run.toml"} < set(files("python"))
     assert read_rows(tmp_path / "python") == read_rows(tmp_path / "command")
-    for name in ("summary.csv", "froc.csv", "run.toml"):
+    for name in ("summary.csv", "froc.csv"):
         assert (tmp_path / "python" / name).read_text() == (tmp_path / "command" / name).read_text()
+    assert RunConfig.load(tmp_path / "python" / "run.toml") == RunConfig.load(
+        tmp_path / "command" / "run.toml"
+    )
     assert list(table.columns) == list(KEYS)
     assert len(table) == 3 * len(SUITES["r152"].cases)
     assert table[table.agent == "ttc-oracle"].avoided.all()

@@ -272,18 +272,18 @@ def test_run_writes_rows_as_they_finish(tmp_path, monkeypatch):
             raise RuntimeError("internal failure")
 
     monkeypatch.setitem(AGENTS, "faulty", Faulty)
-    agents = ["no-brake", "faulty", "no-brake"]
-    run = new_run(tmp_path / "run", suite="traffic", kinds=["intersection"], agents=agents, seeds=2)
+    values = {"agents": ["no-brake", "faulty", "no-brake"], "conditions": ["clear", "fog"], "seeds": 1}
+    run = new_run(tmp_path / "run", suite="traffic", kinds=["intersection"], **values)
     assert run.total == 4
     reported = []
     assert run.play(reported.append)
     assert read_rows(tmp_path / "run") == reported == run.rows
     assert all(tuple(item) == KEYS for item in reported)
-    assert [(item["agent"], item["seed"]) for item in reported] == [
-        ("no-brake", 0),
-        ("faulty", 0),
-        ("no-brake", 1),
-        ("faulty", 1),
+    assert [(item["agent"], item["condition"]) for item in reported] == [
+        ("no-brake", "clear"),
+        ("faulty", "clear"),
+        ("no-brake", "fog"),
+        ("faulty", "fog"),
     ]
     assert all("internal failure" in item["error"] for item in reported if item["agent"] == "faulty")
     assert all(item["error"] is None and item["distance"] > 50.0 for item in reported[::2])
