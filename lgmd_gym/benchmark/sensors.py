@@ -4,13 +4,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, is_dataclass, replace
 from typing import Any
 
-from lgmd_gym.camera import CONDITIONS, CameraParams, CameraSpec
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.camera import CameraSpec, with_condition
 from lgmd_gym.neuron import NeuronSpec
 
 DEFAULT_CAMERA = "fovea"
 CLEAR = "clear"
-BIRDSEYE = "birdseye"
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +50,7 @@ class SensorConfig:
         Raises:
             ValueError: If the condition is unknown or the camera supports none.
         """
-        if condition not in CONDITIONS:
-            raise unknown_name("camera condition", condition, CONDITIONS)
-        _with_condition(self.camera, condition)
+        with_condition(DEFAULT_CAMERA if self.camera is None else self.camera, condition)
         return replace(self, condition=condition)
 
     @property
@@ -64,24 +60,13 @@ class SensorConfig:
         Raises:
             ValueError: If the camera does not support the condition.
         """
-        camera = _with_condition(self.camera, self.condition)
+        camera = None if self.camera is None else with_condition(self.camera, self.condition)
         return {"camera": camera, "params": self.params, "include_frame": self.include_frame}
 
     @property
     def label(self) -> str:
         """Camera names for rows and titles, as in "fovea" or "zone8+upright8"."""
         return _name(self.camera) if self.camera is not None else "each agent's own"
-
-
-def _with_condition(camera: Any, condition: str) -> Any:
-    """Return a camera argument under a condition, whose fields replace the camera's."""
-    if condition == CLEAR or camera is None:
-        return camera
-    if isinstance(camera, list | tuple):
-        return [_with_condition(item, condition) for item in camera]
-    if _name(camera) == BIRDSEYE:
-        raise ValueError(f"camera 'birdseye' does not support condition {condition!r}; use 'clear'")
-    return CameraParams.make(camera).with_condition(condition)
 
 
 def _plain(value: Any) -> Any:

@@ -1,11 +1,13 @@
-"""Grey frames out of a highway-env road: the driver's view and the view from above."""
+"""Grey camera frames of a highway-env road: the view from the ego car and the top view."""
 
 from lgmd_gym.camera.birdseye import BirdsEye
 from lgmd_gym.camera.ego import EgoCamera
-from lgmd_gym.camera.params import CONDITIONS, PRESETS, CameraItem, CameraParams, CameraSpec
+from lgmd_gym.camera.params import CONDITIONS, PRESETS, CameraParams
 from lgmd_gym.camera.rig import CameraRig
+from lgmd_gym.camera.spec import BIRDSEYE, CameraItem, CameraSpec, with_condition
 
 __all__ = [
+    "BIRDSEYE",
     "CONDITIONS",
     "PRESETS",
     "BirdsEye",
@@ -14,4 +16,5 @@ __all__ = [
     "CameraRig",
     "CameraSpec",
     "EgoCamera",
+    "with_condition",
 ]

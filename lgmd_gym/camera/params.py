@@ -1,48 +1,56 @@
-"""CameraParams: everything that makes a camera, as plain values, and the presets."""
+"""CameraParams: optics, mount and conditions of a camera as plain values; presets and named conditions."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from numbers import Integral, Real
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple
 
 from lgmd_gym.errors import check_keys, unknown_name
 
-# name: (low, high, low is allowed, high is allowed), each with the unit for the message.
-_BOUNDS: dict[str, tuple[float, float, bool, bool, str]] = {
-    "hfov_deg": (1.0, 170.0, False, False, "degrees"),
-    "mount_height": (0.0, 100.0, False, True, "m above the ground"),
-    "mount_setback": (-10.0, 50.0, True, True, "m behind the front bumper"),
-    "mount_left": (-10.0, 10.0, True, True, "m left of the centreline"),
-    "pitch_deg": (-60.0, 60.0, True, True, "degrees"),
-    "yaw_deg": (-360.0, 360.0, True, True, "degrees"),
-    "texture": (0.0, 5.0, True, True, "times the natural contrast"),
-    "roadside": (0.0, 4.0, True, True, "times the natural density"),
-    "seed": (0, 2**32 - 1, True, True, ""),
-    "visibility_m": (0.0, 1e6, True, True, "m (0 is clear air)"),
-    "shot_noise": (0.0, 10.0, True, True, "grey levels at mid-grey"),
-    "read_noise": (0.0, 50.0, True, True, "grey levels"),
-    "vibration_deg": (0.0, 5.0, True, True, "degrees"),
-    "dive_deg": (0.0, 2.0, True, True, "degrees per m/s²"),
-    "heave_m": (0.0, 0.1, True, True, "m"),
-    "shutter_s": (0.0, 0.1, True, True, "s"),
+
+class _Bound(NamedTuple):
+    low: float
+    high: float
+    low_allowed: bool
+    high_allowed: bool
+    unit: str
+
+
+_BOUNDS = {
+    "hfov_deg": _Bound(1.0, 170.0, False, False, "degrees"),
+    "mount_height": _Bound(0.0, 100.0, False, True, "m above the ground"),
+    "mount_setback": _Bound(-10.0, 50.0, True, True, "m behind the front bumper"),
+    "mount_left": _Bound(-10.0, 10.0, True, True, "m left of the centreline"),
+    "pitch_deg": _Bound(-60.0, 60.0, True, True, "degrees"),
+    "yaw_deg": _Bound(-360.0, 360.0, True, True, "degrees"),
+    "texture": _Bound(0.0, 5.0, True, True, "times the natural contrast"),
+    "roadside": _Bound(0.0, 4.0, True, True, "times the natural density"),
+    "seed": _Bound(0, 2**32 - 1, True, True, ""),
+    "visibility_m": _Bound(0.0, 1e6, True, True, "m (0 is clear air)"),
+    "shot_noise": _Bound(0.0, 10.0, True, True, "grey levels at mid-grey"),
+    "read_noise": _Bound(0.0, 50.0, True, True, "grey levels"),
+    "vibration_deg": _Bound(0.0, 5.0, True, True, "degrees"),
+    "dive_deg": _Bound(0.0, 2.0, True, True, "degrees per m/s²"),
+    "heave_m": _Bound(0.0, 0.1, True, True, "m"),
+    "shutter_s": _Bound(0.0, 0.1, True, True, "s"),
 }
 _CHOICES = {"gaze": ("fixed", "path"), "vehicles": ("car", "box"), "light": ("day", "night")}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraParams:
-    """A camera on a car: optics, mount, gaze, look of the world and conditions.
+    """Parameters of a camera on a car: optics, mount, gaze, appearance of the world and conditions.
 
-    Pixels per degree at the centre of the frame, with square pixels: `wide` 2.4, `standard` 3.8,
-    `tele` 6.3, `fovea` 16.0, `paper` 5.3. 160 px over 10° is the centre of a production 8-megapixel
-    120° front camera (3840 px / 120° = 32 px/°, binned two by two).
+    Pixels per degree at the centre of the frame: `wide` 2.4, `standard` 3.8, `tele` 6.3, `fovea` 16.0,
+    `paper` 5.3. `fovea` (160 px over 10°) matches the centre of a production 8-megapixel 120° front camera
+    (3840 px / 120° = 32 px/°) after 2 × 2 binning.
 
     Attributes:
-        name: A label; the key under which results of this camera are filed.
+        name: Label of the camera; its results are stored under this key.
         shape: `(height, width)` of the frame [px].
         hfov_deg: Horizontal field of view, in (1, 170) [degrees].
         mount_height: Height of the lens above the ground [m].
@@ -50,27 +58,27 @@ class CameraParams:
         mount_left: Distance of the lens left of the car's centreline [m].
         pitch_deg: Upward tilt of the optical axis; 0 puts the horizon at half height [degrees].
         yaw_deg: Turn of the optical axis to the right of straight ahead [degrees].
-        gaze: `"fixed"` to the car, or `"path"`: turned towards where the car will be in one second
-            on its present circle, from its own speed and steering only.
-        texture: Contrast of asphalt and verge, as a multiple of the natural one.
-        roadside: Density of posts and trees beside the road, as a multiple of the natural one.
-        vehicles: `"car"`: bodies with windows, lights, wheels; `"box"`: plain shaded boxes.
-        panorama: What is all round, far away: `"skyline"` (hills and trees under an even sky), `"natural"`
-            (1/f noise with the statistics of natural scenes), or the path of an image that is wrapped
-            round 360°, its middle row at the horizon, its left edge in the direction +x, in grey.
-        guard_rail: Steel rails, 0.75 m high on posts, along the outer edges of the road.
-        seed: Seed of textures, skyline and of the grey of vehicles that bring no `shade`.
-        light: `"day"` or `"night"` (own headlights, others' lights shine).
+        gaze: `"fixed"` to the car, or `"path"`: turned towards the car's position in one second on its
+            present circle, from its own speed and steering angle only.
+        texture: Contrast of asphalt and verge, as a multiple of the natural contrast.
+        roadside: Density of posts and trees along the road, as a multiple of the natural density.
+        vehicles: `"car"` for bodies with windows, lights and wheels, `"box"` for plain shaded boxes.
+        panorama: Distant surroundings: `"skyline"` (hills and trees under an even sky), `"natural"`
+            (1/f noise with the statistics of natural scenes), or the path of an image. An image is
+            converted to grey and wrapped around 360°, with its middle row at the horizon and its left
+            edge in the direction +x.
+        guard_rail: Whether steel rails, 0.75 m high on posts, run along the outer edges of the road.
+        seed: Seed of textures, skyline and the grey of vehicles without a `shade`.
+        light: `"day"` or `"night"`; at night, the ego's headlights and the lights of other cars are on.
         visibility_m: Meteorological visibility in fog (5 % contrast, Koschmieder); 0 is clear air [m].
-        shot_noise: Standard deviation of photon noise at grey 128; it grows with √grey [grey levels].
-        read_noise: Standard deviation of the sensor's own noise [grey levels].
+        shot_noise: Standard deviation of photon noise at grey 128, growing with √grey [grey levels].
+        read_noise: Standard deviation of the sensor's read noise [grey levels].
         vibration_deg: RMS pitch of the body on an uneven road at 14 m/s, growing with √speed [degrees].
-        dive_deg: Nose-down pitch per braking deceleration [degrees per m/s²]; sprung cars have 0.05 to 0.15.
-        heave_m: RMS rise and fall of the body on an uneven road at 14 m/s, growing with √speed [m]; roads
-            of ISO 8608 class A to C leave 0.0015 to 0.006 above 1 Hz.
-        shutter_s: Exposure time, over which everything that moves is smeared; 0 freezes [s]. The exposure
-            ends at the time of the frame. Automotive cameras that must not miss a pulsed light (90 Hz)
-            expose 0.011 or more by day.
+        dive_deg: Nose-down pitch per braking deceleration [degrees per m/s²]; 0.05 to 0.15 for sprung cars.
+        heave_m: RMS vertical motion of the body on an uneven road at 14 m/s, growing with √speed [m];
+            0.0015 to 0.006 above 1 Hz on ISO 8608 class A to C roads.
+        shutter_s: Exposure time, which ends at the time of the frame; 0 disables motion blur [s].
+            Automotive cameras that must capture 90 Hz pulsed lights expose for 0.011 s or more by day.
     """
 
     name: str = "custom"
@@ -98,20 +106,20 @@ class CameraParams:
     shutter_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check every field; the message names field, value and bound."""
+        """Check every field."""
         if not isinstance(self.name, str) or not self.name:
             raise ValueError(f"camera name must be a non-empty string, got {self.name!r}")
         object.__setattr__(self, "shape", _checked_shape(self.shape))
         for name, bound in _BOUNDS.items():
             object.__setattr__(self, name, _checked_number(name, getattr(self, name), bound))
-        _check_world(self)
+        _check_surroundings(self)
         for name, known in _CHOICES.items():
             if getattr(self, name) not in known:
                 raise unknown_name(f"camera {name}", getattr(self, name), known)
 
     @property
     def focal_px(self) -> float:
-        """Focal length [px]: also pixels per radian at the centre of the frame."""
+        """Focal length [px], equal to the pixels per radian at the centre of the frame."""
         return 0.5 * self.shape[1] / math.tan(math.radians(0.5 * self.hfov_deg))
 
     @property
@@ -121,7 +129,7 @@ class CameraParams:
 
     @classmethod
     def preset(cls, name: str, **changes: Any) -> CameraParams:
-        """Return the preset of this name, with fields changed.
+        """Return a preset, with fields changed.
 
         Example:
             >>> CameraParams.preset("fovea").hfov_deg
@@ -129,8 +137,7 @@ class CameraParams:
         """
         if name not in PRESETS:
             raise unknown_name("camera preset", name, PRESETS)
-        check_keys("camera field", changes, _field_names())
-        return replace(PRESETS[name], **changes) if changes else PRESETS[name]
+        return cls.make(PRESETS[name], **changes)
 
     @classmethod
     def make(
@@ -139,9 +146,12 @@ class CameraParams:
         """Return camera parameters from a preset's name, parameters, or a dict of fields.
 
         Args:
-            value: None for the `wide` preset; in a dict, `name` may be a preset's: then the other
-                fields change that preset, and `condition` may name one of `CONDITIONS`.
+            value: A preset's name, parameters, or a dict; None for the `wide` preset. If `name` in a dict
+                is that of a preset, the other fields change the preset.
             changes: Fields to change on top.
+
+        The dict and `changes` may contain `condition`, a key of `CONDITIONS`. The other fields override
+        those of the condition.
         """
         if value is None:
             value = "wide"
@@ -150,36 +160,32 @@ class CameraParams:
         elif isinstance(value, CameraParams):
             base = value
         elif isinstance(value, Mapping):
-            base = cls._from_mapping(value)
+            base = replace(PRESETS.get(value.get("name", ""), cls()), **_with_condition(value))
         else:
             raise TypeError(f"camera must be a preset name, CameraParams or a dict, got {value!r}")
-        check_keys("camera field", changes, _field_names())
-        return replace(base, **changes) if changes else base
-
-    @classmethod
-    def _from_mapping(cls, value: Mapping[str, Any]) -> CameraParams:
-        given = dict(value)
-        condition = given.pop("condition", "clear")
-        check_keys("camera field", given, [*_field_names(), "condition"])
-        if condition not in CONDITIONS:
-            raise unknown_name("camera condition", condition, CONDITIONS)
-        base = PRESETS.get(given.get("name", ""))
-        given = {**CONDITIONS[condition], **given}
-        return replace(base, **given) if base else cls(**given)
+        return replace(base, **_with_condition(changes)) if changes else base
 
     def with_condition(self, condition: str) -> CameraParams:
         """Return this camera under a named condition (`clear`, `night`, `fog`, `degraded`)."""
-        if condition not in CONDITIONS:
-            raise unknown_name("camera condition", condition, CONDITIONS)
-        return replace(self, **CONDITIONS[condition])
+        return CameraParams.make(self, condition=condition)
 
 
-def _check_world(p: CameraParams) -> None:
+def _with_condition(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `changes` with `condition` replaced by the fields that it sets."""
+    check_keys("camera field", changes, [*_field_names(), "condition"])
+    others = dict(changes)
+    condition = others.pop("condition", "clear")
+    if condition not in CONDITIONS:
+        raise unknown_name("camera condition", condition, CONDITIONS)
+    return {**CONDITIONS[condition], **others}
+
+
+def _check_surroundings(p: CameraParams) -> None:
     if isinstance(p.panorama, os.PathLike):
         object.__setattr__(p, "panorama", os.fspath(p.panorama))
     if not isinstance(p.panorama, str) or not p.panorama:
         raise ValueError(
-            f"camera panorama must be 'skyline', 'natural' or an image's path, got {p.panorama!r}"
+            f"camera panorama must be 'skyline', 'natural' or the path of an image, got {p.panorama!r}"
         )
     if not isinstance(p.guard_rail, bool):
         raise ValueError(f"camera guard_rail must be true or false, got {p.guard_rail!r}")
@@ -196,18 +202,19 @@ def _checked_shape(shape: Any) -> tuple[int, int]:
     return int(shape[0]), int(shape[1])
 
 
-def _checked_number(name: str, value: Any, bound: tuple[float, float, bool, bool, str]) -> float | int:
-    low, high, low_ok, high_ok, unit = bound
+def _checked_number(name: str, value: Any, bound: _Bound) -> float | int:
     if not isinstance(value, Real) or isinstance(value, bool):
         raise ValueError(f"camera {name} must be a number, got {value!r}")
     value = int(value) if isinstance(value, Integral) else float(value)
-    inside = (value >= low if low_ok else value > low) and (value <= high if high_ok else value < high)
-    if not inside:
-        span = f"{'[' if low_ok else '('}{low:g}, {high:g}{']' if high_ok else ')'}"
-        raise ValueError(f"camera {name}={value!r} is outside {span} {unit}".rstrip())
+    above = value >= bound.low if bound.low_allowed else value > bound.low
+    below = value <= bound.high if bound.high_allowed else value < bound.high
+    if not (above and below):
+        opening, closing = "[" if bound.low_allowed else "(", "]" if bound.high_allowed else ")"
+        interval = f"{opening}{bound.low:g}, {bound.high:g}{closing}"
+        raise ValueError(f"camera {name} must be in {interval} {bound.unit}".rstrip() + f", got {value!r}")
     if name == "seed":
         if not isinstance(value, int):
-            raise ValueError(f"camera seed must be a whole number, got {value!r}")
+            raise ValueError(f"camera seed must be an integer, got {value!r}")
         return value
     return float(value)
 
@@ -219,7 +226,7 @@ PRESETS: dict[str, CameraParams] = {
     "fovea": CameraParams(name="fovea", hfov_deg=10.0),
     "paper": CameraParams(name="paper", hfov_deg=60.0, shape=(288, 352)),
 }
-"""The named cameras; `paper` has the frame of the paper's clips."""
+"""Cameras by name; `paper` has the frame size of the paper's clips."""
 
 CONDITIONS: dict[str, dict[str, Any]] = {
     "clear": {},
@@ -234,10 +241,4 @@ CONDITIONS: dict[str, dict[str, Any]] = {
         "shutter_s": 0.011,
     },
 }
-"""Named conditions: fields laid over a camera by `CameraParams.with_condition`."""
-
-
-CameraItem: TypeAlias = str | CameraParams | Mapping[str, Any]
-"""One camera: a preset name, a `CameraParams`, or the fields of one."""
-CameraSpec: TypeAlias = CameraItem | Sequence[CameraItem]
-"""The `camera` argument of environments and wrappers: one camera, or several."""
+"""Named conditions: the fields of `CameraParams` that each one sets."""

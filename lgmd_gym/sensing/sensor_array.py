@@ -1,28 +1,15 @@
 """SensorArray: the cameras and neurons of one or more environments."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, TypeAlias
 
 import gymnasium as gym
 import numpy as np
 
-from lgmd_gym.camera import BirdsEye, CameraItem, CameraParams, CameraRig, CameraSpec, EgoCamera
+from lgmd_gym.camera import BIRDSEYE, BirdsEye, CameraItem, CameraParams, CameraRig, CameraSpec, EgoCamera
 from lgmd_gym.neuron import LGMD, LGMDParams, Response
 
-BIRDSEYE = "birdseye"
-
-
-class Camera(Protocol):
-    """Camera that renders a highway-env environment as grey frames."""
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(height, width) of a frame [px]."""
-        ...
-
-    def render(self, env: gym.Env, out: np.ndarray | None = None) -> np.ndarray:
-        """Return the current frame, uint8, shape (height, width)."""
-        ...
+Camera: TypeAlias = EgoCamera | BirdsEye
 
 
 def make_cameras(camera: CameraSpec) -> dict[str, Camera]:
@@ -60,9 +47,7 @@ def _with_fields(camera: Camera, fields: dict[str, Any]) -> Camera:
     """Return an `EgoCamera` with changed fields; other cameras are returned unchanged."""
     if not isinstance(camera, EgoCamera) or not fields:
         return camera
-    changes = dict(fields)
-    params = camera.params.with_condition(changes.pop("condition", "clear"))
-    return EgoCamera(CameraParams.make(params, **changes))
+    return EgoCamera(camera.params, **fields)
 
 
 class _ShapeGroup(NamedTuple):
@@ -185,9 +170,8 @@ class SensorArray:
         """Close the cameras that hold resources."""
         for cameras in self.cameras:
             for camera in cameras.values():
-                close = getattr(camera, "close", None)
-                if close is not None:
-                    close()
+                if isinstance(camera, BirdsEye):
+                    camera.close()
 
     def _in_camera_order(self, responses: list[Response]) -> Response:
         """Concatenate the responses of the groups in the order of the cameras."""

@@ -1,4 +1,4 @@
-"""Anti-aliasing, measured."""
+"""Exact area coverage: anti-aliased edges, smooth looming, steady distant texture."""
 
 import itertools
 
@@ -55,7 +55,7 @@ def test_polygons_far_outside_the_frame_are_clipped():
 
 
 def box_area_by_grey(dx, lens="standard", gap=15.0):
-    """Area of a box in the frame, from the grey it changes [px], and the exact one of its rear face."""
+    """Return the area of a box from its grey, its exact visible area and that of its rear face [px]."""
     env = straight_env(line_types=False)
     camera = EgoCamera(lens, **PLAIN, pitch_deg=0.0)
     car = add_car(env, lens_x(env) + gap + 2.0 + dx, 3.5, shade=10, size=(4.0, 1.8, 1.9))
@@ -65,7 +65,6 @@ def box_area_by_grey(dx, lens="standard", gap=15.0):
         [[lens_x(env) + d, 3.5 + s * 0.9, z] for s, z in ((-1, 1.9), (1, 1.9), (1, 0.0))]
     )
     area = (corners[1, 0] - corners[0, 0]) * (corners[2, 1] - corners[1, 1])
-    # A background of one grey: the sky row of each frame row, known from a column far from the car.
     env.road.vehicles.remove(car)
     back = camera.render(env).astype(float)
     grey = frame[frame.shape[0] // 2 + 1, frame.shape[1] // 2]
@@ -77,13 +76,13 @@ def box_area_by_grey(dx, lens="standard", gap=15.0):
 
 
 @pytest.mark.parametrize("dx", np.linspace(0.0, 0.6, 7))
-def test_box_grey_weighs_its_projected_area(dx):
+def test_grey_of_a_box_is_proportional_to_its_projected_area(dx):
     measured, exact, area = box_area_by_grey(dx, lens="tele", gap=9.0)
     assert exact > 300
     assert abs(measured - exact) < 0.01 * area
 
 
-def test_an_edge_moved_by_a_tenth_of_a_pixel_changes_a_tenth_of_its_contrast():
+def test_edge_moved_by_a_tenth_of_a_pixel_changes_the_frame_by_a_tenth_of_its_contrast():
     env = straight_env(line_types=False)
     camera = EgoCamera("standard", **PLAIN)
     car = add_car(env, lens_x(env) + 22.0, 5.0, shade=10, size=(4.0, 1.8, 3.0))
@@ -104,7 +103,7 @@ def test_an_edge_moved_by_a_tenth_of_a_pixel_changes_a_tenth_of_its_contrast():
 
 
 def test_looming_is_smooth():
-    """The whole frame changes by small, even steps while a car comes nearer by centimetres."""
+    """The frame changes by small, even steps while a car approaches by centimetres."""
     env = straight_env(line_types=False)
     camera = EgoCamera("fovea", **PLAIN)
     car = add_car(
@@ -114,16 +113,16 @@ def test_looming_is_smooth():
     for k in range(60):
         car.position[0] = lens_x(env) + 42.0 - 0.1 * k
         camera.render(env)
-        sums.append(camera.light.sum(dtype=np.float64))  # before it is rounded to bytes
+        sums.append(camera.light.sum(dtype=np.float64))  # before rounding to bytes
     steps = np.diff(sums)
-    # 0.1 m is a twentieth of a pixel a side here; the steps grow with 1/distance². What is left is the
-    # line where box meets shadow: two coverages that share a pixel there are blended as if independent.
+    # 0.1 m is a twentieth of a pixel per side; the steps grow with 1/distance². The rest comes from the line
+    # between box and shadow: two coverages in one pixel are blended as if they were independent.
     trend = np.polyval(np.polyfit(np.arange(59), steps, 2), np.arange(59))
     assert np.all(steps < 0)
     assert np.abs(steps / trend - 1).max() < 0.4
 
 
-def test_nothing_pops_up_while_a_detailed_car_approaches():
+def test_details_of_an_approaching_car_fade_in():
     env = straight_env(line_types=False)
     camera = EgoCamera("standard", texture=0.0, roadside=0.0)
     car = add_car(env, 80.0, 3.5, shade=200)
@@ -137,7 +136,7 @@ def test_nothing_pops_up_while_a_detailed_car_approaches():
 
 
 def test_far_markings_fade_and_do_not_flicker():
-    """Rows far ahead hold stripes by the dozen: their mean must be steady at 30 m/s.
+    """Rows far ahead contain dozens of stripes, whose mean must be steady at 30 m/s.
 
     Beyond three periods a pixel the stripes are drawn as their mean; at the limit, 3 periods, a box
     filter leaves at most 1/(3·pi) of the fundamental's amplitude, 2/pi·sin(pi·3/4.33) = 0.52: with a line
@@ -151,11 +150,11 @@ def test_far_markings_fade_and_do_not_flicker():
         frames.append(camera.render(env).astype(float))
     far = np.array(frames)[:, 46:49, 40:120]
     assert far.std(axis=0).max() < 2.0
-    assert np.array(frames)[:, 60:, :].std(axis=0).max() > 20.0  # near ones do move
-    assert far.mean(axis=0).max() > 112.0  # and the far ones are there
+    assert np.array(frames)[:, 60:, :].std(axis=0).max() > 20.0  # near markings move
+    assert far.mean(axis=0).max() > 112.0  # far markings are visible
 
 
-def test_far_asphalt_averages_instead_of_flickering():
+def test_far_asphalt_does_not_flicker():
     """One standard deviation of near asphalt is 9 grey levels; a pixel of row 46 covers 74 m by 0.8 m."""
     env = straight_env(lanes=1, width=60.0, line_types=False, speed=30.0)
     camera = EgoCamera("wide", roadside=0.0)

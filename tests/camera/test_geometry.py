@@ -5,13 +5,15 @@ import pytest
 from support.roads import EGO_LENGTH, add_car, lens_x, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
-from lgmd_gym.camera.pinhole import Pose, camera_vector, ground_footprint, horizon_row, project
+from lgmd_gym.camera.pinhole import LENS, lens_values, project
+from lgmd_gym.camera.pose import CameraPose
+from lgmd_gym.camera.render.texture_sampling import distance_ahead
 
 PLAIN = {"texture": 0.0, "roadside": 0.0, "vehicles": "box"}
 
 
 def changed(camera, env, car):
-    """Bounds (top, bottom, left, right) of the pixels that the car changes."""
+    """Return the bounds (top, bottom, left, right) of the pixels that the car changes."""
     with_car = camera.render(env)
     env.road.vehicles.remove(car)
     without = camera.render(env)
@@ -25,7 +27,7 @@ def changed(camera, env, car):
 
 @pytest.mark.parametrize("shape", [(90, 160), (160, 90), (61, 200)])
 @pytest.mark.parametrize("gap", [8.0, 20.0])
-def test_a_box_covers_the_pixels_that_projection_says(shape, gap):
+def test_box_covers_the_pixels_of_its_projection(shape, gap):
     env = straight_env(line_types=False)
     camera = EgoCamera("standard", shape=shape, **PLAIN)
     # Dark, and higher than the lens, so that its rear face alone sets left, right and top.
@@ -78,14 +80,14 @@ def test_mount_is_behind_the_front_bumper():
 
 
 @pytest.mark.parametrize("pitch", [-8.0, 0.0, 5.0])
-def test_horizon_row(pitch):
+def test_pitch_moves_the_horizon(pitch):
     env = straight_env(line_types=False)
     camera = EgoCamera("wide", pitch_deg=pitch, **PLAIN)
     frame = camera.render(env)
     v = 45 + 80 / math.tan(math.radians(30)) * math.tan(math.radians(pitch))
     far = camera.project([1e7, 3.5, 0.0])
     assert far[1] == pytest.approx(v, abs=0.01)
-    # Asphalt below, in the middle; the skyline and the sky are of another grey.
+    # Asphalt below the horizon; skyline and sky have other greys.
     assert np.all(np.abs(frame[math.ceil(v) + 2 :, 80].astype(int) - 104) <= 1)
     assert np.all(frame[: math.floor(v) - 8, 80] > 150)
 
@@ -102,7 +104,7 @@ def test_yaw_and_gaze_turn_the_picture():
     assert camera.project(point) == pytest.approx((80.0, 45.0 + rise))
 
 
-def test_path_gaze_looks_into_the_turn():
+def test_path_gaze_turns_towards_the_curve():
     env = straight_env()
     point = [lens_x(env) + 20.0, 3.5, 1.2]
     camera = EgoCamera("wide", gaze="path")
@@ -113,7 +115,7 @@ def test_path_gaze_looks_into_the_turn():
     assert camera.project(point)[0] < 75.0
 
 
-def test_behind_the_lens_is_nan():
+def test_point_behind_the_lens_projects_to_nan():
     env = straight_env()
     camera = EgoCamera("wide")
     camera.render(env)
@@ -122,16 +124,15 @@ def test_behind_the_lens_is_nan():
         EgoCamera("wide").project([1.0, 2.0, 3.0])
 
 
-def test_ground_footprint_against_projection():
-    cam = camera_vector(Pose(0.0, 0.0, 1.2, 0.0, 0.0), 138.56, (90, 160))
-    ahead, along, across = ground_footprint(cam, 60.5)
-    assert ahead == pytest.approx(1.2 * 138.56 / 15.5)
-    u, v = project(cam, np.array([ahead, across, 0.0]))
-    assert (u, v) == pytest.approx((81.0, 60.5))
-    above = project(cam, np.array([ahead + along, 0.0, 0.0]))
-    assert above[1] == pytest.approx(59.5, abs=0.1)
-    assert ground_footprint(cam, 44.0)[0] == math.inf
-    assert horizon_row(cam) == pytest.approx(45.0)
+@pytest.mark.parametrize("pitch_deg", [-5.0, 0.0, 5.0])
+def test_distance_of_a_ground_row_agrees_with_projection(pitch_deg):
+    lens = np.zeros(1, LENS)
+    lens[0] = lens_values(CameraPose(3.0, 1.0, 1.2, 0.0, math.radians(pitch_deg)), 138.56, (90, 160))
+    for row in (65, 75, 89):
+        ahead = distance_ahead(lens[0], row)
+        assert project(lens[0], [3.0 + ahead, 1.0, 0.0]) == pytest.approx((80.0, row + 0.5))
+    if pitch_deg == 0.0:
+        assert distance_ahead(lens[0], 60) == pytest.approx(1.2 * 138.56 / 15.5)
 
 
 def test_out_is_filled_and_checked():
@@ -143,15 +144,3 @@ def test_out_is_filled_and_checked():
     for bad in (np.zeros((60, 40), np.uint8), np.zeros((40, 60), np.float32)):
         with pytest.raises(ValueError, match="out must be"):
             camera.render(env, bad)
-
-
-def test_render_batch_is_render_of_each():
-    envs = [straight_env(x=10.0 * k, heading=0.1 * k) for k in range(3)]
-    add_car(envs[1], 40.0, 3.5)
-    camera = EgoCamera("wide")
-    batch = camera.render_batch(envs)
-    assert batch.shape == (3, 90, 160)
-    for env, frame in zip(envs, batch, strict=True):
-        assert np.array_equal(EgoCamera("wide").render(env), frame)
-    with pytest.raises(ValueError, match="out must be"):
-        camera.render_batch(envs, np.zeros((2, 90, 160), np.uint8))

@@ -1,4 +1,4 @@
-"""Several cameras on one car, and what smears a frame."""
+"""Several cameras on one car, and motion blur."""
 
 import itertools
 
@@ -9,15 +9,15 @@ from support.roads import add_car, lens_x, straight_env
 from lgmd_gym.camera import BirdsEye, CameraParams, CameraRig, EgoCamera
 
 
-def nested(**fields):
+def nested_cameras(**fields):
     return [EgoCamera(CameraParams(name=str(fov), hfov_deg=fov, **fields)) for fov in (5, 10, 20, 40)]
 
 
-def busy():
+def busy_env():
     env = straight_env()
-    env.steps, env.config = 3, {"simulation_frequency": 30}
+    env.steps = 3
     for k in range(4):
-        add_car(env, 12.0 + 9.0 * k, 3.5 * (k % 3), heading=0.2 * k).speed = 3.0 * k
+        add_car(env, 12.0 + 9.0 * k, 3.5 * (k % 3), heading=0.2 * k, speed=3.0 * k)
     add_car(env, -20.0, 3.5)
     return env
 
@@ -25,15 +25,15 @@ def busy():
 @pytest.mark.parametrize(
     "cameras",
     [
-        nested(),
-        nested(light="night", read_noise=2.0, seed=3),
+        nested_cameras(),
+        nested_cameras(light="night", read_noise=2.0, seed=3),
         [EgoCamera("fovea"), EgoCamera("wide", yaw_deg=170.0), EgoCamera("paper"), EgoCamera("tele", seed=9)],
         [EgoCamera("wide", mount_setback=0.3), EgoCamera("tele", vehicles="box"), EgoCamera("standard")],
         [EgoCamera(CameraParams.preset("fovea").with_condition("degraded"))],
     ],
 )
-def test_a_rig_draws_what_its_cameras_draw(cameras):
-    env = busy()
+def test_frames_of_a_rig_equal_those_of_its_cameras(cameras):
+    env = busy_env()
     rig = CameraRig(cameras)
     for env.vehicle.position[0] in (0.0, 0.5, 0.5):
         together = rig.render(env)
@@ -44,9 +44,9 @@ def test_a_rig_draws_what_its_cameras_draw(cameras):
             assert np.array_equal(camera.project(point), pixel, equal_nan=True)
 
 
-def test_a_rig_fills_the_callers_frames_and_checks_them():
-    env = busy()
-    rig = CameraRig(nested())
+def test_rig_fills_and_checks_the_given_frames():
+    env = busy_env()
+    rig = CameraRig(nested_cameras())
     batch = np.zeros((4, 90, 160), np.uint8)
     frames = rig.render(env, list(batch))
     assert all(np.shares_memory(frame, batch) for frame in frames)
@@ -58,7 +58,7 @@ def test_a_rig_fills_the_callers_frames_and_checks_them():
     assert CameraRig([]).render(env) == []
 
 
-def test_a_rig_takes_the_top_view_along():
+def test_rig_renders_the_top_view():
     import gymnasium as gym
     import highway_env  # noqa: F401
 
@@ -70,19 +70,19 @@ def test_a_rig_takes_the_top_view_along():
     env.close()
 
 
-def test_a_standing_scene_is_not_smeared():
+def test_still_scene_has_no_motion_blur():
     env = straight_env(speed=0.0)
     add_car(env, 20.0, 3.5)
-    sharp, smeared = EgoCamera("wide"), EgoCamera("wide", shutter_s=0.02)
-    assert np.array_equal(sharp.render(env), smeared.render(env))
+    sharp, blurred = EgoCamera("wide"), EgoCamera("wide", shutter_s=0.02)
+    assert np.array_equal(sharp.render(env), blurred.render(env))
 
 
-def test_blur_is_the_mean_over_the_exposure():
+def test_motion_blur_is_the_mean_over_the_exposure():
     env = straight_env(speed=20.0)
     car = add_car(env, lens_x(env) + 12.0, 3.5, shade=30, heading=np.pi / 2)
     car.speed = 8.0
-    smeared = EgoCamera("wide", shutter_s=0.02)
-    smeared.render(env)
+    blurred = EgoCamera("wide", shutter_s=0.02)
+    blurred.render(env)
     sharp, total, n = EgoCamera("wide"), 0.0, 40
     at, there = env.vehicle.position.copy(), car.position.copy()
     for k in range(n):
@@ -93,28 +93,27 @@ def test_blur_is_the_mean_over_the_exposure():
         total = total + sharp.light.astype(float) / n
     env.vehicle.position[:], car.position[:] = at, there
     frozen = sharp.render(env).astype(float)
-    assert np.abs(smeared.light - total).mean() < 0.15 * np.abs(frozen - total).mean() + 0.1
+    assert np.abs(blurred.light - total).mean() < 0.15 * np.abs(frozen - total).mean() + 0.1
 
 
-def test_turning_smears_the_horizon():
+def test_turning_blurs_the_horizon():
     env = straight_env(speed=15.0)
     env.vehicle.action = {"steering": 0.15, "acceleration": 0.0}
     sharp = EgoCamera("fovea").render(env).astype(float)
-    smeared = EgoCamera("fovea", shutter_s=0.03).render(env).astype(float)
-    assert np.abs(np.diff(smeared[:40], axis=1)).mean() < 0.8 * np.abs(np.diff(sharp[:40], axis=1)).mean()
+    blurred = EgoCamera("fovea", shutter_s=0.03).render(env).astype(float)
+    assert np.abs(np.diff(blurred[:40], axis=1)).mean() < 0.8 * np.abs(np.diff(sharp[:40], axis=1)).mean()
 
 
-def test_heave_raises_and_lowers_the_lens():
+def test_heave_has_its_rms_and_stops_at_standstill():
     env = straight_env()
-    env.steps, env.config = 0, {"simulation_frequency": 30}
     camera = EgoCamera("fovea", heave_m=0.01)
     heights = []
     for env.steps in range(300):
         camera.render(env)
-        heights.append(camera._cam[2])
+        heights.append(camera._lens["z"])
     assert np.mean(heights) == pytest.approx(1.2, abs=1e-3)
     assert np.std(heights) == pytest.approx(0.01 * np.sqrt(13.89 / 14.0), rel=0.15)
     assert max(abs(b - a) for a, b in itertools.pairwise(heights)) < 0.02
     env.vehicle.speed = 0.0
     camera.render(env)
-    assert camera._cam[2] == 1.2
+    assert camera._lens["z"] == 1.2

@@ -1,17 +1,29 @@
-"""Roads and stand-ins for environments that the camera's tests share (no tests here)."""
+"""Straight roads with an ego car, as environments for the camera."""
 
 from types import SimpleNamespace
 
 import numpy as np
-from highway_env.road.lane import LineType, StraightLane
+from highway_env.road.lane import CircularLane, LineType, StraightLane
 from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.kinematics import Vehicle
+from highway_env.vehicle.objects import Landmark, Obstacle
 
 EGO_LENGTH = 4.3
+CAR_SIZE = (4.023, 1.712, 1.427)
+"""Length, width and height of the default car [m]."""
+
+
+def env_of(road, ego, steps=0):
+    """Return a stand-in for an environment with this road and ego."""
+    ego.LENGTH = EGO_LENGTH
+    road.vehicles.append(ego)
+    env = SimpleNamespace(road=road, vehicle=ego, steps=steps, config={"simulation_frequency": 30})
+    env.unwrapped = env
+    return env
 
 
 def straight_env(lanes=3, width=3.5, heading=0.0, x=0.0, y=None, speed=13.89, line_types=True):
-    """A straight road along +x with the ego in its middle lane; no simulation needed."""
+    """Return a straight road along +x with the ego in its middle lane."""
     net = RoadNetwork()
     solid, striped, none = LineType.CONTINUOUS_LINE, LineType.STRIPED, LineType.NONE
     for i in range(lanes):
@@ -20,17 +32,22 @@ def straight_env(lanes=3, width=3.5, heading=0.0, x=0.0, y=None, speed=13.89, li
         lane = StraightLane([-200, i * width], [5000, i * width], width=width, line_types=lines)
         net.add_lane("a", "b", lane)
     road = Road(net, np_random=np.random.RandomState(0))
-    ego = Vehicle(road, [x, width * (lanes // 2) if y is None else y], heading, speed)
-    ego.LENGTH = EGO_LENGTH
-    road.vehicles.append(ego)
-    env = SimpleNamespace(road=road, vehicle=ego)
-    env.unwrapped = env
-    return env
+    return env_of(road, Vehicle(road, [x, width * (lanes // 2) if y is None else y], heading, speed))
 
 
-def add_car(env, x, y, shade=None, heading=0.0, size=(4.023, 1.712, 1.427), cls=Vehicle):
-    """Put a standing vehicle on the road."""
-    car = cls(env.road, [x, y], heading, 0.0)
+def ring_road(kind=LineType.CONTINUOUS, clockwise=True):
+    """Return a ring of 40 m radius with one lane 4 m wide, and the lane."""
+    net = RoadNetwork()
+    phases = (0.0, 2 * np.pi) if clockwise else (2 * np.pi, 0.0)
+    kinds = [kind, LineType.NONE]
+    lane = CircularLane([0, 0], 40.0, *phases, clockwise=clockwise, width=4.0, line_types=kinds)
+    net.add_lane("a", "b", lane)
+    return Road(net, np_random=np.random.RandomState(0)), lane
+
+
+def add_car(env, x, y, shade=None, heading=0.0, size=CAR_SIZE, speed=0.0):
+    """Add a vehicle to the road."""
+    car = Vehicle(env.road, [x, y], heading, speed)
     car.LENGTH, car.WIDTH, car.HEIGHT = size
     if shade is not None:
         car.shade = shade
@@ -38,6 +55,25 @@ def add_car(env, x, y, shade=None, heading=0.0, size=(4.023, 1.712, 1.427), cls=
     return car
 
 
+def add_mark(env, x, y, shade=None, size=(2.0, 2.0)):
+    """Add a landmark, flat on the ground."""
+    mark = Landmark(env.road, [x, y])
+    mark.LENGTH, mark.WIDTH = size
+    if shade is not None:
+        mark.shade = shade
+    env.road.objects.append(mark)
+    return mark
+
+
+def add_obstacle(env, x, y, shade=None):
+    """Add an obstacle."""
+    obstacle = Obstacle(env.road, [x, y])
+    if shade is not None:
+        obstacle.shade = shade
+    env.road.objects.append(obstacle)
+    return obstacle
+
+
 def lens_x(env):
-    """World x of the default lens of an ego heading along +x."""
+    """World x of the default lens of an ego that heads along +x."""
     return env.vehicle.position[0] + EGO_LENGTH / 2 - 1.7

@@ -1,67 +1,50 @@
-"""Kernels of the exposure: what moves while the shutter is open is drawn several times over.
+"""Kernels of motion blur: the mean of several sharp images over the exposure time.
 
-The mean of a few sharp pictures is close to the true light where nothing moves by more than two pixels
-from one to the next; how many that takes is reckoned from the frame itself. Each costs a frame.
+The mean approximates the true light where nothing moves by more than two pixels between images. The number of
+images follows from the motion in the frame; each costs as much as a sharp frame.
 """
-
-from __future__ import annotations
 
 import math
 
 import numba as nb
 
-from lgmd_gym.camera.pinhole import (
-    CAM_COS_PITCH,
-    CAM_COS_YAW,
-    CAM_CU,
-    CAM_CV,
-    CAM_FOCAL,
-    CAM_PITCH,
-    CAM_SIN_PITCH,
-    CAM_SIN_YAW,
-    CAM_X,
-    CAM_Y,
-    CAM_YAW,
-    CAM_Z,
-)
 from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.camera.scene import OBJ_COS, OBJ_LENGTH, OBJ_SIN, OBJ_SPEED, OBJ_X, OBJ_Y
 
 MAX_STEPS = 8
-"""No frame is the mean of more pictures than this."""
+"""Maximum number of images per frame."""
 
 
 @kernel
-def blur_steps(pair, shutter, objects, count):
-    """Pictures that the exposure takes: one for two pixels of the largest motion, two to eight.
+def blur_steps(lens, before, shutter_s, objects, count):
+    """Return the number of images for an exposure: 1 without motion, else one per two pixels, 2 to 8.
 
     Args:
-        pair: `camera_vector(...)` at the end and at the start of the exposure, shape (2, 12).
-        shutter: Exposure time [s].
-        objects: float64, shape (>= count, 12).
+        lens: Lens at the end of the exposure.
+        before: Lens at its start.
+        shutter_s: Exposure time [s].
+        objects: Objects at the end of the exposure.
         count: Number of objects.
     """
-    cam, before = pair[0], pair[1]
-    f, reach = cam[CAM_FOCAL], 1.3 * cam[CAM_CU] / cam[CAM_FOCAL]
-    way = math.sqrt((cam[CAM_X] - before[CAM_X]) ** 2 + (cam[CAM_Y] - before[CAM_Y]) ** 2)
-    turn = abs(cam[CAM_YAW] - before[CAM_YAW]) + abs(cam[CAM_PITCH] - before[CAM_PITCH])
-    # The ground in the lowest row: a point at the distance Z runs down by f·h·way/Z².
-    fall = cam[CAM_CV] * cam[CAM_COS_PITCH] - f * cam[CAM_SIN_PITCH]
-    lowest = max(cam[CAM_Z] * f / fall, 1.0) if fall > 1e-6 else 1e6
-    pixels = f * turn + f * cam[CAM_Z] * way / (lowest * lowest)
+    f, reach = lens.focal, 1.3 * lens.centre_u / lens.focal
+    way = math.sqrt((lens.x - before.x) ** 2 + (lens.y - before.y) ** 2)
+    turn = abs(lens.yaw - before.yaw) + abs(lens.pitch - before.pitch)
+    # The ground in the lowest row: a point at the distance Z moves down by f·h·way/Z².
+    fall = lens.centre_v * lens.cos_pitch - f * lens.sin_pitch
+    lowest = max(lens.z * f / fall, 1.0) if fall > 1e-6 else 1e6
+    pixels = f * turn + f * lens.z * way / (lowest * lowest)
     for i in range(count):
-        dx, dy = objects[i, OBJ_X] - cam[CAM_X], objects[i, OBJ_Y] - cam[CAM_Y]
-        ahead = dx * cam[CAM_COS_YAW] + dy * cam[CAM_SIN_YAW]
-        across = dy * cam[CAM_COS_YAW] - dx * cam[CAM_SIN_YAW]
-        half = 0.5 * objects[i, OBJ_LENGTH]
+        obj = objects[i]
+        dx, dy = obj.x - lens.x, obj.y - lens.y
+        ahead = dx * lens.cos_yaw + dy * lens.sin_yaw
+        across = dy * lens.cos_yaw - dx * lens.sin_yaw
+        half = 0.5 * obj.length
         if ahead < -half or abs(across) > max(ahead, 0.0) * reach + half + 3.0:
             continue
         near = max(ahead - half, 1.0)
-        speed = objects[i, OBJ_SPEED]
-        ux = speed * shutter * objects[i, OBJ_COS] - (cam[CAM_X] - before[CAM_X])
-        uy = speed * shutter * objects[i, OBJ_SIN] - (cam[CAM_Y] - before[CAM_Y])
-        sideways = abs(uy * cam[CAM_COS_YAW] - ux * cam[CAM_SIN_YAW])
-        closer = abs(ux * cam[CAM_COS_YAW] + uy * cam[CAM_SIN_YAW])
+        ux = obj.speed * shutter_s * obj.cos - (lens.x - before.x)
+        uy = obj.speed * shutter_s * obj.sin - (lens.y - before.y)
+        sideways = abs(uy * lens.cos_yaw - ux * lens.sin_yaw)
+        closer = abs(ux * lens.cos_yaw + uy * lens.sin_yaw)
         edge = min(abs(across) + half, near * reach)
         pixels = max(pixels, f * turn + f * (sideways + closer * edge / near) / near)
     if not pixels > 0.01:
@@ -70,25 +53,30 @@ def blur_steps(pair, shutter, objects, count):
 
 
 @kernel
-def lens_at(pair, ago, cam):
-    """Write the lens's pose a share `ago` of the exposure before its end to `cam`."""
-    for i in range(cam.shape[0]):
-        cam[i] = pair[0, i] + ago * (pair[1, i] - pair[0, i])
-    cam[CAM_COS_YAW], cam[CAM_SIN_YAW] = math.cos(cam[CAM_YAW]), math.sin(cam[CAM_YAW])
-    cam[CAM_COS_PITCH], cam[CAM_SIN_PITCH] = math.cos(cam[CAM_PITCH]), math.sin(cam[CAM_PITCH])
+def lens_before(end, start, ago, out):
+    """Write the lens at the share `ago` of the exposure before its end to the record `out`."""
+    out.x = end.x + ago * (start.x - end.x)
+    out.y = end.y + ago * (start.y - end.y)
+    out.z = end.z + ago * (start.z - end.z)
+    out.yaw = end.yaw + ago * (start.yaw - end.yaw)
+    out.pitch = end.pitch + ago * (start.pitch - end.pitch)
+    out.focal, out.centre_u, out.centre_v = end.focal, end.centre_u, end.centre_v
+    out.cos_yaw, out.sin_yaw = math.cos(out.yaw), math.sin(out.yaw)
+    out.cos_pitch, out.sin_pitch = math.cos(out.pitch), math.sin(out.pitch)
 
 
 @kernel
-def move_objects(objects, count, time):
-    """Move all objects along their headings for a time [s]."""
+def move_objects(objects, count, time_s):
+    """Move all objects along their headings for `time_s` [s]."""
     for i in range(count):
-        objects[i, OBJ_X] += time * objects[i, OBJ_SPEED] * objects[i, OBJ_COS]
-        objects[i, OBJ_Y] += time * objects[i, OBJ_SPEED] * objects[i, OBJ_SIN]
+        obj = objects[i]
+        obj.x += time_s * obj.speed * obj.cos
+        obj.y += time_s * obj.speed * obj.sin
 
 
 @kernel
-def add_share(total, image, share):
-    """Add a share of an image to the light summed so far."""
+def add_weighted(total, image, weight):
+    """Add `weight` times an image to the light summed so far."""
     for i in range(total.shape[0]):
         for j in range(total.shape[1]):
-            total[i, j] += nb.float32(share) * image[i, j]
+            total[i, j] += nb.float32(weight) * image[i, j]

@@ -1,18 +1,15 @@
-"""Exact area coverage of polygons, the one drawing primitive of the camera.
+"""Exact area coverage of polygons, the camera's only drawing primitive.
 
-A polygon's edges are summed into an accumulator of coverage *differences*: the running sum along a
-row gives, at every pixel, the exact area of the pixel inside all polygons added so far. Cost grows
-with the outline only, shared edges cancel exactly, and a polygon of any size, however thin, weighs
-what its area says. So an edge that moves by a tenth of a pixel changes the frame by a tenth.
+A polygon's edges are added to an accumulator of coverage *differences*. The running sum along a row is, at
+each pixel, the exact area of the pixel inside all polygons added so far. The cost grows with the outline
+only, shared edges cancel exactly, and a polygon of any size contributes its exact area: an edge that moves by
+a tenth of a pixel changes the frame by a tenth of its contrast.
 """
-
-from __future__ import annotations
 
 import math
 
 import numba as nb
 
-from lgmd_gym.camera.pinhole import CAM_CU, CAM_CV, CAM_FOCAL
 from lgmd_gym.camera.render.jit import kernel
 
 NEAR = 0.1
@@ -33,7 +30,7 @@ def _add_column(acc, k, y0, y1, w, w2):
 
 @kernel
 def _add_cell(acc, k, row, col, w, w2):
-    """Add to one cell; unsigned indices spare the check for negative ones."""
+    """Add to one cell; unsigned indices avoid the check for negative ones."""
     r, c = nb.uint64(row), nb.uint64(col)
     acc[r, c, nb.uint64(k)] += nb.float32(w)
     if w2 != 0.0:
@@ -42,7 +39,7 @@ def _add_cell(acc, k, row, col, w, w2):
 
 @kernel
 def _add_upright(acc, k, x0, y0, x1, y1, w, w2):
-    """Add an edge within one column of the frame, as most edges of small and of upright things are."""
+    """Add an edge within one column of the frame, the most common case for small and upright objects."""
     slope = (x1 - x0) / (y1 - y0)
     row, col = int(y0), int(x0 if x0 < x1 else x1)
     left, y = col + 1.0 - x0, y0
@@ -59,7 +56,7 @@ def _add_upright(acc, k, x0, y0, x1, y1, w, w2):
 
 @kernel
 def _add_inside(acc, k, x0, y0, x1, y1, w, w2):
-    """Add an edge that lies inside the frame and runs down (y0 < y1)."""
+    """Add an edge inside the frame that runs down (y0 < y1)."""
     width = float(acc.shape[1] - 2)
     slope = (x1 - x0) / (y1 - y0)
     row = int(y0)
@@ -68,7 +65,7 @@ def _add_inside(acc, k, x0, y0, x1, y1, w, w2):
         y_next = row + 1.0 if row + 1.0 < y1 else y1
         dy = y_next - y
         x_next = x + slope * dy
-        # Rounding may carry the end of the edge out of the frame.
+        # Rounding may move the end of the edge out of the frame.
         x_next = 0.0 if x_next < 0.0 else width if x_next > width else x_next
         low, high = (x, x_next) if x < x_next else (x_next, x)
         col = int(low)
@@ -93,25 +90,25 @@ def _add_inside(acc, k, x0, y0, x1, y1, w, w2):
 
 
 @kernel
-def add_edge(acc, k, x0, y0, x1, y1, w, w2):  # noqa: C901  (six ways to leave a frame)
+def add_edge(acc, k, x0, y0, x1, y1, w, w2):  # noqa: C901  (six ways to leave the frame)
     """Add one directed edge, clipped to the frame.
 
     Args:
         acc: Accumulator, float32, shape (height, width + 2, channels).
-        k: Channel that gets the weight `w`; channel k + 1 gets `w2`.
+        k: Channel of the weight `w`; `w2` goes to channel k + 1.
         x0: Start, from the left [px].
         y0: Start, from the top [px].
         x1: End, from the left [px].
         y1: End, from the top [px].
         w: Weight.
-        w2: Second weight; 0 leaves channel k + 1 alone.
+        w2: Second weight; 0 leaves channel k + 1 unchanged.
     """
     height, width = acc.shape[0], acc.shape[1] - 2
     if y0 > y1:
         x0, x1 = x1, x0
         y0, y1 = y1, y0
         w, w2 = -w, -w2
-    # Right of the frame an edge covers nothing; written so that NaN and infinity leave too.
+    # An edge right of the frame covers nothing. The condition also rejects NaN and infinity.
     if not (y1 > 0.0 and y0 < height and y1 > y0 and min(x0, x1) < width and abs(x1 - x0) < 1e30):
         return
     slope = (x1 - x0) / (y1 - y0)
@@ -147,23 +144,23 @@ def add_edge(acc, k, x0, y0, x1, y1, w, w2):  # noqa: C901  (six ways to leave a
 
 
 @kernel
-def clip_and_project(cam, pts, n, out):
+def clip_and_project(lens, corners, n, out):
     """Clip a polygon at the near plane and project it.
 
     Args:
-        cam: `camera_vector(...)`.
-        pts: Corners as (depth, right, down), float64, shape (>= n, 3) [m].
+        lens: The lens.
+        corners: Corners as (depth, right, down), float64, shape (>= n, 3) [m].
         n: Number of corners.
-        out: Gets the projected corners (u, v), shape (> n, 2) [px].
+        out: Output: projected corners (u, v), shape (> n, 2) [px].
 
     Returns:
-        Number of projected corners, 0 if the polygon is wholly behind the near plane.
+        Number of projected corners; 0 if the polygon is entirely behind the near plane.
     """
-    f, cu, cv = cam[CAM_FOCAL], cam[CAM_CU], cam[CAM_CV]
+    f, cu, cv = lens.focal, lens.centre_u, lens.centre_v
     m = 0
-    d0, r0, z0 = pts[n - 1, 0], pts[n - 1, 1], pts[n - 1, 2]
+    d0, r0, z0 = corners[n - 1, 0], corners[n - 1, 1], corners[n - 1, 2]
     for i in range(n):
-        d1, r1, z1 = pts[i, 0], pts[i, 1], pts[i, 2]
+        d1, r1, z1 = corners[i, 0], corners[i, 1], corners[i, 2]
         if (d0 >= NEAR) != (d1 >= NEAR):
             t = (NEAR - d0) / (d1 - d0)
             out[m, 0] = cu + f * (r0 + t * (r1 - r0)) / NEAR
@@ -179,7 +176,7 @@ def clip_and_project(cam, pts, n, out):
 
 @kernel
 def winding(uv, n):
-    """Twice the area of a projected polygon; positive when it runs down on its left side."""
+    """Return twice the area of a projected polygon, positive if it runs down on its left side."""
     area = 0.0
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
@@ -189,7 +186,7 @@ def winding(uv, n):
 
 @kernel
 def add_polygon(acc, k, uv, n, w, w2):
-    """Add a projected polygon whose winding is positive (else it subtracts)."""
+    """Add a projected polygon of positive winding; one of negative winding is subtracted."""
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
         add_edge(acc, k, uv[i, 0], uv[i, 1], uv[j, 0], uv[j, 1], w, w2)

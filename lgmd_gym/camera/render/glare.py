@@ -1,77 +1,45 @@
-"""Kernel of glare: what the headlights of oncoming cars do to a lens at night."""
-
-from __future__ import annotations
+"""Kernel of glare: halos around the headlights of oncoming cars at night."""
 
 import math
 
 import numba as nb
 
-from lgmd_gym.camera.pinhole import (
-    CAM_COS_PITCH,
-    CAM_COS_YAW,
-    CAM_CU,
-    CAM_CV,
-    CAM_FOCAL,
-    CAM_SIN_PITCH,
-    CAM_SIN_YAW,
-    CAM_X,
-    CAM_Y,
-    CAM_Z,
-)
+from lgmd_gym.camera.objects import MODEL_CAR, MODEL_TRUCK
 from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.camera.scene import (
-    MODEL_CAR,
-    MODEL_TRUCK,
-    OBJ_COS,
-    OBJ_HEIGHT,
-    OBJ_LENGTH,
-    OBJ_MODEL,
-    OBJ_SIN,
-    OBJ_WIDTH,
-    OBJ_X,
-    OBJ_Y,
-)
 
 BUDGET_PX = 3000.0
-"""All halos of a frame together cover no more pixels than about this."""
-_RADIUS = 0.03  # of a halo, 1.7°: scatter in lens and eye, not the lamp's own size [rad]
-_PEAK = 200.0  # grey that a lamp nearer than _FULL adds in the middle
+"""Approximate maximum area of all halos of a frame [px]."""
+_RADIUS = 0.03  # radius of a halo, 1.7°, from scatter in the lens [rad]
+_PEAK = 200.0  # grey added at the centre by a lamp nearer than _FULL
 _FULL = 50.0  # [m]
-_LAMP_AT = 0.375  # of the width from the middle
+_LAMP_AT = 0.375  # distance of a lamp from the middle, as a share of the width
 
 
 @kernel
-def add_glare(image, cam, obj, clear, budget):
-    """Add the halos of an object's headlights, where they shine at the lens.
+def add_glare(image, lens, obj, clear, budget):
+    """Add the halos of an object's headlights that face the lens.
 
-    Args:
-        image: float32, shape (height, width).
-        cam: `camera_vector(...)`.
-        obj: Row of the array of objects.
-        clear: Transmission of the air, and of the fading far away.
-        budget: Pixels that halos may still cover.
-
-    Returns:
-        Pixels left.
+    `clear` is the transmission of the air times the opacity of the object, and `budget` the remaining area
+    for halos [px]. Returns the budget after these halos.
     """
-    if not (obj[OBJ_MODEL] == MODEL_CAR or obj[OBJ_MODEL] == MODEL_TRUCK) or budget <= 0.0:
+    if not (obj.model == MODEL_CAR or obj.model == MODEL_TRUCK) or budget <= 0.0:
         return budget
-    c, s = obj[OBJ_COS], obj[OBJ_SIN]
-    up = (0.45 if obj[OBJ_MODEL] == MODEL_CAR else 0.22) * obj[OBJ_HEIGHT]
+    c, s = obj.cos, obj.sin
+    up = (0.45 if obj.model == MODEL_CAR else 0.22) * obj.height
     for side in (-_LAMP_AT, _LAMP_AT):
-        x = obj[OBJ_X] + 0.5 * obj[OBJ_LENGTH] * c - side * obj[OBJ_WIDTH] * s - cam[CAM_X]
-        y = obj[OBJ_Y] + 0.5 * obj[OBJ_LENGTH] * s + side * obj[OBJ_WIDTH] * c - cam[CAM_Y]
+        x = obj.x + 0.5 * obj.length * c - side * obj.width * s - lens.x
+        y = obj.y + 0.5 * obj.length * s + side * obj.width * c - lens.y
         away = math.sqrt(x * x + y * y)
-        # Full within 30° of straight at the lens, nothing beyond 60°.
+        # Full within 30° of the direction to the lens, zero beyond 60°.
         facing = min((-(x * c + y * s) / max(away, 0.1) - 0.5) / 0.366, 1.0)
-        ahead = x * cam[CAM_COS_YAW] + y * cam[CAM_SIN_YAW]
-        z = up - cam[CAM_Z]
-        depth = ahead * cam[CAM_COS_PITCH] + z * cam[CAM_SIN_PITCH]
+        ahead = x * lens.cos_yaw + y * lens.sin_yaw
+        z = up - lens.z
+        depth = ahead * lens.cos_pitch + z * lens.sin_pitch
         if not (facing > 0.0 and depth > 1.0):
             continue
-        f = cam[CAM_FOCAL]
-        u = cam[CAM_CU] + f * (y * cam[CAM_COS_YAW] - x * cam[CAM_SIN_YAW]) / depth
-        v = cam[CAM_CV] + f * (ahead * cam[CAM_SIN_PITCH] - z * cam[CAM_COS_PITCH]) / depth
+        f = lens.focal
+        u = lens.centre_u + f * (y * lens.cos_yaw - x * lens.sin_yaw) / depth
+        v = lens.centre_v + f * (ahead * lens.sin_pitch - z * lens.cos_pitch) / depth
         near = min(_FULL / away, 1.0)
         radius = max(f * _RADIUS * math.sqrt(near), 1.5)
         radius = min(radius, math.sqrt(max(budget, 0.0) / math.pi), 24.0)
@@ -81,7 +49,7 @@ def add_glare(image, cam, obj, clear, budget):
 
 @kernel
 def _add_halo(image, u, v, radius, peak):
-    """Add a round, soft light; returns the pixels it went over."""
+    """Add a round, soft light; returns the area of its bounding box [px]."""
     height, width = image.shape
     if not (
         radius > 0.5 and u + radius > 0.0 and u - radius < width and v + radius > 0.0 and v - radius < height

@@ -1,6 +1,4 @@
-"""The one way in which the camera's kernels are compiled."""
-
-from __future__ import annotations
+"""The decorator that compiles the camera's kernels."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +6,7 @@ from typing import Any
 
 import numba as nb
 
-# mtime and size of every file of kernels.
+# Name, mtime and size of every file of the camera.
 _STAMP = tuple(
     (path.name, path.stat().st_mtime, path.stat().st_size)
     for path in sorted(Path(__file__).parents[1].rglob("*.py"))
@@ -16,10 +14,10 @@ _STAMP = tuple(
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a kernel once per machine, single-threaded: a pool of threads in a parent kills forked workers.
+    """Compile a kernel, cached on disk and single-threaded (a thread pool in a parent kills forked workers).
 
-    Numba's cache looks at the file of a kernel, not at the files of those it calls, so that a change
-    in one file leaves old machine code in its callers. Here all files count.
+    Numba invalidates a cached kernel when its own file changes, but not when the file of a kernel that it
+    calls changes. Here a change in any file of the camera invalidates the cache.
     """
     compiled = nb.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})(function)
     index: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)

@@ -1,6 +1,4 @@
-"""A panorama all round instead of the skyline: natural noise, or an image of the user's own."""
-
-from __future__ import annotations
+"""A 360° panorama in place of the skyline: natural noise or an image."""
 
 import math
 from functools import lru_cache
@@ -8,21 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
-from lgmd_gym.camera.effects import far_veil
+from lgmd_gym.camera.effects import far_transmission, haze_grey
 from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.camera.pinhole import CAM_COS_PITCH, CAM_CU, CAM_CV, CAM_FOCAL, CAM_SIN_PITCH, CAM_YAW
 from lgmd_gym.camera.render.jit import kernel
 
-_MAX_LOG2 = 13  # no wider than 8192 px: 0.044° each
+_MAX_LOG2 = 13  # maximum width 8192 px, 0.044° each
 _ROWS = 128  # heights are multiples of this
-_NIGHT = 0.035  # light of a night sky, as a share of the day's
+_NIGHT = 0.035  # light of a night sky, as a share of daylight
 
 
 def panorama_table(p: CameraParams) -> np.ndarray:
-    """Return the panorama of a camera in its own light and air, no finer than its pixels.
+    """Return the panorama of a camera under its light and fog, at the resolution of its pixels.
 
-    Columns go round from the direction +x towards +y; every texel is as high as wide, and the horizon
-    is half-way down.
+    Columns run from the direction +x towards +y, texels are square, and the horizon is at half height.
 
     Returns:
         float32, shape (height, width), width a power of two; shape (0, 0) for the skyline.
@@ -34,7 +30,7 @@ def panorama_table(p: CameraParams) -> np.ndarray:
         return np.zeros((0, 0), dtype=np.float32)
     grey = natural_panorama(p.seed) if p.panorama == "natural" else _image(p.panorama)
     grey = grey.astype(np.float32)
-    # Halve it while a pixel at the centre of the frame covers more than about 1.4 texels.
+    # Halve the resolution while a pixel at the centre of the frame covers more than about 1.4 texels.
     while grey.shape[1] > 16 and 1.0 / p.focal_px > 1.4 * 2.0 * math.pi / grey.shape[1]:
         grey = 0.25 * (grey[0::2, 0::2] + grey[1::2, 0::2] + grey[0::2, 1::2] + grey[1::2, 1::2])
         if grey.shape[0] % 2:
@@ -42,8 +38,8 @@ def panorama_table(p: CameraParams) -> np.ndarray:
     if p.light == "night":
         grey *= _NIGHT
     if p.visibility_m > 0.0:
-        haze, left = far_veil(p)
-        grey = haze + left * (grey - haze)
+        haze = haze_grey(p)
+        grey = haze + far_transmission(p) * (grey - haze)
     return np.ascontiguousarray(grey, dtype=np.float32)
 
 
@@ -51,8 +47,8 @@ def panorama_table(p: CameraParams) -> np.ndarray:
 def natural_panorama(seed: int) -> np.ndarray:
     """Return noise with the statistics of natural scenes; uint8, shape (1024, 4096), 45° up and down.
 
-    Amplitude falls as 1/frequency (Field 1987; Tolhurst et al. 1992 find exponents of 0.8 to 1.5), grey
-    is log-normal with a contrast (deviation over mean) of 0.4, and the sky is lighter than what is below.
+    The amplitude falls as 1/frequency (Field 1987; Tolhurst et al. 1992 report exponents of 0.8 to 1.5). Grey
+    is log-normal with a contrast (deviation over mean) of 0.4, and the sky is lighter than the ground.
     """
     rng = np.random.default_rng([seed, 6])
     shape = (1024, 4096)
@@ -72,7 +68,7 @@ def _image(path: str) -> np.ndarray:
     try:
         stamp = Path(path).stat().st_mtime_ns
         return _read_image(path, stamp)
-    except Exception as error:  # decoders raise errors of every kind
+    except Exception as error:  # decoders raise many types of errors
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(
             f"camera panorama={path!r} cannot be read as an image ({reason}); "
@@ -82,7 +78,7 @@ def _image(path: str) -> np.ndarray:
 
 @lru_cache(maxsize=4)
 def _read_image(path: str, stamp: int) -> np.ndarray:
-    """Read an image as grey, uint8, its width a power of two, its height a multiple of 128."""
+    """Read an image as grey, uint8; the width is a power of two and the height a multiple of 128."""
     from PIL import Image
 
     with Image.open(path) as image:
@@ -95,23 +91,23 @@ def _read_image(path: str, stamp: int) -> np.ndarray:
 
 
 @kernel
-def draw_panorama(image, cam, table, horizon):
-    """Fill the rows down to the horizon; arguments as for `draw_sky`, and `panorama_table(...)`."""
+def draw_panorama(image, lens, table, horizon):
+    """Fill the rows above the horizon from a `panorama_table`."""
     height, width = image.shape
-    f, c, s = cam[CAM_FOCAL], cam[CAM_COS_PITCH], cam[CAM_SIN_PITCH]
+    f, c, s = lens.focal, lens.cos_pitch, lens.sin_pitch
     rows = int(min(max(math.ceil(horizon), 0.0), height))
     high, wide = table.shape
     texels = wide / (2.0 * math.pi)
     for j in range(width):
-        u = j + 0.5 - cam[CAM_CU]
+        u = j + 0.5 - lens.centre_u
         turn = math.atan2(u, f * c)
         for i in range(rows):
-            v = i + 0.5 - cam[CAM_CV]
+            v = i + 0.5 - lens.centre_v
             ahead = f * c + v * s
             if s != 0.0:
                 turn = math.atan2(u, ahead)
             rise = math.atan2(f * s - v * c, math.sqrt(ahead * ahead + u * u))
-            x = (cam[CAM_YAW] + turn) * texels - 0.5
+            x = (lens.yaw + turn) * texels - 0.5
             y = min(max(0.5 * high - rise * texels - 0.5, 0.0), high - 1.0)
             left, top = math.floor(x), int(y)
             wx, wy = x - left, y - top

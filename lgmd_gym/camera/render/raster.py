@@ -1,104 +1,42 @@
-"""The kernel that draws one frame: sky, ground, solids from far to near, then the sensor."""
-
-from __future__ import annotations
+"""The kernel that renders frames: sky, ground, solids from far to near, glare, sensor."""
 
 import math
 
 import numba as nb
 
-from lgmd_gym.camera.effects import (
-    LOOK_EXTINCTION,
-    LOOK_GROUND,
-    LOOK_HAZE,
-    LOOK_NIGHT,
-    LOOK_PAVED,
-    LOOK_SHUTTER,
-    LOOK_SKY,
-    develop,
-    lamp_light,
-    weather_row,
-)
-from lgmd_gym.camera.pinhole import (
-    CAM_COS_PITCH,
-    CAM_COS_YAW,
-    CAM_CV,
-    CAM_FOCAL,
-    CAM_PITCH,
-    CAM_SIN_PITCH,
-    CAM_SIN_YAW,
-    CAM_X,
-    CAM_Y,
-    CAM_YAW,
-)
-from lgmd_gym.camera.render.blur import add_share, blur_steps, lens_at, move_objects
+from lgmd_gym.camera.objects import MODEL_MARK
+from lgmd_gym.camera.render.blur import add_weighted, blur_steps, lens_before, move_objects
+from lgmd_gym.camera.render.buffers import GroundLayer, SolidLayer, View
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
-from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, distance_ahead, shade_row
+from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.markings import add_lines
-from lgmd_gym.camera.render.order import order_objects, visible
+from lgmd_gym.camera.render.order import distance, order_objects, visible
 from lgmd_gym.camera.render.panorama import draw_panorama
+from lgmd_gym.camera.render.sensor import expose
+from lgmd_gym.camera.render.shadows import add_shadow
 from lgmd_gym.camera.render.sky import draw_sky
-from lgmd_gym.camera.render.solids import add_shadow, draw_object
-from lgmd_gym.camera.scene import MODEL_MARK, OBJ_MODEL, OBJ_RANGE, OBJ_X, OBJ_Y, PLANT_RANGE
+from lgmd_gym.camera.render.solids import Air, draw_object
+from lgmd_gym.camera.render.texture_sampling import distance_ahead
+from lgmd_gym.camera.render.weather import apply_weather, light_at
+from lgmd_gym.camera.roadside import PLANT_RANGE
 
 
 @kernel
-def horizon_of(cam):
-    """Row coordinate of the horizon [px]."""
-    return cam[CAM_CV] + cam[CAM_FOCAL] * cam[CAM_SIN_PITCH] / cam[CAM_COS_PITCH]
-
-
-@kernel
-def add_flats(cam, geometry, objects, order, n, scratch):
-    """Add roads, markings, shadows and marks to the ground accumulator."""
-    acc, pts, uv, quad = scratch[0], scratch[2], scratch[4], scratch[6]
-    for i in range(geometry[0].shape[0]):
-        add_ground_quad(acc, ROAD, cam, geometry[0][i], 1.0, pts, uv)
-    add_lines(acc, cam, geometry[1], pts, uv)
-    for i in range(n):
-        add_shadow(acc, cam, objects[order[i]], pts, uv, quad)
-
-
-@kernel
-def draw_ground(image, cam, look, beam, textures, scratch):
-    """Draw what `add_flats` has added, over asphalt and verge, below the horizon."""
-    acc, rows = scratch[0], scratch[1]
-    height, width = image.shape
-    horizon = horizon_of(cam)
-    start = int(min(max(math.floor(horizon), 0.0), float(height)))
-    if look[LOOK_PAVED] > 0.0:
-        for i in range(start, height):
-            acc[i, 0, ROAD] = 1.0
-    if start > 0:
-        # Rounding may put the far end of a road into the row above the horizon.
-        acc[start - 1] = 0.0
-    weather = look[LOOK_NIGHT] > 0.0 or look[LOOK_EXTINCTION] > 0.0
-    for i in range(start, height):
-        part = nb.float32(min(1.0, i + 1.0 - horizon))
-        grey = image[i] if part == 1.0 else rows[5, :width]
-        shade_row(acc, cam, i, look[LOOK_GROUND:], textures, rows, grey)
-        if weather:
-            weather_row(grey, cam, distance_ahead(cam, i), look, beam)
-        if part < 1.0:  # the horizon runs through this row
-            for j in range(width):
-                image[i, j] += part * (grey[j] - image[i, j])
-
-
-@kernel
-def gather_roadside(cam, roadside, objects, count):
-    """Append the posts and trees within range to the objects; returns the new count."""
+def append_roadside(lens, roadside, objects, count):
+    """Append the roadside within range to the objects; returns the new count."""
     n = roadside.shape[0]
     low, high = 0, n
-    start = cam[CAM_X] - PLANT_RANGE
+    start = lens.x - PLANT_RANGE
     while low < high:
         middle = (low + high) // 2
-        if roadside[middle, OBJ_X] < start:
+        if roadside[middle].x < start:
             low = middle + 1
         else:
             high = middle
-    while low < n and roadside[low, OBJ_X] < cam[CAM_X] + PLANT_RANGE and count < objects.shape[0]:
-        dx, dy = roadside[low, OBJ_X] - cam[CAM_X], roadside[low, OBJ_Y] - cam[CAM_Y]
-        if dx * dx + dy * dy < PLANT_RANGE * PLANT_RANGE and visible(cam, roadside[low]):
+    while low < n and roadside[low].x < lens.x + PLANT_RANGE and count < objects.shape[0]:
+        dx, dy = roadside[low].x - lens.x, roadside[low].y - lens.y
+        if dx * dx + dy * dy < PLANT_RANGE * PLANT_RANGE and visible(lens, roadside[low]):
             objects[count] = roadside[low]
             count += 1
         low += 1
@@ -106,91 +44,122 @@ def gather_roadside(cam, roadside, objects, count):
 
 
 @kernel
-def draw_light(image, sky, sky_of, cam, look, beam, geometry, tables, model, objects, count, scratch):
-    """Draw the light that falls on the sensor; see `draw_frames` for the arguments."""
-    height = image.shape[0]
-    order, nearness, solid_acc = scratch[7], scratch[8], scratch[9]
-    pts, frame, uv, greys = scratch[2], scratch[3], scratch[4], scratch[5]
-    count = gather_roadside(cam, geometry[2], objects, count)
-    n = order_objects(cam, objects, count, order, nearness)
-    horizon = horizon_of(cam)
-    if sky_of[0] != cam[CAM_YAW] or sky_of[1] != cam[CAM_PITCH]:
-        sky_of[0], sky_of[1] = cam[CAM_YAW], cam[CAM_PITCH]
-        if tables[3].shape[0] > 0:
-            draw_panorama(sky, cam, tables[3], horizon)
+def draw_distance(image, view, tables, horizon):
+    """Draw sky and skyline or the panorama, kept while the lens does not turn."""
+    lens, sky, aim = view.lens, view.sky, view.sky_aim
+    if aim[0] != lens.yaw or aim[1] != lens.pitch:
+        aim[0], aim[1] = lens.yaw, lens.pitch
+        if tables.panorama.shape[0] > 0:
+            draw_panorama(sky, lens, tables.panorama, horizon)
         else:
-            draw_sky(sky, cam, tables[1], look[LOOK_SKY:], horizon)
-    for i in range(int(min(max(math.ceil(horizon), 0.0), height))):
+            draw_sky(sky, lens, tables.skyline, view.look, horizon)
+    for i in range(int(min(max(math.ceil(horizon), 0.0), image.shape[0]))):
         image[i] = sky[i]
-    add_flats(cam, geometry, objects, order, n, scratch)
-    draw_ground(image, cam, look, beam, tables[0], scratch)
-    budget = BUDGET_PX
-    for i in range(n):
-        obj = objects[order[i]]
-        if obj[OBJ_MODEL] == MODEL_MARK:
-            continue
-        dx, dy = obj[OBJ_X] - cam[CAM_X], obj[OBJ_Y] - cam[CAM_Y]
-        away, ahead = math.sqrt(dx * dx + dy * dy), dx * cam[CAM_COS_YAW] + dy * cam[CAM_SIN_YAW]
-        light = lamp_light(ahead, dy * cam[CAM_COS_YAW] - dx * cam[CAM_SIN_YAW], look[LOOK_NIGHT])
-        # What is far off fades in.
-        fade = min(1.0, 6.0 * (1.0 - away / obj[OBJ_RANGE]))
-        clear = math.exp(-away * look[LOOK_EXTINCTION]) if look[LOOK_EXTINCTION] > 0.0 else 1.0
-        air = (light, clear, look[LOOK_HAZE], look[LOOK_NIGHT], fade)
-        draw_object(image, solid_acc, scratch[1], cam, obj, model, air, frame, pts, uv, greys)
-        if look[LOOK_NIGHT] > 0.0:
-            budget = add_glare(image, cam, obj, clear * fade, budget)
 
 
 @kernel
-def draw_frames(out, image, cams, views, geometry, tables, model, objects, count, scratch):
+def add_flats(layer, lens, road, objects, order, n):
+    """Add roads, markings, shadows and marks to the ground layer."""
+    for i in range(road.surface.shape[0]):
+        add_ground_quad(layer, ROAD, lens, road.surface[i], 1.0)
+    add_lines(layer, lens, road.lines)
+    for i in range(n):
+        add_shadow(layer, lens, objects[order[i]])
+
+
+@kernel
+def draw_ground(image, view, coverage, tables, rows, horizon):
+    """Draw the ground layer over asphalt and verge, below the horizon."""
+    lens, look = view.lens, view.look
+    height, width = image.shape
+    start = int(min(max(math.floor(horizon), 0.0), float(height)))
+    if look.paved > 0.0:
+        for i in range(start, height):
+            coverage[i, 0, ROAD] = 1.0
+    if start > 0:
+        # Rounding may put the far end of a road into the row above the horizon.
+        coverage[start - 1] = 0.0
+    weather = look.night > 0.0 or look.extinction > 0.0
+    for i in range(start, height):
+        part = nb.float32(min(1.0, i + 1.0 - horizon))
+        grey = image[i] if part == 1.0 else rows[5, :width]
+        shade_row(coverage, lens, i, look, tables, rows, grey)
+        if weather:
+            apply_weather(grey, distance_ahead(lens, i), look, view.beam)
+        if part < 1.0:  # the horizon runs through this row
+            for j in range(width):
+                image[i, j] += part * (grey[j] - image[i, j])
+
+
+@kernel
+def draw_solids(image, view, models, objects, order, n, layer):
+    """Draw the solid objects from far to near, and their glare."""
+    lens, look = view.lens, view.look
+    budget = BUDGET_PX
+    for i in range(n):
+        obj = objects[order[i]]
+        if obj.model == MODEL_MARK:
+            continue
+        dx, dy = obj.x - lens.x, obj.y - lens.y
+        away, ahead = distance(lens, obj), dx * lens.cos_yaw + dy * lens.sin_yaw
+        light = light_at(ahead, dy * lens.cos_yaw - dx * lens.sin_yaw, look.night)
+        # Objects fade in over the last sixth of their range.
+        opacity = min(1.0, 6.0 * (1.0 - away / obj.range))
+        clear = math.exp(-away * look.extinction) if look.extinction > 0.0 else 1.0
+        draw_object(image, lens, obj, models, Air(light, clear, look.haze, look.night, opacity), layer)
+        if look.night > 0.0:
+            budget = add_glare(image, lens, obj, clear * opacity, budget)
+
+
+@kernel
+def draw_light(view, road, tables, models, objects, count, buffers):
+    """Draw the light at one time of the exposure to `buffers.image`; see `draw_frames`."""
+    image, lens, order = buffers.image, view.lens, buffers.order
+    count = append_roadside(lens, road.roadside, objects, count)
+    n = order_objects(lens, objects, count, order, buffers.distances)
+    horizon = lens.centre_v + lens.focal * lens.sin_pitch / lens.cos_pitch
+    draw_distance(image, view, tables, horizon)
+    ground = GroundLayer(buffers.ground, buffers.corners, buffers.uv, buffers.quad)
+    add_flats(ground, lens, road, objects, order, n)
+    draw_ground(image, view, buffers.ground, tables, buffers.rows, horizon)
+    solids = SolidLayer(
+        buffers.solids, buffers.rows, buffers.corners, buffers.uv, buffers.axes, buffers.greys
+    )
+    draw_solids(image, view, models, objects, order, n, solids)
+
+
+@kernel
+def draw_frames(out, lenses, views, road, tables, models, objects, count, buffers):
     """Draw one frame of each of several cameras on one car.
 
     Args:
-        out: uint8, shape (cameras, height, width).
-        image: Scratch, float32, shape (height, width).
-        cams: `camera_vector(...)` at the end and at the start of the exposure, shape (cameras, 2, 12).
-        views: Per camera: grey levels and conditions (17,), low beam (width,), sky (height, width),
-            yaw and pitch that the sky was drawn for (2,), where the frame's noise starts.
-        geometry: (surface, lines, roadside) of `RoadGeometry`.
-        tables: (asphalt, its offsets, verge, its offsets), `skyline(seed)`, `noise_table(seed)`,
-            `panorama_table(...)`.
-        model: `models.Model`.
-        objects: float64, shape (>= count, 12).
+        out: Frames, uint8, shape (cameras, height, width).
+        lenses: `LENS` records at the end and at the start of the exposure, shape (cameras, 2).
+        views: `Views`.
+        road: `RoadGeometry`.
+        tables: `Tables`.
+        models: `Models`.
+        objects: `OBJECT` records, shape (512,); the roadside is appended to them.
         count: Number of objects.
-        scratch: see `lgmd_gym.camera.render.context`.
+        buffers: `Buffers`.
     """
-    looks, beams, skies, sky_of, starts = views
+    image, total, moment = buffers.image, buffers.exposure, buffers.lens[0]
     for k in range(out.shape[0]):
-        look, beam, sky = looks[k], beams[k], skies[k]
-        steps = 1
-        if look[LOOK_SHUTTER] > 0.0:
-            steps = blur_steps(cams[k], look[LOOK_SHUTTER], objects, count)
+        end, start = lenses[k, 0], lenses[k, 1]
+        look, beam, sky, sky_aim = views.looks[k], views.beams[k], views.skies[k], views.sky_aims[k]
+        steps = blur_steps(end, start, look.shutter_s, objects, count) if look.shutter_s > 0.0 else 1
         if steps == 1:
-            draw_light(
-                image,
-                sky,
-                sky_of[k],
-                cams[k, 0],
-                look,
-                beam,
-                geometry,
-                tables,
-                model,
-                objects,
-                count,
-                scratch,
-            )
+            view = View(end, look, beam, sky, sky_aim)
+            draw_light(view, road, tables, models, objects, count, buffers)
         else:
-            cam, total = scratch[11], scratch[10]
             total[:] = nb.float32(0.0)
             for step in range(steps):
                 ago = (step + 0.5) / steps
-                lens_at(cams[k], ago, cam)
-                move_objects(objects, count, -ago * look[LOOK_SHUTTER])
-                draw_light(
-                    image, sky, sky_of[k], cam, look, beam, geometry, tables, model, objects, count, scratch
-                )
-                move_objects(objects, count, ago * look[LOOK_SHUTTER])
-                add_share(total, image, nb.float32(1.0 / steps))
+                lens_before(end, start, ago, moment)
+                move_objects(objects, count, -ago * look.shutter_s)
+                view = View(moment, look, beam, sky, sky_aim)
+                draw_light(view, road, tables, models, objects, count, buffers)
+                move_objects(objects, count, ago * look.shutter_s)
+                add_weighted(total, image, nb.float32(1.0 / steps))
             image[:] = total
-        develop(out[k], image, look, tables[2], starts[k])
+        expose(out[k], image, look, tables.noise, views.noise_starts[k])

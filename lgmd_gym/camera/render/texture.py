@@ -1,11 +1,9 @@
-"""World-anchored ground textures, filtered beforehand for every footprint a pixel can have.
+"""World-anchored ground textures, prefiltered for every footprint of a pixel.
 
-A tile of grey deviations with natural (1/f) statistics, periodic in both directions, and all its
-box-averages over 2^i x 2^j texels (a rip-map): far rows see pixels that are metres long and
-centimetres wide, which an ordinary mip-map would blur to nothing.
+A texture is a tile of grey deviations with natural (1/f) statistics, periodic in both directions, with all
+its box averages over 2^i x 2^j texels (a rip-map). The footprints of far pixels are metres long and
+centimetres wide; a mip-map with square footprints would blur them to a plain grey.
 """
-
-from __future__ import annotations
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -13,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 TEXEL_M = 0.04
-"""Size of a texel [m]: the near ground of a 60° lens at 160 px has 3 to 8 cm a pixel."""
+"""Size of a texel [m]. The near ground of a 60° lens at 160 px has 3 to 8 cm per pixel."""
 _LONG_LOG2, _WIDE_LOG2 = 12, 9  # 164 m along x, 20 m along y
 _STD_CODE = 36.0  # standard deviation of the stored bytes around 128
 
@@ -22,17 +20,17 @@ class Texture(NamedTuple):
     """A rip-map.
 
     Attributes:
-        data: All levels, uint8, flat; 128 is the mean, 36 one standard deviation of the finest.
-        offset: Where level (i, j) starts, int64, shape (levels along x, levels along y).
+        data: All levels, uint8, flat; 128 is the mean, and 36 one standard deviation of the finest level.
+        level_start: Index of the first texel of level (i, j), int64, shape (levels along x, along y).
     """
 
     data: np.ndarray
-    offset: np.ndarray
+    level_start: np.ndarray
 
 
 @lru_cache(maxsize=8)
 def ground_texture(kind: str, seed: int) -> Texture:
-    """Return the texture of `"asphalt"` or `"verge"`; built once per seed and process."""
+    """Return the texture of `"asphalt"` or `"verge"`, built once per seed and process."""
     rng = np.random.default_rng([seed, {"asphalt": 1, "verge": 2}[kind]])
     if kind == "asphalt":
         tile = _noise(rng, exponent=0.85)
@@ -48,13 +46,13 @@ def ground_texture(kind: str, seed: int) -> Texture:
 
 
 def _noise(rng: np.random.Generator, exponent: float) -> np.ndarray:
-    """Periodic noise whose amplitude falls as 1/frequency^exponent; float32, unit variance."""
+    """Periodic noise with amplitude 1/frequency^exponent; float32, unit variance."""
     shape = (1 << _LONG_LOG2, 1 << _WIDE_LOG2)
     white = rng.standard_normal(shape, dtype=np.float32)
     spectrum = np.fft.rfft2(white)
     fx = np.fft.fftfreq(shape[0]).astype(np.float32)[:, None]
     fy = np.fft.rfftfreq(shape[1]).astype(np.float32)[None, :]
-    # Below one wave in 12 m the spectrum is flat: no blotches that repeat at a glance.
+    # The spectrum is flat below one wave in 12 m, which avoids visibly repeating blotches.
     floor = TEXEL_M / 12.0
     weight = fx * fx + fy * fy + np.float32(floor * floor)
     np.power(weight, np.float32(-0.5 * exponent), out=weight)
@@ -67,7 +65,7 @@ def _noise(rng: np.random.Generator, exponent: float) -> np.ndarray:
 
 
 def _add_seams(tile: np.ndarray, rng: np.random.Generator) -> None:
-    """Add sealed cracks and patches, as any older road has them."""
+    """Add the sealed cracks and patches of an older road."""
     long, wide = tile.shape
     for _ in range(14):
         x, y = int(rng.integers(long)), int(rng.integers(wide))
@@ -84,18 +82,18 @@ def _add_seams(tile: np.ndarray, rng: np.random.Generator) -> None:
 
 
 def _ripmap(tile: np.ndarray) -> Texture:
-    offset = np.zeros((_LONG_LOG2 + 1, _WIDE_LOG2 + 1), dtype=np.int64)
+    level_start = np.zeros((_LONG_LOG2 + 1, _WIDE_LOG2 + 1), dtype=np.int64)
     data = np.empty(((2 << _LONG_LOG2) - 1) * ((2 << _WIDE_LOG2) - 1), dtype=np.uint8)
     at = 0
     for i in range(_LONG_LOG2 + 1):
         level = tile
         for j in range(_WIDE_LOG2 + 1):
-            offset[i, j] = at
-            # Adding a half and cutting rounds straight into place, without another array of floats.
+            level_start[i, j] = at
+            # Adding 0.5 and truncating rounds in place, without another array of floats.
             np.add(level.ravel(), np.float32(0.5), out=data[at : at + level.size], casting="unsafe")
             at += level.size
             if j < _WIDE_LOG2:
                 level = np.float32(0.5) * (level[:, 0::2] + level[:, 1::2])
         if i < _LONG_LOG2:
             tile = np.float32(0.5) * (tile[0::2] + tile[1::2])
-    return Texture(data, offset)
+    return Texture(data, level_start)

@@ -1,0 +1,130 @@
+"""The arrays that the kernels of a frame share, by name."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lgmd_gym.camera.objects import MAX_DRAWN
+from lgmd_gym.camera.pinhole import LENS
+
+
+class Views(NamedTuple):
+    """Per-camera arrays.
+
+    Attributes:
+        looks: `LOOK` records, shape (cameras,).
+        beams: Fall-off of the low beam over the columns, float32, shape (cameras, width).
+        skies: The last sky, float32, shape (cameras, height, width).
+        sky_aims: Yaw and pitch of the last sky, float64, shape (cameras, 2).
+        noise_starts: Index of the frame's first number in the noise table, int64, shape (cameras,).
+    """
+
+    looks: np.ndarray
+    beams: np.ndarray
+    skies: np.ndarray
+    sky_aims: np.ndarray
+    noise_starts: np.ndarray
+
+
+class View(NamedTuple):
+    """One camera, posed: a row of `Views`, and a `LENS` record."""
+
+    lens: np.ndarray
+    look: np.ndarray
+    beam: np.ndarray
+    sky: np.ndarray
+    sky_aim: np.ndarray
+
+
+class Tables(NamedTuple):
+    """Lookup tables.
+
+    Attributes:
+        asphalt: `Texture.data`.
+        verge: `Texture.data`.
+        level_start: `Texture.level_start` of both.
+        skyline: See `skyline`.
+        noise: See `noise_table`.
+        panorama: See `panorama_table`.
+    """
+
+    asphalt: np.ndarray
+    verge: np.ndarray
+    level_start: np.ndarray
+    skyline: np.ndarray
+    noise: np.ndarray
+    panorama: np.ndarray
+
+
+class Buffers(NamedTuple):
+    """Scratch memory.
+
+    Attributes:
+        image: Light of the last frame, float32, shape (height, width) [grey levels].
+        exposure: Light summed over the exposure, float32, shape (height, width).
+        lens: The lens at one time of the exposure, a `LENS` record, shape (1,).
+        ground: Coverage differences of road, paint and shadow, float32, shape (height, width + 2, 3).
+        solids: Coverage differences of a solid and of its grey, float32, shape (height, width + 2, 2).
+        rows: float32, shape (6, width + 2).
+        corners: Corners of a polygon as (depth, right, down), float64, shape (16, 3) [m].
+        uv: Projected corners of a polygon, float64, shape (20, 2) [px].
+        quad: x, y of four corners on the ground, float64, shape (8,) [m].
+        axes: Axes of an object, see `place_object`, float64, shape (5, 3).
+        greys: Grey and light of the polygons of all models, float64, shape (polygons, 2).
+        order: Indices of the objects in drawing order, int64, shape (512,).
+        distances: Distances of the objects from the lens, float64, shape (512,) [m].
+    """
+
+    image: np.ndarray
+    exposure: np.ndarray
+    lens: np.ndarray
+    ground: np.ndarray
+    solids: np.ndarray
+    rows: np.ndarray
+    corners: np.ndarray
+    uv: np.ndarray
+    quad: np.ndarray
+    axes: np.ndarray
+    greys: np.ndarray
+    order: np.ndarray
+    distances: np.ndarray
+
+
+class GroundLayer(NamedTuple):
+    """The `Buffers` that polygons on the ground are added to."""
+
+    coverage: np.ndarray
+    corners: np.ndarray
+    uv: np.ndarray
+    quad: np.ndarray
+
+
+class SolidLayer(NamedTuple):
+    """The `Buffers` that solids are drawn with."""
+
+    coverage: np.ndarray
+    rows: np.ndarray
+    corners: np.ndarray
+    uv: np.ndarray
+    axes: np.ndarray
+    greys: np.ndarray
+
+
+def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
+    """Return buffers for frames of `(height, width)` and models with this many polygons."""
+    height, width = shape
+    return Buffers(
+        image=np.zeros((height, width), dtype=np.float32),
+        exposure=np.zeros((height, width), dtype=np.float32),
+        lens=np.zeros(1, dtype=LENS),
+        ground=np.zeros((height, width + 2, 3), dtype=np.float32),
+        solids=np.zeros((height, width + 2, 2), dtype=np.float32),
+        rows=np.zeros((6, width + 2), dtype=np.float32),
+        corners=np.zeros((16, 3)),
+        uv=np.zeros((20, 2)),
+        quad=np.zeros(8),
+        axes=np.zeros((5, 3)),
+        greys=np.zeros((polygons, 2)),
+        order=np.zeros(MAX_DRAWN, dtype=np.int64),
+        distances=np.zeros(MAX_DRAWN),
+    )

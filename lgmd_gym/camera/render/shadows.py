@@ -1,0 +1,60 @@
+"""Kernels of the shadows of objects and of marks on the ground."""
+
+from lgmd_gym.camera.effects import ASPHALT_GREY, PAINT_GREY
+from lgmd_gym.camera.objects import MODEL_MARK, MODEL_POST, MODEL_RAIL, MODEL_TREE
+from lgmd_gym.camera.render.ground import PAINT, SHADOW, add_ground_quad
+from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.camera.render.order import distance
+
+SUN = (-0.48, 0.36, 0.80)
+"""Direction towards the sun (world x, y, up)."""
+
+
+@kernel
+def _add_footprint(layer, k, lens, obj, centre, grow, weight):
+    """Add an object's rectangle on the ground, around `centre` and grown on all sides, to channel k."""
+    x, y = centre
+    hx, hy = 0.5 * obj.length + grow, 0.5 * obj.width + grow
+    quad = layer.quad
+    for i in range(4):
+        lx = -hx if i < 2 else hx
+        ly = -hy if i == 0 or i == 3 else hy
+        quad[2 * i] = x + lx * obj.cos - ly * obj.sin
+        quad[2 * i + 1] = y + lx * obj.sin + ly * obj.cos
+    add_ground_quad(layer, k, lens, quad, weight)
+
+
+@kernel
+def _add_mark(layer, lens, obj):
+    """Add a ground mark: filled if it has a shade, else a painted outline."""
+    centre = (obj.x, obj.y)
+    if obj.shade >= 0.0:
+        # A shade lighter than asphalt is added like paint; a darker one removes light like a shadow.
+        paint = (obj.shade - ASPHALT_GREY) / (PAINT_GREY - ASPHALT_GREY)
+        if paint > 0.0:
+            _add_footprint(layer, PAINT, lens, obj, centre, 0.0, min(paint, 1.0))
+        else:
+            _add_footprint(layer, SHADOW, lens, obj, centre, 0.0, 1.0 - obj.shade / ASPHALT_GREY)
+        return
+    _add_footprint(layer, PAINT, lens, obj, centre, 0.0, 0.8)
+    inset = -min(0.2, 0.25 * min(obj.length, obj.width))
+    _add_footprint(layer, PAINT, lens, obj, centre, inset, -0.5)
+
+
+@kernel
+def add_shadow(layer, lens, obj):
+    """Add the mark or the soft shadow (three nested quads) of an object to the ground layer."""
+    if obj.model == MODEL_MARK:
+        _add_mark(layer, lens, obj)
+        return
+    if obj.model == MODEL_POST or obj.model == MODEL_RAIL:
+        return
+    lean = -0.12 * obj.height / SUN[2]
+    centre = (obj.x + lean * SUN[0], obj.y + lean * SUN[1])
+    if obj.model == MODEL_TREE:
+        dark = min(0.4, 0.8 - distance(lens, obj) / 60.0)
+        if dark > 0.0:
+            _add_footprint(layer, SHADOW, lens, obj, centre, -0.2 * obj.width, dark)
+        return
+    for ring in range(3):
+        _add_footprint(layer, SHADOW, lens, obj, centre, 0.16 * ring - 0.08, 0.22)

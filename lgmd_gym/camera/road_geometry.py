@@ -1,0 +1,162 @@
+"""The static geometry of a highway-env road: asphalt, markings and roadside as arrays.
+
+Lanes are read by duck typing, once per road network.
+"""
+
+import math
+import weakref
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lgmd_gym.camera.objects import OBJECT
+from lgmd_gym.camera.roadside import guard_rails, posts_and_plants
+
+SHOULDER = 0.5
+"""Width of the asphalt beyond the outer line [m]."""
+STRIPED, CONTINUOUS, CONTINUOUS_LINE = 1, 2, 3  # highway_env.road.lane.LineType
+
+LINE = np.dtype([(name, np.float64) for name in ("x0", "y0", "x1", "y1", "start", "striped")])
+"""A straight piece of a marking: its ends and its start along the lane [m], 1.0 if striped."""
+
+_LANE_STEP = 2.0
+_MAX_PIECES = 2000
+_BAY_LENGTH = 20.0  # a network whose longest lane is no longer than this is a car park [m]
+
+
+class RoadGeometry(NamedTuple):
+    """The static part of a road.
+
+    Attributes:
+        surface: Asphalt as quads, float64, shape (n, 8): x, y of the corners in turn [m].
+        lines: Markings, `LINE` records, shape (n,).
+        roadside: Posts, trees and guard rails, `OBJECT` records sorted by x, shape (n,).
+        paved: Whether all ground is asphalt, as for a road without lanes.
+    """
+
+    surface: np.ndarray
+    lines: np.ndarray
+    roadside: np.ndarray
+    paved: bool
+
+
+_CACHE: weakref.WeakKeyDictionary[Any, dict[tuple[float, int, bool], RoadGeometry]] = (
+    weakref.WeakKeyDictionary()
+)
+
+
+def road_geometry(road: Any, roadside: float = 0.0, seed: int = 0, rail: bool = False) -> RoadGeometry:
+    """Return the geometry of a road's network, cached for the lifetime of the network.
+
+    Args:
+        road: The highway-env `Road`.
+        roadside: Density of posts and trees, as a multiple of the natural density.
+        seed: Seed of their positions.
+        rail: Whether guard rails run along the outer edges.
+    """
+    network = getattr(road, "network", None)
+    key = (roadside, seed, rail)
+    if network is None:
+        return _extract([], *key)
+    try:
+        known = _CACHE.setdefault(network, {})
+    except TypeError:  # not hashable or without weak references: no cache
+        return _extract(_lanes(network), *key)
+    if key not in known:
+        known[key] = _extract(_lanes(network), *key)
+    return known[key]
+
+
+def _lanes(network: Any) -> list[Any]:
+    lanes = [lane for ends in network.graph.values() for group in ends.values() for lane in group]
+    return [lane for lane in lanes if math.isfinite(lane.length) and lane.length > 0.0]
+
+
+def _extract(lanes: list[Any], roadside: float, seed: int, rail: bool) -> RoadGeometry:
+    if not lanes:
+        return RoadGeometry(np.zeros((0, 8)), np.zeros(0, LINE), np.zeros(0, OBJECT), True)
+    surface: list[np.ndarray] = []
+    lines: list[np.ndarray] = [np.zeros((0, 6))]
+    segments: list[np.ndarray] = []
+    for lane in lanes:
+        stations = _stations(lane)
+        surface.append(_ribbon(lane, stations))
+        segments.append(_segments(lane, stations))
+        for side, kind in enumerate(getattr(lane, "line_types", None) or (0, 0)):
+            if kind in (STRIPED, CONTINUOUS, CONTINUOUS_LINE):
+                lines.append(_line(lane, stations, side, striped=kind == STRIPED))
+    if max(lane.length for lane in lanes) <= _BAY_LENGTH:
+        surface.append(_car_park(np.concatenate(surface)))
+        records = np.zeros(0, OBJECT)
+    else:
+        records = _roadside_of(np.concatenate(segments).tobytes(), roadside, seed, rail)
+    lines_once = _without_duplicates(np.concatenate(lines))
+    return RoadGeometry(np.concatenate(surface), lines_once.view(LINE)[:, 0], records, False)
+
+
+@lru_cache(maxsize=16)
+def _roadside_of(segments: bytes, roadside: float, seed: int, rail: bool) -> np.ndarray:
+    """Roadside, cached by the shape of the lanes: environments build a new network at each reset."""
+    pieces = np.frombuffer(segments).reshape(-1, 6)
+    out = posts_and_plants(pieces, roadside, seed)
+    if rail:
+        out = np.concatenate((out, guard_rails(pieces)))
+        out = out[np.argsort(out["x"], kind="stable")]
+    return out
+
+
+def _stations(lane: Any) -> np.ndarray:
+    """Distances along the lane between which it may be drawn straight; shape (n,) [m]."""
+    length = float(lane.length)
+    probe = length * np.array([0.0, 0.07, 0.19, 0.31, 0.43, 0.5, 0.62, 0.71, 0.83, 0.94, 1.0])
+    points = np.array([lane.position(s, 0.0) for s in probe], dtype=np.float64)
+    chord = points[0] + np.outer(probe / length, points[-1] - points[0])
+    widths = [lane.width_at(s) for s in probe]
+    if np.abs(points - chord).max() < 0.01 and max(widths) - min(widths) < 0.01:
+        return probe[[0, -1]]
+    headings = np.unwrap([lane.heading_at(s) for s in np.linspace(0.0, length, 64)])
+    # 0.08 rad per piece keeps an edge of 25 m radius within 2 cm of its arc.
+    pieces = max(length / _LANE_STEP, float(np.abs(np.diff(headings)).sum()) / 0.08)
+    return np.linspace(0.0, length, min(int(pieces) + 2, _MAX_PIECES))
+
+
+def _segments(lane: Any, stations: np.ndarray) -> np.ndarray:
+    """Centre line of a lane in pieces: x0, y0, x1, y1, start along the lane, width; shape (n, 6) [m]."""
+    centre = np.array([lane.position(s, 0.0) for s in stations], dtype=np.float64)
+    width = np.array([lane.width_at(s) for s in stations[:-1]])
+    return np.concatenate((centre[:-1], centre[1:], stations[:-1, None], width[:, None]), axis=1)
+
+
+def _edge(lane: Any, stations: np.ndarray, side: int, extra: float) -> np.ndarray:
+    lateral = [(side - 0.5) * (lane.width_at(s) + 2.0 * extra) for s in stations]
+    return np.array([lane.position(s, r) for s, r in zip(stations, lateral, strict=True)], dtype=np.float64)
+
+
+def _ribbon(lane: Any, stations: np.ndarray) -> np.ndarray:
+    left, right = _edge(lane, stations, 0, SHOULDER), _edge(lane, stations, 1, SHOULDER)
+    return np.concatenate((left[:-1], right[:-1], right[1:], left[1:]), axis=1)
+
+
+def _line(lane: Any, stations: np.ndarray, side: int, *, striped: bool) -> np.ndarray:
+    edge = _edge(lane, stations, side, 0.0)
+    along = np.stack((stations[:-1], np.full(len(stations) - 1, float(striped))), axis=1)
+    return np.concatenate((edge[:-1], edge[1:], along), axis=1)
+
+
+def _car_park(surface: np.ndarray) -> np.ndarray:
+    """One quad around all bays of a car park, whose aisles belong to no lane."""
+    x, y = surface[:, 0::2], surface[:, 1::2]
+    x0, x1, y0, y1 = x.min() - 5.0, x.max() + 5.0, y.min() - 3.0, y.max() + 3.0
+    return np.array([[x0, y0, x0, y1, x1, y1, x1, y0]])
+
+
+def _without_duplicates(lines: np.ndarray) -> np.ndarray:
+    """Drop lines of neighbouring lanes that coincide within 10 cm; a solid line replaces a striped one."""
+    ends = np.round(lines[:, :4] * 10.0)
+    swapped = ends[:, [2, 3, 0, 1]]
+    flip = (ends[:, 0] > swapped[:, 0]) | ((ends[:, 0] == swapped[:, 0]) & (ends[:, 1] > swapped[:, 1]))
+    keys = np.where(flip[:, None], swapped, ends)
+    order = np.argsort(lines[:, 5], kind="stable")
+    _, first = np.unique(keys[order], axis=0, return_index=True)
+    return np.ascontiguousarray(lines[np.sort(order[first])])

@@ -1,0 +1,49 @@
+"""The `camera` argument of environments and wrappers: types and named conditions."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+from lgmd_gym.camera.params import CONDITIONS, CameraParams
+from lgmd_gym.errors import unknown_name
+
+BIRDSEYE = "birdseye"
+"""The camera name of highway-env's top view."""
+
+CameraItem: TypeAlias = str | CameraParams | Mapping[str, Any]
+"""One camera: the name of a preset or "birdseye", a `CameraParams`, or a dict of its fields."""
+CameraSpec: TypeAlias = CameraItem | Sequence[CameraItem]
+"""The `camera` argument: one camera, or several."""
+
+
+def with_condition(camera: CameraSpec, condition: str) -> CameraSpec:
+    """Return a camera argument under a named condition.
+
+    Fields that a dict sets explicitly take precedence over those of the condition.
+
+    Args:
+        camera: One camera or several.
+        condition: A key of `CONDITIONS`; "clear" changes nothing.
+
+    Raises:
+        ValueError: For an unknown condition or preset, or for "birdseye" under a condition other than
+            "clear".
+
+    Example:
+        >>> with_condition("fovea", "fog").visibility_m
+        120.0
+    """
+    if condition not in CONDITIONS:
+        raise unknown_name("camera condition", condition, CONDITIONS)
+    if condition == "clear":
+        return camera
+    if isinstance(camera, list | tuple):
+        return [_item_with_condition(item, condition) for item in camera]
+    return _item_with_condition(camera, condition)
+
+
+def _item_with_condition(camera: Any, condition: str) -> CameraParams:
+    if camera == BIRDSEYE or (isinstance(camera, Mapping) and camera.get("name") == BIRDSEYE):
+        raise ValueError(f"camera 'birdseye' does not support condition {condition!r}; use 'clear'")
+    if isinstance(camera, Mapping):
+        return CameraParams.make({**camera, "condition": condition})
+    return CameraParams.make(camera, condition=condition)

@@ -1,0 +1,45 @@
+"""Night, fog, noise, vibration and dive."""
+
+import numpy as np
+import pytest
+from support.roads import add_car, straight_env
+
+from lgmd_gym.camera import EgoCamera
+
+
+def test_fog_night_and_noise_change_contrast_light_and_deviation():
+    env = straight_env()
+    add_car(env, 60.0, 3.5, shade=20)
+    env.steps = 10
+    clear = EgoCamera("tele").render(env).astype(float)
+    fog = EgoCamera("tele", visibility_m=60.0).render(env).astype(float)
+    assert np.ptp(fog[30:55]) < 0.35 * np.ptp(clear[30:55])
+    night = EgoCamera("tele", light="night").render(env).astype(float)
+    assert night[:30].mean() < 20 < clear[:30].mean()
+    assert night.max() > 120  # tail lights
+    noisy = EgoCamera("tele", read_noise=4.0).render(env).astype(float)
+    assert (noisy - clear).std() == pytest.approx(4.0, rel=0.1)
+    env.steps = 11
+    assert not np.array_equal(EgoCamera("tele", read_noise=4.0).render(env), noisy)
+
+
+def test_dive_and_vibration_pitch_the_camera():
+    env = straight_env()
+    env.steps = 7
+    point = [1000.0, 3.5, 1.2]
+    camera = EgoCamera("fovea", dive_deg=0.1)
+    camera.render(env)
+    assert camera.project(point)[1] == pytest.approx(45.0, abs=1e-6)
+    env.vehicle.action = {"acceleration": -9.0, "steering": 0.0}
+    camera.render(env)
+    # Nose-down pitch of 0.9°: the point moves up by 14.4 px.
+    assert camera.project(point)[1] == pytest.approx(45.0 - 0.9 * camera.params.pixels_per_degree, abs=0.1)
+    vibrating = EgoCamera("fovea", vibration_deg=0.1)
+    rows = []
+    for env.steps in range(300):
+        vibrating.render(env)
+        rows.append(vibrating.project(point)[1])
+    assert np.std(rows) == pytest.approx(0.1 * camera.params.pixels_per_degree, rel=0.15)
+    env.vehicle.speed = 0.0
+    vibrating.render(env)
+    assert vibrating.project(point)[1] == pytest.approx(45.0, abs=1e-6)

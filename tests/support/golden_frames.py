@@ -1,0 +1,73 @@
+"""Scenes and cameras of the golden frames.
+
+Run `python tests/support/golden_frames.py` in the root of the project to write tests/golden/camera.npz anew
+after an intended change of the rendering, and state the reason in the changelog.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from highway_env.vehicle.kinematics import Vehicle
+from support.roads import add_car, add_mark, add_obstacle, env_of, ring_road, straight_env
+
+from lgmd_gym.camera import CONDITIONS, CameraParams, EgoCamera
+
+PATH = Path(__file__).parents[1] / "golden" / "camera.npz"
+SHAPE = (45, 80)
+LENSES = ("wide", "standard", "tele", "fovea")
+OPTIONS = {
+    "box": {"vehicles": "box", "seed": 7},
+    "rail": {"guard_rail": True, "texture": 2.0},
+    "panorama": {"panorama": "natural", "pitch_deg": 7.0, "roadside": 3.0},
+    "mount": {"gaze": "path", "mount_height": 1.6, "mount_left": 0.4, "pitch_deg": -8.0, "yaw_deg": 12.0},
+    "motion": {"vibration_deg": 1.0, "heave_m": 0.05, "dive_deg": 0.3, "shutter_s": 0.03},
+    "night-rail": {"light": "night", "guard_rail": True},
+}
+"""Camera fields that the golden frames cover in addition to the named conditions."""
+
+
+def busy_road():
+    """Return a straight road with moving cars, a truck, an oncoming car, obstacles and marks."""
+    env = straight_env(x=0.3)
+    env.steps = 3
+    env.vehicle.action = {"steering": 0.06, "acceleration": -3.0}
+    for k in range(5):
+        car = add_car(env, 14.0 + 9.0 * k, 3.5 * (k % 3), 40 + 40 * k, heading=0.2 * k, speed=3.0 * k)
+        car.action = {"acceleration": -2.0 * (k % 2), "steering": 0.0}
+    add_car(env, 35.0, 7.5, heading=np.pi, speed=10.0)
+    add_car(env, 60.0, 0.0, size=(12.0, 2.5, 3.4))
+    add_obstacle(env, 30.0, 1.0)
+    add_obstacle(env, 22.0, 6.0, shade=120)
+    add_mark(env, 20.0, 4.5)
+    add_mark(env, 25.0, 0.0, shade=40, size=(8.0, 3.0))
+    add_mark(env, 15.0, 6.0, shade=180, size=(3.0, 2.0))
+    return env
+
+
+def curve():
+    """Return a ring road with a car ahead."""
+    road, lane = ring_road()
+    env = env_of(road, Vehicle(road, lane.position(1.0, 0.0), lane.heading_at(1.0), 10.0), steps=5)
+    add_car(env, *lane.position(15.0, 0.0), heading=lane.heading_at(15.0))
+    return env
+
+
+def golden_frames():
+    """Return all frames by name, uint8, shape (45, 80)."""
+    frames = {}
+    for lens in LENSES:
+        for condition in CONDITIONS:
+            camera = EgoCamera(CameraParams.preset(lens, shape=SHAPE, condition=condition))
+            frames[f"{lens}-{condition}"] = camera.render(busy_road())
+        frames[f"{lens}-curve"] = EgoCamera(lens, shape=SHAPE).render(curve())
+    for name, fields in OPTIONS.items():
+        frames[name] = EgoCamera("wide", shape=SHAPE, **fields).render(busy_road())
+    return frames
+
+
+if __name__ == "__main__":
+    np.savez_compressed(PATH, **golden_frames())
+    print(f"{len(np.load(PATH).files)} frames in {PATH}")
