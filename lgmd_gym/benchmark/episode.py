@@ -33,10 +33,10 @@ class Episode:
     """Time series and outcome of one episode.
 
     Attributes:
-        series: Arrays of shape (decisions + 1,) by name, the first value from the reset; NaN where undefined.
+        series: Arrays of shape (decisions + 1,) by name, the first value from the reset; inf where undefined.
         collision: Whether the ego had contact.
-        impact_speed: Ego speed at contact [m/s]; NaN without contact.
-        relative_impact_speed: Impact speed minus the target's speed along the ego's heading [m/s]; NaN
+        impact_speed: Ego speed at contact [m/s]; inf without contact.
+        relative_impact_speed: Impact speed minus the target's speed along the ego's heading [m/s]; inf
             without contact.
         target_width: Width of the first actor [m]; NaN on an empty road.
         fps: Camera frame rate [Hz].

@@ -6,7 +6,7 @@ where a metric's name gives another.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan, degrees, inf, isfinite, nan
+from math import atan, degrees, inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -30,8 +30,8 @@ class Counterfactual:
 
     Attributes:
         threat: Whether it had contact.
-        contact_time: Time of contact [s]; NaN without contact.
-        relative_impact_speed: Relative impact speed [m/s]; NaN without contact.
+        contact_time: Time of contact [s]; inf without contact.
+        relative_impact_speed: Relative impact speed [m/s]; inf without contact.
     """
 
     threat: bool
@@ -41,14 +41,14 @@ class Counterfactual:
     @classmethod
     def of(cls, episode: Episode) -> "Counterfactual":
         """Return the counterfactual given by a `no-brake` episode."""
-        contact = float(episode.series["time"][-1]) if episode.collision else nan
+        contact = float(episode.series["time"][-1]) if episode.collision else inf
         return cls(episode.collision, contact, episode.relative_impact_speed)
 
     @classmethod
     def of_row(cls, row: dict[str, Any]) -> "Counterfactual":
         """Return the counterfactual given by a `no-brake` row."""
         if not row["collision"]:
-            return cls(False, nan, nan)
+            return cls(False, inf, inf)
         return cls(True, row["duration"], row["relative_impact_speed"])
 
 
@@ -80,7 +80,7 @@ class PairedEpisode:
         return cls(episode, counterfactual, premature, onset, int(alerts[0]) if alerts.size else None)
 
     def at(self, name: str, index: int | None) -> Value:
-        """Return the value of a series at an index; undefined for None, NaN and infinity."""
+        """Return the value of a series at an index; undefined for None and infinity."""
         return UNDEFINED if index is None else number(self.episode.series[name][index])
 
 
@@ -108,7 +108,7 @@ def measure(pair: PairedEpisode) -> dict[str, Any]:
 
 
 def number(value: Any) -> Value:
-    """Return a value as a float and whether it is finite, because JSON has no NaN."""
+    """Return a value as a float and whether it is finite, because JSON has no infinity."""
     return float(value), isfinite(value)
 
 
@@ -252,8 +252,7 @@ def min_ttc(pair: PairedEpisode) -> Value:
     """Lowest time to contact; 0 with contact, undefined if none was ever predicted."""
     if pair.episode.collision:
         return 0.0, True
-    values = pair.episode.series["ttc"]
-    return number(np.nanmin(values)) if np.isfinite(values).any() else UNDEFINED
+    return number(pair.episode.series["ttc"].min())
 
 
 @metric
@@ -261,7 +260,7 @@ def stopping_margin(pair: PairedEpisode) -> Value:
     """Lowest free distance ahead in a braked threat that ended without contact."""
     gaps = pair.episode.series["gap"]
     stopped = pair.counterfactual.threat and not pair.episode.collision and pair.onset is not None
-    return number(np.nanmin(gaps)) if stopped and np.isfinite(gaps).any() else UNDEFINED
+    return number(gaps.min()) if stopped else UNDEFINED
 
 
 @metric

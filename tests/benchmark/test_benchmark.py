@@ -25,11 +25,11 @@ from lgmd_gym.cli import main as cli
 
 SLOW_APPROACH = Case("test/CCRs/v20", "CCRs", (("ego_speed", 5.556),))
 THREAT = Counterfactual(True, 5.0, 10.0)
-NO_THREAT = Counterfactual(False, float("nan"), float("nan"))
+NO_THREAT = Counterfactual(False, float("inf"), float("inf"))
 BOUNDS = ("no-brake", "always-brake", "ttc-oracle", "spike-threshold")
 
 
-def episode(deceleration, collision=False, relative=float("nan"), alert=None):
+def episode(deceleration, collision=False, relative=float("inf"), alert=None):
     """Return an episode at 10 Hz and 10 m/s with a time to contact from 5 to 1 s."""
     n = len(deceleration)
     series = {name: np.zeros(n) for name in SERIES}
@@ -163,6 +163,13 @@ TELE = CameraParams.preset("tele")
 def test_condition_applies_to_every_kind_of_camera_argument(camera):
     foggy = SensorConfig([camera]).with_condition("fog").arguments["camera"]
     assert foggy == [TELE.with_condition("fog")]
+
+
+def test_plain_camera_holds_the_changes_of_its_preset():
+    camera = CameraParams.preset("tele", pitch_deg=1.5)
+    plain = SensorConfig(camera).plain.camera
+    assert plain == {"name": "tele", "pitch_deg": 1.5}
+    assert CameraParams.make(plain) == camera
 
 
 def test_birdseye_camera_supports_no_condition():

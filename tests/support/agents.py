@@ -21,7 +21,7 @@ class NeuronResponse(NamedTuple):
 def make_step(*frequencies, trace=False, cameras=1, potential=0.5, speed=8.0, yaw_rate=0.0, **truth):
     """Return observation and `info` after camera frames with these spike frequencies [spikes/s].
 
-    With `trace`, `info` contains every frame; ground truth is NaN unless given.
+    With `trace`, `info` contains every frame; ground truth is inf (undefined) unless given.
     """
     observation = {
         "spike_frequency": np.full(cameras, frequencies[-1], np.float32),
@@ -31,7 +31,7 @@ def make_step(*frequencies, trace=False, cameras=1, potential=0.5, speed=8.0, ya
         "frame": np.zeros((90, 160, cameras), np.uint8),
     }
     keys = ("ttc", "gap", "target_speed", "ego_speed")
-    info = {"lgmd/alert": frequencies[-1] >= 30} | dict.fromkeys(keys, float("nan")) | truth
+    info = {"lgmd/alert": frequencies[-1] >= 30} | dict.fromkeys(keys, float("inf")) | truth
     if trace:
         potentials = observation["membrane_potential"]
         responses = [NeuronResponse(np.full(cameras, value), potentials) for value in frequencies]
