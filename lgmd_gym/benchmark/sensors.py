@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, is_dataclass, replace
 from typing import Any
 
-from lgmd_gym.camera import CameraSpec, with_condition
+from lgmd_gym.camera import PRESETS, CameraParams, CameraSpec, with_condition
 from lgmd_gym.neuron import NeuronSpec
 
 DEFAULT_CAMERA = "fovea"
@@ -70,6 +70,14 @@ class SensorConfig:
 
 
 def _plain(value: Any) -> Any:
+    """Return parameters as plain values; of a camera only the fields that differ from its preset.
+
+    Fields of a dict take precedence over a condition, so a dict of all fields would disable conditions.
+    """
+    if isinstance(value, CameraParams):
+        base = asdict(PRESETS.get(value.name, CameraParams()))
+        changes = {name: field for name, field in asdict(value).items() if field != base[name]}
+        return {"name": value.name} | changes
     if is_dataclass(value) and not isinstance(value, type):
         return asdict(value)
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
