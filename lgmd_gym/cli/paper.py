@@ -5,17 +5,9 @@ from pathlib import Path
 
 from rich.console import Console
 
+from lgmd_gym.cli import video
 from lgmd_gym.cli.console import make_console
-from lgmd_gym.cli.options import Paper, Video
-from lgmd_gym.cli.video import (
-    detect_clips,
-    make_clip_folders,
-    make_run_folder,
-    print_errors,
-    print_notes,
-    process_clips,
-    progress_bar,
-)
+from lgmd_gym.cli.options import Paper
 from lgmd_gym.paper import experiments
 from lgmd_gym.paper.backgrounds import Panorama, Screen
 from lgmd_gym.paper.claims import claim_table, evaluate_claims, write_claims
@@ -36,10 +28,10 @@ def run(options: Paper) -> int:
     jobs = []
     if options.clips is not None:
         jobs = make_jobs([options.clips], options.crashes)
-        print_notes(jobs, Video(clips=(str(options.clips),), crashes=options.crashes))
+        video.print_notes(jobs, options.crashes)
     settings = {"clips": [job.clip for job in jobs], "picture": options.picture}
-    out = make_run_folder(options.out, "paper", settings)
-    with progress_bar("paper", experiments.STEPS) as set_progress:
+    out = video.make_run_folder(options.out, "paper", settings)
+    with video.progress_bar("paper", experiments.STEPS) as set_progress:
         steps = iter(range(1, experiments.STEPS + 1))
         results = experiments.run_experiments(lambda: set_progress(next(steps)), options.picture)
     console, clip_results, detections = make_console(120), [], None
@@ -50,7 +42,7 @@ def run(options: Paper) -> int:
     paper_figures(results, out)
     console.print(claim_table(claims))
     console.print(f"claims and figures: {out}", soft_wrap=True)
-    return print_errors(clip_results)
+    return video.print_errors(clip_results)
 
 
 def _process_all_configs(
@@ -61,12 +53,12 @@ def _process_all_configs(
     Returns:
         Results of all configurations, and the detections of the configuration `paper`.
     """
-    folders = make_clip_folders(out, jobs)
+    folders = video.make_clip_folders(out, jobs)
     results, detections = [], {}
     for name, config in PLAYBACK_CONFIGS.items():
-        batch = process_clips(jobs, folders, name, config, f"-{name}")
+        batch = video.process_clips(jobs, folders, name, config, f"-{name}")
         results += batch
-        detections[name] = detect_clips(jobs, batch)
+        detections[name] = video.detect_clips(jobs, batch)
     descriptions = {name: config.describe() for name, config in PLAYBACK_CONFIGS.items()}
     for name in ("paper", "conservative"):
         console.print(tables.detection_table(f"{name}: {descriptions[name]}", detections[name]))

@@ -28,7 +28,7 @@ def run(options: Video) -> int:
         raise ValueError("a clip is required: pass video files or folders, as in lgmd-gym video CLIP.mp4")
     configs = _configs(options)
     jobs = make_jobs(options.clips, options.crashes, options.crash_frame)
-    print_notes(jobs, options)
+    print_notes(jobs, options.crashes, options.fps)
     for job in jobs:  # decode the first frame of each clip before creating the folder
         next(iter(ClipRun(job.clip, next(iter(configs.values())))))
     out = make_run_folder(options.out, "video", {"clips": [job.clip for job in jobs], "configs": configs})
@@ -54,13 +54,13 @@ def run(options: Video) -> int:
     return print_errors(results)
 
 
-def print_notes(jobs: Sequence[ClipJob], options: Video) -> None:
+def print_notes(jobs: Sequence[ClipJob], crashes: Path | None, fps: float | None = None) -> None:
     """Print which clips are resampled and which have no annotation."""
     for job in jobs:
-        if job.info.variable and options.fps is None:
+        if job.info.variable and fps is None:
             _note(f"{job.clip.name} has a variable frame rate; resampled to {job.info.fps:g} Hz")
-        if options.crashes is not None and not job.annotated:
-            _note(f"{job.clip.name} has no row in {options.crashes}; it is not in the detection table")
+        if crashes is not None and not job.annotated:
+            _note(f"{job.clip.name} has no row in {crashes}; it is not in the detection table")
 
 
 def make_run_folder(out: Path | None, command: str, settings: dict[str, Any]) -> Path:
@@ -88,17 +88,7 @@ def process_clips(
     jobs: Sequence[ClipJob], folders: Sequence[Path], name: str, config: PlaybackConfig, suffix: str,
     *, overlay: bool = False, figure: bool = True,
 ) -> list[ClipResult]:  # fmt: skip
-    """Process every clip with one configuration and show a progress bar.
-
-    Args:
-        jobs: The clips.
-        folders: Existing folder of each clip.
-        name: Text of the progress bar.
-        config: Neuron parameters and frame processing.
-        suffix: Text after "trace" and "overlay" in the file names.
-        overlay: Whether to write overlay videos.
-        figure: Whether to draw figures.
-    """
+    """Process every clip with one configuration into its folder and show a progress bar."""
     results, frames_before = [], 0
     with progress_bar(name, sum(job.info.frames for job in jobs)) as set_progress:
         for job, folder in zip(jobs, folders, strict=True):
@@ -143,10 +133,9 @@ def progress_bar(name: str, total: float) -> Iterator[Callable[[float], None]]:
 def _configs(options: Video) -> dict[str, PlaybackConfig]:
     """Return the named configurations with the values of the other options."""
     names = tuple(PLAYBACK_CONFIGS) if options.configs == ("all",) else dict.fromkeys(options.configs)
-    values = {
-        "fps": options.fps, "size": options.size, "drop_duplicates": options.drop_duplicates,
-        "roi": options.roi,
-    }  # fmt: skip
+    values: dict[str, Any] = {
+        name: getattr(options, name) for name in ("fps", "size", "drop_duplicates", "roi")
+    }
     params = read_params(options.params)
     if params is not None:
         values["params"] = LGMDParams.from_dict(params)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ from lgmd_gym.paper.stimuli import (
 )
 
 FPS = 30.0
+SCREEN = Screen(fps=FPS)
 DARK, LIGHT, GREY = 20.0, 235.0, 127.5
 # The paper's model, an ablation and the previous model.
 MODELS = {
@@ -42,7 +44,6 @@ class StimulusResponse:
     """Responses of several models to one stimulus.
 
     Attributes:
-        name: Name of the stimulus.
         time: Time of each frame [s], shape (frames,).
         frequency: Spike frequency of each model [spikes/s], shape (frames,).
         potential: Membrane potential K of each model, shape (frames,).
@@ -51,7 +52,6 @@ class StimulusResponse:
         pictures: (time [s], frame) at selected times.
     """
 
-    name: str
     time: np.ndarray
     frequency: dict[str, np.ndarray]
     potential: dict[str, np.ndarray]
@@ -69,22 +69,17 @@ class StimulusResponse:
 
 
 def run_stimulus(
-    name: str,
-    screen: Screen,
-    seconds: float,
-    background: Background,
-    foreground: ForegroundObject | None = None,
-    models: Mapping[str, LGMDParams] = MODELS,
+    background: Background, foreground: ForegroundObject | None = None, seconds: float = CONTACT, *,
+    screen: Screen = SCREEN, models: Mapping[str, LGMDParams] = MODELS,
     picture_times: tuple[float, ...] = (),
-) -> StimulusResponse:
+) -> StimulusResponse:  # fmt: skip
     """Run several models on one stimulus.
 
     Args:
-        name: Name of the stimulus.
-        screen: Size, frame rate and scale.
-        seconds: Duration [s].
         background: Background.
         foreground: Moving object; None for none.
+        seconds: Duration [s].
+        screen: Size, frame rate and scale.
         models: Parameters of each model.
         picture_times: Times whose frames are stored [s].
     """
@@ -101,12 +96,9 @@ def run_stimulus(
     def series(field: str) -> dict[str, np.ndarray]:
         return {model: np.array([getattr(r, field) for r in rows]) for model, rows in responses.items()}
 
-    first = next(iter(models))
-    time = np.arange(len(responses[first])) / screen.fps
-    frequency, potential = series("spike_frequency"), series("membrane_potential")
-    return StimulusResponse(
-        name, time, frequency, potential, series("spikes"), series("ffi")[first], pictures
-    )
+    frequency, potential, spikes = map(series, ("spike_frequency", "membrane_potential", "spikes"))
+    ffi = next(iter(series("ffi").values()))
+    return StimulusResponse(np.arange(len(ffi)) / screen.fps, frequency, potential, spikes, ffi, pictures)
 
 
 class GratingResponse(NamedTuple):
@@ -125,20 +117,15 @@ class GratingResponse(NamedTuple):
 
 def gratings(on_step: StepCallback) -> list[GratingResponse]:
     """Return the responses to 30 gratings of full contrast: 6 spatial by 5 temporal frequencies."""
-    return [
-        grating_response(Grating(spatial=spatial, temporal=temporal), on_step)
-        for spatial in SPATIAL
-        for temporal in TEMPORAL
-    ]
+    stimuli = [Grating(spatial=spatial, temporal=rate) for spatial, rate in product(SPATIAL, TEMPORAL)]
+    return [grating_response(grating, on_step) for grating in stimuli]
 
 
 def low_contrast_gratings(on_step: StepCallback) -> list[GratingResponse]:
     """Return the responses to 30 gratings of 40 periods/m: 6 contrasts by 5 temporal frequencies."""
-    return [
-        grating_response(Grating(spatial=40.0, temporal=temporal, contrast=contrast), on_step)
-        for contrast in CONTRASTS
-        for temporal in TEMPORAL
-    ]
+    pairs = product(CONTRASTS, TEMPORAL)
+    stimuli = [Grating(spatial=40.0, temporal=rate, contrast=contrast) for contrast, rate in pairs]
+    return [grating_response(grating, on_step) for grating in stimuli]
 
 
 def grating_response(grating: Grating, on_step: StepCallback = lambda: None) -> GratingResponse:
@@ -149,7 +136,7 @@ def grating_response(grating: Grating, on_step: StepCallback = lambda: None) -> 
         "no warm start": LGMDParams(warm_start=False),
     }
     screen = Screen(shape=SHAPES["gratings"], fps=FPS)
-    response = run_stimulus("grating", screen, 1.2, grating, models=models)
+    response = run_stimulus(grating, seconds=1.2, screen=screen, models=models)
     on_step()
     potential = {model: float(values.max()) for model, values in response.potential.items()}
     return GratingResponse(grating, potential, float(response.ffi[1:].mean()))
@@ -174,16 +161,12 @@ class LoomingInGrating(NamedTuple):
 def looming_in_gratings(on_step: StepCallback) -> list[LoomingInGrating]:
     """Return the responses to squares that loom in gratings of 2 Hz."""
     results = []
-    for contrast in (0.2, 0.5, 1.0):
-        for spatial in (40.0, 60.0, 80.0):
-            for luminance in (DARK, LIGHT):
-                grating = Grating(spatial=spatial, temporal=2.0, contrast=contrast)
-                square = Looming(contact=CONTACT, luminance=luminance)
-                response = run_stimulus(
-                    f"{spatial:g}/m", Screen(fps=FPS), CONTACT, grating, square, picture_times=PICTURE_TIMES
-                )
-                results.append(LoomingInGrating(contrast, spatial, luminance, response))
-                on_step()
+    for contrast, spatial, luminance in product((0.2, 0.5, 1.0), (40.0, 60.0, 80.0), (DARK, LIGHT)):
+        grating = Grating(spatial=spatial, temporal=2.0, contrast=contrast)
+        square = Looming(contact=CONTACT, luminance=luminance)
+        response = run_stimulus(grating, square, picture_times=PICTURE_TIMES)
+        results.append(LoomingInGrating(contrast, spatial, luminance, response))
+        on_step()
     return results
 
 
@@ -203,17 +186,15 @@ class LuminanceLeads(NamedTuple):
 
 def light_and_dark(on_step: StepCallback) -> list[LuminanceLeads]:
     """Return the alarm times of dark and light squares on three grey backgrounds at 60 Hz."""
-    results = []
-    for background in (60.0, GREY, 195.0):
-        leads = []
-        for luminance in (DARK, LIGHT):
-            square = Looming(contact=CONTACT, luminance=luminance, l_over_v=0.2)
-            response = run_stimulus("plain", Screen(fps=60.0), CONTACT, Plain(luminance=background), square)
-            alarms = response.times_above(30.0)
-            leads.append(CONTACT - float(alarms[0]) if len(alarms) else math.nan)
-            on_step()
-        results.append(LuminanceLeads(background, *leads))
-    return results
+
+    def lead(background: float, luminance: float) -> float:
+        square = Looming(contact=CONTACT, luminance=luminance, l_over_v=0.2)
+        response = run_stimulus(Plain(luminance=background), square, screen=Screen(fps=60.0))
+        on_step()
+        alarms = response.times_above(30.0)
+        return CONTACT - float(alarms[0]) if len(alarms) else math.nan
+
+    return [LuminanceLeads(grey, lead(grey, DARK), lead(grey, LIGHT)) for grey in (60.0, GREY, 195.0)]
 
 
 def panorama(on_step: StepCallback, picture: Path | None = None) -> dict[str, StimulusResponse]:
@@ -230,7 +211,7 @@ def panorama(on_step: StepCallback, picture: Path | None = None) -> dict[str, St
     }
     responses = {}
     for name, (foreground, times) in objects.items():
-        responses[name] = run_stimulus(name, Screen(fps=FPS), CONTACT, background, foreground, models, times)
+        responses[name] = run_stimulus(background, foreground, models=models, picture_times=times)
         on_step()
     return responses
 
@@ -257,8 +238,7 @@ def approaches(on_step: StepCallback) -> list[Approach]:
     for l_over_v in L_OVER_V:
         contact = max(2.0, 8.0 * l_over_v)
         square = Looming(l_over_v=l_over_v, contact=contact, largest=85.0)
-        name = f"l/|v| {1000 * l_over_v:g} ms"
-        response = run_stimulus(name, Screen(fps=FPS), contact, Plain(), square)
+        response = run_stimulus(Plain(), square, contact)
         frequency = response.frequency["paper"]
         # The frequency is a mean over six frames, so its maximum spans several frames: take their middle.
         peak = response.time[frequency == frequency.max()].mean()
@@ -280,7 +260,7 @@ def selectivity(on_step: StepCallback) -> dict[str, dict[str, int]]:
     }
     counts: dict[str, dict[str, int]] = {model: {} for model in MODELS}
     for name, foreground in objects.items():
-        response = run_stimulus(name, Screen(fps=FPS), CONTACT, Plain(), foreground)
+        response = run_stimulus(Plain(), foreground)
         for model, spikes in response.spikes.items():
             counts[model][name] = int(spikes.sum())
         on_step()
@@ -320,11 +300,6 @@ def run_experiments(on_step: StepCallback, picture: Path | None = None) -> Exper
         picture: Image file for the panorama; None for a random image.
     """
     return ExperimentResults(
-        gratings(on_step),
-        low_contrast_gratings(on_step),
-        looming_in_gratings(on_step),
-        light_and_dark(on_step),
-        panorama(on_step, picture),
-        approaches(on_step),
-        selectivity(on_step),
-    )
+        gratings(on_step), low_contrast_gratings(on_step), looming_in_gratings(on_step),
+        light_and_dark(on_step), panorama(on_step, picture), approaches(on_step), selectivity(on_step),
+    )  # fmt: skip

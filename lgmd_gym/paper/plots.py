@@ -34,14 +34,9 @@ def paper_figures(results: ExperimentResults, folder: Path) -> list[Path]:
     """Draw every figure into a folder and return their paths."""
     plt = load_pyplot()
     paths = []
-    figures = {
-        "1-gratings": _gratings,
-        "2-looming-in-gratings": _looming,
-        "3-panorama": _panorama,
-        "4-biology": _biology,
-    }
+    names = ("1-gratings", "2-looming-in-gratings", "3-panorama", "4-biology")
     with plt.rc_context(STYLE):
-        for name, draw in figures.items():
+        for name, draw in zip(names, (_gratings, _looming, _panorama, _biology), strict=True):
             path = folder / f"{name}.png"
             figure = draw(plt, results)
             figure.savefig(path)
@@ -84,21 +79,10 @@ def _gratings(plt: Any, results: ExperimentResults) -> Any:
 
 
 def _heat_map(
-    axis: Any,
-    responses: list[GratingResponse],
-    values: tuple[float, ...],
-    key: Callable[[GratingResponse], float],
-    model: str,
-) -> Any:
-    """Draw the highest K of a model, with F̂ as text, over a property of the grating and its frequency.
-
-    Args:
-        axis: Axes to draw on.
-        responses: Responses to the gratings.
-        values: Values of the property.
-        key: Function that returns the property.
-        model: Name of the model.
-    """
+    axis: Any, responses: list[GratingResponse], values: tuple[float, ...],
+    key: Callable[[GratingResponse], float], model: str,
+) -> Any:  # fmt: skip
+    """Draw the highest K of a model, with F̂ as text, over a property of the gratings and their frequency."""
     table = np.zeros((len(values), len(TEMPORAL)))
     axis.grid(visible=False)
     for item in responses:
@@ -215,21 +199,12 @@ def _draw_peaks(left: Any, right: Any, results: ExperimentResults) -> None:
         left.plot(1000 * x, 1000 * (slope * x + intercept), color=colour, linewidth=1.0)
         angle = 2.0 * np.degrees(np.arctan(x / y))
         right.plot(1000 * x, angle, marker, color=colour, label=f"at the {name}")
-    left.plot(
-        1000 * x,
-        1000 * LOCUST_SLOPE * x - 27.0,
-        color="0.6",
-        linestyle="--",
-        label="locust: 4.7 · l/|v| - 27 ms",
-    )
+    locust = {"color": "0.6", "linestyle": "--"}
+    left.plot(1000 * x, 1000 * LOCUST_SLOPE * x - 27.0, label="locust: 4.7 · l/|v| - 27 ms", **locust)
     left.set_ylabel("time before contact [ms]")
     left.set_ylim(0.0, 1500.0)
-    right.axhline(
-        2.0 * math.degrees(math.atan(1.0 / LOCUST_SLOPE)),
-        color="0.6",
-        linestyle="--",
-        label="locust: 24°, 27 ms before its peak",
-    )
+    angle = 2.0 * math.degrees(math.atan(1.0 / LOCUST_SLOPE))
+    right.axhline(angle, label="locust: 24°, 27 ms before its peak", **locust)
     right.set_ylabel("angle of the square [deg]")
     right.set_ylim(0.0, 60.0)
     for axis in (left, right):

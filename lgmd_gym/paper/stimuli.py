@@ -43,41 +43,36 @@ class ScreenBox(NamedTuple):
     half_height: float
 
 
-class ForegroundObject(Protocol):
-    """Moving object in front of the background."""
+@dataclass(frozen=True, kw_only=True)
+class ForegroundObject:
+    """Moving object in front of the background.
 
-    @property
-    def luminance(self) -> float:
-        """Luminance in 0-255."""
-        ...
+    Attributes:
+        luminance: Luminance in 0-255.
+        outline: Outline of the object.
+    """
 
-    @property
-    def outline(self) -> Literal["square", "disc"]:
-        """Outline of the object."""
-        ...
+    luminance: float = 20.0
+    outline: Literal["square", "disc"] = "square"
 
     def box(self, time: float, screen: Screen) -> ScreenBox:
         """Return the position at a time [s]."""
-        ...
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Looming:
+class Looming(ForegroundObject):
     """An object that approaches the eye at constant speed; its angle is 2·atan(l/|v| / time to contact).
 
     Attributes:
         l_over_v: Half its size over its speed [s].
         contact: Time of contact with the eye [s].
         largest: Angular half size at which it stops [deg].
-        luminance: Luminance in 0-255.
-        outline: Outline of the object.
     """
 
     l_over_v: float = 0.1
     contact: float = 3.0
     largest: float = 40.0
-    luminance: float = 20.0
-    outline: Literal["square", "disc"] = "square"
 
     def box(self, time: float, screen: Screen) -> ScreenBox:
         """Return the position at a time [s]."""
@@ -105,22 +100,18 @@ class Receding(Looming):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Translating:
+class Translating(ForegroundObject):
     """An object of constant size that moves sideways across the screen.
 
     Attributes:
         half_size: Half its size on the screen [m].
         speed: Speed on the screen [m/s], + to the right.
         centred: Time at which it is at the centre of the screen [s].
-        luminance: Luminance in 0-255.
-        outline: Outline of the object.
     """
 
     half_size: float = 0.04
     speed: float = PAPER_SPEED
     centred: float = 2.0
-    luminance: float = 20.0
-    outline: Literal["square", "disc"] = "square"
 
     def box(self, time: float, screen: Screen) -> ScreenBox:
         """Return the position at a time [s]."""
@@ -129,22 +120,18 @@ class Translating:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Elongating:
+class Elongating(ForegroundObject):
     """An object whose edges move outwards at constant speed on the screen.
 
     Attributes:
         start: Half size at time 0 [m].
         speed: Speed of each edge [m/s].
         all_round: Whether the upper and lower edges move as well.
-        luminance: Luminance in 0-255.
-        outline: Outline of the object.
     """
 
     start: float = 0.01
     speed: float = PAPER_SPEED
     all_round: bool = True
-    luminance: float = 20.0
-    outline: Literal["square", "disc"] = "square"
 
     def box(self, time: float, screen: Screen) -> ScreenBox:
         """Return the position at a time [s]."""
@@ -153,11 +140,9 @@ class Elongating:
 
 
 def stimulus_frames(
-    screen: Screen,
-    seconds: float,
-    background: Background | None = None,
+    screen: Screen, seconds: float, background: Background | None = None,
     foreground: ForegroundObject | None = None,
-) -> Iterator[Frame]:
+) -> Iterator[Frame]:  # fmt: skip
     """Yield the grey frames of a stimulus: uint8, shape (height, width), row 0 at the top.
 
     Args:

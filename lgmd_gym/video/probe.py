@@ -47,10 +47,8 @@ def probe(path: str | Path) -> VideoInfo:
         ValueError: For a file that is missing, empty, not a video, or without a video stream.
     """
     path = Path(path)
-    if not path.exists():
-        raise ValueError(f"clip {str(path)!r} does not exist")
     if not path.is_file():
-        raise ValueError(f"clip {str(path)!r} is not a file")
+        raise ValueError(f"clip {str(path)!r} {'is not a file' if path.exists() else 'does not exist'}")
     if path.stat().st_size == 0:
         raise ValueError(f"clip {str(path)!r} is empty (0 bytes)")
     with open_video(path) as (container, stream):
@@ -85,9 +83,7 @@ def open_video(path: Path) -> Iterator["tuple[InputContainer, VideoStream]"]:
     try:
         container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
     except FFmpegError as error:
-        raise ValueError(
-            f"clip {str(path)!r} is truncated or not a video: {error.strerror or 'ffmpeg cannot read it'}"
-        ) from None
+        raise ValueError(f"clip {str(path)!r} is truncated or not a video: {error.strerror}") from None
     with container:
         for stream in container.streams.video:
             if not stream.disposition & Disposition.attached_pic:
@@ -97,12 +93,7 @@ def open_video(path: Path) -> Iterator["tuple[InputContainer, VideoStream]"]:
 
 
 def _scan(container: "InputContainer", stream: "VideoStream") -> tuple[int, np.ndarray, float, float]:
-    """Read all packets of a file.
-
-    Returns:
-        Number of frames and their sorted time stamps [ticks] in the video stream; end of the last packet of
-        that stream and of any stream [s].
-    """
+    """Return the frames and sorted time stamps [ticks] of a stream, its end and that of all streams [s]."""
     frames, stamps = 0, array("q")  # eight bytes per frame: 2 MB for two hours
     end = file_end = 0.0
     for packet in container.demux(container.streams.video + container.streams.audio):
@@ -119,13 +110,7 @@ def _scan(container: "InputContainer", stream: "VideoStream") -> tuple[int, np.n
 
 
 def _rate(stamps: np.ndarray, tick: float, named: float) -> tuple[float, bool]:
-    """Return the frame rate [Hz] and whether it varies.
-
-    Args:
-        stamps: Sorted time stamps [ticks].
-        tick: Duration of a tick [s].
-        named: Frame rate in the file's header [Hz].
-    """
+    """Return the frame rate [Hz] and whether it varies; `named` is the rate in the file's header [Hz]."""
     intervals = np.sort(np.diff(stamps))
     intervals = intervals[intervals > 0]
     if not len(intervals):

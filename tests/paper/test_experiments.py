@@ -19,7 +19,7 @@ def stimulus_response(frequency):
     frequency = np.asarray(frequency, float)
     models = dict.fromkeys([*experiments.MODELS, "T_sp = 0.78", "sigma_3 = 2"], frequency)
     time = np.arange(len(frequency)) / experiments.FPS
-    return experiments.StimulusResponse("", time, models, models, models, np.full(len(time), 9.0), [])
+    return experiments.StimulusResponse(time, models, models, models, np.full(len(time), 9.0), [])
 
 
 def grating_response(contrast, temporal, k):

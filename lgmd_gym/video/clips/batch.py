@@ -1,5 +1,6 @@
 """Process clips and write their traces, figures and overlay videos to a folder."""
 
+import csv
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -12,7 +13,7 @@ import numpy as np
 from lgmd_gym.video import TruncatedVideoError, find_clips
 from lgmd_gym.video.clips.annotations import read_crashes
 from lgmd_gym.video.clips.detection import ClipDetection, detect
-from lgmd_gym.video.clips.playback import TRACE_COLUMNS, ClipRun, ClipTraceWriter, PlaybackConfig
+from lgmd_gym.video.clips.playback import TRACE_COLUMNS, ClipRun, PlaybackConfig
 from lgmd_gym.video.clips.summary import ClipSummary
 from lgmd_gym.video.probe import VideoInfo, probe
 
@@ -112,7 +113,8 @@ def process_clip(
     result = ClipResult(job.clip, folder / f"trace{suffix}.csv", ClipSummary(reader.fps, crash_frame))
     start = time.perf_counter()
     with ExitStack() as stack:
-        trace = stack.enter_context(ClipTraceWriter(result.trace))
+        trace = csv.writer(stack.enter_context(result.trace.open("w", newline="", encoding="utf-8")))
+        trace.writerow(TRACE_COLUMNS)
         overlay_writer = None
         if overlay:
             from lgmd_gym.video.clips.overlay import OverlayWriter
@@ -122,7 +124,7 @@ def process_clip(
             stack.enter_context(overlay_writer)
         try:
             for frame in run:
-                trace.write(frame)
+                trace.writerow(frame.row())
                 result.summary.add(frame)
                 if overlay_writer is not None and run.neuron is not None:
                     overlay_writer.write(frame, run.neuron)

@@ -1,11 +1,10 @@
 """Run the neuron on a video, frame by frame."""
 
-import csv
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -185,22 +184,3 @@ class DuplicateFilter:
         self._last = grey
         self._differences.append(difference)
         return False
-
-
-class ClipTraceWriter:
-    """Write one CSV row per frame; use it in a `with` block. An interrupted run keeps its rows."""
-
-    def __init__(self, path: Path) -> None:
-        self._file: IO[str] = path.open("w", newline="", encoding="utf-8")
-        self._writer = csv.writer(self._file)
-        self._writer.writerow(TRACE_COLUMNS)
-
-    def write(self, frame: ClipFrame) -> None:
-        """Append one row."""
-        self._writer.writerow(frame.row())
-
-    def __enter__(self) -> "ClipTraceWriter":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._file.close()

@@ -69,17 +69,18 @@ def _draw_series(axes: list[Any], series: dict[str, np.ndarray], config: Playbac
     threshold = p.sigma_1 * p.t_f
     if np.isfinite(threshold) and series["ffi"].max() > 0.6 * threshold:
         inhibition.axhline(threshold, color="0.5", linestyle=":", linewidth=1.0)
-        _annotate(inhibition, (0.995, threshold + 0.3), f"inhibition grows above {threshold:g}", "0.4", data="y")
+        _annotate(
+            inhibition, (0.995, threshold + 0.3), f"inhibition grows above {threshold:g}", "0.4", data="y"
+        )
     potential.plot(time, series["membrane_potential"], color=COLOURS[6], label="K")
     potential.plot(time, series["adapted_potential"], color=COLOURS[0], label="K̂, adapted")
     potential.axhline(p.t_sp, color="0.5", linestyle=":", linewidth=1.0)
-    _annotate(potential, (0.995, p.t_sp + 0.01), f"first spike at T_sp = {p.t_sp:g}", "0.4", data="y")
+    _annotate(potential, (0.995, p.t_sp + 0.01), f"first spike at T_sp = {p.t_sp:g}", data="y")
     potential.set_ylim(0.45, 1.02)
     potential.set_ylabel("membrane\npotential")
     potential.legend(loc="upper left", fontsize=8, ncols=2)
-    raster.vlines(
-        time, 0.0, series["spikes"], color=COLOURS[0], linewidth=1.0 if len(time) < BINS // 8 else 0.4
-    )
+    width = 1.0 if len(time) < BINS // 8 else 0.4
+    raster.vlines(time, 0.0, series["spikes"], color=COLOURS[0], linewidth=width)
     raster.set_ylabel("spikes\nper frame")
     frequency.plot(time, series["spike_frequency"], color=COLOURS[0])
     alarm = series["spike_frequency"] >= p.t_sf
@@ -91,16 +92,8 @@ def _draw_series(axes: list[Any], series: dict[str, np.ndarray], config: Playbac
         axis.set_ylim(bottom=0.0)
 
 
-def _annotate(axis: Any, at: tuple[float, float], text: str, colour: str, data: str = "x") -> None:
-    """Write a small annotation.
-
-    Args:
-        axis: Axes to write on.
-        at: Position.
-        text: Annotation.
-        colour: Text colour.
-        data: Coordinate of `at` in data units; the other is a fraction of the axes.
-    """
+def _annotate(axis: Any, at: tuple[float, float], text: str, colour: str = "0.4", data: str = "x") -> None:
+    """Write a small text; the coordinate `data` is in data units, the other a fraction of the axes."""
     units = ("data", "axes fraction") if data == "x" else ("axes fraction", "data")
     side = "left" if data == "x" else "right"
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}

@@ -1,20 +1,20 @@
 """Terminal tables of processed clips."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.video.clips.batch import ClipResult
-from lgmd_gym.video.clips.detection import ChanceLevel, ClipDetection, summarize_detections
+from lgmd_gym.video.clips.detection import ChanceLevel, ClipDetection, DetectionSummary, summarize_detections
 
 DETECTION_CAPTION = (
     "onset: an alarm after 1/3 s without alarm, in the 1.5 s before the crash (45 frames at 30 Hz). Earlier "
     "frames: those before that window, without the first 8/30 s; in a clip without a crash, all frames. "
-    "Chance: probability of an onset in any 1.5 s, from the onsets in the earlier frames [95 % interval]; few "
-    "frames give a wide interval. p: probability of at least as many hits, each at the upper bound of the "
-    "chance over all clips."
+    "Chance: probability of an onset in any 1.5 s, from the onsets in the earlier frames [95 % interval]; "
+    "few frames give a wide interval. p: probability of at least as many hits, each at the upper bound of "
+    "the chance over all clips."
 )
 CONFIG_CAPTION = (
     "hits: crashes with an onset in the 1.5 s before. Chance: probability of an onset in any 1.5 s, from the "
@@ -36,16 +36,12 @@ def clip_table(results: Sequence[ClipResult]) -> Table:
     table = _table(("clip",), CLIP_COLUMNS)
     for item in results:
         s = item.summary
+        first = "–" if s.first_alarm is None else f"{s.first_alarm:.2f}"
+        alarm, speed = 100.0 * s.alarms / max(s.frames, 1), s.frames / s.fps / item.seconds
         table.add_row(
-            item.clip.name,
-            str(s.frames),
-            f"{s.peak:.0f}",
-            "–" if s.first_alarm is None else f"{s.first_alarm:.2f}",
-            str(s.onsets),
-            f"{100.0 * s.alarms / max(s.frames, 1):.0f}",
-            str(item.duplicates) if item.duplicates else "–",
-            f"{s.frames / s.fps / item.seconds:.0f}",
-        )
+            item.clip.name, str(s.frames), f"{s.peak:.0f}", first, str(s.onsets), f"{alarm:.0f}",
+            str(item.duplicates or "–"), f"{speed:.0f}",
+        )  # fmt: skip
     return table
 
 
@@ -53,29 +49,15 @@ def detection_table(title: str, detections: Sequence[ClipDetection]) -> Table:
     """Return one row per clip and one for all: onset before the crash, and its probability by chance."""
     table = _table(("clip",), DETECTION_COLUMNS, title, DETECTION_CAPTION)
     for item in detections:
-        crash = item.crash_s is not None
+        hit = "–" if item.crash_s is None else "no" if item.lead_s is None else "yes"
         table.add_row(
-            item.clip,
-            f"{item.crash_s:.2f}" if item.crash_s is not None else "none",
-            ("yes" if item.lead_s is not None else "no") if crash else "–",
-            f"{item.lead_s:.2f}" if item.lead_s is not None else "–",
-            _percentage(item.alarm_frames),
-            f"{item.chance.onsets} in {item.chance.seconds:.1f}",
-            _interval(item.chance),
-            f"{item.peak:.0f}",
-        )
+            item.clip, _seconds(item.crash_s, "none"), hit, _seconds(item.lead_s),
+            *_chance_cells(item), f"{item.peak:.0f}",
+        )  # fmt: skip
     total = summarize_detections(detections)
+    hits, lead = f"{total.hits.k} of {total.hits.n}", _seconds(total.lead_s)
     table.add_section()
-    table.add_row(
-        "all",
-        "",
-        f"{total.hits.k} of {total.hits.n}",
-        f"{total.lead_s:.2f}" if total.hits.k else "–",
-        _percentage(total.alarm_frames),
-        f"{total.chance.onsets} in {total.chance.seconds:.1f}",
-        _interval(total.chance),
-        f"p = {total.p_value:.1g}",
-    )
+    table.add_row("all", "", hits, lead, *_chance_cells(total), f"p = {total.p_value:.1g}")
     return table
 
 
@@ -91,16 +73,12 @@ def config_table(detections: Mapping[str, Sequence[ClipDetection]], descriptions
     )
     for name, items in detections.items():
         total = summarize_detections(items)
+        alarm = 100.0 * total.alarm_frames.k / max(total.alarm_frames.n, 1)
         table.add_row(
-            name,
-            descriptions[name],
-            f"{total.hits.k}/{total.hits.n}",
-            _interval(total.chance),
-            f"{total.p_value:.1g}",
-            f"{total.lead_s:.2f}" if total.hits.k else "–",
-            f"{100.0 * total.alarm_frames.k / max(total.alarm_frames.n, 1):.0f}",
+            name, descriptions[name], f"{total.hits.k}/{total.hits.n}", _interval(total.chance),
+            f"{total.p_value:.1g}", _seconds(total.lead_s), f"{alarm:.0f}",
             f"{total.silent_clips.k}/{total.silent_clips.n}",
-        )
+        )  # fmt: skip
     return table
 
 
@@ -116,9 +94,15 @@ def _table(
     return table
 
 
-def _percentage(rate: Rate) -> str:
-    """Return k/n and the percentage."""
-    return "–" if rate.n == 0 else f"{rate.k}/{rate.n} = {100.0 * rate.k / rate.n:.0f} %"
+def _seconds(value: float | None, missing: str = "–") -> str:
+    return missing if value is None or math.isnan(value) else f"{value:.2f}"
+
+
+def _chance_cells(item: ClipDetection | DetectionSummary) -> tuple[str, str, str]:
+    """Return the share of alarm frames, the onsets and the chance level of the earlier part."""
+    rate, chance = item.alarm_frames, item.chance
+    share = "–" if rate.n == 0 else f"{rate.k}/{rate.n} = {100.0 * rate.k / rate.n:.0f} %"
+    return share, f"{chance.onsets} in {chance.seconds:.1f}", _interval(chance)
 
 
 def _interval(chance: ChanceLevel) -> str:
