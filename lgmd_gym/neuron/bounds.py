@@ -5,14 +5,7 @@ from typing import Any, NamedTuple
 
 
 class _Bound(NamedTuple):
-    """Range of a field.
-
-    Attributes:
-        low: Smallest value.
-        high: Largest finite value.
-        exclusive: Whether `low` itself is excluded.
-        infinite: Whether infinity is allowed.
-    """
+    """Range of a field; `exclusive` excludes `low` itself."""
 
     low: float
     high: float = math.inf

@@ -72,15 +72,7 @@ def danger_zone(
 
 
 def _nearest_section(slope: NDArray, camera: float, clearance: float, near: float, far: float) -> NDArray:
-    """Return the distance at which each ray enters the box above the lane; infinite without entry.
-
-    Args:
-        slope: Tangents of the rays' angles below the horizon.
-        camera: Height of the camera [m].
-        clearance: Height of the box [m].
-        near: Distance at which the box begins [m].
-        far: Distance at which the box ends [m].
-    """
+    """Return the distance [m] at which rays of a slope enter the box above the lane, or infinity."""
     with np.errstate(divide="ignore"):
         ground = np.where(slope > 0, camera / slope, np.inf)  # intersection with the ground
         top = (camera - clearance) / slope  # intersection with the top of the box

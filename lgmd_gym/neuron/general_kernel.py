@@ -1,7 +1,5 @@
 """General kernel: every structural option of `LGMDParams`, in plain loops; `kernels` is the fast kernel."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -10,10 +8,10 @@ from lgmd_gym.neuron import scalars as sc
 from lgmd_gym.neuron.scalars import feed_forward, fire
 
 
-class GeneralMaps(NamedTuple):
-    """Maps of N neurons, float32.
+def allocate(num: int, shape: tuple[int, int], n_p: int, paths: int) -> tuple[NDArray[np.float32], ...]:
+    """Return the maps of `num` neurons over `shape` pixels, filled with 0; ON and OFF are two paths.
 
-    Attributes:
+    Returns:
         p: P of the last n_p frames (at least one), newest first, (N, n_p, H, W).
         e: E per path with a border of one pixel, (N, paths, H + 2, W + 2).
         memory: Memory of the delay per path and ring, (N, paths, 3, H, W).
@@ -21,23 +19,12 @@ class GeneralMaps(NamedTuple):
         s: S with a border of one pixel, (N, H + 2, W + 2).
         g: G, (N, H, W).
     """
-
-    p: NDArray[np.float32]
-    e: NDArray[np.float32]
-    memory: NDArray[np.float32]
-    inhibition: NDArray[np.float32]
-    s: NDArray[np.float32]
-    g: NDArray[np.float32]
-
-
-def allocate(num: int, shape: tuple[int, int], n_p: int, paths: int) -> GeneralMaps:
-    """Return the maps of `num` neurons over `shape` pixels, filled with 0; ON and OFF are two paths."""
     h, w = shape
     sizes = (
         (num, max(n_p, 1), h, w), (num, paths, h + 2, w + 2), (num, paths, 3, h, w), (num, paths, h, w),
         (num, h + 2, w + 2), (num, h, w),
     )  # fmt: skip
-    return GeneralMaps(*(np.zeros(size, np.float32) for size in sizes))
+    return tuple(np.zeros(size, np.float32) for size in sizes)
 
 
 @njit(cache=True, nogil=True)
@@ -152,25 +139,12 @@ def grouping(s, g_map, row, const) -> float | np.floating:
 def step(
     first, last, frames, previous, y0, x0, weight, active, scalars, const, p, e, memory, inhibition, s, g
 ) -> None:  # fmt: skip
-    """Step the active neurons among first..last-1.
+    """Step the active neurons among first..last-1 and update `previous`, `scalars` and the maps.
 
-    Args:
-        first: First neuron.
-        last: One beyond the last neuron.
-        frames: New frames, (N, H, W), uint8 or float32.
-        previous: Last luminance of the region, (N, h, w), in the dtype of `frames`; overwritten.
-        y0: First row of the region in the frame.
-        x0: First column of the region in the frame.
-        weight: Pixel weights of the region, (h, w) float32; of shape (0, 0) if all are 1.
-        active: Selection of neurons, (N,) bool.
-        scalars: Scalar states, (N, RING + n_ts) float64, indexed by the names in `scalars`.
-        const: Packed constants, indexed by the names in `scalars`.
-        p: P; this and the following arguments are the fields of `GeneralMaps`.
-        e: E.
-        memory: Memory of the delay.
-        inhibition: I.
-        s: S.
-        g: G.
+    `frames` (N, H, W) and `previous`, the last frames of the region (N, h, w), are uint8 or float32. The
+    region starts at (y0, x0); `weight` holds its pixel weights, (h, w) float32, or is of shape (0, 0) if all
+    are 1. `active` is (N,) bool. `scalars` (N, RING + n_ts) and `const` are float64, indexed by the names in
+    `scalars`. The other arguments are the maps of `allocate`.
     """
     for n in range(first, last):
         if not active[n]:

@@ -233,8 +233,8 @@ def step(
 ) -> None:  # fmt: skip
     """Step the active neurons among first..last-1.
 
-    The arguments are those of `general_kernel.step`, with the fields of `state.Maps`. S and S * Ce are
-    scratch memory; all neurons of a call share those of the first, which stay in the cache.
+    The arguments are those of `general_kernel.step`, with the maps of `state.allocate`. S and S * Ce
+    are scratch memory; all neurons of a call share those of the first, which stay in the cache.
     """
     h, w, width = previous.shape[1], previous.shape[2], frames.shape[2]
     columns = -(-w // LANES) * LANES

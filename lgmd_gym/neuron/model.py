@@ -111,13 +111,12 @@ class LGMD:
         if frame.dtype != self._previous.dtype:
             frame = self._as_float(frame)
         frames = frame[None] if self.num is None else frame
-        region = (self._previous, self._y0, self._x0, self._weight)
-        args = (frames, *region, selected, self._scalars, self._const, *self._maps)
+        arguments = (self._previous, self._y0, self._x0, self._weight, selected, self._scalars, self._const)
         kernel = kernels.step if self._fast else general_kernel.step
         if self._threads.count == 1:
-            kernel(0, self._count, *args)
+            kernel(0, self._count, frames, *arguments, *self._maps)
         else:
-            self._threads.run(kernel, self._count, args)
+            self._threads.run(kernel, self._count, (frames, *arguments, *self._maps))
         return self._response()
 
     def reset(self, mask: ArrayLike | None = None) -> None:

@@ -102,73 +102,44 @@ def splat(typingctx, value):
     return vector(types.float32), codegen
 
 
-def _binary(emit):
-    """Return an intrinsic of two vectors, given the function that emits its instruction."""
-
-    @intrinsic
-    def function(typingctx, a, b):
-        def codegen(context, builder, signature, args):
-            return emit(builder, *args)
-
-        return vector(vector, vector), codegen
-
-    return function
+def _elementwise(arity, emit):
+    """Return an intrinsic of `arity` vectors, given the function that emits its instructions."""
+    result = vector(*[vector] * arity), lambda context, builder, signature, args: emit(builder, *args)
+    functions = {
+        1: lambda typingctx, a: result,
+        2: lambda typingctx, a, b: result,
+        3: lambda typingctx, a, b, c: result,
+    }
+    return intrinsic(functions[arity])
 
 
-def _call(builder, name, args, result: ir.Type = _FLOATS):
+def _call(builder, name, *args, result: ir.Type = _FLOATS):
     """Emit a call of an LLVM intrinsic, given its full name."""
     kind = ir.FunctionType(result, [arg.type for arg in args])
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), args)
 
 
-_add = _binary(lambda b, x, y: b.fadd(x, y))
-_sub = _binary(lambda b, x, y: b.fsub(x, y))
-_mul = _binary(lambda b, x, y: b.fmul(x, y))
+def _abs(builder, x):
+    return _call(builder, f"llvm.fabs.v{LANES}f32", x)
+
+
+_add = _elementwise(2, lambda b, x, y: b.fadd(x, y))
+_sub = _elementwise(2, lambda b, x, y: b.fsub(x, y))
+_mul = _elementwise(2, lambda b, x, y: b.fmul(x, y))
+# x * y + z, with a single rounding if the machine supports it.
+madd = _elementwise(3, lambda b, x, y, z: _call(b, f"llvm.fmuladd.v{LANES}f32", x, y, z))
+# |x|.
+magnitude = _elementwise(1, _abs)
 # Larger of both lanes; neither may be NaN.
-maximum = _binary(lambda b, x, y: b.select(b.fcmp_ordered(">", x, y), x, y))
-# x where x >= y, else 0.
-at_least = _binary(lambda b, x, y: b.select(b.fcmp_ordered(">=", x, y), x, _ZEROS))
-
-
-@intrinsic
-def madd(typingctx, a, b, c):
-    """Return a * b + c, with a single rounding if the machine supports it."""
-
-    def codegen(context, builder, signature, args):
-        return _call(builder, f"llvm.fmuladd.v{LANES}f32", args)
-
-    return vector(vector, vector, vector), codegen
-
-
-@intrinsic
-def magnitude(typingctx, a):
-    """Return |a|."""
-
-    def codegen(context, builder, signature, args):
-        return _call(builder, f"llvm.fabs.v{LANES}f32", args)
-
-    return vector(vector), codegen
-
-
-@intrinsic
-def clear_below(typingctx, a, limit):
-    """Return `a` where |a| >= limit, else 0."""
-
-    def codegen(context, builder, signature, args):
-        size = _call(builder, f"llvm.fabs.v{LANES}f32", args[:1])
-        return builder.select(builder.fcmp_ordered(">=", size, args[1]), args[0], _ZEROS)
-
-    return vector(vector, vector), codegen
-
-
-@intrinsic
-def select_by_sign(typingctx, sign, plus, minus):
-    """Return `plus` where sign >= 0, else `minus`."""
-
-    def codegen(context, builder, signature, args):
-        return builder.select(builder.fcmp_ordered(">=", args[0], _ZEROS), args[1], args[2])
-
-    return vector(vector, vector, vector), codegen
+maximum = _elementwise(2, lambda b, x, y: b.select(b.fcmp_ordered(">", x, y), x, y))
+# x where x >= limit, else 0.
+at_least = _elementwise(2, lambda b, x, limit: b.select(b.fcmp_ordered(">=", x, limit), x, _ZEROS))
+# x where |x| >= limit, else 0.
+clear_below = _elementwise(
+    2, lambda b, x, limit: b.select(b.fcmp_ordered(">=", _abs(b, x), limit), x, _ZEROS)
+)
+# x where sign >= 0, else y.
+select_by_sign = _elementwise(3, lambda b, sign, x, y: b.select(b.fcmp_ordered(">=", sign, _ZEROS), x, y))
 
 
 @intrinsic
@@ -189,27 +160,19 @@ def largest(typingctx, a):
     """Return the largest of all lanes, float32; none may be NaN."""
 
     def codegen(context, builder, signature, args):
-        return _call(builder, f"llvm.vector.reduce.fmax.v{LANES}f32", args, ir.FloatType())
+        return _call(builder, f"llvm.vector.reduce.fmax.v{LANES}f32", *args, result=ir.FloatType())
 
     return types.float32(vector), codegen
 
 
-@overload(operator.add)
-def _overload_add(a, b):
-    if a == vector and b == vector:
-        return lambda a, b: _add(a, b)
-    return None
+def _overload_operator(symbol, function) -> None:
+    """Make a Python operator of two vectors call an intrinsic."""
+
+    @overload(symbol)
+    def implementation(a, b):
+        return (lambda a, b: function(a, b)) if a == vector and b == vector else None
 
 
-@overload(operator.sub)
-def _overload_sub(a, b):
-    if a == vector and b == vector:
-        return lambda a, b: _sub(a, b)
-    return None
-
-
-@overload(operator.mul)
-def _overload_mul(a, b):
-    if a == vector and b == vector:
-        return lambda a, b: _mul(a, b)
-    return None
+_overload_operator(operator.add, _add)
+_overload_operator(operator.sub, _sub)
+_overload_operator(operator.mul, _mul)

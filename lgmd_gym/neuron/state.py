@@ -1,7 +1,6 @@
 """Memory layout of the maps of the fast kernel."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,42 +9,30 @@ from lgmd_gym.neuron import scalars as sc
 from lgmd_gym.neuron.simd import LANES
 
 
-class Maps(NamedTuple):
-    """Maps of N neurons over H rows of `blocks` blocks of 16 pixels; float32 unless stated otherwise.
+def allocate(num: int, shape: tuple[int, int]) -> tuple[NDArray, ...]:
+    """Return the maps of `num` neurons over `shape` pixels, filled with 0.
 
-    Attributes:
+    Rows are padded to `columns`, a multiple of 16 pixels. Maps are float32 unless stated otherwise.
+
+    Returns:
         p: P of the current and the last frame in turn, with borders, (N, 2, size).
-        memory: Delayed rings; each block holds 16 lanes of |P| and of P per ring, (N, H * blocks * 6 * 16).
-        s: The last three rows of S, and their column sums with a border, (N, 4 * blocks * 16 + 32).
-        products: S * Ce of the rows that can pass the grouping threshold, (N, H * blocks * 16).
-        g: G, (N, H * blocks * 16).
+        memory: Delayed rings; each block of 16 pixels holds 16 lanes of |P| and of P per ring,
+            (N, H * columns * 6).
+        s: The last three rows of S, and their column sums with a border, (N, 4 * columns + 32).
+        products: S * Ce of the rows that can pass the grouping threshold, (N, H * columns).
+        g: G, (N, H * columns).
         slots: Per row, the index of its S * Ce or -1, and whether its G is not 0, (N, 2, H) int32.
     """
-
-    p: NDArray[np.float32]
-    memory: NDArray[np.float32]
-    s: NDArray[np.float32]
-    products: NDArray[np.float32]
-    g: NDArray[np.float32]
-    slots: NDArray[np.int32]
-
-
-def allocate(num: int, shape: tuple[int, int]) -> Maps:
-    """Return the maps of `num` neurons over `shape` pixels, filled with 0."""
     h, w = shape
-    blocks = -(-w // LANES)
-    columns = blocks * LANES
-    return Maps(
-        p=_aligned_zeros(num, 2, LANES + (h + 2) * (columns + LANES)),
-        memory=_aligned_zeros(num, h * columns * 6),
-        s=_aligned_zeros(num, 4 * columns + 2 * LANES),
-        products=_aligned_zeros(num, h * columns),
-        g=_aligned_zeros(num, h * columns),
-        slots=np.zeros((num, 2, h), np.int32),
-    )
+    columns = -(-w // LANES) * LANES
+    sizes = (
+        (num, 2, LANES + (h + 2) * (columns + LANES)), (num, h * columns * 6), (num, 4 * columns + 2 * LANES),
+        (num, h * columns), (num, h * columns),
+    )  # fmt: skip
+    return *(_aligned_zeros(size) for size in sizes), np.zeros((num, 2, h), np.int32)
 
 
-def _aligned_zeros(*shape: int) -> NDArray[np.float32]:
+def _aligned_zeros(shape: tuple[int, ...]) -> NDArray[np.float32]:
     """Return zeros that start at a multiple of a vector's size: loads across cache lines cost twice."""
     size = math.prod(shape)
     buffer = np.zeros(size + LANES, np.float32)
@@ -54,7 +41,7 @@ def _aligned_zeros(*shape: int) -> NDArray[np.float32]:
 
 
 def layers(scalars, const, p, memory, s, products, g, slots) -> dict[str, NDArray[np.float32]]:
-    """Return P, E, I, S and G of the last frame, each of shape (N, H, blocks * 16)."""
+    """Return P, E, I, S and G of the last frame, each of shape (N, H, columns)."""
     num, h = len(scalars), slots.shape[2]
     current = (scalars[:, sc.AGE].astype(int) - 1) % 2
     bordered = p[np.arange(num), current, LANES:].reshape(num, h + 2, -1)

@@ -62,11 +62,9 @@ def checked_mask(mask: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
 def checked_region(
     shape: tuple[int, int], mask: ArrayLike | None, roi: tuple[int, int, int, int] | None
 ) -> tuple[int, int, tuple[int, int], NDArray[np.float32], int]:
-    """Return the rectangle to compute.
+    """Return top row, left column, (height, width), pixel weights and number of pixels of the region.
 
-    Returns:
-        Top row, left column, (height, width), pixel weights (of shape (0, 0) if all are 1), and the number
-        of pixels with a weight > 0.
+    The weights are of shape (0, 0) if all are 1; the number counts the pixels with a weight > 0.
     """
     if mask is not None and roi is not None:
         raise ValueError("mask and roi must not both be given; set the mask to 0 outside the region instead")

@@ -111,10 +111,6 @@ class Canvas:
         scale(source, size, self.surface.subsurface(_rect(placed)))
         return placed
 
-    def blit(self, surface: Any, at: tuple[int, int]) -> None:
-        """Copy a pygame surface without scaling."""
-        self.surface.blit(surface, at)
-
 
 def fit_box(size: tuple[int, int], box: Box) -> Box:
     """Return the largest centred box with the aspect ratio of `size` (width, height) inside a box."""

@@ -178,7 +178,7 @@ class TopViewPanel:
     def draw(self, canvas: Canvas) -> None:
         """Draw the current road."""
         self._viewer.display()
-        canvas.blit(self._viewer.sim_surface, TOP_VIEW[:2])
+        canvas.surface.blit(self._viewer.sim_surface, TOP_VIEW[:2])
         x = TOP_VIEW[0] + TOP_VIEW_CENTRE[0] * (TOP_VIEW[2] - TOP_VIEW[0])
         y = TOP_VIEW[1] + TOP_VIEW_CENTRE[1] * (TOP_VIEW[3] - TOP_VIEW[1])
         canvas.tag((x, y - 24), "ego", 14)

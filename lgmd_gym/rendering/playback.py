@@ -1,6 +1,7 @@
 """Playback of one episode, with the composed picture in a window or a video file."""
 
-from contextlib import ExitStack
+from collections.abc import Callable
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -98,60 +99,45 @@ def play_episode(
         env = make_target(target, arguments, **sensors.arguments)
         stack.callback(env.close)
         if video is None and not live:
-            return _play(env, agent, seed, None)
+            return _play(env, agent, seed, lambda: True)
         view = LGMDView(env, title=f"{target}   {agent.name}   seed {seed}", overlays=overlays)
         rate = float(view.metadata["render_fps"])
         writer = stack.enter_context(VideoWriter(video, rate)) if video is not None else None
-        window = stack.enter_context(Window(target, SIZE, rate)) if live else None
-        return _play(view, agent, seed, PictureOutput(view, writer, window))
+        window = stack.enter_context(closing(Window(target, SIZE, rate))) if live else None
+
+        def show() -> bool:
+            view.agent_alert = agent.alert
+            picture = view.render()
+            assert picture is not None  # mode "rgb_array"
+            if writer is not None:
+                writer.write(picture)
+            return window is None or window.show(picture)
+
+        result = _play(view, agent, seed, show)
+        if not result.stopped:
+            any(not show() for _ in range(round(FINAL_SECONDS * rate)))
+        return result
 
 
-class PictureOutput:
-    """Output of pictures to a video file, a window, or both.
-
-    Args:
-        view: The view that renders the pictures.
-        writer: Writer of the video file; None for no file.
-        window: The window; None for no window.
-    """
-
-    def __init__(self, view: LGMDView, writer: VideoWriter | None, window: Window | None) -> None:
-        self._view, self._writer, self._window = view, writer, window
-
-    def show(self, alert: bool) -> bool:
-        """Render the current picture with the agent's alert; return False if the window was closed."""
-        self._view.agent_alert = alert
-        picture = self._view.render()
-        assert picture is not None  # mode "rgb_array"
-        if self._writer is not None:
-            self._writer.write(picture)
-        return self._window is None or self._window.show(picture)
-
-
-def _play(env: gym.Env, agent: Agent, seed: int, output: PictureOutput | None) -> PlaybackResult:
+def _play(env: gym.Env, agent: Agent, seed: int, show: Callable[[], bool]) -> PlaybackResult:
+    """Play one episode until it ends, or until `show` returns False."""
     observation, info = env.reset(seed=seed)
     agent.reset(seed)
-    rate = env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
-    done, is_open, decisions = False, True, 0
+    done, decisions = False, 0
     while True:
         # The agent acts before the picture is drawn, because the picture shows its alert.
         action = agent.act(observation, info)
-        if output is not None:
-            is_open = output.show(agent.alert)
+        is_open = show()
         if done or not is_open:
             break
         observation, _, terminated, truncated, info = env.step(action)
         done = terminated or truncated
         decisions += 1
-    for _ in range(round(FINAL_SECONDS * rate)):
-        if output is None or not is_open:
-            break
-        is_open = output.show(agent.alert)
     return PlaybackResult(
         collision=bool(info["collision"]),
         impact_speed=info["relative_impact_speed"],
         ego_speed=info["ego_speed"],
         gap=info["gap"],
-        duration=decisions / rate,
+        duration=decisions / env.unwrapped.config["policy_frequency"],  # type: ignore[attr-defined]
         stopped=not done,
     )

@@ -121,7 +121,12 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
         picture: np.ndarray = self._dashboard.draw(state)
         if self._mode == "rgb_array":
             return picture
-        self._show(picture)
+        if self._window is None:
+            from lgmd_gym.rendering.window import Window
+
+            size = picture.shape[1], picture.shape[0]
+            self._window = Window(self._title, size, self.metadata["render_fps"])
+        self._window.show(picture)
         return None
 
     def close(self) -> None:
@@ -139,14 +144,6 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
         if self._mode == "human":
             self.render()
         return info
-
-    def _show(self, picture: np.ndarray) -> None:
-        from lgmd_gym.rendering.window import Window
-
-        if self._window is None:
-            size = picture.shape[1], picture.shape[0]
-            self._window = Window(self._title, size, self.metadata["render_fps"])
-        self._window.show(picture)
 
 
 def find_observation_wrapper(env: gym.Env) -> LGMDObservation:

@@ -61,12 +61,6 @@ class Window:
         self._clock.tick(self._fps)
         return True
 
-    def __enter__(self) -> "Window":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def close(self) -> None:
         """Close the window; pictures can still be drawn afterwards."""
         if self.open:

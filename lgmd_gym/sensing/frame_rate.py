@@ -1,6 +1,7 @@
 """Camera frame rates of highway-env simulations."""
 
 import warnings
+from math import ceil
 
 DEFAULT_FPS = 30.0  # [Hz]
 MIN_FPS = 15.0  # [Hz], for defaults; lower rates bound the spike frequency too much (5 spikes/s at 5 Hz)
@@ -39,11 +40,8 @@ def _checked_rate(fps: float, simulation_frequency: float) -> float:
         raise ValueError(f"fps must be > 0, got {fps!r}")
     ratio = simulation_frequency / fps
     if abs(ratio - round(ratio)) > 1e-9:
-        multiple = fps
-        while multiple < DEFAULT_FPS:
-            multiple += fps
         raise ValueError(
-            f"fps must divide simulation_frequency {simulation_frequency:g} Hz, got {fps:g}; "
-            f"use another fps or gym.make(id, config={{'simulation_frequency': {multiple:g}}})"
+            f"fps must divide simulation_frequency {simulation_frequency:g} Hz, got {fps:g}; use another fps "
+            f"or gym.make(id, config={{'simulation_frequency': {fps * ceil(DEFAULT_FPS / fps):g}}})"
         )
     return float(fps)

@@ -7,14 +7,7 @@ import gymnasium as gym
 
 
 class HookedStep:
-    """Replacement of `Road.step` that calls a callback afterwards.
-
-    It is a class because a deep copy of an environment must step its own road.
-
-    Args:
-        step: The original `Road.step`.
-        callback: Bound method to call after each step.
-    """
+    """Wrapper of `Road.step` that calls a bound method afterwards; it supports deep copies of the road."""
 
     def __init__(self, step: Callable[[float], None], callback: Callable[[], None]) -> None:
         self.step = step

@@ -168,11 +168,7 @@ class LGMDObservation(VectorWrapper):
 
 
 def _check_envs(env: VectorEnv) -> float:
-    """Return the simulation frequency [Hz] of all environments.
-
-    Raises:
-        ValueError: For an unsupported vector environment, or unsupported environments in it.
-    """
+    """Return the simulation frequency [Hz]; raise ValueError for unsupported environments."""
     if not isinstance(env, SyncVectorEnv):
         raise ValueError(
             f"env must be a SyncVectorEnv, got {type(env).__name__}; for worker processes, wrap each "
