@@ -67,9 +67,7 @@ class AgentAdapter(Agent):
 
 
 def make_user_agent(text: str) -> AgentAdapter:
-    """Return the agent for "module:Class" or "module:Class:option=value,…".
-
-    The working directory is on the search path for modules.
+    """Return the agent for "module:Class[:option=value,…]"; modules may be in the working directory.
 
     Raises:
         ValueError: If the class cannot be imported, has no `act`, or does not accept an option.

@@ -124,7 +124,7 @@ class DangerZone(FieldRule):
     """Brakes fully on the excitation of the ground field for the ego speed.
 
     This is `StoppingZone` without upright fields: the ground field belongs to the zone with the next higher
-    design speed. Condition: see `FieldRule`. Shadows and steel plates cause false activations.
+    design speed. Shadows and steel plates cause false activations. Condition: see `FieldRule`.
 
     Observes `membrane_potential`, `ego_speed`, `ego_yaw_rate`. Parameters: `DangerZoneParams`.
     """

@@ -73,9 +73,7 @@ class FrameDifferenceParams(RuleParams):
 class FrameDifference(ImageRule):
     """Brakes fully on the mean absolute frame difference, mean |L(t) − L(t − 1)| [grey levels].
 
-    Condition: see `ImageRule`.
-
-    Observes `frame`, `ego_yaw_rate`. Parameters: `FrameDifferenceParams`.
+    Condition: see `ImageRule`. Observes `frame`, `ego_yaw_rate`. Parameters: `FrameDifferenceParams`.
     """
 
     name = "frame-difference"
@@ -106,9 +104,7 @@ class FlowDivergenceParams(RuleParams):
 class FlowDivergence(ImageRule):
     """Brakes fully on the mean divergence of dense optical flow (Farnebäck), mean(∂u/∂x + ∂v/∂y) [1/s].
 
-    Condition: see `ImageRule`. Requires OpenCV.
-
-    Observes `frame`, `ego_yaw_rate`. Parameters: `FlowDivergenceParams`.
+    Condition: see `ImageRule`. Observes `frame`, `ego_yaw_rate`. Parameters: `FlowDivergenceParams`.
 
     Raises:
         ValueError: If OpenCV is not installed.

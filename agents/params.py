@@ -17,8 +17,7 @@ def parameter(default: float, low: float, high: float, *, affects_camera: bool =
         default: Default value.
         low: Lower end of the search range of tuning.
         high: Upper end of the search range of tuning.
-        affects_camera: Whether the rule's cameras depend on the value. Tuning searches such a parameter only
-            on request, because each value requires new recordings.
+        affects_camera: Whether the rule's cameras depend on the value; then tuning searches it on request.
     """
     return field(default=default, metadata={"search_range": (low, high), "affects_camera": affects_camera})
 

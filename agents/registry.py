@@ -45,13 +45,10 @@ def make_agent(text: str) -> Agent:
     """Return the agent for a string.
 
     Args:
-        text: One of four forms.
-            "NAME" or "NAME:OPTION=VALUE,…" is a registered agent, for example
-            "spike-threshold:threshold=45,frames=2".
-            "RULE:toml=FILE" reads a rule's options from a TOML file.
-            "MODULE:CLASS" or "MODULE:CLASS:OPTION=VALUE,…" is a class of the user with a method `act`.
-            "policy:NAME" or "policy:FILE.zip" is a learned policy. Loading a policy unpickles its file and
-            can run arbitrary code.
+        text: "NAME[:OPTION=VALUE,…]" for a registered agent, as in "spike-threshold:threshold=45,frames=2";
+            "RULE:toml=FILE" for a rule with options from a TOML file; "MODULE:CLASS[:OPTION=VALUE,…]" for a
+            user's class with a method `act`; "policy:NAME" or "policy:FILE.zip" for a learned policy, whose
+            file is unpickled and can run arbitrary code.
 
     Raises:
         ValueError: For an unknown agent or option, or a value out of bounds.

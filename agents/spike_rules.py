@@ -44,7 +44,6 @@ class SpikeThreshold(FrequencyRule):
     """Brakes fully when the spike frequency reaches a threshold.
 
     Condition: f ≥ `threshold` in `frames` consecutive camera frames. The alert is the alert of the neuron.
-
     Observes `spike_frequency`. Parameters: `SpikeThresholdParams`.
     """
 
@@ -79,7 +78,7 @@ class AdaptiveThresholdParams(RuleParams):
 
 
 class AdaptiveThreshold(FrequencyRule):
-    """Brakes fully when the spike frequency exceeds a multiple of its running mean.
+    """Brakes fully when the spike frequency reaches a multiple of its running mean.
 
     Condition: f(t) ≥ max(`threshold`, `gain` · m(t − 1)) in `frames` consecutive camera frames, with the
     first-order low-pass m(t) = m(t − 1) + (f(t) − m(t − 1)) / `memory`. The paper proposes an adaptive

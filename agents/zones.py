@@ -29,12 +29,7 @@ def stopping_distance(speed: Speed, deceleration: float, reaction: float) -> Spe
 
 
 def zone_ends(deceleration: float, reaction: float) -> np.ndarray:
-    """Return the distance from the front bumper to the far end of each zone, shape (10,) [m].
-
-    Args:
-        deceleration: Deceleration of full braking [m/s²].
-        reaction: Time from the demand to full braking [s].
-    """
+    """Return the stopping distance for each design speed: the far ends of the zones, shape (10,) [m]."""
     return stopping_distance(np.array(SPEEDS_KMH) * KMH, deceleration, reaction)
 
 

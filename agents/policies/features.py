@@ -88,10 +88,8 @@ class FeatureConfig:
     def box_arguments(self, shapes: dict[str, tuple[int, ...]]) -> dict[str, tuple[Any, ...]]:
         """Return low, high, shape and dtype of a Gymnasium `Box` for each input.
 
-        Vectors have shape (history · n,), oldest first; frames (height, width, channels · history).
-
-        Args:
-            shapes: Shape of each observation.
+        Vectors have shape (history · n,), oldest first; frames (height, width, channels · history). `shapes`
+        contains the shape of each observation.
 
         Raises:
             ValueError: If an input requires other cameras.

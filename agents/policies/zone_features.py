@@ -39,16 +39,7 @@ class ZoneFeatures:
         self._peak, self._confirmed = np.zeros(NUM_SELECTED), np.zeros(NUM_SELECTED + 1)
 
     def update(self, signal: np.ndarray, speed: float, yaw_rate: float) -> None:
-        """Process one frame.
-
-        Args:
-            signal: Observation of the twenty neurons, shape (20,).
-            speed: Ego speed [m/s].
-            yaw_rate: Ego yaw rate [rad/s].
-
-        Raises:
-            ValueError: If the signal has another shape.
-        """
+        """Process one frame: observation of the neurons, shape (20,), speed [m/s] and yaw rate [rad/s]."""
         check_zone_shape(self._name, signal.shape)
         active = self._gate.update(yaw_rate) and speed > self._crawl
         values = excitation(signal) if self._name == "zones" else np.asarray(signal, np.float64)
@@ -82,7 +73,7 @@ def select_fields(ground: np.ndarray, upright: np.ndarray, speed: float, near_sh
         ground: Values of the ground fields, shape (10,).
         upright: Values of the upright fields, shape (10,).
         speed: Ego speed [m/s].
-        near_share: Minimum design speed of nearer zones relative to the ego speed.
+        near_share: Minimum design speed of nearer zones, relative to the ego speed.
     """
     zone, nearest = zone_index(speed), zone_index(near_share * speed)
     farther = min(zone + 1, NUM_ZONES - 1)

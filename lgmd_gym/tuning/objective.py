@@ -9,6 +9,7 @@ Rules without a latch are simulated in closed loop.
 import json
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,8 @@ class ObjectiveValue:
         rows = list(rows)
         energy = [avoided_energy(row) for row in rows if row["threat"]]
         false = [float(row["false_activation"]) for row in rows if not row["threat"]]
-        return cls(_mean(energy), _mean(false), len(energy), len(false))
+        energy_mean, false_rate = (float(np.mean(values or [0.0])) for values in (energy, false))
+        return cls(energy_mean, false_rate, len(energy), len(false))
 
 
 def avoided_energy(row: Row) -> float:
@@ -66,10 +68,6 @@ def avoided_energy(row: Row) -> float:
     impact_speed = row["relative_impact_speed"] or 0.0
     unbraked_speed = row["speed_reduction"] + impact_speed
     return 1.0 - (impact_speed / unbraked_speed) ** 2 if unbraked_speed > 0.0 else 1.0
-
-
-def _mean(values: list[float]) -> float:
-    return float(np.mean(values)) if values else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,21 +99,15 @@ class ObservationRecorder(Agent):
 
 
 class FixedOnsetBrake(Agent):
-    """Agent that brakes fully from a given decision on.
-
-    Args:
-        onset: Index of the decision; None for never.
-    """
+    """Agent that brakes fully from the decision with index `onset` on; never for None."""
 
     def __init__(self, onset: int | None) -> None:
-        self._remaining = onset
+        self._onset, self._decision = inf if onset is None else onset, -1
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Return `BRAKE` from the onset on, `HOLD` before."""
-        if self._remaining is None:
-            return HOLD
-        self._remaining -= 1
-        return BRAKE if self._remaining < 0 else HOLD
+        self._decision += 1
+        return BRAKE if self._decision >= self._onset else HOLD
 
 
 class Objective:
