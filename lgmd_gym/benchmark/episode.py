@@ -54,15 +54,10 @@ class Episode:
     reward_sum: float = float("nan")
 
 
-def make_env(case: Case, sensor_config: SensorConfig, **options: Any) -> gym.Env:
-    """Return the environment of a case; `options` are passed to `gym.make`."""
-    return gym.make(
-        env_id(case.family),
-        **sensor_config.for_agent().arguments,
-        trace=True,
-        **dict(case.arguments),
-        **options,
-    )
+def make_env(case: Case, sensor_config: SensorConfig) -> gym.Env:
+    """Return the environment of a case."""
+    arguments = sensor_config.for_agent().arguments | dict(case.arguments)
+    return gym.make(env_id(case.family), trace=True, **arguments)
 
 
 def rollout(env: gym.Env, agent: Agent, seed: int) -> Iterator[tuple[Step, np.ndarray]]:
@@ -93,15 +88,15 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
         seed: Seed of the environment and of the agent.
     """
     rows: list[tuple[float, ...]] = []
-    info, total, policy_hz = {}, 0.0, 0.0
+    info, total = {}, 0.0
+    base: Any = env.unwrapped
+    policy_hz = base.config["policy_frequency"]
     for step, action in rollout(env, agent, seed):
         info, total = step.info, total + step.reward
-        policy_hz = policy_hz or env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
         standstill_hold = info["ego_speed"] == 0.0 and float(action[0]) < 0.0
         truth = (info[name] for name in GROUND_TRUTH)
         signals = (float(np.max(step.observation[name])) for name in SIGNALS)
         rows.append((len(rows) / policy_hz, *truth, *signals, float(agent.alert), float(standstill_hold)))
-    base: Any = env.unwrapped
     actors, bodies = base.scenario.actors, base.road.obstacles
     return Episode(
         series={name: np.array(column) for name, column in zip(SERIES, zip(*rows, strict=True), strict=True)},
