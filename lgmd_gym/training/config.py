@@ -72,9 +72,9 @@ class TrainConfig:
     def __post_init__(self) -> None:
         if self.algo not in ALGORITHMS:
             raise unknown_name("algorithm", self.algo, ALGORITHMS)
-        for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes"):
-            whole(name, getattr(self, name), 1)
-        whole("traffic_episodes", self.traffic_episodes, 0)
+        for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes", "traffic_episodes"):
+            low = 0 if name == "traffic_episodes" else 1
+            object.__setattr__(self, name, whole(name, getattr(self, name), low))
         for demand in self.demands:
             check_within("demands", demand, -1.0, 1.0)
         if self.algo == "dqn" and not self.demands:
@@ -130,7 +130,9 @@ class TrainConfig:
         given = {name: value for name, value in options.items() if value is not None}
         if sensors_of is not None:
             if "camera" in given:
-                raise ValueError(f"use either camera or sensors_of, got {given['camera']} and {sensors_of!r}")
+                raise ValueError(
+                    f"use either camera or sensors_of, got {given['camera']!r} and {sensors_of!r}"
+                )
             given["camera"] = _cameras_of(sensors_of)
         values = read_hyperparams(algo, env_id, file)
         if inputs:

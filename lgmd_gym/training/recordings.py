@@ -10,7 +10,12 @@ import lgmd_gym
 from lgmd_gym.agents import HOLD
 from lgmd_gym.agents.policies.features import FRAME
 from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
-from lgmd_gym.training.offline.episodes import EpisodeRecorder, Record, RecordedEpisode, record_parallel
+from lgmd_gym.training.offline.episodes import (
+    EpisodeRecorder,
+    RecordedEpisode,
+    RecordFunction,
+    record_parallel,
+)
 from lgmd_gym.training.offline.storage import check_file, load, save
 from lgmd_gym.training.offline.traffic import TrafficRecorder
 
@@ -31,7 +36,7 @@ class RecordingSet:
 
     name: str
     seeds: range
-    record: Record
+    record: RecordFunction
 
 
 def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
@@ -62,16 +67,10 @@ def _frame_shrink(config: TrainConfig) -> int | None:
 
 def origin_of(config: TrainConfig) -> dict[str, Any]:
     """Return the settings that recorded episodes depend on, as plain values."""
-    origin = {
-        "format": FORMAT,
-        "env_id": config.env_id,
-        "env_kwargs": config.env_kwargs,
-        "camera": config.camera,
-        "demands": config.demands,
-        "shrink": _frame_shrink(config),
-        "lgmd_gym": lgmd_gym.__version__,
-    }
-    return loads(dumps(origin))
+    values = config.to_dict()
+    origin: dict[str, Any] = {"format": FORMAT, "lgmd_gym": lgmd_gym.__version__}
+    origin |= {name: values[name] for name in ("env_id", "env_kwargs", "camera", "demands")}
+    return loads(dumps(origin | {"shrink": _frame_shrink(config)}))  # lists in place of tuples
 
 
 def load_or_record(

@@ -107,13 +107,14 @@ def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path
         model = train_online(config, folder, progress)
     path = folder / "policy.zip"
     model.save(path, exclude=EXCLUDED)
+    values = config.to_dict() | {"recordings": None}  # a path on the machine of the training
     card = {
         "lgmd_gym": lgmd_gym.__version__,
         "algo": type(model).__name__.lower(),  # stable-baselines3 class that reads the file
-        "camera": config.camera,
-        "features": config.features.to_dict(),
-        "demands": list(config.demands) or None,
-        "config": {**config.to_dict(), "recordings": None},  # a path on the machine of the training
+        "camera": values["camera"],
+        "features": values["features"],
+        "demands": values["demands"] or None,
+        "config": values,
         "wall_time": round(time.perf_counter() - start, 1),
     }
     write_card(path, card)

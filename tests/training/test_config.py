@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from support.recordings import OFFLINE_YAML, offline_config, write_yaml
 
+from lgmd_gym.camera import PRESETS
 from lgmd_gym.cli import main as cli
 from lgmd_gym.training import TrainConfig, train
 from lgmd_gym.training.hyperparams import read_hyperparams
@@ -48,12 +49,14 @@ def test_options_replace_the_hyperparameters(tmp_path):
     assert (config.n_timesteps, config.seed) == (9, 0)
 
 
-def test_config_survives_json():
-    config = TrainConfig.from_hyperparams("ppo", camera={"name": "wide", "shape": [45, 80]})
+@pytest.mark.parametrize("camera", ["wide", {"name": "wide", "shape": [45, 80]}, PRESETS["tele"]])
+def test_config_survives_json(camera):
+    config = TrainConfig.from_hyperparams("ppo", camera=camera)
     values = json.loads(json.dumps(config.to_dict()))
     restored = TrainConfig.from_dict(values)
     assert restored.features == config.features
     assert json.loads(json.dumps(restored.to_dict())) == values
+    restored.make_env("train").close()
 
 
 def test_cameras_are_presets_or_those_of_an_agent():

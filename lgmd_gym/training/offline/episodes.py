@@ -47,11 +47,11 @@ class RecordedEpisode:
         return len(self.rewards)
 
 
-Record: TypeAlias = Callable[[range], list[list[RecordedEpisode]]]
+RecordFunction: TypeAlias = Callable[[range], list[list[RecordedEpisode]]]
 """Method `record` of `EpisodeRecorder` and `TrafficRecorder`: the episodes of each seed."""
 
 
-def record_parallel(record: Record, seeds: range, jobs: int = 1) -> Iterator[list[RecordedEpisode]]:
+def record_parallel(record: RecordFunction, seeds: range, jobs: int = 1) -> Iterator[list[RecordedEpisode]]:
     """Yield the episodes of each seed, recorded by `jobs` processes with the method of a recorder."""
     chunks = [seeds[start : start + CHUNK_SIZE] for start in range(0, len(seeds), CHUNK_SIZE)]
     results: Any = Parallel(n_jobs=jobs, return_as="generator")(delayed(record)(chunk) for chunk in chunks)
