@@ -60,10 +60,10 @@ def test_contact_sheet(tmp_path):
 def test_on_record(capsys):
     """The result on recorded episodes equals that of the closed loop."""
     example = load("on_record")
-    drives = example.record("stopping-zone", 4, jobs=1)
-    told = example.evaluate("stopping-zone", drives)
+    episodes = example.record("stopping-zone", 4, jobs=1)
+    results = example.evaluate("stopping-zone", episodes)
     env = gym.make("LGMD/RandomBraking-v0", split="test", camera=make_agent("stopping-zone").camera)
-    for seed, (ret, contact, brakes) in enumerate(told):
+    for seed, (ret, contact, brakes) in enumerate(results):
         agent = make_agent("stopping-zone")
         observation, info = env.reset(seed=seed)
         agent.reset(seed)
@@ -73,10 +73,10 @@ def test_on_record(capsys):
             braked = braked or bool(action[0] < 0.0)
             observation, reward, terminated, truncated, info = env.step(action)
             total, done = total + float(reward), terminated or truncated
-        assert ret == pytest.approx(total, abs=0.15)  # returns lie on lines between replays
+        assert ret == pytest.approx(total, abs=0.15)  # returns between replays are interpolated
         assert (bool(contact), bool(brakes)) == (info["collision"], braked)
-    assert {brakes for *_, brakes in told} == {0.0, 1.0}
-    example.record = lambda agent, count: drives
+    assert {brakes for *_, brakes in results} == {0.0, 1.0}
+    example.record = lambda agent, count: episodes
     example.main(["4", "stopping-zone", "no-brake+stopping-zone"])
     rule, mean = capsys.readouterr().out.splitlines()[2:]
     assert rule.endswith("stopping-zone")
