@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from PIL import Image
@@ -70,7 +71,7 @@ def record_video(card: ScenarioCard, agent_name: str, stem: Path) -> None:
             action = agent.act(observation, info)
             env.agent_alert = agent.alert
             if decisions % FRAME_SKIP == 0:
-                picture = env.render()
+                picture = cast(np.ndarray, env.render())
                 writer.write(_reduce(picture))
                 # Frames of the first second rank lower. Without spikes, the frame at four seconds is used.
                 frequency = float(observation["spike_frequency"].max()) - (decisions < rate)
@@ -81,7 +82,7 @@ def record_video(card: ScenarioCard, agent_name: str, stem: Path) -> None:
             done = terminated or truncated or decisions == max_decisions
         env.agent_alert = agent.alert
         for _ in range(round(rate / FRAME_SKIP)):  # hold the last picture for one second
-            writer.write(_reduce(env.render()))
+            writer.write(_reduce(cast(np.ndarray, env.render())))
     env.close()
     assert still is not None
     Image.fromarray(still).save(stem.with_suffix(".jpg"), quality=82)
