@@ -51,6 +51,10 @@ class ObjectList:
         self.count = 0
         self._bytes = self.records.view(np.uint8).data
 
+    def __reduce__(self) -> tuple[type, tuple[()]]:
+        """Copy and pickle as an empty list: every frame rewrites the records, and a memoryview has no copy."""
+        return ObjectList, ()
+
     def read(self, scene: SceneState, p: CameraParams, poses: Sequence[CameraPose]) -> None:
         """Read all objects but the ego that may be in view from these poses.
 
