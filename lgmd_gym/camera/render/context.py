@@ -52,7 +52,7 @@ class RenderContext:
             noise_starts=np.zeros(count, dtype=np.int64),
         )
         asphalt, verge = ground_texture("asphalt", first.seed), ground_texture("verge", first.seed)
-        self._tables = Tables(
+        tables = Tables(
             asphalt=asphalt.data,
             verge=verge.data,
             level_start=asphalt.level_start,
@@ -60,8 +60,10 @@ class RenderContext:
             noise=noise_table(first.seed),
             panorama=panorama_table(first),
         )
-        self._models = all_models()
-        self.buffers = make_buffers(first.shape, len(self._models.corners_used))
+        self._models = tuple(all_models())
+        self.buffers = make_buffers(first.shape, len(all_models().corners_used))
+        self._plain_views, self._plain_tables = tuple(self._views), tuple(tables)
+        self._plain_buffers = tuple(self.buffers)
         self._paved = False
 
     def aim(self, scene: SceneState, gaze: tuple[float, float] | None = None) -> list[CameraPose]:
@@ -93,6 +95,6 @@ class RenderContext:
             self._paved = road.paved
             self._views.looks["paved"] = float(road.paved)
         draw_frames(
-            out, self.lenses, self._views, road, self._tables, self._models,
-            objects.records, objects.count, self.buffers,
+            out, self.lenses, self._plain_views, road, self._plain_tables, self._models,
+            objects.records, objects.count, self._plain_buffers,
         )  # fmt: skip

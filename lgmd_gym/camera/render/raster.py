@@ -6,11 +6,12 @@ import numba as nb
 
 from lgmd_gym.camera.objects import MODEL_MARK
 from lgmd_gym.camera.render.blur import add_weighted, blur_steps, lens_before, move_objects
-from lgmd_gym.camera.render.buffers import GroundLayer, SolidLayer, View
+from lgmd_gym.camera.render.buffers import Buffers, GroundLayer, SolidLayer, Tables, View, Views
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
 from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.markings import add_lines
+from lgmd_gym.camera.render.models import Models
 from lgmd_gym.camera.render.order import distance, order_objects, visible
 from lgmd_gym.camera.render.panorama import draw_panorama
 from lgmd_gym.camera.render.sensor import expose
@@ -135,14 +136,15 @@ def draw_frames(out, lenses, views, road, tables, models, objects, count, buffer
     Args:
         out: Frames, uint8, shape (cameras, height, width).
         lenses: `LENS` records at the end and at the start of the exposure, shape (cameras, 2).
-        views: `Views`.
+        views: The fields of `Views` (plain tuples are cheaper to pass from Python than named ones).
         road: `RoadGeometry`.
-        tables: `Tables`.
-        models: `Models`.
+        tables: The fields of `Tables`.
+        models: The fields of `Models`.
         objects: `OBJECT` records, shape (512,); the roadside is appended to them.
         count: Number of objects.
-        buffers: `Buffers`.
+        buffers: The fields of `Buffers`.
     """
+    views, tables, models, buffers = Views(*views), Tables(*tables), Models(*models), Buffers(*buffers)
     image, total, moment = buffers.image, buffers.exposure, buffers.lens[0]
     for k in range(out.shape[0]):
         end, start = lenses[k, 0], lenses[k, 1]
