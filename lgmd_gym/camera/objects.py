@@ -52,7 +52,7 @@ class ObjectList:
         self._bytes = self.records.view(np.uint8).data
 
     def __reduce__(self) -> tuple[type, tuple[()]]:
-        """Copy and pickle as an empty list: every frame rewrites the records, and a memoryview has no copy."""
+        """Copy and pickle as an empty list; every frame rewrites the records."""
         return ObjectList, ()
 
     def read(self, scene: SceneState, p: CameraParams, poses: Sequence[CameraPose]) -> None:

@@ -7,8 +7,7 @@ from rich.table import Table
 
 from lgmd_gym.agents import AGENTS
 from lgmd_gym.agents.policies.policy import find_policy, read_card, shipped_policies
-from lgmd_gym.benchmark.suites import SUITES
-from lgmd_gym.benchmark.suites import TRAFFIC
+from lgmd_gym.benchmark.suites import SUITES, TRAFFIC
 from lgmd_gym.camera.params import PRESETS
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import List

@@ -109,8 +109,8 @@ def test_help_of_a_command_is_readable(command, capsys):
         (["drive", "LGMD/CCRs-v0", "--set", "ego_speed=-1"], "ego_speed must be in (0, 40] m/s, got -1"),
         (["drive", "LGMD/CCRs-v0", "--set", "speed=5"], "did you mean 'ego_speed'?"),
         (["drive", "LGMD/CCRs-v0", "--set", "ego_speed"], "must be NAME=NUMBER"),
-        (["drive", "LGMD/CCRs-v0", "--video", "out.txt"], "needs a suffix among .mp4"),
-        (["drive", "LGMD/CCRs-v0", "--video", "nowhere/out.mp4"], "does not exist; make it first"),
+        (["drive", "LGMD/CCRs-v0", "--video", "out.txt"], "must have a suffix among .mp4"),
+        (["drive", "LGMD/CCRs-v0", "--video", "nowhere/out.mp4"], "does not exist; create it first"),
         (["list", "agent"], "agent"),
     ],
 )
