@@ -40,7 +40,7 @@ def zone_index(speed: float) -> int:
 
 def zone_cameras(ends: np.ndarray) -> list[dict[str, Any]]:
     """Return the cameras for zones with given far ends [m]: ten ground fields, then ten upright fields."""
-    cameras = []
+    cameras: list[dict[str, Any]] = []
     for name, (shape, pitch) in FIELDS.items():
         for speed, end in zip(SPEEDS_KMH, ends, strict=True):
             depth = float(end) + LENS_SETBACK

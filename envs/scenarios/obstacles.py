@@ -15,7 +15,7 @@ from lgmd_gym.envs.scenarios.scenario import (
     Scenario,
 )
 
-STEEL, SHADOW, RAIL = 150, 30, 175  # body greys
+STEEL, SHADOW, RAIL = 150, 30, 175  # grey levels
 RAIL_PIECE, RAIL_HEIGHT, RAIL_DEPTH = 4.0, 0.75, 0.3  # [m]
 CURVE_LENGTH = 120.0  # [m], limit of the length of a curve with a guard rail
 
@@ -38,7 +38,7 @@ def drive_over_plate(ego_speed: float = 80 * KMH, shade: int = STEEL) -> Scenari
 
     Args:
         ego_speed: Ego speed, in (0, 40] [m/s].
-        shade: Grey of the plate in [0, 255].
+        shade: Grey level of the plate in [0, 255].
     """
     speed = check_speed("ego_speed", ego_speed)
     plate = Actor(
@@ -54,7 +54,7 @@ def drive_through_shadow(ego_speed: float = 80 * KMH, length: float = 12.0, shad
     Args:
         ego_speed: Ego speed, in (0, 40] [m/s].
         length: Length of the shadow along the road, in [1, 100] [m].
-        shade: Grey of the shadow in [0, 255].
+        shade: Grey level of the shadow in [0, 255].
     """
     speed = check_speed("ego_speed", ego_speed)
     shadow_length = check_within("length", length, 1.0, 100.0, "m")
@@ -80,7 +80,7 @@ def pass_pedestrian(
         ego_speed: Ego speed, in (0, 40] [m/s].
         clearance: Distance between the sides of ego and pedestrian, in [0.2, 10] [m].
         walking_speed: Pedestrian speed, in [0, ego_speed) [m/s].
-        shade: Grey of the clothes in [0, 255]; None draws it from the seed.
+        shade: Grey level of the clothes in [0, 255]; None to draw it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     walking = check_speed("walking_speed", walking_speed, zero=True)
@@ -104,7 +104,7 @@ def pass_pedestrian(
 
 @family("CurveGuardRail")
 def drive_along_rail(ego_speed: float = 50 * KMH, radius: float = 60.0, left: bool = True) -> Scenario:
-    """The ego drives a curve with a guard rail along its outside; not a threat.
+    """The ego drives through a curve with a guard rail along the outside; not a threat.
 
     Args:
         ego_speed: Ego speed, in (0, 40] [m/s]; the lateral acceleration v²/radius is limited to 4 m/s².
@@ -143,7 +143,7 @@ def _rail(path: Path, start: float, end: float, to_right: float) -> tuple[Actor,
         pose = path.pose(distance)
         return pose.x - to_right * sin(pose.heading), pose.y + to_right * cos(pose.heading)
 
-    pieces = []
+    pieces: list[Actor] = []
     count = int((end - start) / RAIL_PIECE)
     for number in range(count):
         x0, y0 = shifted(start + number * RAIL_PIECE)

@@ -1,9 +1,9 @@
 """The `camera` argument of environments and wrappers: types and named conditions."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
-from lgmd_gym.camera.params import CONDITIONS, CameraParams
+from lgmd_gym.camera.params import CLEAR, CONDITIONS, CameraParams
 from lgmd_gym.errors import unknown_name
 
 BIRDSEYE = "birdseye"
@@ -34,14 +34,14 @@ def with_condition(camera: CameraSpec, condition: str) -> CameraSpec:
     """
     if condition not in CONDITIONS:
         raise unknown_name("camera condition", condition, CONDITIONS)
-    if condition == "clear":
+    if condition == CLEAR:
         return camera
     if isinstance(camera, list | tuple):
         return [_item_with_condition(item, condition) for item in camera]
-    return _item_with_condition(camera, condition)
+    return _item_with_condition(cast(CameraItem, camera), condition)
 
 
-def _item_with_condition(camera: Any, condition: str) -> CameraParams:
+def _item_with_condition(camera: CameraItem, condition: str) -> CameraParams:
     if camera == BIRDSEYE or (isinstance(camera, Mapping) and camera.get("name") == BIRDSEYE):
         raise ValueError(f"camera 'birdseye' does not support condition {condition!r}; use 'clear'")
     if isinstance(camera, Mapping):

@@ -71,7 +71,9 @@ def danger_zone(
     return zone
 
 
-def _nearest_section(slope: NDArray, camera: float, clearance: float, near: float, far: float) -> NDArray:
+def _nearest_section(
+    slope: NDArray[np.float64], camera: float, clearance: float, near: float, far: float
+) -> NDArray[np.float64]:
     """Return the distance [m] at which rays of a slope enter the box above the lane, or infinity."""
     with np.errstate(divide="ignore"):
         ground = np.where(slope > 0, camera / slope, np.inf)  # intersection with the ground

@@ -1,5 +1,7 @@
 """LGMD: the stateful neuron."""
 
+from typing import Any, cast
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -82,7 +84,7 @@ class LGMD:
         self._previous = np.zeros((self._count, *region_shape), np.uint8)
         self._fast = kernels.supports(self.params)
         if self._fast:
-            self._maps = state.allocate(self._count, region_shape)
+            self._maps: tuple[NDArray[Any], ...] = state.allocate(self._count, region_shape)
         else:
             paths = 2 if self.params.on_off else 1
             self._maps = general_kernel.allocate(self._count, region_shape, self.params.n_p, paths)
@@ -112,7 +114,7 @@ class LGMD:
             frame = self._as_float(frame)
         frames = frame[None] if self.num is None else frame
         arguments = (self._previous, self._y0, self._x0, self._weight, selected, self._scalars, self._const)
-        kernel = kernels.step if self._fast else general_kernel.step
+        kernel = cast(Any, kernels if self._fast else general_kernel).step
         if self._threads.count == 1:
             kernel(0, self._count, frames, *arguments, *self._maps)
         else:
@@ -137,10 +139,10 @@ class LGMD:
         E is `|P|` by path, and I is that of the path which P excites (ON where P >= 0); see `LGMDParams` for
         the equations. All maps are 0 before the first change and outside the mask.
         """
-        read = state.layers if self._fast else general_kernel.layers
+        read = cast(Any, state if self._fast else general_kernel).layers
         maps = read(self._scalars, self._const, *self._maps)
         h, w = self._previous.shape[1:]
-        images = {}
+        images: dict[str, NDArray[np.float32]] = {}
         for name, values in maps.items():
             image = np.zeros((self._count, *self.shape), np.float32)
             image[:, self._y0 : self._y0 + h, self._x0 : self._x0 + w] = values[..., :w]
@@ -154,7 +156,7 @@ class LGMD:
         frequency, spikes, k, k_hat, f, w, latency, alert = self._scalars[:, RESPONSE].T.copy()
         return Response(frequency, spikes.astype(np.int64), k, k_hat, f, w, latency, alert > 0.0)
 
-    def _as_float(self, frame: NDArray) -> NDArray[np.float32]:
+    def _as_float(self, frame: NDArray[Any]) -> NDArray[np.float32]:
         """Return the frame as float32, and store luminance as float32 from now on."""
         self._previous = self._previous.astype(np.float32, copy=False)
         return frame.astype(np.float32, copy=False)

@@ -1,6 +1,7 @@
 """Memory layout of the maps of the fast kernel."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from lgmd_gym.neuron import scalars as sc
 from lgmd_gym.neuron.simd import LANES
 
 
-def allocate(num: int, shape: tuple[int, int]) -> tuple[NDArray, ...]:
+def allocate(num: int, shape: tuple[int, int]) -> tuple[NDArray[Any], ...]:
     """Return the maps of `num` neurons over `shape` pixels, filled with 0.
 
     Rows are padded to `columns`, a multiple of 16 pixels. Maps are float32 unless stated otherwise.

@@ -95,7 +95,9 @@ def checked_selection(name: str, selection: ArrayLike, count: int) -> NDArray[np
     return np.ascontiguousarray(selected)
 
 
-def checked_frames(frames: Any, shape: tuple[int, ...], active: NDArray[np.bool_] | None = None) -> NDArray:
+def checked_frames(
+    frames: Any, shape: tuple[int, ...], active: NDArray[np.bool_] | None = None
+) -> NDArray[Any]:
     """Return frames as contiguous uint8 or float32; contiguous uint8 frames are not copied.
 
     Args:

@@ -123,7 +123,7 @@ class SensorArray:
         The attribute maps fields of `CameraParams`, and optionally `condition`, to values. Call this method
         after each reset.
         """
-        fields = getattr(env.unwrapped, "camera_fields", None) or {}
+        fields: dict[str, Any] = getattr(env.unwrapped, "camera_fields", None) or {}
         if fields != self._applied_fields[index]:
             self._applied_fields[index] = dict(fields)
             base = self._base_cameras[index]
@@ -145,7 +145,7 @@ class SensorArray:
         Returns:
             Arrays of shape (num_envs, cameras).
         """
-        responses = []
+        responses: list[Response] = []
         for (neuron, members), batch in zip(self._groups, frames, strict=True):
             selected = None if active is None else np.repeat(active, len(members))
             responses.append(neuron.step(batch.reshape(-1, *neuron.shape), selected))

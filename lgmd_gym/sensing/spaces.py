@@ -19,7 +19,7 @@ def make_space(
     fps: float,
     simulation_frequency: float,
     include_frame: bool,
-    base: spaces.Space | None,
+    base: spaces.Space[Any] | None,
 ) -> spaces.Dict:
     """Return the observation space of one environment.
 
@@ -35,7 +35,7 @@ def make_space(
         ValueError: For `include_frame` with cameras of different shapes.
     """
     count = (len(sensors.names),)
-    parts: dict[str, spaces.Space] = {
+    parts: dict[str, spaces.Space[Any]] = {
         "spike_frequency": spaces.Box(0.0, max_spike_frequency(params, fps), count, np.float32),
         "membrane_potential": spaces.Box(min(params.k_0, 0.5), 1.0, count, np.float32),
         "ffi": spaces.Box(0.0, max_ffi(params), count, np.float32),
@@ -72,7 +72,7 @@ def signal_info(response: Response, index: int, names: list[str]) -> dict[str, A
 
 
 def yaw_rate(heading: float, previous: float, elapsed: float) -> float:
-    """Return the mean yaw rate [rad/s] between two headings [rad] by the shorter turn; 0 for no time."""
+    """Return the mean yaw rate [rad/s] between two headings [rad] by the shorter turn; 0 if none has elapsed."""
     turned = (heading - previous + pi) % (2 * pi) - pi
     return turned / elapsed if elapsed > 0.0 else 0.0
 

@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import asdict
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
@@ -33,7 +33,7 @@ class TraceFrame(NamedTuple):
 class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     """Observe LGMD neurons, each driven by a camera on the ego vehicle of a highway-env environment.
 
-    Every camera frame is rendered and processed, also if the policy acts at a lower rate. In a decision
+    Every camera frame is rendered and processed, even if the policy acts at a lower rate. In a decision
     without a new frame, the observation keeps the last values. `reset` processes the first frame.
 
     **Observation space**: a `Dict` of `Box` spaces, float32 unless stated otherwise.
@@ -219,5 +219,5 @@ def _to_json(value: Any) -> Any:
     elif isinstance(value, LGMDParams):
         value = value.to_dict()
     elif isinstance(value, list | tuple):
-        value = [_to_json(item) for item in value]
+        value = [_to_json(item) for item in cast(list[Any], value)]
     return json.loads(json.dumps(value))

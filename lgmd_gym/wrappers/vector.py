@@ -26,7 +26,7 @@ class LGMDObservation(VectorWrapper):
     ``final_obs`` and ``final_info`` hold the outputs before the reset.
 
     Args:
-        env: A `SyncVectorEnv` of highway-env environments without cameras; make environments of this
+        env: A `SyncVectorEnv` of highway-env environments without cameras; create environments of this
             package with ``camera=None``.
         camera: See `lgmd_gym.LGMDObservation`.
         params: See `lgmd_gym.LGMDObservation`.
@@ -72,7 +72,7 @@ class LGMDObservation(VectorWrapper):
         ]
         env.envs[:] = self._recorders
         self._response = self.sensors.step(self._buffer.reset_frames, np.zeros(self.num_envs, np.bool_))
-        base = env.single_observation_space if include_base else None
+        base: Any = env.single_observation_space if include_base else None
         self.single_observation_space = make_space(
             self.sensors, self.params, self.fps, simulation_frequency, include_frame, base
         )
@@ -133,7 +133,7 @@ class LGMDObservation(VectorWrapper):
         return observation
 
     def _row(self, index: int, motion: EgoMotion) -> dict[str, Any]:
-        """Return the observation of one environment without ``base``."""
+        """Return the observation of one environment, except for the key ``base``."""
         row: dict[str, Any] = dict(signal_arrays(self._response, index))
         row["ego_speed"] = np.array([motion.speed], dtype=np.float32)
         row["ego_yaw_rate"] = np.array([motion.yaw_rate], dtype=np.float32)
@@ -174,7 +174,7 @@ def _check_envs(env: VectorEnv) -> float:
             f"env must be a SyncVectorEnv, got {type(env).__name__}; for worker processes, wrap each "
             "environment in lgmd_gym.LGMDObservation instead"
         )
-    rates = set()
+    rates: set[float] = set()
     for single in env.envs:
         check_highway_env(single)
         layer: Any = single
