@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
+from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.scenarios.distribution import (
-    CONDITIONS,
     LEVELS,
     check_levels,
     draw_camera_fields,
@@ -20,10 +20,10 @@ class RandomBrakingEnv(BrakingEnv):
     ## Description
 
     A level is a random scenario with a number. Half of the levels are threats (CCRs, CCRm, CCRb, CCCscp),
-    half are non-threats (all other families). A level fixes the family and its arguments, the body greys, the
-    camera condition (night, fog, …) and the contrast of the road texture, in every process. The splits are
-    disjoint: training never uses a level of validation or test. The environment's seed selects the levels;
-    `info` adds `level` (the number) and `condition` (the camera condition).
+    half are non-threats (all other families). A level fixes the family and its arguments, the grey levels,
+    the camera condition (night, fog, …) and the contrast of the road texture, in every process. The splits
+    are disjoint: training never uses a level of validation or test. The environment's seed selects the
+    levels; `info` adds `level` (the number) and `condition` (the camera condition).
 
     ## Arguments
 
@@ -44,7 +44,7 @@ class RandomBrakingEnv(BrakingEnv):
         split: str = "train",
         start_level: int = 0,
         num_levels: int = 0,
-        conditions: Sequence[str] = CONDITIONS,
+        conditions: Sequence[str] = tuple(CONDITIONS),
         config: dict[str, Any] | None = None,
         render_mode: str | None = None,
     ) -> None:

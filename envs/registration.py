@@ -57,9 +57,10 @@ def make_braking(
     Raises:
         ValueError: If an argument, key or name is unknown, or a value is out of range.
     """
+    from lgmd_gym.camera import CLEAR
     from lgmd_gym.envs.braking import BrakingEnv
     from lgmd_gym.envs.random_braking import RandomBrakingEnv
-    from lgmd_gym.envs.scenarios.distribution import CLEAR, check_conditions
+    from lgmd_gym.envs.scenarios.distribution import check_conditions
     from lgmd_gym.errors import check_keys
 
     if family == RANDOM:

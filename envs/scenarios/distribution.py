@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.scenarios.registry import make_scenario
 from lgmd_gym.envs.scenarios.scenario import Scenario
@@ -12,13 +13,6 @@ from lgmd_gym.errors import unknown_name
 
 SPLITS = ("train", "validation", "test")
 LEVELS = 1_000_000  # per split
-CLEAR = "clear"
-CONDITIONS = (
-    CLEAR,
-    "night",
-    "fog",
-    "degraded",
-)  # names of the camera's conditions; a test compares both lists
 THREAT_SHARE = 0.5
 SPEED_KMH = (10.0, 80.0)
 HEADWAY = (0.5, 3.0)  # [s]; in FMVSS 127 a lead car brakes 12 m ahead at 80 km/h, a headway of 0.54 s

@@ -8,11 +8,11 @@ from typing import Any
 import tomli_w
 
 from lgmd_gym.benchmark.folder import provenance
-from lgmd_gym.benchmark.sensors import CLEAR, SensorConfig
+from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suite_file import copy_suite, read_toml
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.task import NO_BRAKE
-from lgmd_gym.camera import CONDITIONS, CameraSpec
+from lgmd_gym.camera import CLEAR, CONDITIONS, CameraSpec
 from lgmd_gym.envs.traffic.registration import KINDS
 from lgmd_gym.errors import check_keys, unknown_name
 from lgmd_gym.neuron import NeuronSpec
@@ -32,14 +32,14 @@ HEAD = "# Repeat with lgmd-gym bench --config {file}. Made by lgmd-gym {version}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunConfig:
-    """Everything that decides the rows of a run; not the processes or the folder.
+    """Configuration of a run: every setting that affects its rows.
 
     Attributes:
         suite: Name of a suite, path of a suite file (".toml"), or "traffic".
         agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
         seeds: Number of seeds, >= 1; for traffic, of every kind.
         first_seed: First seed, >= 0.
-        conditions: Camera conditions by name; the suite is played under each.
+        conditions: Camera conditions by name; the suite is run under each.
         camera: See `LGMDObservation`; None for each agent's own, see `Agent.camera`.
         params: See `LGMDObservation`; None for each agent's own or the defaults.
         kinds: Kinds of traffic; None for all. Only for the suite "traffic".
@@ -131,12 +131,12 @@ class RunConfig:
 
 
 def _names(name: str, values: Iterable[str], kind: str = "", known: Iterable[str] = ()) -> tuple[str, ...]:
-    """Return distinct names, at least one, all of them strings and among the known ones, if any."""
+    """Return the distinct names; raise ValueError for an unknown one, or if there are none."""
     if isinstance(values, str) or not all(isinstance(value, str) for value in values):
         raise ValueError(f"{name} must be a list of strings, got {values!r}")
     names = tuple(dict.fromkeys(values))
     if not names:
-        raise ValueError(f"{name} must hold at least one name, got none")
+        raise ValueError(f"{name} must contain at least one name, got none")
     for value in names:
         if kind and value not in known:
             raise unknown_name(kind, value, known)

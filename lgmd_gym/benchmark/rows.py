@@ -5,7 +5,7 @@ from typing import Any
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.metrics import METRICS, PREMATURE, Counterfactual, PairedEpisode, measure
-from lgmd_gym.benchmark.sensors import CLEAR
+from lgmd_gym.camera import CLEAR
 
 Row = dict[str, Any]
 RowKey = tuple[str, str, int, str]
@@ -16,7 +16,7 @@ KEYS = (*ID_KEYS, "camera", *METRICS, "error")
 
 
 def key_of(row: Row) -> RowKey:
-    """Return what identifies a row within its run: agent, case, seed, condition."""
+    """Return the key of a row, unique within its run: agent, case, seed, condition."""
     return row["agent"], row["case"], row["seed"], row["condition"]
 
 
@@ -49,8 +49,8 @@ def make_row(
 
     Args:
         agent: Agent string.
-        case: Case played.
-        seed: Seed played.
+        case: Case of the episode.
+        seed: Seed of the episode.
         episode: Episode to measure.
         counterfactual: Outcome of `no-brake`, which defines a threat.
         premature: Lead before the counterfactual contact beyond which braking is premature [s].

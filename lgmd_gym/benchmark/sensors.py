@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, is_dataclass, replace
 from typing import Any
 
-from lgmd_gym.camera import PRESETS, CameraParams, CameraSpec, with_condition
+from lgmd_gym.camera import CLEAR, PRESETS, CameraParams, CameraSpec, with_condition
 from lgmd_gym.neuron import NeuronSpec
 
 DEFAULT_CAMERA = "fovea"
-CLEAR = "clear"
 
 
 @dataclass(frozen=True, slots=True)

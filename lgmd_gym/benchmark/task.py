@@ -1,4 +1,4 @@
-"""One task of a run: one agent in one case with one seed, played in any process."""
+"""One task of a run: one agent in one case with one seed."""
 
 import traceback
 from dataclasses import dataclass
@@ -12,18 +12,19 @@ from lgmd_gym.benchmark.episode import Episode, make_env, play
 from lgmd_gym.benchmark.fcw_driver import FCWDriver
 from lgmd_gym.benchmark.metrics import Counterfactual
 from lgmd_gym.benchmark.rows import KEYS, Row, RowKey, make_row, new_row
-from lgmd_gym.benchmark.sensors import CLEAR, SensorConfig
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.camera import CLEAR
 
 NO_BRAKE = "no-brake"
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One episode to play.
+    """One episode to run.
 
     Attributes:
         agent: Agent string.
-        case: Case to play.
+        case: Case to run.
         seed: Seed of the environment and the agent.
         sensor_config: Camera and neuron parameters under the condition.
         counterfactual: Outcome of `no-brake`; None for `no-brake` itself.
@@ -59,7 +60,7 @@ class Result:
 
 
 def run_task(task: Task) -> Result:
-    """Play a task; an exception in the agent or the environment becomes an error row."""
+    """Run a task; an exception in the agent or the environment becomes an error row."""
     try:
         agent: Any = make_agent(task.agent)
         sensor_config = task.sensor_config.for_agent(agent)

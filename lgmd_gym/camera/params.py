@@ -57,7 +57,7 @@ class CameraParams:
         mount_setback: Distance of the lens behind the front bumper [m].
         mount_left: Distance of the lens left of the car's centreline [m].
         pitch_deg: Upward tilt of the optical axis; 0 puts the horizon at half height [degrees].
-        yaw_deg: Turn of the optical axis to the right of straight ahead [degrees].
+        yaw_deg: Yaw of the optical axis, + to the right; 0 is straight ahead [degrees].
         gaze: `"fixed"` to the car, or `"path"`: turned towards the car's position in one second on its
             present circle, from its own speed and steering angle only.
         texture: Contrast of asphalt and verge, as a multiple of the natural contrast.
@@ -174,7 +174,7 @@ def _with_condition(changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return `changes` with `condition` replaced by the fields that it sets."""
     check_keys("camera field", changes, [*_field_names(), "condition"])
     others = dict(changes)
-    condition = others.pop("condition", "clear")
+    condition = others.pop("condition", CLEAR)
     if condition not in CONDITIONS:
         raise unknown_name("camera condition", condition, CONDITIONS)
     return {**CONDITIONS[condition], **others}
@@ -228,8 +228,9 @@ PRESETS: dict[str, CameraParams] = {
 }
 """Cameras by name; `paper` has the frame size of the paper's clips."""
 
+CLEAR = "clear"
 CONDITIONS: dict[str, dict[str, Any]] = {
-    "clear": {},
+    CLEAR: {},
     "night": {"light": "night", "read_noise": 2.0, "shot_noise": 3.0},
     "fog": {"visibility_m": 120.0},
     "degraded": {

@@ -6,12 +6,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from lgmd_gym import CameraParams, EgoCamera, camera
+from lgmd_gym import CameraParams, EgoCamera
 from lgmd_gym.benchmark.suites import find_suite
+from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.envs import FAMILIES
 from lgmd_gym.envs.random_braking import RandomBrakingEnv
 from lgmd_gym.envs.scenarios.distribution import (
-    CONDITIONS,
     LEVELS,
     NON_THREATS,
     THREATS,
@@ -88,10 +88,6 @@ def test_the_road_matches_the_scenario():
         assert any(lane.__class__.__name__ == "CircularLane" for lane in lanes) is (kind == "curve")
         if kind == "two-way":
             assert len(lanes) == 2
-
-
-def test_conditions_equal_those_of_the_camera():
-    assert tuple(CONDITIONS) == tuple(camera.CONDITIONS)
 
 
 def test_levels_set_condition_and_texture_of_the_camera():

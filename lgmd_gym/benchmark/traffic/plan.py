@@ -1,4 +1,4 @@
-"""The episodes of the traffic suite: one recording per camera serves all agents with that camera."""
+"""The episodes of the traffic suite: all agents with the same camera share one recording."""
 
 import traceback
 from collections.abc import Iterable, Iterator
@@ -11,11 +11,12 @@ from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.executor import TaskMap
 from lgmd_gym.benchmark.plan import Plan
 from lgmd_gym.benchmark.rows import Row, key_of, new_row
-from lgmd_gym.benchmark.sensors import CLEAR, SensorConfig
+from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import Result
 from lgmd_gym.benchmark.traffic.recording import record_traffic
 from lgmd_gym.benchmark.traffic.replay import Replay
 from lgmd_gym.benchmark.traffic.rows import KEYS, measure, traffic_case
+from lgmd_gym.camera import CLEAR
 from lgmd_gym.envs.traffic.registration import traffic_id
 
 
@@ -53,7 +54,7 @@ class TrafficPlan(Plan):
         return len(config.agents) * len(self.kinds) * config.seeds * len(config.conditions)
 
     def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
-        """Play the missing episodes and yield their results as they finish.
+        """Run the missing episodes and yield their results as they finish.
 
         Seeds come before kinds, so that an interrupted run holds a balanced sample.
         """

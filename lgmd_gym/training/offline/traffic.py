@@ -15,10 +15,10 @@ import numpy as np
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.episode import rollout
 from lgmd_gym.benchmark.task import NO_BRAKE
-from lgmd_gym.camera import CameraSpec
+from lgmd_gym.camera import CONDITIONS, CameraSpec
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.reward import RewardParams
-from lgmd_gym.envs.scenarios.distribution import CONDITIONS, draw_camera_fields
+from lgmd_gym.envs.scenarios.distribution import draw_camera_fields
 from lgmd_gym.envs.traffic.emergencies import HARD_BRAKING, Emergencies, simulate_driver
 from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
 from lgmd_gym.training.offline.episodes import Observation, RecordedEpisode, select_signals, stack
@@ -49,7 +49,7 @@ class TrafficRecorder:
         kind = list(KINDS)[seed % len(KINDS)]
         env = make_traffic(kind, camera=self.camera, include_frame=self.shrink is not None)
         base: Any = env.unwrapped
-        base.camera_fields = draw_camera_fields(self.split, seed, CONDITIONS)
+        base.camera_fields = draw_camera_fields(self.split, seed, tuple(CONDITIONS))
         try:
             observations, emergencies = run_episode(env, seed, self.shrink)
         finally:
