@@ -1,4 +1,4 @@
-"""Agents of the user: classes with a method `act`, given as "module:Class"."""
+"""User-defined agents: classes with a method `act`, given as "module:Class"."""
 
 import os
 import sys
@@ -33,17 +33,17 @@ class AgentAdapter(Agent):
 
     @property
     def camera(self) -> "CameraSpec | None":
-        """Cameras of the object; None without the attribute."""
+        """The object's attribute `camera`; None if it has none."""
         return getattr(self.agent, "camera", None)
 
     @property
     def neuron(self) -> "NeuronSpec":
-        """Neuron parameters of the object; None without the attribute."""
+        """The object's attribute `neuron`; None if it has none."""
         return getattr(self.agent, "neuron", None)
 
     @property
     def alert(self) -> bool:
-        """Alert of the object; the neuron's alert without the attribute."""
+        """The object's attribute `alert`; the alert of the neuron if it has none."""
         return bool(getattr(self.agent, "alert", self._alert))
 
     def reset(self, seed: int | None = None) -> None:

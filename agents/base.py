@@ -89,5 +89,5 @@ class LatchingAgent(Agent):
         return BRAKE if self._latched else HOLD
 
     def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
-        """Return whether to begin braking; called at every decision in order."""
+        """Return whether to begin braking; called once per decision, in order."""
         raise NotImplementedError

@@ -29,7 +29,7 @@ class AlwaysBrake(Agent):
 
 
 class RandomBrake(Agent):
-    """Brakes fully from a random time: the chance level. The onset time T ~ Exp(rate).
+    """Brakes fully from a random time on, as a chance-level baseline. The onset time T ~ Exp(rate).
 
     Args:
         rate: Mean number of onsets per second, > 0 [1/s].

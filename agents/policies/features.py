@@ -73,12 +73,12 @@ class FeatureConfig:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "FeatureConfig":
-        """Return the configuration for plain values; unknown keys raise ValueError."""
+        """Return the configuration from plain values; unknown keys raise ValueError."""
         check_keys("policy feature", values, cls.__dataclass_fields__)
         return cls(**values)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values."""
+        """Return the configuration as plain values."""
         return asdict(self) | {"inputs": list(self.inputs)}
 
     def latches(self, demand: float) -> bool:
