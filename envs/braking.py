@@ -19,7 +19,7 @@ from lgmd_gym.envs.simulation.vehicles import ACTOR_CLASSES, EgoCar
 from lgmd_gym.envs.spaces import EgoState, make_action
 from lgmd_gym.errors import check_keys
 
-SHADES = (30, 220)  # range of random body greys
+SHADES = (30, 220)  # range of random grey levels
 START_RANGE = 500.0  # [m], range of the random start position, which varies the road texture
 PASSED_DISTANCE = 2.0  # [m] behind the ego's rear beyond which an actor has been passed
 
@@ -32,7 +32,7 @@ class BrakingEnv(EgoBrakeEnv):
     The ego and all actors follow scripted paths and speeds. Cars move exactly under piecewise linear
     acceleration and never reverse. Contact is detected inside the step, with the speeds of that moment. The
     scenario fixes the scene; the seed draws the start position on the road (which varies the visible road
-    texture) and the body grey of every actor whose `shade` is None. Physics runs at 60 Hz, decisions at
+    texture) and the grey level of every actor whose `shade` is None. Physics runs at 60 Hz, decisions at
     30 Hz.
 
     ## Action Space
@@ -153,7 +153,7 @@ class BrakingEnv(EgoBrakeEnv):
         self.action_space = self.action_type.space()
 
     def update_metadata(self, video_real_time_ratio: int = 1) -> None:
-        """Set `render_fps` to real time."""
+        """Set `render_fps` so that videos play in real time."""
         super().update_metadata(video_real_time_ratio)
 
     @property

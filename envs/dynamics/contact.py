@@ -39,7 +39,7 @@ class Contact(NamedTuple):
 
     @classmethod
     def between(cls, ego: Any, other: Any) -> "Contact":
-        """Return the contact of two road objects that touch now."""
+        """Return the contact of two road objects that currently touch."""
         side = touched_side(outline(ego), outline(other))
         return cls(other, side, float(ego.speed), float(ego.speed) - speed_along(ego, other))
 
@@ -67,7 +67,7 @@ def first_touch(moving: Rectangle, standing: Rectangle, dx: float, dy: float) ->
         dy: Displacement along y relative to `standing` [m].
 
     Returns:
-        A fraction in [0, 1], 0 for rectangles that overlap from the start, `inf` without a touch.
+        A fraction in [0, 1], 0 for rectangles that overlap from the start, `inf` if they do not touch.
     """
     apart_x, apart_y = standing.x - moving.x, standing.y - moving.y
     reach = hypot(moving.length, moving.width) / 2 + hypot(standing.length, standing.width) / 2

@@ -170,7 +170,7 @@ def arc(radius: float, angle: float) -> Bend:
 
 
 def turn(angle: float, radius: float, easing: float) -> tuple[Bend, ...]:
-    """Return clothoid, arc and clothoid that turn by `angle`.
+    """Return a clothoid, an arc and a clothoid that together turn by `angle`.
 
     Args:
         angle: Change of heading, + to the left, |angle| <= π [rad].

@@ -36,7 +36,7 @@ def pass_standing(
         lateral_offset: Centreline of the stationary cars minus ego centreline, + left, in [-20, 20] and far
             enough to avoid contact [m].
         cars: Number of stationary cars in the queue, in [1, 20].
-        shade: Body grey of the stationary cars in [0, 255]; None draws each from the seed.
+        shade: Grey level of the stationary cars in [0, 255]; None to draw each from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     if abs(check_within("lateral_offset", lateral_offset, -20.0, 20.0, "m")) <= CONTACT_OFFSET:
@@ -65,7 +65,7 @@ def pass_between(ego_speed: float = 80 * KMH, inner_gap: float = 4.5, shade: int
     Args:
         ego_speed: Ego speed, in (0, 40] [m/s].
         inner_gap: Distance between the inner sides of the parked cars, in [2, 10] [m].
-        shade: Body grey of the parked cars in [0, 255]; None draws each from the seed.
+        shade: Grey level of the parked cars in [0, 255]; None to draw each from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     aside = check_within("inner_gap", inner_gap, 2.0, 10.0, "m") / 2 + TARGET_WIDTH / 2
@@ -84,7 +84,7 @@ def being_overtaken(
     Args:
         ego_speed: Ego speed, in (0, 40) [m/s].
         excess: Speed of the other car minus ego speed, >= 0.1 [m/s].
-        shade: Body grey of the other car in [0, 255]; None draws it from the seed.
+        shade: Grey level of the other car in [0, 255]; None to draw it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     faster = check_speed("ego_speed + excess", speed + check_within("excess", excess, 0.1, MAX_SPEED, "m/s"))
@@ -102,7 +102,7 @@ def meet_oncoming(
     Args:
         ego_speed: Ego speed, in (0, 40] [m/s].
         oncoming_speed: Speed of the oncoming car, in (0, 40] [m/s].
-        shade: Body grey of the other car in [0, 255]; None draws it from the seed.
+        shade: Grey level of the other car in [0, 255]; None to draw it from the seed.
     """
     speed, oncoming = check_speed("ego_speed", ego_speed), check_speed("oncoming_speed", oncoming_speed)
     gap = START_TTC * (speed + oncoming)
@@ -131,7 +131,7 @@ def cut_in(
         gap: Bumper-to-bumper distance at the start of the lane change, in [2, 200] [m].
         excess: Speed of the other car minus ego speed, >= 0 [m/s].
         change_length: Length of the lane change along the road, in [10, 200] [m].
-        shade: Body grey of the other car in [0, 255]; None draws it from the seed.
+        shade: Grey level of the other car in [0, 255]; None to draw it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     faster = check_speed("ego_speed + excess", speed + check_within("excess", excess, 0.0, MAX_SPEED, "m/s"))
@@ -156,7 +156,7 @@ def cut_out(
         ego_speed: Speed of both cars, in (0, 40] [m/s].
         headway: Time headway, in [0.3, 10] [s].
         change_length: Length of the lane change along the road, in [10, 200] [m].
-        shade: Body grey of the other car in [0, 255]; None draws it from the seed.
+        shade: Grey level of the other car in [0, 255]; None to draw it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     lead = Actor(

@@ -31,7 +31,7 @@ def cross_straight(
     from_stop: bool = False,
     shade: int | None = None,
 ) -> Scenario:
-    """A car crosses the ego's path and is struck in its side (Car-to-Car Crossing straight crossing path).
+    """A car crosses the ego's path and is struck in the side (Car-to-Car Crossing straight crossing path).
 
     Without braking, the ego's centreline meets the target's side a quarter of its length behind its front.
     Source: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.5.
@@ -41,7 +41,7 @@ def cross_straight(
         target_speed: Target speed, in (0, 40] [m/s].
         side: Side from which the target comes, "right" or "left".
         from_stop: Whether the ego waits 2.9 m before the target's path and then accelerates to `ego_speed`.
-        shade: Body grey of the target in [0, 255]; None draws it from the seed.
+        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
     """
     speed, across = check_speed("ego_speed", ego_speed), check_speed("target_speed", target_speed)
     if from_stop:
@@ -76,7 +76,7 @@ def cross_and_clear(
         clear_by: Time between the target's rear leaving the ego's lane and the ego's arrival, in [0.5, 4]
             [s].
         side: Side from which the target comes, "right" or "left".
-        shade: Body grey of the target in [0, 255]; None draws it from the seed.
+        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
     """
     speed, across = check_speed("ego_speed", ego_speed), check_speed("target_speed", target_speed)
     distance = START_TTC * speed
@@ -100,7 +100,7 @@ def _crossing_car(distance: float, before: float, speed: float, side: str, shade
         before: Distance from the car's centre to the ego's centreline, along the car's path [m].
         speed: Speed [m/s].
         side: Side from which the car comes.
-        shade: Body grey; None draws it from the seed.
+        shade: Grey level; None to draw it from the seed.
     """
     if side not in SIDES:
         raise unknown_name("side", side, SIDES)

@@ -47,7 +47,7 @@ def approach_standing(
             aligned, larger values are to the left (2026).
         target_heading: Target heading relative to the ego's, + left, in [-π/2, π/2] [rad].
         beside: Whether a second stationary car is next to the target, in the lane to the left.
-        shade: Body grey of the target in [0, 255]; None draws it from the seed.
+        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     target = Actor(
@@ -83,7 +83,7 @@ def approach_slower(
         overlap: Alternative to `lateral_offset`, as in CCRs.
         impact_location: Alternative to `lateral_offset`, as in CCRs.
         beside: Whether a second car drives next to the target, in the lane to the left.
-        shade: Body grey of the target in [0, 255]; None draws it from the seed.
+        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     lead = check_speed("target_speed", target_speed)
@@ -128,7 +128,7 @@ def follow_braking(
         overlap: Alternative to `lateral_offset`, as in CCRs.
         impact_location: Alternative to `lateral_offset`, as in CCRs.
         beside: Whether a second car brakes next to the target, in the lane to the left.
-        shade: Body grey of the target in [0, 255]; None draws it from the seed.
+        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     strength = check_within("deceleration", deceleration, 0.5, 10.0, "m/s²")
@@ -160,7 +160,7 @@ def follow_steadily(ego_speed: float = 50 * KMH, headway: float = 2.0, shade: in
     Args:
         ego_speed: Speed of both cars, in (0, 40] [m/s].
         headway: Time headway, in [0.3, 10] [s].
-        shade: Body grey of the lead car in [0, 255]; None draws it from the seed.
+        shade: Grey level of the lead car in [0, 255]; None to draw it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     gap = speed * check_within("headway", headway, 0.3, 10.0, "s")
@@ -178,7 +178,7 @@ def lead_brakes_and_releases(
         ego_speed: Initial speed of both cars, in (0, 40] [m/s].
         headway: Initial time headway, in [0.3, 10] [s].
         speed_drop: Speed that the lead car loses and regains at 2.5 m/s², in [0.1, ego_speed] [m/s].
-        shade: Body grey of the lead car in [0, 255]; None draws it from the seed.
+        shade: Grey level of the lead car in [0, 255]; None to draw it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
     gap = speed * check_within("headway", headway, 0.3, 10.0, "s")

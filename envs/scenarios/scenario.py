@@ -34,7 +34,7 @@ class Actor:
         profile: Scripted changes of speed, in order of their start.
         path: Bends driven from the start on; empty for a straight path.
         kind: "car"; "box", a solid object; or "road_marking", a flat object that the ego drives over.
-        shade: Body grey in [0, 255]; None draws it from the environment's seed.
+        shade: Grey level in [0, 255]; None to draw it from the environment's seed.
         length: Length [m].
         width: Width [m].
         height: Height [m].

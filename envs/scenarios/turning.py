@@ -20,7 +20,7 @@ def turn_before_oncoming(left: bool = True, shade: int | None = None) -> Scenari
 
     Args:
         left: Whether the ego turns left, across the front of the other car; otherwise right.
-        shade: Body grey of the stationary car in [0, 255]; None draws it from the seed.
+        shade: Grey level of the stationary car in [0, 255]; None to draw it from the seed.
     """
     approach, slow, slowing = 30 * KMH, 17 * KMH, 2.5
     slowing_distance = (approach**2 - slow**2) / (2 * slowing)
@@ -51,7 +51,7 @@ def lead_turns_off(left: bool = False, shade: int | None = None) -> Scenario:
 
     Args:
         left: Whether the lead car turns left; otherwise right.
-        shade: Body grey of the lead car in [0, 255]; None draws it from the seed.
+        shade: Grey level of the lead car in [0, 255]; None to draw it from the seed.
     """
     both, lead_slow, slow, slowing = 40 * KMH, 10 * KMH, 27 * KMH, 3.0
     lead_time = (both - lead_slow) / slowing
@@ -81,14 +81,14 @@ def lead_turns_off(left: bool = False, shade: int | None = None) -> Scenario:
 
 @family("CurveObjectOutside")
 def curve_with_car_outside(left: bool = True, shade: int | None = None) -> Scenario:
-    """The ego drives a tight curve with a stationary car just outside of it, straight ahead; not a threat.
+    """The ego drives through a tight curve past a stationary car on its outside; not a threat.
 
     The ego slows from 30 to 22.5 km/h before a curve of 25 m radius; at its entry the car is within 1.6 s.
     Source: UN R152 Rev.2, Annex 3 Appendix 2, case 3.
 
     Args:
         left: Whether the curve turns left; otherwise right.
-        shade: Body grey of the stationary car in [0, 255]; None draws it from the seed.
+        shade: Grey level of the stationary car in [0, 255]; None to draw it from the seed.
     """
     approach, slow, slowing = 30 * KMH, 22.5 * KMH, 2.0
     onset = APPROACH * approach + (approach**2 - slow**2) / (2 * slowing) + 1.0

@@ -14,7 +14,7 @@ COMFORT_DECELERATION = 3.0  # [m/s²], limit of the driver's deceleration toward
 
 
 class TrafficEgo(TrafficCar):
-    """The car under test: IDM drives without lane changes, an agent can add braking.
+    """The car under test: driven by IDM without lane changes; an agent can add braking.
 
     Without lane changes, episodes with and without braking differ by the braking alone. MOBIL would also
     overtake on a two-way road regardless of oncoming cars. The steering is highway-env's. The speed follows
