@@ -1,4 +1,4 @@
-"""BirdsEye: highway-env's top view as grey frames."""
+"""BirdsEye: highway-env's top view as greyscale frames."""
 
 from typing import Any
 

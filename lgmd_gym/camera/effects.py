@@ -1,4 +1,4 @@
-"""Light, weather and sensor noise of a camera, as numbers for the kernels."""
+"""Numeric parameters of light, weather and sensor noise for the kernels."""
 
 import math
 from functools import lru_cache
@@ -52,12 +52,12 @@ def look_of(p: CameraParams) -> np.ndarray:
 
 
 def haze_grey(p: CameraParams) -> float:
-    """Grey level of the fog."""
+    """Return the grey level of the fog."""
     return 18.0 if p.light == "night" else 200.0
 
 
 def far_transmission(p: CameraParams) -> float:
-    """Share of the contrast of sky and skyline that remains behind 500 m of fog."""
+    """Return the share of the contrast of sky and skyline that remains behind 500 m of fog."""
     return math.exp(-500.0 * math.log(20.0) / p.visibility_m)
 
 

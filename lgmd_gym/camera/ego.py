@@ -99,7 +99,7 @@ class EgoCamera:
 
 
 def check_frame(out: np.ndarray, shape: tuple[int, int]) -> None:
-    """Refuse a frame of another shape or dtype.
+    """Raise ValueError for a frame of another shape or dtype.
 
     Raises:
         ValueError: If `out` is not uint8 of this shape.

@@ -39,7 +39,7 @@ _MODELS: dict[type, tuple[int, float]] = {}
 
 
 class ObjectList:
-    """The objects of a scene that lenses may have in view.
+    """The objects of a scene that may be visible to the cameras.
 
     Attributes:
         records: `OBJECT` records, shape (512,). The kernels append the roadside.
@@ -56,7 +56,7 @@ class ObjectList:
         return ObjectList, ()
 
     def read(self, scene: SceneState, p: CameraParams, poses: Sequence[CameraPose]) -> None:
-        """Read all objects but the ego that may be in view from these poses.
+        """Read all objects except the ego that may be visible from these poses.
 
         Args:
             scene: State of the environment.
@@ -120,7 +120,7 @@ class ObjectList:
 
 
 def _appearance(item: Any, index: int, p: CameraParams) -> tuple[int, float, float]:
-    """Model, height [m] and shade of an object."""
+    """Return model, height [m] and shade of an object."""
     cls = item.__class__
     model, height = _MODELS.get(cls) or _default_appearance(cls)
     height = getattr(item, "HEIGHT", height)
@@ -139,7 +139,7 @@ def _appearance(item: Any, index: int, p: CameraParams) -> tuple[int, float, flo
 
 
 def _default_appearance(cls: type) -> tuple[int, float]:
-    """Model and default height [m] of a class of objects, from the names of its base classes."""
+    """Return model and default height [m] of a class of objects, from the names of its base classes."""
     names = {base.__name__ for base in cls.__mro__}
     if "Landmark" in names:
         model = MODEL_MARK, 0.0

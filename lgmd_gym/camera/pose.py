@@ -57,20 +57,20 @@ def earlier(scene: SceneState, ago_s: float) -> SceneState:
 
 
 def _slip_and_yaw_rate(ego: Any) -> tuple[float, float]:
-    """Slip angle [rad] and yaw rate [rad/s] of highway-env's kinematic bicycle."""
+    """Return slip angle [rad] and yaw rate [rad/s] of highway-env's kinematic bicycle."""
     steering = (getattr(ego, "action", None) or {}).get("steering", 0.0)
     slip = math.atan(0.5 * math.tan(steering))
     return slip, ego.speed * math.sin(slip) / (0.5 * ego.LENGTH)
 
 
 def _path_yaw(ego: Any) -> float:
-    """Direction, relative to the heading, of the ego's position in one second on its circle [rad]."""
+    """Return the direction, relative to the heading, of the ego's position in one second [rad]."""
     slip, rate = _slip_and_yaw_rate(ego)
     return max(-_PATH_MAX, min(_PATH_MAX, slip + 0.5 * (rate * _PATH_S)))
 
 
 def _body_pitch(p: CameraParams, scene: SceneState) -> float:
-    """Upward pitch of the car's body from an uneven road and from braking [rad]."""
+    """Return the upward pitch of the car's body due to an uneven road and braking [rad]."""
     pitch = 0.0
     if p.vibration_deg > 0.0:
         pitch += _vibration(p.vibration_deg, p.seed, scene, 0.37)
@@ -81,7 +81,7 @@ def _body_pitch(p: CameraParams, scene: SceneState) -> float:
 
 
 def _vibration(rms: float, seed: int, scene: SceneState, shift: float) -> float:
-    """Sum of the body's natural vibrations with an RMS of `rms` at 14 m/s; `shift` sets the phases apart.
+    """Return the sum of the body's natural vibrations, RMS `rms` at 14 m/s; `shift` offsets the phases.
 
     The spectrum of a road's height falls with the square of the spatial frequency (ISO 8608). The variance
     above the body's frequency is therefore proportional to the speed, and the RMS to its square root.

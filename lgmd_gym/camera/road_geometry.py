@@ -97,7 +97,7 @@ def _extract(lanes: list[Any], roadside: float, seed: int, rail: bool) -> RoadGe
 
 @lru_cache(maxsize=16)
 def _roadside_of(segments: bytes, roadside: float, seed: int, rail: bool) -> np.ndarray:
-    """Roadside, cached by the shape of the lanes: environments build a new network at each reset."""
+    """Return the roadside, cached by the shape of the lanes, because each reset builds a new network."""
     pieces = np.frombuffer(segments).reshape(-1, 6)
     out = posts_and_plants(pieces, roadside, seed)
     if rail:
@@ -107,7 +107,7 @@ def _roadside_of(segments: bytes, roadside: float, seed: int, rail: bool) -> np.
 
 
 def _stations(lane: Any) -> np.ndarray:
-    """Distances along the lane between which it may be drawn straight; shape (n,) [m]."""
+    """Return the distances along the lane between which it is drawn straight; shape (n,) [m]."""
     length = float(lane.length)
     probe = length * np.array([0.0, 0.07, 0.19, 0.31, 0.43, 0.5, 0.62, 0.71, 0.83, 0.94, 1.0])
     points = np.array([lane.position(s, 0.0) for s in probe], dtype=np.float64)
@@ -122,7 +122,7 @@ def _stations(lane: Any) -> np.ndarray:
 
 
 def _segments(lane: Any, stations: np.ndarray) -> np.ndarray:
-    """Centre line of a lane in pieces: x0, y0, x1, y1, start along the lane, width; shape (n, 6) [m]."""
+    """Return a lane in straight pieces: x0, y0, x1, y1, start along the lane, width; shape (n, 6) [m]."""
     centre = np.array([lane.position(s, 0.0) for s in stations], dtype=np.float64)
     width = np.array([lane.width_at(s) for s in stations[:-1]])
     return np.concatenate((centre[:-1], centre[1:], stations[:-1, None], width[:, None]), axis=1)
@@ -145,7 +145,7 @@ def _line(lane: Any, stations: np.ndarray, side: int, *, striped: bool) -> np.nd
 
 
 def _car_park(surface: np.ndarray) -> np.ndarray:
-    """One quad around all bays of a car park, whose aisles belong to no lane."""
+    """Return one quad around all bays of a car park, whose aisles belong to no lane."""
     x, y = surface[:, 0::2], surface[:, 1::2]
     x0, x1, y0, y1 = x.min() - 5.0, x.max() + 5.0, y.min() - 3.0, y.max() + 3.0
     return np.array([[x0, y0, x0, y1, x1, y1, x1, y0]])

@@ -66,14 +66,14 @@ def guard_rails(segments: np.ndarray) -> np.ndarray:
 
 
 def _directions(segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors, shape (n, 2), and lengths, shape (n,), of pieces x0, y0, x1, y1, … [m]."""
+    """Return the unit vectors, shape (n, 2), and lengths, shape (n,), of pieces x0, y0, x1, y1, … [m]."""
     delta = segments[:, 2:4] - segments[:, 0:2]
     length = np.maximum(np.hypot(delta[:, 0], delta[:, 1]), 1e-9)
     return delta / length[:, None], length
 
 
 def _nodes(lane: np.ndarray) -> np.ndarray:
-    """Points every 8 m along one lane's segments: x, y, unit normal to the right, width; shape (n, 5)."""
+    """Return points every 8 m along a lane: x, y, unit normal to the right, width; shape (n, 5)."""
     unit, length = _directions(lane)
     total = lane[-1, 4] + length[-1]
     along = np.linspace(0.0, total, int(np.ceil(total / _RAIL_STEP)) + 1)
@@ -96,7 +96,7 @@ def _positions(records: np.ndarray) -> np.ndarray:
 def _along_edges(
     segments: np.ndarray, step: float, offset: float, spread: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Points every `step` metres along the outer edges, `offset` to `offset + spread` beyond them."""
+    """Return points every `step` metres along the outer edges, `offset` to `offset + spread` beyond them."""
     unit, length = _directions(segments)
     start, width = segments[:, 4], segments[:, 5]
     first = np.ceil(start / step)
@@ -118,7 +118,7 @@ def _along_edges(
 
 
 def _clear_of(points: np.ndarray, segments: np.ndarray, margin: np.ndarray) -> np.ndarray:
-    """Whether each point is at least `margin` beyond the edges of all lanes; bool, shape (n,)."""
+    """Return whether each point is at least `margin` beyond the edges of all lanes; bool, shape (n,)."""
     clear = np.ones(len(points), dtype=bool)
     for x0, y0, x1, y1, _, width in segments:
         dx, dy = x1 - x0, y1 - y0

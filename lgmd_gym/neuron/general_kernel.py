@@ -1,4 +1,4 @@
-"""General kernel: every structural option of `LGMDParams`, in plain loops; `kernels` is the fast kernel."""
+"""General kernel: all structural options of `LGMDParams` in plain loops; `kernels` has the fast kernel."""
 
 import numpy as np
 from numba import njit

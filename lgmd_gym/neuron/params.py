@@ -159,7 +159,7 @@ class LGMDParams:
 
     @classmethod
     def off_only(cls) -> Self:
-        """Return the model without its ON path, which responds to dark objects only, as LGMD2 does."""
+        """Return the model without its ON path; like LGMD2, it responds to dark objects only."""
         return cls(theta_1=0.0)
 
     @classmethod
@@ -186,7 +186,7 @@ class LGMDParams:
 
     @classmethod
     def make(cls, spec: "NeuronSpec") -> Self:
-        """Return parameters from a `params` argument: parameters, a mapping, or None for the defaults.
+        """Return the parameters for a `params` argument: an instance, a mapping, or None for the defaults.
 
         Raises:
             ValueError: For an unknown key or a value out of range.

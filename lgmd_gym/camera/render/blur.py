@@ -54,7 +54,7 @@ def blur_steps(lens, before, shutter_s, objects, count):
 
 @kernel
 def lens_before(end, start, ago, out):
-    """Write the lens at the share `ago` of the exposure before its end to the record `out`."""
+    """Write the lens at `ago` before the end of the exposure, as a share of it, to the record `out`."""
     out.x = end.x + ago * (start.x - end.x)
     out.y = end.y + ago * (start.y - end.y)
     out.z = end.z + ago * (start.z - end.z)

@@ -40,7 +40,7 @@ def add_quad(layer, k, lens, weight):
 
 @kernel
 def _sum_row(coverage, row, rows):
-    """Sum one row of coverage differences to coverage (rows 0 to 2 of `rows`), and clear it."""
+    """Sum one row of coverage differences into coverage (rows 0 to 2 of `rows`), and clear it."""
     width = rows.shape[1] - 2
     cells = coverage[row]
     for k in range(3):

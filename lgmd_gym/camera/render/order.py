@@ -37,7 +37,7 @@ def visible(lens, obj):
 
 @kernel
 def _separating_side(a, b, px, py):
-    """Find a side of box a with all of box b beyond it.
+    """Find a side of box a that separates it from box b.
 
     Returns 1 if the point (px, py) is on a's side of it (a may hide b, but not the reverse), -1 if it is on
     b's side, 0 if there is no such side.

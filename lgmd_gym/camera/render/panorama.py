@@ -1,4 +1,4 @@
-"""A 360° panorama in place of the skyline: natural noise or an image."""
+"""A 360° panorama that replaces the skyline: natural noise or an image."""
 
 import math
 from functools import lru_cache

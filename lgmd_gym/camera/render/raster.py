@@ -46,7 +46,7 @@ def append_roadside(lens, roadside, objects, count):
 
 @kernel
 def draw_distance(image, view, tables, horizon):
-    """Draw sky and skyline or the panorama, kept while the lens does not turn."""
+    """Draw the sky and skyline, or the panorama; reuse them while the lens does not turn."""
     lens, sky, aim = view.lens, view.sky, view.sky_aim
     if aim[0] != lens.yaw or aim[1] != lens.pitch:
         aim[0], aim[1] = lens.yaw, lens.pitch

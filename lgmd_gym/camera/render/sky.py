@@ -32,7 +32,7 @@ def skyline(seed: int) -> np.ndarray:
 
 
 def _profile(rng: np.random.Generator, n: int, exponent: float, lowest: int) -> np.ndarray:
-    """Periodic noise with amplitude 1/frequency^exponent above `lowest` waves per turn; unit variance."""
+    """Return periodic noise, 1/frequency^exponent above `lowest` waves per turn; unit variance."""
     frequency = np.maximum(np.arange(n // 2 + 1), lowest).astype(np.float64)
     spectrum = np.fft.rfft(rng.standard_normal(n)) * frequency**-exponent
     spectrum[0] = 0.0

@@ -17,7 +17,7 @@ _STD_CODE = 36.0  # standard deviation of the stored bytes around 128
 
 
 class Texture(NamedTuple):
-    """A rip-map.
+    """Rip-map: box averages of a texture over 2^i x 2^j texels.
 
     Attributes:
         data: All levels, uint8, flat; 128 is the mean, and 36 one standard deviation of the finest level.
@@ -46,7 +46,7 @@ def ground_texture(kind: str, seed: int) -> Texture:
 
 
 def _noise(rng: np.random.Generator, exponent: float) -> np.ndarray:
-    """Periodic noise with amplitude 1/frequency^exponent; float32, unit variance."""
+    """Return periodic noise with amplitude 1/frequency^exponent; float32, unit variance."""
     shape = (1 << _LONG_LOG2, 1 << _WIDE_LOG2)
     white = rng.standard_normal(shape, dtype=np.float32)
     spectrum = np.fft.rfft2(white)

@@ -13,7 +13,7 @@ _BEAM_GAIN, _NIGHT_LIGHT = 1.25, 0.04
 
 @kernel
 def light_at(ahead, across, night):
-    """Return the light on a place `ahead` and `across` of the lens [m]: 1 by day, the low beam's at night."""
+    """Return the light at a point `ahead` and `across` of the lens [m]: 1 by day, the low beam at night."""
     if night == 0.0:
         return 1.0
     tan = across / max(ahead, 1.0)
