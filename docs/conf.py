@@ -1,4 +1,4 @@
-"""Sphinx's settings; pages and figures that come from code are made before the build."""
+"""Sphinx configuration; pages and figures are generated from the code before the build."""
 
 import sys
 from pathlib import Path
@@ -29,7 +29,7 @@ napoleon_use_rtype = False
 
 
 def setup(app: Sphinx) -> None:
-    """Have the pages from code made first."""
+    """Generate the pages from the code before the build."""
     import generate
 
     app.connect("config-inited", lambda app, config: generate.main(Path(app.confdir) / "_generated"))

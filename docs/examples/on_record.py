@@ -4,10 +4,10 @@
 
 The number is the number of levels, drawn from the split `test` of `LGMD/RandomBraking-v0`, which no training
 uses. They are recorded without braking through the cameras of the first agent; all agents must have the same
-cameras. An agent's first braking decision on the recorded observations and the recorded outcome of braking
-there give its result. Agents joined by "+", for example several trainings, are averaged. The columns are the
-mean return with its 95 % bootstrap interval, its difference from the first arm on the same episodes, and the
-shares of threats avoided and of non-threats with false activations.
+cameras. The result of an agent is the recorded outcome of braking at its first braking decision on the
+recorded observations. Agents joined by "+", for example several training runs, are averaged. The columns
+are the mean return with its 95 % bootstrap interval, its difference from the first arm on the same episodes,
+and the shares of threats avoided and of non-threats with false activations.
 """
 
 import sys

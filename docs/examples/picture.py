@@ -1,4 +1,4 @@
-"""The picture and the film of the README: an approach to a standing car.
+"""The picture and the GIF of the README: an approach to a standing car.
 
 python docs/examples/picture.py docs/picture.png docs/approach.gif
 """

@@ -1,4 +1,4 @@
-"""RL training: PPO of stable-baselines3 with spike frequency and own speed as inputs.
+"""RL training: PPO of stable-baselines3 with spike frequency and ego speed as inputs.
 
     pip install -c constraints.txt ".[train]"
     python docs/examples/rl_training.py 100000 docs/tutorials/rl_training.png
