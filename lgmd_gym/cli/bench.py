@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def run(options: "Bench") -> int:
-    """Play a suite and print its summary; 0 if complete, 1 if an episode failed, 130 after Ctrl-C."""
+    """Run a suite and print its summary; return 0 if complete, 1 for failed episodes, 130 for Ctrl-C."""
     from lgmd_gym.benchmark.executor import Executor
     from lgmd_gym.benchmark.runner import INTERRUPTED
     from lgmd_gym.report.outputs import write_outputs
@@ -51,7 +51,7 @@ def run(options: "Bench") -> int:
 
 
 def _cluster(options: "Bench") -> str | None:
-    """Return the address of the Dask scheduler, None for local processes."""
+    """Return the address of the Dask scheduler, or None for local processes."""
     if options.backend == "dask" and options.address is None:
         raise ValueError("--backend dask needs --address tcp://HOST:8786 of the scheduler")
     if options.backend != "dask" and options.address is not None:
@@ -161,7 +161,7 @@ class Tally:
         self.avoided = self.threats = self.false = self.non_threats = self.failed = 0
 
     def add(self, row: dict[str, Any], new: bool = True) -> None:
-        """Count one row; `new` if it was played in this session."""
+        """Count one row; `new` if it was run in this session."""
         self.played += new
         if row["error"] is not None:
             self.failed += 1

@@ -35,7 +35,7 @@ class Bench:
     """Agents with options, for example spike-threshold:threshold=45,frames=2; MODULE:CLASS for an agent of
     your own. Default: no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""
     seeds: Count = None
-    """Number of seeds per case; a seed sets the place on the road and the target's grey. Default: 3."""
+    """Number of seeds per case; a seed sets the start position and the target's grey level. Default: 3."""
     first_seed: Count = None
     """First seed. Default: 0."""
     conditions: Names = None
@@ -64,7 +64,7 @@ class Bench:
 
 @dataclass(frozen=True, kw_only=True)
 class Compare:
-    """Compare agents in pairs, or several trainings as arms, on the same episodes.
+    """Compare agents in pairs, or several training runs as arms, on the same episodes.
 
     Pairs: differences B − A over episodes of the same case, seed and condition, with 95 % intervals from a
     bootstrap over cases. Arms: mean return and shares of each arm, and the difference to the first arm. Arms
@@ -102,7 +102,7 @@ class Drive:
     overlays: Annotated[tuple[str, ...], arg(metavar="[NAME ...]")] = ("zone", "targets")
     """Overlays on the camera frame: zone (lane ahead), targets (vehicles); --overlays alone for none."""
     seed: int = 0
-    """Seed of the environment: place on the road and grey of the target."""
+    """Seed of the environment: start position and grey level of the target."""
     camera: Name = None
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
     params: File = None
@@ -176,7 +176,7 @@ class Train:
     """Train a policy with stable-baselines3; run it with --agents policy:FOLDER/policy.zip.
 
     The folder contains TensorBoard logs, checkpoints, the evaluations on the validation split and the policy
-    that did best in them. Ctrl-C keeps the checkpoints; --resume continues from the last one.
+    with the best mean return in them. Ctrl-C keeps the checkpoints; --resume continues from the last one.
     """
 
     algo: str = "sac"
@@ -189,7 +189,7 @@ class Train:
     """Agent whose cameras are used instead, for example stopping-zone."""
     inputs: Names = None
     """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change and
-    ego_yaw_rate; also frame, and with the cameras of stopping-zone zones, zones_spikes and zones_ffi.
+    ego_yaw_rate; also frame; with the cameras of stopping-zone, also zones, zones_spikes and zones_ffi.
     Default: from the hyperparameters."""
     demands: Annotated[tuple[float, ...] | None, arg(metavar="[X ...]", help_behavior_hint=_default_hint)] = (
         None
@@ -197,7 +197,7 @@ class Train:
     """Demands that the policy chooses from, from -1 (full braking) to 1; --demands alone for a continuous
     demand. Default: 0 -0.4 -1 for ppo and dqn, continuous for sac, 0 -1 for offline."""
     n_timesteps: Count = None
-    """Number of policy decisions, for offline of recorded episodes. Default: from the hyperparameters."""
+    """Number of policy decisions (offline: of recorded episodes). Default: from the hyperparameters."""
     seed: int = 0
     """Seed of the network and the environments."""
     hyperparams: File = None
@@ -205,9 +205,9 @@ class Train:
     eval_freq: int = 20_000
     """Number of decisions between two evaluations; offline evaluates after every epoch."""
     eval_episodes: Count = None
-    """Number of episodes per evaluation. Default: 60, for offline 600."""
+    """Number of episodes per evaluation. Default: 60; for offline, 600."""
     recordings: File = None
-    """Folder of an offline training with the same cameras whose recorded episodes are reused."""
+    """Folder of an offline training run with the same cameras, to reuse its recorded episodes."""
     traffic_episodes: int = 0
     """Number of traffic episodes, in which braking is false, that offline trains on in addition."""
     jobs: int = 2
@@ -215,7 +215,7 @@ class Train:
     out: File = None
     """Training folder; must not exist. Default: runs/train-ALGO-DATE-TIME."""
     resume: File = None
-    """Folder of an interrupted training; continues it with its own options."""
+    """Folder of an interrupted training run, to continue it with its own options."""
 
 
 @dataclass(frozen=True, kw_only=True)

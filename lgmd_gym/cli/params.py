@@ -7,7 +7,7 @@ from lgmd_gym.neuron import LGMDParams
 
 
 def read_params(path: Path | None) -> dict[str, Any] | None:
-    """Return the LGMD parameters in a TOML file as plain values, None for no file.
+    """Return the LGMD parameters in a TOML file as plain values, or None for no file.
 
     Raises:
         ValueError: If the file cannot be read or holds an unknown parameter.

@@ -9,7 +9,7 @@ from lgmd_gym.training import TrainConfig, resume, train
 
 
 def run(options: Train) -> int:
-    """Train a policy, or resume a training, and print where the policy is."""
+    """Train a policy, or resume a training run, and print the path of the policy."""
     _check_installed()
     folder = options.resume or options.out or _default_folder(options.algo)
     progress = sys.stderr.isatty()

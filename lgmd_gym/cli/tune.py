@@ -52,12 +52,12 @@ def _check(options: Tune) -> None:
 
 
 def _neuron_file(best: Path) -> Path:
-    """Return the file for the parameters of the neuron."""
+    """Return the path of the file for the neuron parameters."""
     return best.with_name(f"{best.stem}-neuron{best.suffix}")
 
 
 def _save(agent: str, proposal: Proposal, best: Path) -> str:
-    """Write a proposal to TOML files; return the options of `lgmd-gym bench` that use them."""
+    """Write the parameters to TOML files; return the options of `lgmd-gym bench` that load them."""
     arguments = f"--agents {agent}:toml={best}"
     _write_toml(best, rule_options(proposal))
     if CAMERA_KEY in proposal:

@@ -148,5 +148,5 @@ def _configs(options: Video) -> dict[str, PlaybackConfig]:
 
 
 def _note(text: str) -> None:
-    """Print a line on stderr."""
+    """Print a line to stderr."""
     print(f"lgmd-gym: {text}", file=sys.stderr)

@@ -9,7 +9,7 @@ from lgmd_gym._version import __version__
 from lgmd_gym.gallery.cards import ScenarioCard
 from lgmd_gym.gallery.outcomes import AgentOutcome
 
-ImageSheet = Mapping[str, Mapping[str, str]]  # row to column to file name
+ImageSheet = Mapping[str, Mapping[str, str]]  # row -> column -> file name
 
 
 def render_page(
@@ -23,7 +23,7 @@ def render_page(
 
     Args:
         cards: Scenarios, whose videos are in `media/`.
-        outcomes: Scenario name to agent to outcome; empty for traffic.
+        outcomes: Outcomes by scenario name and agent; empty for traffic.
         sheets: Image sheets "lenses" and "roads"; may be empty.
         agent: Agent in the videos.
         seeds: Number of seeds per scenario behind the outcomes.

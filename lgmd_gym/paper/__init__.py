@@ -1,1 +1,1 @@
-"""The experiments of the seed paper: stimuli, measurements, claims and figures."""
+"""The experiments of the LGMD paper: stimuli, measurements, claims and figures."""

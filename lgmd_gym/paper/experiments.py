@@ -176,7 +176,7 @@ class LuminanceLeads(NamedTuple):
     Attributes:
         background: Luminance of the background in 0-255.
         dark: Time from the first alarm (30 spikes/s) to contact of a dark square [s].
-        light: The same of a light square [s].
+        light: The same for a light square [s].
     """
 
     background: float

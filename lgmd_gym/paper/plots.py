@@ -46,7 +46,7 @@ def paper_figures(results: ExperimentResults, folder: Path) -> list[Path]:
 
 
 def _gratings(plt: Any, results: ExperimentResults) -> Any:
-    """Six gratings, and the highest K of four models over contrast, spatial and temporal frequency."""
+    """Draw six gratings, and the highest K of four models over contrast, spatial and temporal frequency."""
     models = ("paper", "fixed inhibition", "neither adaptation nor silencing", "Yue & Rind 2006")
     figure = plt.figure(figsize=(11.0, 7.6), layout="constrained")
     figure.suptitle(
@@ -96,7 +96,7 @@ def _heat_map(
 
 
 def _looming(plt: Any, results: ExperimentResults) -> Any:
-    """A square that looms in gratings: frames, spike frequency and F̂, one column per contrast."""
+    """Draw a square that looms in gratings: frames, spike frequency and F̂, one column per contrast."""
     contrasts = list(dict.fromkeys(item.contrast for item in results.looming))
     figure = plt.figure(figsize=(11.0, 7.4), layout="constrained")
     figure.suptitle("A square looms in a drifting grating, l/|v| = 100 ms, 30 Hz")
@@ -126,7 +126,7 @@ def _looming(plt: Any, results: ExperimentResults) -> Any:
 
 
 def _panorama(plt: Any, results: ExperimentResults) -> Any:
-    """Objects that approach, recede and translate in a shifting panorama, one column each."""
+    """Draw objects that approach, recede and translate in a shifting panorama, one column each."""
     names = ("approaching, dark", "receding", "passing at 0.108 m/s", "passing at 0.3 m/s")
     figure = plt.figure(figsize=(12.0, 8.0), layout="constrained")
     figure.suptitle("An object in a shifting panorama, 30 Hz (orange: T_sf = 30 spikes/s)")
@@ -159,7 +159,7 @@ def _panorama(plt: Any, results: ExperimentResults) -> Any:
 
 
 def _biology(plt: Any, results: ExperimentResults) -> Any:
-    """Peak time and angle over l/|v|, approaches aligned at contact, and spikes by kind of motion."""
+    """Draw peak time and angle over l/|v|, approaches aligned at contact, and spikes by kind of motion."""
     figure, axes = plt.subplots(2, 2, figsize=(10.0, 7.6), layout="constrained")
     figure.suptitle(
         "Comparison with the locust (Gabbiani, Krapp & Laurent 1999): a dark square on grey, 30 Hz"

@@ -1,1 +1,1 @@
-"""The composed picture of camera frame, neuron layers and road: drawing, playback, window and recording."""
+"""Dashboard of camera frame, neuron layers and road: drawing, playback, window and recording."""

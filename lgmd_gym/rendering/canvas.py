@@ -19,8 +19,7 @@ PINK, YELLOW, PURPLE = (222, 138, 184), (240, 228, 66), (180, 90, 160)
 class Canvas:
     """A picture of a fixed size.
 
-    Text is blended from cached masks instead of `pygame.font`, which closing any highway-env window would
-    shut down.
+    Text is blended from cached masks, because closing any highway-env window shuts down `pygame.font`.
 
     Args:
         size: (width, height) [px].

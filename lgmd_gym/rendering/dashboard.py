@@ -13,7 +13,7 @@ MAX_CAMERAS = len(panels.CAMERA_COLOURS)
 
 
 class Dashboard:
-    """Composed picture of an observed highway-env environment.
+    """Picture of an observed highway-env environment: camera, layers, spikes, road and display state.
 
     Args:
         observer: The observation wrapper, after the first reset.

@@ -1,4 +1,4 @@
-"""Panels of the composed picture: camera frame, layers, bars, lamps and top view."""
+"""Panels of the dashboard: camera frame, layers, bars, lamps and top view."""
 
 from math import isfinite
 from typing import Any

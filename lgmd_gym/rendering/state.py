@@ -1,4 +1,4 @@
-"""DisplayState: the quantities that the lamps and bars of the composed picture show."""
+"""DisplayState: the quantities that the lamps and bars of the dashboard show."""
 
 from dataclasses import dataclass
 from math import inf

@@ -16,7 +16,7 @@ def camera_rate(fps: float | None, simulation_frequency: float) -> float:
         simulation_frequency: Simulation frequency [Hz].
 
     Raises:
-        ValueError: If `fps` does not divide the simulation frequency, or that is below 15 Hz.
+        ValueError: If `fps` does not divide the simulation frequency, or if the latter is below 15 Hz.
     """
     if fps is not None:
         return _checked_rate(fps, simulation_frequency)

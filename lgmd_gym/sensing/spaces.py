@@ -72,7 +72,7 @@ def signal_info(response: Response, index: int, names: list[str]) -> dict[str, A
 
 
 def yaw_rate(heading: float, previous: float, elapsed: float) -> float:
-    """Return the mean yaw rate [rad/s] between two headings [rad] by the shorter turn; 0 if none has elapsed."""
+    """Return the mean yaw rate [rad/s] between two headings [rad] by the shorter turn; 0 without duration."""
     turned = (heading - previous + pi) % (2 * pi) - pi
     return turned / elapsed if elapsed > 0.0 else 0.0
 

@@ -23,7 +23,7 @@ def train_online(config: TrainConfig, folder: Path, progress: bool) -> "BaseAlgo
     eval_envs = VecMonitor(DummyVecEnv([lambda: config.make_policy_env("validation")]))
     try:
         model = _make_model(config, folder, envs)
-        # The constructor seeds environment i with seed + i. Trainings with neighbouring seeds would then
+        # The constructor seeds environment i with seed + i. Training runs with neighbouring seeds would then
         # share the levels of most environments.
         envs.seed(SEED_STRIDE * config.seed + model.num_timesteps)
         remaining = config.n_timesteps - model.num_timesteps
@@ -115,7 +115,7 @@ def _callbacks(config: TrainConfig, folder: Path, eval_envs: "VecEnv") -> "list[
 
 
 def _restore_evaluations(callback: "EvalCallback") -> None:
-    """Load the evaluations of an interrupted training; only a better model then replaces its best one."""
+    """Load the evaluations of an interrupted run; only a better model then replaces its best one."""
     file = Path(callback.log_path or "").with_suffix(".npz")
     if file.exists():
         with np.load(file) as log:

@@ -1,4 +1,4 @@
-"""Recorded episodes of an offline training: recorded once, or reused from another training."""
+"""Recorded episodes of an offline training run: newly recorded, or reused from another run."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +21,7 @@ from lgmd_gym.training.offline.traffic import TrafficRecorder
 
 FILE_SIZE = 100  # largest number of seeds in one file
 TRAFFIC_RATIO = 4  # training episodes in traffic per validation episode in traffic
-FORMAT = 4  # of the files; recordings of another format are refused
+FORMAT = 4  # of the files; recordings of another format are rejected
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class RecordingSet:
 
 
 def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
-    """Return the recordings that a training requires for "train" or "validation"."""
+    """Return the recordings that a training run requires for "train" or "validation"."""
     train = split == "train"
     shrink = _frame_shrink(config)
     first = SEED_STRIDE * config.seed if train else VALIDATION_SEED
@@ -94,7 +94,7 @@ def load_or_record(
 
 
 def check_recordings(config: TrainConfig) -> None:
-    """Check the recordings of another training that a configuration names.
+    """Check the recordings of another training run that a configuration reuses.
 
     Raises:
         ValueError: If there are none or too few, or they were recorded with other settings.

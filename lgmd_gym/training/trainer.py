@@ -1,4 +1,4 @@
-"""`train` and `resume`: one training in a folder, from its configuration to the policy file."""
+"""`train` and `resume`: one training run in a folder, from its configuration to the policy file."""
 
 import inspect
 import json
@@ -48,7 +48,7 @@ def train(config: TrainConfig, folder: Path, *, progress: bool = False, jobs: in
         Policy file.
 
     Raises:
-        ValueError: If the configuration cannot be trained or the folder exists; nothing is written then.
+        ValueError: If the configuration is invalid or the folder exists; nothing is written in that case.
     """
     whole("jobs", jobs, 1)
     check_config(config)
@@ -58,7 +58,7 @@ def train(config: TrainConfig, folder: Path, *, progress: bool = False, jobs: in
 
 
 def resume(folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
-    """Resume an interrupted training from its last checkpoint, with the configuration in its folder.
+    """Resume an interrupted training run from its last checkpoint, with the configuration in its folder.
 
     Args and return value are those of `train`.
 
@@ -79,7 +79,7 @@ def check_config(config: TrainConfig) -> None:
     """Check everything that can fail before training: environment, algorithm arguments, recordings.
 
     Raises:
-        ValueError: For the first fault found.
+        ValueError: For the first problem found.
     """
     env = config.make_policy_env("train")
     try:
@@ -107,7 +107,7 @@ def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path
         model = train_online(config, folder, progress)
     path = folder / "policy.zip"
     model.save(path, exclude=EXCLUDED)
-    values = config.to_dict() | {"recordings": None}  # a path on the machine of the training
+    values = config.to_dict() | {"recordings": None}  # a path on the machine that ran the training
     card = {
         "lgmd_gym": lgmd_gym.__version__,
         "algo": type(model).__name__.lower(),  # stable-baselines3 class that reads the file

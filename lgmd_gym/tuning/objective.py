@@ -191,7 +191,7 @@ def record(case: Case, seed: int, sensors: SensorConfig) -> NoBrakeRecording:
 
 
 def find_onset(rule: Agent, recording: NoBrakeRecording) -> int | None:
-    """Replay a latching rule; return the index of the decision at which it brakes, None for never."""
+    """Replay a latching rule; return the index of the decision at which it brakes, or None."""
     rule.reset(recording.seed)
     for index, (observation, info) in enumerate(recording.steps):
         if float(rule.act(observation, info)[0]) < HOLD:

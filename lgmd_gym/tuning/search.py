@@ -24,7 +24,7 @@ def tune(
     best_of: int = 3,
     log: Callable[[str], None] = print,
 ) -> Proposal:
-    """Search a space and return the proposal with the highest value on the validation objective.
+    """Search a space and return the parameters with the highest value on the validation objective.
 
     Args:
         space: Search space.
@@ -75,7 +75,7 @@ def sensitivity(space: SearchSpace, objective: Objective) -> list[tuple[str, flo
 
 
 def evaluate(space: SearchSpace, proposal: Proposal, objective: Objective) -> ObjectiveValue:
-    """Return the value of a proposal."""
+    """Return the objective value of a proposal."""
     return objective.evaluate(agent_string(space.agent, proposal), sensor_config(proposal))
 
 

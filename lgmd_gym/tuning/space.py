@@ -61,14 +61,14 @@ class SearchSpace:
         return " ".join((self.agent, *(["with", *parts] if parts else [])))
 
     def defaults(self) -> Proposal:
-        """Return the default of everything that is searched."""
+        """Return the default of every searched parameter."""
         proposal: Proposal = {item.name: item.default for item in self._searched_fields()}
         if self.cameras:
             proposal[CAMERA_KEY] = self.cameras[0]
         return proposal | {NEURON_PREFIX + name: neuron_defaults()[name] for name in self.neuron}
 
     def propose(self, trial: Any) -> Proposal:
-        """Return the proposal that an Optuna trial suggests."""
+        """Return the parameters that an Optuna trial suggests."""
         proposal: Proposal = {}
         for item in self._searched_fields():
             low, high = item.metadata["search_range"]
@@ -104,19 +104,19 @@ class SearchSpace:
 
 
 def rule_options(proposal: Proposal) -> Proposal:
-    """Return the parameters of the rule in a proposal."""
+    """Return the rule parameters among proposed parameters."""
     names = (name for name in proposal if name != CAMERA_KEY and not name.startswith(NEURON_PREFIX))
     return {name: proposal[name] for name in names}
 
 
 def neuron_params(proposal: Proposal) -> Proposal:
-    """Return the parameters of the neuron in a proposal, without their prefix."""
+    """Return the neuron parameters among proposed parameters, without their prefix."""
     names = [name for name in proposal if name.startswith(NEURON_PREFIX)]
     return {name.removeprefix(NEURON_PREFIX): proposal[name] for name in names}
 
 
 def sensor_config(proposal: Proposal) -> SensorConfig:
-    """Return the sensor configuration of a proposal."""
+    """Return the sensor configuration for proposed parameters."""
     return SensorConfig(proposal.get(CAMERA_KEY), neuron_params(proposal) or None)
 
 

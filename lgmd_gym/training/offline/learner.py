@@ -106,7 +106,7 @@ class OfflineLearner:
         validation: OfflineDataset,
         log: Callable[[int, dict[str, float]], None] = lambda epoch, metrics: None,
     ) -> "PPO":
-        """Train to the end and return the model with the best mean return on the validation episodes.
+        """Train for all epochs and return the model with the best mean return on the validation episodes.
 
         Args:
             train: Training episodes.

@@ -48,7 +48,7 @@ def _rows(path: Path) -> list[dict[str, str | None]]:
 
 
 def _crash_frame(text: str | None, where: str) -> int | None:
-    """Return a frame number, None for no crash."""
+    """Return the frame number in a CSV field, or None for no crash."""
     value = (text or "").strip().lower()
     if value in ("", "none", "-"):
         return None

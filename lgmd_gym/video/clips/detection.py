@@ -137,7 +137,7 @@ class DetectionSummary(NamedTuple):
 
 
 def summarize_detections(detections: Iterable[ClipDetection]) -> DetectionSummary:
-    """Return the summary over clips."""
+    """Return the detection summary over all clips."""
     items = list(detections)
     crashes = [item for item in items if item.crash_s is not None]
     hits = Rate.of(item.lead_s is not None for item in crashes)

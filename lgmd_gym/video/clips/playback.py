@@ -46,7 +46,7 @@ class PlaybackConfig:
             )
 
     def describe(self, fps: float | None = None) -> str:
-        """Return T_sf with the frame rate that it applies to, and the values that differ from the defaults.
+        """Describe T_sf with its frame rate, and all values that differ from the defaults.
 
         Args:
             fps: Frame rate of a clip [Hz]; None if unknown.
