@@ -51,7 +51,7 @@ class DiscreteDemand(ContinuousDemand):
     def __init__(self, env: "BrakingEnv", demands: Sequence[float] = (0.0, -0.5, -1.0)) -> None:
         super().__init__(env)
         if not demands:
-            raise ValueError("demands must hold at least one number in [-1, 1], got none")
+            raise ValueError("demands must contain at least one number in [-1, 1], got none")
         self.demands = tuple(check_within("demands", demand, -1.0, 1.0) for demand in demands)
 
     def space(self) -> spaces.Space:

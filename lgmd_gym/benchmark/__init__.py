@@ -20,22 +20,22 @@ def run(
     plots: bool = True,
     report: bool = True,
 ) -> "pd.DataFrame":
-    """Play a benchmark run and write the same folder as `lgmd-gym bench`.
+    """Run a benchmark and write the same folder as `lgmd-gym bench`.
 
     Args:
         config: Configuration of the run.
-        folder: Run folder, which must not exist; None keeps no folder.
-        executor: Processes to play on.
+        folder: Run folder, which must not exist; None to keep no folder.
+        executor: Worker processes or cluster that run the episodes.
         plots: Whether to draw one PNG per case.
         report: Whether to write report.html.
 
     Returns:
-        One line per episode with the columns `lgmd_gym.benchmark.rows.KEYS`, those of `no-brake` included;
+        One row per episode, including `no-brake`, with the columns `lgmd_gym.benchmark.rows.KEYS`;
         for the suite "traffic", `lgmd_gym.benchmark.traffic.rows.KEYS`.
 
     Raises:
         ValueError: If the configuration is invalid, the cluster is not reachable, or the folder exists or
-            cannot be made.
+            cannot be created.
         RuntimeError: If the run stopped early, because a worker was killed or the disk is full.
 
     Example:

@@ -59,7 +59,7 @@ def make_case(suite: str, family: str, variant: str, **arguments: Any) -> Case:
 def speed_cases(
     suite: str, family: str, speeds_kmh: list[int], tail: str = "", **arguments: Any
 ) -> tuple[Case, ...]:
-    """Return one case per ego speed, with the same name tail and arguments for all."""
+    """Return one case per ego speed, with the same name suffix and arguments for all."""
     return tuple(
         make_case(suite, family, f"v{speed}{tail}", ego_speed=to_mps(speed), **arguments)
         for speed in speeds_kmh

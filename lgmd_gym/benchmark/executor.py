@@ -26,12 +26,12 @@ TaskMap = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 
 
 class PoolLostError(RuntimeError):
-    """The workers are lost, and the tasks in flight with them."""
+    """Raised when the workers are lost, and with them their unfinished tasks."""
 
 
 @dataclass(frozen=True, slots=True)
 class Executor:
-    """Number and place of the worker processes.
+    """Where tasks run: in this process, in worker processes or on a Dask cluster.
 
     Attributes:
         jobs: Number of processes; 1 runs in this process. A cluster uses all of its workers instead.
@@ -85,7 +85,7 @@ def _local(jobs: int) -> "Iterator[Parallel]":
         with Parallel(n_jobs=jobs, return_as="generator_unordered") as parallel:
             yield parallel
     except BrokenProcessPool:
-        raise PoolLostError("a worker process was killed (is memory short?)") from None
+        raise PoolLostError("a worker process was killed (possibly out of memory)") from None
 
 
 @contextlib.contextmanager
@@ -126,7 +126,7 @@ def _connect(address: str) -> Any:
 
 
 def _lost_errors() -> tuple[type[BaseException], ...]:
-    """Return the exceptions of a lost cluster; tasks themselves raise none."""
+    """Return the exception types that indicate a lost cluster."""
     from distributed.client import FutureCancelledError
     from distributed.comm.core import CommClosedError
     from distributed.scheduler import KilledWorker
@@ -161,7 +161,7 @@ class _ClusterMonitor:
     """Interrupts the main thread once a cluster is lost, because joblib would wait for results forever.
 
     Attributes:
-        failure: Reason of the loss; "" before one.
+        failure: Reason why the cluster was lost; "" if it is not.
     """
 
     def __init__(self, client: Any) -> None:
@@ -189,7 +189,7 @@ class _ClusterMonitor:
                 return
 
     def _failure(self) -> str:
-        """Return what is wrong with the cluster at present; "" for nothing."""
+        """Return the present fault of the cluster, or "" if there is none."""
         if self.client.status != "running":
             return "its scheduler does not respond"
         # Tasks turn exceptions into rows, so only Dask itself sets this status.

@@ -33,12 +33,12 @@ class RunFolder:
 
     def __init__(self, path: Path, rows: "list[Row]", repaired: bool = False) -> None:
         self.path, self.rows, self.repaired = path, rows, repaired
-        # Unbuffered, so that closing does not retry what a full disk has refused.
+        # Unbuffered, so that closing does not retry a write that failed on a full disk.
         self._rows = (path / "episodes.jsonl").open("ab", buffering=0)
 
     @classmethod
     def create(cls, path: Path) -> "RunFolder":
-        """Create a folder.
+        """Create a run folder.
 
         Raises:
             ValueError: If it exists or cannot be created.
@@ -49,10 +49,10 @@ class RunFolder:
     def reopen(cls, path: Path) -> "RunFolder":
         """Open the folder of an incomplete run.
 
-        An incomplete last line is removed, and so are error rows, whose episodes are played again.
+        An incomplete last line is removed, and so are error rows, whose episodes are run again.
 
         Raises:
-            ValueError: If it holds no run, a damaged one, or one of another version of this package.
+            ValueError: If it contains no run, a damaged one, or one of another version of this package.
         """
         rows, repaired = read_rows(path)
         made = read_settings(path).get("lgmd_gym")
@@ -107,10 +107,10 @@ def new_folder(path: Path, kind: str) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=False)
     except FileExistsError:
-        raise ValueError(f"{kind} {str(path)!r} exists and is kept; choose another --out") from None
+        raise ValueError(f"{kind} {str(path)!r} already exists; choose another --out") from None
     except OSError as error:
         raise ValueError(
-            f"{kind} {str(path)!r} cannot be made ({error.strerror}); choose another --out"
+            f"{kind} {str(path)!r} cannot be created ({error.strerror}); choose another --out"
         ) from None
     return path
 
@@ -119,11 +119,11 @@ def read_rows(path: Path) -> "tuple[list[Row], bool]":
     """Return the rows of a run folder, and whether an incomplete last line was skipped.
 
     Raises:
-        ValueError: If the folder holds no run, or a damaged one.
+        ValueError: If the folder contains no run or a damaged one.
     """
     file = path / "episodes.jsonl"
     if not file.is_file():
-        raise ValueError(f"{str(path)!r} holds no run (no episodes.jsonl); start one with --out")
+        raise ValueError(f"{str(path)!r} contains no run (no episodes.jsonl); start one with --out")
     rows = []
     lines = file.read_bytes().splitlines(keepends=True)
     for number, line in enumerate(lines):
@@ -152,7 +152,7 @@ def read_settings(path: Path) -> dict[str, Any]:
 
 
 def read_series(path: Path, name: str) -> dict[str, np.ndarray] | None:
-    """Return the time series in `traces/<name>.npz` of a run folder, None if there is no such file."""
+    """Return the time series in `traces/<name>.npz` of a run folder, or None if there is no such file."""
     file = path / "traces" / f"{name}.npz"
     if not file.exists():
         return None

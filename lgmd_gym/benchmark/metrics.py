@@ -153,7 +153,7 @@ def target_speed(pair: PairedEpisode) -> Value:
 
 @metric
 def target_shade(pair: PairedEpisode) -> Value:
-    """Body grey of the first actor in [0, 255]; the mean of the asphalt is 104 by day."""
+    """Grey level of the first actor in [0, 255]; the mean of the asphalt is 104 by day."""
     return number(pair.episode.target_shade)
 
 
@@ -171,7 +171,7 @@ def relative_impact_speed(pair: PairedEpisode) -> Value:
 
 @metric
 def speed_reduction(pair: PairedEpisode) -> Value:
-    """Reduction of the relative impact speed against no braking; all of it without contact."""
+    """Relative impact speed of `no-brake` minus that of the agent, which is 0 without contact."""
     if not pair.counterfactual.threat:
         return UNDEFINED
     left = pair.episode.relative_impact_speed if pair.episode.collision else 0.0
@@ -257,7 +257,7 @@ def min_ttc(pair: PairedEpisode) -> Value:
 
 @metric
 def stopping_margin(pair: PairedEpisode) -> Value:
-    """Lowest free distance ahead in a braked threat that ended without contact."""
+    """Lowest free distance ahead in a threat in which the agent braked and had no contact."""
     gaps = pair.episode.series["gap"]
     stopped = pair.counterfactual.threat and not pair.episode.collision and pair.onset is not None
     return number(gaps.min()) if stopped else UNDEFINED

@@ -44,7 +44,7 @@ class Plan(ABC):
 
     @abstractmethod
     def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
-        """Play the episodes that are not among `rows`, and yield their results as they finish."""
+        """Run the episodes that are not among `rows`, and yield their results as they finish."""
 
     @abstractmethod
     def _make_env(self, sensor_config: SensorConfig) -> gym.Env:
@@ -65,7 +65,7 @@ class Plan(ABC):
 class CasePlan(Plan):
     """The episodes of a suite of cases.
 
-    `no-brake` is played first, even if it is not among the agents: it defines the counterfactual.
+    `no-brake` is run first, even if it is not among the agents: it defines the counterfactual.
     """
 
     def __init__(self, config: RunConfig) -> None:
@@ -80,7 +80,7 @@ class CasePlan(Plan):
         return len(self.cases) * self.config.seeds * len(self.config.conditions) * len(agents)
 
     def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
-        """Play the missing episodes, `no-brake` first, and yield their results as they finish."""
+        """Run the missing episodes, `no-brake` first, and yield their results as they finish."""
         done = {key_of(row): row for row in rows}
         counterfactuals = {
             key[1:]: Counterfactual.of_row(row) for key, row in done.items() if key[0] == NO_BRAKE

@@ -15,7 +15,7 @@ R152_TARGET = 20  # km/h, UN R152 6.5
 
 
 def ncap2023() -> tuple[Case, ...]:
-    """Return the cells of N1 8.2: CCRs 45 AEB and 30 FCW, CCRm 55, CCRb 4, CCCscp 30."""
+    """Return the cases of N1 8.2: CCRs 45 AEB and 30 FCW, CCRm 55, CCRb 4, CCCscp 30."""
     suite = "ncap2023"
     aeb = list(range(10, 55, 5))
     fcw = list(range(55, 85, 5))
@@ -83,7 +83,7 @@ def _robustness(suite: str) -> tuple[Case, ...]:
 
 
 def braking_lead(suite: str) -> tuple[Case, ...]:
-    """Return N1 8.2.2.3: CCRb, both at 50 km/h, 2 and 6 m/s² reached within 1 s, gaps of 12 and 40 m."""
+    """Return the CCRb cases of N1 8.2.2.3: both cars at 50 km/h, 2 and 6 m/s², gaps of 12 and 40 m."""
     return tuple(
         make_case(
             suite,
@@ -100,7 +100,7 @@ def braking_lead(suite: str) -> tuple[Case, ...]:
 
 
 def _crossing(suite: str) -> tuple[Case, ...]:
-    """Return N1 8.2.5: CCCscp from a stop 2.9 m ahead of the path and at 20 to 60 km/h.
+    """Return the CCCscp cases of N1 8.2.5: from a stop 2.9 m before the path, and at 20 to 60 km/h.
 
     The target drives at 20 to 60 km/h and comes from the far side, the left, which is the default of the
     OpenSCENARIO file for 2026.
@@ -134,7 +134,7 @@ def _crossing(suite: str) -> tuple[Case, ...]:
 
 
 def r152() -> tuple[Case, ...]:
-    """Return UN R152 Rev.2, 6.4 and 6.5: stationary target at 20, 40, 42, 60, moving at 30 and 60 km/h.
+    """Return the cases of UN R152 6.4 (stationary target, 20 to 60 km/h) and 6.5 (moving, 30 and 60).
 
     40 km/h is tested at maximum mass and 42 km/h in running order. The brake model has no mass, so the load
     states differ only in their limits.
@@ -146,7 +146,7 @@ def r152() -> tuple[Case, ...]:
 
 
 def fmvss127() -> tuple[Case, ...]:
-    """Return 49 CFR 571.127 S7.3 to S7.5 without manual braking: stopped, slower, decelerating lead.
+    """Return the cases of 49 CFR 571.127 S7.3 to S7.5 without manual braking.
 
     The deceleration is reached 1.0 s after its onset (S7.5 allows up to 1.5 s).
     """

@@ -1,4 +1,4 @@
-"""A benchmark run: its rows are written as episodes finish, whatever stops it."""
+"""A benchmark run, which writes each row when its episode finishes."""
 
 import contextlib
 import time
@@ -22,8 +22,8 @@ class Run:
 
     Args:
         config: Configuration.
-        folder: Open run folder, whose episodes are not played again.
-        executor: Processes to play on.
+        folder: Open run folder, whose episodes are not run again.
+        executor: Worker processes or cluster that run the episodes.
 
     Attributes:
         plan: The episodes of the run.
@@ -43,7 +43,7 @@ class Run:
 
         Raises:
             ValueError: If the configuration is invalid, the cluster is not reachable, or the folder exists
-                or cannot be made.
+                or cannot be created.
         """
         _check(config, executor)
         folder = RunFolder.create(path)
@@ -54,7 +54,7 @@ class Run:
         """Return the incomplete run of a folder.
 
         Raises:
-            ValueError: If the folder holds no run, a damaged one, or one of another version, or if the
+            ValueError: If the folder contains no run, a damaged one, or one of another version, or if the
                 cluster is not reachable.
         """
         folder = RunFolder.reopen(path)
@@ -68,7 +68,7 @@ class Run:
         return self.plan.total
 
     def play(self, progress: Callable[[Row], None] | None = None) -> bool:
-        """Play the missing episodes and write every row as it finishes.
+        """Run the missing episodes and write every row as it finishes.
 
         Args:
             progress: Called with each new row.
@@ -101,7 +101,7 @@ class Run:
         """Write a result; time series of `no-brake` and of the first seed are kept."""
         key = key_of(result.row)
         kept = key[0] == NO_BRAKE or key[2] == self.config.first_seed
-        # Before the row, because an episode with a row is not played again.
+        # Before the row, because an episode with a row is not run again.
         if kept and result.series is not None:
             self.folder.add_series(series_name(key), result.series)
         self.folder.add(result.row)

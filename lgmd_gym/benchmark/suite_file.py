@@ -56,7 +56,7 @@ def load_suite(path: Path) -> Suite:
             raise ValueError(f"name {name!r} is the name of a shipped suite; choose another")
         tables = values.get("cases")
         if not isinstance(tables, list) or not tables:
-            raise ValueError("cases must hold at least one [[cases]] table")
+            raise ValueError("cases must contain at least one [[cases]] table")
         cases = tuple(case for table in tables for case in _cases(name, table))
         names: set[str] = set()
         for case in cases:
@@ -70,7 +70,7 @@ def load_suite(path: Path) -> Suite:
 
 
 def copy_suite(source: Path, target: Path) -> None:
-    """Write the cases of a suite file to another, one table each."""
+    """Copy a suite file, with one table per case."""
     suite = load_suite(source)
     tables = []
     for case in suite.cases:

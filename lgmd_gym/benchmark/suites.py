@@ -17,7 +17,7 @@ class Suite:
 
     Attributes:
         name: Name of the suite, the first part of every case name.
-        cases: Cases in playing order.
+        cases: Cases in the order in which they run.
         about: One line on its source and limits.
     """
 
@@ -132,7 +132,7 @@ def find_suite(name: str) -> Suite:
 
 
 def find_case(name: str) -> Case:
-    """Return the case of a full name.
+    """Return the case with a full name, such as "quick/CCRs/v30".
 
     Raises:
         ValueError: If the name is unknown.

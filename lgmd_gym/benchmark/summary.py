@@ -101,7 +101,7 @@ def case_order(case: str) -> list[tuple[int, str]]:
 
 
 def without_fcw_driver(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows of automatic braking, which alone count in totals."""
+    """Return the rows without an FCW driver; totals include only these."""
     return [row for row in rows if not row["fcw_driver"]]
 
 

@@ -101,7 +101,7 @@ def contact_sheet(file: FigureFile, frames: dict[str, dict[str, np.ndarray]]) ->
     """
     columns = list(dict.fromkeys(column for row in frames.values() for column in row))
     if not columns:
-        raise ValueError("frames must hold at least one frame, got none")
+        raise ValueError("frames must contain at least one frame, got none")
     aspect = max(frame.shape[0] / frame.shape[1] for row in frames.values() for frame in row.values())
     size = (0.3 + 2.0 * len(columns), 0.25 + 2.0 * aspect * len(frames))
     options: dict[str, Any] = {"pil_kwargs": {"optimize": True}}

@@ -1,4 +1,4 @@
-"""Contents of a run folder, as the report reads them."""
+"""Contents of a run folder, for the report."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +32,7 @@ class ReportData:
         """Read a run folder.
 
         Raises:
-            ValueError: If the folder holds no run, or a damaged one.
+            ValueError: If the folder contains no run or a damaged one.
         """
         rows, config = read_rows(path)[0], RunConfig.load(path / RUN_FILE)
         suite = get_suite(config.suite)

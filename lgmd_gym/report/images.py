@@ -58,7 +58,7 @@ def capture_frames(
     """Repeat an episode and return frames of the first camera.
 
     Args:
-        case: Case without a warned driver.
+        case: Case without an FCW driver.
         agent: Agent string.
         seed: Seed of the environment and the agent.
         sensor_config: Camera and neuron parameters.

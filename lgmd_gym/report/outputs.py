@@ -1,4 +1,4 @@
-"""All files that a run folder receives after its episodes."""
+"""Output files that are written to a run folder after its episodes."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ def write_outputs(path: Path, plots: bool = True, report: bool = True) -> list[P
         The files written.
 
     Raises:
-        ValueError: If the folder holds no run, or a damaged one.
+        ValueError: If the folder contains no run or a damaged one.
     """
     config, rows = RunConfig.load(path / RUN_FILE), read_rows(path)[0]
     if not rows:
@@ -49,7 +49,7 @@ def write_outputs(path: Path, plots: bool = True, report: bool = True) -> list[P
 
 
 def _plot_cases(path: Path, config: RunConfig) -> list[Path]:
-    """Draw the first seed of every case, all agents in one figure."""
+    """Draw one figure per case: all agents with the first seed."""
     alert_level = LGMDParams.make(config.params).t_sf
     folder, seed, files = path / "plots", config.first_seed, []
     folder.mkdir(exist_ok=True)

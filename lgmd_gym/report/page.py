@@ -36,7 +36,7 @@ def write_report(path: Path) -> Path:
     Only the episodes whose camera frames are shown are simulated again.
 
     Raises:
-        ValueError: If the folder holds no run, or a damaged one.
+        ValueError: If the folder contains no run or a damaged one.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -62,7 +62,7 @@ def write_report(path: Path) -> Path:
 
 
 def band(share: float | None) -> str:
-    """Return the colour of a share in fifths, the highest green; "" for None."""
+    """Return the colour of a share, one per fifth and green for the highest; "" for None."""
     return "" if share is None else BANDS[min(int(5 * share), 4)]
 
 

@@ -10,7 +10,7 @@ from lgmd_gym.benchmark.task import NO_BRAKE
 MAX_FALSE_ACTIVATIONS = 12
 AGENTS_WITHOUT_NEURON = (NO_BRAKE, "always-brake", "random-brake", "ttc-oracle")
 
-# Description -> filter of the rows, and the value that the shown row maximises (the first row of a draw).
+# Description -> filter of the rows, and the value that the shown row maximises (the first one on ties).
 EXTREMES: dict[str, tuple[Callable[[Row], bool], Callable[[Row], float]]] = {
     "smallest stopping margin": (
         lambda row: row["avoided"] and row["stopping_margin"] is not None,

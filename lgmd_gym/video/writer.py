@@ -29,7 +29,7 @@ class VideoWriter:
         if self.path.suffix.lower() not in SUFFIXES:
             raise ValueError(f"video must have a suffix among {', '.join(SUFFIXES)}, got {str(path)!r}")
         if self.path.exists():
-            raise ValueError(f"video {str(path)!r} exists and is kept; choose another name")
+            raise ValueError(f"video {str(path)!r} already exists; choose another name")
         if not self.path.parent.is_dir():
             raise ValueError(f"folder {str(self.path.parent)!r} of the video does not exist; create it first")
         self._container: Any = None

@@ -165,7 +165,7 @@ def test_condition_applies_to_every_kind_of_camera_argument(camera):
     assert foggy == [TELE.with_condition("fog")]
 
 
-def test_plain_camera_holds_the_changes_of_its_preset():
+def test_plain_camera_contains_only_the_changes_to_its_preset():
     camera = CameraParams.preset("tele", pitch_deg=1.5)
     plain = SensorConfig(camera).plain.camera
     assert plain == {"name": "tele", "pitch_deg": 1.5}
@@ -229,13 +229,13 @@ def test_exception_of_an_agent_becomes_an_error_row(monkeypatch):
 
 @pytest.fixture(scope="module")
 def quick_run(tmp_path_factory):
-    """The quick suite with one seed, played in this process."""
+    """The quick suite with one seed, run in this process."""
     run = new_run(tmp_path_factory.mktemp("runs") / "quick", agents=BOUNDS[1:], seeds=1)
     assert run.play()
     return run
 
 
-def test_run_plays_every_episode_once(quick_run):
+def test_every_episode_runs_once(quick_run):
     assert len(quick_run.rows) == quick_run.total == 4 * len(SUITES["quick"].cases)
     assert read_rows(quick_run.folder.path) == quick_run.rows
     assert len({(row["agent"], row["case"], row["seed"]) for row in quick_run.rows}) == quick_run.total
@@ -301,8 +301,8 @@ def test_resumed_run_has_the_rows_of_a_complete_one(quick_run, tmp_path, fractio
     assert sorted_rows(read_rows(folder)) == sorted_rows(quick_run.rows) == sorted_rows(run.rows)
 
 
-def test_resume_refuses_missing_damaged_and_older_runs(tmp_path):
-    with pytest.raises(ValueError, match="holds no run"):
+def test_resume_rejects_missing_damaged_and_older_runs(tmp_path):
+    with pytest.raises(ValueError, match="contains no run"):
         Run.resume(tmp_path)
     new_run(tmp_path / "run", agents=["no-brake"], seeds=1).play(interrupt)
     settings = json.loads((tmp_path / "run" / "run.json").read_text())
@@ -342,7 +342,7 @@ def test_python_function_and_command_write_the_same_folder(tmp_path):
         ({"suite": "quik"}, "did you mean 'quick'"),
         ({"suite": "trafic"}, "did you mean 'traffic'"),
         ({"agents": ["nobrake"]}, "did you mean 'no-brake'"),
-        ({"agents": []}, "agents must hold at least one name, got none"),
+        ({"agents": []}, "agents must contain at least one name, got none"),
         ({"agents": "no-brake"}, "agents must be a list of strings, got 'no-brake'"),
         ({"conditions": ["fogg"]}, "did you mean 'fog'"),
         ({"kinds": ["merge"]}, "kinds applies to suite 'traffic' only"),
@@ -353,14 +353,14 @@ def test_python_function_and_command_write_the_same_folder(tmp_path):
         ({"params": {"sigma_33": 1.0}}, "did you mean 'sigma_3'"),
     ],
 )
-def test_invalid_configuration_is_refused_before_the_folder_is_made(tmp_path, values, message):
+def test_invalid_configuration_is_rejected_before_the_folder_is_created(tmp_path, values, message):
     with pytest.raises(ValueError, match=message):
         new_run(tmp_path / "run", **{"agents": ["no-brake"], "seeds": 1} | values)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_existing_folder_and_zero_jobs_are_refused(tmp_path):
-    with pytest.raises(ValueError, match="exists and is kept"):
+def test_existing_folder_and_zero_jobs_are_rejected(tmp_path):
+    with pytest.raises(ValueError, match="already exists"):
         new_run(tmp_path, agents=["no-brake"])
     with pytest.raises(ValueError, match="jobs must be >= 1, got 0"):
         Executor(jobs=0)

@@ -139,12 +139,12 @@ def test_invalid_run_config_gives_a_suggestion(tmp_path, text, words, capsys):
     assert not out.exists()
 
 
-def test_config_refuses_further_options(tmp_path, capsys):
+def test_config_rejects_further_options(tmp_path, capsys):
     assert cli.run(["bench", "--config", "run.toml", "--seeds", "2", "--first-seed", "4"]) == 2
     assert "--config replaces --seeds, --first-seed" in capsys.readouterr().err
 
 
-def test_unreachable_cluster_is_refused_within_seconds(tmp_path, capsys):
+def test_unreachable_cluster_is_reported_within_seconds(tmp_path, capsys):
     with socket.socket() as unused:  # a port without a listener
         unused.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{unused.getsockname()[1]}"
@@ -316,7 +316,7 @@ def cluster(tmp_path):
 
 
 @pytest.mark.slow
-def test_cluster_without_one_worker_plays_every_episode_once(cluster, complete_run, tmp_path):
+def test_cluster_that_loses_a_worker_runs_every_episode_once(cluster, complete_run, tmp_path):
     address, (_, worker, _) = cluster
     out = tmp_path / "run"
     command = bench(out, "--backend", "dask", "--address", address)

@@ -187,7 +187,7 @@ def test_one_contact_costs_the_weight_of_its_cell():
     assert points[0].earned == pytest.approx(1.2 * 39 / 40)
 
 
-def test_totals_leave_out_cases_with_a_warned_driver(tmp_path):
+def test_totals_leave_out_cases_with_an_fcw_driver(tmp_path):
     def scored(case, fcw_driver, avoided):
         values = {"avoided": avoided, "premature_brake": False, "speed_reduction": 3.0}
         return threat_row(case=case, fcw_driver=fcw_driver, **values)

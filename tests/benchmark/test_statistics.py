@@ -32,7 +32,7 @@ def test_poisson_interval_of_zero_is_the_one_sided_bound():
 
 
 @pytest.mark.parametrize(("count", "confidence"), [(-1, 0.95), (3, 1.0)])
-def test_poisson_interval_refuses_invalid_arguments(count, confidence):
+def test_poisson_interval_rejects_invalid_arguments(count, confidence):
     with pytest.raises(ValueError, match=r"count must be >= 0 and confidence in \(0, 1\)"):
         poisson_interval(count, confidence)
 

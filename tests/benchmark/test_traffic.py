@@ -113,7 +113,7 @@ def test_fork_is_independent_of_its_original(merge):
     assert observation["ego_speed"] == merge.steps[80].observation["ego_speed"]
 
 
-def test_fork_that_differs_from_the_recording_is_refused(merge):
+def test_fork_that_differs_from_the_recording_is_rejected(merge):
     steps = list(merge.steps)
     steps[9] = steps[10]
     with pytest.raises(RuntimeError, match="merge traffic, seed 0 does not repeat at decision 9"):
@@ -319,11 +319,11 @@ def test_number_of_processes_does_not_change_the_rows(tmp_path):
     [
         ({"agents": ["spike-treshold"]}, "did you mean 'spike-threshold'"),
         ({"kinds": ["merg"]}, "did you mean 'merge'"),
-        ({"kinds": []}, "kinds must hold at least one name, got none"),
+        ({"kinds": []}, "kinds must contain at least one name, got none"),
         ({"camera": "foeva"}, "foeva"),
     ],
 )
-def test_invalid_configuration_is_refused_before_the_folder_is_made(tmp_path, values, message):
+def test_invalid_configuration_is_rejected_before_the_folder_is_created(tmp_path, values, message):
     with pytest.raises(ValueError, match=message):
         new_run(tmp_path / "run", **{"suite": "traffic", "agents": ["no-brake"], "seeds": 1} | values)
     assert list(tmp_path.iterdir()) == []

@@ -120,7 +120,7 @@ def test_the_command_writes_a_page_with_videos(tmp_path, capsys):
     assert Image.open(out / "media" / "CCRs.jpg").size == (1280, 720)
     assert "http" not in html  # the page loads nothing from the network
     assert re.search(r"<th>no-brake</th><td class=\"failed\">avoided 0/1, contact at 50 km/h<", html)
-    with pytest.raises(ValueError, match="exists and is kept"):
+    with pytest.raises(ValueError, match="already exists"):
         make_gallery(out)
 
 

@@ -148,7 +148,7 @@ def test_a_fast_grating_saturates_k_at_low_contrast_only():
     [
         (["--clips", "."], "--clips and --crashes must be used together"),
         (["--picture", "nowhere.png"], "picture 'nowhere.png' cannot be read"),
-        (["--out", "/proc/nowhere/run"], "cannot be made"),
+        (["--out", "/proc/nowhere/run"], "cannot be created"),
         (["--clips", "nowhere", "--crashes", "nowhere.csv"], "clip 'nowhere' does not exist"),
     ],
 )
@@ -174,4 +174,4 @@ def test_the_command_writes_claims_and_figures(tmp_path, capsys):
     assert results["gratings alone: K stays 0.5 (full contrast)"] == HOLDS
     assert results["receding: only at the start"] == HOLDS
     assert cli.run(["paper", "--out", str(out)]) == 2
-    assert "exists and is kept" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Files of recorded episodes, and the episodes that a training records or reuses."""
+"""Files of recorded episodes, and the episodes that a training run records or reuses."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def test_files_restore_every_episode(tmp_path):
 
 def test_file_without_episodes_is_rejected(tmp_path):
     (tmp_path / "text.npz").write_text("text")
-    with pytest.raises(ValueError, match=r"text\.npz' holds no recorded episodes"):
+    with pytest.raises(ValueError, match=r"text\.npz' contains no recorded episodes"):
         load(tmp_path / "text.npz")
 
 

@@ -41,7 +41,7 @@ def test_the_command_writes_trace_figure_and_overlay(tmp_path, clip, capsys):
     inactive, active = (pictures[number][20:50, 30:160].mean((0, 1)) for number in (5, alert))
     assert active[0] > inactive[0] + 100  # the alert indicator turns orange
     assert run(clip, "--out", out) == 2
-    assert "exists and is kept" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
 
 
 def test_configurations_are_compared_on_a_folder_of_clips(tmp_path, clip, looming, capsys):

@@ -1,4 +1,4 @@
-"""Interquartile mean, and a stratified bootstrap over trainings and cases."""
+"""Interquartile mean, and a stratified bootstrap over training runs and cases."""
 
 from typing import Any
 
@@ -37,11 +37,11 @@ class StratifiedBootstrap:
                 self._weights[:, chosen] = rng.multinomial(n, np.full(n, 1.0 / n), size=DRAWS)
 
     def means(self, values: np.ndarray, seed: int) -> np.ndarray:
-        """Return means over sampled cases of sampled trainings, shape (samples, trainings).
+        """Return means over sampled cases of sampled training runs, shape (samples, trainings).
 
         Args:
             values: Shape (trainings, cases); NaN where a case has no value.
-            seed: Seed of the sampling of trainings.
+            seed: Seed of the sampling of training runs.
         """
         defined = np.isfinite(values[0])
         weights = self._weights[:, defined]

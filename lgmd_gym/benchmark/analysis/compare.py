@@ -101,7 +101,7 @@ def compare_rows(
 ) -> Comparison:
     """Compare the rows of two agents; rows of the same case, seed and condition are a pair.
 
-    Cases with a warned driver are left out, as in all totals.
+    Cases with an FCW driver are left out, as in all totals.
     """
     rows_a, rows_b = without_fcw_driver(rows_a), without_fcw_driver(rows_b)
     completed_a, completed_b = (

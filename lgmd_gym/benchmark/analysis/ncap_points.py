@@ -1,4 +1,4 @@
-"""Colours and points of the Euro NCAP suites; derived from the protocols, no rating.
+"""Colours and points of the Euro NCAP suites; derived from the protocols, not an official rating.
 
 2023 (Assessment Protocol Collision Avoidance v10.4.1, 3.3.2): the colour bands are published as numbers for
 50 km/h only. A contact at another speed earns nothing, so the points are a lower bound. CCCscp is left out.

@@ -35,7 +35,7 @@ def difference_figure(file: FigureFile, comparisons: "list[Comparison]") -> "Fig
 
 
 def _plot_differences(axis: Any, name: str, comparisons: "list[Comparison]", labels: bool) -> None:
-    """Plot one quantity; comparison i is at the height i."""
+    """Plot one quantity; comparison i is at y = i."""
     axis.axvline(0.0, color="0.4", linewidth=1.0)
     unit = ""
     for height, comparison in enumerate(comparisons):

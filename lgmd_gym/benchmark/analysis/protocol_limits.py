@@ -1,4 +1,4 @@
-"""Limits of UN R152, FMVSS 127 and Euro NCAP 2026, applied to rows; derived from the protocols, no rating."""
+"""Limits of UN R152, FMVSS 127 and Euro NCAP 2026, applied to rows; not an official rating."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -30,7 +30,7 @@ LimitCheck = Callable[[Row], tuple[bool, str]]
 
 
 class LimitResult(NamedTuple):
-    """Runs of one agent in one case against the limit."""
+    """Number of runs of one agent in one case that meet the limit."""
 
     agent: str
     case: str
@@ -61,7 +61,7 @@ def r152_limit(relative_kmh: float, load: str) -> float:
 
 
 def r152_load(case: str) -> str:
-    """Return the load state whose limit holds for a case of suite r152.
+    """Return the load state whose limit applies to a case of suite r152.
 
     The regulation tests 40 km/h laden only and the other speeds in both states; unladen is the stricter one.
     """

@@ -22,14 +22,14 @@ LIMIT_CAPTION = (
 
 
 class CaseCell(NamedTuple):
-    """Text of a table cell, and share of successful episodes; the defaults are for no episode."""
+    """Table cell: its text and the share of successful episodes; empty by default."""
 
     text: str = ""
     share: float | None = None
 
 
 class CaseLine(NamedTuple):
-    """Results of all agents in one case; `case` lacks the suite's name, `limit` may be empty."""
+    """Results of all agents in one case; `case` omits the name of the suite, and `limit` may be empty."""
 
     case: str
     limit: str
@@ -57,7 +57,7 @@ def limit_lines(rows: list[Row], agents: list[str], suite: str) -> list[CaseLine
 
 
 def success_lines(rows: list[Row], agents: list[str]) -> list[CaseLine]:
-    """Return threats avoided plus non-threats without a false activation, of n, per case."""
+    """Return, per case, how many of n threats were avoided and non-threats had no false activation."""
     by_cell = {(item.agent, item.group): item for item in summaries(rows, lambda row: row["case"])}
     return [
         CaseLine(case.split("/", 1)[1], "", [_success(by_cell.get((agent, case))) for agent in agents])
@@ -80,7 +80,7 @@ def agent_summaries(rows: list[Row], agents: list[str]) -> list[AgentSummary]:
 
 
 def score_tables(rows: list[Row], agents: list[str], title: str) -> list[Table]:
-    """Return the scores of the agents; cases with a warned driver have a separate table."""
+    """Return the scores of the agents; cases with an FCW driver have a separate table."""
     parts = {
         title: without_fcw_driver(rows),
         "cases with a driver who brakes 1.2 s after the alert": [row for row in rows if row["fcw_driver"]],

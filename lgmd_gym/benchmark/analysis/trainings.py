@@ -1,8 +1,8 @@
-"""Comparison of arms: groups of agents over the same episodes, such as several trainings of one recipe.
+"""Comparison of arms: groups of agents over the same episodes, such as several training runs.
 
-The mean return of an arm is the interquartile mean over its trainings of the mean over cases. Intervals are
-from a stratified bootstrap that draws trainings, and cases from threats and non-threats separately. All arms
-have the same case samples, so their differences are paired by case.
+The mean return of an arm is the interquartile mean, over its training runs, of the mean over cases. Intervals
+are from a stratified bootstrap that draws training runs, and cases from threats and non-threats separately.
+All arms have the same case samples, so their differences are paired by case.
 """
 
 from collections.abc import Sequence
@@ -20,12 +20,16 @@ from lgmd_gym.benchmark.summary import without_fcw_driver
 from lgmd_gym.errors import unknown_name
 
 RETURN = "episode_return"
-SHARES = {"avoided": True, "premature_brake": True, "false_activation": False}  # row key -> over threats?
-MIN_TRAININGS = 5  # fewest trainings, apart from one, for which intervals are given
+SHARES = {
+    "avoided": True,
+    "premature_brake": True,
+    "false_activation": False,
+}  # row key -> whether over threats
+MIN_TRAININGS = 5  # fewest training runs, apart from one, for which intervals are given
 
 
 class Estimate(NamedTuple):
-    """Value over n cases with its 95 % interval; an arm of two to four trainings has no interval."""
+    """Value over n cases with its 95 % interval; an arm of two to four training runs has none."""
 
     value: float
     low: float | None
@@ -49,10 +53,10 @@ class ArmResult(NamedTuple):
     name: str
     condition: str
     trainings: int
-    mean_return: Estimate  # interquartile mean over trainings of the mean return
-    return_range: tuple[float, float]  # lowest and highest mean return of a training
+    mean_return: Estimate  # interquartile mean over training runs of the mean return
+    return_range: tuple[float, float]  # lowest and highest mean return of a training run
     difference: Estimate | None  # mean return minus that of the first arm; None for the first arm
-    shares: dict[str, Estimate]  # mean over trainings by key of SHARES; keys without a case are left out
+    shares: dict[str, Estimate]  # mean over training runs by key of SHARES; keys without a case are left out
 
 
 def compare_arms(path: Path, arms: Sequence[str] = ()) -> list[ArmResult]:
@@ -153,7 +157,7 @@ def _share(values: np.ndarray, samples: np.ndarray) -> Estimate:
     """Return a share with the union of its bootstrap and Wilson intervals, one trial per case.
 
     The bootstrap of shares that are all 0 or all 1 has no width. Wilson's interval does not include the
-    variation over trainings.
+    variation over training runs.
     """
     n = int(np.isfinite(values[0]).sum())
     value = float(np.nanmean(values))
@@ -178,7 +182,7 @@ def _has_interval(trainings: int) -> bool:
 
 
 def _bounds(samples: np.ndarray, trainings: int) -> tuple[float | None, float | None]:
-    """Return the 95 % percentile interval; (None, None) for two to four trainings."""
+    """Return the 95 % percentile interval; (None, None) for two to four training runs."""
     if not _has_interval(trainings):
         return None, None
     low, high = np.percentile(samples, (2.5, 97.5))

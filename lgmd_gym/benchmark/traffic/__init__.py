@@ -1,8 +1,8 @@
 """The traffic suite: agents on recorded traffic, and their false activations per 100 km.
 
 An IDM driver drives the ego and the agent can only add braking. A braking event counts if it decelerates the
-ego by more than 0.25 g beyond the driver. It is false if, without it, the ego has no contact (of any part,
-at anyone's fault) within 10 s and the driver does not brake by 5 m/s² or more, the emergency braking of
+ego by more than 0.25 g beyond the driver. It is false if, without it, the ego has no contact (with any part,
+regardless of fault) within 10 s and the driver does not brake by 5 m/s² or more, the emergency braking of
 UN R152. It is premature, and counted separately, if that emergency is more than 4 s away. The driver never
 brakes harder than 6 m/s².
 

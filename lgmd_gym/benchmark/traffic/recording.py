@@ -1,4 +1,4 @@
-"""Recordings of traffic without an agent, from which any agent can branch off at any decision."""
+"""Recordings of traffic without an agent, which can be forked at any decision."""
 
 import copy
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.envs.traffic.emergencies import HARD_BRAKING, HORIZON, Emergencies, simulate_driver
 from lgmd_gym.envs.traffic.registration import traffic_id
 
-SNAPSHOT_EVERY = 300  # decisions between two snapshots; one snapshot takes as long as some 20 decisions
+SNAPSHOT_EVERY = 300  # decisions between two snapshots; one snapshot takes as long as about 20 decisions
 
 
 @dataclass(frozen=True, slots=True)

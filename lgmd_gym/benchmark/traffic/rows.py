@@ -57,12 +57,12 @@ class BrakingEvent:
 
     @property
     def false(self) -> bool:
-        """Whether it counts and no emergency follows without it."""
+        """Whether the event counts and no emergency would follow without it."""
         return self.counts and self.time_to_emergency is None
 
     @property
     def premature(self) -> bool:
-        """Whether it counts and the emergency is more than 4 s away."""
+        """Whether the event counts and the emergency is more than 4 s away."""
         return self.counts and self.time_to_emergency is not None and self.time_to_emergency > PREMATURE
 
 

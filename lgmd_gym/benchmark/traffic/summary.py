@@ -37,7 +37,7 @@ class TrafficSummary(NamedTuple):
     Attributes:
         agent: Agent string.
         kind: Kind of traffic; "" for all.
-        drives: Number of episodes played.
+        drives: Number of episodes.
         distance: Total distance [m].
         alerts: Number of alerts.
         brakes: Number of braking events beyond 0.25 g.

@@ -45,7 +45,7 @@ def load(file: Path) -> list[list[RecordedEpisode]]:
     """Return the episodes in a file, by seed.
 
     Raises:
-        ValueError: If the file holds no recorded episodes.
+        ValueError: If the file contains no recorded episodes.
     """
     with _open(file) as archive:
         episodes = _episodes(archive)
@@ -60,7 +60,7 @@ def check_file(file: Path, origin: dict[str, Any]) -> int:
         origin: Required settings; a `shrink` of None accepts any.
 
     Raises:
-        ValueError: If the file holds no recorded episodes, or was recorded with other settings.
+        ValueError: If the file contains no recorded episodes, or was recorded with other settings.
     """
     with _open(file) as archive:
         recorded = json.loads(str(archive["origin"]))
@@ -85,7 +85,7 @@ def _open(file: Path) -> Any:
         if "origin" not in archive:
             raise ValueError("no entry 'origin'")
     except (OSError, ValueError, BadZipFile) as error:
-        raise ValueError(f"{str(file)!r} holds no recorded episodes ({error})") from None
+        raise ValueError(f"{str(file)!r} contains no recorded episodes ({error})") from None
     return archive
 
 
