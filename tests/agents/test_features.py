@@ -131,7 +131,7 @@ def test_zone_features_are_zero_at_a_crawl():
     assert active[0][0] == pytest.approx(3.0, abs=0.01)
 
 
-def test_missing_or_other_observations_are_refused():
+def test_missing_or_other_observations_are_rejected():
     two_cameras = observe(1.0) | {"membrane_potential": np.array([0.5, 0.6]), "ego_yaw_rate": np.zeros(1)}
     with pytest.raises(ValueError, match="requires the 20 cameras of stopping-zone, got 2; train with"):
         zone_history().update(two_cameras)
@@ -162,6 +162,6 @@ def test_shrink_frame_averages_blocks():
         ({"reward_scale": 0.0}, "reward_scale must be a number > 0, got 0.0"),
     ],
 )
-def test_invalid_features_are_refused(values, message):
+def test_invalid_features_are_rejected(values, message):
     with pytest.raises(ValueError, match=message):
         FeatureConfig.from_dict(values)

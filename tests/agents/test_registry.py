@@ -47,7 +47,7 @@ def test_registered_names_are_the_names_of_the_agents():
     assert [name for name, cls in AGENTS.items() if make_agent(name).name != name or cls.name != name] == []
 
 
-def test_a_duplicate_name_is_refused():
+def test_a_duplicate_name_is_rejected():
     class Duplicate(Agent):
         name = "no-brake"
 
@@ -75,7 +75,7 @@ def test_a_duplicate_name_is_refused():
         (f"{USER_AGENT}:levle=3", "did you mean 'level'"),
     ],
 )
-def test_an_invalid_string_is_refused(text, message):
+def test_an_invalid_string_is_rejected(text, message):
     with pytest.raises(ValueError, match=message):
         make_agent(text)
 
@@ -90,7 +90,7 @@ def test_a_user_agent_acts_with_its_options_and_the_alert_of_the_neuron():
 
 
 @pytest.mark.parametrize("action", [float("nan"), [0.0, 1.0], []])
-def test_a_user_agent_with_an_invalid_action_is_refused(action):
+def test_a_user_agent_with_an_invalid_action_is_rejected(action):
     agent = make_agent(USER_AGENT)
     agent.agent.act = lambda observation, info: action
     with pytest.raises(ValueError, match="must return one finite number"):

@@ -75,7 +75,7 @@ def test_the_rule_is_inactive_in_turns_and_at_a_crawl():
 
 
 @pytest.mark.parametrize(("name", "cameras"), [("stopping-zone", 20), ("danger-zone", 10)])
-def test_other_cameras_are_refused(name, cameras):
+def test_other_cameras_are_rejected(name, cameras):
     with pytest.raises(ValueError, match=f"{name} requires its own {cameras} cameras, got 1; leave --camera"):
         make_agent(name).should_brake(frequency_reading(0.0))
 

@@ -23,7 +23,7 @@ def view():
 
 
 def play(env, consume):
-    """Play 90 decisions and pass each picture to a function."""
+    """Run 90 decisions and pass each picture to a function."""
     env.reset(seed=0)
     for _ in range(90):
         env.step(np.zeros(1, np.float32))

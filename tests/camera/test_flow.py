@@ -98,7 +98,7 @@ def test_texture_is_periodic_and_its_levels_are_box_averages():
     assert level == pytest.approx(tile.reshape(2048, 2, 128, 4).mean(axis=(1, 3)), abs=1.01)
 
 
-def test_frames_of_a_drive_change_evenly():
+def test_frames_of_an_episode_change_evenly():
     changes = f_hat(drive(EgoCamera("wide"), frames=200), tau_ms=0.0)
     assert changes.max() < 1.8 * np.median(changes)
     assert changes.min() > 0.5 * np.median(changes)

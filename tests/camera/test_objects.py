@@ -11,7 +11,7 @@ from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera.objects import index_shade
 
 
-def test_obstacles_stand_and_landmarks_are_flat():
+def test_obstacles_are_upright_and_landmarks_are_flat():
     env = straight_env()
     camera = EgoCamera("wide", roadside=0.0)
     bare = camera.render(env).astype(int)

@@ -1,4 +1,4 @@
-"""Extreme scenes and cameras: bounded time, finite light, no trace in later frames."""
+"""Extreme scenes and cameras: bounded time, finite light, no effect on later frames."""
 
 import time
 
@@ -110,7 +110,7 @@ def test_vehicle_around_behind_and_next_to_the_lens():
 
 
 @pytest.mark.parametrize("height", [np.nan, np.inf, 1e300])
-def test_invalid_vehicle_height_leaves_no_trace_in_later_frames(height):
+def test_invalid_vehicle_height_does_not_affect_later_frames(height):
     env = straight_env()
     car = add_car(env, 20.0, 3.5)
     for pitch in (0.0, 5.0):

@@ -145,7 +145,7 @@ def test_import_is_fast():
     assert min(timed("import lgmd_gym") for _ in range(5)) - min(timed("pass") for _ in range(5)) < 0.5
 
 
-def test_the_package_folder_holds_four_modules_and_folders():
+def test_the_package_folder_contains_four_modules_and_folders():
     flat = {path.name for path in (ROOT / "lgmd_gym").glob("*.py")}
     assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py"}
 

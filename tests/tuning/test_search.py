@@ -100,7 +100,7 @@ def test_bench_accepts_the_options_that_tune_prints(tmp_path, monkeypatch, capsy
         (("--false-cost", "0"), "false_cost must be > 0, got 0.0"),
     ],
 )
-def test_invalid_options_are_refused(option, message, capsys):
+def test_invalid_options_are_rejected(option, message, capsys):
     assert cli.run(["tune", *option]) == 2
     assert message in capsys.readouterr().err
 

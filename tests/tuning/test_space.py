@@ -1,4 +1,4 @@
-"""Search spaces: what is searched, and what is refused."""
+"""Search spaces: what is searched, and what is rejected."""
 
 import pytest
 
@@ -55,6 +55,6 @@ def test_shifts_include_the_camera_geometry_but_not_the_camera_preset():
         ({"neuron": ("t_ffi",)}, "unknown neuron parameter 't_ffi'"),  # infinite: cannot be scaled
     ],
 )
-def test_an_invalid_space_is_refused(changes, message):
+def test_an_invalid_space_is_rejected(changes, message):
     with pytest.raises(ValueError, match=message):
         SearchSpace(**({"agent": "spike-threshold"} | changes))
