@@ -20,7 +20,7 @@ ALGORITHMS = ("ppo", "sac", "dqn")
 
 
 class Policy(Agent):
-    """Brakes as a trained stable-baselines3 model decides, without exploration.
+    """Agent that acts with a trained stable-baselines3 model, without exploration.
 
     The file is a model of `lgmd-gym train` with a card: a JSON member with the cameras, features and demands.
     Loading a policy unpickles its file and can run arbitrary code, as with all stable-baselines3 files.
@@ -56,7 +56,7 @@ class Policy(Agent):
 
     @property
     def alert(self) -> bool:
-        """Whether the policy brakes; the alert of any one of many neurons is not a warning of the policy."""
+        """Whether the policy brakes; the alerts of individual neurons are not used."""
         return self._demand < 0.0
 
     def reset(self, seed: int | None = None) -> None:

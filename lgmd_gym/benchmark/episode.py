@@ -1,4 +1,4 @@
-"""Playing of one agent through one environment with one seed."""
+"""Episodes: one agent in one environment with one seed."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Episode:
             without contact.
         target_width: Width of the first actor [m]; NaN on an empty road.
         fps: Camera frame rate [Hz].
-        target_shade: Body grey of the first actor in [0, 255]; NaN on an empty road.
+        target_shade: Grey level of the first actor in [0, 255]; NaN on an empty road.
         reward_sum: Undiscounted return of the environment.
     """
 
@@ -61,11 +61,11 @@ def make_env(case: Case, sensor_config: SensorConfig) -> gym.Env:
 
 
 def rollout(env: gym.Env, agent: Agent, seed: int) -> Iterator[tuple[Step, np.ndarray]]:
-    """Yield every step of an episode and the agent's action on it, the final step included.
+    """Yield every step of an episode, including the final one, and the agent's action on it.
 
     Args:
         env: Environment inside `LGMDObservation`.
-        agent: Acting agent.
+        agent: Agent that acts.
         seed: Seed of the environment and of the agent.
     """
     step = Step(*env.reset(seed=seed))
@@ -80,11 +80,11 @@ def rollout(env: gym.Env, agent: Agent, seed: int) -> Iterator[tuple[Step, np.nd
 
 
 def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
-    """Play one episode to its end.
+    """Run one episode to its end.
 
     Args:
         env: Braking environment inside `LGMDObservation`.
-        agent: Acting agent.
+        agent: Agent that acts.
         seed: Seed of the environment and of the agent.
     """
     rows: list[tuple[float, ...]] = []

@@ -40,7 +40,7 @@ COMMANDS: dict[str, type] = {
 
 
 def main(argv: list[str] | None = None) -> None:
-    """Run the command line and exit; bad input gives one line on stderr and exit code 2."""
+    """Run the command line and exit; invalid input prints one line to stderr and exits with code 2."""
     sys.exit(run(argv))
 
 

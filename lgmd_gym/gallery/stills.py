@@ -9,7 +9,7 @@ import numpy as np
 from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.params import CONDITIONS, PRESETS
 
-# Environment id to a seed and a number of simulation steps after which vehicles are in view.
+# Environment id -> seed and number of simulation steps after which vehicles are in view.
 ROADS = {
     "highway-v0": (1, 30),
     "merge-v0": (0, 60),
@@ -27,7 +27,7 @@ APPROACH = 90  # decisions of an approach at 8 m/s, after which the target is 16
 
 
 def road_sheet(roads: tuple[str, ...], conditions: tuple[str, ...]) -> dict[str, dict[str, np.ndarray]]:
-    """Return frames of the wide camera: road to condition to frame, uint8, shape (height, width)."""
+    """Return frames of the wide camera by road and condition, uint8, shape (height, width)."""
     wide = CameraParams.preset("wide")
     cameras = {name: EgoCamera(wide.with_condition(name)) for name in conditions}
     with warnings.catch_warnings():
@@ -36,7 +36,7 @@ def road_sheet(roads: tuple[str, ...], conditions: tuple[str, ...]) -> dict[str,
 
 
 def lens_sheet() -> dict[str, dict[str, np.ndarray]]:
-    """Return frames of the same approach: lens to condition to frame, uint8, shape (height, width)."""
+    """Return frames of the same approach by lens and condition, uint8, shape (height, width)."""
     env: Any = gym.make("LGMD/CCRs-v0", ego_speed=8.0, shade=60, camera=None)
     env.reset(seed=0)
     for _ in range(APPROACH):

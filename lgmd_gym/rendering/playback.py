@@ -1,4 +1,4 @@
-"""Playback of one episode, with the composed picture in a window or a video file."""
+"""Playback of one episode, with the dashboard in a window or a video file."""
 
 from collections.abc import Callable
 from contextlib import ExitStack, closing
@@ -25,7 +25,7 @@ FINAL_SECONDS = 1.0  # [s], for which the last picture stays
 
 @dataclass(frozen=True, slots=True)
 class PlaybackResult:
-    """Result of a played episode; undefined values are infinite.
+    """Result of an episode; undefined values are infinite.
 
     Attributes:
         collision: Whether the ego had contact.
@@ -79,7 +79,7 @@ def play_episode(
     overlays: tuple[str, ...] = (),
     sensors: SensorConfig | None = None,
 ) -> PlaybackResult:
-    """Play one episode, and optionally show or record the composed picture.
+    """Run one episode, and optionally show or record the dashboard.
 
     Args:
         target: See `make_target`.
@@ -120,7 +120,7 @@ def play_episode(
 
 
 def _play(env: gym.Env, agent: Agent, seed: int, show: Callable[[], bool]) -> PlaybackResult:
-    """Play one episode until it ends, or until `show` returns False."""
+    """Run one episode until it ends, or until `show` returns False."""
     observation, info = env.reset(seed=seed)
     agent.reset(seed)
     done, decisions = False, 0

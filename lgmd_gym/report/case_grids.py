@@ -77,6 +77,6 @@ def _cell(rows: list[Row] | None, suite: str) -> GridCell | None:
 
 
 def _head_speed(head: str) -> int:
-    """Return the speed in a row heading [km/h]; 0 from stop."""
+    """Return the speed in a row heading [km/h]; 0 for a start from standstill."""
     digits = head.split()[0]
     return int(digits) if digits.isdigit() else 0

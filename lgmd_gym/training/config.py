@@ -1,4 +1,4 @@
-"""`TrainConfig`: the options of a training, from the command line, a YAML file or Python."""
+"""`TrainConfig`: the options of a training run, from the command line, a YAML file or Python."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
@@ -18,14 +18,14 @@ from lgmd_gym.training.policy_wrapper import PolicyWrapper
 
 RANDOM_ID = "LGMD/RandomBraking-v0"
 CAMERAS = ("fovea", "tele", "wide")
-SEED_STRIDE = 1_000_000  # distance of the environment seeds of neighbouring training seeds
+SEED_STRIDE = 1_000_000  # distance between the environment seeds of neighbouring training seeds
 VALIDATION_SEED = 10_000  # first environment seed of an evaluation
 DEMANDS = {"ppo": (0.0, -0.4, -1.0), "dqn": (0.0, -0.4, -1.0), "sac": (), OFFLINE: (0.0, -1.0)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrainConfig:
-    """Options of a training, as plain values apart from `features`.
+    """Options of a training run, as plain values apart from `features`.
 
     `from_hyperparams` fills in the hyperparameters of an algorithm; the constructor reads no file.
 
@@ -45,7 +45,7 @@ class TrainConfig:
         seed: Seed of the network and the environments.
         eval_freq: Number of decisions between two evaluations; "offline" evaluates after every epoch.
         eval_episodes: Number of episodes per evaluation.
-        recordings: Folder of an offline training whose recorded episodes are reused; None to record new ones.
+        recordings: Folder of an offline training run, to reuse its recorded episodes; None to record anew.
         traffic_episodes: Number of traffic episodes that "offline" trains on in addition; a quarter as many
             are added to its evaluations.
 
@@ -113,7 +113,7 @@ class TrainConfig:
         sensors_of: str | None = None,
         **options: Any,
     ) -> "TrainConfig":
-        """Return the configuration that a hyperparameter file gives for an environment.
+        """Return the configuration for an environment from a hyperparameter file.
 
         Args:
             algo: "ppo", "sac", "dqn" or "offline".
@@ -148,7 +148,7 @@ class TrainConfig:
         return cls(**{**values, "features": FeatureConfig.from_dict(values.get("features", {}))})
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values."""
+        """Return the configuration as plain values."""
         return asdict(self) | {"features": self.features.to_dict()}
 
     def make_env(self, split: str, camera: CameraSpec | None = None) -> gym.Env:

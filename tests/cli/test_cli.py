@@ -31,7 +31,7 @@ def test_bench_writes_a_run_folder(tmp_path):
     assert (out / "summary.csv").exists()
     again = run("bench", "--agents", "spike-threshold", "--seeds", "1", "--out", str(out))
     assert again.returncode == 2
-    assert "exists and is kept" in again.stderr
+    assert "already exists" in again.stderr
 
 
 def test_drive_writes_a_video(tmp_path):
@@ -102,7 +102,7 @@ def test_help_of_a_command_is_readable(command, capsys):
         (["bench", "--agents", "spike-treshold"], "did you mean 'spike-threshold'?"),
         (["bench", "--camera", "fova"], "did you mean 'fovea'?"),
         (["bench", "--params", "nowhere.toml"], "params file 'nowhere.toml' cannot be read"),
-        (["bench", "--out", "/proc/nowhere/run"], "run folder '/proc/nowhere/run' cannot be made"),
+        (["bench", "--out", "/proc/nowhere/run"], "run folder '/proc/nowhere/run' cannot be created"),
         (["drive", "LGMD/CCR-v0"], "did you mean 'LGMD/CCR"),
         (["drive", "quick/CCRs/v35"], "did you mean 'quick/CCRs/v"),
         (["drive", "LGMD/CCRs-v0", "--set", "ego_speed=50"], "for 50 km/h pass 13.89"),

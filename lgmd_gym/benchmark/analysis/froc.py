@@ -40,7 +40,7 @@ class OpenLoopTrace:
     """Time series of one `no-brake` episode."""
 
     condition: str
-    shade: float | None  # body grey level of the first actor; None on an empty road
+    shade: float | None  # grey level of the first actor; None on an empty road
     contact_time: float  # [s]; inf without contact
     series: dict[str, np.ndarray]  # keys: lgmd_gym.benchmark.episode.SERIES
 
@@ -64,8 +64,8 @@ class FrocPoint(NamedTuple):
     threshold: float
     detected: Rate  # of all threats
     false_alarms: int
-    distance: float  # driven while an alarm is false [m]
-    false_per_km: float  # inf for no distance
+    distance: float  # driven while an alarm would be false [m]
+    false_per_km: float  # inf without distance
     false_low: float  # exact Poisson 95 % interval [1/km]
     false_high: float
     chance: float  # share of random windows, as long as a detection window, in which an alarm begins
@@ -83,7 +83,7 @@ def load_traces(path: Path) -> list[OpenLoopTrace]:
     """Return the open-loop traces of a run folder, ordered by condition, case and seed.
 
     Raises:
-        ValueError: If the folder holds no run, or a damaged one.
+        ValueError: If the folder contains no run or a damaged one.
     """
     rows = [row for row in read_rows(path)[0] if row["agent"] == NO_BRAKE and row["error"] is None]
     traces = []
@@ -159,7 +159,7 @@ def _points(
 
 
 def _distance(trace: OpenLoopTrace) -> float:
-    """Return the distance driven while an alarm is false [m]."""
+    """Return the distance driven while an alarm would be false [m]."""
     time, speed = trace.series["time"], trace.series["ego_speed"]
     before = time < trace.false_alarm_end
     return float(np.trapezoid(speed[before], time[before]))

@@ -1,4 +1,4 @@
-"""Replay of one agent on a recording of traffic, live from its first braking on."""
+"""Replay of one agent on a recording of traffic; simulated live from its first braking on."""
 
 import gymnasium as gym
 
@@ -14,7 +14,7 @@ NEVER = -1e9  # [s]
 
 
 class Replay:
-    """Plays one agent on one recording.
+    """Runs one agent on one recording.
 
     Until the agent brakes, it receives the recorded steps. At its first demand the recorded state is forked:
     the recording is the branch without braking, and the fork is stepped live. For every later braking event,
@@ -26,7 +26,7 @@ class Replay:
 
     Args:
         recording: Recording to replay.
-        agent: Agent to play.
+        agent: Agent to run.
         live: Whether to step live from the start, to verify that the result is the same.
     """
 
@@ -40,7 +40,7 @@ class Replay:
         self._done = False
 
     def play(self) -> EpisodeLog:
-        """Play to the end of the episode."""
+        """Run to the end of the episode."""
         self.agent.reset(self.recording.seed)
         step, decision = self.recording.steps[0], 0
         while True:
@@ -88,7 +88,7 @@ class Replay:
             self._event = None
 
     def _time_to_emergency(self, time: float) -> float | None:
-        """Return the time to the next emergency without braking [s], None for none."""
+        """Return the time to the next emergency without braking [s], or None if there is none."""
         if self.env is None:
             return self.recording.emergencies.time_until(time)
         return look_ahead(self.env, time).time_until(time)
