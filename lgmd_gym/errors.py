@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+MAX_LISTED = 40  # names that a message lists in full
+
 
 def unknown_name(kind: str, name: object, known: Iterable[str]) -> ValueError:
     """Return a ValueError for an unknown name; its message suggests the closest known name.
@@ -17,8 +19,13 @@ def unknown_name(kind: str, name: object, known: Iterable[str]) -> ValueError:
         ValueError("unknown agent 'spike-treshold'; did you mean 'spike-threshold'?")
     """
     names = sorted(known)
-    closest = get_close_matches(str(name), names, n=1, cutoff=0.5)
-    fix = f"did you mean {closest[0]!r}?" if closest else f"known: {', '.join(names) or 'none'}"
+    if closest := get_close_matches(str(name), names, n=1, cutoff=0.5):
+        fix = f"did you mean {closest[0]!r}?"
+    elif len(names) > MAX_LISTED:
+        closest = get_close_matches(str(name), names, n=5, cutoff=0.0)
+        fix = f"closest of {len(names)} names: {', '.join(closest)}"
+    else:
+        fix = f"known: {', '.join(names) or 'none'}"
     return ValueError(f"unknown {kind} {name!r}; {fix}")
 
 

@@ -12,6 +12,7 @@ import tyro
 from tyro.conf import subcommand
 
 from lgmd_gym.cli import options
+from lgmd_gym.errors import unknown_name
 
 DESCRIPTION = """Simulate emergency braking on the spike frequency of a locust looming neuron (LGMD).
 
@@ -63,6 +64,8 @@ def _parse(argv: list[str] | None) -> Any:
     arguments = sys.argv[1:] if argv is None else argv
     if not arguments:
         raise ValueError(f"a command is required: {', '.join(COMMANDS)}; see lgmd-gym --help")
+    if arguments[0] not in (*COMMANDS, "-h", "--help"):
+        raise unknown_name("command", arguments[0], COMMANDS)
     stderr = io.StringIO()
     try:
         with contextlib.redirect_stderr(stderr):
@@ -80,7 +83,7 @@ def _parse(argv: list[str] | None) -> Any:
     except SystemExit as stop:
         if not stop.code:
             raise
-        raise ValueError(_one_line(stderr.getvalue())) from None
+        raise ValueError(_one_line(stderr.getvalue(), arguments[0])) from None
 
 
 def _command_type() -> Any:
@@ -92,16 +95,16 @@ def _command_type() -> Any:
     return Union[tuple(commands)]  # noqa: UP007  (built from a table)
 
 
-def _one_line(box: str) -> str:
-    """Return the message in the parser's box, with the nearest option if the box suggests one."""
-    text = re.sub(r"\x1b\[[0-9;]*m", "", box)
-    message = []
-    for line in text.splitlines():
-        words = line.strip("│╭╰╮╯ ")
-        if words and not words.strip("─") and message:
-            break  # a rule inside the box; the rest repeats the help
-        if words and not line.startswith(("╭", "╰")) and words.strip("─"):
-            message.append(words)
-    nearest = re.search(r"Perhaps you meant:[^-]*(--[a-z][a-z-]*)", text)
-    hint = f"; did you mean {nearest[1]}?" if nearest else "; see lgmd-gym --help"
-    return re.sub(r" \(applied to [^)]*\)", "", " ".join(message)) + hint
+def _one_line(box: str, command: str) -> str:
+    """Return the message in the parser's box, with the nearest option of the command if the box has one."""
+    lines = [line.strip("│╭╰╮╯|+ ") for line in re.sub(r"\x1b\[[0-9;]*m", "", box).splitlines()[1:]]
+    text = " ".join("──" if re.fullmatch("[─-]+", line) else line for line in lines if line)
+    text = re.sub(r" \(applied to [^)]*\)| Arguments are applied .* matter\.", "", text)
+    message = re.split(r" ?──", text.removeprefix("── "))[0]
+    if value := re.match(r"Error parsing (--[a-z-]+):.*?('.*?')", message):
+        message = f"{value[1]} has the invalid value {value[2]}"
+    for suggestion in text.partition("Perhaps you meant:")[2].split(" --help"):
+        option = re.search(rf"--[a-z-]+(?=.* in lgmd-gym {command}$)", suggestion)
+        if option:
+            return f"{message}; did you mean {option[0]}?"
+    return f"{message}; see lgmd-gym {command} --help"

@@ -16,6 +16,7 @@ from lgmd_gym.envs import env_id
 from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.rendering.dashboard import SIZE
+from lgmd_gym.rendering.overlays import checked_overlays
 from lgmd_gym.rendering.view import LGMDView
 from lgmd_gym.rendering.window import Window
 from lgmd_gym.video import VideoWriter
@@ -94,6 +95,9 @@ def play_episode(
     Raises:
         ValueError: For an unknown name, a video that cannot be written, or a missing display.
     """
+    if seed < 0:
+        raise ValueError(f"seed must be >= 0, got {seed}")
+    checked_overlays(overlays)
     sensors = (sensors or SensorConfig()).for_agent(agent)
     with ExitStack() as stack:
         env = make_target(target, arguments, **sensors.arguments)

@@ -72,8 +72,8 @@ class TrainConfig:
     def __post_init__(self) -> None:
         if self.algo not in ALGORITHMS:
             raise unknown_name("algorithm", self.algo, ALGORITHMS)
-        for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes", "traffic_episodes"):
-            low = 0 if name == "traffic_episodes" else 1
+        for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes", "traffic_episodes", "seed"):
+            low = 0 if name in ("traffic_episodes", "seed") else 1
             object.__setattr__(self, name, whole(name, getattr(self, name), low))
         for demand in self.demands:
             check_within("demands", demand, -1.0, 1.0)
