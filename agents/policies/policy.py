@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 CARD = "lgmd_gym.json"  # member of the model's zip file
 SHIPPED = Path(__file__).parent  # folder of the policies in this package
-ALGORITHMS = ("ppo", "sac", "dqn")
 
 
 class Policy(Agent):

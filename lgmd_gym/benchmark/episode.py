@@ -11,11 +11,11 @@ from lgmd_gym.agents import Agent
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs import env_id
+from lgmd_gym.sensing.spaces import SIGNALS
 
 GROUND_TRUTH = ("ego_speed", "gap", "ttc", "drac", "deceleration", "target_speed")  # keys of `info`
-SIGNALS = ("spike_frequency", "membrane_potential", "ffi")  # keys of the observation; maximum over cameras
-# One value per decision each. `standstill_hold` is 1 while the agent keeps a standing ego from starting,
-# which the deceleration does not show.
+# One value per decision each; of `SIGNALS`, the maximum over the cameras. `standstill_hold` is 1 while the
+# agent keeps a standing ego from starting, which the deceleration does not show.
 SERIES = ("time", *GROUND_TRUTH, *SIGNALS, "alert", "standstill_hold")
 
 

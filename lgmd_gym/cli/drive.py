@@ -7,9 +7,8 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.cli.options import Drive
 from lgmd_gym.cli.params import read_params
+from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.rendering.playback import play_episode
-
-KMH = 3.6  # km/h per m/s
 
 
 def run(options: Drive) -> int:
@@ -28,10 +27,10 @@ def run(options: Drive) -> int:
     if result.stopped:
         print(f"window closed after {result.duration:.2f} s")
     elif result.collision:
-        print(f"contact at {KMH * result.impact_speed:.1f} km/h relative speed after {result.duration:.2f} s")
+        print(f"contact at {result.impact_speed / KMH:.1f} km/h relative speed after {result.duration:.2f} s")
     else:
         gap = f"free distance ahead {result.gap:.2f} m" if isfinite(result.gap) else "no vehicle ahead"
-        print(f"no contact: {KMH * result.ego_speed:.1f} km/h after {result.duration:.2f} s, {gap}")
+        print(f"no contact: {result.ego_speed / KMH:.1f} km/h after {result.duration:.2f} s, {gap}")
     if options.video is not None:
         print(f"video: {options.video}")
     return 0

@@ -23,7 +23,7 @@ ROADS = {
     "parking-v0": (2, 10),
 }
 LENSES = ("wide", "standard", "tele", "fovea")
-APPROACH = 90  # decisions of an approach at 8 m/s, after which the target is 16 m ahead
+APPROACH_DECISIONS = 90  # decisions of an approach at 8 m/s, after which the target is 16 m ahead
 
 
 def road_sheet(roads: tuple[str, ...], conditions: tuple[str, ...]) -> dict[str, dict[str, np.ndarray]]:
@@ -39,7 +39,7 @@ def lens_sheet() -> dict[str, dict[str, np.ndarray]]:
     """Return frames of the same approach by lens and condition, uint8, shape (height, width)."""
     env: Any = gym.make("LGMD/CCRs-v0", ego_speed=8.0, shade=60, camera=None)
     env.reset(seed=0)
-    for _ in range(APPROACH):
+    for _ in range(APPROACH_DECISIONS):
         env.step([0.0])
     return {
         lens: {name: EgoCamera(PRESETS[lens].with_condition(name)).render(env) for name in CONDITIONS}

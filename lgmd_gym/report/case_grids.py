@@ -3,14 +3,14 @@
 import re
 from typing import NamedTuple
 
-from lgmd_gym.benchmark.analysis.ncap_points import OVERLAP_WEIGHTS, REAR_CASE, ROW_COLOURS
+from lgmd_gym.benchmark.analysis.ncap_points import REAR_CASE, ROW_COLOURS
 from lgmd_gym.benchmark.analysis.protocol_limits import relative_impact
+from lgmd_gym.benchmark.protocols import OVERLAPS
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.envs.dynamics.units import KMH
 
 CROSSING_CASE = re.compile(r"/CCCscp/(?:v(?P<speed>\d+)|from-stop)/target(?P<target>\d+)$")
 AXES = {"overlap": "overlap [%]", "location": "impact location [%]", "target": "target speed [km/h]"}
-OVERLAPS = tuple(OVERLAP_WEIGHTS)
 
 
 class GridCell(NamedTuple):

@@ -9,7 +9,7 @@ from gymnasium import spaces
 from lgmd_gym.neuron import LGMDParams, Response
 from lgmd_gym.sensing.sensor_array import SensorArray
 
-MAX_SPEED = 100.0  # [m/s], above highway-env's limit of 40 m/s
+SPEED_BOUND = 100.0  # [m/s], above highway-env's limit of 40 m/s
 SIGNALS = ("spike_frequency", "membrane_potential", "ffi")
 
 
@@ -39,7 +39,7 @@ def make_space(
         "spike_frequency": spaces.Box(0.0, max_spike_frequency(params, fps), count, np.float32),
         "membrane_potential": spaces.Box(min(params.k_0, 0.5), 1.0, count, np.float32),
         "ffi": spaces.Box(0.0, max_ffi(params), count, np.float32),
-        "ego_speed": spaces.Box(-MAX_SPEED, MAX_SPEED, (1,), np.float32),
+        "ego_speed": spaces.Box(-SPEED_BOUND, SPEED_BOUND, (1,), np.float32),
         # The heading changes by at most half a turn per simulation step.
         "ego_yaw_rate": spaces.Box(-pi * simulation_frequency, pi * simulation_frequency, (1,), np.float32),
     }

@@ -28,7 +28,7 @@ LEAD_TIME = 1.0  # latest start of a detection before contact [s]
 THRESHOLDS = tuple(float(level) for level in range(5, 305, 5))
 ASPHALT = 104.0  # mean grey level of the asphalt by day
 LOW_CONTRAST = 0.35  # Weber contrast |grey - asphalt| / asphalt
-CONTRASTS = ("dark", "like asphalt", "light")
+CONTRAST_CLASSES = ("dark", "like asphalt", "light")
 COLUMNS = (
     *("condition", "contrast", "lead", "threshold", "threats", "detected", "detected_low", "detected_high"),
     *("false_alarms", "km", "false_per_km", "false_low", "false_high", "chance"),
@@ -51,7 +51,7 @@ class OpenLoopTrace:
 
     @property
     def contrast(self) -> str:
-        """Contrast of the first actor with the asphalt, one of `CONTRASTS`; "none" on an empty road."""
+        """First actor against the asphalt, one of `CONTRAST_CLASSES`; "none" on an empty road."""
         if self.shade is None:
             return "none"
         weber = (self.shade - ASPHALT) / ASPHALT
@@ -75,7 +75,7 @@ class FrocCurve(NamedTuple):
     """Points by rising threshold: detections of the threats of one contrast, false alarms of all traces."""
 
     condition: str
-    contrast: str  # "all", or one of CONTRASTS
+    contrast: str  # "all", or one of CONTRAST_CLASSES
     points: tuple[FrocPoint, ...]
 
 
@@ -122,7 +122,7 @@ def froc_curves(
         present = {trace.contrast for trace in chosen if trace.contact_time < inf}
         curves[condition] = [
             FrocCurve(condition, contrast, tuple(_points(chosen, onsets, lead_time, contrast)))
-            for contrast in ("all", *(name for name in CONTRASTS if name in present))
+            for contrast in ("all", *(name for name in CONTRAST_CLASSES if name in present))
         ]
     return curves
 

@@ -7,7 +7,7 @@ from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.traffic.recording import TrafficRecording, look_ahead
 from lgmd_gym.benchmark.traffic.rows import BrakingEvent, EpisodeLog
 
-RELEASE = 1.0  # [s] without a demand that ends a braking event, and without an alert before the next one
+EVENT_PAUSE = 1.0  # [s] without a demand that ends a braking event, and without an alert before the next one
 HANDOVER = 3.0  # [s] after a standstill during which only the driver acts
 RESEED = 1_000_003  # seed offset of the agent's reset after each standstill
 NEVER = -1e9  # [s]
@@ -20,7 +20,7 @@ class Replay:
     the recording is the branch without braking, and the fork is stepped live. For every later braking event,
     a fork of the live state is stepped without braking.
 
-    A braking event ends after `RELEASE` without a demand, or at a standstill. After a standstill only the
+    A braking event ends after `EVENT_PAUSE` without a demand, or at a standstill. After a standstill only the
     driver acts for `HANDOVER`; then the agent is reset, with another seed each time, so that an agent that
     always brakes still makes progress.
 
@@ -63,7 +63,7 @@ class Replay:
             self._handover_until = NEVER
         demand = min(float(self.agent.act(step.observation, step.info)[0]), HOLD)
         if self.agent.alert:
-            self.log.alerts += time - self._last_alert > RELEASE
+            self.log.alerts += time - self._last_alert > EVENT_PAUSE
             self._last_alert = time
         return demand
 
@@ -84,7 +84,7 @@ class Replay:
             self.log.stops += event.counts  # otherwise the driver has stopped
             self._standstills += 1
             self._handover_until = time + HANDOVER
-        if standstill or time - event.last > RELEASE:
+        if standstill or time - event.last > EVENT_PAUSE:
             self._event = None
 
     def _time_to_emergency(self, time: float) -> float | None:
