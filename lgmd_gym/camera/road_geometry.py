@@ -145,7 +145,7 @@ def _line(lane: Any, stations: np.ndarray, side: int, *, striped: bool) -> np.nd
 
 
 def _car_park(surface: np.ndarray) -> np.ndarray:
-    """Return one quad around all bays of a car park, whose aisles belong to no lane."""
+    """Return one quad around all bays of a car park, because its aisles are not lanes."""
     x, y = surface[:, 0::2], surface[:, 1::2]
     x0, x1, y0, y1 = x.min() - 5.0, x.max() + 5.0, y.min() - 3.0, y.max() + 3.0
     return np.array([[x0, y0, x0, y1, x1, y1, x1, y0]])

@@ -121,7 +121,7 @@ def sensor_config(proposal: Proposal) -> SensorConfig:
 
 
 def agent_string(agent: str, proposal: Proposal) -> str:
-    """Return the agent string for a rule with a proposal's parameters."""
+    """Return the agent string for a rule with proposed parameters."""
     options = rule_options(proposal)
     return agent + ":" * bool(options) + ",".join(f"{name}={value!r}" for name, value in options.items())
 

@@ -170,7 +170,7 @@ def _per_km(count: float, distance: float) -> float:
 
 
 def _chance(traces: list[OpenLoopTrace], starts: list[np.ndarray], length: float) -> float:
-    """Return the share of windows of a length, before any detection window, in which an alarm begins.
+    """Return the share of windows of `length` [s] before the detection window in which an alarm begins.
 
     The result is NaN if no trace is long enough for a window.
     """

@@ -29,7 +29,7 @@ MIN_TRAININGS = 5  # fewest training runs, apart from one, for which intervals a
 
 
 class Estimate(NamedTuple):
-    """Value over n cases with its 95 % interval; an arm of two to four training runs has none."""
+    """Value over n cases with its 95 % interval; None as bounds for arms of two to four training runs."""
 
     value: float
     low: float | None
