@@ -2,8 +2,11 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO
+
+from PIL import ImageFont
 
 # Palette of Okabe and Ito, which colour-blind readers can distinguish; darkest first.
 COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -29,6 +32,14 @@ def load_pyplot() -> Any:
     from matplotlib import pyplot
 
     return pyplot
+
+
+@lru_cache
+def load_font(size: int) -> ImageFont.FreeTypeFont:
+    """Return DejaVu Sans, which matplotlib ships and which contains the characters of units."""
+    import matplotlib as mpl
+
+    return ImageFont.truetype(f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf", size)
 
 
 @contextmanager

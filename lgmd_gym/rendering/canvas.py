@@ -1,11 +1,11 @@
 """Canvas: a picture in one array, with pygame shapes and cached text."""
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import pygame
-from PIL import ImageFont
+
+from lgmd_gym.plotting.style import load_font
 
 Colour = tuple[int, int, int]
 Box = tuple[int, int, int, int]  # left, top, right, bottom [px]
@@ -127,7 +127,7 @@ def _rect(box: Box) -> pygame.Rect:
 @lru_cache(maxsize=2048)
 def _mask(text: str, size: int) -> np.ndarray:
     """Return the coverage of a line of text, float32, shape (height, width, 1), in [0, 1]."""
-    font = _font(size)
+    font = load_font(size)
     ascent, descent = font.getmetrics()
     bitmap, (dx, dy) = font.getmask2(text, mode="L")
     width, height = bitmap.size
@@ -135,11 +135,3 @@ def _mask(text: str, size: int) -> np.ndarray:
     coverage = np.asarray(list(bitmap), np.float32).reshape(height, width)[: ascent + descent - dy]
     mask[dy : dy + coverage.shape[0], dx : dx + width, 0] = coverage / 255.0
     return mask
-
-
-@lru_cache
-def _font(size: int) -> Any:
-    """Return DejaVu Sans, which matplotlib ships and which contains the characters of units."""
-    import matplotlib as mpl
-
-    return ImageFont.truetype(f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf", size)

@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from lgmd_gym.neuron import LGMD
+from lgmd_gym.plotting.style import load_font
 from lgmd_gym.video import VideoWriter
 from lgmd_gym.video.clips.playback import ClipFrame, PlaybackConfig
 
@@ -36,7 +37,7 @@ class OverlayWriter:
         self._fps = fps
         self._writer = VideoWriter(path, fps)
         self._history: deque[tuple[float, float, int]] = deque()
-        self._fonts = {size: _font(size) for size in (13, 16, 22)}
+        self._fonts = {size: load_font(size) for size in (13, 16, 22)}
 
     def write(self, frame: ClipFrame, neuron: LGMD) -> None:
         """Append the picture of one frame."""
@@ -137,10 +138,3 @@ def _blend(picture: np.ndarray, excitation: np.ndarray) -> np.ndarray:
     grey = picture.mean(2, keepdims=True, dtype=np.float32)
     muted = 0.5 * picture + 0.3 * grey
     return (muted + strength * (np.array((255, 120, 0), np.float32) - muted)).astype(np.uint8)
-
-
-def _font(size: int) -> Any:
-    """Return the DejaVu Sans font that matplotlib includes."""
-    import matplotlib as mpl
-
-    return ImageFont.truetype(f"{mpl.get_data_path()}/fonts/ttf/DejaVuSans.ttf", size)
