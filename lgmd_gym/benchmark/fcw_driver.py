@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.agents import Agent
+
 REACTION = 1.2  # [s] from the alert to braking, Euro NCAP AEB C2C v4.3.1, 8.4.6
 DECELERATION = 4.0  # [m/s²], same section
 
@@ -17,7 +19,7 @@ class FCWDriver:
         decision_hz: Decision rate [Hz].
     """
 
-    def __init__(self, agent: Any, max_deceleration: float, decision_hz: float) -> None:
+    def __init__(self, agent: Agent, max_deceleration: float, decision_hz: float) -> None:
         self.agent = agent
         self.name = f"{agent.name} (FCW driver)"
         self._demand = -DECELERATION / max_deceleration

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, is_dataclass, replace
 from typing import Any
 
+from lgmd_gym.agents import Agent
 from lgmd_gym.camera import CLEAR, PRESETS, CameraParams, CameraSpec, with_condition
 from lgmd_gym.neuron import NeuronSpec
 
@@ -27,7 +28,7 @@ class SensorConfig:
     condition: str = CLEAR
     include_frame: bool = False
 
-    def for_agent(self, agent: Any = None) -> "SensorConfig":
+    def for_agent(self, agent: Agent | None = None) -> "SensorConfig":
         """Return the config with the agent's own camera and parameters in place of None."""
         include_frame = self.include_frame or bool(getattr(agent, "include_frame", False))
         camera, params = self.camera, self.params
