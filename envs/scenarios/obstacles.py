@@ -1,4 +1,4 @@
-"""Objects on and next to the road that are not cars: driving without a threat."""
+"""Scenarios without a threat: objects on or next to the road that are not cars."""
 
 from math import atan2, cos, hypot, pi, sin
 

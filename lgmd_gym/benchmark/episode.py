@@ -94,9 +94,9 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
     for step, action in rollout(env, agent, seed):
         info, total = step.info, total + step.reward
         standstill_hold = info["ego_speed"] == 0.0 and float(action[0]) < 0.0
-        truth = (info[name] for name in GROUND_TRUTH)
+        values = (info[name] for name in GROUND_TRUTH)
         signals = (float(np.max(step.observation[name])) for name in SIGNALS)
-        rows.append((len(rows) / policy_hz, *truth, *signals, float(agent.alert), float(standstill_hold)))
+        rows.append((len(rows) / policy_hz, *values, *signals, float(agent.alert), float(standstill_hold)))
     actors, bodies = base.scenario.actors, base.road.obstacles
     return Episode(
         series={name: np.array(column) for name, column in zip(SERIES, zip(*rows, strict=True), strict=True)},

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from lgmd_gym.errors import check_keys, unknown_name
 
 
-class _Bound(NamedTuple):
+class _Interval(NamedTuple):
     low: float
     high: float
     low_allowed: bool
@@ -21,22 +21,22 @@ class _Bound(NamedTuple):
 
 
 _BOUNDS = {
-    "hfov_deg": _Bound(1.0, 170.0, False, False, "degrees"),
-    "mount_height": _Bound(0.0, 100.0, False, True, "m above the ground"),
-    "mount_setback": _Bound(-10.0, 50.0, True, True, "m behind the front bumper"),
-    "mount_left": _Bound(-10.0, 10.0, True, True, "m left of the centreline"),
-    "pitch_deg": _Bound(-60.0, 60.0, True, True, "degrees"),
-    "yaw_deg": _Bound(-360.0, 360.0, True, True, "degrees"),
-    "texture": _Bound(0.0, 5.0, True, True, "times the natural contrast"),
-    "roadside": _Bound(0.0, 4.0, True, True, "times the natural density"),
-    "seed": _Bound(0, 2**32 - 1, True, True, ""),
-    "visibility_m": _Bound(0.0, 1e6, True, True, "m (0 is clear air)"),
-    "shot_noise": _Bound(0.0, 10.0, True, True, "grey levels at mid-grey"),
-    "read_noise": _Bound(0.0, 50.0, True, True, "grey levels"),
-    "vibration_deg": _Bound(0.0, 5.0, True, True, "degrees"),
-    "dive_deg": _Bound(0.0, 2.0, True, True, "degrees per m/s²"),
-    "heave_m": _Bound(0.0, 0.1, True, True, "m"),
-    "shutter_s": _Bound(0.0, 0.1, True, True, "s"),
+    "hfov_deg": _Interval(1.0, 170.0, False, False, "degrees"),
+    "mount_height": _Interval(0.0, 100.0, False, True, "m above the ground"),
+    "mount_setback": _Interval(-10.0, 50.0, True, True, "m behind the front bumper"),
+    "mount_left": _Interval(-10.0, 10.0, True, True, "m left of the centreline"),
+    "pitch_deg": _Interval(-60.0, 60.0, True, True, "degrees"),
+    "yaw_deg": _Interval(-360.0, 360.0, True, True, "degrees"),
+    "texture": _Interval(0.0, 5.0, True, True, "times the natural contrast"),
+    "roadside": _Interval(0.0, 4.0, True, True, "times the natural density"),
+    "seed": _Interval(0, 2**32 - 1, True, True, ""),
+    "visibility_m": _Interval(0.0, 1e6, True, True, "m (0 is clear air)"),
+    "shot_noise": _Interval(0.0, 10.0, True, True, "grey levels at mid-grey"),
+    "read_noise": _Interval(0.0, 50.0, True, True, "grey levels"),
+    "vibration_deg": _Interval(0.0, 5.0, True, True, "degrees"),
+    "dive_deg": _Interval(0.0, 2.0, True, True, "degrees per m/s²"),
+    "heave_m": _Interval(0.0, 0.1, True, True, "m"),
+    "shutter_s": _Interval(0.0, 0.1, True, True, "s"),
 }
 _CHOICES = {"gaze": ("fixed", "path"), "vehicles": ("car", "box"), "light": ("day", "night")}
 
@@ -202,7 +202,7 @@ def _checked_shape(shape: Any) -> tuple[int, int]:
     return int(shape[0]), int(shape[1])
 
 
-def _checked_number(name: str, value: Any, bound: _Bound) -> float | int:
+def _checked_number(name: str, value: Any, bound: _Interval) -> float | int:
     if not isinstance(value, Real) or isinstance(value, bool):
         raise ValueError(f"camera {name} must be a number, got {value!r}")
     value = int(value) if isinstance(value, Integral) else float(value)

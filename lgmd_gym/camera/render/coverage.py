@@ -176,7 +176,7 @@ def clip_and_project(lens, corners, n, out):
 
 @kernel
 def winding(uv, n):
-    """Return twice the area of a projected polygon, positive if it runs down on its left side."""
+    """Return twice the signed area of a projected polygon; positive if its left edge runs downwards."""
     area = 0.0
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
