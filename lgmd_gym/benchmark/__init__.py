@@ -34,6 +34,7 @@ def run(
         for the suite "traffic", `lgmd_gym.benchmark.traffic.rows.KEYS`.
 
     Raises:
+        TypeError: If the configuration is not a `RunConfig`.
         ValueError: If the configuration is invalid, the cluster is not reachable, or the folder exists or
             cannot be created.
         RuntimeError: If the run stopped early, because a worker was killed or the disk is full.
@@ -42,6 +43,8 @@ def run(
         >>> config = RunConfig(suite="quick", agents=("ttc-oracle",), seeds=1)
         >>> table = run(config)  # doctest: +SKIP
     """
+    if not isinstance(config, RunConfig):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise TypeError(f"config must be a RunConfig, got {config!r}; use RunConfig(suite=..., agents=...)")
     import pandas as pd
 
     from lgmd_gym.benchmark.runner import Run

@@ -336,6 +336,12 @@ def test_python_function_and_command_write_the_same_folder(tmp_path):
     assert table[table.agent == "ttc-oracle"].avoided.all()
 
 
+def test_run_requires_a_configuration(tmp_path):
+    with pytest.raises(TypeError, match="config must be a RunConfig, got 'quick'"):
+        run_benchmark("quick", tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [

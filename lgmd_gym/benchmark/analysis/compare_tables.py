@@ -60,7 +60,7 @@ def arm_table(results: Sequence[ArmResult], title: str) -> Table:
     keys = [key for key in SHARE_HEADINGS if key in results[0].shares]
     table = Table(title=title, caption=escape(ARM_CAPTION), box=SIMPLE_HEAD)
     table.add_column("arm", min_width=15, overflow="fold")
-    for heading in ("train-\nings", "return", "difference\nto the first"):
+    for heading in ("training\nruns", "return", "difference\nto the first"):
         table.add_column(heading, justify="right")
     for key in keys:
         heading = f"{SHARE_HEADINGS[key]},\n% of {results[0].shares[key].n}"
