@@ -60,7 +60,7 @@ def test_trained_policy_acts_as_the_model_predicts(tmp_path, demands, latch):
         if terminated:
             break
     assert terminated is latch
-    with pytest.raises(ValueError, match="run' exists"):
+    with pytest.raises(ValueError, match="run' already exists"):
         train(config, tmp_path / "run")
 
 
