@@ -44,9 +44,9 @@ def neuron(shape, kind=LGMD):
 
 def camera(name, vehicles):
     """Return a function that renders a road with vehicles."""
-    from test_bench_camera import scene
+    from test_bench_camera import busy_env
 
-    env, ego_camera = scene(vehicles), EgoCamera(name)
+    env, ego_camera = busy_env(vehicles), EgoCamera(name)
     out = ego_camera.render(env)
     return lambda: ego_camera.render(env, out)
 
