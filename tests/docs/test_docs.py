@@ -127,6 +127,10 @@ def test_the_citation_file_matches_the_project():
     assert f"license: {project['license']}" in text
 
 
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 130
+
+
 def test_pictures_are_small():
     """All pictures in the repository are under 3 MB together."""
     kinds = {".png", ".gif", ".jpg", ".mp4", ".svg"}
