@@ -71,7 +71,7 @@ class FrameDifferenceParams(RuleParams):
 
 
 class FrameDifference(ImageRule):
-    """Brakes fully on the mean absolute frame difference, mean |L(t) − L(t − 1)| [grey levels].
+    """Brakes fully on the mean absolute frame difference, `mean |L(t) − L(t − 1)|` [grey levels].
 
     Condition: see `ImageRule`. Observes `frame`, `ego_yaw_rate`. Parameters: `FrameDifferenceParams`.
     """
