@@ -1,0 +1,97 @@
+"""Cases, cameras and the episodes that they define."""
+
+import pytest
+
+from lgmd_gym.agents import AGENTS, Agent
+from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.episode import SERIES, make_env, play
+from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.suites import SUITES, find_case, find_suite
+from lgmd_gym.benchmark.task import Task, run_task
+from lgmd_gym.camera import CameraParams
+
+SLOW_APPROACH = Case("test/CCRs/v20", "CCRs", (("ego_speed", 5.556),))
+THREAT = Counterfactual(True, 5.0, 10.0)
+
+
+def test_night_case_renders_dark_frames():
+    means = {}
+    for name in ("CCRs/v30/location50", "CCRs/v30/robust-night"):
+        env = make_env(find_case(f"ncap2026/{name}"), SensorConfig("wide"))
+        env.reset(seed=0)
+        means[name] = env.get_wrapper_attr("frames")["wide"].mean()
+        env.close()
+    day, night = means.values()
+    assert night < 0.5 * day
+
+
+TELE = CameraParams.preset("tele")
+
+
+@pytest.mark.parametrize("camera", ["tele", {"name": "tele"}, TELE, SensorConfig(TELE).plain.camera])
+def test_condition_applies_to_every_kind_of_camera_argument(camera):
+    foggy = SensorConfig([camera]).with_condition("fog").arguments["camera"]
+    assert foggy == [TELE.with_condition("fog")]
+
+
+def test_plain_camera_contains_only_the_changes_to_its_preset():
+    camera = CameraParams.preset("tele", pitch_deg=1.5)
+    plain = SensorConfig(camera).plain.camera
+    assert plain == {"name": "tele", "pitch_deg": 1.5}
+    assert CameraParams.make(plain) == camera
+
+
+def test_birdseye_camera_supports_no_condition():
+    with pytest.raises(ValueError, match="'birdseye' does not support condition 'fog'; use 'clear'"):
+        SensorConfig("birdseye").with_condition("fog")
+
+
+def test_suite_cases_have_distinct_names_and_valid_scenarios():
+    offenders = []
+    for suite in SUITES.values():
+        names = [case.name for case in suite.cases]
+        offenders += [name for name in set(names) if names.count(name) > 1]
+        for case in suite.cases:
+            valid = case.suite == suite.name and f"/{case.scenario.family}/" in case.name
+            if f"/{case.family}/v" in case.name:
+                valid = valid and f"/v{case.scenario.ego_speed * 3.6:.0f}" in case.name
+            if not valid or find_case(case.name) != case:
+                offenders.append(case.name)
+    assert offenders == []
+
+
+def test_unknown_suite_and_case_suggest_the_nearest_name():
+    with pytest.raises(ValueError, match="unknown suite 'quik'; did you mean 'quick'"):
+        find_suite("quik")
+    with pytest.raises(ValueError, match="did you mean 'quick/CCRs/v30'"):
+        find_case("quick/CCRs/v3")
+
+
+def test_played_episode_has_contact_at_the_expected_time_and_speed():
+    env = make_env(SLOW_APPROACH, SensorConfig())
+    played = play(env, AGENTS["no-brake"](), 0)
+    assert played.collision
+    assert played.relative_impact_speed == pytest.approx(5.556)
+    assert Counterfactual.of(played).contact_time == pytest.approx(5.0, abs=0.05)
+    assert played.series["spike_frequency"].max() > 30
+    assert tuple(played.series) == SERIES
+    assert {len(values) for values in played.series.values()} == {len(played.series["time"])}
+
+
+class Broken(Agent):
+    """Raises an exception in the middle of an episode."""
+
+    name = "broken"
+
+    def demand(self, observation, info):
+        if info["ttc"] < 4:
+            raise RuntimeError("internal failure")
+        return 0.0
+
+
+def test_exception_of_an_agent_becomes_an_error_row(monkeypatch):
+    monkeypatch.setitem(AGENTS, "broken", Broken)
+    result = run_task(Task("broken", SLOW_APPROACH, 0, SensorConfig(), THREAT))
+    assert "internal failure" in result.row["error"]
+    assert result.row["collision"] is None

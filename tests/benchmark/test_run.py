@@ -1,0 +1,162 @@
+"""Runs of a suite: rows, resumption, errors, and the folder that they write."""
+
+import json
+
+import numpy as np
+import pytest
+from support.runs import interrupt, new_run, read_rows, sorted_rows
+
+from lgmd_gym.benchmark import RunConfig
+from lgmd_gym.benchmark import run as run_benchmark
+from lgmd_gym.benchmark.executor import Executor
+from lgmd_gym.benchmark.rows import KEYS
+from lgmd_gym.benchmark.runner import Run
+from lgmd_gym.benchmark.suites import SUITES
+from lgmd_gym.cli import main as cli
+
+BOUNDS = ("no-brake", "always-brake", "ttc-oracle", "spike-threshold")
+
+
+@pytest.fixture(scope="module")
+def quick_run(tmp_path_factory):
+    """The quick suite with one seed, run in this process."""
+    run = new_run(tmp_path_factory.mktemp("runs") / "quick", agents=BOUNDS[1:], seeds=1)
+    assert run.play()
+    return run
+
+
+def test_every_episode_runs_once(quick_run):
+    assert len(quick_run.rows) == quick_run.total == 4 * len(SUITES["quick"].cases)
+    assert read_rows(quick_run.folder.path) == quick_run.rows
+    assert len({(row["agent"], row["case"], row["seed"]) for row in quick_run.rows}) == quick_run.total
+    assert all(row["error"] is None for row in quick_run.rows)
+    settings = json.loads((quick_run.folder.path / "run.json").read_text())
+    assert settings["complete"] is True
+    assert settings["packages"]["numpy"] == np.__version__
+
+
+def test_bounding_agents_and_the_neuron_behave_as_documented(quick_run):
+    def rows(agent, family=""):
+        return [row for row in quick_run.rows if row["agent"] == agent and f"/{family}" in row["case"]]
+
+    assert all(row["avoided"] is not True for row in rows("no-brake"))
+    assert all(row["collision"] for row in rows("no-brake", "CCR"))
+    for family in ("AdjacentPass", "Following", "EmptyRoad"):
+        assert not any(row["collision"] for row in rows("no-brake", family))
+    assert all(row["avoided"] for row in rows("ttc-oracle", "CCR"))
+    assert not any(row["false_activation"] for row in rows("ttc-oracle"))
+    assert not any(row["avoided"] for row in rows("always-brake"))
+    assert all(row["false_activation"] for row in rows("always-brake") if not row["threat"])
+    slow = [row for row in rows("spike-threshold", "CCRs") if row["ego_speed"] * 3.6 < 41]
+    assert len(slow) == 4
+    assert all(row["avoided"] for row in slow)
+    for family in ("EmptyRoad", "Following"):
+        assert not any(row["false_activation"] for row in rows("spike-threshold", family))
+
+
+def test_number_of_processes_does_not_change_the_rows(quick_run, tmp_path):
+    run = new_run(tmp_path / "two", jobs=2, agents=BOUNDS[1:], seeds=1)
+    assert run.play()
+    assert sorted_rows(run.rows) == sorted_rows(quick_run.rows)
+
+
+def test_interrupted_run_keeps_its_rows(tmp_path):
+    run = new_run(tmp_path / "run", agents=["no-brake"], seeds=1)
+
+    def interrupt_after_three(row):
+        if len(run.rows) == 3:
+            raise KeyboardInterrupt
+
+    assert not run.play(interrupt_after_three)
+    assert run.stop_reason == "interrupted"
+    assert len(read_rows(tmp_path / "run")) == 3
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["complete"] is False
+
+
+@pytest.mark.parametrize("fraction", [0.3, 0.6, 0.9])
+def test_resumed_run_has_the_rows_of_a_complete_one(quick_run, tmp_path, fraction):
+    """The folder is left as by kill -9: some rows, the last one incomplete."""
+    folder = tmp_path / "run"
+    interrupted = new_run(folder, agents=BOUNDS[1:], seeds=1)
+    assert not interrupted.play(interrupt)
+    whole = (quick_run.folder.path / "episodes.jsonl").read_bytes()
+    (folder / "episodes.jsonl").write_bytes(whole[: int(fraction * len(whole))])
+    run = Run.resume(folder)
+    assert run.folder.repaired
+    before = len(run.rows)
+    assert 0 < before < run.total
+    played = []
+    assert run.play(played.append)
+    assert len(played) == run.total - before
+    assert sorted_rows(read_rows(folder)) == sorted_rows(quick_run.rows) == sorted_rows(run.rows)
+
+
+def test_resume_rejects_missing_damaged_and_older_runs(tmp_path):
+    with pytest.raises(ValueError, match="contains no run"):
+        Run.resume(tmp_path)
+    new_run(tmp_path / "run", agents=["no-brake"], seeds=1).play(interrupt)
+    settings = json.loads((tmp_path / "run" / "run.json").read_text())
+    (tmp_path / "run" / "run.json").write_text(json.dumps(settings | {"lgmd_gym": "0.0.1"}))
+    with pytest.raises(ValueError, match=r"made by lgmd-gym 0.0.1, this is .*; start a new run"):
+        Run.resume(tmp_path / "run")
+    (tmp_path / "run" / "episodes.jsonl").write_text("{}\nnonsense\n{}\n")
+    with pytest.raises(ValueError, match="damaged in line 2"):
+        Run.resume(tmp_path / "run")
+
+
+def test_python_function_and_command_write_the_same_folder(tmp_path):
+    config = RunConfig(suite="r152", agents=("ttc-oracle", "spike-threshold"), seeds=1)
+    table = run_benchmark(config, tmp_path / "python")
+    flags = ["--suite", "r152", "--agents", "ttc-oracle", "spike-threshold", "--seeds", "1", "--jobs", "1"]
+    assert cli.run(["bench", *flags, "--out", str(tmp_path / "command")]) == 0
+
+    def files(name):
+        return sorted(str(path.relative_to(tmp_path / name)) for path in (tmp_path / name).rglob("*"))
+
+    assert files("python") == files("command")
+    assert {"summary.csv", "froc.csv", "plots", "report.html", "run.toml"} < set(files("python"))
+    assert read_rows(tmp_path / "python") == read_rows(tmp_path / "command")
+    for name in ("summary.csv", "froc.csv"):
+        assert (tmp_path / "python" / name).read_text() == (tmp_path / "command" / name).read_text()
+    assert RunConfig.load(tmp_path / "python" / "run.toml") == RunConfig.load(
+        tmp_path / "command" / "run.toml"
+    )
+    assert list(table.columns) == list(KEYS)
+    assert len(table) == 3 * len(SUITES["r152"].cases)
+    assert table[table.agent == "ttc-oracle"].avoided.all()
+
+
+def test_run_requires_a_configuration(tmp_path):
+    with pytest.raises(TypeError, match="config must be a RunConfig, got 'quick'"):
+        run_benchmark("quick", tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"suite": "quik"}, "did you mean 'quick'"),
+        ({"suite": "trafic"}, "did you mean 'traffic'"),
+        ({"agents": ["nobrake"]}, "did you mean 'no-brake'"),
+        ({"agents": []}, "agents must contain at least one name, got none"),
+        ({"agents": "no-brake"}, "agents must be a list of strings, got 'no-brake'"),
+        ({"conditions": ["fogg"]}, "did you mean 'fog'"),
+        ({"kinds": ["merge"]}, "kinds applies to suite 'traffic' only"),
+        ({"seeds": 0}, "seeds must be a whole number >= 1, got 0"),
+        ({"seeds": 1.5}, "seeds must be a whole number >= 1, got 1.5"),
+        ({"first_seed": -1}, "first_seed must be a whole number >= 0, got -1"),
+        ({"camera": "fova"}, "did you mean 'fovea'"),
+        ({"params": {"sigma_33": 1.0}}, "did you mean 'sigma_3'"),
+    ],
+)
+def test_invalid_configuration_is_rejected_before_the_folder_is_created(tmp_path, values, message):
+    with pytest.raises(ValueError, match=message):
+        new_run(tmp_path / "run", **{"agents": ["no-brake"], "seeds": 1} | values)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_existing_folder_and_zero_jobs_are_rejected(tmp_path):
+    with pytest.raises(ValueError, match="already exists"):
+        new_run(tmp_path, agents=["no-brake"])
+    with pytest.raises(ValueError, match="jobs must be >= 1, got 0"):
+        Executor(jobs=0)
