@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from lgmd_gym.envs.braking import BrakingEnv
-    from lgmd_gym.envs.dynamics.path import Bend
-    from lgmd_gym.envs.dynamics.speed_profile import Segment
+    from lgmd_gym.envs.dynamics.bend import Bend
+    from lgmd_gym.envs.dynamics.segment import Segment
     from lgmd_gym.envs.registration import env_id, register_envs
     from lgmd_gym.envs.scenarios import FAMILIES, make_scenario
     from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
@@ -34,8 +34,8 @@ _MODULES = {
     "env_id": "registration",
     "register_envs": "registration",
     "Actor": "scenarios.scenario",
-    "Bend": "dynamics.path",
-    "Segment": "dynamics.speed_profile",
+    "Bend": "dynamics.bend",
+    "Segment": "dynamics.segment",
     "RoadPlan": "scenarios.scenario",
     "Scenario": "scenarios.scenario",
 }

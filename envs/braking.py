@@ -1,27 +1,22 @@
 """`BrakingEnv`: the highway-env environment of all braking scenarios."""
 
 from dataclasses import asdict
-from math import cos, inf, sin
 from typing import Any, cast
 
 import numpy as np
 from highway_env.road.road import RoadNetwork
 
-from lgmd_gym.envs import surrogate_safety
 from lgmd_gym.envs.base import EgoBrakeEnv
-from lgmd_gym.envs.dynamics.path import Path, Pose
-from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
+from lgmd_gym.envs.dynamics.episode import is_terminated, is_truncated
+from lgmd_gym.envs.info import INFO, INFO_KEYS, write_info
 from lgmd_gym.envs.reward import RewardParams, step_reward
-from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, LANE_WIDTH, RoadPlan, Scenario
+from lgmd_gym.envs.scenarios.scenario import RoadPlan, Scenario
 from lgmd_gym.envs.simulation.network import build_network
 from lgmd_gym.envs.simulation.road import BrakingRoad
-from lgmd_gym.envs.simulation.vehicles import ACTOR_CLASSES, EgoCar
+from lgmd_gym.envs.simulation.vehicles import EgoCar
+from lgmd_gym.envs.simulation.world import World, place
 from lgmd_gym.envs.spaces import EgoState, make_action
 from lgmd_gym.errors import check_keys
-
-SHADES = (30, 220)  # range of random grey levels
-START_RANGE = 500.0  # [m], range of the random start position, which varies the road texture
-PASSED_DISTANCE = 2.0  # [m] behind the ego's rear beyond which an actor has been passed
 
 
 class BrakingEnv(EgoBrakeEnv):
@@ -117,7 +112,6 @@ class BrakingEnv(EgoBrakeEnv):
         self.scenario = scenario
         self.camera_fields: dict[str, Any] = {}
         self._network: tuple[RoadPlan, RoadNetwork] | None = None
-        self._closed_in = False
         super().__init__(config, render_mode)
 
     @classmethod
@@ -142,7 +136,9 @@ class BrakingEnv(EgoBrakeEnv):
         check_keys("key of config['reward']", reward, self.config["reward"])
         super().configure(config)
         self.config["reward"] = {**self.config["reward"], **reward}
-        self._reward_params = RewardParams(**self.config["reward"])
+        self._weights = RewardParams(**self.config["reward"]).record()
+        self._brake_record = self.brake.record(self.config["throttle"])
+        self._world = World(1, self.brake.max_demands(self.config["policy_frequency"]))
 
     def define_spaces(self) -> None:
         """Set the action and observation types and their spaces."""
@@ -163,8 +159,23 @@ class BrakingEnv(EgoBrakeEnv):
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Advance by one decision; see `AbstractEnv.step`."""
-        self._motion_before = self.ego.speed, self.ego.acceleration
-        return super().step(action)
+        if self.vehicle is None:
+            raise RuntimeError("the environment has no episode: call reset() before step()")
+        world = self._world
+        bodies, episode = world.bodies[0], world.episodes[0]
+        episode["last_speed"], episode["last_acceleration"] = bodies[0]["speed"], bodies[0]["acceleration"]
+        dt = 1.0 / self.config["policy_frequency"]
+        self.time += dt
+        self._simulate(action)
+        episode["time"] = self.time
+        obs, info = self.observation_type.observe(), self._info(None)
+        reward = step_reward(
+            bodies[0], world.egos[0], episode, self._brake_record[()], self._weights[()], info["ttc"], dt
+        )
+        terminated, truncated = is_terminated(bodies, episode), is_truncated(episode)
+        if self.render_mode == "human":
+            self.render()
+        return obs, reward, terminated, truncated, info
 
     def _reset(self) -> None:
         self._build(self.np_random)
@@ -172,68 +183,16 @@ class BrakingEnv(EgoBrakeEnv):
     def _build(self, rng: np.random.Generator) -> None:
         """Build the scene; straight road networks are reused between episodes."""
         scenario = self.scenario
-        start = Pose(float(rng.uniform(0.0, START_RANGE)), scenario.road.ego_lane * LANE_WIDTH, 0.0)
+        placement = place(scenario, rng)
         if self._network is None or self._network[0] != scenario.road or scenario.road.relative_to_ego:
-            self._network = scenario.road, build_network(scenario.road, start)
-        road = BrakingRoad(self._network[1], rng)
-        script = SpeedProfile(scenario.ego_speed, scenario.ego_profile)
-        ego = EgoCar(road, Path(start, scenario.ego_path), script, self.brake, self.config["throttle"])
-        road.vehicles.append(ego)
-        for actor in scenario.actors:
-            drawn = int(rng.integers(*SHADES, endpoint=True))
-            shade = drawn if actor.shade is None else int(actor.shade)
-            centre = start.x + EGO_LENGTH / 2 + actor.gap + actor.length / 2
-            pose = Pose(centre, start.y - actor.lateral_offset, -actor.heading)
-            road.add(ACTOR_CLASSES[actor.kind](road, Path(pose, actor.path), actor, shade))
-        road.ego = ego
-        self.road, self.controlled_vehicles = road, [ego]
-        self._motion_before = ego.speed, ego.acceleration
-        self._closed_in = False
-
-    def _reward(self, action: Any) -> float:
-        return step_reward(self, self._reward_params, *self._motion_before)
-
-    def _is_terminated(self) -> bool:
-        ego = self.ego
-        if self.road.contact is not None:
-            return True
-        if ego.speed == 0.0:
-            return ego.script.speed > 0.0
-        obstacles = self.road.obstacles
-        if not obstacles:
-            return False
-        remaining = [item for item in obstacles if not self._is_passed(item)]
-        self._closed_in = self._closed_in or any(ego.speed > item.speed for item in remaining)
-        resolved = all(
-            item.script.finished and item.path.straight and ego.speed < item.speed for item in remaining
-        )
-        return not remaining or (self._closed_in and resolved)
-
-    def _is_passed(self, item: Any) -> bool:
-        """Return whether an obstacle is behind the ego's rear and not faster than the ego."""
-        ego = self.ego
-        dx, dy = item.position[0] - ego.position[0], item.position[1] - ego.position[1]
-        behind = -(dx * cos(ego.heading) + dy * sin(ego.heading)) - (ego.LENGTH + item.LENGTH) / 2
-        return behind > PASSED_DISTANCE and item.speed <= ego.speed
-
-    def _is_truncated(self) -> bool:
-        return self.time >= self.scenario.duration - 1e-9
+            self._network = scenario.road, build_network(scenario.road, placement.start)
+        self._world.load(0, placement)
+        self.road = BrakingRoad(self._network[1], rng, self._world, self._brake_record)
+        self.controlled_vehicles = [self.road.ego]
 
     def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
-        ego, contact, obstacles = self.ego, self.road.contact, self.road.obstacles
-        lead = surrogate_safety.find_lead(ego, obstacles)
-        return {
-            "speed": float(ego.speed),
-            "crashed": bool(ego.crashed),
-            "ego_speed": float(ego.speed),
-            "gap": lead.gap if lead else inf,
-            "ttc": surrogate_safety.time_to_contact(ego, obstacles),
-            "thw": surrogate_safety.time_headway(ego, lead),
-            "drac": surrogate_safety.deceleration_to_avoid_crash(ego, lead),
-            "required_deceleration": surrogate_safety.required_deceleration(ego, lead),
-            "collision": contact is not None,
-            "impact_speed": contact.impact_speed if contact else inf,
-            "relative_impact_speed": contact.relative_impact_speed if contact else inf,
-            "deceleration": ego.braking,
-            "target_speed": float(obstacles[0].speed) if obstacles else inf,
-        }
+        world = self._world
+        bodies, episode = world.bodies[0], world.episodes[0]
+        values = np.zeros(1, INFO)
+        write_info(bodies, episode, world.egos[0], world.paths[0], values[0])
+        return dict(zip(INFO_KEYS, values[0].tolist(), strict=True))

@@ -1,13 +1,18 @@
 """Reward of the braking environments: progress, minus contact, needless braking and jerk."""
 
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from dataclasses import astuple, dataclass, fields
+from typing import Any
 
+import numpy as np
+
+from lgmd_gym.envs.dynamics.bodies import ego_braking
+from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.units import check_within
-from lgmd_gym.envs.surrogate_safety import time_to_contact
 
-if TYPE_CHECKING:
-    from lgmd_gym.envs.braking import BrakingEnv
+REWARD = np.dtype(
+    [(name, np.float64) for name in ("contact", "impact", "progress", "brake", "jerk", "need_ttc")]
+)
+"""`RewardParams` for the compiled functions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,23 +40,30 @@ class RewardParams:
         for item in fields(self):
             check_within(item.name, getattr(self, item.name), 0.0, 1e6)
 
+    def record(self) -> np.ndarray:
+        """Return the weights as a `REWARD` record of shape ()."""
+        return np.array(astuple(self), REWARD)
 
-def step_reward(env: "BrakingEnv", params: RewardParams, speed: float, acceleration: float) -> float:
+
+@compiled
+def step_reward(body: Any, ego: Any, episode: Any, brake: Any, weights: Any, ttc: float, dt: float) -> float:
     """Return the reward of the last decision.
 
     Args:
-        env: The environment after the step.
-        params: Weights.
-        speed: Ego speed before the step [m/s].
-        acceleration: Ego acceleration before the step [m/s²].
+        body: The ego's `BODY` record after the decision.
+        ego: `EGO_STATE` record.
+        episode: `EPISODE` record.
+        brake: `BRAKE` record.
+        weights: `REWARD` record.
+        ttc: Time to contact after the decision [s].
+        dt: Duration of the decision [s].
     """
-    ego, contact = env.ego, env.road.contact
-    scripted = env.scenario.top_speed
-    dt = 1.0 / env.config["policy_frequency"]
-    reward = params.progress * dt * min((speed + ego.speed) / (2.0 * scripted), 1.0)
-    reward -= params.jerk * abs(ego.acceleration - acceleration) / ego.brake.max_deceleration
-    if contact is not None:
-        return reward - params.contact - params.impact * (contact.relative_impact_speed / scripted) ** 2
-    if ego.braking > 0.0 and time_to_contact(ego, env.road.obstacles) >= params.need_ttc:
-        reward -= params.brake * dt * ego.braking / ego.brake.max_deceleration
+    scripted = episode.top_speed
+    reward = weights.progress * dt * min((episode.last_speed + body.speed) / (2.0 * scripted), 1.0)
+    reward -= weights.jerk * abs(body.acceleration - episode.last_acceleration) / brake.max_deceleration
+    if episode.touched > 0:
+        return reward - weights.contact - weights.impact * (episode.relative_impact_speed / scripted) ** 2
+    braking = ego_braking(body, ego)
+    if braking > 0.0 and ttc >= weights.need_ttc:
+        reward -= weights.brake * dt * braking / brake.max_deceleration
     return reward

@@ -1,17 +1,99 @@
 """Surrogate safety measures: gap, time to contact, time headway, DRAC and required deceleration.
 
-Undefined values are `inf`. A road object without a `path` is assumed to move straight on.
+Undefined values are `inf`. The compiled functions read `BODY` records, the ego first. Of other highway-env
+vehicles and road objects, `find_lead` and `time_to_contact` assume that they move straight on.
 """
 
 from collections.abc import Sequence
 from math import cos, inf, sin
 from typing import Any, NamedTuple
 
-from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch, outline, speed_along
+import numpy as np
+
+from lgmd_gym.envs.dynamics.bodies import BODY, BOX, ROAD_MARKING, outline_of
+from lgmd_gym.envs.dynamics.contact import first_touch
+from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.swept_contact import PathMotion, gap_on_path, time_on_paths
 
 TTC_HORIZON, TTC_STEP = 10.0, 0.1  # [s]
 GAP_HORIZON, GAP_STEP = 300.0, 1.0  # [m]
+_NO_PATHS = np.zeros((1, 6))
+
+
+@compiled
+def lead_of(bodies: np.ndarray, count: int, paths: np.ndarray) -> tuple[float, int]:
+    """Return the gap to the first solid body on the ego's path [m], and its index; `inf` and 0 if none.
+
+    The ego's outline is swept along its path up to 300 m; other bodies are taken at their current positions.
+
+    Args:
+        bodies: `BODY` records, the ego first.
+        count: Number of bodies.
+        paths: Table of the paths' cells.
+    """
+    ego = bodies[0]
+    here = outline_of(ego)
+    dx, dy = GAP_HORIZON * cos(ego.heading), GAP_HORIZON * sin(ego.heading)
+    gap, lead = inf, 0
+    for i in range(1, count):
+        body = bodies[i]
+        if body.kind == ROAD_MARKING:
+            continue
+        place = outline_of(body)
+        if _is_straight(ego):
+            free = GAP_HORIZON * first_touch(here, place, dx, dy)
+        else:
+            free = gap_on_path(_motion(ego, paths), place, GAP_HORIZON, GAP_STEP)
+        if free < gap:
+            gap, lead = free, i
+    return gap, lead
+
+
+@compiled
+def contact_time(bodies: np.ndarray, count: int, paths: np.ndarray) -> float:
+    """Return the time to the ego's first contact at constant speeds and paths [s]; `inf` beyond 10 s.
+
+    Definition: Euro NCAP AEB C2C v4.3.1, 2.1. Arguments: see `lead_of`.
+    """
+    ego = bodies[0]
+    here = outline_of(ego)
+    vx, vy = ego.speed * cos(ego.heading), ego.speed * sin(ego.heading)
+    ttc = inf
+    for i in range(1, count):
+        body = bodies[i]
+        if body.kind == ROAD_MARKING:
+            continue
+        if _is_straight(ego) and _is_straight(body):
+            dx = TTC_HORIZON * (vx - body.speed * cos(body.heading))
+            dy = TTC_HORIZON * (vy - body.speed * sin(body.heading))
+            time = TTC_HORIZON * first_touch(here, outline_of(body), dx, dy)
+        else:
+            time = time_on_paths(_motion(ego, paths), _motion(body, paths), TTC_HORIZON, TTC_STEP)
+        ttc = min(ttc, time)
+    return ttc
+
+
+@compiled
+def headway(gap: float, speed: float) -> float:
+    """Return the time headway THW = gap / v [s]; `inf` at standstill."""
+    return inf if speed == 0.0 else gap / speed
+
+
+@compiled
+def rate_to_avoid_crash(gap: float, closing_speed: float) -> float:
+    """Return DRAC = Δv² / (2·gap) [m/s²]; 0 if the gap does not close, `inf` at contact."""
+    return max(closing_speed, 0.0) ** 2 / (2.0 * gap) if gap > 0.0 else inf
+
+
+@compiled
+def _is_straight(body: Any) -> bool:
+    return body.path_end - body.path == 1
+
+
+@compiled
+def _motion(body: Any, paths: np.ndarray) -> PathMotion:
+    cells = paths[body.path : body.path_end]
+    return PathMotion(cells, body.travelled, body.speed, body.length, body.width)
 
 
 class Lead(NamedTuple):
@@ -27,72 +109,23 @@ class Lead(NamedTuple):
 
 
 def find_lead(ego: Any, obstacles: Sequence[Any]) -> Lead | None:
-    """Return the first obstacle on the ego's path within 300 m, or None.
-
-    The ego's outline is swept along its path; obstacles are taken at their current positions.
-    """
-    here, straight = outline(ego), _is_straight(ego)
-    dx, dy = GAP_HORIZON * cos(here.heading), GAP_HORIZON * sin(here.heading)
-    gap, lead = inf, None
-    for other in obstacles:
-        place = outline(other)
-        if straight:
-            free = GAP_HORIZON * first_touch(here, place, dx, dy)
-        else:
-            free = gap_on_path(_motion(ego), Rectangle(*map(float, place)), GAP_HORIZON, GAP_STEP)
-        if free < gap:
-            gap, lead = free, other
-    return None if lead is None else Lead(gap, lead)
+    """Return the first of some highway-env road objects straight ahead within 300 m, or None."""
+    gap, index = lead_of(_records(ego, obstacles), len(obstacles) + 1, _NO_PATHS)
+    return Lead(gap, obstacles[index - 1]) if index else None
 
 
 def time_to_contact(ego: Any, obstacles: Sequence[Any]) -> float:
-    """Return the time to the ego's first contact at constant speeds and paths [s]; `inf` beyond 10 s.
-
-    Definition: Euro NCAP AEB C2C v4.3.1, 2.1.
-    """
-    here, straight = outline(ego), _is_straight(ego)
-    vx, vy = ego.speed * cos(here.heading), ego.speed * sin(here.heading)
-    ttc = inf
-    for other in obstacles:
-        if straight and _is_straight(other):
-            place = outline(other)
-            dx = TTC_HORIZON * (vx - other.speed * cos(place.heading))
-            dy = TTC_HORIZON * (vy - other.speed * sin(place.heading))
-            time = TTC_HORIZON * first_touch(here, place, dx, dy)
-        else:
-            time = time_on_paths(_motion(ego), _motion(other), TTC_HORIZON, TTC_STEP)
-        ttc = min(ttc, time)
-    return ttc
+    """Return the time to the first contact with some highway-env road objects [s]; see `contact_time`."""
+    return contact_time(_records(ego, obstacles), len(obstacles) + 1, _NO_PATHS)
 
 
-def time_headway(ego: Any, lead: Lead | None) -> float:
-    """Return the time headway THW = gap / v [s]; `inf` without a lead or at standstill."""
-    return inf if lead is None or ego.speed == 0.0 else lead.gap / ego.speed
-
-
-def deceleration_to_avoid_crash(ego: Any, lead: Lead | None) -> float:
-    """Return DRAC = Δv² / (2·gap) [m/s²]; 0 if the gap does not close, `inf` without a lead or at contact."""
-    if lead is None or lead.gap <= 0.0:
-        return inf
-    closing_speed = ego.speed - speed_along(ego, lead.other)
-    return max(closing_speed, 0.0) ** 2 / (2.0 * lead.gap)
-
-
-def required_deceleration(ego: Any, lead: Lead | None) -> float:
-    """Return the deceleration that just avoids contact if the lead keeps its acceleration [m/s²].
-
-    Jansson (2005), 5.3.5: max(0, DRAC − a_lead); `inf` without a lead or at contact.
-    """
-    drac = deceleration_to_avoid_crash(ego, lead)
-    return inf if lead is None else max(drac - lead.other.acceleration, 0.0)
-
-
-def _is_straight(item: Any) -> bool:
-    path = getattr(item, "path", None)
-    return path is None or path.straight
-
-
-def _motion(item: Any) -> PathMotion:
-    """Return the motion of a road object on a path, with plain floats for the compiled functions."""
-    speed, length, width = float(item.speed), float(item.LENGTH), float(item.WIDTH)
-    return PathMotion(item.path.table, float(item.travelled), speed, length, width)
+def _records(ego: Any, obstacles: Sequence[Any]) -> np.ndarray:
+    """Return road objects as `BODY` records on straight paths, the ego first."""
+    records = np.zeros(len(obstacles) + 1, BODY)
+    records["kind"], records["path_end"] = BOX, 1
+    rows = [(*item.position, item.heading, item.speed, item.LENGTH, item.WIDTH) for item in (ego, *obstacles)]
+    for name, column in zip(
+        ("x", "y", "heading", "speed", "length", "width"), zip(*rows, strict=True), strict=True
+    ):
+        records[name] = column
+    return records

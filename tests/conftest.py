@@ -1,10 +1,15 @@
 """Fixtures of several test files."""
 
 import pytest
+from hypothesis import settings
 from support.clips import write_lossless
 
 from lgmd_gym.paper.backgrounds import Plain, Screen
 from lgmd_gym.paper.stimuli import Looming, stimulus_frames
+
+# A first example may include the compilation of a kernel.
+settings.register_profile("compiled", deadline=None)
+settings.load_profile("compiled")
 
 
 @pytest.fixture(scope="session")

@@ -1,10 +1,33 @@
 """The ego's brake: latency and dead time, then a linear build-up of the deceleration."""
 
-from collections import deque
 from dataclasses import dataclass
-from math import inf
+from math import ceil, inf
+from typing import Any
 
+import numpy as np
+
+from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.units import check_within
+
+DELAY_LINE = np.dtype(
+    [("time", np.float64), ("demand", np.float64), ("last_put", np.float64), ("count", np.int64)]
+)
+"""State of a queue of demands: time since the start [s], active demand, last demand put in, number of
+demands in the queue."""
+BRAKE = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            "max_deceleration",
+            "max_acceleration",
+            "jerk",
+            "delay",
+            "regain_acceleration",
+            "throttle",
+        )
+    ]
+)
+"""`BrakeParams` for the compiled functions; `throttle` is 1 if demands above 0 have an effect, else 0."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +70,53 @@ class BrakeParams:
         """Time from a demand to the first change of acceleration [s]."""
         return self.latency + self.dead_time
 
+    def max_demands(self, policy_frequency: float) -> int:
+        """Return the maximum number of demands in the delay line at a rate of decisions [Hz]."""
+        return ceil(self.delay * policy_frequency) + 2
+
+    def record(self, throttle: bool) -> np.ndarray:
+        """Return the parameters as a `BRAKE` record of shape ()."""
+        values = (self.max_deceleration, self.max_acceleration, self.jerk, self.delay)
+        return np.array((*values, self.regain_acceleration, float(throttle)), BRAKE)
+
+
+@compiled
+def put_demand(line: Any, pending: np.ndarray, delay: float, demand: float) -> None:
+    """Add a demand in [-1, 1] to a `DELAY_LINE` at its current time; a repeated demand is not stored.
+
+    Args:
+        line: `DELAY_LINE` record.
+        pending: Demands in the line, each with the time at which it becomes active, shape (capacity, 2).
+        delay: Delay of every demand [s].
+        demand: The demand.
+    """
+    if demand != line.last_put:
+        line.last_put = demand
+        pending[line.count, 0], pending[line.count, 1] = line.time + delay, demand
+        line.count += 1
+
+
+@compiled
+def next_part(line: Any, pending: np.ndarray, end: float) -> tuple[float, float]:
+    """Advance a `DELAY_LINE` to its next change of demand, at most to the time `end` [s].
+
+    Returns:
+        Duration of this part [s], and the demand that is active in it.
+    """
+    # A demand due within a nanosecond of the end belongs to the next step.
+    while line.count > 0 and pending[0, 0] < end - 1e-9:
+        due, demand, before, start = pending[0, 0], pending[0, 1], line.demand, line.time
+        line.count -= 1
+        for i in range(line.count):
+            pending[i, 0], pending[i, 1] = pending[i + 1, 0], pending[i + 1, 1]
+        line.demand = demand
+        if due > start:
+            line.time = due
+            return due - start, before
+    duration = end - line.time
+    line.time = end
+    return duration, line.demand
+
 
 class DelayLine:
     """A queue that delays demands by a constant time, which need not be a multiple of the simulation step.
@@ -57,28 +127,19 @@ class DelayLine:
 
     def __init__(self, delay: float) -> None:
         self.delay = delay
-        self.time = 0.0
-        self.demand = 0.0
-        self._last_put = 0.0
-        self._pending: deque[tuple[float, float]] = deque()
+        self._line = np.zeros((), DELAY_LINE)
+        self._pending = np.zeros((8, 2))
 
     def put(self, demand: float) -> None:
         """Add a demand in [-1, 1] at the current time."""
-        if demand != self._last_put:
-            self._last_put = demand
-            self._pending.append((self.time + self.delay, demand))
+        if self._line["count"] == len(self._pending):
+            self._pending = np.concatenate((self._pending, np.zeros_like(self._pending)))
+        put_demand(self._line[()], self._pending, self.delay, float(demand))
 
     def advance(self, dt: float) -> list[tuple[float, float]]:
         """Advance by `dt` [s] and return (duration [s], active demand) for each part of that time."""
-        end = self.time + dt
-        parts = []
-        # A demand due within a nanosecond of the step's end belongs to the next step.
-        while self._pending and self._pending[0][0] < end - 1e-9:
-            due, demand = self._pending.popleft()
-            if due > self.time:
-                parts.append((due - self.time, self.demand))
-                self.time = due
-            self.demand = demand
-        parts.append((end - self.time, self.demand))
-        self.time = end
+        line, parts = self._line[()], []
+        end = float(line["time"]) + dt
+        while not parts or line["time"] < end:
+            parts.append(next_part(line, self._pending, end))
         return parts

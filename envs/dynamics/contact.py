@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from math import cos, hypot, inf, sin
 from typing import Any, NamedTuple
 
+from lgmd_gym.envs.dynamics.jit import compiled
+
 END = 0.25  # [m] from an end of the ego within which a touch belongs to that end
 TOLERANCE = 0.02  # [m] by which a corner may be farther away than the nearest one and still touch
 
@@ -47,7 +49,7 @@ class Contact(NamedTuple):
 def outline(item: Any) -> Rectangle:
     """Return the outline of a highway-env vehicle or road object."""
     x, y = item.position
-    return Rectangle(float(x), float(y), float(item.heading), item.LENGTH, item.WIDTH)
+    return Rectangle(float(x), float(y), float(item.heading), float(item.LENGTH), float(item.WIDTH))
 
 
 def speed_along(ego: Any, other: Any) -> float:
@@ -55,10 +57,9 @@ def speed_along(ego: Any, other: Any) -> float:
     return float(other.speed * cos(float(other.heading) - float(ego.heading)))
 
 
+@compiled
 def first_touch(moving: Rectangle, standing: Rectangle, dx: float, dy: float) -> float:
     """Return the fraction of a displacement at which `moving` first touches `standing`.
-
-    `swept_contact` compiles this function for its kernels.
 
     Args:
         moving: The displaced rectangle; its heading does not change.

@@ -1,82 +1,96 @@
 """Scripted speed: segments of acceleration, followed exactly."""
 
-from dataclasses import dataclass
 from math import copysign, inf
+from typing import Any
 
+import numpy as np
+
+from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.longitudinal import advance
-from lgmd_gym.envs.dynamics.units import check_speed, check_within
+from lgmd_gym.envs.dynamics.segment import Segment
+
+SCRIPT_FIELDS = [
+    ("script_speed", np.float64),
+    ("script_acceleration", np.float64),
+    ("script_time", np.float64),
+    ("segment", np.int64),
+    ("segment_end", np.int64),
+]
+"""State of a script: speed [m/s], acceleration [m/s²], time since its start [s]; the rows of its remaining
+segments in a table, first and last + 1."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Segment:
-    """A scripted change of speed: acceleration from `start` until `final_speed` is reached.
+def segment_table(segments: tuple[Segment, ...]) -> np.ndarray:
+    """Return segments as rows of start, acceleration, build-up and final speed; float64, shape (n, 4)."""
+    rows = [(item.start, item.acceleration, item.build_up, item.final_speed) for item in segments]
+    return np.array(rows, dtype=np.float64).reshape(len(rows), 4)
 
-    Attributes:
-        start: Time at which the acceleration begins, in [0, 10000] [s].
-        acceleration: Full acceleration, negative for braking, in [-12, 12] [m/s²].
-        build_up: Time from `start` to the full acceleration, a linear ramp, in [0, 10] [s].
-        final_speed: Speed at the end of the segment, in [0, 40] [m/s].
+
+@compiled
+def step_script(script: Any, segments: np.ndarray, dt: float) -> float:
+    """Advance a script, a record with `SCRIPT_FIELDS`, by `dt` [s]; returns the distance travelled [m].
+
+    Speed is constant between the segments. A segment that starts before the previous one has ended is delayed
+    until then.
     """
+    end = script.script_time + dt
+    distance = 0.0
+    while script.segment < script.segment_end and segments[script.segment, 0] < end:
+        start, acceleration, build_up, final_speed = segments[script.segment]
+        distance += _advance_script(script, 0.0, inf, start - script.script_time)
+        jerk = abs(acceleration) / build_up if build_up > 0.0 else inf
+        distance += _advance_script(script, acceleration, jerk, end - script.script_time)
+        if (final_speed - script.script_speed) * copysign(1.0, acceleration) > 0.0:
+            break
+        script.segment += 1
+        script.script_speed, script.script_acceleration = final_speed, 0.0
+    return distance + _advance_script(script, 0.0, inf, end - script.script_time)
 
-    start: float
-    acceleration: float
-    build_up: float = 0.0
-    final_speed: float = 0.0
 
-    def __post_init__(self) -> None:
-        check_within("start", self.start, 0.0, 1e4, "s")
-        check_within("acceleration", self.acceleration, -12.0, 12.0, "m/s²")
-        check_within("build_up", self.build_up, 0.0, 10.0, "s")
-        check_speed("final_speed", self.final_speed, zero=True)
+@compiled
+def _advance_script(script: Any, target: float, jerk: float, duration: float) -> float:
+    """Advance speed and time, and return the distance travelled [m]."""
+    if duration <= 0.0:
+        return 0.0
+    moved = advance(script.script_speed, script.script_acceleration, target, jerk, duration)
+    script.script_speed, script.script_acceleration = moved[1], moved[2]
+    script.script_time += duration
+    return moved[0]
 
 
 class SpeedProfile:
-    """A speed that follows scripted segments and is constant between them.
+    """A speed that follows scripted segments; see `step_script`.
 
     Args:
         speed: Initial speed [m/s].
-        segments: Segments in order of their start. A segment that starts before the previous one has ended
-            is delayed until then.
-
-    Attributes:
-        speed: Current speed [m/s].
-        acceleration: Current acceleration [m/s²].
-        time: Time since the start [s].
+        segments: Segments in order of their start.
     """
 
     def __init__(self, speed: float, segments: tuple[Segment, ...] = ()) -> None:
-        self.speed = speed
-        self.acceleration = 0.0
-        self.time = 0.0
-        self._remaining = list(segments)
+        self._script = np.zeros((), SCRIPT_FIELDS)
+        self._script["script_speed"], self._script["segment_end"] = speed, len(segments)
+        self._segments = segment_table(segments)
+
+    @property
+    def speed(self) -> float:
+        """Current speed [m/s]."""
+        return float(self._script["script_speed"])
+
+    @property
+    def acceleration(self) -> float:
+        """Current acceleration [m/s²]."""
+        return float(self._script["script_acceleration"])
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return float(self._script["script_time"])
 
     @property
     def finished(self) -> bool:
         """Whether all segments have ended."""
-        return not self._remaining
+        return bool(self._script["segment"] == self._script["segment_end"])
 
     def step(self, dt: float) -> float:
         """Advance by `dt` [s] and return the distance travelled [m]."""
-        end = self.time + dt
-        distance = 0.0
-        while self._remaining and self._remaining[0].start < end:
-            segment = self._remaining[0]
-            distance += self._advance(0.0, inf, segment.start - self.time)
-            jerk = abs(segment.acceleration) / segment.build_up if segment.build_up > 0.0 else inf
-            distance += self._advance(segment.acceleration, jerk, end - self.time)
-            remaining = (segment.final_speed - self.speed) * copysign(1.0, segment.acceleration)
-            if remaining > 0.0:
-                break
-            self._remaining.pop(0)
-            self.speed, self.acceleration = segment.final_speed, 0.0
-        return distance + self._advance(0.0, inf, end - self.time)
-
-    def _advance(self, target: float, jerk: float, duration: float) -> float:
-        """Advance speed and time, and return the distance travelled [m]."""
-        if duration <= 0.0:
-            return 0.0
-        distance, self.speed, self.acceleration = advance(
-            self.speed, self.acceleration, target, jerk, duration
-        )
-        self.time += duration
-        return distance
+        return step_script(self._script[()], self._segments, dt)

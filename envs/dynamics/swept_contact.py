@@ -4,13 +4,10 @@ from math import hypot, inf
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
-from lgmd_gym.envs.dynamics.path import advance_pose
-
-_first_touch = njit(cache=True, nogil=True)(first_touch)
-_advance_pose = njit(cache=True, nogil=True)(advance_pose)
+from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.envs.dynamics.path import pose_at
 
 
 class PathMotion(NamedTuple):
@@ -23,7 +20,7 @@ class PathMotion(NamedTuple):
     width: float  # [m]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def time_on_paths(one: Any, other: Any, horizon: float, step: float) -> float:  # pragma: no cover
     """Return the time at which two moving rectangles first touch [s]; `inf` beyond the horizon.
 
@@ -44,14 +41,14 @@ def time_on_paths(one: Any, other: Any, horizon: float, step: float) -> float:  
             continue
         later = time + step
         c, d = _outline(one, one.speed * later), _outline(other, other.speed * later)
-        touch = _first_touch(a, b, (c.x - a.x) - (d.x - b.x), (c.y - a.y) - (d.y - b.y))
+        touch = first_touch(a, b, (c.x - a.x) - (d.x - b.x), (c.y - a.y) - (d.y - b.y))
         if touch <= 1.0:
             return time + touch * step
         time = later
     return inf
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def gap_on_path(one: Any, standing: Rectangle, horizon: float, step: float) -> float:  # pragma: no cover
     """Return the distance along a path up to a standing rectangle [m]; `inf` beyond the horizon.
 
@@ -70,19 +67,15 @@ def gap_on_path(one: Any, standing: Rectangle, horizon: float, step: float) -> f
             gap += free
             continue
         there = _outline(one, gap + step)
-        touch = _first_touch(here, standing, there.x - here.x, there.y - here.y)
+        touch = first_touch(here, standing, there.x - here.x, there.y - here.y)
         if touch <= 1.0:
             return gap + touch * step
         gap += step
     return inf
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _outline(motion: Any, distance: float) -> Rectangle:  # pragma: no cover
-    """Return the outline `distance` metres further along the path, as `Path.pose` computes it."""
-    station = motion.travelled + distance
-    index = np.searchsorted(motion.table[:, 0], station, side="right") - 1
-    cell = motion.table[max(index, 0)]
-    curvature, slope = (0.0, 0.0) if index < 0 else (cell[4], cell[5])
-    pose = _advance_pose(cell[1], cell[2], cell[3], curvature, slope, station - cell[0])
+    """Return the outline `distance` metres further along the path."""
+    pose = pose_at(motion.table, motion.travelled + distance)
     return Rectangle(pose.x, pose.y, pose.heading, motion.length, motion.width)

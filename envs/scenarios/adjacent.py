@@ -2,7 +2,7 @@
 
 from math import pi
 
-from lgmd_gym.envs.dynamics.path import Bend, lane_change
+from lgmd_gym.envs.dynamics.bend import Bend, lane_change
 from lgmd_gym.envs.dynamics.units import KMH, MAX_SPEED, check_speed, check_within
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (

@@ -2,7 +2,7 @@
 
 from math import pi
 
-from lgmd_gym.envs.dynamics.speed_profile import Segment, SpeedProfile
+from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.units import KMH, check_speed, check_within
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (
@@ -122,6 +122,9 @@ def _road(distance: float, side: str) -> RoadPlan:
 
 def _time_to_cover(distance: float, profile: tuple[Segment, ...]) -> float:
     """Return the time that a car needs for a distance from a standstill [s]."""
+    # A module that loads numba; the registration of the scenario families must not.
+    from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
+
     script, covered, step = SpeedProfile(0.0, profile), 0.0, 1e-3
     while covered < distance:
         covered += script.step(step)

@@ -1,8 +1,9 @@
 """Scenarios without a threat: objects on or next to the road that are not cars."""
 
 from math import atan2, cos, hypot, pi, sin
+from typing import TYPE_CHECKING
 
-from lgmd_gym.envs.dynamics.path import Bend, Path, Pose, arc
+from lgmd_gym.envs.dynamics.bend import Bend, Pose, arc
 from lgmd_gym.envs.dynamics.units import KMH, check_speed, check_within
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (
@@ -14,6 +15,9 @@ from lgmd_gym.envs.scenarios.scenario import (
     RoadPlan,
     Scenario,
 )
+
+if TYPE_CHECKING:
+    from lgmd_gym.envs.dynamics.path import Path
 
 STEEL, SHADOW, RAIL = 150, 30, 175  # grey levels
 RAIL_PIECE, RAIL_HEIGHT, RAIL_DEPTH = 4.0, 0.75, 0.3  # [m]
@@ -119,6 +123,9 @@ def drive_along_rail(ego_speed: float = 50 * KMH, radius: float = 60.0, left: bo
             f"{speed**2 / bend_radius:.1f} m/s², beyond 4 m/s²; "
             f"pass at most {(4.0 * bend_radius) ** 0.5:.1f} m/s"
         )
+    # A module that loads numba; the registration of the scenario families must not.
+    from lgmd_gym.envs.dynamics.path import Path
+
     side = 1.0 if left else -1.0
     entry = 3.0 * speed
     curve = arc(bend_radius, side * min(pi / 2, CURVE_LENGTH / bend_radius))
@@ -136,7 +143,7 @@ def drive_along_rail(ego_speed: float = 50 * KMH, radius: float = 60.0, left: bo
     )
 
 
-def _rail(path: Path, start: float, end: float, to_right: float) -> tuple[Actor, ...]:
+def _rail(path: "Path", start: float, end: float, to_right: float) -> tuple[Actor, ...]:
     """Return boxes in a row along a path, shifted to its right by `to_right` [m]."""
 
     def shifted(distance: float) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from math import copysign, pi
 
-from lgmd_gym.envs.dynamics.speed_profile import Segment
+from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.units import KMH, check_speed, check_within
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from lgmd_gym.envs.dynamics.path import Bend
-from lgmd_gym.envs.dynamics.speed_profile import Segment
+from lgmd_gym.envs.dynamics.bend import Bend
+from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.units import check_finite, check_speed, check_within
 from lgmd_gym.errors import unknown_name
 

@@ -2,8 +2,8 @@
 
 from math import pi
 
-from lgmd_gym.envs.dynamics.path import Bend, arc, lane_change, turn
-from lgmd_gym.envs.dynamics.speed_profile import Segment
+from lgmd_gym.envs.dynamics.bend import Bend, arc, lane_change, turn
+from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.units import KMH, check_within
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, LANE_WIDTH, TARGET_LENGTH, Actor, RoadPlan, Scenario

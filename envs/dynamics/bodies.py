@@ -1,0 +1,127 @@
+"""The ego and the actors of an episode as records, and their motion."""
+
+from math import asin, atan, tan
+from typing import Any
+
+import numpy as np
+
+from lgmd_gym.envs.dynamics.brake import next_part
+from lgmd_gym.envs.dynamics.contact import Rectangle
+from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.envs.dynamics.longitudinal import advance
+from lgmd_gym.envs.dynamics.path import pose_at
+from lgmd_gym.envs.dynamics.speed_profile import SCRIPT_FIELDS, step_script
+from lgmd_gym.envs.dynamics.units import MAX_SPEED
+
+EGO, CAR, BOX, ROAD_MARKING = 0, 1, 2, 3  # kinds of bodies
+REGAIN_TIME = 0.5  # [s] within which the driver regains the scripted speed after braking
+
+BODY = np.dtype(
+    [
+        *(
+            (name, np.float64)
+            for name in ("x", "y", "heading", "speed", "acceleration", "travelled", "steering")
+        ),
+        *((name, np.float64) for name in ("length", "width", "height", "shade")),
+        *((name, np.int64) for name in ("kind", "path", "path_end")),
+        *SCRIPT_FIELDS,
+    ]
+)
+"""A body: centre [m], heading [rad], speed [m/s], acceleration [m/s²], distance along its path [m], steering
+angle of highway-env's bicycle model [rad], size [m], grey level, kind, and the rows of its path in a table
+(first and last + 1); then its script."""
+
+EGO_STATE = np.dtype([("on_script", np.int64), ("yaw_rate", np.float64)])
+"""Whether the ego still follows its script, as no demand has become active; mean yaw rate over the last step,
++ to the right [rad/s]."""
+
+
+@compiled
+def outline_of(body: Any) -> Rectangle:
+    """Return the outline of a body."""
+    return Rectangle(body.x, body.y, body.heading, body.length, body.width)
+
+
+@compiled
+def move(body: Any, paths: np.ndarray, distance: float) -> None:
+    """Move a body along its path by a distance [m]."""
+    before = body.heading
+    body.travelled += distance
+    pose = pose_at(paths[body.path : body.path_end], body.travelled)
+    body.x, body.y, body.heading = pose.x, pose.y, pose.heading
+    body.steering = 0.0
+    if body.path_end - body.path > 1 and distance > 0.0:
+        # The steering angle at which highway-env's bicycle model has the same yaw rate.
+        slip = asin(max(-0.7, min(0.7, (body.heading - before) / distance * body.length / 2)))
+        body.steering = atan(2.0 * tan(slip))
+
+
+@compiled
+def step_actor(body: Any, segments: np.ndarray, paths: np.ndarray, dt: float) -> None:
+    """Advance an actor by `dt` [s] along its script."""
+    distance = step_script(body, segments, dt)
+    body.speed, body.acceleration = body.script_speed, body.script_acceleration
+    if distance != 0.0 or body.kind == CAR:
+        move(body, paths, distance)
+
+
+@compiled
+def step_ego(
+    body: Any, ego: Any, line: Any, pending: np.ndarray, brake: Any, segments: np.ndarray,
+    paths: np.ndarray, dt: float,
+) -> None:  # fmt: skip
+    """Advance the ego by `dt` [s] under its delayed demands.
+
+    Args:
+        body: The ego's `BODY` record.
+        ego: The ego's `EGO_STATE` record.
+        line: `DELAY_LINE` record.
+        pending: Demands in the line, see `put_demand`.
+        brake: `BRAKE` record.
+        segments: Table of the scripts' segments.
+        paths: Table of the paths' cells.
+        dt: Duration [s].
+    """
+    heading, end, distance = body.heading, line.time + dt, 0.0
+    while True:
+        duration, demand = next_part(line, pending, end)
+        distance += _advance_ego(body, ego, brake, segments, duration, demand)
+        if not line.time < end:
+            break
+    move(body, paths, distance)
+    ego.yaw_rate = (body.heading - heading) / dt
+
+
+@compiled
+def _advance_ego(
+    body: Any, ego: Any, brake: Any, segments: np.ndarray, duration: float, demand: float
+) -> float:
+    """Advance the ego's speed under one demand and return the distance travelled [m]."""
+    scripted = step_script(body, segments, duration)
+    if demand != 0.0:
+        ego.on_script = 0
+    if ego.on_script:
+        body.speed, body.acceleration = body.script_speed, body.script_acceleration
+        return scripted
+    target = _target_acceleration(body, brake, demand)
+    moved = advance(body.speed, body.acceleration, target, brake.jerk, duration)
+    body.speed, body.acceleration = moved[1], moved[2]
+    return moved[0]
+
+
+@compiled
+def _target_acceleration(body: Any, brake: Any, demand: float) -> float:
+    """Return the ego's acceleration under a constant demand after the build-up [m/s²]."""
+    if demand < 0.0:
+        # A demand weaker than the scripted deceleration does not release the scripted brake.
+        return min(demand * brake.max_deceleration, body.script_acceleration)
+    if demand > 0.0:
+        return demand * brake.max_acceleration if body.speed < MAX_SPEED else 0.0
+    deficit, limit = body.script_speed - body.speed, brake.regain_acceleration
+    return body.script_acceleration + min(max(deficit / REGAIN_TIME, -limit), limit)
+
+
+@compiled
+def ego_braking(body: Any, ego: Any) -> float:
+    """Return the ego's deceleration beyond the script, >= 0 [m/s²]."""
+    return 0.0 if ego.on_script else max(0.0, body.script_acceleration - body.acceleration)

@@ -1,0 +1,132 @@
+"""One simulation step of all bodies with contact detection, and the end of an episode."""
+
+from math import cos, inf, sin
+from typing import Any
+
+import numpy as np
+
+from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, move, step_actor, step_ego
+from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
+from lgmd_gym.envs.dynamics.jit import compiled
+
+PASSED_DISTANCE = 2.0  # [m] behind the ego's rear beyond which an actor has been passed
+
+EPISODE = np.dtype(
+    [
+        *((name, np.int64) for name in ("bodies", "touched", "closed_in", "steps")),
+        *((name, np.float64) for name in ("impact_speed", "relative_impact_speed")),
+        *(
+            (name, np.float64)
+            for name in ("time", "duration", "top_speed", "last_speed", "last_acceleration")
+        ),
+    ]
+)
+"""State of an episode: number of bodies, index of the body in contact with the ego (0 without contact),
+whether the ego has closed in on an actor, simulation steps; ego speed and speed relative to the other body at
+contact, inf without contact [m/s]; time after the last decision and duration [s], highest scripted speed
+[m/s], ego speed [m/s] and acceleration [m/s²] before the last decision."""
+
+
+@compiled
+def step_bodies(
+    bodies: np.ndarray, episode: Any, ego: Any, line: Any, pending: np.ndarray, brake: Any,
+    segments: np.ndarray, paths: np.ndarray, before: np.ndarray, dt: float,
+) -> None:  # fmt: skip
+    """Advance all bodies by `dt` [s], or up to the ego's first contact; after it they do not move.
+
+    Args:
+        bodies: `BODY` records, the ego first.
+        episode: `EPISODE` record.
+        ego: `EGO_STATE` record.
+        line: `DELAY_LINE` record.
+        pending: Demands in the line, see `put_demand`.
+        brake: `BRAKE` record.
+        segments: Table of the scripts' segments.
+        paths: Table of the paths' cells.
+        before: Scratch memory, float64, shape (bodies, 5).
+        dt: Duration [s].
+    """
+    if episode.touched > 0:
+        return
+    for i in range(episode.bodies):
+        body = bodies[i]
+        before[i, 0], before[i, 1], before[i, 2] = body.x, body.y, body.heading
+        before[i, 3], before[i, 4] = body.travelled, body.speed
+    step_ego(bodies[0], ego, line, pending, brake, segments, paths, dt)
+    for i in range(1, episode.bodies):
+        step_actor(bodies[i], segments, paths, dt)
+    fraction, touched = first_contact_of(bodies, episode.bodies, before)
+    if touched == 0:
+        return
+    for i in range(episode.bodies):
+        body = bodies[i]
+        if body.kind != ROAD_MARKING:
+            move(body, paths, (1.0 - fraction) * (before[i, 3] - body.travelled))
+            body.speed = (1.0 - fraction) * before[i, 4] + fraction * body.speed
+    here, other = bodies[0], bodies[touched]
+    episode.touched, episode.impact_speed = touched, here.speed
+    episode.relative_impact_speed = here.speed - other.speed * cos(other.heading - here.heading)
+
+
+@compiled
+def first_contact_of(bodies: np.ndarray, count: int, before: np.ndarray) -> tuple[float, int]:
+    """Return the fraction of a step at which the ego first touches a body, and its index; else `inf` and 0.
+
+    Args:
+        bodies: `BODY` records after the step.
+        count: Number of bodies.
+        before: x, y and heading before the step, float64, shape (bodies, >= 3).
+    """
+    ego = bodies[0]
+    start = Rectangle(before[0, 0], before[0, 1], before[0, 2], ego.length, ego.width)
+    ego_dx, ego_dy = ego.x - start.x, ego.y - start.y
+    found, touched = inf, 0
+    for i in range(1, count):
+        body = bodies[i]
+        if body.kind == ROAD_MARKING:
+            continue
+        old = Rectangle(before[i, 0], before[i, 1], before[i, 2], body.length, body.width)
+        fraction = first_touch(start, old, ego_dx - (body.x - old.x), ego_dy - (body.y - old.y))
+        if fraction < found:
+            found, touched = fraction, i
+    return found, touched
+
+
+@compiled
+def is_terminated(bodies: np.ndarray, episode: Any) -> bool:
+    """Return whether the episode is over, see `BrakingEnv`; updates `closed_in`, once per decision."""
+    ego = bodies[0]
+    if episode.touched > 0:
+        return True
+    if ego.speed == 0.0:
+        return ego.script_speed > 0.0
+    solid, left, resolved = 0, 0, True
+    for i in range(1, episode.bodies):
+        body = bodies[i]
+        if body.kind == ROAD_MARKING:
+            continue
+        solid += 1
+        if _is_passed(ego, body):
+            continue
+        left += 1
+        if ego.speed > body.speed:
+            episode.closed_in = 1
+        ended, straight = body.segment == body.segment_end, body.path_end - body.path == 1
+        resolved = resolved and ended and straight and ego.speed < body.speed
+    if solid == 0:
+        return False
+    return left == 0 or (episode.closed_in > 0 and resolved)
+
+
+@compiled
+def _is_passed(ego: Any, body: Any) -> bool:
+    """Return whether a body is behind the ego's rear and not faster than the ego."""
+    dx, dy = body.x - ego.x, body.y - ego.y
+    behind = -(dx * cos(ego.heading) + dy * sin(ego.heading)) - (ego.length + body.length) / 2
+    return behind > PASSED_DISTANCE and body.speed <= ego.speed
+
+
+@compiled
+def is_truncated(episode: Any) -> bool:
+    """Return whether the scenario's duration has passed."""
+    return episode.time >= episode.duration - 1e-9

@@ -1,0 +1,28 @@
+"""Segments: scripted changes of speed."""
+
+from dataclasses import dataclass
+
+from lgmd_gym.envs.dynamics.units import check_speed, check_within
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segment:
+    """A scripted change of speed: acceleration from `start` until `final_speed` is reached.
+
+    Attributes:
+        start: Time at which the acceleration begins, in [0, 10000] [s].
+        acceleration: Full acceleration, negative for braking, in [-12, 12] [m/s²].
+        build_up: Time from `start` to the full acceleration, a linear ramp, in [0, 10] [s].
+        final_speed: Speed at the end of the segment, in [0, 40] [m/s].
+    """
+
+    start: float
+    acceleration: float
+    build_up: float = 0.0
+    final_speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_within("start", self.start, 0.0, 1e4, "s")
+        check_within("acceleration", self.acceleration, -12.0, 12.0, "m/s²")
+        check_within("build_up", self.build_up, 0.0, 10.0, "s")
+        check_speed("final_speed", self.final_speed, zero=True)

@@ -1,0 +1,49 @@
+"""The info of a braking environment as a record."""
+
+from math import cos, inf
+from typing import Any
+
+import numpy as np
+
+from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, ego_braking
+from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.envs.surrogate_safety import contact_time, headway, lead_of, rate_to_avoid_crash
+
+INFO_KEYS = (
+    "speed", "crashed", "ego_speed", "gap", "ttc", "thw", "drac", "required_deceleration", "collision",
+    "impact_speed", "relative_impact_speed", "deceleration", "target_speed",
+)  # fmt: skip
+INFO = np.dtype(
+    [(key, np.bool_ if key in ("crashed", "collision") else np.float64) for key in INFO_KEYS], align=True
+)
+"""The info of one environment; see `BrakingEnv` for meanings and units."""
+
+
+@compiled
+def write_info(bodies: np.ndarray, episode: Any, ego: Any, paths: np.ndarray, info: Any) -> None:
+    """Write the present state of an episode to an `INFO` record.
+
+    Args:
+        bodies: `BODY` records, the ego first.
+        episode: `EPISODE` record.
+        ego: `EGO_STATE` record.
+        paths: Table of the paths' cells.
+        info: `INFO` record.
+    """
+    here = bodies[0]
+    gap, lead = lead_of(bodies, episode.bodies, paths)
+    info.speed = info.ego_speed = here.speed
+    info.crashed = info.collision = episode.touched > 0
+    info.gap, info.ttc = gap, contact_time(bodies, episode.bodies, paths)
+    info.thw, info.drac, info.required_deceleration = headway(gap, here.speed), inf, inf
+    if lead > 0:
+        other = bodies[lead]
+        closing_speed = here.speed - other.speed * cos(other.heading - here.heading)
+        info.drac = rate_to_avoid_crash(gap, closing_speed)
+        info.required_deceleration = max(info.drac - other.acceleration, 0.0)
+    info.impact_speed, info.relative_impact_speed = episode.impact_speed, episode.relative_impact_speed
+    info.deceleration = ego_braking(here, ego)
+    info.target_speed = inf
+    for i in range(episode.bodies - 1, 0, -1):
+        if bodies[i].kind != ROAD_MARKING:
+            info.target_speed = bodies[i].speed

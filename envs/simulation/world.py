@@ -1,0 +1,131 @@
+"""`World`: the state of one or more episodes as arrays."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lgmd_gym.envs.dynamics.bend import Pose
+from lgmd_gym.envs.dynamics.bodies import BODY, BOX, CAR, EGO, EGO_STATE, ROAD_MARKING
+from lgmd_gym.envs.dynamics.brake import DELAY_LINE
+from lgmd_gym.envs.dynamics.episode import EPISODE
+from lgmd_gym.envs.dynamics.path import path_table
+from lgmd_gym.envs.dynamics.speed_profile import segment_table
+from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, EGO_WIDTH, LANE_WIDTH, Actor, Scenario
+
+KINDS = {"car": CAR, "box": BOX, "road_marking": ROAD_MARKING}
+EGO_HEIGHT = 1.5  # [m]
+SHADES = (30, 220)  # range of random grey levels
+START_RANGE = 500.0  # [m], range of the random start position, which varies the road texture
+
+
+class Placement(NamedTuple):
+    """A scenario placed on the road, ready to be loaded into a `World`.
+
+    Attributes:
+        scenario: The scenario.
+        start: Initial pose of the ego.
+        actors: Actors in the order of their bodies: cars, then other objects.
+        bodies: `BODY` records, the ego first; rows of paths and segments count from 0.
+        segments: Table of the scripts' segments, float64, shape (n, 4).
+        paths: Table of the paths' cells, float64, shape (n, 6).
+    """
+
+    scenario: Scenario
+    start: Pose
+    actors: tuple[Actor, ...]
+    bodies: np.ndarray
+    segments: np.ndarray
+    paths: np.ndarray
+
+
+def place(scenario: Scenario, rng: np.random.Generator) -> Placement:
+    """Place a scenario at a random start, with a random grey level for every actor without a `shade`."""
+    start = Pose(float(rng.uniform(0.0, START_RANGE)), scenario.road.ego_lane * LANE_WIDTH, 0.0)
+    drawn = [int(rng.integers(*SHADES, endpoint=True)) for _ in scenario.actors]
+    shaded = list(zip(scenario.actors, drawn, strict=True))
+    # highway-env keeps cars and other objects in two lists, and the camera reads them in this order.
+    shaded.sort(key=lambda item: item[0].kind != "car")
+    tables = [path_table(start, scenario.ego_path)]
+    scripts = [segment_table(scenario.ego_profile)]
+    rows: list[tuple[Any, ...]] = [(*start, scenario.ego_speed, EGO_LENGTH, EGO_WIDTH, EGO_HEIGHT, 0.0, EGO)]
+    for actor, shade in shaded:
+        centre = start.x + EGO_LENGTH / 2 + actor.gap + actor.length / 2
+        pose = Pose(centre, start.y - actor.lateral_offset, -actor.heading)
+        tables.append(path_table(pose, actor.path))
+        scripts.append(segment_table(actor.profile))
+        grey = shade if actor.shade is None else int(actor.shade)
+        rows.append((*pose, actor.speed, actor.length, actor.width, actor.height, grey, KINDS[actor.kind]))
+    return Placement(
+        scenario, start, tuple(actor for actor, _ in shaded), _bodies(rows, scripts, tables),
+        np.concatenate(scripts), np.concatenate(tables),
+    )  # fmt: skip
+
+
+def _bodies(rows: list[tuple[Any, ...]], scripts: list[np.ndarray], tables: list[np.ndarray]) -> np.ndarray:
+    bodies = np.zeros(len(rows), BODY)
+    names = ("x", "y", "heading", "speed", "length", "width", "height", "shade", "kind")
+    for name, column in zip(names, zip(*rows, strict=True), strict=True):
+        bodies[name] = column
+    bodies["script_speed"] = bodies["speed"]
+    bodies["segment_end"] = np.cumsum([len(script) for script in scripts])
+    bodies["segment"][1:] = bodies["segment_end"][:-1]
+    bodies["path_end"] = np.cumsum([len(table) for table in tables])
+    bodies["path"][1:] = bodies["path_end"][:-1]
+    return bodies
+
+
+class World:
+    """The episodes of N environments as arrays; the arguments of the compiled functions.
+
+    Args:
+        num: Number of environments N.
+        max_demands: Maximum number of demands in a delay line, see `BrakeParams.max_demands`.
+
+    Attributes:
+        bodies: `BODY` records, shape (N, bodies).
+        episodes: `EPISODE` records, shape (N,).
+        egos: `EGO_STATE` records, shape (N,).
+        lines: `DELAY_LINE` records, shape (N,).
+        pending: Demands in the delay lines, float64, shape (N, demands, 2).
+        segments: Tables of the scripts' segments, float64, shape (N, segments, 4).
+        paths: Tables of the paths' cells, float64, shape (N, cells, 6).
+        before: Scratch memory, float64, shape (N, bodies, 5).
+    """
+
+    def __init__(self, num: int, max_demands: int) -> None:
+        self.bodies = np.zeros((num, 1), BODY)
+        self.episodes = np.zeros(num, EPISODE)
+        self.egos = np.zeros(num, EGO_STATE)
+        self.lines = np.zeros(num, DELAY_LINE)
+        self.pending = np.zeros((num, max_demands, 2))
+        self.segments = np.zeros((num, 1, 4))
+        self.paths = np.zeros((num, 1, 6))
+        self.before = np.zeros((num, 1, 5))
+
+    def load(self, index: int, placement: Placement) -> bool:
+        """Start an episode in environment `index`; returns whether arrays were replaced by larger ones."""
+        scenario, count = placement.scenario, len(placement.bodies)
+        grown = self._reserve(count, len(placement.segments), len(placement.paths))
+        self.bodies[index, :count] = placement.bodies
+        self.segments[index, : len(placement.segments)] = placement.segments
+        self.paths[index, : len(placement.paths)] = placement.paths
+        self.lines[index] = (0.0, 0.0, 0.0, 0)
+        self.egos[index] = (1, 0.0)
+        self.episodes[index] = (
+            count, 0, 0, 0, np.inf, np.inf, 0.0, scenario.duration, scenario.top_speed, scenario.ego_speed,
+            0.0,
+        )  # fmt: skip
+        return grown
+
+    def _reserve(self, bodies: int, segments: int, cells: int) -> bool:
+        """Enlarge the arrays to at least these numbers of rows."""
+        grown = False
+        needed = (("bodies", bodies), ("before", bodies), ("segments", segments), ("paths", cells))
+        for name, rows in needed:
+            old = getattr(self, name)
+            if old.shape[1] < rows:
+                new = np.zeros((old.shape[0], rows, *old.shape[2:]), old.dtype)
+                new[:, : old.shape[1]] = old
+                setattr(self, name, new)
+                grown = True
+        return grown
