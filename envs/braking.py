@@ -4,17 +4,17 @@ from dataclasses import asdict
 from typing import Any, cast
 
 import numpy as np
-from highway_env.road.road import RoadNetwork
 
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.envs.dynamics.episode import is_terminated, is_truncated
+from lgmd_gym.envs.episode_source import EpisodeSource, FixedScenario
 from lgmd_gym.envs.info import INFO, INFO_KEYS, write_info
 from lgmd_gym.envs.reward import RewardParams, step_reward
-from lgmd_gym.envs.scenarios.scenario import RoadPlan, Scenario
-from lgmd_gym.envs.simulation.network import build_network
+from lgmd_gym.envs.scenarios.scenario import Scenario
+from lgmd_gym.envs.simulation.network import road_network
 from lgmd_gym.envs.simulation.road import BrakingRoad
 from lgmd_gym.envs.simulation.vehicles import EgoCar
-from lgmd_gym.envs.simulation.world import World, place
+from lgmd_gym.envs.simulation.world import World
 from lgmd_gym.envs.spaces import EgoState, make_action
 from lgmd_gym.errors import check_keys
 
@@ -86,7 +86,7 @@ class BrakingEnv(EgoBrakeEnv):
     ## Arguments
 
     Args:
-        scenario: The scenario.
+        scenario: The scenario, or a source of scenarios.
         config: highway-env's configuration keys; the fields of `BrakeParams`; `throttle`, whether demands
             above 0 have an effect (False); `action`, see Action Space; `reward`, fields of `RewardParams`.
             Defaults of `simulation_frequency` and `policy_frequency`: 60 and 30 Hz.
@@ -107,11 +107,15 @@ class BrakingEnv(EgoBrakeEnv):
     road: BrakingRoad
 
     def __init__(
-        self, scenario: Scenario, config: dict[str, Any] | None = None, render_mode: str | None = None
+        self,
+        scenario: Scenario | EpisodeSource,
+        config: dict[str, Any] | None = None,
+        render_mode: str | None = None,
     ) -> None:
-        self.scenario = scenario
+        self._source = FixedScenario(scenario) if isinstance(scenario, Scenario) else scenario
+        self.scenario = self._source.first
         self.camera_fields: dict[str, Any] = {}
-        self._network: tuple[RoadPlan, RoadNetwork] | None = None
+        self._episode_info: dict[str, Any] = {}
         super().__init__(config, render_mode)
 
     @classmethod
@@ -178,16 +182,13 @@ class BrakingEnv(EgoBrakeEnv):
         return obs, reward, terminated, truncated, info
 
     def _reset(self) -> None:
-        self._build(self.np_random)
-
-    def _build(self, rng: np.random.Generator) -> None:
-        """Build the scene; straight road networks are reused between episodes."""
-        scenario = self.scenario
-        placement = place(scenario, rng)
-        if self._network is None or self._network[0] != scenario.road or scenario.road.relative_to_ego:
-            self._network = scenario.road, build_network(scenario.road, placement.start)
+        draw = self._source.draw(self.np_random)
+        placement = draw.placement
+        self.scenario, self._episode_info = placement.scenario, draw.info
+        self.camera_fields = self.camera_fields | draw.camera_fields
         self._world.load(0, placement)
-        self.road = BrakingRoad(self._network[1], rng, self._world, self._brake_record)
+        network = road_network(placement.scenario.road, placement.start)
+        self.road = BrakingRoad(network, self.np_random, self._world, self._brake_record)
         self.controlled_vehicles = [self.road.ego]
 
     def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
@@ -195,4 +196,4 @@ class BrakingEnv(EgoBrakeEnv):
         bodies, episode = world.bodies[0], world.episodes[0]
         values = np.zeros(1, INFO)
         write_info(bodies, episode, world.egos[0], world.paths[0], values[0])
-        return dict(zip(INFO_KEYS, values[0].tolist(), strict=True))
+        return dict(zip(INFO_KEYS, values[0].tolist(), strict=True)) | self._episode_info

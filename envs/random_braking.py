@@ -5,13 +5,7 @@ from typing import Any
 
 from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.envs.braking import BrakingEnv
-from lgmd_gym.envs.scenarios.distribution import (
-    LEVELS,
-    check_levels,
-    draw_camera_fields,
-    draw_scenario,
-    level_generator,
-)
+from lgmd_gym.envs.episode_source import RandomLevels
 
 
 class RandomBrakingEnv(BrakingEnv):
@@ -48,20 +42,4 @@ class RandomBrakingEnv(BrakingEnv):
         config: dict[str, Any] | None = None,
         render_mode: str | None = None,
     ) -> None:
-        check_levels(split, start_level, num_levels, conditions)
-        self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
-        self.num_levels = num_levels or LEVELS - start_level
-        self.level = start_level
-        first = draw_scenario(level_generator(split, start_level))
-        super().__init__(first, config=config, render_mode=render_mode)
-
-    def _reset(self) -> None:
-        self.level = self.start_level + int(self.np_random.integers(self.num_levels))
-        rng = level_generator(self.split, self.level)
-        self.scenario = draw_scenario(rng)
-        self.camera_fields = draw_camera_fields(self.split, self.level, self.conditions)
-        self._build(rng)
-
-    def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
-        info = super()._info(obs, action)
-        return info | {"level": self.level, "condition": self.camera_fields["condition"]}
+        super().__init__(RandomLevels(split, start_level, num_levels, conditions), config, render_mode)

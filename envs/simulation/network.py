@@ -1,5 +1,6 @@
 """highway-env road networks built from road plans."""
 
+from functools import lru_cache
 from math import cos, pi, sin
 
 from highway_env.road.lane import AbstractLane, CircularLane, LineType, StraightLane
@@ -15,8 +16,8 @@ Point = tuple[float, float]
 NONE, STRIPED, SOLID = LineType.NONE, LineType.STRIPED, LineType.CONTINUOUS_LINE
 
 
-def build_network(plan: RoadPlan, start: Pose) -> RoadNetwork:
-    """Return the road network of a plan.
+def road_network(plan: RoadPlan, start: Pose) -> RoadNetwork:
+    """Return the road network of a plan; straight roads are built once per process.
 
     Args:
         plan: The road plan.
@@ -29,6 +30,7 @@ def build_network(plan: RoadPlan, start: Pose) -> RoadNetwork:
     return _straight(plan)
 
 
+@lru_cache(maxsize=16)
 def _straight(plan: RoadPlan) -> RoadNetwork:
     """Return parallel lanes along x; lane 0 is the leftmost, at y = 0."""
     network = RoadNetwork()

@@ -1,0 +1,80 @@
+"""Sources of episodes: a fixed scenario, or random levels."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from lgmd_gym.envs.scenarios.distribution import (
+    LEVELS,
+    check_levels,
+    draw_camera_fields,
+    draw_scenario,
+    level_generator,
+)
+from lgmd_gym.envs.scenarios.scenario import Scenario
+from lgmd_gym.envs.simulation.world import Placement, place
+
+
+class Draw(NamedTuple):
+    """The next episode of an environment.
+
+    Attributes:
+        placement: The scenario, placed on the road.
+        camera_fields: Fields of `CameraParams` and `condition` that the episode sets.
+        info: Additional keys of the episode's info.
+    """
+
+    placement: Placement
+    camera_fields: dict[str, Any]
+    info: dict[str, Any]
+
+
+class EpisodeSource(Protocol):
+    """Draws the episodes of an environment."""
+
+    @property
+    def first(self) -> Scenario:
+        """A scenario of this source, without a draw."""
+        ...
+
+    def draw(self, rng: np.random.Generator) -> Draw:
+        """Return the next episode; `rng` is the environment's random generator."""
+        ...
+
+
+class FixedScenario:
+    """The same scenario in every episode, with a random start and random grey levels.
+
+    Args:
+        scenario: The scenario.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.first = scenario
+
+    def draw(self, rng: np.random.Generator) -> Draw:
+        """Return the next episode."""
+        return Draw(place(self.first, rng), {}, {})
+
+
+class RandomLevels:
+    """A random level per episode; arguments as in `RandomBrakingEnv`.
+
+    Raises:
+        ValueError: If the split or a condition is unknown, or levels are outside the split.
+    """
+
+    def __init__(self, split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> None:
+        check_levels(split, start_level, num_levels, conditions)
+        self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
+        self.num_levels = num_levels or LEVELS - start_level
+        self.first = draw_scenario(level_generator(split, start_level))
+
+    def draw(self, rng: np.random.Generator) -> Draw:
+        """Return the next episode."""
+        level = self.start_level + int(rng.integers(self.num_levels))
+        generator = level_generator(self.split, level)
+        placement = place(draw_scenario(generator), generator)
+        fields = draw_camera_fields(self.split, level, self.conditions)
+        return Draw(placement, fields, {"level": level, "condition": fields["condition"]})
