@@ -10,8 +10,6 @@ from lgmd_gym.envs.dynamics.longitudinal import advance
 from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, EGO_WIDTH
 from lgmd_gym.envs.traffic.drivers import TrafficCar
 
-COMFORT_DECELERATION = 3.0  # [m/s²], limit of the driver's deceleration towards its target speed
-
 
 class TrafficEgo(TrafficCar):
     """The car under test: driven by IDM without lane changes; an agent can add braking.
@@ -34,6 +32,7 @@ class TrafficEgo(TrafficCar):
         travelled: Distance travelled since the reset [m].
     """
 
+    IS_EGO = True
     color = (50, 200, 0)  # in highway-env's top view
 
     def __init__(
@@ -63,23 +62,8 @@ class TrafficEgo(TrafficCar):
             return 0.0
         return max(0.0, min(self.driver_acceleration, 0.0) - self.current_acceleration)
 
-    def acceleration(self, ego_vehicle: Any, front_vehicle: Any = None, rear_vehicle: Any = None) -> float:
-        """Return the IDM acceleration with a limited free-road term [m/s²].
-
-        The free-road term of IDM falls with the fourth power of speed over target speed. Without the limit, a
-        car that has to give way (target speed 0) would always brake with an emergency deceleration.
-        """
-        free = super().acceleration(ego_vehicle)
-        total = super().acceleration(ego_vehicle, front_vehicle, rear_vehicle)
-        return max(free, -COMFORT_DECELERATION) + (total - free)
-
-    def act(self, action: Any = None) -> None:
-        """Update the driver's steering and acceleration."""
-        super().act()
-        self.driver_acceleration = float(cast(dict[str, float], self.action)["acceleration"])
-
-    def step(self, dt: float) -> None:
-        """Advance by `dt` [s] under the delayed demands."""
+    def move(self, dt: float) -> None:
+        """Advance by `dt` [s] with the driver's steering angle, under the delayed demands."""
         self.timer += dt
         action = cast(dict[str, float], self.action)
         slip = atan(tan(action["steering"]) / 2)
@@ -91,7 +75,6 @@ class TrafficEgo(TrafficCar):
         self.yaw_rate = turned / dt
         self.travelled += distance
         action["acceleration"] = self.current_acceleration
-        self.on_state_update()
 
     def _advance(self, duration: float, demand: float) -> float:
         """Advance the speed under one demand and return the distance travelled [m]."""

@@ -10,6 +10,7 @@ from highway_env.envs.two_way_env import TwoWayEnv
 
 from lgmd_gym.envs.traffic.drivers import TrafficCar
 from lgmd_gym.envs.traffic.env import TrafficEnv
+from lgmd_gym.envs.traffic.road import TrafficRoad
 
 
 class HighwayTraffic(TrafficEnv, HighwayEnv):
@@ -83,6 +84,10 @@ class IntersectionTraffic(TrafficEnv, IntersectionEnv):
         "initial_vehicle_count": 8,
         "spawn_probability": 0.35,
     }
+
+    def _make_road(self) -> None:
+        super()._make_road()
+        self.road = TrafficRoad(self.road, None, self.regulated)  # highway-env simulates traffic on it
 
     def _modify_scene(self) -> None:
         lane: Any = self.ego.lane

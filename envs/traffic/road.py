@@ -1,35 +1,48 @@
-"""The road of the traffic environments: contact detection inside each step, and fast neighbour searches."""
+"""The road of the traffic environments: compiled drivers and motion, contact detection inside each step."""
 
+from array import array
 from math import hypot
 from typing import Any
 
+import numpy as np
 from highway_env.road.regulation import RegulatedRoad
 from highway_env.road.road import Road
+from highway_env.utils import rotated_rectangles_intersect
 from highway_env.vehicle.objects import Landmark
 
-from lgmd_gym.envs.dynamics.contact import Contact, first_contact, first_touch, outline
+from lgmd_gym.envs.dynamics.contact import Contact
 from lgmd_gym.envs.traffic.ego import TrafficEgo
+from lgmd_gym.envs.traffic.kernels import (
+    ALL_DONE,
+    CAR,
+    TAU_PURSUIT,
+    decide,
+    find_contact,
+    locate,
+    mark_collisions,
+    move,
+)
+from lgmd_gym.envs.traffic.lanes import LaneTable
 
-# Lower bound of highway-env's distance past the end of a curved lane, relative to that of its bounding box.
-BOX_FACTOR = 0.8
+_NO_FIELDS = [0.0] * (len(CAR.names or ()) - 7)
 
 
 class TrafficRoad(RegulatedRoad):
-    """A highway-env road that finds the ego's first contact within each step.
+    """A highway-env road that moves all cars in compiled kernels and finds the ego's first contact.
 
     Other cars that touch each other stop, as in highway-env, but are not pushed apart. After the ego's first
     contact the road does not advance: all cars keep the positions and speeds of that moment.
 
     Args:
         road: The original road; its cars and objects are assigned to the new road.
-        ego: The car under test.
+        ego: The car under test; None while highway-env builds the scene, without collisions.
         regulated: Whether cars give way at intersections of their routes (highway-env's rules).
 
     Attributes:
         contact: First contact of the ego, or None.
     """
 
-    def __init__(self, road: Road, ego: TrafficEgo, regulated: bool) -> None:
+    def __init__(self, road: Road, ego: TrafficEgo | None, regulated: bool) -> None:
         super().__init__(
             road.network,
             road.vehicles,
@@ -40,10 +53,17 @@ class TrafficRoad(RegulatedRoad):
         self.vehicles, self.objects = road.vehicles, road.objects  # also if empty
         for item in (*self.vehicles, *self.objects):
             item.road = self
-        self.ego, self.regulated = ego, regulated
+        self._ego, self.regulated = ego, regulated
         self.contact: Contact | None = None
-        self._places: dict[int, list[float | None]] | None = None
-        self._boxes = [(index, lane, *_box(lane)) for index, lane in self.network.lanes_dict().items()]
+        self._lanes = LaneTable(self.network)
+        self._records = np.zeros(0, CAR)
+        self._predictions: dict[int, list[tuple[float, float, float]]] = {}
+
+    @property
+    def ego(self) -> TrafficEgo:
+        """The car under test."""
+        assert self._ego is not None
+        return self._ego
 
     @property
     def cars(self) -> list[Any]:
@@ -53,146 +73,135 @@ class TrafficRoad(RegulatedRoad):
     @property
     def obstacles(self) -> list[Any]:
         """Cars and solid objects that the ego can touch."""
-        items = (*self.vehicles, *self.objects)
-        return [item for item in items if item is not self.ego and not isinstance(item, Landmark)]
+        return [item for item in self.items if item is not self._ego]
+
+    @property
+    def items(self) -> list[Any]:
+        """All cars, then the solid objects."""
+        return [*self.vehicles, *(item for item in self.objects if not isinstance(item, Landmark))]
 
     def act(self) -> None:
         """Update the decisions of all drivers."""
-        if self.contact is None:
-            self._places = {}  # valid while no car moves
-            super().act()
-            self._places = None
+        if self.contact is not None:
+            return
+        cars = self._records = self.read()
+        table, number = self._lanes, len(self.vehicles)
+        along, across = table.coordinates(cars)
+        bends = table.bends(along + (cars["speed"] * TAU_PURSUIT)[:, None])
+        pieces = table.pieces if self.neighbour_vehicles_connected_lanes else table.pieces[:, :1].copy()
+        arguments = (cars, number, table.records, pieces, table.offsets, along, across, bends)
+        waiting = decide(*arguments, 0, False)
+        while waiting != ALL_DONE:
+            car: Any = self.vehicles[waiting]
+            car.follow_road()
+            cars["target_lane"][waiting] = table.numbers[car.target_lane_index]
+            cars["planned_lane"][waiting] = car.planned_lane
+            waiting = decide(*arguments, waiting, True)
+        ego = self._ego
+        if ego is not None:
+            record = cars[self.vehicles.index(ego)]
+            ego.action = {
+                "steering": float(record["steering"]),
+                "acceleration": float(record["acceleration"]),
+            }
+            ego.driver_acceleration = ego.action["acceleration"]
 
     def step(self, dt: float) -> None:
-        """Advance all cars by `dt` [s], or up to the ego's first contact."""
+        """Advance all cars by `dt` [s], or up to the ego's first contact; call `act` before."""
         if self.contact is not None:
             return
         self.steps += 1
         if self.regulated and self.steps % int(1 / dt / self.REGULATION_FREQUENCY) == 0:
             self.enforce_road_rules()
-        items = [self.ego, *self.obstacles]
-        before = [outline(item) for item in items]
-        speeds = [item.speed for item in items]
-        travelled = self.ego.travelled
+        cars, number = self._records, len(self.vehicles)
+        before, ego = cars.copy(), self._ego
+        move(cars, number, np.arctan(1 / 2 * np.tan(cars["steering"])), dt)
+        travelled = 0.0
+        if ego is not None:
+            travelled = ego.travelled
+            ego.move(dt)
+            cars[self.vehicles.index(ego)] = ego.record(self._lanes)
+        along, across = self._lanes.coordinates(cars)
+        locate(cars, number, self._lanes.records, along, across, self._lanes.bends(along))
+        self._write(cars)
+        if ego is None:
+            return
+        fraction, index = find_contact(before, cars, self.vehicles.index(ego))
+        if fraction <= 1.0:
+            self._stop_at_contact(before, fraction, index, travelled)
+            cars = self.read()
+        crashed = cars["crashed"].copy()
+        mark_collisions(cars, number)
+        for i in np.flatnonzero(cars["crashed"] > crashed):
+            self.vehicles[i].crashed = True
+
+    def _stop_at_contact(self, before: np.ndarray, fraction: float, index: int, travelled: float) -> None:
+        """Move all cars back to the ego's first contact, at a fraction of the step."""
+        for car, record in zip(self.vehicles, before, strict=False):
+            for axis, place in enumerate((record["x"], record["y"])):
+                car.position[axis] = (1 - fraction) * place + fraction * car.position[axis]
+            car.speed = float((1 - fraction) * record["speed"] + fraction * car.speed)
+        ego, other = self.ego, self.items[index]
+        ego.travelled = (1 - fraction) * travelled + fraction * ego.travelled
+        self.contact = Contact.between(ego, other)
+        ego.crashed = other.crashed = True
+
+    def read(self) -> np.ndarray:
+        """Return all cars, then the solid objects, as `CAR` records."""
+        values = array("d")
         for car in self.vehicles:
-            car.step(dt)
-        fraction, index = first_contact(before, [outline(item) for item in items])
-        if index:
-            for car, place, speed in zip(items[: len(self.vehicles)], before, speeds, strict=False):
-                for axis in (0, 1):
-                    car.position[axis] = (1 - fraction) * place[axis] + fraction * car.position[axis]
-                car.speed = (1 - fraction) * speed + fraction * car.speed
-            self.ego.travelled = (1 - fraction) * travelled + fraction * self.ego.travelled
-            self.contact = Contact.between(self.ego, items[index])
-            self.ego.crashed = items[index].crashed = True
-        self._mark_collisions()
+            values.extend(car.record(self._lanes))  # type: ignore[attr-defined]
+        for item in self.items[len(self.vehicles) :] if self.objects else ():
+            lane = self._lanes.numbers[item.lane_index]
+            x, y = item.position
+            values.extend((x, y, item.heading, item.speed, item.LENGTH, item.WIDTH, lane, *_NO_FIELDS))
+        return np.frombuffer(values).view(CAR)
 
-    def _mark_collisions(self) -> None:
-        """Mark the other cars that touch each other as crashed."""
-        cars = [car for car in self.vehicles if car is not self.ego]
-        places = [(float(car.position[0]), float(car.position[1])) for car in cars]
-        for i, (x, y) in enumerate(places):
-            for j in range(i):
-                if abs(places[j][0] - x) + abs(places[j][1] - y) > 8.0:
-                    continue
-                if first_touch(outline(cars[i]), outline(cars[j]), 0.0, 0.0) == 0.0:
-                    cars[i].crashed = cars[j].crashed = True
+    def _write(self, cars: np.ndarray) -> None:
+        """Assign the state of `CAR` records to the cars."""
+        table, ego = self._lanes, self._ego
+        vehicles: list[Any] = self.vehicles
+        for car, row in zip(vehicles, cars.tolist(), strict=False):
+            x, y, heading, speed, _, _, lane, target, _, timer, steering, acceleration, *_ = row
+            number = int(lane)
+            car.lane_index, car.lane = table.indices[number], table.lanes[number]
+            car.target_lane_index, car.timer = table.indices[int(target)], timer
+            if car is not ego:
+                car.position[0], car.position[1] = x, y
+                car.heading, car.speed = heading, speed
+                car.action = {"steering": steering, "acceleration": acceleration}
 
-    def neighbour_vehicles(self, vehicle: Any, lane_index: Any = None) -> tuple[Any, Any]:
-        """Return the preceding and the following vehicle on a lane, as `Road.neighbour_vehicles` does.
+    def enforce_road_rules(self) -> None:
+        """Let cars give way to others whose routes they may cross, as highway-env does."""
+        self._predictions = {}
+        super().enforce_road_rules()
 
-        Args:
-            vehicle: The reference vehicle.
-            lane_index: The lane; None for the lane of the vehicle.
+    def is_conflict_possible(  # type: ignore[override]
+        self, v1: Any, v2: Any, horizon: float = 3.0, step: float = 0.25
+    ) -> bool:
+        """Return whether the routes of two cars may conflict within `horizon` [s].
+
+        In contrast to highway-env, cars that are too far apart to meet are skipped, and the positions of a
+        car are predicted once for all pairs.
         """
-        lane_index = lane_index or vehicle.lane_index
-        if not lane_index:
-            return None, None
-        lane = self.network.get_lane(lane_index)
-        here = float(lane.local_coordinates(vehicle.position)[0])
-        front = rear = None
-        ahead = behind = 0.0
-        lanes = [(self._along(piece), offset) for piece, offset in self._pieces(lane_index, lane)]
-        for number, item in enumerate((*self.vehicles, *self.objects)):
-            if item is vehicle or isinstance(item, Landmark):
-                continue
-            for places, offset in lanes:
-                place = places[number]
-                if place is None:
-                    continue
-                place += offset
-                if place >= here and (front is None or place <= ahead):
-                    front, ahead = item, place
-                if place < here and (rear is None or place > behind):
-                    rear, behind = item, place
-                break
-        return front, rear
-
-    def closest_lane(self, position: Any, heading: float, hint: Any) -> Any:
-        """Return the index of the closest lane, as `RoadNetwork.get_closest_lane_index` does.
-
-        Lanes whose bounding box is farther away than the hint are skipped.
-
-        Args:
-            position: Position [m].
-            heading: Heading [rad].
-            hint: Index of a lane that is probably close.
-        """
-        x, y = float(position[0]), float(position[1])
-        best = float(self.network.get_lane(hint).distance_with_heading(position, heading))
-        closest = None
-        for index, lane, left, top, right, bottom in self._boxes:
-            away = max(left - x, x - right, top - y, y - bottom)
-            if away * BOX_FACTOR > best:
-                continue
-            distance = float(lane.distance_with_heading(position, heading))
-            # Among lanes at equal distance, the first one in the network is returned.
-            if distance < best or (closest is None and distance == best):
-                best, closest = distance, index
-        return hint if closest is None else closest
-
-    def _pieces(self, lane_index: Any, lane: Any) -> list[tuple[Any, float]]:
-        """Return a lane, the previous and the next lanes, each with its start along the lane [m]."""
-        start, end, number = lane_index
-        pieces = [(lane, 0.0)]
-        if not self.neighbour_vehicles_connected_lanes:
-            return pieces
-        for lanes in self.network.graph.get(end, {}).values():
-            if lanes:
-                pieces.append((lanes[number if number < len(lanes) else 0], float(lane.length)))
-        for ends in self.network.graph.values():
-            lanes = ends.get(start)
-            if lanes:
-                before = lanes[number if number < len(lanes) else 0]
-                pieces.append((before, -float(before.length)))
-        return pieces
-
-    def _along(self, lane: Any) -> list[float | None]:
-        """Return the position of every vehicle and object along a lane [m]; None if it is not on the lane."""
-        if self._places is not None and id(lane) in self._places:
-            return self._places[id(lane)]
-        places: list[float | None] = []
-        for item in (*self.vehicles, *self.objects):
-            along, across = lane.local_coordinates(item.position)
-            on = -lane.VEHICLE_LENGTH <= along < lane.length + lane.VEHICLE_LENGTH
-            on = on and abs(across) <= lane.width_at(along) / 2 + 1.0
-            places.append(float(along) if on else None)
-        if self._places is not None:
-            self._places[id(lane)] = places
-        return places
-
-    @staticmethod
-    def is_conflict_possible(v1: Any, v2: Any, horizon: int = 3, step: float = 0.25) -> bool:
-        """Return whether the routes of two cars may conflict; skips cars that are too far apart to meet."""
-        apart = hypot(float(v2.position[0] - v1.position[0]), float(v2.position[1] - v1.position[1]))
-        if apart > (v1.speed + v2.speed) * horizon + v1.LENGTH + v2.LENGTH:
+        (x1, y1), (x2, y2) = v1.position.tolist(), v2.position.tolist()
+        if hypot(x2 - x1, y2 - y1) > (v1.speed + v2.speed) * horizon + v1.LENGTH + v2.LENGTH:
             return False
-        return bool(RegulatedRoad.is_conflict_possible(v1, v2, horizon, step))
+        times = np.arange(step, horizon, step)
+        for one, other in zip(self._predict(v1, times), self._predict(v2, times), strict=True):
+            if hypot(other[0] - one[0], other[1] - one[1]) <= v1.LENGTH and rotated_rectangles_intersect(
+                ((one[0], one[1]), 1.5 * v1.LENGTH, 0.9 * v1.WIDTH, one[2]),  # type: ignore[arg-type]
+                ((other[0], other[1]), 1.5 * v2.LENGTH, 0.9 * v2.WIDTH, other[2]),  # type: ignore[arg-type]
+            ):
+                return True
+        return False
 
-
-def _box(lane: Any) -> tuple[float, float, float, float]:
-    """Return left, top, right and bottom of a lane's centreline with a small margin [m]."""
-    pieces = max(2, int(lane.length / 2.0) + 1)
-    points = [lane.position(lane.length * number / (pieces - 1), 0.0) for number in range(pieces)]
-    xs, ys = [float(point[0]) for point in points], [float(point[1]) for point in points]
-    return min(xs) - 0.1, min(ys) - 0.1, max(xs) + 0.1, max(ys) + 0.1
+    def _predict(self, car: Any, times: np.ndarray) -> list[tuple[float, float, float]]:
+        """Return the predicted poses of a car: x [m], y [m] and heading [rad] at each time."""
+        if id(car) not in self._predictions:
+            positions, headings = car.predict_trajectory_constant_speed(times)
+            self._predictions[id(car)] = [
+                (*position.tolist(), float(heading))
+                for position, heading in zip(positions, headings, strict=True)
+            ]
+        return self._predictions[id(car)]

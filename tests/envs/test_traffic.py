@@ -1,5 +1,6 @@
 """Traffic environments: highway-env's drivers, the agent's brake, contact, determinism."""
 
+import copy
 import subprocess
 import sys
 from pathlib import Path
@@ -7,12 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from highway_env.envs.intersection_env import IntersectionEnv
+from highway_env.road.regulation import RegulatedRoad
 from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.behavior import IDMVehicle
 from support.traffic import BRAKE, HOLD, BlockedHighway, EmptyHighway, car_states, run_for
 
-from lgmd_gym.envs.traffic.drivers import IntersectionCar, TrafficCar
-from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
+from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, idm, neighbours, steer
+from lgmd_gym.envs.traffic.lanes import LaneTable
+from lgmd_gym.envs.traffic.registration import KINDS, find_kind, make_traffic
+from lgmd_gym.envs.traffic.road import TrafficRoad
 
 TESTS = Path(__file__).parents[1]
 
@@ -37,29 +41,73 @@ def test_seeds_vary_the_traffic():
     assert positions[0] == positions[2] != positions[1]
 
 
+def stock_road(kind, road):
+    """Return highway-env's road with copies of the cars of a traffic road."""
+    cars = copy.deepcopy(road.vehicles, {id(road): None, id(road.network): road.network})
+    road_class = RegulatedRoad if find_kind(kind).regulated else Road
+    stock = road_class(road.network, cars, road.objects, neighbour_vehicles_connected_lanes=True)
+    for car in cars:
+        car.road = stock
+    return stock
+
+
+def lane_changes(road):
+    """Return the number of cars that change lanes within a road."""
+    return sum(
+        car.lane_index[:2] == car.target_lane_index[:2] and car.lane_index != car.target_lane_index
+        for car in road.vehicles
+    )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_cars_move_as_on_a_road_of_highway_env(kind):
+    """Positions, lanes, lane changes and yielding of all cars but the ego, over twelve seconds."""
+    env = make_traffic(kind, camera=None)
+    env.reset(seed=8)
+    env.road.vehicles.remove(env.ego)
+    road = TrafficRoad(env.road, None, env.regulated)
+    for car in road.vehicles:
+        car.continues_to_next_lane = True  # as in highway-env
+    stock = stock_road(kind, road)
+    changes = 0
+    for _ in range(360):
+        for each in (road, stock):
+            each.act()
+            each.step(1 / 30)
+        changes += lane_changes(road)
+        for car, other in zip(road.vehicles, stock.vehicles, strict=True):
+            other.speed = max(other.speed, 0.0)  # cars of highway-env can reverse
+            assert car.position == pytest.approx(other.position, abs=1e-6)
+            assert (car.heading, car.speed) == pytest.approx((other.heading, other.speed), abs=1e-6)
+            assert (car.lane_index, car.target_lane_index) == (other.lane_index, other.target_lane_index)
+            assert (car.lane, car.target_speed) == (other.lane, other.target_speed)
+    assert changes > 0 or kind in ("two-way", "intersection"), "no lane change"
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_drivers_and_neighbour_searches_equal_highway_env(kind):
     """Neighbours, lanes, IDM accelerations and steering angles equal those of the original methods."""
     env = make_traffic(kind, camera=None)
     env.reset(seed=3)
-    road, crossing = env.road, kind == "intersection"
-    names = ("ACC_MAX", "COMFORT_ACC_MAX", "COMFORT_ACC_MIN", "DISTANCE_WANTED", "TIME_WANTED")
-    pinned = IntersectionCar if crossing else TrafficCar
-    original = type("Original", (IDMVehicle,), {name: getattr(pinned, name) for name in names})
+    road, lanes = env.road, LaneTable(env.road.network)
     for _ in range(6):
         run_for(env, 1)
-        for car in road.vehicles:
+        cars = road.read()
+        along, across = lanes.coordinates(cars)
+        ahead = lanes.bends(along + (cars["speed"] * TAU_PURSUIT)[:, None])
+        for i, car in enumerate(road.vehicles):
             assert car.lane_index == RoadNetwork.get_closest_lane_index(
                 road.network, car.position, car.heading
             )
-            for lane in (car.lane_index, car.target_lane_index):
-                neighbours = road.neighbour_vehicles(car, lane)
-                assert neighbours == Road.neighbour_vehicles(road, car, lane)
-                if car is not env.ego:
-                    stock = original.acceleration(car, car, *neighbours)
-                    assert car.acceleration(car, *neighbours) == pytest.approx(stock, rel=1e-9)
-                    steering = IDMVehicle.steering_control(car, lane)
-                    assert car.steering_control(lane) == pytest.approx(steering, abs=1e-12)
+            for index in (car.lane_index, car.target_lane_index):
+                k = lanes.numbers[index]
+                found = neighbours(cars, i, k, lanes.records, lanes.pieces, lanes.offsets, along, across)
+                stock = Road.neighbour_vehicles(road, car, index)
+                assert [road.items[j] if j >= 0 else None for j in found] == list(stock)
+                acceleration = idm(cars[i], cars, i, found[0], lanes.records, along)
+                assert acceleration == pytest.approx(IDMVehicle.acceleration(car, car, *stock), rel=1e-9)
+                steering = steer(cars[i], lanes.records[k], along[i, k], across[i, k], ahead[i, k])
+                assert steering == pytest.approx(IDMVehicle.steering_control(car, index), abs=1e-12)
             assert car.speed >= 0.0
 
 
@@ -82,8 +130,7 @@ def test_brake_has_dead_time_build_up_and_limit():
     env = EmptyHighway()
     env.reset(seed=0)
     ego = env.ego
-    ego.target_speed = 1e6  # not limited by the target speed
-    ego.acceleration = lambda **kwargs: 0.0
+    ego.target_speed = ego.speed  # the driver does not decelerate
     start, began = ego.speed, ego.travelled
     infos = run_for(env, 6, BRAKE)
     assert [info["deceleration"] for info in infos[:4]] == [0.0] * 4

@@ -1,0 +1,420 @@
+"""Compiled decisions and motion of all cars of a traffic road: highway-env's IDM, MOBIL and bicycle model.
+
+Every result is equal to the bit to that of highway-env's formulas on plain floats: sums and products are in
+the same order, `dot` rounds as `numpy.dot` does, and the caller computes the functions that NumPy and the C
+library round differently.
+"""
+
+from math import asin, atan, cos, inf, pi, pow, sin, sqrt, tan
+from typing import Any
+
+import numpy as np
+from numba import extending, types
+
+from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
+from lgmd_gym.envs.dynamics.jit import compiled
+
+CAR = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            *(
+                "x",
+                "y",
+                "heading",
+                "speed",
+                "length",
+                "width",
+                "lane",
+                "target_lane",
+                "target_speed",
+                "timer",
+            ),
+            *("steering", "acceleration", "crashed", "changes_lanes", "continues", "planned_lane", "is_ego"),
+            *("comfort_acceleration", "comfort_deceleration", "distance", "headway", "exponent", "square"),
+        )
+    ]
+)
+"""A car or solid object of the road. `lane` and `target_lane` are rows of the lanes. `planned_lane` is the
+lane number at the head of the route, `UNPLANNED` for a route without one and `NO_ROUTE` without a route.
+`exponent` and `square` (2) are exponents: `x**2` of Python is `pow`, which may differ from `x * x`."""
+LANE = np.dtype(
+    [
+        *(
+            (name, np.float64)
+            for name in (
+                *("x", "y", "along_x", "along_y", "across_x", "across_y", "heading", "length", "width"),
+                *("amplitude", "pulsation", "phase", "radius", "turn", "speed_limit"),
+            )
+        ),
+        *((name, np.int64) for name in ("shape", "forbidden", "road", "number", "lanes")),
+    ]
+)
+"""A lane: its start or centre [m], its directions, and the fields of highway-env's class; `road` is the index
+of its road and `lanes` the number of that road's lanes."""
+STRAIGHT, SINE, CIRCLE = 0, 1, 2
+NO_ROUTE, UNPLANNED = -2.0, -1.0
+ALL_DONE = -1
+
+MAX_ACCELERATION, MAX_STEERING = 6.0, pi / 3  # [m/s²], [rad]
+TAU_PURSUIT, KP_HEADING, KP_LATERAL = 0.5 * 0.2, 1 / 0.2, 1 / 0.6  # [s], [1/s], [1/s]
+LANE_CHANGE_DELAY, MIN_GAIN, MAX_IMPOSED = 1.0, 0.2, 2.0  # [s], [m/s²], [m/s²]
+MAX_SPEED = 40.0  # [m/s]
+COMFORT_DECELERATION = 3.0  # [m/s²], limit of the ego's deceleration towards its target speed
+END_MARGIN = 5.0  # [m] by which a lane extends beyond its ends, `AbstractLane.VEHICLE_LENGTH`
+MAX_APART = 8.0  # [m], sum of both coordinates beyond which two cars are not tested for a touch
+
+intrinsic: Any = extending.intrinsic  # a decorated function is called without its typing context
+
+
+@intrinsic
+def _fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
+    """Return a·b + c with one rounding."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.fma(*args)
+
+    return types.float64(types.float64, types.float64, types.float64), generate
+
+
+@compiled
+def dot(ax: float, ay: float, bx: float, by: float) -> float:
+    """Return the dot product of two vectors, rounded as `numpy.dot` does with fused multiply-add."""
+    return _fma(ay, by, ax * bx)
+
+
+@compiled
+def wrapped(angle: float) -> float:
+    """Return an angle in [-pi, pi) [rad]."""
+    return (angle + pi) % (2 * pi) - pi
+
+
+@compiled
+def limited(value: float, limit: float) -> float:
+    """Return a value clipped to ± limit."""
+    return min(max(value, -limit), limit)
+
+
+@compiled
+def not_zero(value: float) -> float:
+    """Return a value whose magnitude is at least 0.01."""
+    if abs(value) > 1e-2:
+        return value
+    return 1e-2 if value >= 0 else -1e-2
+
+
+@compiled
+def project(cars: Any, lanes: Any, polar: Any, along: Any, across: Any) -> None:
+    """Write the coordinates of every car along and across every lane, shape (cars, lanes) [m].
+
+    Args:
+        cars: `CAR` records.
+        lanes: `LANE` records.
+        polar: Angle of each car about each lane's centre, shape (cars, lanes) [rad].
+        along: Output.
+        across: Output.
+    """
+    for i in range(len(cars)):
+        for k in range(len(lanes)):
+            lane = lanes[k]
+            dx, dy = cars[i].x - lane.x, cars[i].y - lane.y
+            if lane.shape == CIRCLE:
+                phase = lane.phase + wrapped(polar[i, k] - lane.phase)
+                along[i, k] = lane.turn * (phase - lane.phase) * lane.radius
+                across[i, k] = lane.turn * (lane.radius - sqrt(dot(dx, dy, dx, dy)))
+                continue
+            along[i, k] = dot(dx, dy, lane.along_x, lane.along_y)
+            across[i, k] = dot(dx, dy, lane.across_x, lane.across_y)
+            if lane.shape == SINE:
+                across[i, k] -= lane.amplitude * sin(lane.pulsation * along[i, k] + lane.phase)
+
+
+@compiled
+def heading_at(lane: Any, along: float, bend: float) -> float:
+    """Return the heading of a lane [rad]; `bend` is the angle of a sine lane to its axis."""
+    if lane.shape == CIRCLE:
+        return lane.turn * along / lane.radius + lane.phase + pi / 2 * lane.turn
+    return lane.heading + bend if lane.shape == SINE else lane.heading
+
+
+@compiled
+def locate(cars: Any, number: int, lanes: Any, along: Any, across: Any, bend: Any) -> None:
+    """Assign the first `number` cars to their closest lanes, by distance [m] plus angle [rad]."""
+    for i in range(number):
+        best = inf
+        for k in range(len(lanes)):
+            lane = lanes[k]
+            place = along[i, k]
+            angle = abs(wrapped(cars[i].heading - heading_at(lane, place, bend[i, k])))
+            apart = abs(across[i, k]) + max(place - lane.length, 0.0) + max(0.0 - place, 0.0) + angle
+            if apart < best:
+                best, cars[i].lane = apart, k
+
+
+@compiled
+def neighbours(
+    cars: Any, i: int, own: int, lanes: Any, pieces: Any, offsets: Any, along: Any, across: Any
+) -> Any:
+    """Return the indices of the car in front of car i and behind it on lane `own`; -1 for none.
+
+    Args:
+        cars: `CAR` records.
+        i: Index of the car.
+        own: Index of the lane.
+        lanes: `LANE` records.
+        pieces: Indices of each lane and of its previous and next lanes, -1 for none, shape (lanes, n).
+        offsets: Start of each of these along the lane, shape (lanes, n) [m].
+        along: See `project`.
+        across: See `project`.
+    """
+    here, front, rear, ahead, behind = along[i, own], -1, -1, 0.0, 0.0
+    for j in range(len(cars)):
+        if j == i:
+            continue
+        for n in range(pieces.shape[1]):
+            k = pieces[own, n]
+            if k < 0:
+                break
+            lane, place = lanes[k], along[j, k]
+            if not -END_MARGIN <= place < lane.length + END_MARGIN:
+                continue
+            if abs(across[j, k]) > lane.width / 2 + 1.0:
+                continue
+            place += offsets[own, n]
+            if place >= here and (front < 0 or place <= ahead):
+                front, ahead = j, place
+            if place < here and (rear < 0 or place > behind):
+                rear, behind = j, place
+            break
+    return front, rear
+
+
+@compiled
+def desired_gap(driver: Any, car: Any, front: Any) -> float:
+    """Return the IDM distance that a driver would keep in a car behind another one [m]."""
+    closing = car.speed - front.speed * cos(front.heading - car.heading)
+    comfort = 2.0 * sqrt(-driver.comfort_acceleration * driver.comfort_deceleration)
+    return driver.distance + car.speed * driver.headway + car.speed * closing / comfort
+
+
+@compiled
+def free_acceleration(driver: Any, car: Any, lanes: Any) -> float:
+    """Return the IDM acceleration of a driver in a car on a free road [m/s²]."""
+    target = min(max(car.target_speed, 0.0), lanes[int(car.lane)].speed_limit)
+    ratio = max(car.speed, 0.0) / abs(not_zero(target))
+    return driver.comfort_acceleration * (1.0 - pow(ratio, driver.exponent))
+
+
+@compiled
+def idm(driver: Any, cars: Any, i: int, front: int, lanes: Any, along: Any) -> float:
+    """Return the IDM acceleration of a driver in car i behind another one; -1 for none [m/s²]."""
+    car = cars[i]
+    result = free_acceleration(driver, car, lanes)
+    if front >= 0:
+        lane = int(car.lane)
+        distance = not_zero(along[front, lane] - along[i, lane])
+        gap = desired_gap(driver, car, cars[front])
+        result -= driver.comfort_acceleration * pow(gap / distance, driver.square)
+    return result
+
+
+@compiled
+def follow(cars: Any, i: int, front: int, lanes: Any, along: Any) -> float:
+    """Return the acceleration of car i behind another one; -1 for none [m/s²].
+
+    The free-road term of IDM falls with the fourth power of speed over target speed. Without a limit, an ego
+    that has to give way (target speed 0) would always brake with an emergency deceleration.
+    """
+    total = idm(cars[i], cars, i, front, lanes, along)
+    if cars[i].is_ego == 0.0:
+        return total
+    free = free_acceleration(cars[i], cars[i], lanes)
+    return max(free, -COMFORT_DECELERATION) + (total - free)
+
+
+@compiled
+def accepts(
+    cars: Any, number: int, i: int, new: int, lanes: Any, pieces: Any, offsets: Any, along: Any, across: Any
+) -> bool:
+    """Return whether MOBIL recommends that car i change to lane `new`.
+
+    The first `number` records are cars; objects do not follow. highway-env's politeness is 0, so the
+    accelerations of the followers do not count.
+    """
+    driver = cars[i]
+    front, rear = neighbours(cars, i, new, lanes, pieces, offsets, along, across)
+    if 0 <= rear < number and idm(driver, cars, rear, i, lanes, along) < -MAX_IMPOSED:
+        return False
+    predicted = idm(driver, cars, i, front, lanes, along)
+    if driver.planned_lane >= 0.0:
+        target = lanes[int(driver.target_lane)].number
+        if np.sign(lanes[new].number - target) != np.sign(driver.planned_lane - target):
+            return False
+        return predicted >= -MAX_IMPOSED
+    old, _ = neighbours(cars, i, int(driver.lane), lanes, pieces, offsets, along, across)
+    return predicted - idm(driver, cars, i, old, lanes, along) >= MIN_GAIN
+
+
+@compiled
+def is_taken(cars: Any, number: int, i: int, along: Any) -> bool:
+    """Return whether a car shortly ahead of car i also changes to its target lane."""
+    car, own = cars[i], int(cars[i].lane)
+    for j in range(number):
+        other = cars[j]
+        if j != i and other.lane != car.target_lane and other.target_lane == car.target_lane:
+            distance = along[j, own] - along[i, own]
+            if 0.0 < distance < desired_gap(car, car, other):
+                return True
+    return False
+
+
+@compiled
+def change_lane(
+    cars: Any, number: int, i: int, lanes: Any, pieces: Any, offsets: Any, along: Any, across: Any
+) -> None:
+    """Begin or abort a lane change of car i, as `IDMVehicle.change_lane_policy` does."""
+    car, own = cars[i], int(cars[i].lane)
+    if car.lane != car.target_lane:
+        if lanes[own].road == lanes[int(car.target_lane)].road and is_taken(cars, number, i, along):
+            car.target_lane = car.lane
+        return
+    if not car.timer > LANE_CHANGE_DELAY:
+        return
+    car.timer = 0.0
+    for new in (own - 1, own + 1):  # the lanes of a road are in order
+        if not 0 <= lanes[own].number + new - own < lanes[own].lanes:
+            continue
+        lane = lanes[new]
+        reachable = abs(across[i, new]) <= 2 * lane.width and 0 <= along[i, new] < lane.length + END_MARGIN
+        if lane.forbidden or not reachable or abs(car.speed) < 1:
+            continue
+        if accepts(cars, number, i, new, lanes, pieces, offsets, along, across):
+            car.target_lane = new
+
+
+@compiled
+def steer(car: Any, lane: Any, along: float, across: float, bend: float) -> float:
+    """Return the steering angle of a car towards the centre of its target lane [rad].
+
+    Args:
+        car: `CAR` record.
+        lane: The target lane.
+        along: Place of the car along the lane [m].
+        across: Place of the car across the lane [m].
+        bend: Angle of a sine lane to its axis at the place that the car reaches in `TAU_PURSUIT` [rad].
+    """
+    speed = not_zero(car.speed)
+    ahead = heading_at(lane, along + car.speed * TAU_PURSUIT, bend)
+    drift = asin(limited(-KP_LATERAL * across / speed, 1.0))
+    rate = KP_HEADING * wrapped(ahead + limited(drift, pi / 4) - car.heading)
+    slip = asin(limited(car.length / 2 / speed * rate, 1.0))
+    return limited(atan(2.0 * tan(slip)), MAX_STEERING)
+
+
+@compiled
+def decide(
+    cars: Any, number: int, lanes: Any, pieces: Any, offsets: Any, along: Any, across: Any, bend: Any,
+    first: int, follows: bool,
+) -> int:  # fmt: skip
+    """Update steering angle, acceleration and target lane of each car, in order.
+
+    The choice of the next road at the end of a lane is highway-env's.
+
+    Args:
+        cars: `CAR` records, the cars first.
+        number: Number of cars.
+        lanes: `LANE` records.
+        pieces: See `neighbours`.
+        offsets: See `neighbours`.
+        along: See `project`.
+        across: See `project`.
+        bend: See `steer`; shape (cars, lanes).
+        first: Index of the first car to update.
+        follows: Whether that car has already chosen its next lane.
+
+    Returns:
+        Index of the car that has to choose its next lane before it continues, or `ALL_DONE`.
+    """
+    for i in range(first, number):
+        car = cars[i]
+        if car.crashed:
+            continue
+        target = int(car.target_lane)
+        at_end = along[i, target] > lanes[target].length - END_MARGIN / 2
+        if car.continues and at_end and not (follows and i == first):
+            return i
+        if car.changes_lanes:
+            change_lane(cars, number, i, lanes, pieces, offsets, along, across)
+            target = int(car.target_lane)
+        car.steering = steer(car, lanes[target], along[i, target], across[i, target], bend[i, target])
+        front, _ = neighbours(cars, i, int(car.lane), lanes, pieces, offsets, along, across)
+        acceleration = follow(cars, i, front, lanes, along)
+        if car.lane != car.target_lane:
+            front, _ = neighbours(cars, i, target, lanes, pieces, offsets, along, across)
+            acceleration = min(acceleration, follow(cars, i, front, lanes, along))
+        car.acceleration = limited(acceleration, MAX_ACCELERATION)
+    return ALL_DONE
+
+
+@compiled
+def move(cars: Any, number: int, slip: Any, dt: float) -> None:
+    """Advance the cars except the ego by `dt` [s]; they never reverse. `slip` is their slip angle [rad]."""
+    for i in range(number):
+        car = cars[i]
+        if car.is_ego:
+            continue
+        car.timer += dt
+        beta = slip[i]
+        if car.crashed:
+            car.steering = beta = 0.0
+            car.acceleration = -1.0 * car.speed
+        if car.speed > MAX_SPEED:
+            car.acceleration = min(car.acceleration, MAX_SPEED - car.speed)
+        course = car.heading + beta
+        car.x += car.speed * cos(course) * dt
+        car.y += car.speed * sin(course) * dt
+        car.heading += car.speed * sin(beta) / (car.length / 2) * dt
+        car.speed = max(car.speed + car.acceleration * dt, 0.0)  # an Euler step can overshoot zero
+
+
+@compiled
+def outline_of(car: Any) -> Rectangle:
+    """Return the outline of a car."""
+    return Rectangle(car.x, car.y, car.heading, car.length, car.width)
+
+
+@compiled
+def find_contact(before: Any, after: Any, ego: int) -> Any:
+    """Return when the ego first touches another car or object within a step.
+
+    Args:
+        before: `CAR` records at the start of the step.
+        after: The same records at its end.
+        ego: Index of the ego.
+
+    Returns:
+        The fraction of the step, `inf` without contact, and the index of the touched record.
+    """
+    start, end = before[ego], after[ego]
+    dx, dy = end.x - start.x, end.y - start.y
+    found, index = inf, ego
+    for i in range(len(before)):
+        if i == ego:
+            continue
+        old, new = before[i], after[i]
+        fraction = first_touch(outline_of(start), outline_of(old), dx - (new.x - old.x), dy - (new.y - old.y))
+        if fraction < found:
+            found, index = fraction, i
+    return found, index
+
+
+@compiled
+def mark_collisions(cars: Any, number: int) -> None:
+    """Mark the cars other than the ego that touch each other as crashed."""
+    for i in range(number):
+        for j in range(i):
+            one, other = cars[i], cars[j]
+            if one.is_ego or other.is_ego or abs(other.x - one.x) + abs(other.y - one.y) > MAX_APART:
+                continue
+            if first_touch(outline_of(one), outline_of(other), 0.0, 0.0) == 0.0:
+                one.crashed = other.crashed = 1.0
