@@ -3,7 +3,6 @@
 from lgmd_gym.camera.birdseye import BirdsEye
 from lgmd_gym.camera.ego import EgoCamera
 from lgmd_gym.camera.params import CLEAR, CONDITIONS, PRESETS, CameraParams
-from lgmd_gym.camera.rig import CameraRig
 from lgmd_gym.camera.spec import BIRDSEYE, CameraItem, CameraSpec, with_condition
 
 __all__ = [
@@ -14,7 +13,6 @@ __all__ = [
     "BirdsEye",
     "CameraItem",
     "CameraParams",
-    "CameraRig",
     "CameraSpec",
     "EgoCamera",
     "with_condition",

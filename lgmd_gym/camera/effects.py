@@ -25,15 +25,16 @@ and for an all-paved ground, sensor noise [grey levels], exposure time [s].
 ASPHALT_GREY, PAINT_GREY = 104.0, 208.0  # by day
 BEAM_WIDTH = 0.26  # the low beam falls to 1/e at this tangent of the angle from straight ahead
 _TEXTURE_GAIN = 1.0 / 36.0  # textures store 36 per standard deviation
-_NOISE_LOG2 = 17
+NOISE_LOG2 = 17
+"""Binary logarithm of the length of the noise table."""
 
 
 def look_of(p: CameraParams) -> np.ndarray:
     """Return the appearance of the world for a camera, a `LOOK` record of shape ()."""
     look = np.zeros((), LOOK)
-    look["asphalt"], look["asphalt_gain"] = ASPHALT_GREY, 9.0 * p.texture * _TEXTURE_GAIN
-    look["verge"], look["verge_gain"] = 76.0, 16.0 * p.texture * _TEXTURE_GAIN
-    look["paint"] = PAINT_GREY
+    look["asphalt"], look["verge"], look["paint"] = ASPHALT_GREY, 76.0, PAINT_GREY
+    for name, gain in texture_gains(p.texture).items():
+        look[name] = gain
     night = p.light == "night"
     sky = (6.0, 14.0, 7.0, 4.0, 1.0) if night else (172.0, 214.0, 128.0, 78.0, 12.0)
     for name, grey in zip(("zenith", "horizon", "hills", "trees", "leaf_gain"), sky, strict=True):
@@ -49,6 +50,14 @@ def look_of(p: CameraParams) -> np.ndarray:
     look["shot_noise"], look["read_noise"] = p.shot_noise, p.read_noise
     look["shutter_s"] = p.shutter_s
     return look
+
+
+def texture_gains(texture: float) -> dict[str, float]:
+    """Return the fields of `LOOK` that the contrast of asphalt and verge determines."""
+    return {
+        "asphalt_gain": 9.0 * texture * _TEXTURE_GAIN,
+        "verge_gain": 16.0 * texture * _TEXTURE_GAIN,
+    }
 
 
 def haze_grey(p: CameraParams) -> float:
@@ -71,9 +80,4 @@ def beam_profile(p: CameraParams) -> np.ndarray:
 @lru_cache(maxsize=4)
 def noise_table(seed: int) -> np.ndarray:
     """Return standard normal numbers, float32, shape (131072,)."""
-    return np.random.default_rng([seed, 5]).standard_normal(1 << _NOISE_LOG2, dtype=np.float32)
-
-
-def noise_start(seed: int, steps: int, x: float, y: float, heading: float) -> int:
-    """Return the index of a frame's first number in the noise table, a function of seed and road state."""
-    return hash((seed, steps, x, y, heading)) & ((1 << _NOISE_LOG2) - 1)
+    return np.random.default_rng([seed, 5]).standard_normal(1 << NOISE_LOG2, dtype=np.float32)

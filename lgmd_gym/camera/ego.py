@@ -4,12 +4,15 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.camera.objects import ObjectList
+from lgmd_gym.camera.batch import CameraBatch
 from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pinhole import project
-from lgmd_gym.camera.render.context import RenderContext
-from lgmd_gym.camera.scene import scene_of
+from lgmd_gym.camera.render.buffers import Buffers
+from lgmd_gym.camera.render.context import Workspace
+from lgmd_gym.camera.render.panorama import panorama_table
+from lgmd_gym.camera.road_pool import RoadPool, road_key
 from lgmd_gym.camera.spec import CameraItem
+from lgmd_gym.camera.world import World, view_of
 
 _UINT8 = np.dtype(np.uint8)
 
@@ -18,15 +21,11 @@ class EgoCamera:
     """A camera on the ego car of any highway-env environment.
 
     Frames are grey, uint8, shape (height, width), with row 0 at the top. The same seed and the same road
-    state give the same frame, in any process. The ego's own body is not drawn. A `CameraRig` renders several
-    cameras on one car faster.
+    state give the same frame, in any process. The ego's own body is not drawn.
 
     Args:
         params: A preset's name, `CameraParams`, a dict of its fields, or None for `wide`.
         fields: Fields of `CameraParams` to change, or `condition`.
-
-    Attributes:
-        context: Tables and buffers of this camera.
 
     Example:
         >>> EgoCamera("fovea", mount_height=1.4).params.hfov_deg
@@ -35,8 +34,8 @@ class EgoCamera:
 
     def __init__(self, params: CameraItem | None = None, **fields: Any) -> None:
         self._params = CameraParams.make(params, **fields)
-        self.context = RenderContext([self._params])
-        self._objects = ObjectList()
+        panorama_table(self._params)  # raises an error for an image that cannot be read
+        self._stage: _Stage | None = None
         self._lens: Any = None
 
     @property
@@ -50,9 +49,14 @@ class EgoCamera:
         return self._params.shape
 
     @property
+    def buffers(self) -> Buffers:
+        """Scratch memory; `image` is the light of the last frame before the sensor."""
+        return self._own_stage().workspace.buffers
+
+    @property
     def light(self) -> np.ndarray:
         """Light of the last `render` before the sensor, float32, shape (height, width) [grey levels]."""
-        return self.context.buffers.image
+        return self.buffers.image
 
     def render(
         self, env: Any, out: np.ndarray | None = None, gaze: tuple[float, float] | None = None
@@ -72,11 +76,9 @@ class EgoCamera:
             out = np.empty(self._params.shape, dtype=np.uint8)
         else:
             check_frame(out, self._params.shape)
-        scene = scene_of(env)
-        poses = self.context.aim(scene, gaze)
-        self._objects.read(scene, self._params, poses)
-        self.context.draw(out[None], scene, self._objects)
-        self._lens = self.context.lenses[0, 0]
+        stage = self._own_stage()
+        stage.render(env, out, gaze)
+        self._lens = stage.batch.lenses[0, 0, 0]
         return out
 
     def project(self, points_m: Any) -> np.ndarray:
@@ -94,8 +96,37 @@ class EgoCamera:
         return project(self._lens, points_m)
 
     def set_lens(self, lens: Any) -> None:
-        """Set the `LENS` record that `project` uses, after a frame rendered by a `CameraRig`."""
+        """Set the `LENS` record that `project` uses, after a frame drawn by a `CameraBatch`."""
         self._lens = lens
+
+    def _own_stage(self) -> "_Stage":
+        if self._stage is None:
+            self._stage = _Stage(self._params)
+        return self._stage
+
+
+class _Stage:
+    """What one camera needs to draw frames by itself."""
+
+    def __init__(self, p: CameraParams) -> None:
+        self.batch = CameraBatch([p], p.shape)
+        self.workspace = Workspace(p.shape)
+        self._params, self._keys = p, (road_key(p),)
+        self._world, self._roads = World(), RoadPool(1, 1)
+        self._view = view_of([p])
+        self._selected = np.ones((1, 1), np.bool_)
+        self._turned = False  # whether the last gaze replaced that of the parameters
+
+    def render(self, env: Any, out: np.ndarray, gaze: tuple[float, float] | None) -> None:
+        """Draw the present frame into `out`."""
+        if gaze is not None or self._turned:
+            self.batch.turn(0, 0, self._params, gaze)
+            self._turned = gaze is not None
+        ego = self._world.read(env, None if self._turned else self._view)
+        self._roads.assign(0, ego.road, self._keys)
+        self.batch.draw(
+            0, 1, self._world.arrays, self._roads.arrays, out[None, None], self._selected, self.workspace
+        )
 
 
 def check_frame(out: np.ndarray, shape: tuple[int, int]) -> None:

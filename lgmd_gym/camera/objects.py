@@ -5,14 +5,12 @@ Objects are read by duck typing, so that this module does not import highway-env
 
 import math
 import struct
-from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.camera.pose import CameraPose
-from lgmd_gym.camera.scene import SceneState
+from lgmd_gym.camera.render.jit import exact_kernel
+from lgmd_gym.camera.scene import Ego
 
 MAX_RANGE = 600.0
 """Range of vehicles and obstacles from the lens; they fade in over the last sixth [m]."""
@@ -23,6 +21,8 @@ MODEL_CAR, MODEL_TRUCK, MODEL_BOX, MODEL_MARK, MODEL_BARRIER, MODEL_RAIL = 0, 1,
 MODEL_POST, MODEL_TREE = 6, 7  # flat pictures that face the lens
 OUTLINE = -1.0
 """Shade of a ground mark that is painted as an outline; other shades fill it."""
+FIRST_INDEXED = -2.0
+"""Shade of the first vehicle without a grey of its own, see `index_shade`; that of the k-th is lower by k."""
 
 OBJECT = np.dtype(
     [
@@ -30,112 +30,123 @@ OBJECT = np.dtype(
         *(("braking", np.int64), ("model", np.int64), ("range", np.float64), ("speed", np.float64)),
     ]
 )
-"""An object: centre [m], heading, size [m], grey of the body, brake lights, model, range [m], speed [m/s]."""
+"""An object: centre [m], heading, size [m], grey of the body, brake lights, model, range [m], speed [m/s].
+
+A vehicle has the model `MODEL_CAR`; `choose_objects` draws large ones as trucks.
+"""
 _RECORD = struct.Struct("=8d2q2d")  # packing is twice as fast as assigning a record
 
-_BRAKE_LIGHT_MPS2 = -0.5
+BRAKE_LIGHT_MPS2 = -0.5
+"""Acceleration below which the brake lights are on [m/s²]."""
 _MOUNT_REACH = 100.0  # upper bound of the distance between a lens and the ego's centre [m]
+_TALL_M, _LONG_M, _TRUCK_HEIGHT_M = 2.2, 7.5, 2.8  # a taller or longer car is drawn as a truck
 _MODELS: dict[type, tuple[int, float]] = {}
 
 
-class ObjectList:
-    """The objects of a scene that may be visible to the cameras.
+class View(NamedTuple):
+    """Directions that the cameras of a car look in: from `first` to `last`, at most 170° apart.
 
     Attributes:
-        records: `OBJECT` records, shape (512,). The kernels append the roadside.
-        count: Number of records in use.
+        first: Yaw to the left of or at all optical axes, relative to the ego's heading [rad].
+        last: Yaw to the right of or at all optical axes [rad].
+        reach: Maximum distance of a lens from the ego's front, rear or centreline [m].
     """
 
-    def __init__(self) -> None:
-        self.records = np.zeros(MAX_DRAWN, OBJECT)
-        self.count = 0
-        self._bytes = self.records.view(np.uint8).data
-
-    def __reduce__(self) -> tuple[type, tuple[()]]:
-        """Copy and pickle as an empty list; every frame rewrites the records."""
-        return ObjectList, ()
-
-    def read(self, scene: SceneState, p: CameraParams, poses: Sequence[CameraPose]) -> None:
-        """Read all objects except the ego that may be visible from these poses.
-
-        Args:
-            scene: State of the environment.
-            p: Parameters of one of the cameras, for `seed` and `vehicles`.
-            poses: Poses of the lenses.
-
-        Raises:
-            ValueError: For an object whose pose is not finite.
-        """
-        x, y, _, yaw, _ = poses[0]
-        if len(poses) == 1 or all(pose.x == x and pose.y == y and pose.yaw == yaw for pose in poses):
-            # One direction of view: skip the objects behind the lens.
-            self._read(scene, p, (x, y), (math.cos(yaw), math.sin(yaw)), MAX_RANGE)
-        else:
-            self._read(scene, p, (scene.x, scene.y), (0.0, 0.0), MAX_RANGE + _MOUNT_REACH)
-
-    def _read(
-        self,
-        scene: SceneState,
-        p: CameraParams,
-        centre: tuple[float, float],
-        view: tuple[float, float],
-        reach: float,
-    ) -> None:
-        self.count = 0
-        x, y = centre
-        view_x, view_y = view
-        ego = scene.ego
-        for group in (scene.road.vehicles, scene.road.objects):
-            for index, item in enumerate(group):
-                if item is ego:
-                    continue
-                position = item.position
-                # Arithmetic on Python floats is several times faster than on NumPy scalars.
-                px, py = position.tolist() if position.__class__ is np.ndarray else position
-                dx, dy = px - x, py - y
-                ahead = dx * view_x + dy * view_y
-                if not -item.LENGTH - item.WIDTH < ahead < reach or dx * dx + dy * dy > reach * reach:
-                    if not math.isfinite(ahead):
-                        raise ValueError(
-                            f"{type(item).__name__} {index} of the road has position ({px}, {py})"
-                        )
-                    continue
-                if self.count == MAX_DRAWN:
-                    return
-                self._append(item, px, py, index, p)
-
-    def _append(self, item: Any, px: float, py: float, index: int, p: CameraParams) -> None:
-        heading = item.heading
-        if not math.isfinite(heading):
-            raise ValueError(f"{type(item).__name__} {index} of the road has heading {heading}")
-        model, height, shade = _appearance(item, index, p)
-        action = getattr(item, "action", None)
-        braking = bool(action) and action.get("acceleration", 0.0) < _BRAKE_LIGHT_MPS2
-        _RECORD.pack_into(
-            self._bytes, self.count * _RECORD.size,
-            px, py, math.cos(heading), math.sin(heading), item.LENGTH, item.WIDTH, height, shade,
-            braking, model, MAX_RANGE, getattr(item, "speed", 0.0),
-        )  # fmt: skip
-        self.count += 1
+    first: float
+    last: float
+    reach: float
 
 
-def _appearance(item: Any, index: int, p: CameraParams) -> tuple[int, float, float]:
-    """Return model, height [m] and shade of an object."""
-    cls = item.__class__
-    model, height = _MODELS.get(cls) or _default_appearance(cls)
-    height = getattr(item, "HEIGHT", height)
-    if model == MODEL_CAR:
-        if p.vehicles == "box":
-            model = MODEL_BOX
-        elif height > 2.2 or item.LENGTH > 7.5:
-            model, height = MODEL_TRUCK, max(height, 2.8)
+def read_objects(ego: Ego, view: View | None, records: memoryview, index: int = 0) -> int:
+    """Read all objects of a road that may be visible, except the ego; returns their number.
+
+    Args:
+        ego: The ego and its road.
+        view: Directions of view, to skip objects behind all lenses; None for all around.
+        records: Bytes of `OBJECT` records, shape (environments, 512).
+        index: Index of the environment.
+
+    Raises:
+        ValueError: For an object whose pose is not finite.
+    """
+    road, vehicle, x, y, heading = ego
+    reach = (MAX_RANGE + _MOUNT_REACH) ** 2
+    rear, a_x, a_y, b_x, b_y = -math.inf, 0.0, 0.0, 0.0, 0.0
+    if view is not None:
+        rear = -view.reach - 0.5 * vehicle.LENGTH
+        a_x, a_y = math.cos(heading + view.first), math.sin(heading + view.first)
+        b_x, b_y = math.cos(heading + view.last), math.sin(heading + view.last)
+    count, start = 0, index * MAX_DRAWN
+    for group in (road.vehicles, road.objects):
+        for place, item in enumerate(group):
+            if item is vehicle:
+                continue
+            position = item.position
+            # Arithmetic on Python floats is several times faster than on NumPy scalars.
+            px, py = position.tolist() if position.__class__ is np.ndarray else position
+            dx, dy = px - x, py - y
+            away = dx * dx + dy * dy
+            if not away <= reach:
+                if not math.isfinite(away):
+                    raise ValueError(f"{type(item).__name__} {place} of the road has position ({px}, {py})")
+                continue
+            behind = rear - item.LENGTH - item.WIDTH
+            if dx * a_x + dy * a_y < behind and dx * b_x + dy * b_y < behind:
+                continue
+            if count == MAX_DRAWN:
+                return count
+            _write(item, px, py, place, records, start + count)
+            count += 1
+    return count
+
+
+def _write(item: Any, x: float, y: float, place: int, records: memoryview, row: int) -> None:
+    heading = item.heading
+    if not math.isfinite(heading):
+        raise ValueError(f"{type(item).__name__} {place} of the road has heading {heading}")
+    model, height = _MODELS.get(item.__class__) or _default_appearance(item.__class__)
     shade = getattr(item, "shade", None)
-    if shade is not None:
-        # An obstacle with a grey of its own has no stripes.
-        return MODEL_BOX if model == MODEL_BARRIER else model, height, shade
-    if model == MODEL_MARK:
-        return model, height, OUTLINE
-    return model, height, 185.0 if model == MODEL_BARRIER else index_shade(p.seed, index)
+    if shade is None:
+        shade = OUTLINE if model == MODEL_MARK else 185.0 if model == MODEL_BARRIER else FIRST_INDEXED - place
+    elif model == MODEL_BARRIER:
+        model = MODEL_BOX  # an obstacle with a grey of its own has no stripes
+    action = getattr(item, "action", None)
+    braking = bool(action) and action.get("acceleration", 0.0) < BRAKE_LIGHT_MPS2
+    _RECORD.pack_into(
+        records, row * _RECORD.size,
+        x, y, math.cos(heading), math.sin(heading), item.LENGTH, item.WIDTH, getattr(item, "HEIGHT", height),
+        shade, braking, model, MAX_RANGE, getattr(item, "speed", 0.0),
+    )  # fmt: skip
+
+
+@exact_kernel
+def choose_objects(lens, mount, objects, count, chosen):
+    """Copy the objects in front of a lens and in range; returns their number.
+
+    Args:
+        lens: `LENS` record.
+        mount: `MOUNT` record, for `box` and `seed`.
+        objects: `OBJECT` records.
+        count: Number of objects.
+        chosen: `OBJECT` records to write, with the model and the grey that are drawn.
+    """
+    n = 0
+    for i in range(count):
+        dx, dy = objects[i].x - lens.x, objects[i].y - lens.y
+        ahead = dx * lens.cos_yaw + dy * lens.sin_yaw
+        if ahead <= -objects[i].length - objects[i].width or dx * dx + dy * dy > MAX_RANGE * MAX_RANGE:
+            continue
+        chosen[n] = objects[i]
+        obj = chosen[n]
+        n += 1
+        if obj.model == MODEL_CAR:
+            if mount.box != 0:
+                obj.model = MODEL_BOX
+            elif obj.height > _TALL_M or obj.length > _LONG_M:
+                obj.model, obj.height = MODEL_TRUCK, max(obj.height, _TRUCK_HEIGHT_M)
+        if obj.shade <= FIRST_INDEXED:
+            obj.shade = index_shade(mount.seed, FIRST_INDEXED - obj.shade)
+    return n
 
 
 def _default_appearance(cls: type) -> tuple[int, float]:
@@ -151,7 +162,8 @@ def _default_appearance(cls: type) -> tuple[int, float]:
     return model
 
 
-def index_shade(seed: int, index: int) -> float:
+@exact_kernel
+def index_shade(seed, index):
     """Return the grey of the index-th vehicle: 30 to 225, evenly spread, the same in every process."""
     # Golden-ratio steps: neighbours in the list differ, and any few cover dark to light.
     return 30.0 + 195.0 * ((0.29 + 0.6180339887498949 * index + 0.7548776662466927 * seed) % 1.0)

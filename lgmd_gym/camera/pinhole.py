@@ -6,12 +6,9 @@ Pixels: u to the right, v down. (0, 0) is the outer corner of the top left pixel
 column <= u < column + 1 and row <= v < row + 1.
 """
 
-import math
 from typing import Any
 
 import numpy as np
-
-from lgmd_gym.camera.pose import CameraPose
 
 LENS = np.dtype(
     [
@@ -23,13 +20,6 @@ LENS = np.dtype(
     ]
 )
 """A posed lens, as the kernels read it: position [m], angles [rad], focal length and image centre [px]."""
-
-
-def lens_values(pose: CameraPose, focal_px: float, shape: tuple[int, int]) -> tuple[float, ...]:
-    """Return the values of one `LENS` record."""
-    x, y, z, yaw, pitch = pose
-    turned = (math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch))
-    return (x, y, z, *turned, focal_px, 0.5 * shape[1], 0.5 * shape[0], yaw, pitch)
 
 
 def project(lens: Any, points_m: np.ndarray) -> np.ndarray:

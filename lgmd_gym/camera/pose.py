@@ -1,92 +1,118 @@
 """Pose of a lens on the moving ego car: mount, gaze and motion of the car's body."""
 
 import math
-from typing import Any, NamedTuple
 
+import numpy as np
+
+from lgmd_gym.camera.effects import NOISE_LOG2
 from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.camera.scene import SceneState
+from lgmd_gym.camera.render.jit import exact_kernel
+
+MOUNT = np.dtype(
+    [
+        *((name, np.float64) for name in ("setback", "left", "height", "yaw_deg", "pitch_deg")),
+        *((name, np.float64) for name in ("heave_m", "vibration_deg", "dive_deg", "phase", "shutter_s")),
+        *((name, np.float64) for name in ("focal", "centre_u", "centre_v")),
+        *((name, np.int64) for name in ("path", "noisy", "box", "seed")),
+    ]
+)
+"""How a camera sits on the car and moves with it, as the kernels read it.
+
+The fields of `CameraParams`; phase of the vibrations [turns]; focal length and image centre [px]; 1 for the
+gaze `"path"`, for sensor noise and for `vehicles="box"`.
+"""
 
 _PATH_S = 1.0  # look-ahead time of the gaze "path" [s]
 _PATH_MAX = math.radians(40.0)
 _BODY_HZ = (1.1, 1.9, 3.4)  # bounce, pitch and wheel-hop side band of a sprung body
 
 
-class CameraPose(NamedTuple):
-    """Position of the lens [m], yaw towards +y and pitch upwards [rad]."""
-
-    x: float
-    y: float
-    z: float
-    yaw: float
-    pitch: float
-
-
-def lens_pose(p: CameraParams, scene: SceneState, gaze: tuple[float, float] | None = None) -> CameraPose:
-    """Return the pose of a camera's lens.
-
-    Args:
-        p: Camera parameters.
-        scene: State of the environment.
-        gaze: Turn to the right and upwards on top of the mount [degrees]; replaces the `path` gaze.
-    """
-    ego, heading = scene.ego, scene.heading
-    forward = 0.5 * ego.LENGTH - p.mount_setback
-    c, s = math.cos(heading), math.sin(heading)
-    x, y = scene.x + forward * c + p.mount_left * s, scene.y + forward * s - p.mount_left * c
-    z = p.mount_height
-    if p.heave_m > 0.0:
-        z = max(z + _vibration(p.heave_m, p.seed, scene, 0.61), 0.1 * z)  # above the ground
-    yaw, pitch = p.yaw_deg, p.pitch_deg
-    if gaze is not None:
-        yaw, pitch = yaw + gaze[0], pitch + gaze[1]
-    elif p.gaze == "path":
-        yaw += math.degrees(_path_yaw(ego))
-    return CameraPose(x, y, z, heading + math.radians(yaw), math.radians(pitch) + _body_pitch(p, scene))
-
-
-def earlier(scene: SceneState, ago_s: float) -> SceneState:
-    """Return the scene with the ego moved back along its present circle by `ago_s` [s]."""
-    slip, rate = _slip_and_yaw_rate(scene.ego)
-    distance, course = scene.ego.speed * ago_s, scene.heading + slip - 0.5 * rate * ago_s
-    return scene._replace(
-        x=scene.x - distance * math.cos(course),
-        y=scene.y - distance * math.sin(course),
-        heading=scene.heading - rate * ago_s,
-        time_s=scene.time_s - ago_s,
+def mount_of(p: CameraParams) -> np.ndarray:
+    """Return the `MOUNT` record of a camera, shape ()."""
+    height, width = p.shape
+    values = (
+        *(p.mount_setback, p.mount_left, p.mount_height, p.yaw_deg, p.pitch_deg),
+        *(p.heave_m, p.vibration_deg, p.dive_deg, 0.1 * (p.seed % 10), p.shutter_s),
+        *(p.focal_px, 0.5 * width, 0.5 * height),
+        *(p.gaze == "path", p.shot_noise > 0.0 or p.read_noise > 0.0, p.vehicles == "box", p.seed),
     )
+    return np.array(values, dtype=MOUNT)
 
 
-def _slip_and_yaw_rate(ego: Any) -> tuple[float, float]:
+@exact_kernel
+def _slip_and_yaw_rate(scene):
     """Return slip angle [rad] and yaw rate [rad/s] of highway-env's kinematic bicycle."""
-    steering = (getattr(ego, "action", None) or {}).get("steering", 0.0)
-    slip = math.atan(0.5 * math.tan(steering))
-    return slip, ego.speed * math.sin(slip) / (0.5 * ego.LENGTH)
+    slip = math.atan(0.5 * math.tan(scene.steering))
+    return slip, scene.speed * math.sin(slip) / (0.5 * scene.length)
 
 
-def _path_yaw(ego: Any) -> float:
+@exact_kernel
+def _path_yaw(scene):
     """Return the direction, relative to the heading, of the ego's position in one second [rad]."""
-    slip, rate = _slip_and_yaw_rate(ego)
+    slip, rate = _slip_and_yaw_rate(scene)
     return max(-_PATH_MAX, min(_PATH_MAX, slip + 0.5 * (rate * _PATH_S)))
 
 
-def _body_pitch(p: CameraParams, scene: SceneState) -> float:
-    """Return the upward pitch of the car's body due to an uneven road and braking [rad]."""
-    pitch = 0.0
-    if p.vibration_deg > 0.0:
-        pitch += _vibration(p.vibration_deg, p.seed, scene, 0.37)
-    if p.dive_deg > 0.0:
-        demand = (getattr(scene.ego, "action", None) or {}).get("acceleration", 0.0)
-        pitch += p.dive_deg * max(-12.0, min(6.0, float(demand)))
-    return math.radians(pitch)
-
-
-def _vibration(rms: float, seed: int, scene: SceneState, shift: float) -> float:
+@exact_kernel
+def _vibration(rms, phase, scene, time_s, shift):
     """Return the sum of the body's natural vibrations, RMS `rms` at 14 m/s; `shift` offsets the phases.
 
     The spectrum of a road's height falls with the square of the spatial frequency (ISO 8608). The variance
     above the body's frequency is therefore proportional to the speed, and the RMS to its square root.
     """
-    rms = rms * math.sqrt(min(abs(float(scene.ego.speed)), 60.0) / 14.0)
-    phase = 0.1 * (seed % 10)
-    turns = (hz * scene.time_s + shift * k + phase for k, hz in enumerate(_BODY_HZ))
-    return rms * math.sqrt(2.0 / 3.0) * sum(math.sin(2.0 * math.pi * turn) for turn in turns)
+    rms = rms * math.sqrt(min(abs(scene.speed), 60.0) / 14.0)
+    total = 0.0
+    for k in range(len(_BODY_HZ)):
+        total += math.sin(2.0 * math.pi * (_BODY_HZ[k] * time_s + shift * k + phase))
+    return rms * math.sqrt(2.0 / 3.0) * total
+
+
+@exact_kernel
+def _body_pitch(mount, scene, time_s):
+    """Return the upward pitch of the car's body due to an uneven road and braking [rad]."""
+    pitch = 0.0
+    if mount.vibration_deg > 0.0:
+        pitch += _vibration(mount.vibration_deg, mount.phase, scene, time_s, 0.37)
+    if mount.dive_deg > 0.0:
+        pitch += mount.dive_deg * max(-12.0, min(6.0, scene.acceleration))
+    return math.radians(pitch)
+
+
+@exact_kernel
+def pose_lens(mount, scene, ago_s, lens):
+    """Write the pose of a camera's lens to a `LENS` record.
+
+    Args:
+        mount: `MOUNT` record.
+        scene: `SCENE` record.
+        ago_s: Time before the scene, at which the ego was on its present circle [s].
+        lens: Record to write.
+    """
+    x, y, heading, time_s = scene.x, scene.y, scene.heading, scene.time_s
+    if ago_s > 0.0:
+        slip, rate = _slip_and_yaw_rate(scene)
+        distance, course = scene.speed * ago_s, heading + slip - 0.5 * rate * ago_s
+        x, y = x - distance * math.cos(course), y - distance * math.sin(course)
+        heading, time_s = heading - rate * ago_s, time_s - ago_s
+    forward = 0.5 * scene.length - mount.setback
+    c, s = math.cos(heading), math.sin(heading)
+    z = mount.height
+    if mount.heave_m > 0.0:
+        # Above the ground.
+        z = max(z + _vibration(mount.heave_m, mount.phase, scene, time_s, 0.61), 0.1 * z)
+    yaw_deg = mount.yaw_deg
+    if mount.path != 0:
+        yaw_deg += math.degrees(_path_yaw(scene))
+    yaw = heading + math.radians(yaw_deg)
+    pitch = math.radians(mount.pitch_deg) + _body_pitch(mount, scene, time_s)
+    lens.x, lens.y, lens.z = x + forward * c + mount.left * s, y + forward * s - mount.left * c, z
+    lens.cos_yaw, lens.sin_yaw = math.cos(yaw), math.sin(yaw)
+    lens.cos_pitch, lens.sin_pitch = math.cos(pitch), math.sin(pitch)
+    lens.focal, lens.centre_u, lens.centre_v = mount.focal, mount.centre_u, mount.centre_v
+    lens.yaw, lens.pitch = yaw, pitch
+
+
+@exact_kernel
+def noise_start(mount, scene, lens):
+    """Return the index of a frame's first number in the noise table, a function of seed and road state."""
+    return hash((mount.seed, scene.steps, lens.x, lens.y, lens.yaw)) & ((1 << NOISE_LOG2) - 1)

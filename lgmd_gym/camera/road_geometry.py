@@ -50,12 +50,12 @@ def road_geometry(road: Any, roadside: float = 0.0, seed: int = 0, rail: bool = 
     """Return the geometry of a road's network, cached for the lifetime of the network.
 
     Args:
-        road: The highway-env `Road`.
+        road: The highway-env `Road` or its `RoadNetwork`.
         roadside: Density of posts and trees, as a multiple of the natural density.
         seed: Seed of their positions.
         rail: Whether guard rails run along the outer edges.
     """
-    network = getattr(road, "network", None)
+    network = network_of(road)
     key = (roadside, seed, rail)
     if network is None:
         return _extract([], *key)
@@ -66,6 +66,11 @@ def road_geometry(road: Any, roadside: float = 0.0, seed: int = 0, rail: bool = 
     if key not in known:
         known[key] = _extract(_lanes(network), *key)
     return known[key]
+
+
+def network_of(road: Any) -> Any:
+    """Return the network of a highway-env `Road`, or None; a `RoadNetwork` is returned as it is."""
+    return road if hasattr(road, "graph") else getattr(road, "network", None)
 
 
 def _lanes(network: Any) -> list[Any]:

@@ -113,13 +113,33 @@ class LGMD:
         if frame.dtype != self._previous.dtype:
             frame = self._as_float(frame)
         frames = frame[None] if self.num is None else frame
-        arguments = (self._previous, self._y0, self._x0, self._weight, selected, self._scalars, self._const)
-        kernel = cast(Any, kernels if self._fast else general_kernel).step
         if self._threads.count == 1:
-            kernel(0, self._count, frames, *arguments, *self._maps)
+            self.step_range(0, self._count, frames, selected)
         else:
-            self._threads.run(kernel, self._count, (frames, *arguments, *self._maps))
+            self._threads.run(self.step_range, self._count, (frames, selected))
         return self._response()
+
+    def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
+        """Step the active neurons among first..last-1, without a check of the arguments.
+
+        Threads may step disjoint ranges at once.
+
+        Args:
+            first: First neuron.
+            last: Last neuron + 1.
+            frames: Frames of all N neurons, contiguous uint8, shape (N, H, W).
+            active: Selection of the neurons to step, bool, shape (N,).
+        """
+        kernel = cast(Any, kernels if self._fast else general_kernel).step
+        kernel(
+            first, last, frames, self._previous, self._y0, self._x0, self._weight, active, self._scalars,
+            self._const, *self._maps,
+        )  # fmt: skip
+
+    @property
+    def outputs(self) -> NDArray[np.float64]:
+        """View of the last outputs: the fields of `Response` in order, shape (N, 8)."""
+        return self._scalars[:, RESPONSE]
 
     def reset(self, mask: ArrayLike | None = None) -> None:
         """Return to the state before the first frame.

@@ -1,82 +1,54 @@
 """SensorArray: the cameras and neurons of one or more environments."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Mapping
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
-from lgmd_gym.camera import BIRDSEYE, BirdsEye, CameraItem, CameraParams, CameraRig, CameraSpec, EgoCamera
-from lgmd_gym.neuron import LGMD, LGMDParams, Response
-
-Camera: TypeAlias = EgoCamera | BirdsEye
-
-
-def make_cameras(camera: CameraSpec) -> dict[str, Camera]:
-    """Return cameras by name.
-
-    Args:
-        camera: A preset name, "birdseye", `CameraParams`, a mapping of its fields, or a sequence of these.
-
-    Raises:
-        ValueError: For an unknown preset, an empty sequence, or a repeated name.
-    """
-    several = isinstance(camera, Sequence) and not isinstance(camera, str)
-    items: Sequence[CameraItem] = camera if several else [camera]  # type: ignore[assignment, list-item]
-    if not items:
-        raise ValueError(f"camera must have at least one element, got {camera!r}; use camera='fovea'")
-    cameras: dict[str, Camera] = {}
-    for item in items:
-        name, built = _make_camera(item)
-        if name in cameras:
-            raise ValueError(f"camera names must be unique, got {name!r} twice; rename one of them")
-        cameras[name] = built
-    return cameras
-
-
-def _make_camera(item: CameraItem) -> tuple[str, Camera]:
-    if item == BIRDSEYE:
-        return BIRDSEYE, BirdsEye()
-    if isinstance(item, Mapping) and item.get("name") == BIRDSEYE:
-        return BIRDSEYE, BirdsEye(**{key: value for key, value in item.items() if key != "name"})
-    params = CameraParams.make(item)
-    return params.name, EgoCamera(params)
-
-
-def _with_fields(camera: Camera, fields: dict[str, Any]) -> Camera:
-    """Return an `EgoCamera` with changed fields; other cameras are returned unchanged."""
-    if not isinstance(camera, EgoCamera) or not fields:
-        return camera
-    return EgoCamera(camera.params, **fields)
-
-
-class _ShapeGroup(NamedTuple):
-    """Cameras with the same frame shape, whose neurons are stepped in one call.
-
-    Attributes:
-        neuron: num_envs * len(members) neurons, ordered by environment, then by camera.
-        members: Indices of the cameras.
-    """
-
-    neuron: LGMD
-    members: list[int]
+from lgmd_gym.camera import BirdsEye, CameraParams, CameraSpec, EgoCamera
+from lgmd_gym.camera.road_pool import RoadPool
+from lgmd_gym.camera.world import World
+from lgmd_gym.neuron import LGMDParams, Response
+from lgmd_gym.neuron.threads import Threads
+from lgmd_gym.sensing.cameras import Variants, make_cameras
+from lgmd_gym.sensing.sensor_group import SensorGroup
 
 
 class SensorArray:
     """Cameras of one or more environments, each with its own neuron.
+
+    A frame of an environment takes two steps. First its state is written: by `read` for a highway-env
+    environment, or by a caller that fills `scenes`, `objects` and `object_counts` itself and calls `set_road`
+    after a change of the road. Then `process` or `step` draws the frames and steps the neurons, in compiled
+    code without the GIL; `responses` and `frames` hold the results.
 
     Args:
         camera: Cameras of every environment, see `make_cameras`.
         fps: Camera frame rate [Hz].
         params: Parameters of the neurons.
         num_envs: Number of environments.
-        threads: Number of threads of a step; None for the calling thread only.
+        threads: Number of threads of `step`; None for the calling thread only.
 
     Attributes:
-        cameras: Per environment, the cameras by name.
+        num_envs: Number of environments.
         names: Names of the cameras.
         shapes: Frame shapes (height, width) of the cameras [px].
+        scenes: `SCENE` records, shape (num_envs,).
+        objects: `OBJECT` records, shape (num_envs, 512): vehicles, obstacles and marks of each environment in
+            the order of `road.vehicles`, then `road.objects`, without the ego and the roadside. Vehicles of
+            any size are of `MODEL_CAR`; an obstacle with a grey of its own is of `MODEL_BOX`; `range` is
+            `MAX_RANGE`.
+        object_counts: Number of objects, int64, shape (num_envs,).
+        enabled: Cameras in use, bool, shape (num_envs, cameras), initially all. A camera that is not enabled
+            is neither drawn nor stepped and keeps its last outputs. Its neuron is reset before the first
+            frame after a pause.
+        frames: The last frames, one array per frame shape, uint8, shape (num_envs, cameras of that shape,
+            height, width); see `frame_of`.
+        responses: The last outputs of the neurons, arrays of shape (num_envs, cameras), updated in place.
     """
+
+    responses: Response
 
     def __init__(
         self,
@@ -87,79 +59,136 @@ class SensorArray:
         threads: int | None = None,
     ) -> None:
         self.num_envs = num_envs
-        self.cameras = [make_cameras(camera) for _ in range(num_envs)]
-        self._base_cameras = [dict(cameras) for cameras in self.cameras]
-        self._applied_fields: list[dict[str, Any]] = [{}] * num_envs
-        self._rigs = [CameraRig(list(cameras.values())) for cameras in self.cameras]
-        self.names = list(self.cameras[0])
-        self.shapes = [camera.shape for camera in self.cameras[0].values()]
+        cameras = make_cameras(camera)
+        self.names = list(cameras)
+        self.shapes = [item.shape for item in cameras.values()]
+        self._top_views = [
+            {k: item for k, item in enumerate(made.values()) if isinstance(item, BirdsEye)}
+            for made in (cameras, *(make_cameras(camera) for _ in range(num_envs - 1)))
+        ]
+        self._variants = Variants(list(cameras.values()))
+        unchanged, _ = self._variants.make({})
+        self._used_variants = [unchanged] * num_envs
+        self._textures: list[float | None] = [None] * num_envs
+        self._fields: list[dict[str, Any]] = [{}] * num_envs
+        size = num_envs, len(self.names)
+        self._world, self._roads = World(num_envs), RoadPool(*size)
+        self.enabled = np.ones(size, np.bool_)
+        self._stale = np.zeros(size, np.bool_)
+        self._all = np.ones(num_envs, np.bool_)
+        numbers = np.zeros((len(Response._fields), *size))
+        self._outputs = numbers, np.zeros(size, np.int64), np.zeros(size, np.bool_)
+        self._threads = Threads(threads or 1)
         by_shape: dict[tuple[int, int], list[int]] = {}
         for index, shape in enumerate(self.shapes):
             by_shape.setdefault(shape, []).append(index)
         self._groups = [
-            _ShapeGroup(LGMD(shape, fps, params, num_envs * len(members), threads=threads), members)
+            SensorGroup(shape, members, unchanged.params, fps, params, num_envs)
             for shape, members in by_shape.items()
         ]
         # Index of each camera's group, and of the camera in that group.
         self._locations = [
-            next((g, members.index(k)) for g, (_, members) in enumerate(self._groups) if k in members)
+            next((g, group.members.index(k)) for g, group in enumerate(self._groups) if k in group.members)
             for k in range(len(self.names))
         ]
+        self._link()
+        self.reset()
 
-    def empty_frames(self) -> list[np.ndarray]:
-        """Return buffers for one frame of every camera.
-
-        Returns:
-            One array per frame shape, uint8, shape (num_envs, cameras of that shape, height, width).
-        """
+    @property
+    def cameras(self) -> list[dict[str, EgoCamera | BirdsEye]]:
+        """Per environment, the cameras by name, posed as in their last frames."""
         return [
-            np.zeros((self.num_envs, len(members), *neuron.shape), np.uint8)
-            for neuron, members in self._groups
+            {name: self._camera(k, index) for k, name in enumerate(self.names)}
+            for index in range(self.num_envs)
         ]
 
-    def apply_camera_fields(self, env: gym.Env, index: int = 0) -> None:
-        """Apply `env.unwrapped.camera_fields`, if present, to the cameras of environment `index`.
-
-        The attribute maps fields of `CameraParams`, and optionally `condition`, to values. Call this method
-        after each reset.
-        """
-        fields: dict[str, Any] = getattr(env.unwrapped, "camera_fields", None) or {}
-        if fields != self._applied_fields[index]:
-            self._applied_fields[index] = dict(fields)
-            base = self._base_cameras[index]
-            self.cameras[index] = {name: _with_fields(camera, fields) for name, camera in base.items()}
-            self._rigs[index] = CameraRig(list(self.cameras[index].values()))
-
-    def render(self, env: gym.Env, frames: list[np.ndarray], index: int = 0) -> None:
-        """Render all cameras of environment `index` into `frames`, see `empty_frames`."""
-        self._rigs[index].render(env, [frames[group][index, row] for group, row in self._locations])
-
-    def step(self, frames: list[np.ndarray], active: np.ndarray | None = None) -> Response:
-        """Step the neurons.
+    def read(self, env: gym.Env, index: int = 0) -> None:
+        """Read the present state of a highway-env environment, and render its top views.
 
         Args:
-            frames: Frames in the layout of `empty_frames`.
-            active: Selection of the environments with a new frame, bool, shape (num_envs,); None for all.
-                The neurons of other environments keep their outputs.
+            env: The environment, wrapped or not, after its first reset.
+            index: Index of the environment.
 
-        Returns:
-            Arrays of shape (num_envs, cameras).
+        Raises:
+            ValueError: If the environment has no road or ego yet, or a pose is not finite.
         """
-        responses: list[Response] = []
-        for (neuron, members), batch in zip(self._groups, frames, strict=True):
-            selected = None if active is None else np.repeat(active, len(members))
-            responses.append(neuron.step(batch.reshape(-1, *neuron.shape), selected))
-        return self._in_camera_order(responses)
+        variant = self._used_variants[index]
+        ego = self._world.read(env, variant.view, index)
+        self._roads.assign(index, ego.road, variant.road_keys)
+        for camera, top_view in self._top_views[index].items():
+            if self.enabled[index, camera]:
+                top_view.render(env, self.frame_of(camera, index))
+
+    def set_road(self, index: int, road: Any) -> None:
+        """Set the road of environment `index`, a highway-env `Road` or `RoadNetwork`.
+
+        A call with the same network as before returns at once: a network must not change. One thread at a
+        time may call this method and `set_camera_fields`, also while others process other environments.
+        """
+        self._roads.assign(index, road, self._used_variants[index].road_keys)
+
+    def set_camera_fields(self, index: int, fields: Mapping[str, Any] | None) -> None:
+        """Change the cameras of environment `index` relative to the `camera` argument.
+
+        Args:
+            index: Index of the environment.
+            fields: Fields of `CameraParams`, and optionally `condition`; None or empty for no change.
+
+        Raises:
+            ValueError: If a field is unknown or out of range, or changes the shape of a camera.
+        """
+        fields = fields or {}
+        if fields == self._fields[index]:
+            return
+        variant, texture = self._variants.make(fields)
+        for (group, member), p in zip(self._locations, variant.params, strict=True):
+            if p is not None:
+                self._groups[group].batch.set_params(index, member, p, texture)
+        self._used_variants[index], self._textures[index] = variant, texture
+        self._fields[index] = dict(fields)
+        self._roads.reassign(index, variant.road_keys)
+
+    def process(self, first: int, last: int, active: np.ndarray | None = None) -> None:
+        """Draw and process one frame of every enabled camera of the environments first..last-1.
+
+        Threads may process disjoint ranges at once.
+
+        Args:
+            first: First environment.
+            last: Last environment + 1.
+            active: Selection of the environments with a new frame, bool, shape (num_envs,); None for all. The
+                others keep their frames and outputs.
+        """
+        active = self._all if active is None else active
+        for group in self._groups:
+            if group.select(first, last, active, self.enabled, self._stale):
+                group.process(first, last, self._world.arrays, self._roads.arrays, self._outputs)
+
+    def step(self, active: np.ndarray | None = None) -> None:
+        """Process all environments like `process`, on `threads` threads."""
+        if self._threads.count == 1:
+            self.process(0, self.num_envs, active)
+        else:
+            self._threads.run(self.process, self.num_envs, (active,))
 
     def reset(self, mask: np.ndarray | None = None) -> None:
-        """Reset the neurons of selected environments, bool, shape (num_envs,); None for all."""
-        for neuron, members in self._groups:
-            neuron.reset(None if mask is None else np.repeat(mask, len(members)))
+        """Reset the neurons of selected environments, bool, shape (num_envs,); None for all.
 
-    def frame_of(self, frames: list[np.ndarray], camera: int, index: int = 0) -> np.ndarray:
-        """Return a view of the frame of one camera of environment `index`, uint8, shape (height, width)."""
+        Threads may reset disjoint selections at once.
+        """
+        mask = self._all if mask is None else mask
+        self._stale[mask] = False
+        for group in self._groups:
+            group.reset(mask, self._outputs)
+
+    def frame_of(self, camera: int, index: int = 0) -> np.ndarray:
+        """Return a view of the last frame of one camera of environment `index`, uint8, (height, width)."""
         group, row = self._locations[camera]
-        return frames[group][index, row]
+        return self._groups[group].frames[index, row]
+
+    def response_of(self, index: int = 0) -> Response:
+        """Return a copy of the last outputs of environment `index`, arrays of shape (cameras,)."""
+        return Response(*(field[index].copy() for field in self.responses))
 
     def layers(self, camera: int = 0) -> dict[str, np.ndarray]:
         """Return the layer maps of one camera's last frame in the first environment."""
@@ -168,19 +197,31 @@ class SensorArray:
 
     def close(self) -> None:
         """Close the cameras that hold resources."""
-        for cameras in self.cameras:
-            for camera in cameras.values():
-                if isinstance(camera, BirdsEye):
-                    camera.close()
+        for top_views in self._top_views:
+            for top_view in top_views.values():
+                top_view.close()
 
-    def _in_camera_order(self, responses: list[Response]) -> Response:
-        """Concatenate the responses of the groups in the order of the cameras."""
-        if len(responses) == 1:
-            return Response(*(field.reshape(self.num_envs, -1) for field in responses[0]))
-        order = np.argsort([member for _, members in self._groups for member in members])
-        return Response(
-            *(
-                np.concatenate([np.reshape(part, (self.num_envs, -1)) for part in field], axis=1)[:, order]
-                for field in zip(*responses, strict=True)
-            )
-        )
+    def _camera(self, camera: int, index: int) -> EgoCamera | BirdsEye:
+        p, texture = self._used_variants[index].params[camera], self._textures[index]
+        if p is None:
+            return self._top_views[index][camera]
+        group, row = self._locations[camera]
+        posed = EgoCamera(p if texture is None else CameraParams.make(p, texture=texture))
+        posed.set_lens(self._groups[group].batch.lenses[index, row, 0])
+        return posed
+
+    def _link(self) -> None:
+        """Name the arrays that belong to others."""
+        self.scenes, self.objects, self.object_counts = self._world.arrays
+        self.frames = [group.frames for group in self._groups]
+        numbers, spikes, alerts = self._outputs
+        fields = dict(zip(Response._fields, numbers, strict=True))
+        self.responses = Response(**fields | {"spikes": spikes, "alert": alerts})
+
+    def __getstate__(self) -> dict[str, Any]:
+        linked = ("scenes", "objects", "object_counts", "frames", "responses")
+        return {name: value for name, value in self.__dict__.items() if name not in linked}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._link()

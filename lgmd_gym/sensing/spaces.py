@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from lgmd_gym.neuron import LGMDParams, Response
+from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.sensing.sensor_array import SensorArray
 
 SPEED_BOUND = 100.0  # [m/s], above highway-env's limit of 40 m/s
@@ -56,19 +56,34 @@ def make_space(
     return spaces.Dict(parts)
 
 
-def signal_arrays(response: Response, index: int) -> dict[str, np.ndarray]:
-    """Return the signals of environment `index`, each float32 of shape (cameras,)."""
-    return {name: getattr(response, name)[index].astype(np.float32) for name in SIGNALS}
+def make_observation(
+    sensors: SensorArray, index: int, speed: float, yaw_rate: float, include_frame: bool
+) -> dict[str, Any]:
+    """Return the observation of environment `index` as new arrays, without the key ``base``.
+
+    Args:
+        sensors: The cameras and neurons.
+        index: Index of the environment.
+        speed: Ego speed [m/s].
+        yaw_rate: Mean yaw rate of the decision [rad/s].
+        include_frame: Whether to include the frames.
+    """
+    responses = sensors.responses
+    observation = {
+        "spike_frequency": responses.spike_frequency[index].astype(np.float32),
+        "membrane_potential": responses.membrane_potential[index].astype(np.float32),
+        "ffi": responses.ffi[index].astype(np.float32),
+        "ego_speed": np.array([speed], dtype=np.float32),
+        "ego_yaw_rate": np.array([yaw_rate], dtype=np.float32),
+    }
+    if include_frame:  # all cameras have the same shape
+        observation["frame"] = sensors.frames[0][index].transpose(1, 2, 0).copy()
+    return observation
 
 
-def signal_info(response: Response, index: int, names: list[str]) -> dict[str, Any]:
-    """Return the `lgmd/` keys of the info of environment `index`."""
-    info: dict[str, Any] = {}
-    for name in SIGNALS:
-        for camera, value in zip(names, getattr(response, name)[index], strict=True):
-            info[f"lgmd/{camera}/{name}"] = float(value)
-    info["lgmd/alert"] = bool(response.alert[index].any())
-    return info
+def signal_keys(names: list[str]) -> dict[str, list[str]]:
+    """Return the info keys of the cameras, by signal."""
+    return {signal: [f"lgmd/{camera}/{signal}" for camera in names] for signal in SIGNALS}
 
 
 def yaw_rate(heading: float, previous: float, elapsed: float) -> float:

@@ -13,7 +13,7 @@ from lgmd_gym.neuron import LGMDParams, NeuronSpec, Response
 from lgmd_gym.sensing.frame_rate import camera_rate
 from lgmd_gym.sensing.road_hook import check_highway_env, on_road_step
 from lgmd_gym.sensing.sensor_array import SensorArray
-from lgmd_gym.sensing.spaces import make_space, signal_arrays, signal_info, yaw_rate
+from lgmd_gym.sensing.spaces import make_observation, make_space, signal_keys, yaw_rate
 
 
 class TraceFrame(NamedTuple):
@@ -111,7 +111,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self.camera = camera
         self.include_frame, self.include_base, self.trace = include_frame, include_base, trace
         self._requested_fps = fps
-        self._last_response: Response | None = None
+        self._was_reset = False
         self._trace_frames: list[TraceFrame] = []
         self._substeps, self._heading = 0, 0.0
         self.rendering_paused = False
@@ -125,9 +125,10 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         if self._highway_env.config["simulation_frequency"] != self._simulation_frequency:
             self._build_sensors()
         self.sensors.reset()
-        self.sensors.apply_camera_fields(self._highway_env)
+        self.sensors.set_camera_fields(0, getattr(self._highway_env, "camera_fields", None))
         on_road_step(self.env, self._on_substep)
         self._substeps, self._trace_frames, self.rendering_paused = 0, [], False
+        self._was_reset = True
         self._process_frame()
         self._heading = float(self._highway_env.vehicle.heading)
         return self._observation(base, 0.0), self._extend_info(info)
@@ -149,14 +150,12 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     @property
     def frames(self) -> dict[str, np.ndarray]:
         """The last frame of each camera, uint8 (height, width); the next frame overwrites it."""
-        return {
-            name: self.sensors.frame_of(self._frames, index) for index, name in enumerate(self.sensors.names)
-        }
+        return {name: self.sensors.frame_of(index) for index, name in enumerate(self.sensors.names)}
 
     @property
     def response(self) -> Response:
         """Outputs of the neurons for the last camera frame, arrays of shape (cameras,)."""
-        return Response(*(field[0] for field in self._batched_response()))
+        return self.sensors.response_of()
 
     @property
     def _highway_env(self) -> Any:
@@ -168,7 +167,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self.fps = camera_rate(self._requested_fps, self._simulation_frequency)
         self._stride = round(self._simulation_frequency / self.fps)
         self.sensors = SensorArray(self.camera, self.fps, self.params)
-        self._frames = self.sensors.empty_frames()
+        self._info_keys = signal_keys(self.sensors.names)
         base = self.env.observation_space if self.include_base else None
         self.observation_space = make_space(
             self.sensors, self.params, self.fps, self._simulation_frequency, self.include_frame, base
@@ -182,31 +181,28 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     def _process_frame(self) -> None:
         if self.rendering_paused:
             return
-        self.sensors.render(self._highway_env, self._frames)
-        self._last_response = self.sensors.step(self._frames)
+        self.sensors.read(self._highway_env)
+        self.sensors.process(0, 1)
         if self.trace:
             time = self._substeps / self._simulation_frequency
             speed = float(self._highway_env.vehicle.speed)
             self._trace_frames.append(TraceFrame(time, speed, self.response))
 
-    def _batched_response(self) -> Response:
-        """Return the last response, arrays of shape (1, cameras)."""
-        if self._last_response is None:
-            raise RuntimeError("reset must be called before step")
-        return self._last_response
-
     def _observation(self, base: Any, rate: float) -> dict[str, Any]:
-        observation: dict[str, Any] = dict(signal_arrays(self._batched_response(), 0))
-        observation["ego_speed"] = np.array([self._highway_env.vehicle.speed], dtype=np.float32)
-        observation["ego_yaw_rate"] = np.array([rate], dtype=np.float32)
-        if self.include_frame:
-            observation["frame"] = np.stack(list(self.frames.values()), axis=-1)
+        if not self._was_reset:
+            raise RuntimeError("reset must be called before step")
+        speed = float(self._highway_env.vehicle.speed)
+        observation = make_observation(self.sensors, 0, speed, rate, self.include_frame)
         if self.include_base:
             observation["base"] = base
         return observation
 
     def _extend_info(self, info: dict[str, Any]) -> dict[str, Any]:
-        info = info | signal_info(self._batched_response(), 0, self.sensors.names)
+        info = dict(info)
+        responses = self.sensors.responses
+        for signal, keys in self._info_keys.items():
+            info.update(zip(keys, getattr(responses, signal)[0].tolist(), strict=True))
+        info["lgmd/alert"] = bool(responses.alert[0].any())
         if self.trace:
             info["lgmd/trace"] = self._trace_frames
         return info

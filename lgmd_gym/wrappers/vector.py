@@ -9,11 +9,11 @@ from gymnasium.vector.utils import batch_space
 
 from lgmd_gym.camera import CameraSpec
 from lgmd_gym.neuron import LGMDParams, NeuronSpec, Response
-from lgmd_gym.sensing.frame_buffer import EgoMotion, FrameBuffer, FrameRecorder
 from lgmd_gym.sensing.frame_rate import camera_rate
+from lgmd_gym.sensing.frame_recorder import FrameRecorder
 from lgmd_gym.sensing.road_hook import check_highway_env
 from lgmd_gym.sensing.sensor_array import SensorArray
-from lgmd_gym.sensing.spaces import SIGNALS, make_space, signal_arrays
+from lgmd_gym.sensing.spaces import make_observation, make_space, signal_keys
 from lgmd_gym.wrappers.observation import LGMDObservation as SingleObservation
 
 
@@ -21,9 +21,9 @@ class LGMDObservation(VectorWrapper):
     """Observe LGMD neurons, one per environment and camera, that are stepped together.
 
     Observation space and ``lgmd/`` info keys are those of `lgmd_gym.LGMDObservation`, batched and without
-    ``lgmd/trace``. The environments are stepped one after the other into a frame buffer; each frame index of
-    the decision is then one batched neuron step. All autoreset modes are supported. In SAME_STEP mode,
-    ``final_obs`` and ``final_info`` hold the outputs before the reset.
+    ``lgmd/trace``. The environments are stepped one after the other; the last frames of their decisions are
+    then drawn and processed together. All autoreset modes are supported. In SAME_STEP mode, ``final_obs`` and
+    ``final_info`` hold the outputs before the reset.
 
     Args:
         env: A `SyncVectorEnv` of highway-env environments without cameras; create environments of this
@@ -33,7 +33,7 @@ class LGMDObservation(VectorWrapper):
         fps: See `lgmd_gym.LGMDObservation`.
         include_frame: See `lgmd_gym.LGMDObservation`.
         include_base: See `lgmd_gym.LGMDObservation`.
-        threads: Number of threads of a neuron step; None for the calling thread only.
+        threads: Number of threads that draw and process the frames; None for the calling thread only.
 
     Raises:
         ValueError: If `env` is not a `SyncVectorEnv`, or its environments are not highway-env environments,
@@ -65,13 +65,14 @@ class LGMDObservation(VectorWrapper):
         self.include_frame, self.include_base = include_frame, include_base
         self.fps = camera_rate(fps, simulation_frequency)
         self.sensors = SensorArray(camera, self.fps, self.params, self.num_envs, threads)
-        self._buffer = FrameBuffer(self.sensors)
+        self._info_keys = signal_keys(self.sensors.names)
+        self._pending = np.zeros(self.num_envs, np.bool_)
         stride = round(simulation_frequency / self.fps)
         self._recorders = [
-            FrameRecorder(single, self._buffer, index, stride) for index, single in enumerate(env.envs)
+            FrameRecorder(single, self.sensors, index, stride, self._pending, include_frame)
+            for index, single in enumerate(env.envs)
         ]
         env.envs[:] = self._recorders
-        self._response = self.sensors.step(self._buffer.reset_frames, np.zeros(self.num_envs, np.bool_))
         base: Any = env.single_observation_space if include_base else None
         self.single_observation_space = make_space(
             self.sensors, self.params, self.fps, simulation_frequency, include_frame, base
@@ -82,88 +83,64 @@ class LGMDObservation(VectorWrapper):
         self, *, seed: Any = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Reset all environments, or those selected by ``options["reset_mask"]``."""
-        self._start_decision()
         base, infos = self.env.reset(seed=seed, options=options)
-        self._process_reset_frames()
-        return self._observation(base), self._extend_infos(infos)
+        self._process_pending()
+        return self._observation(base), infos | self._info_arrays(self.sensors.responses)
 
     def step(self, actions: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Step all environments and process their camera frames."""
-        self._start_decision()
         base, rewards, terminated, truncated, infos = self.env.step(actions)
-        self._process_recorded_frames()
+        self._process_pending()
         if "final_obs" in infos:
             self._extend_final(infos)
-        self._process_reset_frames()
-        return self._observation(base), rewards, terminated, truncated, self._extend_infos(infos)
+        infos = infos | self._info_arrays(self.sensors.responses)
+        return self._observation(base), rewards, terminated, truncated, infos
 
     def close(self, **arguments: Any) -> None:
         """Close the cameras, then the environments."""
         self.sensors.close()
         super().close(**arguments)
 
-    def _start_decision(self) -> None:
-        for recorder in self._recorders:
-            recorder.start_decision()
-
-    def _process_recorded_frames(self) -> None:
-        """Process the frames of the decision: one batched step per frame index."""
-        counts = np.array([recorder.frame_count for recorder in self._recorders])
-        for index in range(counts.max()):
-            self._process(self._buffer.slot(index), index < counts)
-
-    def _process_reset_frames(self) -> None:
-        """Reset the neurons of environments that were reset, and process their first frames."""
-        was_reset = np.array([recorder.was_reset for recorder in self._recorders])
-        if was_reset.any():
-            self.sensors.reset(was_reset)
-            self._process(self._buffer.reset_frames, was_reset)
-
-    def _process(self, frames: list[np.ndarray], active: np.ndarray) -> None:
-        self._response: Response = self.sensors.step(frames, active)
-        if self.include_frame:
-            for last, new in zip(self._buffer.last_frames, frames, strict=True):
-                last[active] = new[active]
+    def _process_pending(self) -> None:
+        self.sensors.step(self._pending)
+        self._pending[:] = False
 
     def _observation(self, base: Any) -> dict[str, Any]:
-        rows = [self._row(index, recorder.motion) for index, recorder in enumerate(self._recorders)]
+        rows = [
+            make_observation(self.sensors, index, *recorder.motion, self.include_frame)
+            for index, recorder in enumerate(self._recorders)
+        ]
         observation: dict[str, Any] = {key: np.stack([row[key] for row in rows]) for key in rows[0]}
         if self.include_base:
             observation["base"] = base
         return observation
 
-    def _row(self, index: int, motion: EgoMotion) -> dict[str, Any]:
-        """Return the observation of one environment, except for the key ``base``."""
-        row: dict[str, Any] = dict(signal_arrays(self._response, index))
-        row["ego_speed"] = np.array([motion.speed], dtype=np.float32)
-        row["ego_yaw_rate"] = np.array([motion.yaw_rate], dtype=np.float32)
-        if self.include_frame:
-            cameras = range(len(self.sensors.names))
-            frames = [self.sensors.frame_of(self._buffer.last_frames, camera, index) for camera in cameras]
-            row["frame"] = np.stack(frames, axis=-1)
-        return row
-
-    def _extend_infos(self, infos: dict[str, Any]) -> dict[str, Any]:
-        return infos | self._info_arrays(np.ones(self.num_envs, dtype=np.bool_))
-
     def _extend_final(self, infos: dict[str, Any]) -> None:
         """Write the outputs at the end of episodes into ``final_obs`` and ``final_info``."""
         ended = infos["_final_obs"]
         for index in np.flatnonzero(ended):
-            final = self._row(int(index), self._recorders[index].final_motion)
+            final = dict(self._recorders[index].final_observation)
             if self.include_base:
                 final["base"] = infos["final_obs"][index]
             infos["final_obs"][index] = final
-        infos["final_info"] |= self._info_arrays(ended)
+        rows = [recorder.final_response for recorder in self._recorders]
+        responses = Response(*(np.stack(field) for field in zip(*rows, strict=True)))
+        infos["final_info"] |= self._info_arrays(responses, ended)
 
-    def _info_arrays(self, valid: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the ``lgmd/`` keys and their masks in the format of Gymnasium's vector infos."""
+    def _info_arrays(self, responses: Response, valid: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """Return the ``lgmd/`` keys and their masks in the format of Gymnasium's vector infos.
+
+        Args:
+            responses: Arrays of shape (num_envs, cameras).
+            valid: Environments with outputs, bool, shape (num_envs,); None for all.
+        """
+        valid = np.ones(self.num_envs, np.bool_) if valid is None else valid
         arrays = {
-            f"lgmd/{camera}/{name}": np.where(valid, getattr(self._response, name)[:, index], 0.0)
-            for name in SIGNALS
-            for index, camera in enumerate(self.sensors.names)
+            key: np.where(valid, getattr(responses, signal)[:, camera], 0.0)
+            for signal, keys in self._info_keys.items()
+            for camera, key in enumerate(keys)
         }
-        arrays["lgmd/alert"] = self._response.alert.any(axis=1) & valid
+        arrays["lgmd/alert"] = responses.alert.any(axis=1) & valid
         return arrays | {f"_{key}": valid.copy() for key in arrays}
 
 

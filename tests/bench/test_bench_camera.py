@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.roads import add_car, straight_env
 
-from lgmd_gym.camera import CONDITIONS, CameraParams, CameraRig, EgoCamera
+from lgmd_gym.camera import CONDITIONS, EgoCamera
 
 pytestmark = pytest.mark.bench
 
@@ -53,18 +53,3 @@ def test_time_added_by_an_option(benchmark, name):
     reference = median_time(lambda: plain.render(env, out), 200)
     benchmark(camera.render, env, out)
     assert benchmark.stats.stats.median < factor * reference
-
-
-def test_rig_is_not_slower_than_its_cameras(benchmark):
-    env = busy_env()
-    cameras = [EgoCamera(CameraParams(name=str(fov), hfov_deg=fov)) for fov in (5, 10, 20, 40)]
-    rig = CameraRig(cameras)
-    outs = rig.render(env)
-
-    def render_separately():
-        for camera, out in zip(cameras, outs, strict=True):
-            camera.render(env, out)
-
-    reference = median_time(render_separately, 50)
-    benchmark(rig.render, env, outs)
-    assert benchmark.stats.stats.median < 1.1 * reference

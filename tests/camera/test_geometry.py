@@ -5,8 +5,6 @@ import pytest
 from support.roads import EGO_LENGTH, add_car, lens_x, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
-from lgmd_gym.camera.pinhole import LENS, lens_values, project
-from lgmd_gym.camera.pose import CameraPose
 from lgmd_gym.camera.render.texture_sampling import distance_ahead
 
 PLAIN = {"texture": 0.0, "roadside": 0.0, "vehicles": "box"}
@@ -126,13 +124,14 @@ def test_point_behind_the_lens_projects_to_nan():
 
 @pytest.mark.parametrize("pitch_deg", [-5.0, 0.0, 5.0])
 def test_distance_of_a_ground_row_agrees_with_projection(pitch_deg):
-    lens = np.zeros(1, LENS)
-    lens[0] = lens_values(CameraPose(3.0, 1.0, 1.2, 0.0, math.radians(pitch_deg)), 138.56, (90, 160))
+    env = straight_env(x=3.0, y=1.0)
+    camera = EgoCamera("wide", pitch_deg=pitch_deg)
+    camera.render(env)
     for row in (65, 75, 89):
-        ahead = distance_ahead(lens[0], row)
-        assert project(lens[0], [3.0 + ahead, 1.0, 0.0]) == pytest.approx((80.0, row + 0.5))
+        ahead = distance_ahead(camera._lens, row)
+        assert camera.project([lens_x(env) + ahead, 1.0, 0.0]) == pytest.approx((80.0, row + 0.5))
     if pitch_deg == 0.0:
-        assert distance_ahead(lens[0], 60) == pytest.approx(1.2 * 138.56 / 15.5)
+        assert distance_ahead(camera._lens, 60) == pytest.approx(1.2 * 138.564 / 15.5)
 
 
 def test_out_is_filled_and_checked():

@@ -149,5 +149,5 @@ def test_coverage_buffers_are_zero_after_each_frame():
         camera = EgoCamera(preset, guard_rail=True)
         for yaw_deg in (-120.0, -35.0, 0.0, 35.0, 120.0):
             camera.render(env, gaze=(yaw_deg, 0.1 * yaw_deg))
-            assert not camera.context.buffers.ground.any()
-            assert not camera.context.buffers.solids.any()
+            assert not camera.buffers.ground.any()
+            assert not camera.buffers.solids.any()

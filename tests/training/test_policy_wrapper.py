@@ -57,8 +57,8 @@ def test_hard_braking_latches_until_the_episode_ends():
 
 
 def test_no_frame_is_rendered_after_the_brake_latches(monkeypatch):
-    calls, render = [], SensorArray.render
-    monkeypatch.setattr(SensorArray, "render", lambda *arguments: (calls.append(1), render(*arguments)))
+    calls, process = [], SensorArray.process
+    monkeypatch.setattr(SensorArray, "process", lambda *arguments: (calls.append(1), process(*arguments)))
     env = PolicyWrapper(gym.make("LGMD/CCRs-v0"), inputs=["ego_speed"], latch=True)
     for _ in range(2):
         calls.clear()

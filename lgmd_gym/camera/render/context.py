@@ -1,100 +1,128 @@
-"""RenderContext: the tables and buffers to draw several cameras of one frame size in one call."""
+"""The kernel that poses and draws the cameras of many environments, and its tables and scratch memory."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from lgmd_gym.camera.effects import beam_profile, look_of, noise_start, noise_table
-from lgmd_gym.camera.objects import ObjectList
+from lgmd_gym.camera.effects import noise_table
+from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, choose_objects
 from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.camera.pinhole import LENS, lens_values
-from lgmd_gym.camera.pose import CameraPose, earlier, lens_pose
-from lgmd_gym.camera.render.buffers import Tables, Views, make_buffers
+from lgmd_gym.camera.pose import noise_start, pose_lens
+from lgmd_gym.camera.render.buffers import Buffers, Tables, Views, make_buffers
+from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.models import all_models
 from lgmd_gym.camera.render.panorama import panorama_table
 from lgmd_gym.camera.render.raster import draw_frames
 from lgmd_gym.camera.render.sky import skyline
 from lgmd_gym.camera.render.texture import ground_texture
-from lgmd_gym.camera.road_geometry import road_geometry
-from lgmd_gym.camera.scene import SceneState
+from lgmd_gym.camera.road_geometry import RoadGeometry
 
 
-def context_key(p: CameraParams) -> tuple[Any, ...]:
-    """Return the parameters that cameras must have in common to share a `RenderContext`."""
-    common = (p.shape, p.seed, p.roadside, p.guard_rail, p.vehicles)
+def tables_key(p: CameraParams) -> tuple[Any, ...]:
+    """Return the parameters that cameras of one frame size must have in common to share `SharedTables`."""
     # The table of a panorama includes light and fog, at the resolution of the lens.
-    return common if p.panorama == "skyline" else (*common, p.panorama, p.light, p.visibility_m, p.focal_px)
+    return (p.seed,) if p.panorama == "skyline" else (p.seed, p.panorama, p.light, p.visibility_m, p.focal_px)
 
 
-class RenderContext:
-    """Tables and buffers for cameras with equal `context_key`.
-
-    Args:
-        cameras: Parameters of the cameras, at least one.
+class SharedTables:
+    """Lookup tables for the cameras with one `tables_key`; copies share the arrays.
 
     Attributes:
-        params: Parameters of the cameras.
-        lenses: `LENS` records at the end and at the start of the exposure, shape (cameras, 2).
-        buffers: `Buffers`; `image` is the light of the last camera before the sensor.
+        arrays: The fields of `Tables`.
     """
 
-    def __init__(self, cameras: Sequence[CameraParams]) -> None:
-        self.params = tuple(cameras)
-        first, count = self.params[0], len(self.params)
-        self.lenses = np.zeros((count, 2), LENS)
-        self._focal_px = [p.focal_px for p in self.params]
-        self._views = Views(
-            looks=np.stack([look_of(p) for p in self.params]),
-            beams=np.stack([beam_profile(p) for p in self.params]),
-            skies=np.zeros((count, *first.shape), dtype=np.float32),
-            sky_aims=np.full((count, 2), np.nan),
-            noise_starts=np.zeros(count, dtype=np.int64),
+    def __init__(self, p: CameraParams) -> None:
+        self._params = p
+        asphalt, verge = ground_texture("asphalt", p.seed), ground_texture("verge", p.seed)
+        self.arrays = tuple(
+            Tables(
+                asphalt=asphalt.data,
+                verge=verge.data,
+                level_start=asphalt.level_start,
+                skyline=skyline(p.seed),
+                noise=noise_table(p.seed),
+                panorama=panorama_table(p),
+            )
         )
-        asphalt, verge = ground_texture("asphalt", first.seed), ground_texture("verge", first.seed)
-        tables = Tables(
-            asphalt=asphalt.data,
-            verge=verge.data,
-            level_start=asphalt.level_start,
-            skyline=skyline(first.seed),
-            noise=noise_table(first.seed),
-            panorama=panorama_table(first),
-        )
-        self._models = tuple(all_models())
-        self.buffers = make_buffers(first.shape, len(all_models().corners_used))
-        self._plain_views, self._plain_tables = tuple(self._views), tuple(tables)
-        self._plain_buffers = tuple(self.buffers)
-        self._paved = False
 
-    def aim(self, scene: SceneState, gaze: tuple[float, float] | None = None) -> list[CameraPose]:
-        """Pose the lenses in a scene; returns their poses at the end of the exposure."""
-        poses = []
-        for k, (p, focal) in enumerate(zip(self.params, self._focal_px, strict=True)):
-            pose = lens_pose(p, scene, gaze)
-            self.lenses[k, 0] = lens_values(pose, focal, p.shape)
-            poses.append(pose)
-            if p.shutter_s > 0.0:
-                before = lens_pose(p, earlier(scene, p.shutter_s), gaze)
-                self.lenses[k, 1] = lens_values(before, focal, p.shape)
-            if p.shot_noise > 0.0 or p.read_noise > 0.0:
-                start = noise_start(p.seed, scene.steps, pose.x, pose.y, pose.yaw)
-                self._views.noise_starts[k] = start
-        return poses
+    def __deepcopy__(self, memo: dict[int, Any]) -> "SharedTables":
+        return self
 
-    def draw(self, out: np.ndarray, scene: SceneState, objects: ObjectList) -> None:
-        """Draw the scene of the last `aim`.
+    def __reduce__(self) -> tuple[Any, ...]:
+        return SharedTables, (self._params,)
 
-        Args:
-            out: Frames, uint8, shape (cameras, height, width).
-            scene: State of the environment.
-            objects: Objects of the scene.
-        """
-        p = self.params[0]
-        road = road_geometry(scene.road, p.roadside, p.seed, p.guard_rail)
-        if road.paved != self._paved:
-            self._paved = road.paved
-            self._views.looks["paved"] = float(road.paved)
-        draw_frames(
-            out, self.lenses, self._plain_views, road, self._plain_tables, self._models,
-            objects.records, objects.count, self._plain_buffers,
-        )  # fmt: skip
+
+class Workspace:
+    """Scratch memory of one thread for frames of one size.
+
+    Attributes:
+        buffers: `Buffers`; `image` is the light of the last frame before the sensor.
+        arrays: Objects of the frame, `OBJECT` records of shape (512,), and the fields of `buffers`.
+    """
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.buffers: Buffers = make_buffers(shape, len(all_models().corners_used))
+        self.arrays = (np.zeros(MAX_DRAWN, OBJECT), *self.buffers)
+        self._shape = shape
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Workspace, (self._shape,)
+
+
+@kernel
+def draw_cameras(
+    first, last, tables_index, frames, selected, batch, world, roads, views, tables, models, space
+):
+    """Pose and draw the selected cameras of the environments first..last-1.
+
+    Arrays of shape (environments, members, …) hold one row per camera of this frame size.
+
+    Args:
+        first: First environment.
+        last: Last environment + 1.
+        tables_index: Index of `tables`; cameras with other tables are skipped.
+        frames: Frames to draw, uint8, shape (environments, members, height, width).
+        selected: Cameras to draw, bool, shape (environments, members).
+        batch: Index of the tables per camera, int64 (environments, members); camera of each member, int64
+            (members,); `MOUNT` records (environments, members); `LENS` records at the end and at the start
+            of the exposure (environments, members, 2).
+        world: `SCENE` records (environments,); `OBJECT` records (environments, 512) and their number, int64
+            (environments,).
+        roads: The fields of `RoadArrays`.
+        views: The fields of `Views`, with a leading axis for the environments.
+        tables: The fields of `Tables`.
+        models: The fields of `Models`.
+        space: `Workspace.arrays`.
+    """
+    tables_indices, cameras, mounts, lenses = batch
+    scenes, objects, counts = world
+    surface, lines, roadside, spans = roads
+    views = Views(*views)
+    chosen, buffers = space[0], space[1:]
+    for env in range(first, last):
+        scene = scenes[env]
+        for k in range(cameras.shape[0]):
+            if not selected[env, k] or tables_indices[env, k] != tables_index:
+                continue
+            mount, lens, span = mounts[env, k], lenses[env, k, 0], spans[env, cameras[k]]
+            pose_lens(mount, scene, 0.0, lens)
+            if mount.shutter_s > 0.0:
+                pose_lens(mount, scene, mount.shutter_s, lenses[env, k, 1])
+            if mount.noisy != 0:
+                views.noise_starts[env, k] = noise_start(mount, scene, lens)
+            views.looks[env, k].paved = float(span[6])
+            count = choose_objects(lens, mount, objects[env], counts[env], chosen)
+            road = RoadGeometry(
+                surface[span[0] : span[1]],
+                lines[span[2] : span[3]],
+                roadside[span[4] : span[5]],
+                span[6] != 0,
+            )
+            rows = (
+                views.looks[env, k : k + 1], views.beams[env, k : k + 1], views.skies[env, k : k + 1],
+                views.sky_aims[env, k : k + 1], views.noise_starts[env, k : k + 1],
+            )  # fmt: skip
+            draw_frames(
+                frames[env, k : k + 1], lenses[env, k : k + 1], rows, road, tables, models, chosen, count,
+                buffers,
+            )  # fmt: skip

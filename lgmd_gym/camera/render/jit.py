@@ -1,4 +1,4 @@
-"""The decorator that compiles the camera's kernels."""
+"""The decorators that compile the camera's kernels."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +19,16 @@ def kernel(function: Callable[..., Any]) -> Any:
     Numba invalidates a cached kernel when its own file changes, but not when the file of a kernel that it
     calls changes. Here a change in any file of the camera invalidates the cache.
     """
-    compiled = nb.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"})(function)
+    return _compile(function, fastmath={"contract", "nsz"})
+
+
+def exact_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel like `kernel`, with the results of the same arithmetic in Python, to the bit."""
+    return _compile(function, fastmath=False)
+
+
+def _compile(function: Callable[..., Any], fastmath: bool | set[str]) -> Any:
+    compiled = nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=fastmath)(function)
     index: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):
         index._source_stamp = _STAMP

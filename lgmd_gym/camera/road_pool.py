@@ -1,0 +1,159 @@
+"""RoadPool: the static geometry of the roads of many environments in common arrays."""
+
+import copy
+from collections.abc import Sequence
+from hashlib import blake2b
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from lgmd_gym.camera.objects import OBJECT
+from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.road_geometry import LINE, RoadGeometry, network_of, road_geometry
+
+RoadKey: TypeAlias = tuple[float, int, bool]
+"""What the geometry depends on besides the lanes: `roadside`, `seed` and `guard_rail` of `CameraParams`."""
+Span: TypeAlias = tuple[int, ...]
+"""A row of `RoadArrays.spans`."""
+
+
+def road_key(p: CameraParams) -> RoadKey:
+    """Return the parameters of a camera that its road depends on."""
+    return p.roadside, p.seed, p.guard_rail
+
+
+class RoadArrays(NamedTuple):
+    """Roads as the kernels read them.
+
+    Attributes:
+        surface: Asphalt of all roads, float64, shape (n, 8); see `RoadGeometry`.
+        lines: Markings of all roads, `LINE` records.
+        roadside: Posts, trees and rails of all roads, `OBJECT` records.
+        spans: First and last + 1 row of `surface`, `lines` and `roadside`, and 1 for an all-paved ground,
+            per environment and camera, int64, shape (num_envs, cameras, 7).
+    """
+
+    surface: np.ndarray
+    lines: np.ndarray
+    roadside: np.ndarray
+    spans: np.ndarray
+
+
+class RoadPool:
+    """Geometry of the roads of many environments; equal roads are stored once.
+
+    One thread at a time may call `assign`, also while others draw environments whose roads stay the same:
+    rows in use never change, and a larger pool is a new set of arrays.
+
+    Args:
+        num_envs: Number of environments.
+        cameras: Number of cameras per environment.
+
+    Attributes:
+        arrays: The present `RoadArrays`.
+    """
+
+    def __init__(self, num_envs: int, cameras: int) -> None:
+        spans = np.zeros((num_envs, cameras, 7), dtype=np.int64)
+        self.arrays = RoadArrays(np.zeros((0, 8)), np.zeros(0, LINE), np.zeros(0, OBJECT), spans)
+        self._roads: list[tuple[Any, Sequence[RoadKey]] | None] = [None] * num_envs
+        self._stored: dict[bytes, Span] = {}
+        self._used = [0, 0, 0]  # rows of surface, lines and roadside
+        self._shared = False  # whether a copy of this pool has the same arrays
+
+    def assign(self, index: int, road: Any, keys: Sequence[RoadKey]) -> None:
+        """Set the road of an environment.
+
+        A call with the same network and keys as before returns at once: a network must not change.
+
+        Args:
+            index: Environment.
+            road: A highway-env `Road` or `RoadNetwork`.
+            keys: `road_key` of every camera.
+        """
+        network, known = network_of(road), self._roads[index]
+        if known is not None and network is known[0] and keys == known[1]:
+            return
+        roads = {key: road_geometry(network, *key) for key in dict.fromkeys(keys)}
+        digests = {key: _digest(geometry) for key, geometry in roads.items()}
+        new = {digests[key]: road for key, road in roads.items() if digests[key] not in self._stored}
+        if new:
+            self._reserve(list(new.values()), set(digests.values()))
+            for digest, geometry in new.items():
+                self._stored[digest] = _append(self.arrays, self._used, geometry)
+        self.arrays.spans[index] = [self._stored[digests[key]] for key in keys]
+        self._roads[index] = network, keys
+
+    def reassign(self, index: int, keys: Sequence[RoadKey]) -> None:
+        """Set the keys of an environment's cameras, and keep its road."""
+        known = self._roads[index]
+        if known is not None:
+            self.assign(index, known[0], keys)
+
+    def _reserve(self, roads: Sequence[RoadGeometry], keep: set[bytes]) -> None:
+        """Make space for more roads, if necessary in new arrays without the roads that no camera uses."""
+        needed = [used + _count(roads, kind) for kind, used in enumerate(self._used)]
+        old = self.arrays
+        fits = all(need <= len(rows) for need, rows in zip(needed, old[:3], strict=True))
+        if fits and not self._shared:
+            return
+        spans = old.spans.reshape(-1, 7).tolist()
+        in_use = set(map(tuple, spans))
+        kept = {digest: span for digest, span in self._stored.items() if span in in_use or digest in keep}
+        old_roads = {digest: _road_at(old, span) for digest, span in kept.items()}
+        sizes = [_count([*old_roads.values(), *roads], kind) for kind in range(3)]
+        arrays = RoadArrays(
+            *(
+                np.zeros((2 * size, *rows.shape[1:]), rows.dtype)
+                for size, rows in zip(sizes, old[:3], strict=True)
+            ),
+            spans=old.spans.copy(),
+        )
+        used = [0, 0, 0]
+        stored = {digest: _append(arrays, used, road) for digest, road in old_roads.items()}
+        moved = {span: stored[digest] for digest, span in kept.items()}
+        arrays.spans.reshape(-1, 7)[:] = [moved.get(tuple(span), span) for span in spans]
+        self.arrays, self._stored, self._used, self._shared = arrays, stored, used, False
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "RoadPool":
+        """Copy with common geometry: the next new road of either pool goes into new arrays."""
+        self._shared = True
+        clone = copy.copy(self)
+        clone.arrays = self.arrays._replace(spans=self.arrays.spans.copy())
+        clone._roads = copy.deepcopy(self._roads, memo)
+        clone._stored, clone._used = dict(self._stored), list(self._used)
+        return clone
+
+
+def _digest(road: RoadGeometry) -> bytes:
+    """Return a digest of a geometry's contents."""
+    digest = blake2b(bytes([road.paved]), digest_size=16)
+    for rows in _rows(road):
+        digest.update(len(rows).to_bytes(8, "little"))
+        digest.update(rows.tobytes())
+    return digest.digest()
+
+
+def _append(arrays: RoadArrays, used: list[int], road: RoadGeometry) -> Span:
+    """Store a road behind the rows in use, and return its span."""
+    span: list[int] = []
+    for kind, rows in enumerate(_rows(road)):
+        start = used[kind]
+        used[kind] = end = start + len(rows)
+        arrays[kind][start:end] = rows
+        span += [start, end]
+    return *span, int(road.paved)
+
+
+def _rows(road: RoadGeometry) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return road.surface, road.lines, road.roadside
+
+
+def _count(roads: Sequence[RoadGeometry], kind: int) -> int:
+    """Return the number of rows of several roads; `kind` is 0, 1 or 2 for surface, lines or roadside."""
+    return sum(len(_rows(road)[kind]) for road in roads)
+
+
+def _road_at(arrays: RoadArrays, span: Span) -> RoadGeometry:
+    surface, lines, roadside = (arrays[kind][span[2 * kind] : span[2 * kind + 1]] for kind in range(3))
+    return RoadGeometry(surface, lines, roadside, span[6] != 0)

@@ -1,0 +1,78 @@
+"""World: what the cameras of many environments see, apart from the roads."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, View, read_objects
+from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.scene import SCENE, Ego, read_scene
+
+_PATH_DEG = 40.0  # bound of the gaze "path"
+_MAX_SPREAD = math.radians(170.0)
+
+
+class World:
+    """Egos, clocks and objects of many environments.
+
+    Args:
+        num_envs: Number of environments.
+
+    Attributes:
+        scenes: `SCENE` records, shape (num_envs,).
+        objects: `OBJECT` records, shape (num_envs, 512), in the order of the road's lists: vehicles, then
+            objects, without the ego.
+        object_counts: Number of objects, int64, shape (num_envs,).
+    """
+
+    def __init__(self, num_envs: int = 1) -> None:
+        self.scenes = np.zeros(num_envs, SCENE)
+        self.objects = np.zeros((num_envs, MAX_DRAWN), OBJECT)
+        self.object_counts = np.zeros(num_envs, dtype=np.int64)
+        self._take_views()
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The arrays as the kernels read them."""
+        return self.scenes, self.objects, self.object_counts
+
+    def read(self, env: Any, view: View | None, index: int = 0) -> Ego:
+        """Read the present state of a highway-env environment.
+
+        Args:
+            env: The environment, wrapped or not, after its first reset.
+            view: See `read_objects`.
+            index: Index of the environment.
+
+        Raises:
+            ValueError: If the environment has no road or ego yet, or a pose is not finite.
+        """
+        ego = read_scene(env, self._scene_bytes, index)
+        self.object_counts[index] = read_objects(ego, view, self._object_bytes, index)
+        return ego
+
+    def _take_views(self) -> None:
+        self._scene_bytes = self.scenes.view(np.uint8).data
+        self._object_bytes = self.objects.reshape(-1).view(np.uint8).data
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if not name.endswith("_bytes")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._take_views()
+
+
+def view_of(cameras: Sequence[CameraParams]) -> View | None:
+    """Return the directions that cameras look in; None if they look all around, or if there are none."""
+    if not cameras:
+        return None
+    margins = [_PATH_DEG if p.gaze == "path" else 0.0 for p in cameras]
+    first = min(p.yaw_deg - margin for p, margin in zip(cameras, margins, strict=True))
+    last = max(p.yaw_deg + margin for p, margin in zip(cameras, margins, strict=True))
+    if math.radians(last - first) > _MAX_SPREAD:
+        return None
+    reach = max(abs(p.mount_setback) for p in cameras) + max(abs(p.mount_left) for p in cameras)
+    return View(math.radians(first), math.radians(last), reach)

@@ -1,0 +1,112 @@
+"""The cameras of a sensor array, from the `camera` argument and the fields that an environment changes."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+from lgmd_gym.camera import BIRDSEYE, BirdsEye, CameraItem, CameraParams, CameraSpec
+from lgmd_gym.camera.objects import View
+from lgmd_gym.camera.road_pool import RoadKey, road_key
+from lgmd_gym.camera.world import view_of
+
+_MAX_KNOWN = 256  # distinct fields that are remembered
+
+Camera: TypeAlias = CameraParams | BirdsEye
+
+
+def make_cameras(camera: CameraSpec) -> dict[str, Camera]:
+    """Return parameters or top views by camera name.
+
+    Args:
+        camera: A preset name, "birdseye", `CameraParams`, a mapping of its fields, or a sequence of these.
+
+    Raises:
+        ValueError: For an unknown preset, an empty sequence, or a repeated name.
+    """
+    several = isinstance(camera, Sequence) and not isinstance(camera, str)
+    items: Sequence[CameraItem] = camera if several else [camera]  # type: ignore[assignment, list-item]
+    if not items:
+        raise ValueError(f"camera must have at least one element, got {camera!r}; use camera='fovea'")
+    cameras: dict[str, Camera] = {}
+    for item in items:
+        name, built = _make_camera(item)
+        if name in cameras:
+            raise ValueError(f"camera names must be unique, got {name!r} twice; rename one of them")
+        cameras[name] = built
+    return cameras
+
+
+def _make_camera(item: CameraItem) -> tuple[str, Camera]:
+    if item == BIRDSEYE:
+        return BIRDSEYE, BirdsEye()
+    if isinstance(item, Mapping) and item.get("name") == BIRDSEYE:
+        return BIRDSEYE, BirdsEye(**{key: value for key, value in item.items() if key != "name"})
+    params = CameraParams.make(item)
+    return params.name, params
+
+
+class Variant(NamedTuple):
+    """The cameras of an environment with some fields changed, apart from the texture.
+
+    Attributes:
+        params: Parameters of every camera; None for a top view.
+        road_keys: `road_key` of every camera, with a placeholder for a top view.
+        view: Directions that the cameras look in, see `read_objects`.
+    """
+
+    params: tuple[CameraParams | None, ...]
+    road_keys: tuple[RoadKey, ...]
+    view: View | None
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Variant":
+        return self
+
+
+class Variants:
+    """The variants of the cameras, each built once.
+
+    Args:
+        cameras: The unchanged cameras.
+    """
+
+    def __init__(self, cameras: Sequence[Camera]) -> None:
+        self._base = tuple(item if isinstance(item, CameraParams) else None for item in cameras)
+        self._known: dict[str, Variant] = {}
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Variants":
+        return self
+
+    def make(self, fields: Mapping[str, Any]) -> tuple[Variant, float | None]:
+        """Return the cameras with changed fields, and the texture among the fields or None.
+
+        The texture is separate because environments draw it at random, and it changes two numbers only.
+
+        Args:
+            fields: Fields of `CameraParams`, and optionally `condition`.
+
+        Raises:
+            ValueError: If a field is unknown or out of range, or changes the shape of a camera.
+        """
+        others = {name: value for name, value in fields.items() if name != "texture"}
+        texture = fields.get("texture")
+        if texture is not None:
+            texture = CameraParams(texture=texture).texture
+        key = repr(others)
+        variant = self._known.get(key)
+        if variant is None:
+            if len(self._known) >= _MAX_KNOWN:
+                self._known.clear()
+            self._known[key] = variant = self._build(others)
+        return variant, texture
+
+    def _build(self, fields: dict[str, Any]) -> Variant:
+        params = tuple(None if base is None else CameraParams.make(base, **fields) for base in self._base)
+        for base, changed in zip(self._base, params, strict=True):
+            if base is not None and changed is not None and changed.shape != base.shape:
+                raise ValueError(
+                    f"camera_fields must keep the shape {base.shape} of camera {base.name!r}, got "
+                    f"{changed.shape}; set the shape in the camera argument"
+                )
+        known = [p for p in params if p is not None]
+        placeholder = road_key(known[0]) if known else (0.0, 0, False)
+        keys = tuple(placeholder if p is None else road_key(p) for p in params)
+        return Variant(params, keys, view_of(known))

@@ -1,0 +1,106 @@
+"""SensorGroup: the cameras of a sensor array with one frame shape, and their neurons."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from lgmd_gym.camera import CameraParams
+from lgmd_gym.camera.batch import CameraBatch
+from lgmd_gym.camera.render.context import Workspace
+from lgmd_gym.neuron import LGMD, LGMDParams
+from lgmd_gym.sensing.kernels import collect_outputs, select_cameras
+
+
+class SensorGroup:
+    """Cameras with one frame shape, and their neurons.
+
+    Args:
+        shape: Frame shape (height, width) [px].
+        members: Indices of the cameras.
+        params: Parameters of all cameras of the array; None for a top view.
+        fps: Camera frame rate [Hz].
+        neuron_params: Parameters of the neurons.
+        num_envs: Number of environments.
+
+    Attributes:
+        members: Indices of the cameras.
+        batch: The cameras.
+        neuron: num_envs * len(members) neurons, ordered by environment, then by camera.
+        frames: The last frames, uint8, shape (num_envs, members, height, width).
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        members: list[int],
+        params: Sequence[CameraParams | None],
+        fps: float,
+        neuron_params: LGMDParams,
+        num_envs: int,
+    ) -> None:
+        self.members = members
+        size = num_envs, len(members)
+        self.batch = CameraBatch([params[k] for k in members], shape, members, num_envs)
+        self.neuron = LGMD(shape, fps, neuron_params, num_envs * len(members))
+        self.frames = np.zeros((*size, *shape), np.uint8)
+        self._cameras = np.array(members, dtype=np.int64)
+        self._selected, self._fresh = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
+        self._workspaces: list[Workspace] = []
+
+    def select(
+        self, first: int, last: int, active: np.ndarray, enabled: np.ndarray, stale: np.ndarray
+    ) -> bool:
+        """Select the cameras to process, and reset the neurons of those that have missed frames.
+
+        Returns whether there are any; see `select_cameras`.
+        """
+        num_selected, num_fresh = select_cameras(
+            first, last, active, enabled, self._cameras, stale, self._fresh, self._selected
+        )
+        if num_fresh:
+            mask = np.zeros_like(self._fresh)
+            mask[first:last] = self._fresh[first:last]
+            self.neuron.reset(mask.ravel())
+        return num_selected > 0
+
+    def process(
+        self,
+        first: int,
+        last: int,
+        world: tuple[np.ndarray, ...],
+        roads: tuple[np.ndarray, ...],
+        outputs: tuple[np.ndarray, ...],
+    ) -> None:
+        """Draw the selected cameras of the environments first..last-1, and step their neurons.
+
+        Args:
+            first: First environment.
+            last: Last environment + 1.
+            world: `World.arrays`.
+            roads: `RoadPool.arrays`.
+            outputs: The last three arguments of `collect_outputs`.
+        """
+        try:  # threads take and return workspaces; both list operations are atomic
+            workspace = self._workspaces.pop()
+        except IndexError:
+            workspace = Workspace(self.batch.shape)
+        self.batch.draw(first, last, world, roads, self.frames, self._selected, workspace)
+        self._workspaces.append(workspace)
+        count = len(self.members)
+        frames = self.frames.reshape(-1, *self.batch.shape)
+        self.neuron.step_range(first * count, last * count, frames, self._selected.reshape(-1))
+
+        collect_outputs(first, last, self._selected, self._cameras, self.neuron.outputs, *outputs)
+
+    def reset(self, mask: np.ndarray, outputs: tuple[np.ndarray, ...]) -> None:
+        """Reset the neurons of selected environments, bool, shape (num_envs,).
+
+        `outputs` are the last three arguments of `collect_outputs`.
+        """
+        selected = np.repeat(mask[:, None], len(self.members), axis=1)
+        self.neuron.reset(selected.ravel())
+        collect_outputs(0, len(mask), selected, self._cameras, self.neuron.outputs, *outputs)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_workspaces": []}

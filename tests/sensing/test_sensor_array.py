@@ -1,0 +1,252 @@
+"""`SensorArray`: batches of cameras and neurons equal single cameras and neurons to the bit."""
+
+import copy
+import pickle
+import threading
+
+import numpy as np
+import pytest
+from support.golden_frames import busy_road, curve
+from support.roads import add_car, straight_env
+
+from lgmd_gym import LGMD, BirdsEye, CameraParams, EgoCamera, LGMDParams
+from lgmd_gym.camera import CONDITIONS
+from lgmd_gym.camera.objects import OBJECT
+from lgmd_gym.sensing.sensor_array import SensorArray
+
+SMALL = {"shape": (45, 80)}
+CAMERAS = [
+    CameraParams.preset("wide", **SMALL),
+    {"name": "small", "shape": (30, 40), "yaw_deg": 20.0, "seed": 3},
+    CameraParams.preset("fovea", **SMALL, guard_rail=True),
+    {"name": "back", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box"},
+    {"name": "path", "shape": (45, 80), "gaze": "path", "panorama": "natural", "mount_left": 0.4},
+]
+FIELDS = [
+    {},
+    {"condition": "night", "texture": 0.7},
+    {"condition": "degraded", "texture": 1.4},
+    {"condition": "fog", "seed": 5, "roadside": 2.0},
+]
+
+
+def scenes():
+    """Return environments with different roads, egos and traffic."""
+    empty = straight_env(lanes=2, speed=5.0)
+    return [busy_road(), curve(), empty, busy_road()]
+
+
+def move(envs, step):
+    for k, env in enumerate(envs):
+        env.steps = step
+        env.vehicle.position[0] += 0.3 * (k + 1)
+        env.vehicle.heading += 0.01 * k
+        env.vehicle.action = {"steering": 0.02 * k, "acceleration": -1.5 * k}
+        for car in env.road.vehicles:
+            if car is not env.vehicle:
+                car.position[0] += 0.02 * step
+
+
+def make_array(camera=CAMERAS, num_envs=4, **arguments):
+    sensors = SensorArray(camera, 30.0, LGMDParams(), num_envs, **arguments)
+    for index in range(num_envs):
+        sensors.set_camera_fields(index, FIELDS[index])
+    return sensors
+
+
+def reference(camera, fields):
+    """Return a camera and a neuron of their own."""
+    own = EgoCamera(CameraParams.make(camera), **fields)
+    return own, LGMD(own.shape, 30.0, LGMDParams())
+
+
+@pytest.mark.parametrize("threads", [None, 3])
+def test_frames_and_outputs_equal_those_of_single_cameras_and_neurons(threads):
+    envs, sensors = scenes(), make_array(threads=threads)
+    singles = [[reference(camera, fields) for camera in CAMERAS] for fields in FIELDS]
+    for step in range(6):
+        move(envs, step)
+        for index, env in enumerate(envs):
+            sensors.read(env, index)
+        sensors.step()
+        for index, env in enumerate(envs):
+            for k, (camera, neuron) in enumerate(singles[index]):
+                frame = camera.render(env)
+                np.testing.assert_array_equal(sensors.frame_of(k, index), frame)
+                expected = neuron.step(frame)
+                assert [field[index, k].item() for field in sensors.responses] == list(expected)
+    assert sensors.responses.spikes.dtype == np.int64
+    assert sensors.responses.alert.dtype == np.bool_
+
+
+def test_camera_fields_change_at_any_time():
+    envs, sensors = scenes(), make_array()
+    for step in range(8):
+        move(envs, step)
+        for index, env in enumerate(envs):
+            fields = FIELDS[(index + step // 2) % 4]
+            sensors.set_camera_fields(index, fields)
+            sensors.read(env, index)
+            sensors.process(index, index + 1)
+            for k, camera in enumerate(CAMERAS):
+                own = EgoCamera(CameraParams.make(camera), **fields)
+                np.testing.assert_array_equal(sensors.frame_of(k, index), own.render(env))
+                assert sensors.cameras[index][sensors.names[k]].params == own.params
+                point = [30.0, 2.0, 0.5]
+                projected = sensors.cameras[index][sensors.names[k]].project(point)
+                np.testing.assert_array_equal(projected, own.project(point))
+
+
+def test_inactive_environments_keep_frames_and_outputs():
+    envs, sensors = scenes(), make_array("wide")
+    for step in range(4):
+        move(envs, step)
+        for index, env in enumerate(envs):
+            sensors.read(env, index)
+        sensors.step()
+    before = copy.deepcopy((sensors.frames, sensors.responses))
+    move(envs, 5)
+    for index, env in enumerate(envs):
+        sensors.read(env, index)
+    active = np.array([True, False, True, True])
+    sensors.process(0, 3, active)
+    changed = [not np.array_equal(sensors.frames[0][k], before[0][0][k]) for k in range(4)]
+    assert changed == [True, False, True, False]
+    for new, old in zip(sensors.responses, before[1], strict=True):
+        np.testing.assert_array_equal(new[[1, 3]], old[[1, 3]])
+    assert (sensors.responses.ffi != before[1].ffi)[[0, 2]].all()
+
+
+def test_a_disabled_camera_pauses_and_starts_anew():
+    env = busy_road()
+    sensors = make_array(num_envs=1)
+    own, neuron = reference(CAMERAS[2], {})
+    for step in range(12):
+        move([env], step)
+        sensors.enabled[0, 2] = not 4 <= step < 8
+        sensors.read(env)
+        kept = [field[0, 2].item() for field in sensors.responses], sensors.frame_of(2).copy()
+        sensors.process(0, 1)
+        if sensors.enabled[0, 2]:
+            frame = own.render(env)
+            if step == 8:
+                neuron.reset()
+            np.testing.assert_array_equal(sensors.frame_of(2), frame)
+            kept = list(neuron.step(frame)), frame
+        assert [field[0, 2].item() for field in sensors.responses] == kept[0]
+        np.testing.assert_array_equal(sensors.frame_of(2), kept[1])
+        np.testing.assert_array_equal(sensors.frame_of(0), EgoCamera(CAMERAS[0]).render(env))
+
+
+def test_reset_returns_selected_neurons_to_their_first_frame():
+    envs, sensors = scenes(), make_array(num_envs=2)
+    fresh = make_array(num_envs=2)
+    for step in range(4):
+        move(envs, step)
+        for index in range(2):
+            sensors.read(envs[index], index)
+        sensors.step()
+    before = copy.deepcopy(sensors.responses)
+    sensors.reset(np.array([False, True]))
+    for new, old, initial in zip(sensors.responses, before, fresh.responses, strict=True):
+        np.testing.assert_array_equal(new[0], old[0])
+        np.testing.assert_array_equal(new[1], initial[1])
+    assert before.ffi[1].max() > 0.0
+
+
+def test_scenes_and_objects_may_be_written_directly():
+    env = busy_road()
+    read, written = make_array("fovea", 1), make_array("fovea", 1)
+    read.read(env)
+    written.set_road(0, env.road.network)
+    written.scenes[:], written.objects[:] = read.scenes, read.objects
+    written.object_counts[:] = read.object_counts
+    read.step()
+    written.step()
+    assert read.objects.dtype == OBJECT
+    np.testing.assert_array_equal(read.frames[0], written.frames[0])
+
+
+def test_threads_process_disjoint_ranges_at_once():
+    envs = scenes()
+    apart, together = make_array(), make_array()
+    for step in range(5):
+        move(envs, step)
+        for index, env in enumerate(envs):
+            apart.read(env, index)
+            together.read(env, index)
+        together.step()
+        threads = [threading.Thread(target=apart.process, args=(k, k + 1)) for k in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    for one, other in zip(apart.frames, together.frames, strict=True):
+        np.testing.assert_array_equal(one, other)
+    np.testing.assert_equal(apart.responses._asdict(), together.responses._asdict())
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda item: pickle.loads(pickle.dumps(item))])
+def test_copies_are_independent(duplicate):
+    env, sensors = busy_road(), make_array(num_envs=1)
+    for step in range(4):
+        move([env], step)
+        sensors.read(env)
+        sensors.step()
+    clone = duplicate(sensors)
+    np.testing.assert_equal(clone.responses._asdict(), sensors.responses._asdict())
+    other = curve()
+    for used, scene in ((clone, other), (sensors, env), (clone, env)):
+        used.read(scene)
+        used.step()
+        for k, camera in enumerate(CAMERAS):
+            np.testing.assert_array_equal(
+                used.frame_of(k), EgoCamera(CameraParams.make(camera)).render(scene)
+            )
+    assert not np.array_equal(clone.responses.ffi, sensors.responses.ffi)
+
+
+def test_top_views_are_rendered_by_read():
+    import gymnasium as gym
+    import highway_env  # noqa: F401
+
+    env = gym.make("two-way-v0")
+    env.reset(seed=0)
+    top_view = {"name": "birdseye", "shape": (45, 80)}
+    sensors = SensorArray(["wide", top_view, "tele"], 30.0, LGMDParams())
+    neuron = LGMD((45, 80), 30.0)
+    for _ in range(3):
+        env.step(1)
+        sensors.read(env)
+        sensors.step()
+        frame = BirdsEye((45, 80)).render(env)
+        np.testing.assert_array_equal(sensors.frame_of(1), frame)
+        assert sensors.responses.ffi[0, 1] == neuron.step(frame).ffi
+        np.testing.assert_array_equal(sensors.frame_of(2), EgoCamera("tele").render(env))
+    sensors.close()
+    env.close()
+
+
+def test_invalid_camera_fields_raise():
+    sensors = make_array(num_envs=1)
+    with pytest.raises(ValueError, match="unknown camera field 'textur'; did you mean 'texture'"):
+        sensors.set_camera_fields(0, {"textur": 1.0})
+    with pytest.raises(ValueError, match=r"camera texture must be in \[0, 5\]"):
+        sensors.set_camera_fields(0, {"texture": 9.0})
+    with pytest.raises(ValueError, match=r"must keep the shape \(45, 80\) of camera 'wide', got \(9, 9\)"):
+        sensors.set_camera_fields(0, {"shape": (9, 9)})
+
+
+def test_conditions_are_covered():
+    assert {fields.get("condition", "clear") for fields in FIELDS} == set(CONDITIONS)
+
+
+def test_a_full_list_of_objects_is_drawn():
+    env = straight_env()
+    for k in range(600):
+        add_car(env, 10.0 + 0.5 * k, 3.5 * (k % 3))
+    sensors = SensorArray("wide", 30.0, LGMDParams())
+    sensors.read(env)
+    sensors.step()
+    assert sensors.object_counts[0] == 512
+    np.testing.assert_array_equal(sensors.frame_of(0), EgoCamera("wide").render(env))
