@@ -140,7 +140,7 @@ class BrakingEnv(EgoBrakeEnv):
         check_keys("key of config['reward']", reward, self.config["reward"])
         super().configure(config)
         self.config["reward"] = {**self.config["reward"], **reward}
-        self._weights = RewardParams(**self.config["reward"]).record()
+        self.weights = RewardParams(**self.config["reward"]).record()
         self._brake_record = self.brake.record(self.config["throttle"])
         self._world = World(1, self.brake.max_demands(self.config["policy_frequency"]))
 
@@ -174,7 +174,7 @@ class BrakingEnv(EgoBrakeEnv):
         episode["time"] = self.time
         obs, info = self.observation_type.observe(), self._info(None)
         reward = step_reward(
-            bodies[0], world.egos[0], episode, self._brake_record[()], self._weights[()], info["ttc"], dt
+            bodies[0], world.egos[0], episode, self._brake_record[()], self.weights[()], info["ttc"], dt
         )
         terminated, truncated = is_terminated(bodies, episode), is_truncated(episode)
         if self.render_mode == "human":

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.envs.scenarios.distribution import (
     LEVELS,
     check_levels,
@@ -59,13 +60,31 @@ class FixedScenario:
 
 
 class RandomLevels:
-    """A random level per episode; arguments as in `RandomBrakingEnv`.
+    """A random level per episode.
+
+    A level is a random scenario with a number. Half of the levels are threats (CCRs, CCRm, CCRb, CCCscp),
+    half are non-threats (all other families). A level fixes the family and its arguments, the grey levels,
+    the camera condition (night, fog, …) and the contrast of the road texture, in every process. The splits
+    are disjoint: training never uses a level of validation or test. The environment's seed selects the
+    levels; `info` adds `level` (the number) and `condition` (the camera condition).
+
+    Args:
+        split: Set of levels: "train", "validation" or "test", with 1,000,000 levels each.
+        start_level: First level in use.
+        num_levels: Number of levels in use; 0 for all from `start_level` on.
+        conditions: Camera conditions, drawn with equal probability: "clear", "night", "fog", "degraded".
 
     Raises:
         ValueError: If the split or a condition is unknown, or levels are outside the split.
     """
 
-    def __init__(self, split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> None:
+    def __init__(
+        self,
+        split: str = "train",
+        start_level: int = 0,
+        num_levels: int = 0,
+        conditions: Sequence[str] = tuple(CONDITIONS),
+    ) -> None:
         check_levels(split, start_level, num_levels, conditions)
         self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
         self.num_levels = num_levels or LEVELS - start_level

@@ -5,12 +5,15 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 
 from lgmd_gym.envs.scenarios import FAMILIES, make_scenario
+from lgmd_gym.errors import check_keys
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
+    from lgmd_gym.envs.episode_source import EpisodeSource
     from lgmd_gym.neuron import NeuronSpec
 
 RANDOM = "RandomBraking"
+_LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions")
 
 
 def env_id(family: str) -> str:
@@ -22,8 +25,12 @@ def register_envs() -> None:
     """Register `LGMD/<family>-v0` for every scenario family and `LGMD/RandomBraking-v0`; idempotent."""
     for family in (*FAMILIES, RANDOM):
         if env_id(family) not in gym.registry:
-            entry_point = f"{__name__}:make_braking"
-            gym.register(env_id(family), entry_point=entry_point, kwargs={"family": family})
+            gym.register(
+                env_id(family),
+                entry_point=f"{__name__}:make_braking",
+                vector_entry_point="lgmd_gym.engine:BrakingVectorEnv",
+                kwargs={"family": family},
+            )
 
 
 def make_braking(
@@ -41,7 +48,7 @@ def make_braking(
     """Return a braking environment inside `LGMDObservation`, or without it for `camera=None`.
 
     Args:
-        family: A scenario family for `BrakingEnv`, or "RandomBraking" for `RandomBrakingEnv`.
+        family: A scenario family for `BrakingEnv`, or "RandomBraking" for random levels.
         camera: See `LGMDObservation`; None for no camera, as required by the vectorized
             `lgmd_gym.wrappers.vector.LGMDObservation`.
         params: See `LGMDObservation`.
@@ -52,27 +59,33 @@ def make_braking(
         config: Configuration of `BrakingEnv`.
         render_mode: None, "rgb_array" or "human".
         **arguments: Arguments of the family in SI units, and `condition`, the camera condition: "clear",
-            "night", "fog" or "degraded". For "RandomBraking", arguments of `RandomBrakingEnv`.
+            "night", "fog" or "degraded". For "RandomBraking", arguments of `RandomLevels`.
 
     Raises:
         ValueError: If an argument, key or name is unknown, or a value is out of range.
     """
-    from lgmd_gym.camera import CLEAR
     from lgmd_gym.envs.braking import BrakingEnv
-    from lgmd_gym.envs.random_braking import RandomBrakingEnv
+
+    source, camera_fields = make_source(family, arguments)
+    env = BrakingEnv(source, config=config, render_mode=render_mode)
+    env.camera_fields = camera_fields | env.camera_fields
+    return with_camera(env, camera, params, fps, include_frame, include_base, trace)
+
+
+def make_source(family: str, arguments: dict[str, Any]) -> "tuple[EpisodeSource, dict[str, Any]]":
+    """Return the source of the episodes of a family and their constant camera fields; see `make_braking`."""
+    from lgmd_gym.camera import CLEAR
+    from lgmd_gym.envs.episode_source import FixedScenario, RandomLevels
     from lgmd_gym.envs.scenarios.distribution import check_conditions
-    from lgmd_gym.errors import check_keys
 
     if family == RANDOM:
-        check_keys(f"argument of {RANDOM}", arguments, ("split", "start_level", "num_levels", "conditions"))
-        env = RandomBrakingEnv(**arguments, config=config, render_mode=render_mode)
-    else:
-        condition = arguments.pop("condition", CLEAR)
-        check_conditions([condition])
-        env = BrakingEnv(make_scenario(family, **arguments), config=config, render_mode=render_mode)
-        if condition != CLEAR:
-            env.camera_fields["condition"] = condition
-    return with_camera(env, camera, params, fps, include_frame, include_base, trace)
+        check_keys(f"argument of {RANDOM}", arguments, _LEVEL_ARGUMENTS)
+        return RandomLevels(**arguments), {}
+    arguments = dict(arguments)
+    condition = arguments.pop("condition", CLEAR)
+    check_conditions([condition])
+    fields = {} if condition == CLEAR else {"condition": condition}
+    return FixedScenario(make_scenario(family, **arguments)), fields
 
 
 def with_camera(env: gym.Env, camera: "CameraSpec | None", *observation: Any) -> gym.Env:

@@ -19,7 +19,7 @@ HEADWAY = (0.5, 3.0)  # [s]; in FMVSS 127 a lead car brakes 12 m ahead at 80 km/
 
 
 def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> None:
-    """Check the arguments of `RandomBrakingEnv`.
+    """Check the arguments of `RandomLevels`.
 
     Raises:
         ValueError: If the split or a condition is unknown, or levels are outside the split.

@@ -9,7 +9,7 @@ from PIL import Image
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.envs import FAMILIES, env_id
-from lgmd_gym.envs.random_braking import RandomBrakingEnv
+from lgmd_gym.envs.episode_source import RandomLevels
 from lgmd_gym.envs.registration import RANDOM
 from lgmd_gym.envs.traffic.registration import KINDS, find_kind
 from lgmd_gym.errors import unknown_name
@@ -48,7 +48,7 @@ def scenario_cards(names: tuple[str, ...] = ()) -> list[ScenarioCard]:
         ValueError: For an unknown name, with the nearest known one.
     """
     cards = {name: ScenarioCard(name, env_id(name), parse_docstring(FAMILIES[name])) for name in FAMILIES}
-    cards[RANDOM] = ScenarioCard(RANDOM, env_id(RANDOM), parse_docstring(RandomBrakingEnv))
+    cards[RANDOM] = ScenarioCard(RANDOM, env_id(RANDOM), parse_docstring(RandomLevels))
     for kind in KINDS:
         cards[kind] = ScenarioCard(kind, f"traffic/{kind}", parse_docstring(find_kind(kind)), traffic=True)
     for name in names:

@@ -1,4 +1,4 @@
-"""`RandomBrakingEnv`: levels, splits and the random distribution."""
+"""`RandomLevels`: levels, splits and the random distribution."""
 
 from dataclasses import replace
 
@@ -10,7 +10,8 @@ from lgmd_gym import CameraParams, EgoCamera
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.envs import FAMILIES
-from lgmd_gym.envs.random_braking import RandomBrakingEnv
+from lgmd_gym.envs.braking import BrakingEnv
+from lgmd_gym.envs.episode_source import RandomLevels
 from lgmd_gym.envs.scenarios.distribution import (
     LEVELS,
     NON_THREATS,
@@ -21,6 +22,10 @@ from lgmd_gym.envs.scenarios.distribution import (
 from lgmd_gym.wrappers.vector import LGMDObservation as LGMDVector
 
 HOLD = np.zeros(1, np.float32)
+
+
+def random_env(**arguments):
+    return BrakingEnv(RandomLevels(**arguments))
 
 
 def run_episode(env, seed=None):
@@ -54,7 +59,7 @@ def test_levels_include_the_headways_of_fmvss127():
 
 
 def test_only_threats_have_contact_without_braking():
-    env = RandomBrakingEnv(split="validation")
+    env = random_env(split="validation")
     families = set()
     for seed in range(120):
         _, scenario, _, collision, _ = run_episode(env, seed)
@@ -64,22 +69,22 @@ def test_only_threats_have_contact_without_braking():
 
 
 def test_levels_do_not_depend_on_the_seed_or_the_range_in_use():
-    one = RandomBrakingEnv(start_level=7, num_levels=1)
-    other = RandomBrakingEnv(start_level=0, num_levels=8)
+    one = random_env(start_level=7, num_levels=1)
+    other = random_env(start_level=0, num_levels=8)
     episodes = {run_episode(other, seed)[0]: run_episode(other, seed) for seed in range(40)}
     assert run_episode(one, seed=1) == run_episode(one, seed=2) == episodes[7]
-    assert run_episode(RandomBrakingEnv(split="test", start_level=7, num_levels=1), 1) != episodes[7]
+    assert run_episode(random_env(split="test", start_level=7, num_levels=1), 1) != episodes[7]
 
 
 def test_resets_without_a_seed_use_the_same_levels():
-    env = RandomBrakingEnv(start_level=100, num_levels=5)
+    env = random_env(start_level=100, num_levels=5)
     env.reset(seed=0)
     levels = {env.reset()[1]["level"] for _ in range(60)}
     assert levels == {100, 101, 102, 103, 104}
 
 
 def test_the_road_matches_the_scenario():
-    env = RandomBrakingEnv()
+    env = random_env()
     env.reset(seed=0)
     for _ in range(60):
         env.reset()
@@ -107,8 +112,8 @@ def test_levels_set_condition_and_texture_of_the_camera():
 
 
 def test_the_scenario_does_not_depend_on_the_conditions():
-    clear = RandomBrakingEnv(conditions=["clear"])
-    mixed = RandomBrakingEnv()
+    clear = random_env(conditions=["clear"])
+    mixed = random_env()
     for seed in range(20):
         assert clear.reset(seed=seed)[1]["condition"] == "clear"
         mixed.reset(seed=seed)

@@ -29,6 +29,7 @@ ORDER = (
     "benchmark",
     "plotting",
     "agents",
+    "engine",
     "envs",
     "wrappers",
     "sensing",

@@ -1,0 +1,91 @@
+"""EpisodeQueue: the next episode of every environment, drawn ahead if there are several threads."""
+
+import copy
+import os
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+from gymnasium.utils import seeding
+
+from lgmd_gym.envs.episode_source import Draw, EpisodeSource
+from lgmd_gym.envs.simulation.network import road_network
+
+
+class Prepared(NamedTuple):
+    """An episode that is ready to be loaded.
+
+    Attributes:
+        draw: The episode.
+        network: Its highway-env road network.
+        generator: The random generator after the draw.
+    """
+
+    draw: Draw
+    network: Any
+    generator: np.random.Generator
+
+
+class EpisodeQueue:
+    """Draws the episodes of N environments, each with its own random generator.
+
+    The draws equal those of `BrakingEnv` with the same seeds.
+
+    Args:
+        sources: Source of every environment.
+        ahead: Whether to draw the next episodes in a background thread while the present ones run.
+
+    Attributes:
+        generators: Random generator of every environment; None before the first seed.
+        seeds: The last seeds.
+    """
+
+    def __init__(self, sources: Sequence[EpisodeSource], ahead: bool) -> None:
+        self.sources = list(sources)
+        self.generators: list[np.random.Generator | None] = [None] * len(sources)
+        self.seeds: list[int | None] = [None] * len(sources)
+        self._ahead = ahead
+        self._waiting: list[Future[Prepared] | None] = [None] * len(sources)
+        self._worker: ThreadPoolExecutor | None = None
+        self._pid = 0
+
+    def seed(self, index: int, seed: int | None) -> None:
+        """Seed the generator of an environment; None keeps it, or seeds a new one from the system."""
+        if seed is not None or self.generators[index] is None:
+            self.generators[index], self.seeds[index] = seeding.np_random(seed)
+            self._waiting[index] = None
+
+    def next(self, index: int) -> Prepared:
+        """Return the next episode of a seeded environment."""
+        waiting, self._waiting[index] = self._waiting[index], None
+        generator = self.generators[index]
+        assert generator is not None
+        # The worker of a parent process does not exist after a fork; its draws are repeated.
+        ready = waiting is not None and self._pid == os.getpid()
+        prepared = waiting.result() if ready and waiting else _prepare(self.sources[index], generator)
+        self.generators[index] = prepared.generator
+        if self._ahead:
+            # The worker draws from a copy, so that a new seed can replace the generator at any time.
+            copied = copy.deepcopy(prepared.generator)
+            self._waiting[index] = self._own_worker().submit(_prepare, self.sources[index], copied)
+        return prepared
+
+    def close(self) -> None:
+        """Stop the background thread."""
+        if self._worker is not None and self._pid == os.getpid():
+            self._worker.shutdown(cancel_futures=True)
+        self._worker = None
+
+    def _own_worker(self) -> ThreadPoolExecutor:
+        """Return the background thread of this process; a forked process has none of its parent's threads."""
+        if self._worker is None or self._pid != os.getpid():
+            self._worker = ThreadPoolExecutor(1, thread_name_prefix="episodes")
+            self._pid = os.getpid()
+        return self._worker
+
+
+def _prepare(source: EpisodeSource, generator: np.random.Generator) -> Prepared:
+    draw = source.draw(generator)
+    network = road_network(draw.placement.scenario.road, draw.placement.start)
+    return Prepared(draw, network, generator)

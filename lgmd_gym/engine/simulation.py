@@ -1,0 +1,166 @@
+"""Simulation: the physics, cameras and neurons of many environments, stepped in compiled code."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgmd_gym.engine.kernels import (
+    Clock,
+    Outcome,
+    Physics,
+    View,
+    advance,
+    finish_decisions,
+    start_decisions,
+    start_episodes,
+)
+from lgmd_gym.envs.dynamics.brake import BRAKE
+from lgmd_gym.envs.episode_source import Draw
+from lgmd_gym.envs.info import INFO
+from lgmd_gym.envs.reward import REWARD
+from lgmd_gym.envs.simulation.world import World
+from lgmd_gym.neuron.threads import Threads
+from lgmd_gym.sensing.sensor_array import SensorArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rates:
+    """Frequencies that all environments of a simulation share.
+
+    Attributes:
+        simulation: Simulation steps per second [Hz].
+        policy: Decisions per second, a divisor of `simulation` [Hz].
+        camera: Camera frames per second, a divisor of `simulation` [Hz].
+    """
+
+    simulation: float
+    policy: float
+    camera: float
+
+    @property
+    def steps(self) -> int:
+        """Simulation steps per decision."""
+        return int(self.simulation // self.policy)
+
+    @property
+    def stride(self) -> int:
+        """Simulation steps per camera frame."""
+        return round(self.simulation / self.camera)
+
+
+class Simulation:
+    """Episodes of N environments with their cameras and neurons.
+
+    Args:
+        num_envs: Number of environments N.
+        rates: Frequencies.
+        sensors: Cameras and neurons of the environments; None for physics only.
+        max_demands: Maximum number of demands in a delay line, see `BrakeParams.max_demands`.
+        threads: Number of threads that share the environments of a step, including the calling one.
+
+    Attributes:
+        world: State of the episodes.
+        brakes: `BRAKE` records, shape (N,); set them before the first `load`.
+        weights: `REWARD` records, shape (N,); set them before the first `load`.
+        outcome: Results of the last step or start of each environment.
+        clock: Progress of the decisions.
+        on_frames: Called after each camera frame with a range of environments and the selection of those that
+            have a new frame; None for no call. May be called from several threads at once.
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        rates: Rates,
+        sensors: SensorArray | None,
+        max_demands: int,
+        threads: int = 1,
+    ) -> None:
+        self.num_envs, self.rates, self.sensors = num_envs, rates, sensors
+        self.world = World(num_envs, max_demands)
+        self.brakes, self.weights = np.zeros(num_envs, BRAKE), np.zeros(num_envs, REWARD)
+        flags = (np.zeros(num_envs, np.bool_) for _ in range(3))
+        self.clock = Clock(
+            demands=np.zeros(num_envs),
+            remaining=np.full(num_envs, -1, np.int64),
+            due=next(flags),
+            headings=np.zeros(num_envs),
+        )
+        self.outcome = Outcome(np.zeros(num_envs, INFO), np.zeros(num_envs), next(flags), next(flags))
+        self.on_frames: Callable[[int, int, np.ndarray], None] | None = None
+        self._view = self._make_view()
+        self._physics = self._make_physics()
+        self._threads = Threads(threads)
+
+    def load(self, index: int, draw: Draw, network: Any) -> None:
+        """Load an episode into environment `index`; `start` begins it.
+
+        Args:
+            index: Index of the environment.
+            draw: The episode.
+            network: Its highway-env road network; not used without sensors.
+        """
+        if self.world.load(index, draw.placement):
+            self._physics = self._make_physics()
+        if self.sensors is not None:
+            self.sensors.set_camera_fields(index, draw.camera_fields)
+            self.sensors.set_road(index, network)
+
+    def start(self, selected: np.ndarray) -> None:
+        """Start the loaded episodes of the selected environments, bool, shape (N,)."""
+        if self.sensors is not None:
+            self.sensors.reset(selected)
+        self._run(self._start_part, selected)
+
+    def step(self, demands: np.ndarray, active: np.ndarray) -> None:
+        """Advance the active environments by one decision.
+
+        Args:
+            demands: Longitudinal demands in [-1, 1], float64, shape (N,).
+            active: Selection of the environments, bool, shape (N,).
+        """
+        self.clock.demands[:] = demands
+        self.clock.remaining[:] = np.where(active, 0, -1)
+        self._run(self._step_part)
+
+    def _run(self, part: Callable[..., None], *arguments: Any) -> None:
+        if self._threads.count == 1:
+            part(0, self.num_envs, *arguments)
+        else:
+            self._threads.run(part, self.num_envs, arguments)
+
+    def _start_part(self, first: int, last: int, selected: np.ndarray) -> None:
+        rate = self.rates.simulation
+        start_episodes(first, last, rate, selected, self._physics, self.clock, self._view, self.outcome)
+        self._process(first, last, selected)
+
+    def _step_part(self, first: int, last: int) -> None:
+        rates, physics, clock = self.rates, self._physics, self.clock
+        start_decisions(first, last, rates.steps, physics, clock)
+        while advance(first, last, rates.stride, rates.simulation, physics, clock, self._view):
+            self._process(first, last, clock.due)
+        finish_decisions(first, last, rates.policy, physics, clock, self.outcome)
+
+    def _process(self, first: int, last: int, due: np.ndarray) -> None:
+        if self.sensors is not None:
+            self.sensors.process(first, last, due)
+            if self.on_frames is not None:
+                self.on_frames(first, last, due)
+
+    def _make_physics(self) -> Physics:
+        world = self.world
+        return Physics(
+            world.bodies, world.episodes, world.egos, world.lines, world.pending, world.segments, world.paths,
+            world.before, self.brakes, self.weights,
+        )  # fmt: skip
+
+    def _make_view(self) -> View:
+        if self.sensors is None:
+            from lgmd_gym.camera.objects import OBJECT
+            from lgmd_gym.camera.scene import SCENE
+
+            shape = self.num_envs
+            return View(np.zeros(shape, SCENE), np.zeros((shape, 512), OBJECT), np.zeros(shape, np.int64))
+        return View(self.sensors.scenes, self.sensors.objects, self.sensors.object_counts)

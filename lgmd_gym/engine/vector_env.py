@@ -1,0 +1,257 @@
+"""`BrakingVectorEnv`: the compiled vector environment of all braking scenarios."""
+
+import copy as copying
+from typing import Any, cast
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from lgmd_gym.camera import CameraSpec
+from lgmd_gym.engine.actions import Demands
+from lgmd_gym.engine.episodes import EpisodeQueue, Prepared
+from lgmd_gym.engine.infos import InfoArrays
+from lgmd_gym.engine.observations import Observations
+from lgmd_gym.engine.simulation import Rates, Simulation
+from lgmd_gym.engine.top_view import TopViews
+from lgmd_gym.envs.braking import BrakingEnv
+from lgmd_gym.envs.registration import make_source
+from lgmd_gym.errors import check_keys
+from lgmd_gym.neuron import LGMDParams, NeuronSpec
+from lgmd_gym.sensing.frame_rate import camera_rate
+from lgmd_gym.sensing.sensor_array import SensorArray
+from lgmd_gym.sensing.spaces import make_space
+
+
+class BrakingVectorEnv(VectorEnv):
+    """N braking environments of one family, with cameras and neurons, stepped in compiled code.
+
+    Observations, rewards, flags, infos and final observations equal those of a `SyncVectorEnv` of single
+    environments with the same seeds and actions; see `BrakingEnv` and `LGMDObservation` for their meaning.
+    `gym.make_vec("LGMD/CCRs-v0", num_envs=64)` makes this environment, and
+    `gym.make_vec(…, vectorization_mode="sync")` the vector of single environments.
+
+    Physics, cameras and neurons of all environments run without the GIL; Python is called a few times per
+    step and thread. With more than one thread, the next episode of each environment is drawn ahead in the
+    background.
+
+    Args:
+        num_envs: Number of environments N.
+        family: A scenario family, or "RandomBraking"; set by the environment id.
+        camera: See `LGMDObservation`; None for no camera, so that observations are those of `BrakingEnv`.
+        params: See `LGMDObservation`.
+        fps: See `LGMDObservation`.
+        include_frame: See `LGMDObservation`.
+        include_base: See `LGMDObservation`.
+        trace: See `LGMDObservation`.
+        config: Configuration of `BrakingEnv`, for all environments.
+        render_mode: None or "rgb_array" (highway-env's top view of every environment).
+        threads: Number of threads of a step, including the calling one.
+        autoreset_mode: Gymnasium's autoreset mode: "NextStep", "SameStep" or "Disabled".
+        copy: Whether observations are new arrays; if not, the next step overwrites them.
+        **arguments: See `lgmd_gym.envs.registration.make_braking`.
+
+    Raises:
+        ValueError: If an argument, key or name is unknown, or a value is out of range.
+
+    Example:
+        >>> import gymnasium as gym, lgmd_gym
+        >>> envs = gym.make_vec("LGMD/CCRs-v0", num_envs=3)
+        >>> observations, infos = envs.reset(seed=1)
+        >>> observations["spike_frequency"].shape
+        (3, 1)
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        family: str,
+        camera: CameraSpec | None = "fovea",
+        params: NeuronSpec = None,
+        fps: float | None = None,
+        include_frame: bool = False,
+        include_base: bool = False,
+        trace: bool = False,
+        config: dict[str, Any] | None = None,
+        render_mode: str | None = None,
+        threads: int = 1,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        copy: bool = True,
+        **arguments: Any,
+    ) -> None:
+        self.num_envs = _at_least_one("num_envs", num_envs)
+        source, self._camera_fields = make_source(family, arguments)
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode must be None or 'rgb_array' for a vector, got {render_mode!r}")
+        self._single = BrakingEnv(source, config=config)
+        self.render_mode, self.copy = render_mode, copy
+        mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**self._single.metadata, "autoreset_mode": mode}
+        settings = self._single.config
+        rates = Rates(
+            simulation=settings["simulation_frequency"],
+            policy=settings["policy_frequency"],
+            camera=camera_rate(fps, settings["simulation_frequency"]) if camera is not None else 1.0,
+        )
+        neuron = LGMDParams.make(params)
+        sensors = None if camera is None else SensorArray(camera, rates.camera, neuron, self.num_envs)
+        demands = self._single.brake.max_demands(rates.policy)
+        self.simulation = Simulation(
+            self.num_envs, rates, sensors, demands, _at_least_one("threads", threads)
+        )
+        self.simulation.brakes[:] = self._single.brake.record(settings["throttle"])
+        self.simulation.weights[:] = self._single.weights
+        self._queue = EpisodeQueue([source] * self.num_envs, ahead=threads > 1)
+        self._episodes: list[Prepared | None] = [None] * self.num_envs
+        self._demands = Demands(self._single.action_type)
+        self._top_views = TopViews(self.simulation, config or {})
+        self._make_spaces(neuron, include_frame, include_base)
+        self._observations = Observations(
+            self.simulation, self.single_observation_space, include_frame, include_base, copy
+        )
+        self._infos = InfoArrays(self.simulation, trace)
+        self._ended = np.zeros(self.num_envs, np.bool_)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Reset all environments, or those selected by ``options["reset_mask"]``.
+
+        Args:
+            seed: Seed of the first environment; the others get the following numbers. Or one seed per
+                environment. None continues their random generators.
+            options: None, or ``reset_mask``, bool, shape (num_envs,).
+
+        Raises:
+            ValueError: If the seeds or the mask have another length, or an option is unknown.
+        """
+        options = dict(options or {})
+        check_keys("option", options, ("reset_mask",))
+        mask = _checked_mask(options.get("reset_mask"), self.num_envs)
+        for index, value in enumerate(_seeds(seed, self.num_envs)):
+            if mask[index]:
+                self._queue.seed(index, value)
+        self._start(mask)
+        self._ended[mask] = False
+        return self._observations.read(), self._infos.read(mask)
+
+    def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Advance all environments by one decision.
+
+        Raises:
+            ValueError: If an action is out of range, or an environment that has ended was not reset in
+                autoreset mode "Disabled".
+            RuntimeError: Before the first reset.
+        """
+        if None in self._episodes:
+            raise RuntimeError("the environments have no episodes: call reset() before step()")
+        mode, ended = self.metadata["autoreset_mode"], self._ended
+        if mode == AutoresetMode.DISABLED and ended.any():
+            raise ValueError(
+                f"environments {np.flatnonzero(ended).tolist()} have ended; "
+                "call reset(options={'reset_mask': terminated | truncated}) before step()"
+            )
+        restart = ended if mode == AutoresetMode.NEXT_STEP else np.zeros_like(ended)
+        self.simulation.step(self._demands.read(actions, self.num_envs), ~restart)
+        if restart.any():
+            self._start(restart)
+        outcome = self.simulation.outcome
+        result = outcome.rewards.copy(), outcome.terminated.copy(), outcome.truncated.copy()
+        self._ended = result[1] | result[2]
+        extra: dict[str, Any] = {}
+        if mode == AutoresetMode.SAME_STEP and self._ended.any():
+            extra = self._end_episodes(self._ended)
+        infos = self._infos.read(np.ones(self.num_envs, np.bool_))
+        return self._observations.read(), *result, infos | extra
+
+    def render(self) -> tuple[Any, ...] | None:
+        """Return highway-env's top view of every environment, uint8, (height, width, 3), or None."""
+        if self.render_mode is None:
+            return None
+        return tuple(
+            self._top_views.render(index, prepared)
+            for index, prepared in enumerate(self._episodes)
+            if prepared
+        )
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Stop background threads and close the cameras."""
+        self._queue.close()
+        self._top_views.close()
+        if self.simulation.sensors is not None:
+            self.simulation.sensors.close()
+
+    @property
+    def np_random(self) -> Any:
+        """Random generators of the environments."""
+        return tuple(self._queue.generators)
+
+    @property
+    def np_random_seed(self) -> Any:
+        """Last seeds of the environments."""
+        return tuple(self._queue.seeds)
+
+    def _start(self, selected: np.ndarray) -> None:
+        """Start new episodes in the selected environments."""
+        for index in np.flatnonzero(selected).tolist():
+            self._queue.seed(index, None)
+            prepared = self._queue.next(index)
+            draw = prepared.draw
+            fields = self._camera_fields | draw.camera_fields
+            self.simulation.load(index, draw._replace(camera_fields=fields), prepared.network)
+            self._episodes[index] = prepared
+            self._infos.set_episode(index, draw.info)
+        self.simulation.start(selected)
+
+    def _end_episodes(self, ended: np.ndarray) -> dict[str, Any]:
+        """Restart environments at once; returns their final observations and infos."""
+        batch = self._observations.read(copy=True)
+        final = np.full(self.num_envs, None, dtype=object)
+        for index in np.flatnonzero(ended).tolist():
+            final[index] = _item(batch, index)
+        infos = {"final_obs": final, "final_info": self._infos.read(ended)}
+        self._start(ended)
+        return infos | {f"_{key}": ended.copy() for key in infos}
+
+    def _make_spaces(self, neuron: LGMDParams, include_frame: bool, include_base: bool) -> None:
+        base, rates, sensors = self._single.observation_space, self.simulation.rates, self.simulation.sensors
+        self.single_action_space = copying.deepcopy(self._single.action_space)
+        self.single_observation_space = cast(gym.Space, base)
+        if sensors is not None:
+            included = base if include_base else None
+            self.single_observation_space = make_space(
+                sensors, neuron, rates.camera, rates.simulation, include_frame, included
+            )
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+
+
+def _at_least_one(name: str, value: int) -> int:
+    if not isinstance(value, int | np.integer) or value < 1:
+        raise ValueError(f"{name} must be an integer >= 1, got {value!r}")
+    return int(value)
+
+
+def _seeds(seed: Any, num_envs: int) -> list[int | None]:
+    if seed is None:
+        return [None] * num_envs
+    seeds = [seed + index for index in range(num_envs)] if isinstance(seed, int | np.integer) else list(seed)
+    if len(seeds) != num_envs:
+        raise ValueError(f"seed must be one number or {num_envs} numbers, got {len(seeds)}")
+    return seeds
+
+
+def _checked_mask(mask: Any, num_envs: int) -> np.ndarray:
+    if mask is None:
+        return np.ones(num_envs, np.bool_)
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (num_envs,):
+        raise ValueError(f"options['reset_mask'] must be a bool array of shape ({num_envs},), got {mask!r}")
+    if not mask.any():
+        raise ValueError("options['reset_mask'] must select at least one environment, got none")
+    return mask
+
+
+def _item(batch: Any, index: int) -> Any:
+    return {key: value[index] for key, value in batch.items()} if isinstance(batch, dict) else batch[index]
