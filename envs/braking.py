@@ -6,10 +6,17 @@ from typing import Any, cast
 import numpy as np
 
 from lgmd_gym.envs.base import EgoBrakeEnv
-from lgmd_gym.envs.dynamics.episode import is_terminated, is_truncated
+from lgmd_gym.envs.decisions import (
+    finish_decisions,
+    make_clock,
+    make_outcome,
+    make_physics,
+    start_decisions,
+    start_episodes,
+)
 from lgmd_gym.envs.episode_source import EpisodeSource, FixedScenario
-from lgmd_gym.envs.info import INFO, INFO_KEYS, write_info
-from lgmd_gym.envs.reward import RewardParams, step_reward
+from lgmd_gym.envs.info import INFO_KEYS
+from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.envs.simulation.network import road_network
 from lgmd_gym.envs.simulation.road import BrakingRoad
@@ -17,6 +24,8 @@ from lgmd_gym.envs.simulation.vehicles import EgoCar
 from lgmd_gym.envs.simulation.world import World
 from lgmd_gym.envs.spaces import EgoState, make_action
 from lgmd_gym.errors import check_keys
+
+_SELECTED = np.ones(1, np.bool_)
 
 
 class BrakingEnv(EgoBrakeEnv):
@@ -140,9 +149,10 @@ class BrakingEnv(EgoBrakeEnv):
         check_keys("key of config['reward']", reward, self.config["reward"])
         super().configure(config)
         self.config["reward"] = {**self.config["reward"], **reward}
-        self.weights = RewardParams(**self.config["reward"]).record()
-        self._brake_record = self.brake.record(self.config["throttle"])
+        self.weights = RewardParams(**self.config["reward"]).record()[None]
+        self._brakes = self.brake.record(self.config["throttle"])[None]
         self._world = World(1, self.brake.max_demands(self.config["policy_frequency"]))
+        self._clock, self._outcome = make_clock(1), make_outcome(1)
 
     def define_spaces(self) -> None:
         """Set the action and observation types and their spaces."""
@@ -165,21 +175,35 @@ class BrakingEnv(EgoBrakeEnv):
         """Advance by one decision; see `AbstractEnv.step`."""
         if self.vehicle is None:
             raise RuntimeError("the environment has no episode: call reset() before step()")
-        world = self._world
-        bodies, episode = world.bodies[0], world.episodes[0]
-        episode["last_speed"], episode["last_acceleration"] = bodies[0]["speed"], bodies[0]["acceleration"]
-        dt = 1.0 / self.config["policy_frequency"]
-        self.time += dt
+        self.time += 1 / self.config["policy_frequency"]
         self._simulate(action)
-        episode["time"] = self.time
-        obs, info = self.observation_type.observe(), self._info(None)
-        reward = step_reward(
-            bodies[0], world.egos[0], episode, self._brake_record[()], self.weights[()], info["ttc"], dt
-        )
-        terminated, truncated = is_terminated(bodies, episode), is_truncated(episode)
+        physics, clock, outcome = self.road.physics, tuple(self._clock), self._outcome
+        finish_decisions(0, 1, self.config["policy_frequency"], physics, clock, tuple(outcome))
         if self.render_mode == "human":
             self.render()
-        return obs, reward, terminated, truncated, info
+        terminated, truncated = bool(outcome.terminated[0]), bool(outcome.truncated[0])
+        return (
+            self.observation_type.observe(),
+            float(outcome.rewards[0]),
+            terminated,
+            truncated,
+            self._info(None),
+        )
+
+    def _simulate(self, action: Any = None) -> None:
+        """Advance by the simulation steps of one decision."""
+        rate = self.config["simulation_frequency"]
+        steps = int(rate // self.config["policy_frequency"])
+        if action is not None and not self.config["manual_control"]:
+            self.action_type.act(action)
+        self._clock.remaining[0] = steps
+        start_decisions(0, 1, steps, self.road.physics, tuple(self._clock))
+        for step in range(steps):
+            self.road.step(1 / rate)
+            self.steps += 1
+            if step < steps - 1:
+                self._automatic_rendering()
+        self.enable_auto_render = False
 
     def _reset(self) -> None:
         draw = self._source.draw(self.np_random)
@@ -188,12 +212,10 @@ class BrakingEnv(EgoBrakeEnv):
         self.camera_fields = self.camera_fields | draw.camera_fields
         self._world.load(0, placement)
         network = road_network(placement.scenario.road, placement.start)
-        self.road = BrakingRoad(network, self.np_random, self._world, self._brake_record)
+        physics = tuple(make_physics(self._world, self._brakes, self.weights))
+        self.road = BrakingRoad(network, self.np_random, physics, self._clock.demands)
         self.controlled_vehicles = [self.road.ego]
+        start_episodes(0, 1, _SELECTED, physics, tuple(self._clock), tuple(self._outcome))
 
     def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
-        world = self._world
-        bodies, episode = world.bodies[0], world.episodes[0]
-        values = np.zeros(1, INFO)
-        write_info(bodies, episode, world.egos[0], world.paths[0], values[0])
-        return dict(zip(INFO_KEYS, values[0].tolist(), strict=True)) | self._episode_info
+        return dict(zip(INFO_KEYS, self._outcome.infos[0].tolist(), strict=True)) | self._episode_info

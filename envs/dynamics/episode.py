@@ -1,7 +1,7 @@
 """One simulation step of all bodies with contact detection, and the end of an episode."""
 
 from math import cos, inf, sin
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,44 @@ EPISODE = np.dtype(
 whether the ego has closed in on an actor, simulation steps; ego speed and speed relative to the other body at
 contact, inf without contact [m/s]; time after the last decision and duration [s], highest scripted speed
 [m/s], ego speed [m/s] and acceleration [m/s²] before the last decision."""
+
+
+class Physics(NamedTuple):
+    """Arrays of the physics, the environments along the first axis.
+
+    Attributes:
+        bodies: See `World`.
+        episodes: See `World`.
+        egos: See `World`.
+        lines: See `World`.
+        pending: See `World`.
+        segments: See `World`.
+        paths: See `World`.
+        before: See `World`.
+        brakes: `BRAKE` records, shape (N,).
+        weights: `REWARD` records, shape (N,).
+    """
+
+    bodies: np.ndarray
+    episodes: np.ndarray
+    egos: np.ndarray
+    lines: np.ndarray
+    pending: np.ndarray
+    segments: np.ndarray
+    paths: np.ndarray
+    before: np.ndarray
+    brakes: np.ndarray
+    weights: np.ndarray
+
+
+@compiled
+def step_environment(i: int, dt: float, physics: Physics) -> None:
+    """Advance environment i by `dt` [s]; see `step_bodies`."""
+    physics = Physics(*physics)
+    step_bodies(
+        physics.bodies[i], physics.episodes[i], physics.egos[i], physics.lines[i], physics.pending[i],
+        physics.brakes[i], physics.segments[i], physics.paths[i], physics.before[i], dt,
+    )  # fmt: skip
 
 
 @compiled

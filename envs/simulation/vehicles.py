@@ -57,12 +57,11 @@ class EgoCar(PathCar):
     Args:
         road: The road.
         body: The ego's `BODY` record.
-        demand: Function that puts a demand into the ego's delay line.
+        demand: Function that sets the demand of the next decision.
 
     Attributes:
         demand: Sets the longitudinal demand: −1 full brake, 0 hold the scripted speed, +1 full throttle.
         yaw_rate: Mean yaw rate over the last step, + to the right [rad/s].
-        braking: Deceleration beyond the script, >= 0 [m/s²].
     """
 
     color = (50, 200, 0)  # in highway-env's top view
@@ -70,7 +69,7 @@ class EgoCar(PathCar):
     def __init__(self, road: Road, body: np.void, demand: Callable[[float], None]) -> None:
         super().__init__(road, body)
         self.demand = demand
-        self.yaw_rate = self.braking = 0.0
+        self.yaw_rate = 0.0
 
 
 class ScriptedCar(PathCar):

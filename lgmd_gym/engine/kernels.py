@@ -6,72 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from lgmd_gym.camera.objects import BRAKE_LIGHT_MPS2, MAX_RANGE, MODEL_BOX, MODEL_CAR, MODEL_MARK
+from lgmd_gym.envs.decisions import Clock
 from lgmd_gym.envs.dynamics.bodies import BOX, CAR
-from lgmd_gym.envs.dynamics.brake import put_demand
-from lgmd_gym.envs.dynamics.episode import is_terminated, is_truncated, step_bodies
+from lgmd_gym.envs.dynamics.episode import Physics, step_environment
 from lgmd_gym.envs.dynamics.jit import compiled
-from lgmd_gym.envs.info import write_info
-from lgmd_gym.envs.reward import step_reward
-
-
-class Physics(NamedTuple):
-    """Arrays of the physics, the environments along the first axis.
-
-    Attributes:
-        bodies: See `World`.
-        episodes: See `World`.
-        egos: See `World`.
-        lines: See `World`.
-        pending: See `World`.
-        segments: See `World`.
-        paths: See `World`.
-        before: See `World`.
-        brakes: `BRAKE` records, shape (N,).
-        weights: `REWARD` records, shape (N,).
-    """
-
-    bodies: np.ndarray
-    episodes: np.ndarray
-    egos: np.ndarray
-    lines: np.ndarray
-    pending: np.ndarray
-    segments: np.ndarray
-    paths: np.ndarray
-    before: np.ndarray
-    brakes: np.ndarray
-    weights: np.ndarray
-
-
-class Clock(NamedTuple):
-    """Progress of the present decision, the environments along the first axis.
-
-    Attributes:
-        demands: Longitudinal demands, float64, shape (N,).
-        remaining: Simulation steps left in the decision, int64, shape (N,); −1 for no decision.
-        due: Output: whether a camera frame is due, bool, shape (N,).
-        headings: Heading before the decision, float64, shape (N,) [rad].
-    """
-
-    demands: np.ndarray
-    remaining: np.ndarray
-    due: np.ndarray
-    headings: np.ndarray
-
-
-class Outcome(NamedTuple):
-    """Results of the present decision, the environments along the first axis.
-
-    Attributes:
-        infos: `INFO` records, shape (N,).
-        rewards: float64, shape (N,).
-        terminated: bool, shape (N,).
-        truncated: bool, shape (N,).
-    """
-
-    infos: np.ndarray
-    rewards: np.ndarray
-    terminated: np.ndarray
-    truncated: np.ndarray
 
 
 class View(NamedTuple):
@@ -86,29 +24,6 @@ class View(NamedTuple):
     scenes: np.ndarray
     objects: np.ndarray
     counts: np.ndarray
-
-
-@compiled
-def start_decisions(first: int, last: int, steps: int, physics: Physics, clock: Clock) -> None:
-    """Put the demands of the environments with `remaining` >= 0 into their delay lines.
-
-    Args:
-        first: First environment.
-        last: Last environment + 1.
-        steps: Simulation steps per decision.
-        physics: `Physics`.
-        clock: `Clock`.
-    """
-    for i in range(first, last):
-        if clock.remaining[i] < 0:
-            continue
-        clock.remaining[i] = steps
-        ego, episode, brake = physics.bodies[i, 0], physics.episodes[i], physics.brakes[i]
-        clock.headings[i] = ego.heading
-        episode.last_speed, episode.last_acceleration = ego.speed, ego.acceleration
-        demand = clock.demands[i]
-        demand = demand if demand < 0.0 or brake.throttle > 0.0 else 0.0
-        put_demand(physics.lines[i], physics.pending[i], brake.delay, demand)
 
 
 @compiled
@@ -129,15 +44,13 @@ def advance(
     Returns:
         Whether a frame is due in any of the environments, see `Clock.due`.
     """
+    physics, clock, view = Physics(*physics), Clock(*clock), View(*view)
     any_due = False
     for i in range(first, last):
         clock.due[i] = False
         episode = physics.episodes[i]
         while clock.remaining[i] > 0 and not clock.due[i]:
-            step_bodies(
-                physics.bodies[i], episode, physics.egos[i], physics.lines[i], physics.pending[i],
-                physics.brakes[i], physics.segments[i], physics.paths[i], physics.before[i], 1.0 / rate,
-            )  # fmt: skip
+            step_environment(i, 1.0 / rate, physics)
             clock.remaining[i] -= 1
             # highway-env counts a step after the frame of that step.
             clock.due[i] = (episode.steps + 1) % stride == 0
@@ -169,45 +82,11 @@ def show(i: int, rate: float, physics: Physics, view: View) -> None:
 
 
 @compiled
-def finish_decisions(
-    first: int, last: int, policy_rate: float, physics: Physics, clock: Clock, outcome: Outcome
+def show_episodes(
+    first: int, last: int, rate: float, selected: np.ndarray, physics: Physics, view: View
 ) -> None:
-    """Write info, reward and end of the environments with a decision.
-
-    Args:
-        first: First environment.
-        last: Last environment + 1.
-        policy_rate: Decisions per second [Hz].
-        physics: `Physics`.
-        clock: `Clock`.
-        outcome: Output.
-    """
-    for i in range(first, last):
-        if clock.remaining[i] < 0:
-            continue
-        bodies, episode, ego, info = physics.bodies[i], physics.episodes[i], physics.egos[i], outcome.infos[i]
-        dt = 1.0 / policy_rate
-        episode.time += dt
-        write_info(bodies, episode, ego, physics.paths[i], info)
-        outcome.rewards[i] = step_reward(
-            bodies[0], ego, episode, physics.brakes[i], physics.weights[i], info.ttc, dt
-        )
-        outcome.terminated[i] = is_terminated(bodies, episode)
-        outcome.truncated[i] = is_truncated(episode)
-
-
-@compiled
-def start_episodes(
-    first: int, last: int, rate: float, selected: np.ndarray, physics: Physics, clock: Clock, view: View,
-    outcome: Outcome,
-) -> None:  # fmt: skip
-    """Write the first info and the first view of the selected environments."""
+    """Write the present state of the selected environments for their cameras."""
+    physics, view = Physics(*physics), View(*view)
     for i in range(first, last):
         if selected[i]:
-            write_info(
-                physics.bodies[i], physics.episodes[i], physics.egos[i], physics.paths[i], outcome.infos[i]
-            )
             show(i, rate, physics, view)
-            clock.headings[i] = physics.bodies[i, 0].heading
-            outcome.rewards[i] = 0.0
-            outcome.terminated[i] = outcome.truncated[i] = False

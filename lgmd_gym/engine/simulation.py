@@ -6,19 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.engine.kernels import (
-    Clock,
-    Outcome,
-    Physics,
-    View,
-    advance,
+from lgmd_gym.engine.kernels import View, advance, show_episodes
+from lgmd_gym.envs.decisions import (
     finish_decisions,
+    make_clock,
+    make_outcome,
+    make_physics,
     start_decisions,
     start_episodes,
 )
 from lgmd_gym.envs.dynamics.brake import BRAKE
 from lgmd_gym.envs.episode_source import Draw
-from lgmd_gym.envs.info import INFO
 from lgmd_gym.envs.reward import REWARD
 from lgmd_gym.envs.simulation.world import World
 from lgmd_gym.neuron.threads import Threads
@@ -66,6 +64,7 @@ class Simulation:
         weights: `REWARD` records, shape (N,); set them before the first `load`.
         outcome: Results of the last step or start of each environment.
         clock: Progress of the decisions.
+        physics: The fields of `Physics`.
         on_frames: Called after each camera frame with a range of environments and the selection of those that
             have a new frame; None for no call. May be called from several threads at once.
     """
@@ -81,17 +80,15 @@ class Simulation:
         self.num_envs, self.rates, self.sensors = num_envs, rates, sensors
         self.world = World(num_envs, max_demands)
         self.brakes, self.weights = np.zeros(num_envs, BRAKE), np.zeros(num_envs, REWARD)
-        flags = (np.zeros(num_envs, np.bool_) for _ in range(3))
-        self.clock = Clock(
-            demands=np.zeros(num_envs),
-            remaining=np.full(num_envs, -1, np.int64),
-            due=next(flags),
-            headings=np.zeros(num_envs),
-        )
-        self.outcome = Outcome(np.zeros(num_envs, INFO), np.zeros(num_envs), next(flags), next(flags))
+        self.clock, self.outcome = make_clock(num_envs), make_outcome(num_envs)
         self.on_frames: Callable[[int, int, np.ndarray], None] | None = None
-        self._view = self._make_view()
-        self._physics = self._make_physics()
+        # Plain tuples are cheaper to pass to compiled functions.
+        self._view, self._clock, self._results = (
+            tuple(self._make_view()),
+            tuple(self.clock),
+            tuple(self.outcome),
+        )
+        self._link()
         self._threads = Threads(threads)
 
     def load(self, index: int, draw: Draw, network: Any) -> None:
@@ -103,7 +100,7 @@ class Simulation:
             network: Its highway-env road network; not used without sensors.
         """
         if self.world.load(index, draw.placement):
-            self._physics = self._make_physics()
+            self._link()
         if self.sensors is not None:
             self.sensors.set_camera_fields(index, draw.camera_fields)
             self.sensors.set_road(index, network)
@@ -132,16 +129,16 @@ class Simulation:
             self._threads.run(part, self.num_envs, arguments)
 
     def _start_part(self, first: int, last: int, selected: np.ndarray) -> None:
-        rate = self.rates.simulation
-        start_episodes(first, last, rate, selected, self._physics, self.clock, self._view, self.outcome)
+        start_episodes(first, last, selected, self.physics, self._clock, self._results)
+        show_episodes(first, last, self.rates.simulation, selected, self.physics, self._view)
         self._process(first, last, selected)
 
     def _step_part(self, first: int, last: int) -> None:
-        rates, physics, clock = self.rates, self._physics, self.clock
+        rates, physics, clock = self.rates, self.physics, self._clock
         start_decisions(first, last, rates.steps, physics, clock)
         while advance(first, last, rates.stride, rates.simulation, physics, clock, self._view):
-            self._process(first, last, clock.due)
-        finish_decisions(first, last, rates.policy, physics, clock, self.outcome)
+            self._process(first, last, self.clock.due)
+        finish_decisions(first, last, rates.policy, physics, clock, self._results)
 
     def _process(self, first: int, last: int, due: np.ndarray) -> None:
         if self.sensors is not None:
@@ -149,12 +146,9 @@ class Simulation:
             if self.on_frames is not None:
                 self.on_frames(first, last, due)
 
-    def _make_physics(self) -> Physics:
-        world = self.world
-        return Physics(
-            world.bodies, world.episodes, world.egos, world.lines, world.pending, world.segments, world.paths,
-            world.before, self.brakes, self.weights,
-        )  # fmt: skip
+    def _link(self) -> None:
+        """Collect the arrays of the physics."""
+        self.physics = tuple(make_physics(self.world, self.brakes, self.weights))
 
     def _make_view(self) -> View:
         if self.sensors is None:

@@ -29,8 +29,8 @@ class TopViews:
             source = FixedScenario(prepared.draw.placement.scenario)
             self._viewers[index] = BrakingEnv(source, config=self._config, render_mode="rgb_array")
         viewer, simulation = self._viewers[index], self._simulation
-        brake = simulation.brakes[index]
-        viewer.road = BrakingRoad(prepared.network, prepared.generator, simulation.world, brake, index)
+        physics, demands = simulation.physics, simulation.clock.demands
+        viewer.road = BrakingRoad(prepared.network, prepared.generator, physics, demands, index)
         viewer.controlled_vehicles = [viewer.road.ego]
         viewer.road.show()
         frame = viewer.render()

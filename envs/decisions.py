@@ -1,0 +1,136 @@
+"""Compiled start, steps and end of the decisions of a range of environments.
+
+The functions take the fields of `Physics`, `Clock` and `Outcome` as plain tuples, too, which are cheaper to
+pass from Python.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lgmd_gym.envs.dynamics.brake import put_demand
+from lgmd_gym.envs.dynamics.episode import Physics, is_terminated, is_truncated
+from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.envs.info import INFO, write_info
+from lgmd_gym.envs.reward import step_reward
+from lgmd_gym.envs.simulation.world import World
+
+
+class Clock(NamedTuple):
+    """Progress of the present decision, the environments along the first axis.
+
+    Attributes:
+        demands: Longitudinal demands, float64, shape (N,).
+        remaining: Simulation steps left in the decision, int64, shape (N,); −1 for no decision.
+        due: Output: whether a camera frame is due, bool, shape (N,).
+        headings: Heading before the decision, float64, shape (N,) [rad].
+    """
+
+    demands: np.ndarray
+    remaining: np.ndarray
+    due: np.ndarray
+    headings: np.ndarray
+
+
+class Outcome(NamedTuple):
+    """Results of the present decision, the environments along the first axis.
+
+    Attributes:
+        infos: `INFO` records, shape (N,).
+        rewards: float64, shape (N,).
+        terminated: bool, shape (N,).
+        truncated: bool, shape (N,).
+    """
+
+    infos: np.ndarray
+    rewards: np.ndarray
+    terminated: np.ndarray
+    truncated: np.ndarray
+
+
+def make_physics(world: World, brakes: np.ndarray, weights: np.ndarray) -> Physics:
+    """Return the arrays of a world; make them again after `World.load` has replaced arrays."""
+    return Physics(
+        world.bodies, world.episodes, world.egos, world.lines, world.pending, world.segments, world.paths,
+        world.before, brakes, weights,
+    )  # fmt: skip
+
+
+def make_clock(num: int) -> Clock:
+    """Return the clock of `num` environments without a decision."""
+    return Clock(np.zeros(num), np.full(num, -1, np.int64), np.zeros(num, np.bool_), np.zeros(num))
+
+
+def make_outcome(num: int) -> Outcome:
+    """Return empty results of `num` environments."""
+    flags = np.zeros((2, num), np.bool_)
+    return Outcome(np.zeros(num, INFO), np.zeros(num), flags[0], flags[1])
+
+
+@compiled
+def start_decisions(first: int, last: int, steps: int, physics: Physics, clock: Clock) -> None:
+    """Put the demands of the environments with `remaining` >= 0 into their delay lines.
+
+    Args:
+        first: First environment.
+        last: Last environment + 1.
+        steps: Simulation steps per decision.
+        physics: `Physics`.
+        clock: `Clock`.
+    """
+    physics, clock = Physics(*physics), Clock(*clock)
+    for i in range(first, last):
+        if clock.remaining[i] < 0:
+            continue
+        clock.remaining[i] = steps
+        ego, episode, brake = physics.bodies[i, 0], physics.episodes[i], physics.brakes[i]
+        clock.headings[i] = ego.heading
+        episode.last_speed, episode.last_acceleration = ego.speed, ego.acceleration
+        demand = clock.demands[i]
+        demand = demand if demand < 0.0 or brake.throttle > 0.0 else 0.0
+        put_demand(physics.lines[i], physics.pending[i], brake.delay, demand)
+
+
+@compiled
+def finish_decisions(
+    first: int, last: int, policy_rate: float, physics: Physics, clock: Clock, outcome: Outcome
+) -> None:
+    """Write info, reward and end of the environments with a decision.
+
+    Args:
+        first: First environment.
+        last: Last environment + 1.
+        policy_rate: Decisions per second [Hz].
+        physics: `Physics`.
+        clock: `Clock`.
+        outcome: Output.
+    """
+    physics, clock, outcome = Physics(*physics), Clock(*clock), Outcome(*outcome)
+    for i in range(first, last):
+        if clock.remaining[i] < 0:
+            continue
+        bodies, episode, ego, info = physics.bodies[i], physics.episodes[i], physics.egos[i], outcome.infos[i]
+        dt = 1.0 / policy_rate
+        episode.time += dt
+        write_info(bodies, episode, ego, physics.paths[i], info)
+        outcome.rewards[i] = step_reward(
+            bodies[0], ego, episode, physics.brakes[i], physics.weights[i], info.ttc, dt
+        )
+        outcome.terminated[i] = is_terminated(bodies, episode)
+        outcome.truncated[i] = is_truncated(episode)
+
+
+@compiled
+def start_episodes(
+    first: int, last: int, selected: np.ndarray, physics: Physics, clock: Clock, outcome: Outcome
+) -> None:
+    """Write the first info and the heading of the selected environments."""
+    physics, clock, outcome = Physics(*physics), Clock(*clock), Outcome(*outcome)
+    for i in range(first, last):
+        if selected[i]:
+            write_info(
+                physics.bodies[i], physics.episodes[i], physics.egos[i], physics.paths[i], outcome.infos[i]
+            )
+            clock.headings[i] = physics.bodies[i, 0].heading
+            outcome.rewards[i] = 0.0
+            outcome.terminated[i] = outcome.truncated[i] = False
