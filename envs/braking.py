@@ -18,6 +18,7 @@ from lgmd_gym.envs.episode_source import EpisodeSource, FixedScenario
 from lgmd_gym.envs.info import INFO_KEYS
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.scenarios.scenario import Scenario
+from lgmd_gym.envs.scene import SceneArrays, write_scene
 from lgmd_gym.envs.simulation.network import road_network
 from lgmd_gym.envs.simulation.road import BrakingRoad
 from lgmd_gym.envs.simulation.vehicles import EgoCar
@@ -204,6 +205,16 @@ class BrakingEnv(EgoBrakeEnv):
             if step < steps - 1:
                 self._automatic_rendering()
         self.enable_auto_render = False
+
+    def write_scene(self, arrays: SceneArrays) -> None:
+        """Write the present state for the cameras, much faster than they can read the vehicles.
+
+        Args:
+            arrays: `SceneArrays` of one environment.
+        """
+        physics = self.road.physics
+        physics[1]["steps"] = self.steps
+        write_scene(0, self.config["simulation_frequency"], physics, tuple(arrays))
 
     def _reset(self) -> None:
         draw = self._source.draw(self.np_random)

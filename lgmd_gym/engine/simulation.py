@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.engine.kernels import View, advance, show_episodes
+from lgmd_gym.engine.kernels import advance, show_episodes
 from lgmd_gym.envs.decisions import (
     finish_decisions,
     make_clock,
@@ -18,6 +18,7 @@ from lgmd_gym.envs.decisions import (
 from lgmd_gym.envs.dynamics.brake import BRAKE
 from lgmd_gym.envs.episode_source import Draw
 from lgmd_gym.envs.reward import REWARD
+from lgmd_gym.envs.scene import SceneArrays
 from lgmd_gym.envs.simulation.world import World
 from lgmd_gym.neuron.threads import Threads
 from lgmd_gym.sensing.sensor_array import SensorArray
@@ -83,8 +84,8 @@ class Simulation:
         self.clock, self.outcome = make_clock(num_envs), make_outcome(num_envs)
         self.on_frames: Callable[[int, int, np.ndarray], None] | None = None
         # Plain tuples are cheaper to pass to compiled functions.
-        self._view, self._clock, self._results = (
-            tuple(self._make_view()),
+        self._scenes, self._clock, self._results = (
+            tuple(self._make_scenes()),
             tuple(self.clock),
             tuple(self.outcome),
         )
@@ -130,13 +131,13 @@ class Simulation:
 
     def _start_part(self, first: int, last: int, selected: np.ndarray) -> None:
         start_episodes(first, last, selected, self.physics, self._clock, self._results)
-        show_episodes(first, last, self.rates.simulation, selected, self.physics, self._view)
+        show_episodes(first, last, self.rates.simulation, selected, self.physics, self._scenes)
         self._process(first, last, selected)
 
     def _step_part(self, first: int, last: int) -> None:
         rates, physics, clock = self.rates, self.physics, self._clock
         start_decisions(first, last, rates.steps, physics, clock)
-        while advance(first, last, rates.stride, rates.simulation, physics, clock, self._view):
+        while advance(first, last, rates.stride, rates.simulation, physics, clock, self._scenes):
             self._process(first, last, self.clock.due)
         finish_decisions(first, last, rates.policy, physics, clock, self._results)
 
@@ -150,11 +151,13 @@ class Simulation:
         """Collect the arrays of the physics."""
         self.physics = tuple(make_physics(self.world, self.brakes, self.weights))
 
-    def _make_view(self) -> View:
+    def _make_scenes(self) -> SceneArrays:
         if self.sensors is None:
             from lgmd_gym.camera.objects import OBJECT
             from lgmd_gym.camera.scene import SCENE
 
             shape = self.num_envs
-            return View(np.zeros(shape, SCENE), np.zeros((shape, 512), OBJECT), np.zeros(shape, np.int64))
-        return View(self.sensors.scenes, self.sensors.objects, self.sensors.object_counts)
+            return SceneArrays(
+                np.zeros(shape, SCENE), np.zeros((shape, 512), OBJECT), np.zeros(shape, np.int64)
+            )
+        return SceneArrays(self.sensors.scenes, self.sensors.objects, self.sensors.object_counts)

@@ -1,0 +1,53 @@
+"""What the cameras see of a braking environment, as the records of the camera."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lgmd_gym.camera.objects import BRAKE_LIGHT_MPS2, MAX_RANGE, MODEL_BOX, MODEL_CAR, MODEL_MARK
+from lgmd_gym.envs.dynamics.bodies import BOX, CAR
+from lgmd_gym.envs.dynamics.episode import Physics
+from lgmd_gym.envs.dynamics.jit import compiled
+
+
+class SceneArrays(NamedTuple):
+    """What the cameras see, the environments along the first axis; see `SensorArray`.
+
+    Attributes:
+        scenes: `SCENE` records, shape (N,).
+        objects: `OBJECT` records, shape (N, objects).
+        counts: Number of objects, int64, shape (N,).
+    """
+
+    scenes: np.ndarray
+    objects: np.ndarray
+    counts: np.ndarray
+
+
+@compiled
+def write_scene(i: int, rate: float, physics: Physics, arrays: SceneArrays) -> None:
+    """Write the present state of environment i for its cameras.
+
+    Args:
+        i: Index of the environment.
+        rate: Simulation frequency [Hz].
+        physics: `Physics`.
+        arrays: `SceneArrays`.
+    """
+    physics, arrays = Physics(*physics), SceneArrays(*arrays)
+    bodies, count = physics.bodies[i], physics.episodes[i].bodies
+    ego, scene, objects = bodies[0], arrays.scenes[i], arrays.objects[i]
+    scene.x, scene.y, scene.heading, scene.speed = ego.x, ego.y, ego.heading, ego.speed
+    scene.steering, scene.acceleration, scene.length = ego.steering, ego.acceleration, ego.length
+    scene.steps = physics.episodes[i].steps
+    scene.time_s = scene.steps / rate
+    for k in range(1, count):
+        body, item = bodies[k], objects[k - 1]
+        item.x, item.y, item.speed = body.x, body.y, body.speed
+        item.cos, item.sin = math.cos(body.heading), math.sin(body.heading)
+        item.length, item.width, item.height, item.shade = body.length, body.width, body.height, body.shade
+        item.range = MAX_RANGE
+        item.model = MODEL_CAR if body.kind == CAR else MODEL_BOX if body.kind == BOX else MODEL_MARK
+        item.braking = 1 if body.kind == CAR and body.acceleration < BRAKE_LIGHT_MPS2 else 0
+    arrays.counts[i] = count - 1
