@@ -58,6 +58,27 @@ class Agent:
         """Start a new episode; `seed` seeds random agents."""
         self._alert = False
 
+    def cameras_in_use(
+        self, speed: np.ndarray, yaw_rate: np.ndarray, potential: np.ndarray | None = None
+    ) -> np.ndarray | None:
+        """Return when the agent reads which cameras, so that the others are not drawn; None for always all.
+
+        The benchmark in traffic calls this method with the motion of an episode in which the agent does not
+        brake. The answer to the first call, without `potential`, are the cameras whose readings matter on
+        their own. In the second call, `potential` holds these readings, and the answer adds the cameras that
+        matter because of them. All other readings may be arbitrary. Cameras are drawn for some time before
+        they are read, for the filters of their neurons.
+
+        Args:
+            speed: Ego speed at each decision, which is also each camera frame, shape (decisions,) [m/s].
+            yaw_rate: Mean yaw rate of each decision, + to the right, shape (decisions,) [rad/s].
+            potential: Membrane potentials, shape (decisions, cameras), valid where the first answer is True.
+
+        Returns:
+            Whether a reading can affect the agent, bool, shape (decisions, cameras), or None.
+        """
+        return None
+
     def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
         """Return the action for an observation: float32, shape (1,), in [-1, 1]."""
         self._alert = bool(info.get("lgmd/alert", False))

@@ -5,10 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.filters import ConsecutiveFrames, YawRateGate
+from lgmd_gym.agents.filters import YawRateGate
 from lgmd_gym.agents.params import RuleParams, parameter
-from lgmd_gym.agents.rule import Rule, SensorReading, excitation
-from lgmd_gym.agents.zones import FULL_DECELERATION, NUM_ZONES, zone_cameras, zone_ends, zone_index
+from lgmd_gym.agents.rule import Rule, SensorReading, excitation, held, read_ahead
+from lgmd_gym.agents.zones import (
+    FULL_DECELERATION,
+    NUM_ZONES,
+    zone_cameras,
+    zone_ends,
+    zone_index,
+    zone_indices,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,8 +89,8 @@ class StoppingZone(Rule):
         """Release the brake and clear all state."""
         super().reset(seed)
         p = self.params
-        self._ground_streaks = [ConsecutiveFrames(p.frames) for _ in range(NUM_ZONES)]
-        self._near_streaks = [ConsecutiveFrames(p.near_frames) for _ in range(NUM_ZONES)]
+        self._ground_frames = np.zeros(NUM_ZONES, np.int64)  # consecutive frames at the threshold
+        self._near_frames = np.zeros(NUM_ZONES, np.int64)
         self._frames_since_upright = np.full(NUM_ZONES, p.memory)
         self._gate = YawRateGate(p.yaw_rate, p.settle)
 
@@ -91,13 +98,37 @@ class StoppingZone(Rule):
         """Return whether an upright obstacle is in the zone for the ego speed or in a nearer one."""
         p = self.params
         self.require_cameras(reading, 2 * NUM_ZONES)
-        ground, upright = np.split(excitation(reading.membrane_potential), 2)
+        levels = excitation(reading.membrane_potential)
+        ground, upright = levels[:NUM_ZONES], levels[NUM_ZONES:]
         on_ground = ground >= p.ground
-        entered = [streak.update(item) for streak, item in zip(self._ground_streaks, on_ground, strict=True)]
-        self._frames_since_upright = np.where(upright >= p.upright, 0, self._frames_since_upright + 1)
-        both = on_ground & (upright >= p.near_upright)
-        near = [streak.update(item) for streak, item in zip(self._near_streaks, both, strict=True)]
-        active = self._gate.update(reading.yaw_rate) and reading.speed > p.crawl
+        self._ground_frames = (self._ground_frames + 1) * on_ground
+        self._near_frames = (self._near_frames + 1) * (on_ground & (upright >= p.near_upright))
+        self._frames_since_upright = (self._frames_since_upright + 1) * (upright < p.upright)
+        if not self._gate.update(reading.yaw_rate) or reading.speed <= p.crawl:
+            return False
         zone, nearest = zone_index(reading.speed), zone_index(p.near_share * reading.speed)
-        in_zone = entered[zone] and bool(self._frames_since_upright[zone] < p.memory)
-        return active and (in_zone or any(near[nearest:zone]))
+        entered = self._ground_frames[zone] >= p.frames and self._frames_since_upright[zone] < p.memory
+        return bool(entered or np.any(self._near_frames[nearest:zone] >= p.near_frames))
+
+    def cameras_in_use(
+        self, speed: np.ndarray, yaw_rate: np.ndarray, potential: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return when the fields of the present and the nearer zones are read; see `Agent.cameras_in_use`.
+
+        An upright field matters only if its ground field is at its threshold.
+        """
+        p = self.params
+        gate = YawRateGate(p.yaw_rate, p.settle)
+        active = np.array([gate.update(rate) for rate in yaw_rate.tolist()], np.bool_) & (speed > p.crawl)
+        zone, nearest = zone_indices(speed)[:, None], zone_indices(p.near_share * speed)[:, None]
+        zones = np.arange(NUM_ZONES)
+        present = active[:, None] & (zones == zone)
+        nearer = active[:, None] & (zones >= nearest) & (zones < zone)
+        ground = read_ahead(present, p.frames - 1) | read_ahead(nearer, p.near_frames - 1)
+        if potential is None:
+            return np.concatenate([ground, np.zeros_like(ground)], axis=1)
+        on_ground = ground & (excitation(potential[:, :NUM_ZONES]) >= p.ground)
+        present &= held(on_ground, p.frames)
+        nearer &= held(on_ground, p.near_frames)
+        upright = read_ahead(present, p.memory - 1) | read_ahead(nearer, p.near_frames - 1)
+        return np.concatenate([ground, upright], axis=1)

@@ -4,6 +4,7 @@ A zone is the part of the ego lane in front of the point at which the car stops 
 field covers the road surface of the zone. Its upright field covers a band at the horizon with the same width.
 """
 
+from bisect import bisect_left
 from math import atan, degrees
 from typing import Any, TypeVar
 
@@ -12,6 +13,7 @@ import numpy as np
 SPEEDS_KMH = (10, 20, 25, 30, 40, 50, 60, 70, 80, 90)  # design speed of each zone
 NUM_ZONES = len(SPEEDS_KMH)
 KMH = 1 / 3.6  # [m/s]
+_SPEEDS = [speed * KMH for speed in SPEEDS_KMH]  # [m/s]
 FULL_DECELERATION = 9.0  # deceleration of full braking [m/s²]
 LENS_HEIGHT, LENS_SETBACK = 1.2, 1.7  # lens above the road and behind the front bumper [m]
 HALF_WIDTH = 1.2  # half the width of a field at the far end of its zone [m]
@@ -35,7 +37,12 @@ def zone_ends(deceleration: float, reaction: float) -> np.ndarray:
 
 def zone_index(speed: float) -> int:
     """Return the index of the zone for a speed [m/s]: the next higher design speed, at most the last."""
-    return min(int(np.searchsorted(np.array(SPEEDS_KMH) * KMH, speed)), NUM_ZONES - 1)
+    return min(bisect_left(_SPEEDS, speed), NUM_ZONES - 1)
+
+
+def zone_indices(speeds: np.ndarray) -> np.ndarray:
+    """Return the index of the zone for each speed [m/s], see `zone_index`."""
+    return np.minimum(np.searchsorted(_SPEEDS, speeds), NUM_ZONES - 1)
 
 
 def zone_cameras(ends: np.ndarray) -> list[dict[str, Any]]:

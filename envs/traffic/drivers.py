@@ -44,18 +44,24 @@ class TrafficCar(IDMVehicle):
         number = self.route[0][2]
         return UNPLANNED if number is None else number
 
-    def record(self, lanes: LaneTable) -> tuple[Any, ...]:
-        """Return the state in the order of the fields of `CAR`."""
+    def state(self, lanes: LaneTable) -> tuple[Any, ...]:
+        """Return the values of `CAR_STATE`."""
         position: Any = self.position
         x, y = position.tolist()
         action: Any = self.action
         return (
-            *(x, y, self.heading, self.speed, self.LENGTH, self.WIDTH),
-            *(lanes.numbers[self.lane_index], lanes.numbers[self.target_lane_index]),
-            *(self.target_speed, self.timer, action["steering"], action["acceleration"], self.crashed),
-            *(self.enable_lane_change, self.continues_to_next_lane, self.planned_lane, self.IS_EGO),
-            *(self.COMFORT_ACC_MAX, self.COMFORT_ACC_MIN, self.DISTANCE_WANTED, self.TIME_WANTED),
-            *(self.DELTA, 2.0),
+            *(x, y, self.heading, self.speed, lanes.numbers[self.lane_index]),
+            *(lanes.numbers[self.target_lane_index], self.timer, action["steering"], action["acceleration"]),
+            *(self.crashed, self.target_speed, self.enable_lane_change, self.continues_to_next_lane),
+            self.planned_lane,
+        )
+
+    @property
+    def constants(self) -> tuple[Any, ...]:
+        """The values of `CAR_CONSTANTS`."""
+        return (
+            *(self.IS_EGO, self.LENGTH, self.WIDTH, self.COMFORT_ACC_MAX, self.COMFORT_ACC_MIN),
+            *(self.DISTANCE_WANTED, self.TIME_WANTED, self.DELTA, 2.0),
         )
 
     def predict_trajectory_constant_speed(self, times: Any) -> Any:

@@ -1,7 +1,7 @@
 """`TrafficEnv`: base of the traffic environments, with an IDM driver and an agent that can brake."""
 
 from functools import partial
-from math import inf
+from math import cos, inf
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -10,13 +10,13 @@ from highway_env.envs.common.abstract import AbstractEnv
 
 from lgmd_gym.envs import surrogate_safety
 from lgmd_gym.envs.base import EgoBrakeEnv
-from lgmd_gym.envs.dynamics.contact import speed_along
 from lgmd_gym.envs.spaces import ContinuousDemand, EgoState
 from lgmd_gym.envs.traffic.ego import TrafficEgo
 from lgmd_gym.envs.traffic.road import TrafficRoad
 
 JAM_TIME, JAM_SPEED = 10.0, 0.5  # [s], [m/s]: the episode ends after this time below this speed
 MIN_START_DISTANCE = 12.0  # [m] between the centres of two cars at the start
+_NO_PATHS = np.zeros((1, 6))  # all cars move straight on
 
 
 class TrafficDemand(ContinuousDemand):
@@ -140,6 +140,15 @@ class TrafficEnv(EgoBrakeEnv):
         # IntersectionEnv.step would add a car at every decision.
         return AbstractEnv.step(self, action)
 
+    def advance(self) -> tuple[dict[str, Any], bool]:
+        """Advance by one decision with the last demand.
+
+        Returns:
+            The info, and whether the episode has ended.
+        """
+        self.step_unobserved()
+        return self._info(None), self._is_terminated() or self._is_truncated()
+
     def step_unobserved(self) -> None:
         """Advance by one decision with the last demand, without computing observation, reward and info."""
         self.time += 1 / self.config["policy_frequency"]
@@ -202,21 +211,22 @@ class TrafficEnv(EgoBrakeEnv):
         return jammed or self.time >= self.config["duration"] - 1e-9
 
     def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
-        ego, contact, obstacles = self.ego, self.road.contact, self.road.obstacles
-        lead = surrogate_safety.find_lead(ego, obstacles)
+        ego, contact, bodies = self.ego, self.road.contact, self.road.bodies()
+        gap, index = surrogate_safety.lead_of(bodies, len(bodies), _NO_PATHS)
+        lead = bodies[index]
         return {
             "speed": float(ego.speed),
             "crashed": bool(ego.crashed),
             "ego_speed": float(ego.speed),
-            "gap": lead.gap if lead else inf,
-            "ttc": surrogate_safety.time_to_contact(ego, obstacles),
+            "gap": gap,
+            "ttc": surrogate_safety.contact_time(bodies, len(bodies), _NO_PATHS),
             "collision": contact is not None,
             "side": contact.side if contact else "",
             "impact_speed": contact.impact_speed if contact else inf,
             "relative_impact_speed": contact.relative_impact_speed if contact else inf,
             "deceleration": ego.braking,
             "driver_acceleration": ego.driver_acceleration,
-            "target_speed": speed_along(ego, lead.other) if lead else inf,
+            "target_speed": float(lead["speed"] * cos(lead["heading"] - ego.heading)) if index else inf,
             "distance": ego.travelled,
         }
 

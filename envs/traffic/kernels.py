@@ -14,27 +14,15 @@ from numba import extending, types
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.jit import compiled
 
-CAR = np.dtype(
-    [
-        (name, np.float64)
-        for name in (
-            *(
-                "x",
-                "y",
-                "heading",
-                "speed",
-                "length",
-                "width",
-                "lane",
-                "target_lane",
-                "target_speed",
-                "timer",
-            ),
-            *("steering", "acceleration", "crashed", "changes_lanes", "continues", "planned_lane", "is_ego"),
-            *("comfort_acceleration", "comfort_deceleration", "distance", "headway", "exponent", "square"),
-        )
-    ]
+CAR_STATE = (
+    *("x", "y", "heading", "speed", "lane", "target_lane", "timer", "steering", "acceleration", "crashed"),
+    *("target_speed", "changes_lanes", "continues", "planned_lane"),
 )
+CAR_CONSTANTS = (
+    *("is_ego", "length", "width", "comfort_acceleration", "comfort_deceleration", "distance", "headway"),
+    *("exponent", "square"),
+)
+CAR = np.dtype([(name, np.float64) for name in (*CAR_STATE, *CAR_CONSTANTS)])
 """A car or solid object of the road. `lane` and `target_lane` are rows of the lanes. `planned_lane` is the
 lane number at the head of the route, `UNPLANNED` for a route without one and `NO_ROUTE` without a route.
 `exponent` and `square` (2) are exponents: `x**2` of Python is `pow`, which may differ from `x * x`."""
@@ -47,11 +35,11 @@ LANE = np.dtype(
                 *("amplitude", "pulsation", "phase", "radius", "turn", "speed_limit"),
             )
         ),
-        *((name, np.int64) for name in ("shape", "forbidden", "road", "number", "lanes")),
+        *((name, np.int64) for name in ("shape", "forbidden", "road", "number", "lanes", "ends")),
     ]
 )
 """A lane: its start or centre [m], its directions, and the fields of highway-env's class; `road` is the index
-of its road and `lanes` the number of that road's lanes."""
+of its road, `lanes` the number of that road's lanes, and `ends` whether no road follows."""
 STRAIGHT, SINE, CIRCLE = 0, 1, 2
 NO_ROUTE, UNPLANNED = -2.0, -1.0
 ALL_DONE = -1
@@ -341,7 +329,8 @@ def decide(
             continue
         target = int(car.target_lane)
         at_end = along[i, target] > lanes[target].length - END_MARGIN / 2
-        if car.continues and at_end and not (follows and i == first):
+        stays = lanes[target].ends and car.planned_lane == NO_ROUTE
+        if car.continues and at_end and not stays and not (follows and i == first):
             return i
         if car.changes_lanes:
             change_lane(cars, number, i, lanes, pieces, offsets, along, across)

@@ -35,7 +35,7 @@ class LaneTable:
             _fill(self.records[row], lane)
             start, end, number = index
             values = (list(roads).index(index[:2]), number, len(network.graph[start][end]))
-            self.records[["road", "number", "lanes"]][row] = values
+            self.records[["road", "number", "lanes", "ends"]][row] = (*values, end not in network.graph)
         self._circular = bool((self.records["shape"] == CIRCLE).any())
         self._sine = bool((self.records["shape"] == SINE).any())
         self._slopes = self.records["amplitude"] * self.records["pulsation"]

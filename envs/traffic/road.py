@@ -10,11 +10,13 @@ from highway_env.road.road import Road
 from highway_env.utils import rotated_rectangles_intersect
 from highway_env.vehicle.objects import Landmark
 
+from lgmd_gym.envs.dynamics.bodies import BODY, BOX
 from lgmd_gym.envs.dynamics.contact import Contact
 from lgmd_gym.envs.traffic.ego import TrafficEgo
 from lgmd_gym.envs.traffic.kernels import (
     ALL_DONE,
     CAR,
+    CAR_STATE,
     TAU_PURSUIT,
     decide,
     find_contact,
@@ -23,8 +25,6 @@ from lgmd_gym.envs.traffic.kernels import (
     move,
 )
 from lgmd_gym.envs.traffic.lanes import LaneTable
-
-_NO_FIELDS = [0.0] * (len(CAR.names or ()) - 7)
 
 
 class TrafficRoad(RegulatedRoad):
@@ -56,7 +56,8 @@ class TrafficRoad(RegulatedRoad):
         self._ego, self.regulated = ego, regulated
         self.contact: Contact | None = None
         self._lanes = LaneTable(self.network)
-        self._records = np.zeros(0, CAR)
+        self._records = self._constants = np.zeros(0, CAR)
+        self._known: list[Any] = []  # the cars of `_constants`
         self._predictions: dict[int, list[tuple[float, float, float]]] = {}
 
     @property
@@ -120,7 +121,7 @@ class TrafficRoad(RegulatedRoad):
         if ego is not None:
             travelled = ego.travelled
             ego.move(dt)
-            cars[self.vehicles.index(ego)] = ego.record(self._lanes)
+            cars[self.vehicles.index(ego)] = (*ego.state(self._lanes), *ego.constants)
         along, across = self._lanes.coordinates(cars)
         locate(cars, number, self._lanes.records, along, across, self._lanes.bends(along))
         self._write(cars)
@@ -148,26 +149,54 @@ class TrafficRoad(RegulatedRoad):
 
     def read(self) -> np.ndarray:
         """Return all cars, then the solid objects, as `CAR` records."""
+        vehicles: list[Any] = self.vehicles
+        if self._known != vehicles:
+            self._known, self._constants = list(vehicles), self._read_constants()
         values = array("d")
-        for car in self.vehicles:
-            values.extend(car.record(self._lanes))  # type: ignore[attr-defined]
-        for item in self.items[len(self.vehicles) :] if self.objects else ():
-            lane = self._lanes.numbers[item.lane_index]
-            x, y = item.position
-            values.extend((x, y, item.heading, item.speed, item.LENGTH, item.WIDTH, lane, *_NO_FIELDS))
-        return np.frombuffer(values).view(CAR)
+        for car in vehicles:
+            values.extend(car.state(self._lanes))
+        cars = self._constants.copy()
+        _numbers(cars)[: len(vehicles), : len(CAR_STATE)] = np.frombuffer(values).reshape(len(vehicles), -1)
+        return cars
+
+    def _read_constants(self) -> np.ndarray:
+        """Return records of all cars without their state, and of the solid objects."""
+        items: list[Any] = self.items
+        cars = np.zeros(len(items), CAR)
+        for number, item in enumerate(items):
+            if number < len(self.vehicles):
+                _numbers(cars)[number, len(CAR_STATE) :] = item.constants
+                continue
+            cars["x"][number], cars["y"][number] = item.position
+            cars["heading"][number], cars["lane"][number] = item.heading, self._lanes.numbers[item.lane_index]
+            cars["length"][number], cars["width"][number] = item.LENGTH, item.WIDTH
+        return cars
+
+    def bodies(self) -> np.ndarray:
+        """Return the ego, the other cars and the solid objects as `BODY` records on straight paths."""
+        vehicles: list[Any] = self.vehicles
+        current = self._known == vehicles and self.contact is None and len(self._records) > 0
+        cars = self._records if current else self.read()
+        ego = vehicles.index(self._ego)
+        cars = cars[[ego, *range(ego), *range(ego + 1, len(cars))]]
+        bodies = np.zeros(len(cars), BODY)
+        bodies["kind"], bodies["path_end"] = BOX, 1
+        for name in ("x", "y", "heading", "speed", "length", "width"):
+            bodies[name] = cars[name]
+        return bodies
 
     def _write(self, cars: np.ndarray) -> None:
         """Assign the state of `CAR` records to the cars."""
         table, ego = self._lanes, self._ego
         vehicles: list[Any] = self.vehicles
-        for car, row in zip(vehicles, cars.tolist(), strict=False):
-            x, y, heading, speed, _, _, lane, target, _, timer, steering, acceleration, *_ = row
+        for car, row in zip(vehicles, _numbers(cars)[:, :9].tolist(), strict=False):
+            x, y, heading, speed, lane, target, timer, steering, acceleration = row
             number = int(lane)
             car.lane_index, car.lane = table.indices[number], table.lanes[number]
             car.target_lane_index, car.timer = table.indices[int(target)], timer
             if car is not ego:
-                car.position[0], car.position[1] = x, y
+                position = car.position
+                position[0], position[1] = x, y
                 car.heading, car.speed = heading, speed
                 car.action = {"steering": steering, "acceleration": acceleration}
 
@@ -205,3 +234,8 @@ class TrafficRoad(RegulatedRoad):
                 for position, heading in zip(positions, headings, strict=True)
             ]
         return self._predictions[id(car)]
+
+
+def _numbers(cars: np.ndarray) -> np.ndarray:
+    """Return a view of `CAR` records as float64, shape (cars, fields)."""
+    return cars.view(np.float64).reshape(len(cars), -1)

@@ -5,6 +5,7 @@ import pytest
 from support.agents import any_brake, frequency_reading, zone_reading
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.rule import SensorReading
 from lgmd_gym.agents.zones import FIELDS, LENS_HEIGHT, LENS_SETBACK, SPEEDS_KMH, zone_ends, zone_index
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_case
@@ -72,6 +73,36 @@ def test_the_rule_is_inactive_in_turns_and_at_a_crawl():
     agent.reset(0)
     assert not any_brake(agent, [zone_reading(speed=2.5, **threat)] * 10)
     assert any_brake(agent, [zone_reading(speed=2.51, **threat)] * 10)
+
+
+def first_brake(agent, potential, speed, yaw_rate):
+    """Return the index of the first reading at which the rule brakes, or None."""
+    agent.reset(0)
+    for index, values in enumerate(zip(potential, potential, speed, yaw_rate, strict=True)):
+        if agent.should_brake(SensorReading(*values)):
+            return index
+    return None
+
+
+@pytest.mark.parametrize("options", ["", ":frames=4,memory=5,near_frames=2,settle=4,near_share=0.3"])
+def test_readings_of_cameras_that_are_not_in_use_have_no_effect(options):
+    rng, agent = np.random.default_rng(7), make_agent(f"stopping-zone{options}")
+    braked = 0
+    for _ in range(60):
+        speed = np.clip(10 + np.cumsum(rng.normal(0.0, 0.6, 150)), 0.0, 28.0)
+        yaw_rate = np.where(rng.uniform(size=150) < 0.02, 0.1, 0.0)
+        # Levels that persist for some frames, mostly below the thresholds.
+        levels = np.repeat(rng.exponential(rng.uniform(0.3, 1.5), (30, 20)), 5, axis=0)
+        potential, arbitrary = 1 / (1 + np.exp(-levels)), rng.uniform(0.5, 1.0, levels.shape)
+        first = agent.cameras_in_use(speed, yaw_rate)
+        assert not first[:, 10:].any()
+        partial = np.where(first, potential, arbitrary)
+        read = agent.cameras_in_use(speed, yaw_rate, partial)
+        assert (read >= first).all()
+        expected = first_brake(agent, potential, speed, yaw_rate)
+        assert first_brake(agent, np.where(read, potential, arbitrary), speed, yaw_rate) == expected
+        braked += expected is not None
+    assert 10 < braked < 60
 
 
 @pytest.mark.parametrize(("name", "cameras"), [("stopping-zone", 20), ("danger-zone", 10)])

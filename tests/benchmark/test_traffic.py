@@ -10,13 +10,20 @@ import numpy as np
 import pytest
 from rich.console import Console
 from support.runs import interrupt, new_run, read_rows, sorted_rows
+from support.traffic import Recorded
 
 from lgmd_gym.agents import AGENTS, BRAKE, HOLD, Agent, make_agent, to_action
+from lgmd_gym.agents.rule import excitation
+from lgmd_gym.agents.stopping_zone import StoppingZone
+from lgmd_gym.benchmark.episode import Step, rollout
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
+from lgmd_gym.benchmark.traffic.observer import Observer
 from lgmd_gym.benchmark.traffic.recording import fork, look_ahead, record_traffic
-from lgmd_gym.benchmark.traffic.replay import RESEED, Replay
+from lgmd_gym.benchmark.traffic.replay import RESEED, LiveEpisode
 from lgmd_gym.benchmark.traffic.rows import KEYS, BrakingEvent, measure
+from lgmd_gym.benchmark.traffic.schedule import CameraSchedule
 from lgmd_gym.benchmark.traffic.summary import COLUMNS, traffic_summaries, write_traffic_summary
 from lgmd_gym.benchmark.traffic.tables import traffic_table
 from lgmd_gym.envs.traffic.emergencies import Emergencies
@@ -47,19 +54,6 @@ class BrakeDuring(Agent):
         return self.level if brakes and len(self.reset_seeds) == 1 else HOLD
 
 
-class Recorder(Agent):
-    """Never brakes, and stores its inputs."""
-
-    def __init__(self):
-        super().__init__()
-        self.inputs = []
-
-    def demand(self, observation, info):
-        arrays = {key: value.tolist() for key, value in observation.items()}
-        self.inputs.append((arrays, without_trace(info)))
-        return HOLD
-
-
 def without_trace(info):
     """Return the values of `info` that can be compared with ==."""
     return {key: value for key, value in info.items() if key != "lgmd/trace"}
@@ -67,7 +61,7 @@ def without_trace(info):
 
 @pytest.fixture(scope="module")
 def merge():
-    return record_traffic("merge", 0, SENSORS, SHORT)
+    return Recorded("merge", config=SHORT)
 
 
 @pytest.fixture
@@ -83,60 +77,147 @@ def wall_kinds(monkeypatch):
 
 def play(kind, agent, seconds=12):
     """Return the log and the measured values of an agent in a kind of traffic."""
-    recording = record_traffic(kind, 0, SENSORS, {"duration": seconds})
-    log = Replay(recording, agent).play()
-    return log, measure(recording, log)
+    recorded = Recorded(kind, config={"duration": seconds})
+    log = recorded.replay(agent).log
+    return log, measure(recorded.recording, log)
+
+
+def same_inputs(step, other):
+    """Return whether an agent receives the same observation, info and trace in two steps."""
+    frames, others = step.info["lgmd/trace"], other.info["lgmd/trace"]
+    return (
+        step.observation.keys() == other.observation.keys()
+        and all(np.array_equal(step.observation[key], other.observation[key]) for key in step.observation)
+        and without_trace(step.info) == without_trace(other.info)
+        and [frame[:2] for frame in frames] == [frame[:2] for frame in others]
+        and all(np.array_equal(a.response, b.response) for a, b in zip(frames, others, strict=True))
+    )
 
 
 def test_fork_repeats_the_recording_bit_for_bit(merge):
     """The decisions are at, shortly after, and far from a snapshot."""
+    recording = merge.recording
     for decision in (0, 37, 300, 313):
-        env = merge.fork(decision)
+        env = recording.fork(decision)
         for later in range(decision + 1, decision + 40):
-            observation, *_, info = env.step(to_action(HOLD))
-            recorded = merge.steps[later]
-            assert all(np.array_equal(observation[key], recorded.observation[key]) for key in observation)
-            assert without_trace(info) == without_trace(recorded.info)
+            assert env.advance()[0] == recording.moments[later].info
 
 
 def test_fork_is_independent_of_its_original(merge):
-    env = merge.fork(60)
+    env = merge.recording.fork(60)
     other = fork(env)
-    before = env.unwrapped.ego.position.tolist(), env.unwrapped.steps
+    before = env.ego.position.tolist(), env.steps
     for _ in range(20):
         braked = other.step(to_action(BRAKE))[4]
     look_ahead(env, 2.0, 1.0)
-    assert (env.unwrapped.ego.position.tolist(), env.unwrapped.steps) == before
-    assert braked["ego_speed"] < env.unwrapped.ego.speed
+    assert (env.ego.position.tolist(), env.steps) == before
+    assert braked["ego_speed"] < env.ego.speed
     for _ in range(20):
-        observation = env.step(to_action(HOLD))[0]
-    assert observation["ego_speed"] == merge.steps[80].observation["ego_speed"]
+        env.step(to_action(HOLD))
+    assert env.ego.speed == merge.recording.moments[80].speed
 
 
 def test_fork_that_differs_from_the_recording_is_rejected(merge):
-    steps = list(merge.steps)
-    steps[9] = steps[10]
+    moments = list(merge.recording.moments)
+    moments[9] = moments[10]
     with pytest.raises(RuntimeError, match="merge traffic, seed 0 does not repeat at decision 9"):
-        replace(merge, steps=tuple(steps)).fork(9)
+        replace(merge.recording, moments=tuple(moments)).fork(9)
 
 
-def test_replay_gives_an_agent_the_inputs_of_a_live_episode():
-    recording = record_traffic("two-way", 1, SENSORS, {"duration": 6})
-    replayed, live = Recorder(), Recorder()
-    logs = [Replay(recording, replayed).play(), Replay(recording, live, live=True).play()]
-    assert replayed.inputs == live.inputs
-    assert len(replayed.inputs) == len(recording.steps) == 6 * 30 + 1
-    assert measure(recording, logs[0]) == measure(recording, logs[1])
+@pytest.mark.parametrize("camera", ["fovea", ["wide", "tele"], "birdseye"])
+def test_recorded_steps_equal_those_of_the_wrapper(camera):
+    config = {"duration": 3}
+    recorded = Recorded("two-way", 1, SensorConfig(camera), config)
+    env = gym.make(traffic_id("two-way"), camera=camera, trace=True, config=config)
+    steps = [step for step, _ in rollout(env, make_agent("no-brake"), 1)]
+    assert len(steps) == len(recorded.steps) == 3 * 30 + 1
+    assert all(same_inputs(step, other) for step, other in zip(recorded.steps, steps, strict=True))
+    assert [step.done for step in recorded.steps] == [step.done for step in steps]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", list(KINDS))
-@pytest.mark.parametrize("agent", ["no-brake", "spike-threshold"])
-def test_replay_and_live_episode_give_the_same_row(kind, agent):
-    for seed in range(2):
-        recording = record_traffic(kind, seed, SENSORS)
-        replayed, live = (Replay(recording, make_agent(agent), live).play() for live in (False, True))
-        assert measure(recording, replayed) == measure(recording, live)
+@pytest.mark.parametrize("decision", [0, 45])
+def test_live_episode_continues_a_recording(merge, decision):
+    live = LiveEpisode(merge.recording, decision, merge.sensor_config)
+    for later in range(decision + 1, decision + 20):
+        assert same_inputs(live.step(HOLD), merge.steps[later])
+
+
+def test_live_episode_observes_the_same_as_the_wrapper_while_braking(merge):
+    live = LiveEpisode(merge.recording, 0, merge.sensor_config)
+    env = gym.make(traffic_id("merge"), camera="fovea", trace=True, config=SHORT)
+    env.reset(seed=0)
+    for _ in range(40):
+        observation, _, terminated, truncated, info = env.step(to_action(BRAKE))
+        assert same_inputs(live.step(BRAKE), Step(observation, info, 0.0, terminated or truncated))
+
+
+def scheduled_steps(kind, seed, agent, config):
+    """Return the recording, the schedule and the steps of an agent whose unread cameras are not drawn."""
+    observer = Observer(SENSORS.for_agent(agent))
+    recording = record_traffic(kind, seed, observer.sensors, 0, observer.fps, config)
+    schedule = CameraSchedule(recording.moments, [agent], len(observer.sensors.names))
+    observer.play_first_pass([recording.moments], [schedule])
+    schedule.plan_second_pass()
+    steps = [
+        observer.observe([moment], [schedule], decision)[0]
+        for decision, moment in enumerate(recording.moments)
+    ]
+    return recording, schedule, steps
+
+
+def potentials(steps):
+    return np.array([step.info["lgmd/trace"][0].response.membrane_potential for step in steps])
+
+
+def motion(recording):
+    """Return speed and yaw rate at every decision."""
+    speed = np.array([moment.speed for moment in recording.moments])
+    return speed, np.array([moment.yaw_rate for moment in recording.moments], np.float32)
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("two-way", 1), ("intersection", 1)])
+def test_readings_of_warmed_up_neurons_equal_those_with_all_cameras(kind, seed):
+    agent, config = make_agent("stopping-zone"), {"duration": 14}
+    recording, schedule, steps = scheduled_steps(kind, seed, agent, config)
+    every = Recorded(kind, seed, SENSORS.for_agent(agent), config).steps
+    expected, found = excitation(potentials(every)), excitation(potentials(steps))
+    read = agent.cameras_in_use(*motion(recording), potentials(every))
+    drawn = np.mean(schedule.first | schedule.second)
+    assert 0.05 < np.mean(read) <= drawn < 0.6
+    assert np.abs(found - expected)[read].max() < 1e-4
+
+
+def test_rows_of_a_batch_equal_those_of_single_drives():
+    agents = ("stopping-zone", "spike-threshold")
+    drives = (Drive("merge", 1, agents[:1]), Drive("intersection", 1, agents))
+    batch = run_traffic_task(TrafficTask(drives, SENSORS))
+    single = [
+        run_traffic_task(TrafficTask((replace(drive, agents=(agent,)),), SENSORS))[0]
+        for drive in drives
+        for agent in drive.agents
+    ]
+    assert [row["error"] for row in batch] == [None] * 3
+    assert batch == single
+    assert batch[-1]["brakes"] > 0
+
+
+@pytest.mark.parametrize("kind", ["wall", *(pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS)])
+def test_cameras_that_are_not_read_do_not_change_the_row(monkeypatch, wall_kinds, kind):
+    """The rule brakes for the stationary car of "wall"."""
+    task = TrafficTask((Drive(kind, 0, ("stopping-zone",)),), SENSORS)
+    (scheduled,) = run_traffic_task(task)
+    monkeypatch.setattr(StoppingZone, "cameras_in_use", lambda *arguments: None)
+    assert run_traffic_task(task) == [scheduled]
+    assert (scheduled["brakes"] > 0) == (kind == "wall")
+
+
+def test_failure_in_one_drive_leaves_the_others(monkeypatch, wall_kinds):
+    monkeypatch.setitem(KINDS, "empty", "support.traffic:Missing")
+    drives = (Drive("empty", 0, ("no-brake",)), Drive("wall", 0, ("no-brake",)))
+    failed, played = run_traffic_task(TrafficTask(drives, SENSORS))
+    assert "Missing" in failed["error"]
+    assert played["error"] is None
+    assert played["collision"]
 
 
 def test_braking_for_a_stationary_car_is_necessary_and_avoids_contact(wall_kinds):

@@ -2,6 +2,10 @@
 
 import numpy as np
 
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.traffic.observer import Observer
+from lgmd_gym.benchmark.traffic.recording import record_traffic
+from lgmd_gym.benchmark.traffic.replay import Replay
 from lgmd_gym.envs.traffic.drivers import TrafficCar
 from lgmd_gym.envs.traffic.kinds import HighwayTraffic
 from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
@@ -39,6 +43,29 @@ def run_for(env, seconds, action=HOLD):
         if terminated or truncated:
             break
     return infos
+
+
+class Recorded:
+    """A recording of traffic with the steps that an agent with all cameras receives.
+
+    Attributes:
+        recording: The recording.
+        steps: Steps of all decisions.
+    """
+
+    def __init__(self, kind, seed=0, sensor_config=None, config=None):
+        self.sensor_config = sensor_config or SensorConfig()
+        observer = Observer(self.sensor_config)
+        self.recording = record_traffic(kind, seed, observer.sensors, 0, observer.fps, config)
+        self.steps = [observer.observe([moment])[0] for moment in self.recording.moments]
+
+    def replay(self, agent):
+        """Return the replay of an agent, played to its end."""
+        replay = Replay(self.recording, agent, self.sensor_config)
+        for step in self.steps:
+            if not replay.done:
+                replay.process(step)
+        return replay
 
 
 def car_states(kinds=tuple(KINDS)):

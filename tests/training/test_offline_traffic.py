@@ -5,9 +5,9 @@ from functools import partial
 import numpy as np
 import pytest
 from support.recordings import offline_config
+from support.traffic import Recorded
 
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.traffic.recording import record_traffic
 from lgmd_gym.envs.traffic.emergencies import Emergencies
 from lgmd_gym.training.offline import traffic
 from lgmd_gym.training.offline.episodes import EpisodeRecorder
@@ -82,16 +82,16 @@ def test_observations_equal_those_of_the_benchmark(monkeypatch, seed):
     monkeypatch.setattr(traffic, "segment_bounds", lambda non_threat, policy_hz: [(0, len(non_threat))])
     ((whole,),) = TrafficRecorder("train", "fovea").record(range(seed, seed + 1))
     sensor_config = SensorConfig(camera="fovea").with_condition("fog")
-    recording = record_traffic(list(traffic.KINDS)[seed], seed, sensor_config, config)
-    assert len(whole) == len(recording.steps) - 1  # no action follows the last observation
+    steps = Recorded(list(traffic.KINDS)[seed], seed, sensor_config, config).steps
+    assert len(whole) == len(steps) - 1  # no action follows the last observation
     for name, array in whole.observations.items():
-        assert np.array_equal(array, np.stack([step.observation[name] for step in recording.steps[:-1]]))
+        assert np.array_equal(array, np.stack([step.observation[name] for step in steps[:-1]]))
 
 
 def test_emergencies_equal_those_of_the_benchmark():
     """The episode has emergencies before and after its end."""
     kind, config = list(traffic.KINDS)[INTERSECTION], {"duration": 8}
-    recording = record_traffic(kind, INTERSECTION, SensorConfig(camera="fovea"), config)
+    recording = Recorded(kind, INTERSECTION, config=config).recording
     assert min(recording.emergencies.hard) < 8.0 < max(recording.emergencies.hard)
     env = traffic.make_traffic(kind, camera="fovea", config=config)
     assert run_episode(env, INTERSECTION)[1] == recording.emergencies

@@ -2,54 +2,59 @@
 
 import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
-import gymnasium as gym
-import numpy as np
-
-from lgmd_gym.agents import HOLD, make_agent, to_action
-from lgmd_gym.benchmark.episode import Step, rollout
-from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.benchmark.traffic.reader import Moment, SceneReader
 from lgmd_gym.envs.traffic.emergencies import HARD_BRAKING, HORIZON, Emergencies, simulate_driver
-from lgmd_gym.envs.traffic.registration import traffic_id
+from lgmd_gym.envs.traffic.env import TrafficEnv
+from lgmd_gym.envs.traffic.registration import make_traffic
+from lgmd_gym.sensing.sensor_array import SensorArray
 
-SNAPSHOT_EVERY = 300  # decisions between two snapshots; one snapshot takes as long as about 20 decisions
+SNAPSHOT_EVERY = 300  # decisions between two snapshots; one snapshot takes as long as about 10 decisions
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class TrafficRecording:
-    """One episode of traffic without an agent.
+    """One episode of traffic without an agent. Its frames are not drawn; see `Observer`.
 
     Attributes:
         kind: Kind of traffic.
         seed: Seed of the traffic.
-        steps: Step of every decision.
+        moments: The reset and every decision.
         snapshots: Environment at every `SNAPSHOT_EVERY`-th decision; copied before use, never stepped.
-        emergencies: Emergencies up to `HORIZON` beyond the end.
         policy_hz: Decision rate [Hz].
         fps: Camera frame rate [Hz].
     """
 
     kind: str
     seed: int
-    steps: tuple[Step, ...]
-    snapshots: tuple[gym.Env, ...]
-    emergencies: Emergencies
+    moments: tuple[Moment, ...]
+    snapshots: tuple[TrafficEnv, ...]
     policy_hz: float
     fps: float
 
-    def fork(self, decision: int) -> gym.Env:
+    @cached_property
+    def emergencies(self) -> Emergencies:
+        """Emergencies up to `HORIZON` beyond the end."""
+        driver = [moment.info["driver_acceleration"] for moment in self.moments]
+        hard = [index / self.policy_hz for index, value in enumerate(driver) if value <= -HARD_BRAKING]
+        end = len(self.moments) - 1
+        beyond = simulate_driver(self.fork(end), end / self.policy_hz)
+        return Emergencies(beyond.contact, (*hard, *beyond.hard))
+
+    def fork(self, decision: int) -> TrafficEnv:
         """Return an environment in the exact state of a decision.
 
         Raises:
-            RuntimeError: If its observation differs from the recorded one.
+            RuntimeError: If its state differs from the recorded one.
         """
-        env = fork(self.snapshots[decision // SNAPSHOT_EVERY])
-        recorded = observation = self.steps[decision].observation
-        for _ in range(decision % SNAPSHOT_EVERY):
-            observation = env.step(to_action(HOLD))[0]
-        if not all(np.array_equal(observation[key], recorded[key]) for key in recorded):
+        number = min(decision // SNAPSHOT_EVERY, len(self.snapshots) - 1)
+        env = fork(self.snapshots[number])
+        for _ in range(decision - number * SNAPSHOT_EVERY):
+            env.step_unobserved()
+        recorded = self.moments[decision].info
+        if (env.ego.speed, env.ego.travelled) != (recorded["ego_speed"], recorded["distance"]):
             raise RuntimeError(
                 f"{self.kind} traffic, seed {self.seed} does not repeat at decision {decision}"
             )
@@ -57,58 +62,53 @@ class TrafficRecording:
 
 
 def record_traffic(
-    kind: str, seed: int, sensor_config: SensorConfig, config: dict[str, Any] | None = None
+    kind: str,
+    seed: int,
+    sensors: SensorArray,
+    index: int,
+    fps: float,
+    config: dict[str, Any] | None = None,
 ) -> TrafficRecording:
     """Record one episode of traffic without an agent.
 
     Args:
         kind: Kind of traffic, a name in `lgmd_gym.envs.traffic.registration.KINDS`.
         seed: Seed of the traffic.
-        sensor_config: Camera and neuron parameters.
+        sensors: Cameras that will draw the frames.
+        index: Index of the episode among the environments of the cameras.
+        fps: Camera frame rate [Hz].
         config: Configuration of `TrafficEnv`.
     """
-    env = gym.make(traffic_id(kind), **sensor_config.for_agent().arguments, trace=True, config=config)
-    base: Any = env.unwrapped
-    policy_hz = base.config["policy_frequency"]
-    steps: list[Step] = []
-    snapshots: list[gym.Env] = []
-    for step, _ in rollout(env, make_agent(NO_BRAKE), seed):
-        if len(steps) % SNAPSHOT_EVERY == 0 and not step.done:
+    env: Any = make_traffic(kind, camera=None, config=config)
+    reader = SceneReader(env, sensors, index, fps)
+    moments, snapshots = [reader.reset(seed)], [fork(env)]
+    while not moments[-1].done:
+        moments.append(reader.step())
+        if (len(moments) - 1) % SNAPSHOT_EVERY == 0:
             snapshots.append(fork(env))
-        steps.append(step)
-    driver = [step.info["driver_acceleration"] for step in steps]
-    hard = [index / policy_hz for index, value in enumerate(driver) if value <= -HARD_BRAKING]
-    beyond = look_ahead(env, (len(steps) - 1) / policy_hz)
-    emergencies = Emergencies(beyond.contact, (*hard, *beyond.hard))
-    fps = env.get_wrapper_attr("fps")
-    return TrafficRecording(kind, seed, tuple(steps), tuple(snapshots), emergencies, policy_hz, fps)
+    return TrafficRecording(kind, seed, tuple(moments), tuple(snapshots), env.config["policy_frequency"], fps)
 
 
-def fork(env: gym.Env, share_cameras: bool = False) -> gym.Env:
-    """Return an independent copy of a traffic environment inside `LGMDObservation`, in the same state.
+def fork(env: TrafficEnv) -> TrafficEnv:
+    """Return an independent copy of a traffic environment in the same state.
 
-    The lanes are shared because they never change. Cameras are copied with their state, except those that
-    hold resources (the bird's-eye view).
-
-    Args:
-        env: Environment to copy.
-        share_cameras: Share all cameras, for a copy that renders no frames.
+    The lanes are shared because they never change. The copy's road has no callback of `on_road_step`.
     """
-    base: Any = env.unwrapped
-    network = base.road.network
-    shared = [network, *network.lanes_list()]
-    for cameras in env.get_wrapper_attr("sensors").cameras:
-        shared += [camera for camera in cameras.values() if share_cameras or hasattr(camera, "close")]
-    return copy.deepcopy(env, {id(item): item for item in shared})
+    network = env.road.network
+    callback = vars(env.road).pop("step", None)
+    try:
+        return copy.deepcopy(env, {id(item): item for item in (network, *network.lanes_list())})
+    finally:
+        if callback is not None:
+            vars(env.road)["step"] = callback
 
 
-def look_ahead(env: gym.Env, time: float, horizon: float = HORIZON) -> Emergencies:
+def look_ahead(env: TrafficEnv, time: float, horizon: float = HORIZON) -> Emergencies:
     """Return the emergencies without braking by the agent, leaving `env` unchanged.
 
     Args:
-        env: Traffic environment inside `LGMDObservation`.
+        env: Traffic environment.
         time: Present time [s].
         horizon: Time ahead [s].
     """
-    base: Any = fork(env, share_cameras=True).unwrapped
-    return simulate_driver(base, time, horizon)
+    return simulate_driver(fork(env), time, horizon)

@@ -1,9 +1,10 @@
 """Replay of one agent on a recording of traffic; simulated live from its first braking on."""
 
-import gymnasium as gym
-
-from lgmd_gym.agents import HOLD, Agent, to_action
+from lgmd_gym.agents import HOLD, Agent
 from lgmd_gym.benchmark.episode import Step
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.traffic.observer import Observer
+from lgmd_gym.benchmark.traffic.reader import SceneReader
 from lgmd_gym.benchmark.traffic.recording import TrafficRecording, look_ahead
 from lgmd_gym.benchmark.traffic.rows import BrakingEvent, EpisodeLog
 
@@ -13,12 +14,45 @@ RESEED = 1_000_003  # seed offset of the agent's reset after each standstill
 NEVER = -1e9  # [s]
 
 
+class LiveEpisode:
+    """An episode of traffic that continues from a decision of a recording; all cameras are drawn.
+
+    Args:
+        recording: The recording.
+        decision: The decision.
+        sensor_config: Camera and neuron parameters.
+        warm_up: Number of recorded decisions before it from which the neurons start; None for all.
+    """
+
+    def __init__(
+        self,
+        recording: TrafficRecording,
+        decision: int,
+        sensor_config: SensorConfig,
+        warm_up: int | None = None,
+    ) -> None:
+        self.env = recording.fork(decision)
+        self._observer = Observer(sensor_config)
+        sensors = self._observer.sensors
+        sensors.set_road(0, self.env.road)
+        first = 0 if warm_up is None else max(decision - warm_up, 0)
+        for moment in recording.moments[first : decision + 1]:
+            (self.start,) = self._observer.observe([moment])
+        self._reader = SceneReader(self.env, sensors, 0, recording.fps, decision)
+
+    def step(self, demand: float) -> Step:
+        """Advance by one decision."""
+        (step,) = self._observer.observe([self._reader.step(demand)])
+        assert step is not None
+        return step
+
+
 class Replay:
     """Runs one agent on one recording.
 
     Until the agent brakes, it receives the recorded steps. At its first demand the recorded state is forked:
-    the recording is the branch without braking, and the fork is stepped live. For every later braking event,
-    a fork of the live state is stepped without braking.
+    the recording is the branch without braking, and the fork is stepped live to the end. For every later
+    braking event, a fork of the live state is stepped without braking.
 
     A braking event ends after `EVENT_PAUSE` without a demand, or at a standstill. After a standstill only the
     driver acts for `HANDOVER`; then the agent is reset, with another seed each time, so that an agent that
@@ -27,32 +61,49 @@ class Replay:
     Args:
         recording: Recording to replay.
         agent: Agent to run.
-        live: Whether to step live from the start, to verify that the result is the same.
+        sensor_config: Camera and neuron parameters.
+        warm_up: See `LiveEpisode`.
+
+    Attributes:
+        log: Events so far.
+        done: Whether the episode has ended.
     """
 
-    def __init__(self, recording: TrafficRecording, agent: Agent, live: bool = False) -> None:
+    def __init__(
+        self,
+        recording: TrafficRecording,
+        agent: Agent,
+        sensor_config: SensorConfig,
+        warm_up: int | None = None,
+    ) -> None:
         self.recording, self.agent = recording, agent
+        self.sensor_config, self.warm_up = sensor_config, warm_up
         self.log = EpisodeLog()
-        self.env: gym.Env | None = recording.fork(0) if live else None
+        self.done = False
+        self._live: LiveEpisode | None = None
         self._event: BrakingEvent | None = None
         self._handover_until = self._last_alert = NEVER
-        self._standstills = 0
-        self._done = False
+        self._standstills = self._decision = 0
+        agent.reset(recording.seed)
 
-    def play(self) -> EpisodeLog:
-        """Run to the end of the episode."""
-        self.agent.reset(self.recording.seed)
-        step, decision = self.recording.steps[0], 0
-        while True:
-            time = decision / self.recording.policy_hz
-            demand = self._demand(step, time)
-            self._update_event(step, time, demand)
-            if self._done:
-                break
-            step = self._advance(decision, demand)
-            decision += 1
-        self.log.end, self.log.duration = step, time
-        return self.log
+    def process(self, step: Step) -> None:
+        """Process the recorded step of the next decision; if the agent brakes, play live to the end."""
+        demand = self._process(step)
+        if self.done or demand == HOLD:
+            return
+        self._live = LiveEpisode(self.recording, self._decision - 1, self.sensor_config, self.warm_up)
+        while not self.done:
+            demand = self._process(self._live.step(demand))
+
+    def _process(self, step: Step) -> float:
+        """Process the step of a decision and return the demand."""
+        time = self._decision / self.recording.policy_hz
+        self._decision += 1
+        demand = self._demand(step, time)
+        self._update_event(step, time, demand)
+        if step.done:
+            self.log.end, self.log.duration, self.done = step, time, True
+        return demand
 
     def _demand(self, step: Step, time: float) -> float:
         """Return the agent's demand in [-1, 0]."""
@@ -89,18 +140,6 @@ class Replay:
 
     def _time_to_emergency(self, time: float) -> float | None:
         """Return the time to the next emergency without braking [s], or None if there is none."""
-        if self.env is None:
+        if self._live is None:
             return self.recording.emergencies.time_until(time)
-        return look_ahead(self.env, time).time_until(time)
-
-    def _advance(self, decision: int, demand: float) -> Step:
-        """Advance by one decision."""
-        if self.env is None and demand < HOLD:
-            self.env = self.recording.fork(decision)
-        if self.env is None:
-            step = self.recording.steps[decision + 1]
-        else:
-            observation, reward, terminated, truncated, info = self.env.step(to_action(demand))
-            step = Step(observation, info, float(reward), terminated or truncated)
-        self._done = step.done
-        return step
+        return look_ahead(self._live.env, time).time_until(time)

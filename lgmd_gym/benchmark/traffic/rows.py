@@ -101,7 +101,7 @@ def measure(recording: TrafficRecording, log: EpisodeLog) -> dict[str, Any]:
     """
     assert log.end is not None
     info = log.end.info
-    threat, collision = bool(recording.steps[-1].info["collision"]), bool(info["collision"])
+    threat, collision = bool(recording.moments[-1].info["collision"]), bool(info["collision"])
     return {
         "threat": threat,
         "collision": collision,

@@ -1,0 +1,166 @@
+"""A batch of traffic episodes, which share the calls of their cameras and neurons."""
+
+import traceback
+from dataclasses import dataclass
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.episode import Step
+from lgmd_gym.benchmark.rows import Row, new_row
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.traffic.observer import Observer
+from lgmd_gym.benchmark.traffic.reader import Moment
+from lgmd_gym.benchmark.traffic.recording import record_traffic
+from lgmd_gym.benchmark.traffic.replay import Replay
+from lgmd_gym.benchmark.traffic.rows import KEYS, measure, traffic_case
+from lgmd_gym.benchmark.traffic.schedule import WARM_UP, CameraSchedule
+from lgmd_gym.camera import CLEAR
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """One seed of a kind of traffic and the agents to run in it.
+
+    Attributes:
+        kind: Kind of traffic.
+        seed: Seed of the traffic and the agents.
+        agents: Agent strings.
+    """
+
+    kind: str
+    seed: int
+    agents: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficTask:
+    """A batch of drives under one condition.
+
+    Attributes:
+        drives: The drives.
+        sensor_config: Camera and neuron parameters under the condition.
+        condition: Name of the camera condition, for the rows.
+    """
+
+    drives: tuple[Drive, ...]
+    sensor_config: SensorConfig
+    condition: str = CLEAR
+
+
+def run_traffic_task(task: TrafficTask) -> list[Row]:
+    """Return the row of every agent in every drive; an exception becomes an error row.
+
+    All agents with the same cameras share a recording.
+    """
+    names = dict.fromkeys(agent for drive in task.drives for agent in drive.agents)
+    sensor_configs = {name: task.sensor_config.for_agent(make_agent(name)) for name in names}
+    groups: list[tuple[SensorConfig, list[str]]] = []
+    for name, sensor_config in sensor_configs.items():
+        same = [agents for known, agents in groups if known == sensor_config]
+        same[0].append(name) if same else groups.append((sensor_config, [name]))
+    rows: dict[tuple[Drive, str], Row] = {}
+    for sensor_config, agents in groups:
+        for drive in _play(task, sensor_config, set(agents)):
+            rows |= {(drive.drive, agent): row for agent, row in drive.rows.items()}
+    return [rows[drive, agent] for drive in task.drives for agent in drive.agents]
+
+
+class _PlayedDrive:
+    """A drive during its play, with the agents that share its recording.
+
+    Args:
+        drive: The drive.
+        agents: The agents.
+        task: Task of the drive.
+        sensor_config: Camera and neuron parameters.
+        observer: Cameras and neurons of all drives.
+        index: Index of the drive among those of `observer`.
+
+    Attributes:
+        drive: The drive.
+        rows: Rows of the finished agents, by agent.
+        replays: Unfinished replays, by agent.
+        moments: Moments of the recording; none if it failed.
+        schedule: Schedule of the cameras.
+    """
+
+    def __init__(
+        self,
+        drive: Drive,
+        agents: list[str],
+        task: TrafficTask,
+        sensor_config: SensorConfig,
+        observer: Observer,
+        index: int,
+    ) -> None:
+        self.drive = drive
+        self.rows: dict[str, Row] = {}
+        self.replays: dict[str, Replay] = {}
+        self.moments: tuple[Moment, ...] = ()
+        self._agents, self._condition, self._label = agents, task.condition, sensor_config.label
+        num_cameras = len(observer.sensors.names)
+        self.schedule = CameraSchedule((), (), num_cameras)
+        try:
+            recording = record_traffic(drive.kind, drive.seed, observer.sensors, index, observer.fps)
+            playing = {name: make_agent(name) for name in agents}
+            self.schedule = CameraSchedule(recording.moments, list(playing.values()), num_cameras)
+        except Exception:
+            self.fail()
+            return
+        self.moments = recording.moments
+        warm_up = None if self.schedule.first is None else WARM_UP
+        self.replays = {
+            name: Replay(recording, agent, sensor_config, warm_up) for name, agent in playing.items()
+        }
+
+    def process(self, step: Step) -> None:
+        """Give the step of the next decision to the agents."""
+        for agent, replay in list(self.replays.items()):
+            try:
+                replay.process(step)
+                if replay.done:
+                    self._add(agent, **measure(replay.recording, replay.log), camera=self._label)
+            except Exception:
+                self._add(agent, error=traceback.format_exc())
+
+    def fail(self) -> None:
+        """End all unfinished agents with the present exception."""
+        for agent in self._agents:
+            if agent not in self.rows:
+                self._add(agent, error=traceback.format_exc())
+
+    def _add(self, agent: str, **values: object) -> None:
+        """Add the row of an agent, which ends its replay."""
+        self.replays.pop(agent, None)
+        drive = self.drive
+        case = traffic_case(drive.kind, drive.seed)
+        self.rows[agent] = new_row(KEYS, agent, case, drive.seed, self._condition, **values)
+
+
+def _play(task: TrafficTask, sensor_config: SensorConfig, agents: set[str]) -> list[_PlayedDrive]:
+    """Play the drives with some agents, which have the same cameras."""
+    chosen = [
+        (drive, [agent for agent in drive.agents if agent in agents])
+        for drive in task.drives
+        if agents.intersection(drive.agents)
+    ]
+    observer = Observer(sensor_config, len(chosen))
+    drives = [
+        _PlayedDrive(drive, names, task, sensor_config, observer, index)
+        for index, (drive, names) in enumerate(chosen)
+    ]
+    schedules = [drive.schedule for drive in drives]
+    try:
+        observer.play_first_pass([drive.moments for drive in drives], schedules)
+        for schedule in schedules:
+            schedule.plan_second_pass()
+        decision = 0
+        while any(drive.replays for drive in drives):
+            moments = [drive.moments[decision] if drive.replays else None for drive in drives]
+            for drive, step in zip(drives, observer.observe(moments, schedules, decision), strict=True):
+                if step is not None:
+                    drive.process(step)
+            decision += 1
+    except Exception:  # of the cameras
+        for drive in drives:
+            drive.fail()
+    return drives

@@ -1,0 +1,102 @@
+"""Reading of traffic environments: the state at every camera frame, for later drawing."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lgmd_gym.agents import to_action
+from lgmd_gym.camera import BIRDSEYE
+from lgmd_gym.envs.traffic.env import TrafficEnv
+from lgmd_gym.sensing.road_hook import on_road_step
+from lgmd_gym.sensing.sensor_array import SensorArray
+from lgmd_gym.sensing.spaces import yaw_rate
+
+
+class SceneFrame(NamedTuple):
+    """The state of an environment at one camera frame, from which cameras can draw it at any time.
+
+    Attributes:
+        time: Simulated time since the reset [s].
+        speed: Ego speed [m/s].
+        scene: `SCENE` record.
+        objects: `OBJECT` records.
+        top_views: Frames of bird's-eye cameras, which only highway-env can draw.
+    """
+
+    time: float
+    speed: float
+    scene: Any
+    objects: np.ndarray
+    top_views: tuple[np.ndarray, ...] = ()
+
+
+class Moment(NamedTuple):
+    """Result of a reset or of one decision of a traffic environment, before its frames are drawn.
+
+    Attributes:
+        info: Info of the environment.
+        speed: Ego speed [m/s].
+        yaw_rate: Mean yaw rate of the decision [rad/s].
+        frames: Camera frames since the last decision.
+        done: Whether the episode has ended.
+    """
+
+    info: dict[str, Any]
+    speed: float
+    yaw_rate: float
+    frames: tuple[SceneFrame, ...]
+    done: bool
+
+
+class SceneReader:
+    """Steps a traffic environment and reads the state at every camera frame.
+
+    Args:
+        env: The environment.
+        sensors: Cameras of a batch of environments.
+        index: Index of the environment in the batch.
+        fps: Camera frame rate [Hz].
+        decision: Number of decisions since the reset, for an environment that has been reset before.
+    """
+
+    def __init__(
+        self, env: TrafficEnv, sensors: SensorArray, index: int, fps: float, decision: int = 0
+    ) -> None:
+        self.env, self.sensors, self.index = env, sensors, index
+        self._hz = env.config["simulation_frequency"]
+        self._stride = round(self._hz / fps)
+        self._top_views = [k for k, name in enumerate(sensors.names) if name == BIRDSEYE]
+        self._substeps = decision * (self._hz // env.config["policy_frequency"])
+        self._frames: list[SceneFrame] = []
+        on_road_step(env, self._on_substep)
+
+    def reset(self, seed: int) -> Moment:
+        """Reset the environment and read the first frame."""
+        _, info = self.env.reset(seed=seed)
+        on_road_step(self.env, self._on_substep)
+        self._substeps, self._frames = 0, []
+        self._read()
+        return Moment(info, float(self.env.ego.speed), 0.0, tuple(self._frames), False)
+
+    def step(self, demand: float | None = None) -> Moment:
+        """Advance by one decision and read its frames; None keeps the last demand."""
+        env, substeps, self._frames = self.env, self._substeps, []
+        heading = float(env.ego.heading)
+        if demand is not None:
+            env.action_type.act(to_action(demand))
+        info, done = env.advance()
+        rate = yaw_rate(float(env.ego.heading), heading, (self._substeps - substeps) / self._hz)
+        return Moment(info, float(env.ego.speed), rate, tuple(self._frames), done)
+
+    def _on_substep(self) -> None:
+        self._substeps += 1
+        if self._substeps % self._stride == 0:
+            self._read()
+
+    def _read(self) -> None:
+        sensors, i = self.sensors, self.index
+        sensors.read(self.env, i)
+        objects = sensors.objects[i, : sensors.object_counts[i]].copy()
+        top_views = tuple(sensors.frame_of(k, i).copy() for k in self._top_views)
+        time, speed = self._substeps / self._hz, float(self.env.ego.speed)
+        self._frames.append(SceneFrame(time, speed, sensors.scenes[i].copy(), objects, top_views))
