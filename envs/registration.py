@@ -1,11 +1,13 @@
 """Registration of the braking environments with Gymnasium."""
 
+import inspect
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 
 from lgmd_gym.envs.scenarios import FAMILIES, make_scenario
-from lgmd_gym.errors import check_keys
+from lgmd_gym.errors import check_keys, unknown_name
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -13,6 +15,7 @@ if TYPE_CHECKING:
     from lgmd_gym.neuron import NeuronSpec
 
 RANDOM = "RandomBraking"
+_OTHERS = ("camera", "params", "fps", "include_frame", "include_base", "trace", "config", "render_mode")
 _LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions")
 
 
@@ -66,26 +69,45 @@ def make_braking(
     """
     from lgmd_gym.envs.braking import BrakingEnv
 
-    source, camera_fields = make_source(family, arguments)
+    source, camera_fields = make_source(family, arguments, _OTHERS)
     env = BrakingEnv(source, config=config, render_mode=render_mode)
     env.camera_fields = camera_fields | env.camera_fields
     return with_camera(env, camera, params, fps, include_frame, include_base, trace)
 
 
-def make_source(family: str, arguments: dict[str, Any]) -> "tuple[EpisodeSource, dict[str, Any]]":
-    """Return the source of the episodes of a family and their constant camera fields; see `make_braking`."""
+def make_source(
+    family: str, arguments: dict[str, Any], others: Iterable[str] = ()
+) -> "tuple[EpisodeSource, dict[str, Any]]":
+    """Return the source of the episodes of a family and their constant camera fields.
+
+    Args:
+        family: See `make_braking`.
+        arguments: See `make_braking`.
+        others: Names of the caller's other arguments, which the message for an unknown argument can suggest.
+
+    Raises:
+        ValueError: If an argument or name is unknown, or a value is out of range.
+    """
     from lgmd_gym.camera import CLEAR
     from lgmd_gym.envs.episode_source import FixedScenario, RandomLevels
     from lgmd_gym.envs.scenarios.distribution import check_conditions
 
+    check_keys(f"argument of {family}", arguments, {*_argument_names(family), *others})
     if family == RANDOM:
-        check_keys(f"argument of {RANDOM}", arguments, _LEVEL_ARGUMENTS)
         return RandomLevels(**arguments), {}
     arguments = dict(arguments)
     condition = arguments.pop("condition", CLEAR)
     check_conditions([condition])
     fields = {} if condition == CLEAR else {"condition": condition}
     return FixedScenario(make_scenario(family, **arguments)), fields
+
+
+def _argument_names(family: str) -> Iterable[str]:
+    if family == RANDOM:
+        return _LEVEL_ARGUMENTS
+    if family not in FAMILIES:
+        raise unknown_name("scenario", family, FAMILIES)
+    return *inspect.signature(FAMILIES[family]).parameters, "condition"
 
 
 def with_camera(env: gym.Env, camera: "CameraSpec | None", *observation: Any) -> gym.Env:

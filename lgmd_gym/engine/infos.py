@@ -65,8 +65,9 @@ class InfoArrays:
         assert self._traces is not None
         for index in (first + np.flatnonzero(due[first:last])).tolist():
             response = Response(*(field[index].copy() for field in sensors.responses))
-            time, speed = sensors.scenes[index]["time_s"], world.bodies[index, 0]["speed"]
-            self._traces[index].append(TraceFrame(float(time), float(speed), response))
+            time = float(world.episodes[index]["steps"]) / self._simulation.rates.simulation
+            speed = float(world.bodies[index, 0]["speed"])
+            self._traces[index].append(TraceFrame(time, speed, response))
 
     def _take_traces(self, selected: np.ndarray) -> np.ndarray:
         """Return the traces of the selected environments since the last call."""

@@ -10,6 +10,7 @@ from gymnasium.vector.utils import batch_space
 
 from lgmd_gym.camera import CameraSpec
 from lgmd_gym.engine.actions import Demands
+from lgmd_gym.engine.arguments import at_least_one, autoreset_mode_of, make_sensors, mask_of, seeds_of
 from lgmd_gym.engine.episodes import EpisodeQueue, Prepared
 from lgmd_gym.engine.infos import InfoArrays
 from lgmd_gym.engine.observations import Observations
@@ -20,8 +21,12 @@ from lgmd_gym.envs.registration import make_source
 from lgmd_gym.errors import check_keys
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
 from lgmd_gym.sensing.frame_rate import camera_rate
-from lgmd_gym.sensing.sensor_array import SensorArray
 from lgmd_gym.sensing.spaces import make_space
+
+_NAMES = (
+    *("num_envs", "camera", "params", "fps", "include_frame", "include_base", "trace", "config"),
+    *("render_mode", "threads", "autoreset_mode", "copy"),
+)
 
 
 class BrakingVectorEnv(VectorEnv):
@@ -81,13 +86,13 @@ class BrakingVectorEnv(VectorEnv):
         copy: bool = True,
         **arguments: Any,
     ) -> None:
-        self.num_envs = _at_least_one("num_envs", num_envs)
-        source, self._camera_fields = make_source(family, arguments)
+        self.num_envs = at_least_one("num_envs", num_envs)
+        source, self._camera_fields = make_source(family, arguments, _NAMES)
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode must be None or 'rgb_array' for a vector, got {render_mode!r}")
         self._single = BrakingEnv(source, config=config)
         self.render_mode, self.copy = render_mode, copy
-        mode = AutoresetMode(autoreset_mode)
+        mode = autoreset_mode_of(autoreset_mode)
         self.metadata = {**self._single.metadata, "autoreset_mode": mode}
         settings = self._single.config
         rates = Rates(
@@ -96,11 +101,9 @@ class BrakingVectorEnv(VectorEnv):
             camera=camera_rate(fps, settings["simulation_frequency"]) if camera is not None else 1.0,
         )
         neuron = LGMDParams.make(params)
-        sensors = None if camera is None else SensorArray(camera, rates.camera, neuron, self.num_envs)
+        sensors = None if camera is None else make_sensors(camera, rates.camera, neuron, self.num_envs)
         demands = self._single.brake.max_demands(rates.policy)
-        self.simulation = Simulation(
-            self.num_envs, rates, sensors, demands, _at_least_one("threads", threads)
-        )
+        self.simulation = Simulation(self.num_envs, rates, sensors, demands, at_least_one("threads", threads))
         self.simulation.brakes[:] = self._single.brake.record(settings["throttle"])
         self.simulation.weights[:] = self._single.weights
         self._queue = EpisodeQueue([source] * self.num_envs, ahead=threads > 1)
@@ -129,8 +132,8 @@ class BrakingVectorEnv(VectorEnv):
         """
         options = dict(options or {})
         check_keys("option", options, ("reset_mask",))
-        mask = _checked_mask(options.get("reset_mask"), self.num_envs)
-        for index, value in enumerate(_seeds(seed, self.num_envs)):
+        mask = mask_of(options.get("reset_mask"), self.num_envs)
+        for index, value in enumerate(seeds_of(seed, self.num_envs)):
             if mask[index]:
                 self._queue.seed(index, value)
         self._start(mask)
@@ -167,14 +170,17 @@ class BrakingVectorEnv(VectorEnv):
         return self._observations.read(), *result, infos | extra
 
     def render(self) -> tuple[Any, ...] | None:
-        """Return highway-env's top view of every environment, uint8, (height, width, 3), or None."""
+        """Return highway-env's top view of every environment, uint8, (height, width, 3), or None.
+
+        Raises:
+            RuntimeError: Before the first reset.
+        """
         if self.render_mode is None:
             return None
-        return tuple(
-            self._top_views.render(index, prepared)
-            for index, prepared in enumerate(self._episodes)
-            if prepared
-        )
+        episodes = [prepared for prepared in self._episodes if prepared is not None]
+        if len(episodes) < self.num_envs:
+            raise RuntimeError("the environments have no episodes: call reset() before render()")
+        return tuple(self._top_views.render(index, prepared) for index, prepared in enumerate(episodes))
 
     def close_extras(self, **kwargs: Any) -> None:
         """Stop background threads and close the cameras."""
@@ -226,31 +232,6 @@ class BrakingVectorEnv(VectorEnv):
             )
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-
-
-def _at_least_one(name: str, value: int) -> int:
-    if not isinstance(value, int | np.integer) or value < 1:
-        raise ValueError(f"{name} must be an integer >= 1, got {value!r}")
-    return int(value)
-
-
-def _seeds(seed: Any, num_envs: int) -> list[int | None]:
-    if seed is None:
-        return [None] * num_envs
-    seeds = [seed + index for index in range(num_envs)] if isinstance(seed, int | np.integer) else list(seed)
-    if len(seeds) != num_envs:
-        raise ValueError(f"seed must be one number or {num_envs} numbers, got {len(seeds)}")
-    return seeds
-
-
-def _checked_mask(mask: Any, num_envs: int) -> np.ndarray:
-    if mask is None:
-        return np.ones(num_envs, np.bool_)
-    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (num_envs,):
-        raise ValueError(f"options['reset_mask'] must be a bool array of shape ({num_envs},), got {mask!r}")
-    if not mask.any():
-        raise ValueError("options['reset_mask'] must select at least one environment, got none")
-    return mask
 
 
 def _item(batch: Any, index: int) -> Any:

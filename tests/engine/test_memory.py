@@ -1,0 +1,43 @@
+"""Memory of the engine: `pytest -n 0 -m slow tests/engine/test_memory.py`."""
+
+import subprocess
+import sys
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+PEAK = """
+import resource, sys
+import gymnasium as gym, numpy as np, lgmd_gym
+num_envs, threads = int(sys.argv[1]), int(sys.argv[2])
+envs = gym.make_vec("LGMD/RandomBraking-v0", num_envs=num_envs, threads=threads, autoreset_mode="SameStep")
+envs.reset(seed=0)
+rng = np.random.default_rng(0)
+for steps in map(int, sys.argv[3:]):
+    for _ in range(steps // num_envs):
+        envs.step(rng.choice([0.0, 0.0, 0.0, -1.0], (num_envs, 1)))
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+
+
+def peaks(*arguments):
+    """Return the peak memory of a fresh process after each number of steps [MiB]."""
+    command = [sys.executable, "-c", PEAK, *map(str, arguments)]
+    result = subprocess.run(command, capture_output=True, text=True, check=True)
+    return [float(line) for line in result.stdout.split()]
+
+
+@pytest.mark.parametrize(("num_envs", "limit_mib"), [(64, 1024), (1024, 4096)])
+def test_peak(num_envs, limit_mib):
+    (peak,) = peaks(num_envs, 2, 20 * num_envs)
+    print(f"\n{num_envs} environments: {peak:.0f} MiB")
+    assert peak < limit_mib
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_no_growth(threads):
+    """Memory after 200,000 steps of environments equals that after 100,000."""
+    first, second = peaks(16, threads, 100_000, 100_000)
+    print(f"\n{first:.1f} MiB after 100,000 steps, {second:.1f} after 200,000")
+    assert second - first < 5

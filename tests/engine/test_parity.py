@@ -1,0 +1,101 @@
+"""The engine equals the vector of single environments to the bit: frames, numbers, flags, infos, resets."""
+
+import numpy as np
+import pytest
+from support.vectors import assert_equal_steps, make_pair, random_demands
+
+from lgmd_gym.envs import FAMILIES, env_id
+
+MODES = ["NextStep", "SameStep", "Disabled"]
+LEVELS = env_id("RandomBraking")
+FAST = {"ego_speed": 3.0}  # a second of braking ends the episode
+TWO_LENSES = ["wide", {"name": "fovea", "shape": [60, 100]}]
+
+ARGUMENTS = {
+    "two cameras": {"camera": TWO_LENSES},
+    "frames of two cameras": {"camera": ["wide", "fovea"], "include_frame": True},
+    "frames of three decisions in two": {"config": {"policy_frequency": 20}, "trace": True},
+    "several frames per decision": {"config": {"policy_frequency": 10}, "trace": True},
+    "fast camera": {"fps": 60, "trace": True},
+    "simulation at 30 Hz": {"config": {"simulation_frequency": 30}},
+    "base": {"include_base": True},
+    "no camera": {"camera": None},
+    "throttle": {"config": {"throttle": True, "max_acceleration": 4.0}},
+    "reward": {"config": {"reward": {"contact": 3.0, "brake": 0.5}}},
+    "brake": {"config": {"max_deceleration": 5.0, "dead_time": 0.3}},
+    "condition": {"condition": "night", "include_frame": True},
+    "neuron": {"params": {"t_sf": 10.0}},
+}
+
+
+def random_actions(rng, num_envs):
+    """Return demands over the whole range."""
+    return rng.uniform(-1.0, 1.0, (num_envs, 1)).astype(np.float32)
+
+
+def hold_or_brake(rng, num_envs):
+    """Return demands that let the first car drive to its contact and stop the others."""
+    demands = rng.choice(np.array([0.0, -1.0, -1.0, -1.0], np.float32), (num_envs, 1))
+    demands[0] = 0.0
+    return demands
+
+
+def random_indices(rng, num_envs):
+    """Return indices of discrete demands."""
+    return rng.choice(3, num_envs, p=[0.2, 0.2, 0.6])
+
+
+def compare(family, mode, threads, steps, draw=random_demands, num_envs=3, seed=0, **arguments):
+    """Compare both for a number of steps; return the number of episodes that ended."""
+    reference, engine = make_pair(env_id(family), num_envs, mode, threads, **arguments)
+    assert engine.single_observation_space == reference.single_observation_space
+    assert engine.observation_space == reference.observation_space
+    assert engine.single_action_space == reference.single_action_space
+    assert engine.action_space == reference.action_space
+    episodes = assert_equal_steps(reference, engine, steps, np.random.default_rng(seed), draw, seed)
+    reference.close()
+    engine.close()
+    return episodes
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("threads", [1, 2])
+def test_random_levels(mode, threads):
+    assert compare("RandomBraking", mode, threads, 260, include_frame=True, trace=True) >= 3
+
+
+@pytest.mark.parametrize("case", ARGUMENTS)
+def test_arguments(case):
+    arguments = ARGUMENTS[case]
+    rate = arguments.get("config", {}).get("policy_frequency", 30)
+    assert compare("CCRs", "SameStep", 2, int(5.3 * rate), hold_or_brake, **arguments, **FAST) >= 3
+
+
+def test_discrete_actions():
+    action = {"type": "DiscreteDemand", "demands": [0.0, -0.5, -1.0]}
+    assert compare("CCRs", "SameStep", 1, 100, random_indices, config={"action": action}, **FAST) >= 3
+
+
+@pytest.mark.parametrize("family", ["CCCscp", "CurveGuardRail", "CutIn"])
+def test_families(family):
+    compare(family, "SameStep", 2, 60, include_frame=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("mode", MODES)
+def test_every_family(family, mode):
+    for threads, draw in ((1, random_demands), (2, random_actions)):
+        compare(family, mode, threads, 1000, draw, num_envs=2, include_frame=True, trace=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("threads", [1, 2, 4])
+def test_two_hundred_random_levels(mode, threads):
+    """Run thousands of steps in 20 environments with random demands until 200 episodes have ended."""
+    episodes, seed = 0, 0
+    while episodes < 200:
+        draw = random_actions if seed % 2 else random_demands
+        episodes += compare("RandomBraking", mode, threads, 500, draw, 20, 1000 * seed, include_frame=True)
+        seed += 1
