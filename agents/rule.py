@@ -36,7 +36,7 @@ def excitation(membrane_potential: Any) -> np.ndarray:
 
     The membrane potential saturates: excitations above 3 map to the interval from 0.95 to 1.
     """
-    k = np.clip(np.asarray(membrane_potential, dtype=np.float64), 0.5, 1.0 - 3e-7)
+    k = np.minimum(np.maximum(np.asarray(membrane_potential, dtype=np.float64), 0.5), 1.0 - 3e-7)
     return np.log(k / (1.0 - k))
 
 

@@ -133,8 +133,9 @@ class TrafficRoad(RegulatedRoad):
             cars = self.read()
         crashed = cars["crashed"].copy()
         mark_collisions(cars, number)
-        for i in np.flatnonzero(cars["crashed"] > crashed):
-            self.vehicles[i].crashed = True
+        if (cars["crashed"] != crashed).any():
+            for i in np.flatnonzero(cars["crashed"][:number]):
+                self.vehicles[i].crashed = True
 
     def _stop_at_contact(self, before: np.ndarray, fraction: float, index: int, travelled: float) -> None:
         """Move all cars back to the ego's first contact, at a fraction of the step."""

@@ -65,7 +65,7 @@ class CameraSchedule:
         if self._read is not None:
             cameras = self._read[decision]
             for field, values in zip(responses, self._outputs[decision], strict=True):
-                field[index, cameras] = values[cameras]
+                np.copyto(field[index], values, where=cameras)
 
     def _cameras_in_use(self, num_cameras: int, potential: np.ndarray | None = None) -> np.ndarray | None:
         """Return when any agent reads which cameras; None for always all."""
