@@ -24,7 +24,7 @@ from numba import njit
 from lgmd_gym.neuron import scalars as sc
 from lgmd_gym.neuron.params import LGMDParams
 from lgmd_gym.neuron.scalars import feed_forward, fire
-from lgmd_gym.neuron.simd import (
+from lgmd_gym.simd import (
     LANES,
     at_least,
     clear_below,

@@ -13,9 +13,9 @@ PLAIN = {"texture": 0.0, "roadside": 0.0, "vehicles": "box"}
 
 
 def coverage(corners, shape=(24, 32)):
-    acc = np.zeros((shape[0], shape[1] + 2, 2), np.float32)
+    acc = np.zeros((2, shape[0], shape[1] + 2), np.float32)
     add_polygon(acc, 0, np.asarray(corners, float), len(corners), 1.0, 0.0)
-    return np.cumsum(acc[:, : shape[1], 0], axis=1)
+    return np.cumsum(acc[0, :, : shape[1]], axis=1)
 
 
 def test_coverage_of_a_pixel_aligned_and_a_shifted_square():

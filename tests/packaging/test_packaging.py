@@ -35,6 +35,7 @@ ORDER = (
     "sensing",
     "camera",
     "neuron",
+    "simd",
     "errors",
 )
 # The one exception: `lgmd_gym.benchmark.run`, the Python API of `lgmd-gym bench`, writes the report, too.

@@ -80,3 +80,11 @@ def add_weighted(total, image, weight):
     for i in range(total.shape[0]):
         for j in range(total.shape[1]):
             total[i, j] += nb.float32(weight) * image[i, j]
+
+
+@kernel
+def overwrite(image, light):
+    """Replace an image by another."""
+    for i in range(image.shape[0]):
+        for j in range(image.shape[1]):
+            image[i, j] = light[i, j]

@@ -22,9 +22,9 @@ def _add_column(acc, k, y0, y1, w, w2):
     row = int(y0)
     while row < y1:
         dy = min(row + 1.0, y1) - max(float(row), y0)
-        acc[row, 0, k] += w * dy
+        acc[k, row, 0] += w * dy
         if w2 != 0.0:
-            acc[row, 0, k + 1] += w2 * dy
+            acc[k + 1, row, 0] += w2 * dy
         row += 1
 
 
@@ -32,9 +32,9 @@ def _add_column(acc, k, y0, y1, w, w2):
 def _add_cell(acc, k, row, col, w, w2):
     """Add to one cell; unsigned indices avoid the check for negative ones."""
     r, c = nb.uint64(row), nb.uint64(col)
-    acc[r, c, nb.uint64(k)] += nb.float32(w)
+    acc[nb.uint64(k), r, c] += nb.float32(w)
     if w2 != 0.0:
-        acc[r, c, nb.uint64(k + 1)] += nb.float32(w2)
+        acc[nb.uint64(k + 1), r, c] += nb.float32(w2)
 
 
 @kernel
@@ -57,7 +57,7 @@ def _add_upright(acc, k, x0, y0, x1, y1, w, w2):
 @kernel
 def _add_inside(acc, k, x0, y0, x1, y1, w, w2):
     """Add an edge inside the frame that runs down (y0 < y1)."""
-    width = float(acc.shape[1] - 2)
+    width = float(acc.shape[2] - 2)
     slope = (x1 - x0) / (y1 - y0)
     row = int(y0)
     x, y = x0, y0
@@ -94,7 +94,7 @@ def add_edge(acc, k, x0, y0, x1, y1, w, w2):  # noqa: C901  (six ways to leave t
     """Add one directed edge, clipped to the frame.
 
     Args:
-        acc: Accumulator, float32, shape (height, width + 2, channels).
+        acc: Accumulator, float32, shape (channels, height, width + 2).
         k: Channel of the weight `w`; `w2` goes to channel k + 1.
         x0: Start, from the left [px].
         y0: Start, from the top [px].
@@ -103,7 +103,7 @@ def add_edge(acc, k, x0, y0, x1, y1, w, w2):  # noqa: C901  (six ways to leave t
         w: Weight.
         w2: Second weight; 0 leaves channel k + 1 unchanged.
     """
-    height, width = acc.shape[0], acc.shape[1] - 2
+    height, width = acc.shape[1], acc.shape[2] - 2
     if y0 > y1:
         x0, x1 = x1, x0
         y0, y1 = y1, y0

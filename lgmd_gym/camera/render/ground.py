@@ -8,7 +8,23 @@ import numba as nb
 
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
 from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.camera.render.texture_sampling import sample_row, texture_line
+from lgmd_gym.camera.render.texture_sampling import distance_ahead, fixed_line, sample, texture_line
+from lgmd_gym.camera.render.weather import row_air, through_air
+from lgmd_gym.simd import (
+    LANES,
+    any_above,
+    any_different,
+    at_least,
+    load_part,
+    madd,
+    maximum,
+    minimum,
+    replace_above,
+    running_sum,
+    splat,
+    splat_last,
+    store_part,
+)
 
 # Channels of the ground layer.
 ROAD, PAINT, SHADOW = 0, 1, 2
@@ -39,96 +55,80 @@ def add_quad(layer, k, lens, weight):
 
 
 @kernel
-def _sum_row(coverage, row, rows):
-    """Sum one row of coverage differences into coverage (rows 0 to 2 of `rows`), and clear it."""
-    width = rows.shape[1] - 2
-    cells = coverage[row]
-    for k in range(3):
-        total = nb.float32(0.0)
-        out = rows[k]
-        j = 0
-        # Four at a time: the sums inside a block do not depend on the sum before it.
-        while j + 4 <= width:
-            a = cells[j, k]
-            b = a + cells[j + 1, k]
-            c = b + cells[j + 2, k]
-            d = c + cells[j + 3, k]
-            out[j], out[j + 1], out[j + 2] = total + a, total + b, total + c
-            total += d
-            out[j + 3] = total
-            j += 4
-        while j < width:
-            total += cells[j, k]
-            out[j] = total
-            j += 1
-    cells[:] = nb.float32(0.0)
-    # Remove rounding errors: a trace of verge on the road, or of road on the verge.
-    for j in range(width):
-        road = rows[ROAD, j]
-        road = nb.float32(1.0) if road > nb.float32(0.9999) else road
-        rows[ROAD, j] = nb.float32(0.0) if road < nb.float32(1e-4) else road
+def _summed(plane, at, count, carry):
+    """Return sixteen coverages of a channel from its differences at index `at`, and the last of them.
+
+    `carry` is the coverage of the pixel before, in all lanes. Reads and clears at most `count` differences.
+    """
+    differences, zero = load_part(plane, at, count), splat(nb.float32(0.0))
+    if not any_different(differences, zero):
+        return carry, carry
+    store_part(plane, at, count, zero)
+    sums = running_sum(differences) + carry
+    return sums, splat_last(sums)
 
 
 @kernel
-def _span(road, width, verge):
-    """Return the first and last + 1 pixel with any road (or any verge); (0, 0) if there is none."""
-    none = nb.float32(1.0) if verge else nb.float32(0.0)
-    first, last = 0, width
-    while first < width and road[first] == none:
-        first += 1
-    if first == width:
-        return 0, 0
-    while road[last - 1] == none:
-        last -= 1
-    return first, last
+def _without_traces(road):
+    """Return the coverage of the road, 0 to 1, without traces of verge on the road and of road on the verge.
+
+    They come from rounding, and from lanes that overlap.
+    """
+    road = replace_above(road, splat(nb.float32(0.9999)), splat(nb.float32(1.0)))
+    return at_least(road, splat(nb.float32(1e-4)))
 
 
 @kernel
-def _gap(road, start, end):
-    """Return the part of [start, end) that is only road if all verge is on its two sides, else (end, end)."""
-    inner, outer = start, end
-    while inner < end and road[inner] < 1.0:
-        inner += 1
-    while outer > inner and road[outer - 1] < 1.0:
-        outer -= 1
-    for j in range(inner, outer):
-        if road[j] < 1.0:
-            return end, end
-    return inner, outer
+def _ground_light(look, tables, line, x, y, coverages):
+    """Return the light of sixteen pixels by day: verge, asphalt, paint and shadow by their coverage."""
+    road, paint, shadow = coverages
+    zero, one, half = splat(nb.float32(0.0)), splat(nb.float32(1.0)), splat(nb.float32(0.5))
+    road = _without_traces(road)
+    grain = verge = zero
+    if any_above(road, zero):
+        grain = splat(nb.float32(look.asphalt_gain)) * sample(tables.asphalt, line, x, y)
+    if any_above(one, road):
+        verge = splat(nb.float32(look.verge_gain)) * sample(tables.verge, line, x, y)
+    asphalt, verge = splat(nb.float32(look.asphalt)) + grain, splat(nb.float32(look.verge)) + verge
+    grey = madd(road, asphalt, (one - road) * verge)
+    # Worn paint shows half of the asphalt's grain.
+    paint = minimum(maximum(paint, zero), one)
+    grey = madd(paint, madd(half, grain, splat(nb.float32(look.paint))) - grey, grey)
+    return grey * (one - minimum(maximum(shadow, zero), splat(nb.float32(0.75))))
 
 
 @kernel
-def shade_row(coverage, lens, row, look, tables, rows, out):
-    """Write one row of the ground layer as grey levels to `out`, float32 (width,), and clear its coverage."""
-    width = out.shape[0]
-    _sum_row(coverage, row, rows)
-    line = texture_line(lens, row, tables.level_start)
-    start, end = _span(rows[ROAD], width, False)
-    sample_row(tables.asphalt, line, rows[3], start, end)
-    start, end = _span(rows[ROAD], width, True)
-    # Most rows have verge on the left and on the right only: skip the road between them.
-    inner, outer = _gap(rows[ROAD], start, end)
-    sample_row(tables.verge, line, rows[4], start, inner)
-    sample_row(tables.verge, line, rows[4], outer, end)
-    _mix_row(look, rows, out)
+def shade_row(image, row, part, coverage, view, tables):
+    """Draw one row of the ground layer over a row of the image, and clear its coverage.
 
-
-@kernel
-def _mix_row(look, rows, out):
-    """Mix verge, asphalt, paint and shadow by their coverage."""
-    a_mean, a_gain = nb.float32(look.asphalt), nb.float32(look.asphalt_gain)
-    v_mean, v_gain = nb.float32(look.verge), nb.float32(look.verge_gain)
-    white, half = nb.float32(look.paint), nb.float32(0.5)
-    one, zero, deep = nb.float32(1.0), nb.float32(0.0), nb.float32(0.75)
-    for j in range(out.shape[0]):
-        m = rows[0, j]
-        p = min(max(rows[1, j], zero), one)
-        d = min(max(rows[2, j], zero), deep)
-        grain = a_gain * rows[3, j]
-        asphalt = a_mean + grain
-        verge = v_mean + v_gain * rows[4, j]
-        # Not verge + m · (asphalt − verge): where m is 1, the row of the verge may contain old values.
-        grey = m * asphalt + (one - m) * verge
-        # Worn paint shows half of the asphalt's grain.
-        grey += p * (white + half * grain - grey)
-        out[j] = grey * (one - d)
+    Args:
+        image: Light, float32, shape (height, width) [grey levels].
+        row: Row of the image, at or below the horizon.
+        part: Share of the row below the horizon.
+        coverage: Coverage differences, see `Buffers.ground`.
+        view: `View`.
+        tables: `Tables`.
+    """
+    width, stride = image.shape[1], coverage.shape[2]
+    road, paint, shadow = coverage[ROAD], coverage[PAINT], coverage[SHADOW]
+    line = texture_line(view.lens, row, tables.level_start)
+    x, y, step_x, step_y = fixed_line(line)
+    air = row_air(view.look, distance_ahead(view.lens, row))
+    share, whole = splat(nb.float32(part)), part == 1.0
+    sum_road = sum_paint = sum_shadow = splat(nb.float32(0.0))
+    for j in range(0, width, LANES):
+        at, pixel, count = row * stride + j, row * width + j, width - j
+        cover_road, sum_road = _summed(road, at, count, sum_road)
+        cover_paint, sum_paint = _summed(paint, at, count, sum_paint)
+        cover_shadow, sum_shadow = _summed(shadow, at, count, sum_shadow)
+        coverages = (cover_road, cover_paint, cover_shadow)
+        grey = _ground_light(view.look, tables, line, x, y, coverages)
+        grey = through_air(grey, air, view.beam, j)
+        if not whole:
+            behind = load_part(image, pixel, count)
+            grey = madd(share, grey - behind, behind)
+        store_part(image, pixel, count, grey)
+        x, y = x + step_x, y + step_y
+    # Edges at the right side of the frame.
+    for j in range(width, width + 2):
+        road[row, j] = paint[row, j] = shadow[row, j] = nb.float32(0.0)

@@ -6,29 +6,39 @@ from typing import Any
 
 import numba as nb
 
-# Name, mtime and size of every file of the camera.
+from lgmd_gym import simd
+
+# Name, mtime and size of every file of the camera, and of the vectors that it uses.
 _STAMP = tuple(
     (path.name, path.stat().st_mtime, path.stat().st_size)
-    for path in sorted(Path(__file__).parents[1].rglob("*.py"))
+    for folder in (Path(__file__).parents[1], Path(simd.__file__).parent)
+    for path in sorted(folder.rglob("*.py"))
 )
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel, cached on disk and single-threaded (a thread pool in a parent kills forked workers).
 
+    A kernel cannot create arrays, assign one array to another, or return an array: without numba's runtime
+    (`_nrt`), calls of kernels do not count references to arrays. The atomic counts took half of the time of a
+    frame, because kernels call each other with tuples of arrays, some of them several times per image row.
+
     Numba invalidates a cached kernel when its own file changes, but not when the file of a kernel that it
-    calls changes. Here a change in any file of the camera invalidates the cache.
+    calls changes. Here a change in any file of the camera or in `lgmd_gym.simd` invalidates the cache.
     """
-    return _compile(function, fastmath={"contract", "nsz"})
+    return _compile(function, fastmath={"contract", "nsz"}, _nrt=False)
 
 
 def exact_kernel(function: Callable[..., Any]) -> Any:
-    """Compile a kernel like `kernel`, with the results of the same arithmetic in Python, to the bit."""
-    return _compile(function, fastmath=False)
+    """Compile a kernel with the results of the same arithmetic in Python, to the bit; see `kernel`.
+
+    It may use all of numba, and counts references.
+    """
+    return _compile(function, fastmath=False, _nrt=True)
 
 
-def _compile(function: Callable[..., Any], fastmath: bool | set[str]) -> Any:
-    compiled = nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=fastmath)(function)
+def _compile(function: Callable[..., Any], **options: Any) -> Any:
+    compiled = nb.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
     index: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):
         index._source_stamp = _STAMP

@@ -5,7 +5,7 @@ import math
 import numba as nb
 
 from lgmd_gym.camera.objects import MODEL_MARK
-from lgmd_gym.camera.render.blur import add_weighted, blur_steps, lens_before, move_objects
+from lgmd_gym.camera.render.blur import add_weighted, blur_steps, lens_before, move_objects, overwrite
 from lgmd_gym.camera.render.buffers import Buffers, GroundLayer, SolidLayer, Tables, View, Views
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
 from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
@@ -18,8 +18,7 @@ from lgmd_gym.camera.render.sensor import expose
 from lgmd_gym.camera.render.shadows import add_shadow
 from lgmd_gym.camera.render.sky import draw_sky
 from lgmd_gym.camera.render.solids import Air, draw_object
-from lgmd_gym.camera.render.texture_sampling import distance_ahead
-from lgmd_gym.camera.render.weather import apply_weather, light_at
+from lgmd_gym.camera.render.weather import light_at
 from lgmd_gym.camera.roadside import PLANT_RANGE
 
 
@@ -55,7 +54,8 @@ def draw_distance(image, view, tables, horizon):
         else:
             draw_sky(sky, lens, tables.skyline, view.look, horizon)
     for i in range(int(min(max(math.ceil(horizon), 0.0), image.shape[0]))):
-        image[i] = sky[i]
+        for j in range(image.shape[1]):
+            image[i, j] = sky[i, j]
 
 
 @kernel
@@ -69,27 +69,18 @@ def add_flats(layer, lens, road, objects, order, n):
 
 
 @kernel
-def draw_ground(image, view, coverage, tables, rows, horizon):
+def draw_ground(image, view, coverage, tables, horizon):
     """Draw the ground layer over asphalt and verge, below the horizon."""
-    lens, look = view.lens, view.look
-    height, width = image.shape
+    height = image.shape[0]
     start = int(min(max(math.floor(horizon), 0.0), float(height)))
-    if look.paved > 0.0:
+    if view.look.paved > 0.0:
         for i in range(start, height):
-            coverage[i, 0, ROAD] = 1.0
+            coverage[ROAD, i, 0] = 1.0
     if start > 0:
         # Rounding may put the far end of a road into the row above the horizon.
-        coverage[start - 1] = 0.0
-    weather = look.night > 0.0 or look.extinction > 0.0
+        coverage[:, start - 1] = 0.0
     for i in range(start, height):
-        part = nb.float32(min(1.0, i + 1.0 - horizon))
-        grey = image[i] if part == 1.0 else rows[5, :width]
-        shade_row(coverage, lens, i, look, tables, rows, grey)
-        if weather:
-            apply_weather(grey, distance_ahead(lens, i), look, view.beam)
-        if part < 1.0:  # the horizon runs through this row
-            for j in range(width):
-                image[i, j] += part * (grey[j] - image[i, j])
+        shade_row(image, i, min(1.0, i + 1.0 - horizon), coverage, view, tables)
 
 
 @kernel
@@ -122,7 +113,7 @@ def draw_light(view, road, tables, models, objects, count, buffers):
     draw_distance(image, view, tables, horizon)
     ground = GroundLayer(buffers.ground, buffers.corners, buffers.uv, buffers.quad)
     add_flats(ground, lens, road, objects, order, n)
-    draw_ground(image, view, buffers.ground, tables, buffers.rows, horizon)
+    draw_ground(image, view, buffers.ground, tables, horizon)
     solids = SolidLayer(
         buffers.solids, buffers.rows, buffers.corners, buffers.uv, buffers.axes, buffers.greys
     )
@@ -163,5 +154,5 @@ def draw_frames(out, lenses, views, road, tables, models, objects, count, buffer
                 draw_light(view, road, tables, models, objects, count, buffers)
                 move_objects(objects, count, ago * look.shutter_s)
                 add_weighted(total, image, nb.float32(1.0 / steps))
-            image[:] = total
+            overwrite(image, total)
         expose(out[k], image, look, tables.noise, views.noise_starts[k])

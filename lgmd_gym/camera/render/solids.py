@@ -150,19 +150,19 @@ def _compose(image, layer, rows, columns, air):
     one, zero = nb.float32(1.0), nb.float32(0.0)
     clear, murk = nb.float32(air.transmission), nb.float32((1.0 - air.transmission) * air.haze)
     first, end = nb.uint64(columns[0]), nb.uint64(columns[1])
-    last = nb.uint64(min(columns[1] + 2, acc.shape[1]))
+    last = nb.uint64(min(columns[1] + 2, acc.shape[2]))
     covers, greys = layer.rows[0], layer.rows[1]
     for i in range(nb.uint64(rows[0]), nb.uint64(rows[1])):
         # Three loops: only the first depends on the pixel before.
         cover, grey = zero, zero
         for j in range(first, end):
-            cover += acc[i, j, 0]
-            grey += acc[i, j, 1]
+            cover += acc[0, i, j]
+            grey += acc[1, i, j]
             covers[j], greys[j] = cover, grey
         for j in range(first, end):
             a = covers[j]
             a = one if a > one else zero if a < zero else a
             image[i, j] = image[i, j] * (one - a) + greys[j] * clear + a * murk
         for j in range(first, last):
-            acc[i, j, 0] = zero
-            acc[i, j, 1] = zero
+            acc[0, i, j] = zero
+            acc[1, i, j] = zero

@@ -21,6 +21,8 @@ class Texture(NamedTuple):
 
     Attributes:
         data: All levels, uint8, flat; 128 is the mean, and 36 one standard deviation of the finest level.
+            Each row of a level, along y, ends with a copy of its first texel: two neighbouring texels are
+            next to each other in memory, at the end of the period too.
         level_start: Index of the first texel of level (i, j), int64, shape (levels along x, along y).
     """
 
@@ -83,15 +85,20 @@ def _add_seams(tile: np.ndarray, rng: np.random.Generator) -> None:
 
 def _ripmap(tile: np.ndarray) -> Texture:
     level_start = np.zeros((_LONG_LOG2 + 1, _WIDE_LOG2 + 1), dtype=np.int64)
-    data = np.empty(((2 << _LONG_LOG2) - 1) * ((2 << _WIDE_LOG2) - 1), dtype=np.uint8)
+    widths = sum((1 << j) + 1 for j in range(_WIDE_LOG2 + 1))
+    # Pairs of texels are read as words of four bytes.
+    data = np.zeros(((2 << _LONG_LOG2) - 1) * widths + 2, dtype=np.uint8)
     at = 0
     for i in range(_LONG_LOG2 + 1):
         level = tile
         for j in range(_WIDE_LOG2 + 1):
             level_start[i, j] = at
+            long, wide = level.shape
+            texels = data[at : at + long * (wide + 1)].reshape(long, wide + 1)
             # Adding 0.5 and truncating rounds in place, without another array of floats.
-            np.add(level.ravel(), np.float32(0.5), out=data[at : at + level.size], casting="unsafe")
-            at += level.size
+            np.add(level, np.float32(0.5), out=texels[:, :wide], casting="unsafe")
+            texels[:, wide] = texels[:, 0]
+            at += texels.size
             if j < _WIDE_LOG2:
                 level = np.float32(0.5) * (level[:, 0::2] + level[:, 1::2])
         if i < _LONG_LOG2:

@@ -1,4 +1,4 @@
-"""Kernels that sample a ground texture along an image row."""
+"""Kernels that sample a ground texture along an image row, sixteen pixels at a time."""
 
 import math
 from typing import NamedTuple
@@ -7,6 +7,7 @@ import numba as nb
 
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.texture import TEXEL_M
+from lgmd_gym.simd import as_floats, gather_words, lane_numbers, madd, splat
 
 
 class TextureLine(NamedTuple):
@@ -40,11 +41,14 @@ def distance_ahead(lens, row):
 
 
 @kernel
-def _level(footprint, top):
-    """Return the level of the rip-map whose texels are as large as the footprint [texels]."""
-    if not footprint < 1e12:
-        return top
-    return min(math.floor(math.log2(max(footprint, 1.0)) + 0.5), top)
+def _level(square, top):
+    """Return the level of the rip-map with texels as large as a footprint, given its square [texels²]."""
+    # round(log2(footprint)), without a logarithm: level i begins at a square of 2^(2i - 1).
+    level, limit = 0, 2.0
+    while level < top and not square < limit:
+        level += 1
+        limit *= 4.0
+    return level
 
 
 @kernel
@@ -57,8 +61,8 @@ def texture_line(lens, row, level_start):
     c, s = lens.cos_yaw, lens.sin_yaw
     along = lens.focal * reach / max(fall, 0.3)
     # The pixel's footprint along the axes of the texture.
-    wide_x = math.sqrt((along * c) ** 2 + (reach * s) ** 2) / TEXEL_M
-    wide_y = math.sqrt((along * s) ** 2 + (reach * c) ** 2) / TEXEL_M
+    wide_x = ((along * c) ** 2 + (reach * s) ** 2) * (1.0 / TEXEL_M**2)
+    wide_y = ((along * s) ** 2 + (reach * c) ** 2) * (1.0 / TEXEL_M**2)
     top_x, top_y = level_start.shape[0] - 1, level_start.shape[1] - 1
     i, j = _level(wide_x, top_x), _level(wide_y, top_y)
     log_x, log_y = top_x - i, top_y - j
@@ -72,27 +76,36 @@ def texture_line(lens, row, level_start):
 
 
 @kernel
-def sample_row(data, line, out, j0, j1):
-    """Write pixels j0 to j1 - 1 of a texture (stored values minus 128, bilinear) along a `TextureLine`."""
-    # 16.16 fixed point wraps and floors without branches; unsigned indices are never negative.
-    px = nb.uint64(nb.int64(math.floor((line.x + line.dx * j0) * 65536.0)))
-    py = nb.uint64(nb.int64(math.floor((line.y + line.dy * j0) * 65536.0)))
-    sx = nb.uint64(nb.int64(math.floor(line.dx * 65536.0 + 0.5)))
-    sy = nb.uint64(nb.int64(math.floor(line.dy * 65536.0 + 0.5)))
-    one, shift, bits = nb.uint64(1), nb.uint64(line.log_y), nb.uint64(16)
-    mask_x, mask_y = (one << nb.uint64(line.log_x)) - one, (one << shift) - one
-    fraction, start = nb.uint64(65535), nb.uint64(line.start)
-    scale = nb.float32(1.0 / 65536.0)
-    for j in range(j0, j1):
-        ix, iy = px >> bits, py >> bits
-        r0 = start + ((ix & mask_x) << shift)
-        r1 = start + (((ix + one) & mask_x) << shift)
-        c0, c1 = iy & mask_y, (iy + one) & mask_y
-        wx, wy = scale * nb.float32(px & fraction), scale * nb.float32(py & fraction)
-        a, b = nb.float32(data[r0 + c0]), nb.float32(data[r0 + c1])
-        c, d = nb.float32(data[r1 + c0]), nb.float32(data[r1 + c1])
-        near = a + wy * (b - a)
-        far = c + wy * (d - c)
-        out[j] = near + wx * (far - near) - nb.float32(128.0)
-        px += sx
-        py += sy
+def _fixed(texels, rounding):
+    """Return texels in 16.16 fixed point, modulo 2^16: no level has more; `rounding` is 0.0 or 0.5."""
+    return nb.int32(nb.int64(math.floor(texels * 65536.0 + rounding)))
+
+
+@kernel
+def fixed_line(line):
+    """Return the texels (x, y) of sixteen pixels from pixel 0 and the steps to the next sixteen, 16.16."""
+    step_x, step_y = _fixed(line.dx, 0.5), _fixed(line.dy, 0.5)
+    lanes = lane_numbers()
+    x = splat(_fixed(line.x, 0.0)) + lanes * splat(step_x)
+    y = splat(_fixed(line.y, 0.0)) + lanes * splat(step_y)
+    return x, y, splat(nb.int32(16) * step_x), splat(nb.int32(16) * step_y)
+
+
+@kernel
+def sample(data, line, x, y):
+    """Return sixteen samples (stored values minus 128, bilinear) at texels in 16.16 fixed point."""
+    bits, low, fraction = splat(nb.int32(16)), splat(nb.int32(255)), splat(nb.int32(65535))
+    one, eight, shift = splat(nb.int32(1)), splat(nb.int32(8)), splat(nb.int32(line.log_y))
+    mask_x = splat(nb.int32((1 << line.log_x) - 1))
+    column = ((y >> bits) & splat(nb.int32((1 << line.log_y) - 1))) + splat(nb.int32(line.start))
+    row = (x >> bits) & mask_x
+    next_row = (row + one) & mask_x
+    # A row is one texel longer than the level is wide.
+    near = gather_words(data, column + (row << shift) + row)
+    far = gather_words(data, column + (next_row << shift) + next_row)
+    scale = splat(nb.float32(1.0 / 65536.0))
+    wx, wy = as_floats(x & fraction) * scale, as_floats(y & fraction) * scale
+    a, c = as_floats(near & low), as_floats(far & low)
+    a = madd(wy, as_floats((near >> eight) & low) - a, a)
+    c = madd(wy, as_floats((far >> eight) & low) - c, c)
+    return madd(wx, c - a, a) - splat(nb.float32(128.0))
