@@ -11,8 +11,8 @@ from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.pose import MOUNT, mount_of
 from lgmd_gym.camera.render.buffers import Views
+from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.context import SharedTables, Workspace, draw_cameras, tables_key
-from lgmd_gym.camera.render.models import all_models
 
 
 class _Prepared(NamedTuple):
@@ -63,6 +63,9 @@ class CameraBatch:
             skies=np.zeros((*size, *shape), dtype=np.float32),
             sky_aims=np.full((*size, 2), np.nan),
             noise_starts=np.zeros(size, dtype=np.int64),
+        )
+        self._bundle = Bundle(
+            self._tables_indices, self._cameras, self._mounts, self.lenses, tuple(self._views)
         )
         self._tables: dict[tuple[Any, ...], tuple[int, SharedTables]] = {}
         self._next_index = 0
@@ -116,8 +119,8 @@ class CameraBatch:
         self,
         first: int,
         last: int,
-        world: tuple[np.ndarray, ...],
-        roads: tuple[np.ndarray, ...],
+        world: Bundle,
+        roads: Bundle,
         frames: np.ndarray,
         selected: np.ndarray,
         workspace: Workspace,
@@ -126,10 +129,8 @@ class CameraBatch:
 
         Threads may draw disjoint ranges at once, each with a workspace of its own.
         """
-        batch = self._tables_indices, self._cameras, self._mounts, self.lenses
-        views, models = tuple(self._views), tuple(all_models())
         for used, tables in self._tables.values():
             draw_cameras(
-                first, last, used, frames, selected, batch, world, roads, views, tables.arrays, models,
-                workspace.arrays,
+                first, last, used, frames, selected, self._bundle.native, world.native, roads.native,
+                tables.bundle.native, workspace.bundle.native,
             )  # fmt: skip

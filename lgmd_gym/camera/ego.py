@@ -9,7 +9,6 @@ from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pinhole import project
 from lgmd_gym.camera.render.buffers import Buffers
 from lgmd_gym.camera.render.context import Workspace
-from lgmd_gym.camera.render.panorama import panorama_table
 from lgmd_gym.camera.road_pool import RoadPool, road_key
 from lgmd_gym.camera.spec import CameraItem
 from lgmd_gym.camera.world import World, view_of
@@ -34,9 +33,20 @@ class EgoCamera:
 
     def __init__(self, params: CameraItem | None = None, **fields: Any) -> None:
         self._params = CameraParams.make(params, **fields)
-        panorama_table(self._params)  # raises an error for an image that cannot be read
-        self._stage: _Stage | None = None
+        self._stage: _Stage | None = _Stage(self._params)
         self._lens: Any = None
+
+    @classmethod
+    def posed(cls, params: CameraParams, lens: Any) -> "EgoCamera":
+        """Return a camera posed as in a frame that a `CameraBatch` has drawn.
+
+        Args:
+            params: Parameters of the camera.
+            lens: `LENS` record of the frame.
+        """
+        camera = cls.__new__(cls)
+        camera._params, camera._stage, camera._lens = params, None, lens
+        return camera
 
     @property
     def params(self) -> CameraParams:
@@ -95,10 +105,6 @@ class EgoCamera:
             raise ValueError("no frame yet: call render() before project()")
         return project(self._lens, points_m)
 
-    def set_lens(self, lens: Any) -> None:
-        """Set the `LENS` record that `project` uses, after a frame drawn by a `CameraBatch`."""
-        self._lens = lens
-
     def _own_stage(self) -> "_Stage":
         if self._stage is None:
             self._stage = _Stage(self._params)
@@ -125,7 +131,7 @@ class _Stage:
         ego = self._world.read(env, None if self._turned else self._view)
         self._roads.assign(0, ego.road, self._keys)
         self.batch.draw(
-            0, 1, self._world.arrays, self._roads.arrays, out[None, None], self._selected, self.workspace
+            0, 1, self._world.bundle, self._roads.bundle, out[None, None], self._selected, self.workspace
         )
 
 

@@ -202,6 +202,15 @@ def _checked_shape(shape: Any) -> tuple[int, int]:
     return int(shape[0]), int(shape[1])
 
 
+def checked_number(name: str, value: Any) -> float | int:
+    """Return the value of a numeric field of `CameraParams`.
+
+    Raises:
+        ValueError: If it is not a number, or out of range.
+    """
+    return _checked_number(name, value, _BOUNDS[name])
+
+
 def _checked_number(name: str, value: Any, bound: _Interval) -> float | int:
     if not isinstance(value, Real) or isinstance(value, bool):
         raise ValueError(f"camera {name} must be a number, got {value!r}")

@@ -114,6 +114,8 @@ def _roadside_of(segments: bytes, roadside: float, seed: int, rail: bool) -> np.
 def _stations(lane: Any) -> np.ndarray:
     """Return the distances along the lane between which it is drawn straight; shape (n,) [m]."""
     length = float(lane.length)
+    if type(lane).__name__ == "StraightLane":  # highway-env's, with a constant width
+        return np.array([0.0, length])
     probe = length * np.array([0.0, 0.07, 0.19, 0.31, 0.43, 0.5, 0.62, 0.71, 0.83, 0.94, 1.0])
     points = np.array([lane.position(s, 0.0) for s in probe], dtype=np.float64)
     chord = points[0] + np.outer(probe / length, points[-1] - points[0])

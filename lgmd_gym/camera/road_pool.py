@@ -9,6 +9,7 @@ import numpy as np
 
 from lgmd_gym.camera.objects import OBJECT
 from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.road_geometry import LINE, RoadGeometry, network_of, road_geometry
 
 RoadKey: TypeAlias = tuple[float, int, bool]
@@ -51,11 +52,13 @@ class RoadPool:
 
     Attributes:
         arrays: The present `RoadArrays`.
+        bundle: The same arrays.
     """
 
     def __init__(self, num_envs: int, cameras: int) -> None:
         spans = np.zeros((num_envs, cameras, 7), dtype=np.int64)
         self.arrays = RoadArrays(np.zeros((0, 8)), np.zeros(0, LINE), np.zeros(0, OBJECT), spans)
+        self.bundle = Bundle(*self.arrays)
         self._roads: list[tuple[Any, Sequence[RoadKey]] | None] = [None] * num_envs
         self._stored: dict[bytes, Span] = {}
         self._used = [0, 0, 0]  # rows of surface, lines and roadside
@@ -114,12 +117,14 @@ class RoadPool:
         moved = {span: stored[digest] for digest, span in kept.items()}
         arrays.spans.reshape(-1, 7)[:] = [moved.get(tuple(span), span) for span in spans]
         self.arrays, self._stored, self._used, self._shared = arrays, stored, used, False
+        self.bundle = Bundle(*arrays)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "RoadPool":
         """Copy with common geometry: the next new road of either pool goes into new arrays."""
         self._shared = True
         clone = copy.copy(self)
         clone.arrays = self.arrays._replace(spans=self.arrays.spans.copy())
+        clone.bundle = Bundle(*clone.arrays)
         clone._roads = copy.deepcopy(self._roads, memo)
         clone._stored, clone._used = dict(self._stored), list(self._used)
         return clone

@@ -1,8 +1,11 @@
 """Posts, bushes, trees and guard rails along the road."""
 
+import math
+
 import numpy as np
 
 from lgmd_gym.camera.objects import MODEL_POST, MODEL_RAIL, MODEL_TREE, OBJECT
+from lgmd_gym.camera.render.jit import exact_kernel
 
 PLANT_RANGE = 150.0
 """Range of the roadside from the lens; it fades in over the last sixth [m]."""
@@ -117,12 +120,17 @@ def _along_edges(
     return np.concatenate(points)
 
 
-def _clear_of(points: np.ndarray, segments: np.ndarray, margin: np.ndarray) -> np.ndarray:
+@exact_kernel
+def _clear_of(points, segments, margin):
     """Return whether each point is at least `margin` beyond the edges of all lanes; bool, shape (n,)."""
-    clear = np.ones(len(points), dtype=bool)
-    for x0, y0, x1, y1, _, width in segments:
-        dx, dy = x1 - x0, y1 - y0
-        rx, ry = points[:, 0] - x0, points[:, 1] - y0
-        t = np.clip((rx * dx + ry * dy) / max(dx * dx + dy * dy, 1e-9), 0.0, 1.0)
-        clear &= np.hypot(rx - t * dx, ry - t * dy) > 0.5 * width + margin
+    clear = np.ones(len(points), dtype=np.bool_)
+    for i in range(len(points)):
+        for j in range(len(segments)):
+            x0, y0, width = segments[j, 0], segments[j, 1], segments[j, 5]
+            dx, dy = segments[j, 2] - x0, segments[j, 3] - y0
+            rx, ry = points[i, 0] - x0, points[i, 1] - y0
+            t = min(max((rx * dx + ry * dy) / max(dx * dx + dy * dy, 1e-9), 0.0), 1.0)
+            if not math.hypot(rx - t * dx, ry - t * dy) > 0.5 * width + margin[i]:
+                clear[i] = False
+                break
     return clear

@@ -8,6 +8,7 @@ import numpy as np
 
 from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, View, read_objects
 from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.scene import SCENE, Ego, read_scene
 
 _PATH_DEG = 40.0  # bound of the gaze "path"
@@ -25,18 +26,15 @@ class World:
         objects: `OBJECT` records, shape (num_envs, 512), in the order of the road's lists: vehicles, then
             objects, without the ego.
         object_counts: Number of objects, int64, shape (num_envs,).
+        bundle: These arrays.
     """
 
     def __init__(self, num_envs: int = 1) -> None:
         self.scenes = np.zeros(num_envs, SCENE)
         self.objects = np.zeros((num_envs, MAX_DRAWN), OBJECT)
         self.object_counts = np.zeros(num_envs, dtype=np.int64)
+        self.bundle = Bundle(self.scenes, self.objects, self.object_counts)
         self._take_views()
-
-    @property
-    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The arrays as the kernels read them."""
-        return self.scenes, self.objects, self.object_counts
 
     def read(self, env: Any, view: View | None, index: int = 0) -> Ego:
         """Read the present state of a highway-env environment.

@@ -138,8 +138,8 @@ class LGMD:
 
     @property
     def outputs(self) -> NDArray[np.float64]:
-        """View of the last outputs: the fields of `Response` in order, shape (N, 8)."""
-        return self._scalars[:, RESPONSE]
+        """The scalar state; the first eight columns are the fields of `Response`, shape (N, at least 8)."""
+        return self._scalars
 
     def reset(self, mask: ArrayLike | None = None) -> None:
         """Return to the state before the first frame.

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from lgmd_gym.camera import BIRDSEYE, BirdsEye, CameraItem, CameraParams, CameraSpec
 from lgmd_gym.camera.objects import View
+from lgmd_gym.camera.params import checked_number
 from lgmd_gym.camera.road_pool import RoadKey, road_key
 from lgmd_gym.camera.world import view_of
 
@@ -89,7 +90,7 @@ class Variants:
         others = {name: value for name, value in fields.items() if name != "texture"}
         texture = fields.get("texture")
         if texture is not None:
-            texture = CameraParams(texture=texture).texture
+            texture = checked_number("texture", texture)
         key = repr(others)
         variant = self._known.get(key)
         if variant is None:

@@ -4,22 +4,22 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def select_cameras(first, last, active, enabled, cameras, stale, fresh, selected):
+def select_cameras(first, last, active, group):
     """Select the enabled cameras of the active environments first..last-1.
 
     Args:
         first: First environment.
         last: Last environment + 1.
         active: Environments with a new frame, bool, shape (num_envs,).
-        enabled: Cameras in use, bool, shape (num_envs, all cameras).
-        cameras: Indices of the cameras to select from (the members), int64, shape (members,).
-        stale: Cameras that have missed a frame, bool, shape (num_envs, all cameras); updated.
-        fresh: Written: cameras that were stale and are selected, bool, shape (num_envs, members).
-        selected: Written: cameras to process, bool, shape (num_envs, members).
+        group: Arrays of the cameras with one frame shape (the members), `Bundle.native`: index of each
+            member among all cameras, int64, shape (members,); the cameras in use, and those that have missed
+            a frame (updated), bool, shape (num_envs, all cameras); the members to process, and those of them
+            that had missed a frame (both written), bool, shape (num_envs, members).
 
     Returns:
-        Numbers of selected and of fresh cameras.
+        Number of members to process, and number of those that had missed a frame.
     """
+    cameras, enabled, stale, selected, fresh = group.arrays
     num_selected, num_fresh = 0, 0
     for env in range(first, last):
         for member in range(cameras.shape[0]):
@@ -35,26 +35,26 @@ def select_cameras(first, last, active, enabled, cameras, stale, fresh, selected
 
 
 @njit(cache=True, nogil=True)
-def collect_outputs(first, last, selected, cameras, outputs, numbers, spikes, alerts):
+def collect_outputs(first, last, selected, neurons):
     """Copy the outputs of the selected cameras' neurons into arrays of all cameras.
 
     Args:
         first: First environment.
         last: Last environment + 1.
         selected: Selected cameras, bool, shape (num_envs, members).
-        cameras: Index of each member among all cameras, int64, shape (members,).
-        outputs: `LGMD.outputs` of the members' neurons, float64, shape (num_envs * members, 8).
-        numbers: Written: all fields of `Response`, float64, shape (8, num_envs, all cameras).
-        spikes: Written: number of spikes, int64, shape (num_envs, all cameras).
-        alerts: Written: alerts, bool, shape (num_envs, all cameras).
+        neurons: Arrays of the members' neurons, `Bundle.native`: index of each member among all cameras,
+            int64, shape (members,); `LGMD.outputs`, float64, (num_envs * members, at least 8); and written,
+            for all cameras: the fields of `Response`, float64, shape (8, num_envs, all cameras), the spikes,
+            int64, and the alerts, bool, shape (num_envs, all cameras).
     """
+    cameras, outputs, numbers, spikes, alerts = neurons.arrays
     members = cameras.shape[0]
     for env in range(first, last):
         for member in range(members):
             if not selected[env, member]:
                 continue
             camera, row = cameras[member], env * members + member
-            for field in range(outputs.shape[1]):
+            for field in range(numbers.shape[0]):
                 numbers[field, env, camera] = outputs[row, field]
             spikes[env, camera] = int(outputs[row, 1])
             alerts[env, camera] = outputs[row, 7] > 0.0

@@ -83,7 +83,9 @@ class SensorArray:
         for index, shape in enumerate(self.shapes):
             by_shape.setdefault(shape, []).append(index)
         self._groups = [
-            SensorGroup(shape, members, unchanged.params, fps, params, num_envs)
+            SensorGroup(
+                shape, members, unchanged.params, fps, params, self.enabled, self._stale, self._outputs
+            )
             for shape, members in by_shape.items()
         ]
         # Index of each camera's group, and of the camera in that group.
@@ -161,8 +163,7 @@ class SensorArray:
         """
         active = self._all if active is None else active
         for group in self._groups:
-            if group.select(first, last, active, self.enabled, self._stale):
-                group.process(first, last, self._world.arrays, self._roads.arrays, self._outputs)
+            group.process(first, last, active, self._world.bundle, self._roads.bundle)
 
     def step(self, active: np.ndarray | None = None) -> None:
         """Process all environments like `process`, on `threads` threads."""
@@ -179,7 +180,7 @@ class SensorArray:
         mask = self._all if mask is None else mask
         self._stale[mask] = False
         for group in self._groups:
-            group.reset(mask, self._outputs)
+            group.reset(mask)
 
     def frame_of(self, camera: int, index: int = 0) -> np.ndarray:
         """Return a view of the last frame of one camera of environment `index`, uint8, (height, width)."""
@@ -206,13 +207,13 @@ class SensorArray:
         if p is None:
             return self._top_views[index][camera]
         group, row = self._locations[camera]
-        posed = EgoCamera(p if texture is None else CameraParams.make(p, texture=texture))
-        posed.set_lens(self._groups[group].batch.lenses[index, row, 0])
-        return posed
+        p = p if texture is None else CameraParams.make(p, texture=texture)
+        return EgoCamera.posed(p, self._groups[group].batch.lenses[index, row, 0])
 
     def _link(self) -> None:
         """Name the arrays that belong to others."""
-        self.scenes, self.objects, self.object_counts = self._world.arrays
+        world = self._world
+        self.scenes, self.objects, self.object_counts = world.scenes, world.objects, world.object_counts
         self.frames = [group.frames for group in self._groups]
         numbers, spikes, alerts = self._outputs
         fields = dict(zip(Response._fields, numbers, strict=True))

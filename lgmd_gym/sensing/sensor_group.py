@@ -7,6 +7,7 @@ import numpy as np
 
 from lgmd_gym.camera import CameraParams
 from lgmd_gym.camera.batch import CameraBatch
+from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.context import Workspace
 from lgmd_gym.neuron import LGMD, LGMDParams
 from lgmd_gym.sensing.kernels import collect_outputs, select_cameras
@@ -21,7 +22,9 @@ class SensorGroup:
         params: Parameters of all cameras of the array; None for a top view.
         fps: Camera frame rate [Hz].
         neuron_params: Parameters of the neurons.
-        num_envs: Number of environments.
+        enabled: Cameras in use, bool, shape (num_envs, cameras).
+        stale: Cameras that have missed a frame, bool, shape (num_envs, cameras).
+        outputs: Outputs of all neurons, see `collect_outputs`.
 
     Attributes:
         members: Indices of the cameras.
@@ -37,50 +40,38 @@ class SensorGroup:
         params: Sequence[CameraParams | None],
         fps: float,
         neuron_params: LGMDParams,
-        num_envs: int,
+        enabled: np.ndarray,
+        stale: np.ndarray,
+        outputs: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> None:
         self.members = members
-        size = num_envs, len(members)
+        size = num_envs, _ = len(enabled), len(members)
         self.batch = CameraBatch([params[k] for k in members], shape, members, num_envs)
         self.neuron = LGMD(shape, fps, neuron_params, num_envs * len(members))
         self.frames = np.zeros((*size, *shape), np.uint8)
-        self._cameras = np.array(members, dtype=np.int64)
+        cameras = np.array(members, dtype=np.int64)
         self._selected, self._fresh = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
+        self._selection = Bundle(cameras, enabled, stale, self._selected, self._fresh)
+        self._neurons = Bundle(cameras, self.neuron.outputs, *outputs)
         self._workspaces: list[Workspace] = []
 
-    def select(
-        self, first: int, last: int, active: np.ndarray, enabled: np.ndarray, stale: np.ndarray
-    ) -> bool:
-        """Select the cameras to process, and reset the neurons of those that have missed frames.
-
-        Returns whether there are any; see `select_cameras`.
-        """
-        num_selected, num_fresh = select_cameras(
-            first, last, active, enabled, self._cameras, stale, self._fresh, self._selected
-        )
-        if num_fresh:
-            mask = np.zeros_like(self._fresh)
-            mask[first:last] = self._fresh[first:last]
-            self.neuron.reset(mask.ravel())
-        return num_selected > 0
-
-    def process(
-        self,
-        first: int,
-        last: int,
-        world: tuple[np.ndarray, ...],
-        roads: tuple[np.ndarray, ...],
-        outputs: tuple[np.ndarray, ...],
-    ) -> None:
-        """Draw the selected cameras of the environments first..last-1, and step their neurons.
+    def process(self, first: int, last: int, active: np.ndarray, world: Bundle, roads: Bundle) -> None:
+        """Draw and process a frame of every enabled camera of active environments among first..last-1.
 
         Args:
             first: First environment.
             last: Last environment + 1.
-            world: `World.arrays`.
-            roads: `RoadPool.arrays`.
-            outputs: The last three arguments of `collect_outputs`.
+            active: Environments with a new frame, bool, shape (num_envs,).
+            world: `World.bundle`.
+            roads: `RoadPool.bundle`.
         """
+        num_selected, num_fresh = select_cameras(first, last, active, self._selection.native)
+        if num_selected == 0:
+            return
+        if num_fresh:  # a neuron that has missed frames starts anew
+            fresh = np.zeros_like(self._fresh)
+            fresh[first:last] = self._fresh[first:last]
+            self.neuron.reset(fresh.ravel())
         try:  # threads take and return workspaces; both list operations are atomic
             workspace = self._workspaces.pop()
         except IndexError:
@@ -90,17 +81,13 @@ class SensorGroup:
         count = len(self.members)
         frames = self.frames.reshape(-1, *self.batch.shape)
         self.neuron.step_range(first * count, last * count, frames, self._selected.reshape(-1))
+        collect_outputs(first, last, self._selected, self._neurons.native)
 
-        collect_outputs(first, last, self._selected, self._cameras, self.neuron.outputs, *outputs)
-
-    def reset(self, mask: np.ndarray, outputs: tuple[np.ndarray, ...]) -> None:
-        """Reset the neurons of selected environments, bool, shape (num_envs,).
-
-        `outputs` are the last three arguments of `collect_outputs`.
-        """
+    def reset(self, mask: np.ndarray) -> None:
+        """Reset the neurons of selected environments, bool, shape (num_envs,)."""
         selected = np.repeat(mask[:, None], len(self.members), axis=1)
         self.neuron.reset(selected.ravel())
-        collect_outputs(0, len(mask), selected, self._cameras, self.neuron.outputs, *outputs)
+        collect_outputs(0, len(mask), selected, self._neurons.native)
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_workspaces": []}

@@ -9,6 +9,7 @@ from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, choose_objects
 from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pose import noise_start, pose_lens
 from lgmd_gym.camera.render.buffers import Buffers, Tables, Views, make_buffers
+from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.models import all_models
 from lgmd_gym.camera.render.panorama import panorama_table
@@ -28,22 +29,21 @@ class SharedTables:
     """Lookup tables for the cameras with one `tables_key`; copies share the arrays.
 
     Attributes:
-        arrays: The fields of `Tables`.
+        bundle: The fields of `Tables`, then those of `Models`.
     """
 
     def __init__(self, p: CameraParams) -> None:
         self._params = p
         asphalt, verge = ground_texture("asphalt", p.seed), ground_texture("verge", p.seed)
-        self.arrays = tuple(
-            Tables(
-                asphalt=asphalt.data,
-                verge=verge.data,
-                level_start=asphalt.level_start,
-                skyline=skyline(p.seed),
-                noise=noise_table(p.seed),
-                panorama=panorama_table(p),
-            )
+        tables = Tables(
+            asphalt=asphalt.data,
+            verge=verge.data,
+            level_start=asphalt.level_start,
+            skyline=skyline(p.seed),
+            noise=noise_table(p.seed),
+            panorama=panorama_table(p),
         )
+        self.bundle = Bundle(tuple(tables), tuple(all_models()))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "SharedTables":
         return self
@@ -57,12 +57,12 @@ class Workspace:
 
     Attributes:
         buffers: `Buffers`; `image` is the light of the last frame before the sensor.
-        arrays: Objects of the frame, `OBJECT` records of shape (512,), and the fields of `buffers`.
+        bundle: Objects of the frame, `OBJECT` records of shape (512,), then the fields of `buffers`.
     """
 
     def __init__(self, shape: tuple[int, int]) -> None:
         self.buffers: Buffers = make_buffers(shape, len(all_models().corners_used))
-        self.arrays = (np.zeros(MAX_DRAWN, OBJECT), *self.buffers)
+        self.bundle = Bundle(np.zeros(MAX_DRAWN, OBJECT), tuple(self.buffers))
         self._shape = shape
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -70,12 +70,11 @@ class Workspace:
 
 
 @kernel
-def draw_cameras(
-    first, last, tables_index, frames, selected, batch, world, roads, views, tables, models, space
-):
+def draw_cameras(first, last, tables_index, frames, selected, batch, world, roads, tables, space):
     """Pose and draw the selected cameras of the environments first..last-1.
 
-    Arrays of shape (environments, members, …) hold one row per camera of this frame size.
+    Arrays of shape (environments, members, …) hold one row per camera of this frame size. The last five
+    arguments are `Bundle.native`.
 
     Args:
         first: First environment.
@@ -85,20 +84,20 @@ def draw_cameras(
         selected: Cameras to draw, bool, shape (environments, members).
         batch: Index of the tables per camera, int64 (environments, members); camera of each member, int64
             (members,); `MOUNT` records (environments, members); `LENS` records at the end and at the start
-            of the exposure (environments, members, 2).
+            of the exposure (environments, members, 2); the fields of `Views`, with a leading axis for the
+            environments.
         world: `SCENE` records (environments,); `OBJECT` records (environments, 512) and their number, int64
             (environments,).
         roads: The fields of `RoadArrays`.
-        views: The fields of `Views`, with a leading axis for the environments.
-        tables: The fields of `Tables`.
-        models: The fields of `Models`.
-        space: `Workspace.arrays`.
+        tables: `SharedTables.bundle`.
+        space: `Workspace.bundle`.
     """
-    tables_indices, cameras, mounts, lenses = batch
-    scenes, objects, counts = world
-    surface, lines, roadside, spans = roads
+    tables_indices, cameras, mounts, lenses, views = batch.arrays
+    scenes, objects, counts = world.arrays
+    surface, lines, roadside, spans = roads.arrays
+    lookup_tables, models = tables.arrays
+    chosen, buffers = space.arrays
     views = Views(*views)
-    chosen, buffers = space[0], space[1:]
     for env in range(first, last):
         scene = scenes[env]
         for k in range(cameras.shape[0]):
@@ -123,6 +122,6 @@ def draw_cameras(
                 views.sky_aims[env, k : k + 1], views.noise_starts[env, k : k + 1],
             )  # fmt: skip
             draw_frames(
-                frames[env, k : k + 1], lenses[env, k : k + 1], rows, road, tables, models, chosen, count,
-                buffers,
+                frames[env, k : k + 1], lenses[env, k : k + 1], rows, road, lookup_tables, models, chosen,
+                count, buffers,
             )  # fmt: skip
