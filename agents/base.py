@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgmd_gym.agents.batch import BatchAgent
+
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
     from lgmd_gym.neuron import NeuronSpec
@@ -87,6 +89,14 @@ class Agent:
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Return the longitudinal demand in [-1, 1]."""
         raise NotImplementedError
+
+    def batch(self, num_envs: int) -> BatchAgent | None:
+        """Return this agent for `num_envs` environments with one camera frame per decision.
+
+        None, the default, for an agent that acts in one environment only; a caller with several environments
+        makes one agent for each.
+        """
+        return None
 
 
 class LatchingAgent(Agent):

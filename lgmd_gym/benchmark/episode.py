@@ -1,6 +1,6 @@
 """Episodes: one agent in one environment with one seed."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -9,14 +9,11 @@ import numpy as np
 
 from lgmd_gym.agents import Agent
 from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.recorder import SeriesRecorder
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs import env_id
+from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.sensing.spaces import SIGNALS
-
-GROUND_TRUTH = ("ego_speed", "gap", "ttc", "drac", "deceleration", "target_speed")  # keys of `info`
-# One value per decision each; of `SIGNALS`, the maximum over the cameras. `standstill_hold` is 1 while the
-# agent keeps a standing ego from starting, which the deceleration does not show.
-SERIES = ("time", *GROUND_TRUTH, *SIGNALS, "alert", "standstill_hold")
 
 
 class Step(NamedTuple):
@@ -53,6 +50,31 @@ class Episode:
     target_shade: float = float("nan")
     reward_sum: float = float("nan")
 
+    @classmethod
+    def of(
+        cls,
+        series: dict[str, np.ndarray],
+        info: Mapping[str, Any],
+        scenario: Scenario,
+        shade: float,
+        fps: float,
+        reward_sum: float,
+    ) -> "Episode":
+        """Return an episode from its series, last info, scenario and return.
+
+        `shade` is the grey level of the first solid actor, or NaN.
+        """
+        return cls(
+            series=series,
+            collision=bool(info["collision"]),
+            impact_speed=info["impact_speed"],
+            relative_impact_speed=info["relative_impact_speed"],
+            target_width=scenario.actors[0].width if scenario.actors else float("nan"),
+            fps=fps,
+            target_shade=shade,
+            reward_sum=reward_sum,
+        )
+
 
 def make_env(case: Case, sensor_config: SensorConfig) -> gym.Env:
     """Return the environment of a case."""
@@ -87,24 +109,14 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
         agent: Agent that acts.
         seed: Seed of the environment and of the agent.
     """
-    rows: list[tuple[float, ...]] = []
-    info, total = {}, 0.0
     base: Any = env.unwrapped
-    policy_hz = base.config["policy_frequency"]
+    recorder, first = SeriesRecorder(1, base.config["policy_frequency"]), np.zeros(1, np.int64)
+    info, total = {}, 0.0
     for step, action in rollout(env, agent, seed):
         info, total = step.info, total + step.reward
-        standstill_hold = info["ego_speed"] == 0.0 and float(action[0]) < 0.0
-        values = (info[name] for name in GROUND_TRUTH)
-        signals = (float(np.max(step.observation[name])) for name in SIGNALS)
-        rows.append((len(rows) / policy_hz, *values, *signals, float(agent.alert), float(standstill_hold)))
-    actors, bodies = base.scenario.actors, base.road.obstacles
-    return Episode(
-        series={name: np.array(column) for name, column in zip(SERIES, zip(*rows, strict=True), strict=True)},
-        collision=bool(info["collision"]),
-        impact_speed=info["impact_speed"],
-        relative_impact_speed=info["relative_impact_speed"],
-        target_width=actors[0].width if actors else float("nan"),
-        fps=env.get_wrapper_attr("fps"),
-        target_shade=float(bodies[0].shade) if bodies else float("nan"),
-        reward_sum=total,
-    )
+        signals = {name: step.observation[name][None] for name in SIGNALS}
+        recorder.add(first, signals, info, np.array([agent.alert]), np.array([float(action[0])]))
+    bodies = base.road.obstacles
+    shade = float(bodies[0].shade) if bodies else float("nan")
+    fps = env.get_wrapper_attr("fps")
+    return Episode.of(recorder.series(0), info, base.scenario, shade, fps, total)

@@ -9,6 +9,8 @@ from _thread import interrupt_main
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from lgmd_gym._version import __version__
@@ -21,12 +23,41 @@ WORKERS = 10.0  # [s] limit for the first worker
 PATIENCE = 20.0  # [s] without scheduler or worker after which a cluster counts as lost
 KILLED = "a task killed worker after worker"
 
-# Maps a function over tasks and yields the results as they finish.
-TaskMap = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
-
 
 class PoolLostError(RuntimeError):
     """Raised when the workers are lost, and with them their unfinished tasks."""
+
+
+class TaskMap:
+    """Maps a function over tasks and yields the results as they finish.
+
+    Args:
+        parallel: The workers.
+        workers: Number of workers; 1 for this process.
+    """
+
+    def __init__(self, parallel: "Parallel", workers: int) -> None:
+        self._parallel, self.workers = parallel, workers
+
+    def __call__(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
+        """Yield the results of `function`, which other processes import by name."""
+        from joblib import delayed
+
+        yield from self._parallel(delayed(function)(task) for task in tasks)  # type: ignore[misc]
+
+    def flatten(self, function: Callable[[Any], Iterator[Any]], tasks: Iterable[Any]) -> Iterator[Any]:
+        """Yield every item of the iterators that `function` returns.
+
+        Items arrive one by one from this process, and the items of a task together from other processes.
+        """
+        if self.workers == 1:
+            yield from chain.from_iterable(map(function, tasks))
+        else:
+            yield from chain.from_iterable(self(partial(_collect, function), tasks))
+
+
+def _collect(function: Callable[[Any], Iterator[Any]], task: Any) -> list[Any]:
+    return list(function(task))
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,30 +97,28 @@ class Executor:
             PoolLostError: If a worker process or the cluster dies.
             ValueError: If the cluster cannot be reached.
         """
-        from joblib import delayed
-
-        with _local(self.jobs) if self.cluster is None else _dask(self.cluster) as parallel:
-            yield lambda function, tasks: parallel(delayed(function)(task) for task in tasks)  # type: ignore[return-value]
+        with _local(self.jobs) if self.cluster is None else _dask(self.cluster) as task_map:
+            yield task_map
 
 
 SERIAL = Executor()
 
 
 @contextlib.contextmanager
-def _local(jobs: int) -> "Iterator[Parallel]":
+def _local(jobs: int) -> Iterator[TaskMap]:
     from joblib import Parallel
 
     # joblib replaces a worker that has grown by 300 MB, as it does by loading PyTorch, and warns of a leak.
     warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
     try:
         with Parallel(n_jobs=jobs, return_as="generator_unordered") as parallel:
-            yield parallel
+            yield TaskMap(parallel, jobs)
     except BrokenProcessPool:
         raise PoolLostError("a worker process was killed (possibly out of memory)") from None
 
 
 @contextlib.contextmanager
-def _dask(address: str) -> "Iterator[Parallel]":
+def _dask(address: str) -> Iterator[TaskMap]:
     from joblib import Parallel, parallel_config
 
     with contextlib.closing(_connect(address)) as client, _ClusterMonitor(client) as monitor:
@@ -98,7 +127,8 @@ def _dask(address: str) -> "Iterator[Parallel]":
                 parallel_config(backend="dask", client=client),
                 Parallel(n_jobs=-1, return_as="generator_unordered") as parallel,
             ):
-                yield parallel
+                # At least 2, because the workers are other processes.
+                yield TaskMap(parallel, max(sum(client.ncores().values()), 2))
         except KeyboardInterrupt:
             if monitor.failure:
                 raise PoolLostError(f"the cluster at {address} is lost: {monitor.failure}") from None

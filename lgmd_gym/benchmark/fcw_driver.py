@@ -1,10 +1,12 @@
 """The driver model of Euro NCAP's forward collision warning (FCW) tests."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from lgmd_gym.agents import Agent
+from lgmd_gym.agents.batch import BatchAgent
 
 REACTION = 1.2  # [s] from the alert to braking, Euro NCAP AEB C2C v4.3.1, 8.4.6
 DECELERATION = 4.0  # [m/s²], same section
@@ -22,9 +24,8 @@ class FCWDriver:
     def __init__(self, agent: Agent, max_deceleration: float, decision_hz: float) -> None:
         self.agent = agent
         self.name = f"{agent.name} (FCW driver)"
-        self._demand = -DECELERATION / max_deceleration
-        self._delay = round(REACTION * decision_hz)
-        self._since_alert: int | None = None
+        self._arguments = max_deceleration, decision_hz
+        self._reaction = _Reaction(1, *self._arguments)
 
     @property
     def alert(self) -> bool:
@@ -34,14 +35,51 @@ class FCWDriver:
     def reset(self, seed: int | None = None) -> None:
         """Reset the agent and the reaction timer."""
         self.agent.reset(seed)
-        self._since_alert = None
+        self._reaction.reset(0)
 
     def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
         """Return the driver's demand, shape (1,), float32."""
         self.agent.act(observation, info)
-        if self._since_alert is not None:
-            self._since_alert += 1
-        elif self.agent.alert:
-            self._since_alert = 0
-        brakes = self._since_alert is not None and self._since_alert >= self._delay
-        return np.array([self._demand if brakes else 0.0], dtype=np.float32)
+        return self._reaction.demands(np.array([self.alert])).astype(np.float32)
+
+    def batch(self, num_envs: int) -> "BatchAgent | None":
+        """Return the driver for the agent in `num_envs` environments; see `Agent.batch`."""
+        agent = self.agent.batch(num_envs)
+        return None if agent is None else _FCWDriverBatch(agent, _Reaction(num_envs, *self._arguments))
+
+
+class _FCWDriverBatch(BatchAgent):
+    """`FCWDriver` in N environments."""
+
+    def __init__(self, agent: BatchAgent, reaction: "_Reaction") -> None:
+        super().__init__(agent.num_envs)
+        self._agent, self._reaction = agent, reaction
+
+    def reset(self, index: int, seed: int | None = None) -> None:
+        self._agent.reset(index, seed)
+        self._reaction.reset(index)
+
+    def act_batch(
+        self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any], active: np.ndarray
+    ) -> np.ndarray:
+        self._agent.act_batch(observations, infos, active)
+        self.alerts = self._agent.alerts
+        return self._reaction.demands(self.alerts).astype(np.float32)[:, None]
+
+
+class _Reaction:
+    """Reaction of N drivers to alerts."""
+
+    def __init__(self, num_envs: int, max_deceleration: float, decision_hz: float) -> None:
+        self._demand = -DECELERATION / max_deceleration
+        self._delay = round(REACTION * decision_hz)
+        self._since_alert = np.full(num_envs, -1)  # decisions; -1 before the first alert
+
+    def reset(self, index: int) -> None:
+        self._since_alert[index] = -1
+
+    def demands(self, alerts: np.ndarray) -> np.ndarray:
+        """Process one decision; return the drivers' demands."""
+        waiting = self._since_alert < 0
+        self._since_alert = np.where(waiting, np.where(alerts, 0, -1), self._since_alert + 1)
+        return np.where(self._since_alert >= self._delay, self._demand, 0.0)

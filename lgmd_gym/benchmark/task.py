@@ -43,6 +43,11 @@ class Task:
         """Key of the task's row, see `rows.key_of`."""
         return self.agent, self.case.name, self.seed, self.condition
 
+    @property
+    def has_driver(self) -> bool:
+        """Whether the FCW driver brakes instead of the agent."""
+        return self.case.fcw_driver and self.agent != NO_BRAKE
+
 
 @dataclass(frozen=True, slots=True)
 class Result:
@@ -60,14 +65,18 @@ class Result:
 
 
 def run_task(task: Task) -> Result:
-    """Run a task; an exception in the agent or the environment becomes an error row."""
+    """Run a task by itself; an exception in the agent or the environment becomes an error row."""
     try:
         agent: Any = make_agent(task.agent)
         sensor_config = task.sensor_config.for_agent(agent)
         episode = _play(task, agent, sensor_config)
     except (Exception, SystemExit):  # an agent that calls exit() would end the worker process
-        error = traceback.format_exc()
-        return Result(new_row(KEYS, task.agent, task.case, task.seed, task.condition, error=error))
+        return error_result(task, traceback.format_exc())
+    return make_result(task, episode, sensor_config)
+
+
+def make_result(task: Task, episode: Episode, sensor_config: SensorConfig) -> Result:
+    """Return the result of an episode that was played with a sensor configuration."""
     counterfactual = task.counterfactual or Counterfactual.of(episode)
     row = make_row(
         task.agent,
@@ -81,10 +90,15 @@ def run_task(task: Task) -> Result:
     return Result(row, episode.series, counterfactual)
 
 
+def error_result(task: Task, error: str) -> Result:
+    """Return the result of a task that failed with a traceback."""
+    return Result(new_row(KEYS, task.agent, task.case, task.seed, task.condition, error=error))
+
+
 def _play(task: Task, agent: Any, sensor_config: SensorConfig) -> Episode:
     env = make_env(task.case, sensor_config)
     try:
-        if task.case.fcw_driver and task.agent != NO_BRAKE:
+        if task.has_driver:
             config = env.unwrapped.config  # type: ignore[attr-defined]
             agent = FCWDriver(agent, config["max_deceleration"], config["policy_frequency"])
         return play(env, agent, task.seed)

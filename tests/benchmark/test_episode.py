@@ -4,8 +4,9 @@ import pytest
 
 from lgmd_gym.agents import AGENTS, Agent
 from lgmd_gym.benchmark.case import Case
-from lgmd_gym.benchmark.episode import SERIES, make_env, play
+from lgmd_gym.benchmark.episode import make_env, play
 from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.recorder import SERIES
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import SUITES, find_case, find_suite
 from lgmd_gym.benchmark.task import Task, run_task

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from lgmd_gym.benchmark.case import Case
-from lgmd_gym.benchmark.episode import SERIES, Episode
+from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.metrics import METRICS, Counterfactual, brake_onset, metric
+from lgmd_gym.benchmark.recorder import SERIES
 from lgmd_gym.benchmark.rows import KEYS, make_row
 from lgmd_gym.benchmark.summary import COLUMNS, summaries, summarise, write_summary
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.episode import GROUND_TRUTH, SERIES, Episode
+from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.recorder import GROUND_TRUTH, SERIES
 from lgmd_gym.benchmark.rows import make_row
 from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.envs import BrakingEnv

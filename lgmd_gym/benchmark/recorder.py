@@ -1,0 +1,70 @@
+"""The time series of episodes, recorded decision by decision."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from lgmd_gym.sensing.spaces import SIGNALS
+
+GROUND_TRUTH = ("ego_speed", "gap", "ttc", "drac", "deceleration", "target_speed")  # keys of `info`
+# One value per decision each; of `SIGNALS`, the maximum over the cameras. `standstill_hold` is 1 while the
+# agent keeps a standing ego from starting, which the deceleration does not show.
+SERIES = ("time", *GROUND_TRUTH, *SIGNALS, "alert", "standstill_hold")
+_ALERT = SERIES.index("alert")
+_SIGNALS = 1 + len(GROUND_TRUTH)
+_INITIAL_LENGTH = 512  # decisions
+
+
+class SeriesRecorder:
+    """Records the present episode of each of N environments.
+
+    Args:
+        num_envs: Number of environments N.
+        decision_hz: Decision rate [Hz].
+    """
+
+    def __init__(self, num_envs: int, decision_hz: float) -> None:
+        self._decision_hz = decision_hz
+        self._lengths = np.zeros(num_envs, np.int64)
+        self._values = np.zeros((num_envs, _INITIAL_LENGTH, len(SERIES)))
+
+    def start(self, index: int) -> None:
+        """Start a new episode in environment `index`."""
+        self._lengths[index] = 0
+
+    def add(
+        self,
+        envs: np.ndarray,
+        observations: Mapping[str, np.ndarray],
+        infos: Mapping[str, Any],
+        alerts: np.ndarray,
+        demands: np.ndarray,
+    ) -> None:
+        """Append one decision of several environments.
+
+        Args:
+            envs: The n environments, int64, shape (n,).
+            observations: Observations with the `SIGNALS`, shape (n, cameras).
+            infos: Infos with the keys of `GROUND_TRUTH`, shape (n,).
+            alerts: Alerts of the agents, bool, shape (n,).
+            demands: Demands of the agents, shape (n,).
+        """
+        lengths = self._lengths[envs]
+        if lengths.max(initial=0) == self._values.shape[1]:
+            self._values = np.concatenate((self._values, np.zeros_like(self._values)), axis=1)
+        rows = np.empty((len(envs), len(SERIES)))
+        rows[:, 0] = lengths / self._decision_hz
+        for column, name in enumerate(GROUND_TRUTH, 1):
+            rows[:, column] = infos[name]
+        for column, name in enumerate(SIGNALS, _SIGNALS):
+            rows[:, column] = observations[name].max(axis=1)
+        rows[:, _ALERT] = alerts
+        rows[:, -1] = (rows[:, 1] == 0.0) & (demands < 0.0)
+        self._values[envs, lengths] = rows
+        self._lengths[envs] += 1
+
+    def series(self, index: int) -> dict[str, np.ndarray]:
+        """Return arrays of shape (decisions,) by name for the present episode of an environment."""
+        values = self._values[index, : self._lengths[index]]
+        return {name: values[:, column].copy() for column, name in enumerate(SERIES)}
