@@ -84,11 +84,9 @@ class Simulation:
         self.clock, self.outcome = make_clock(num_envs), make_outcome(num_envs)
         self.on_frames: Callable[[int, int, np.ndarray], None] | None = None
         # Plain tuples are cheaper to pass to compiled functions.
-        self._scenes, self._clock, self._results = (
-            tuple(self._make_scenes()),
-            tuple(self.clock),
-            tuple(self.outcome),
-        )
+        self._scenes: Any = tuple(self._make_scenes())
+        self._clock: Any = tuple(self.clock)
+        self._results: Any = tuple(self.outcome)
         self._link()
         self._threads = Threads(threads)
 
@@ -149,7 +147,7 @@ class Simulation:
 
     def _link(self) -> None:
         """Collect the arrays of the physics."""
-        self.physics = tuple(make_physics(self.world, self.brakes, self.weights))
+        self.physics: Any = tuple(make_physics(self.world, self.brakes, self.weights))
 
     def _make_scenes(self) -> SceneArrays:
         if self.sensors is None:

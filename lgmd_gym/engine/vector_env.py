@@ -190,7 +190,7 @@ class BrakingVectorEnv(VectorEnv):
             self.simulation.sensors.close()
 
     @property
-    def np_random(self) -> Any:
+    def np_random(self) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Random generators of the environments."""
         return tuple(self._queue.generators)
 
