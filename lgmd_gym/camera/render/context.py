@@ -10,7 +10,7 @@ from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pose import noise_start, pose_lens
 from lgmd_gym.camera.render.buffers import Buffers, Tables, Views, make_buffers
 from lgmd_gym.camera.render.bundle import Bundle
-from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.camera.render.jit import outer_kernel
 from lgmd_gym.camera.render.models import all_models
 from lgmd_gym.camera.render.panorama import panorama_table
 from lgmd_gym.camera.render.raster import draw_frames
@@ -69,7 +69,7 @@ class Workspace:
         return Workspace, (self._shape,)
 
 
-@kernel
+@outer_kernel
 def draw_cameras(first, last, tables_index, frames, selected, batch, world, roads, tables, space):
     """Pose and draw the selected cameras of the environments first..last-1.
 

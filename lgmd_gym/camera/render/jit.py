@@ -29,6 +29,11 @@ def kernel(function: Callable[..., Any]) -> Any:
     return _compile(function, fastmath={"contract", "nsz"}, _nrt=False)
 
 
+def outer_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that receives `Bundle`s, which count references; the rest is as for `kernel`."""
+    return _compile(function, fastmath={"contract", "nsz"}, _nrt=True)
+
+
 def exact_kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel with the results of the same arithmetic in Python, to the bit; see `kernel`.
 
