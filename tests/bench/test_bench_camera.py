@@ -11,7 +11,7 @@ from lgmd_gym.camera import CONDITIONS, EgoCamera
 pytestmark = pytest.mark.bench
 
 # (camera, vehicles, median time per frame on one core of the reference machine [µs])
-CASES = [("wide", 0, 90), ("wide", 5, 100), ("fovea", 5, 130), ("paper", 5, 700)]
+CASES = [("wide", 0, 45), ("wide", 5, 60), ("fovea", 5, 75), ("paper", 5, 300)]
 # Fields of `wide`, and the factor by which they may raise the rendering time with 5 vehicles.
 OPTIONS = {
     "night": ({"light": "night"}, 1.4),
