@@ -19,11 +19,23 @@ _STAMP = tuple(
 def compiled(function: _F) -> _F:
     """Compile a function with exact IEEE arithmetic, without the GIL, cached on disk.
 
+    It cannot create or return arrays: without numba's runtime (`_nrt`), calls do not count references to
+    arrays, which takes longer than the physics. `compiled_with_arrays` can.
+
     The same arguments give the same bits from Python and from other compiled functions. Numba invalidates a
     cached function when its own file changes, but not when the file of a function that it calls changes.
     Here a change in any file of this folder or the one above invalidates the cache.
     """
-    dispatcher = njit(cache=True, nogil=True)(function)
+    return _compile(function, _nrt=False)
+
+
+def compiled_with_arrays(function: _F) -> _F:
+    """Compile a function like `compiled`; it may create and return arrays."""
+    return _compile(function, _nrt=True)
+
+
+def _compile(function: _F, **options: Any) -> _F:
+    dispatcher = njit(cache=True, nogil=True, **options)(function)
     index: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):
         index._source_stamp = (index._source_stamp, _STAMP)

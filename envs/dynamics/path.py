@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.envs.dynamics.bend import Bend, Pose
-from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.envs.dynamics.jit import compiled, compiled_with_arrays
 
 # Nodes and weights of three-point Gauss-Legendre quadrature on [0, 1]. Over cells of this length its error is
 # about 1e-12 m.
@@ -91,7 +91,7 @@ def advance_pose(x: float, y: float, heading: float, curvature: float, slope: fl
     return Pose(x, y, heading + distance * (curvature + distance * slope / 2))
 
 
-@compiled
+@compiled_with_arrays
 def _integrate(x: float, y: float, heading: float, sections: np.ndarray) -> np.ndarray:
     """Return the cells along sections of (length, first curvature, last curvature), + to the left."""
     counts = np.ones(sections.shape[0], np.int64)
