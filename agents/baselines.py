@@ -1,10 +1,12 @@
 """Agents that ignore the observation: the counterfactual without braking and two lower bounds."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from lgmd_gym.agents.base import BRAKE, FPS, HOLD, Agent
+from lgmd_gym.agents.batch import BatchAgent
 from lgmd_gym.agents.options import positive
 
 
@@ -12,6 +14,10 @@ class NoBrake(Agent):
     """Never brakes. A contact of this agent defines a threat."""
 
     name = "no-brake"
+
+    def batch(self, num_envs: int) -> BatchAgent:
+        """Return this agent for `num_envs` environments."""
+        return _ConstantBatch(num_envs, HOLD)
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Return `HOLD`."""
@@ -22,6 +28,10 @@ class AlwaysBrake(Agent):
     """Brakes fully from the first decision: avoids every contact and brakes prematurely in every episode."""
 
     name = "always-brake"
+
+    def batch(self, num_envs: int) -> BatchAgent:
+        """Return this agent for `num_envs` environments."""
+        return _ConstantBatch(num_envs, BRAKE)
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Return `BRAKE`."""
@@ -43,10 +53,14 @@ class RandomBrake(Agent):
         self.fps = positive("fps", fps)
         self.reset()
 
+    def batch(self, num_envs: int) -> BatchAgent:
+        """Return this agent for `num_envs` environments."""
+        return _RandomBrakeBatch(self, num_envs)
+
     def reset(self, seed: int | None = None) -> None:
         """Draw a new onset time from `seed`."""
         super().reset(seed)
-        self._onset = np.random.default_rng(seed).exponential(1.0 / self.rate)
+        self._onset = self.draw_onset(seed)
         self._decisions = 0
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
@@ -54,3 +68,42 @@ class RandomBrake(Agent):
         time = self._decisions / self.fps
         self._decisions += 1
         return BRAKE if time >= self._onset else HOLD
+
+    def draw_onset(self, seed: int | None) -> float:
+        """Return the onset time for a seed [s]."""
+        return np.random.default_rng(seed).exponential(1.0 / self.rate)
+
+
+class _ConstantBatch(BatchAgent):
+    """The same demand in N environments."""
+
+    def __init__(self, num_envs: int, demand: float) -> None:
+        super().__init__(num_envs)
+        self._demands = np.full(num_envs, demand)
+
+    def reset(self, index: int, seed: int | None = None) -> None:
+        """Do nothing: the agent has no state."""
+
+    def demands(
+        self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any], active: np.ndarray
+    ) -> np.ndarray:
+        return self._demands
+
+
+class _RandomBrakeBatch(BatchAgent):
+    """`RandomBrake` in N environments."""
+
+    def __init__(self, agent: RandomBrake, num_envs: int) -> None:
+        super().__init__(num_envs)
+        self._agent = agent
+        self._onsets, self._decisions = np.zeros(num_envs), np.zeros(num_envs, np.int64)
+
+    def reset(self, index: int, seed: int | None = None) -> None:
+        self._onsets[index], self._decisions[index] = self._agent.draw_onset(seed), 0
+
+    def demands(
+        self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any], active: np.ndarray
+    ) -> np.ndarray:
+        times = self._decisions / self._agent.fps
+        self._decisions += 1
+        return np.where(times >= self._onsets, BRAKE, HOLD)

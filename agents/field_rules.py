@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.agents.batch import BatchAgent
+from lgmd_gym.agents.batch_rules import FieldBatch
 from lgmd_gym.agents.filters import ConsecutiveFrames, YawRateGate
 from lgmd_gym.agents.params import RuleParams, parameter
 from lgmd_gym.agents.rule import Rule, SensorReading, excitation
@@ -31,6 +33,10 @@ class FieldRule(Rule):
 
     num_fields: int
 
+    def batch(self, num_envs: int) -> BatchAgent:
+        """Return this rule for `num_envs` environments."""
+        return FieldBatch(self, num_envs)
+
     def reset(self, seed: int | None = None) -> None:
         """Release the brake and clear all state."""
         super().reset(seed)
@@ -40,7 +46,7 @@ class FieldRule(Rule):
 
     def should_brake(self, reading: SensorReading) -> bool:
         """Return whether the field for the ego speed has reached the level for the required frames."""
-        self.require_cameras(reading, self.num_fields)
+        self.require_cameras(len(reading.membrane_potential), self.num_fields)
         reached = [
             streak.update(level >= self.params.level)
             for streak, level in zip(self._streaks, excitation(reading.membrane_potential), strict=True)

@@ -118,8 +118,7 @@ class Rule(LatchingAgent):
         """Return whether the rule's condition holds; called for every camera frame in order."""
         raise NotImplementedError
 
-    def require_cameras(self, reading: SensorReading, count: int) -> None:
-        """Raise ValueError unless a reading comes from `count` cameras."""
-        given = len(reading.membrane_potential)
+    def require_cameras(self, given: int, count: int) -> None:
+        """Raise ValueError unless readings come from `count` cameras."""
         if given != count:
             raise ValueError(f"{self.name} requires its own {count} cameras, got {given}; leave --camera out")

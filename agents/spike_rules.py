@@ -5,6 +5,13 @@ from math import inf
 from typing import Any
 
 from lgmd_gym.agents.base import FPS, HOLD
+from lgmd_gym.agents.batch import BatchAgent
+from lgmd_gym.agents.batch_rules import (
+    AdaptiveThresholdBatch,
+    GradedBatch,
+    SpeedGatedBatch,
+    SpikeThresholdBatch,
+)
 from lgmd_gym.agents.filters import ConsecutiveFrames, YawRateGate
 from lgmd_gym.agents.params import RuleParams, parameter
 from lgmd_gym.agents.rule import Rule, SensorReading, sensor_readings
@@ -50,6 +57,10 @@ class SpikeThreshold(FrequencyRule):
     name = "spike-threshold"
     Params = SpikeThresholdParams
 
+    def batch(self, num_envs: int) -> BatchAgent:
+        """Return this rule for `num_envs` environments."""
+        return SpikeThresholdBatch(self, num_envs)
+
     @property
     def alert(self) -> bool:
         """Alert of the neuron."""
@@ -89,6 +100,10 @@ class AdaptiveThreshold(FrequencyRule):
 
     name = "adaptive-threshold"
     Params = AdaptiveThresholdParams
+
+    def batch(self, num_envs: int) -> BatchAgent:
+        """Return this rule for `num_envs` environments."""
+        return AdaptiveThresholdBatch(self, num_envs)
 
     def reset(self, seed: int | None = None) -> None:
         """Release the brake and clear all state."""
@@ -134,6 +149,10 @@ class Graded(Rule):
     name = "graded"
     Params = GradedParams
     latching = False
+
+    def batch(self, num_envs: int) -> BatchAgent:
+        """Return this rule for `num_envs` environments."""
+        return GradedBatch(self, num_envs)
 
     @property
     def alert(self) -> bool:
@@ -188,6 +207,10 @@ class SpeedGated(FrequencyRule):
 
     name = "speed-gated"
     Params = SpeedGatedParams
+
+    def batch(self, num_envs: int) -> BatchAgent:
+        """Return this rule for `num_envs` environments."""
+        return SpeedGatedBatch(self, num_envs)
 
     def reset(self, seed: int | None = None) -> None:
         """Release the brake and clear all state."""

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.agents.batch import BatchAgent
+from lgmd_gym.agents.batch_rules import StoppingZoneBatch
 from lgmd_gym.agents.filters import YawRateGate
 from lgmd_gym.agents.params import RuleParams, parameter
 from lgmd_gym.agents.rule import Rule, SensorReading, excitation, held, read_ahead
@@ -85,6 +87,10 @@ class StoppingZone(Rule):
         """Ground fields in order of design speed, then upright fields."""
         return zone_cameras(zone_ends(self.params.deceleration, self.params.reaction))
 
+    def batch(self, num_envs: int) -> BatchAgent:
+        """Return this rule for `num_envs` environments."""
+        return StoppingZoneBatch(self, num_envs)
+
     def reset(self, seed: int | None = None) -> None:
         """Release the brake and clear all state."""
         super().reset(seed)
@@ -97,7 +103,7 @@ class StoppingZone(Rule):
     def should_brake(self, reading: SensorReading) -> bool:
         """Return whether an upright obstacle is in the zone for the ego speed or in a nearer one."""
         p = self.params
-        self.require_cameras(reading, 2 * NUM_ZONES)
+        self.require_cameras(len(reading.membrane_potential), 2 * NUM_ZONES)
         levels = excitation(reading.membrane_potential)
         ground, upright = levels[:NUM_ZONES], levels[NUM_ZONES:]
         on_ground = ground >= p.ground

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgmd_gym.agents.base import Agent
+from lgmd_gym.agents.batch import BatchAgent
+from lgmd_gym.agents.policies.batch import PolicyBatch
 from lgmd_gym.agents.policies.features import FRAME, FeatureConfig, FeatureHistory
 from lgmd_gym.errors import unknown_name
 
@@ -28,6 +30,11 @@ class Policy(Agent):
     Args:
         path: Zip file, or name of a policy in this package.
 
+    Attributes:
+        card: Card of the file.
+        features: Inputs of the policy.
+        model: The stable-baselines3 model.
+
     Raises:
         ValueError: If the file cannot be read or has no card, or if stable-baselines3 is not installed.
     """
@@ -38,9 +45,9 @@ class Policy(Agent):
         self.name = f"policy:{path}"
         file = find_policy(path)
         self.card = read_card(file)
-        self._features = FeatureConfig.from_dict(self.card["features"])
-        self._history = FeatureHistory(self._features)
-        self._model = _load_model(file, self.card["algo"])
+        self.features = FeatureConfig.from_dict(self.card["features"])
+        self._history = FeatureHistory(self.features)
+        self.model = _load_model(file, self.card["algo"])
         self.reset()
 
     @property
@@ -51,7 +58,7 @@ class Policy(Agent):
     @property
     def include_frame(self) -> bool:  # type: ignore[override]
         """Whether camera frames are among the inputs."""
-        return FRAME in self._features.inputs
+        return FRAME in self.features.inputs
 
     @property
     def alert(self) -> bool:
@@ -67,15 +74,23 @@ class Policy(Agent):
 
     def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
         """Return a new demand at every `repeat`-th call, else the last one; hold a latched demand."""
-        if self._features.latches(self._demand):
+        if self.features.latches(self._demand):
             return self._demand
         self._history.update(observation)
-        if self._decisions % self._features.repeat == 0:
-            action, _ = self._model.predict(self._history.stack(), deterministic=True)
-            demands = self.card["demands"]
-            self._demand = demands[int(action)] if demands else float(np.reshape(action, -1)[0])
+        if self._decisions % self.features.repeat == 0:
+            self._demand = self.decide(self._history.stack())
         self._decisions += 1
         return self._demand
+
+    def decide(self, inputs: dict[str, np.ndarray]) -> float:
+        """Return the demand for the inputs of one decision."""
+        action, _ = self.model.predict(inputs, deterministic=True)
+        demands = self.card["demands"]
+        return demands[int(action)] if demands else float(np.reshape(action, -1)[0])
+
+    def batch(self, num_envs: int) -> BatchAgent:
+        """Return this policy for `num_envs` environments."""
+        return PolicyBatch(self, num_envs)
 
 
 def shipped_policies() -> list[str]:
