@@ -1,23 +1,20 @@
 """Surrogate safety measures: gap, time to contact, time headway, DRAC and required deceleration.
 
-Undefined values are `inf`. The compiled functions read `BODY` records, the ego first. Of other highway-env
-vehicles and road objects, `find_lead` and `time_to_contact` assume that they move straight on.
+Undefined values are `inf`. The functions are compiled and read `BODY` records, the ego first.
 """
 
-from collections.abc import Sequence
 from math import cos, inf, sin
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.bodies import BODY, BOX, ROAD_MARKING, outline_of
+from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, outline_of
 from lgmd_gym.envs.dynamics.contact import first_touch
 from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.swept_contact import PathMotion, gap_on_path, time_on_paths
 
 TTC_HORIZON, TTC_STEP = 10.0, 0.1  # [s]
 GAP_HORIZON, GAP_STEP = 300.0, 1.0  # [m]
-_NO_PATHS = np.zeros((1, 6))
 
 
 @compiled
@@ -94,38 +91,3 @@ def _is_straight(body: Any) -> bool:
 def _motion(body: Any, paths: np.ndarray) -> PathMotion:
     cells = paths[body.path : body.path_end]
     return PathMotion(cells, body.travelled, body.speed, body.length, body.width)
-
-
-class Lead(NamedTuple):
-    """The first obstacle on the ego's path.
-
-    Attributes:
-        gap: Free distance along the ego's path, from its front bumper [m].
-        other: The obstacle.
-    """
-
-    gap: float
-    other: Any
-
-
-def find_lead(ego: Any, obstacles: Sequence[Any]) -> Lead | None:
-    """Return the first of some highway-env road objects straight ahead within 300 m, or None."""
-    gap, index = lead_of(_records(ego, obstacles), len(obstacles) + 1, _NO_PATHS)
-    return Lead(gap, obstacles[index - 1]) if index else None
-
-
-def time_to_contact(ego: Any, obstacles: Sequence[Any]) -> float:
-    """Return the time to the first contact with some highway-env road objects [s]; see `contact_time`."""
-    return contact_time(_records(ego, obstacles), len(obstacles) + 1, _NO_PATHS)
-
-
-def _records(ego: Any, obstacles: Sequence[Any]) -> np.ndarray:
-    """Return road objects as `BODY` records on straight paths, the ego first."""
-    records = np.zeros(len(obstacles) + 1, BODY)
-    records["kind"], records["path_end"] = BOX, 1
-    rows = [(*item.position, item.heading, item.speed, item.LENGTH, item.WIDTH) for item in (ego, *obstacles)]
-    for name, column in zip(
-        ("x", "y", "heading", "speed", "length", "width"), zip(*rows, strict=True), strict=True
-    ):
-        records[name] = column
-    return records

@@ -4,7 +4,6 @@ highway-env tests polygons after each step and looks one step ahead. It reports 
 late and flags cars that stop a millimetre short. These functions find the first touch inside the step.
 """
 
-from collections.abc import Sequence
 from math import cos, hypot, inf, sin
 from typing import Any, NamedTuple
 
@@ -96,27 +95,6 @@ def first_touch(moving: Rectangle, standing: Rectangle, dx: float, dy: float) ->
         if enter > leave:
             return inf
     return enter
-
-
-def first_contact(before: Sequence[Rectangle], after: Sequence[Rectangle]) -> tuple[float, int]:
-    """Return when the first rectangle touches another one within a step.
-
-    Args:
-        before: Outlines at the start of the step, the ego's first.
-        after: The same outlines at its end.
-
-    Returns:
-        The fraction of the step, `inf` without contact, and the index of the touched rectangle.
-    """
-    start, end = before[0], after[0]
-    ego_dx, ego_dy = end.x - start.x, end.y - start.y
-    found, index = inf, 0
-    for number in range(1, len(before)):
-        old, new = before[number], after[number]
-        fraction = first_touch(start, old, ego_dx - (new.x - old.x), ego_dy - (new.y - old.y))
-        if fraction < found:
-            found, index = fraction, number
-    return found, index
 
 
 def touched_side(ego: Rectangle, other: Rectangle) -> str:

@@ -9,10 +9,9 @@ from numba import njit
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 _FOLDER = Path(__file__).parent
-# Name, mtime and size of every file with compiled functions.
+# Name, mtime and size of every file of the environments.
 _STAMP = tuple(
-    (path.name, path.stat().st_mtime, path.stat().st_size)
-    for path in sorted([*_FOLDER.glob("*.py"), *_FOLDER.parent.glob("*.py")])
+    (path.name, path.stat().st_mtime, path.stat().st_size) for path in sorted(_FOLDER.parent.rglob("*.py"))
 )
 
 
@@ -24,7 +23,7 @@ def compiled(function: _F) -> _F:
 
     The same arguments give the same bits from Python and from other compiled functions. Numba invalidates a
     cached function when its own file changes, but not when the file of a function that it calls changes.
-    Here a change in any file of this folder or the one above invalidates the cache.
+    Here a change in any file of `lgmd_gym.envs` invalidates the cache.
     """
     return _compile(function, _nrt=False)
 

@@ -4,8 +4,8 @@ from typing import Any
 
 from highway_env.vehicle.behavior import IDMVehicle
 
-from lgmd_gym.envs.traffic.kernels import NO_ROUTE, UNPLANNED
 from lgmd_gym.envs.traffic.lanes import LaneTable
+from lgmd_gym.envs.traffic.places import NO_ROUTE, UNPLANNED
 
 
 class TrafficCar(IDMVehicle):

@@ -13,18 +13,9 @@ from highway_env.vehicle.objects import Landmark
 from lgmd_gym.envs.dynamics.bodies import BODY, BOX
 from lgmd_gym.envs.dynamics.contact import Contact
 from lgmd_gym.envs.traffic.ego import TrafficEgo
-from lgmd_gym.envs.traffic.kernels import (
-    ALL_DONE,
-    CAR,
-    CAR_STATE,
-    TAU_PURSUIT,
-    decide,
-    find_contact,
-    locate,
-    mark_collisions,
-    move,
-)
+from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, decide, find_contact, mark_collisions, move
 from lgmd_gym.envs.traffic.lanes import LaneTable
+from lgmd_gym.envs.traffic.places import ALL_DONE, CAR, CAR_STATE, locate
 
 
 class TrafficRoad(RegulatedRoad):

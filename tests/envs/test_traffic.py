@@ -13,8 +13,9 @@ from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.behavior import IDMVehicle
 from support.traffic import BRAKE, HOLD, BlockedHighway, EmptyHighway, car_states, run_for
 
-from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, idm, neighbours, steer
+from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, idm, steer
 from lgmd_gym.envs.traffic.lanes import LaneTable
+from lgmd_gym.envs.traffic.places import neighbours
 from lgmd_gym.envs.traffic.registration import KINDS, find_kind, make_traffic
 from lgmd_gym.envs.traffic.road import TrafficRoad
 
