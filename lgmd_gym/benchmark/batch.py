@@ -3,7 +3,8 @@
 from collections import deque
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
+from uuid import uuid4
 
 import numpy as np
 
@@ -33,8 +34,20 @@ WIDTH = 32  # environments of a simulation; more gain little, and fewer leave mo
 MAX_TASKS = 64  # tasks of a unit of work, whose results leave a worker process together
 
 
-def make_units(tasks: Iterable[Task], workers: int) -> list[list[Task]]:
-    """Return tasks as units of work; the tasks of a unit share agent, sensors and rates.
+class Unit(NamedTuple):
+    """Tasks that share agent, sensors and rates.
+
+    Attributes:
+        run: Identifier of the call of `make_units`; files of agents may change between calls.
+        tasks: The tasks, at least one.
+    """
+
+    run: str
+    tasks: list[Task]
+
+
+def make_units(tasks: Iterable[Task], workers: int) -> list[Unit]:
+    """Return tasks as units of work.
 
     Args:
         tasks: The tasks.
@@ -45,24 +58,23 @@ def make_units(tasks: Iterable[Task], workers: int) -> list[list[Task]]:
     for task in tasks:
         groups.setdefault(_group_key(task), []).append(task)
     size = len(tasks) if workers == 1 else min(MAX_TASKS, -(-len(tasks) // (4 * workers)))
-    units = []
+    units, run = [], uuid4().hex
     for group in groups.values():
         count = -(-len(group) // size)
         bounds = [len(group) * k // count for k in range(count + 1)]
-        units += [group[start:end] for start, end in pairwise(bounds)]
+        units += [Unit(run, group[start:end]) for start, end in pairwise(bounds)]
     return units
 
 
-def play_unit(tasks: Sequence[Task]) -> Iterator[Result]:
+def play_unit(unit: Unit) -> Iterator[Result]:
     """Play the tasks of a unit, and yield their results as they end.
 
     The results equal those of `run_task`. If the batch fails, for example because of an agent for the wrong
     cameras, the remaining tasks run one by one, so that the error belongs to the tasks that cause it.
     """
-    left = {task.key: task for task in tasks}
+    left = {task.key: task for task in unit.tasks}
     try:
-        player = BatchPlayer(tasks[0], min(WIDTH, len(tasks)))
-        for result in player.play(tasks):
+        for result in _player(unit).play(unit.tasks):
             del left[key_of(result.row)]
             yield result
     except (Exception, SystemExit):
@@ -102,6 +114,7 @@ class BatchPlayer:
     def play(self, tasks: Sequence[Task]) -> Iterator[Result]:
         """Play tasks and yield their results as they end; the next task takes the place of one that ended."""
         waiting, outcome = deque(tasks), self._simulation.outcome
+        self._tasks = [None] * len(self._tasks)  # of an earlier call that did not end
         while waiting or self._active.any():
             self._start_episodes(waiting)
             self._views.read()
@@ -195,6 +208,19 @@ class BatchPlayer:
         if batch is not None:
             return BatchSlots(batch, self._views)
         return SingleSlots(lambda: with_driver(make_agent(task.agent)), self._views)
+
+
+_players: dict[Hashable, BatchPlayer] = {}  # at most one, because it is large
+
+
+def _player(unit: Unit) -> BatchPlayer:
+    """Return the player for a unit: that of the unit before if it belongs to the same group and run."""
+    task = unit.tasks[0]
+    key = unit.run, WIDTH, _group_key(task)
+    if key not in _players:
+        _players.clear()
+        _players[key] = BatchPlayer(task, WIDTH)
+    return _players[key]
 
 
 def _group_key(task: Task) -> Hashable:

@@ -9,7 +9,7 @@ from support.runs import new_run, read_rows, sorted_rows
 from lgmd_gym.agents import AGENTS, Agent
 from lgmd_gym.agents.batch import BatchAgent
 from lgmd_gym.benchmark import batch
-from lgmd_gym.benchmark.batch import make_units, play_unit
+from lgmd_gym.benchmark.batch import BatchPlayer, make_units, play_unit
 from lgmd_gym.benchmark.case import level_case
 from lgmd_gym.benchmark.folder import read_series
 from lgmd_gym.benchmark.metrics import Counterfactual
@@ -214,11 +214,11 @@ def test_top_views_are_rendered():
 
 def test_units_share_an_agent_and_are_spread_over_the_workers():
     tasks = make_tasks("no-brake", seeds=range(30)) + make_tasks("ttc-oracle", seeds=range(5))
-    assert [len(unit) for unit in make_units(tasks, 1)] == [180, 30]
+    assert [len(unit.tasks) for unit in make_units(tasks, 1)] == [180, 30]
     units = make_units(tasks, 2)
-    assert [len(unit) for unit in units] == [25, 26, 26, 25, 26, 26, 26, 15, 15]
-    assert [task for unit in units for task in unit] == tasks
-    assert max(map(len, make_units(tasks * 10, 1 + 1))) <= 64
+    assert [len(unit.tasks) for unit in units] == [25, 26, 26, 25, 26, 26, 26, 15, 15]
+    assert [task for unit in units for task in unit.tasks] == tasks
+    assert max(len(unit.tasks) for unit in make_units(tasks * 10, 2)) <= 64
     assert make_units([], 2) == []
 
 
@@ -238,6 +238,24 @@ def test_run_gives_the_rows_and_series_of_single_tasks(tmp_path, jobs):
         assert series is not None
         for name, values in result.series.items():
             np.testing.assert_array_equal(series[name], values)
+
+
+@pytest.mark.usefixtures("_no_fallback")
+def test_units_of_a_group_use_the_same_simulation(monkeypatch):
+    """The second unit begins after a unit that was not played to its end."""
+    made = []
+    monkeypatch.setattr(batch, "_players", {})
+    monkeypatch.setattr(batch, "BatchPlayer", lambda *arguments: made.append(1) or BatchPlayer(*arguments))
+    tasks = make_tasks("stopping-zone", CASES[1:3], seeds=(0, 1))
+    (unit,) = make_units(tasks, 1)
+    next(play_unit(unit._replace(tasks=tasks[:2])))
+    results = list(play_unit(unit._replace(tasks=tasks[2:])))
+    assert_equal_results(results, list(map(run_task, tasks[2:])))
+    assert len(made) == 1
+    (again,) = make_units(tasks[:1], 1)  # the files of the agent may have changed
+    next(play_unit(again))
+    assert len(made) == 2
+    assert len(batch._players) == 1
 
 
 def test_results_appear_as_episodes_end():
