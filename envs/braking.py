@@ -168,6 +168,11 @@ class BrakingEnv(EgoBrakeEnv):
         super().update_metadata(video_real_time_ratio)
 
     @property
+    def vehicle(self) -> EgoCar | None:  # type: ignore[override]
+        """The car under test; None before the first reset."""
+        return self.road.ego if self.controlled_vehicles else None
+
+    @property
     def ego(self) -> EgoCar:
         """The car under test."""
         return cast(EgoCar, self.vehicle)
@@ -205,6 +210,7 @@ class BrakingEnv(EgoBrakeEnv):
             if step < steps - 1:
                 self._automatic_rendering()
         self.enable_auto_render = False
+        self.road.refresh()
 
     def write_scene(self, arrays: SceneArrays) -> None:
         """Write the present state for the cameras, much faster than they can read the vehicles.

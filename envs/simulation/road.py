@@ -15,7 +15,8 @@ _SHOWN = 7  # x, y, heading, speed, acceleration, travelled and steering come fi
 class BrakingRoad(Road):
     """A road whose vehicles and objects show one environment of a simulation.
 
-    The state is that of the simulation: a change to a vehicle lasts until the next step only.
+    The state is that of the simulation: a change to a vehicle lasts until the next step only. The vehicles
+    are brought up to date when they are read from the road, not in every step.
 
     Args:
         network: The road network.
@@ -26,10 +27,9 @@ class BrakingRoad(Road):
 
     Attributes:
         physics: The fields of `Physics`.
-        ego: The car under test.
-        obstacles: Vehicles and solid objects that the ego can touch.
-        items: The ego, then all vehicles and objects in the order of their bodies.
     """
+
+    _stale = False
 
     def __init__(
         self,
@@ -43,12 +43,51 @@ class BrakingRoad(Road):
         self.physics, self._demands, self._index = physics, demands, index
         bodies, episodes, *_ = physics
         bodies = bodies[index, : episodes[index]["bodies"]]
-        self.ego = EgoCar(self, bodies[0], self.set_demand)
-        self.items: list[Any] = [self.ego, *(CLASSES[body["kind"]](self, body) for body in bodies[1:])]
-        items = list(zip(self.items, bodies["kind"].tolist(), strict=True))
+        self._ego = EgoCar(self, bodies[0], self.set_demand)
+        self._items: list[Any] = [self._ego, *(CLASSES[body["kind"]](self, body) for body in bodies[1:])]
+        items = list(zip(self._items, bodies["kind"].tolist(), strict=True))
         self.vehicles = [item for item, kind in items if kind <= CAR]
         self.objects = [item for item, kind in items if kind > CAR]
-        self.obstacles: list[Any] = [item for item, kind in items[1:] if kind != ROAD_MARKING]
+        self._obstacles: list[Any] = [item for item, kind in items[1:] if kind != ROAD_MARKING]
+        self._stale = True
+
+    @property
+    def ego(self) -> EgoCar:
+        """The car under test."""
+        self.refresh()
+        return self._ego
+
+    @property
+    def vehicles(self) -> list[Any]:  # type: ignore[override]
+        """The ego and all scripted cars."""
+        self.refresh()
+        return self._vehicles
+
+    @vehicles.setter
+    def vehicles(self, value: list[Any]) -> None:
+        self._vehicles = value
+
+    @property
+    def objects(self) -> list[Any]:  # type: ignore[override]
+        """All other objects."""
+        self.refresh()
+        return self._objects
+
+    @objects.setter
+    def objects(self, value: list[Any]) -> None:
+        self._objects = value
+
+    @property
+    def obstacles(self) -> list[Any]:
+        """Vehicles and solid objects that the ego can touch."""
+        self.refresh()
+        return self._obstacles
+
+    @property
+    def items(self) -> list[Any]:
+        """The ego, then all vehicles and objects in the order of their bodies."""
+        self.refresh()
+        return self._items
 
     def set_demand(self, demand: float) -> None:
         """Set the longitudinal demand in [-1, 1] of the next decision."""
@@ -60,17 +99,22 @@ class BrakingRoad(Road):
     def step(self, dt: float) -> None:
         """Advance all vehicles and objects by `dt` [s], or up to the ego's first contact."""
         step_environment(self._index, dt, self.physics)
-        self.show()
+        self._stale = True
 
-    def show(self) -> None:
-        """Copy the present state to the vehicles and objects."""
+    def refresh(self) -> None:
+        """Copy the present state to the vehicles and objects, unless they show it already."""
+        if self._stale:
+            self._stale = False
+            self._show()
+
+    def _show(self) -> None:
         bodies, episodes, egos = (values[self._index] for values in self.physics[:3])
         rows = bodies.view(np.float64).reshape(len(bodies), -1)[:, :_SHOWN].tolist()
-        for item, (*motion, steering) in zip(self.items, rows, strict=False):
+        for item, (*motion, steering) in zip(self._items, rows, strict=False):
             item.show(*motion)
             if isinstance(item, PathCar):
                 item.steer(steering)
-        self.ego.yaw_rate = float(egos["yaw_rate"])
+        self._ego.yaw_rate = float(egos["yaw_rate"])
         touched = int(episodes["touched"])
         if touched:
-            self.ego.crashed = self.items[touched].crashed = True
+            self._ego.crashed = self._items[touched].crashed = True

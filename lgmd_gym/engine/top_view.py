@@ -32,7 +32,6 @@ class TopViews:
         physics, demands = simulation.physics, simulation.clock.demands
         viewer.road = BrakingRoad(prepared.network, prepared.generator, physics, demands, index)
         viewer.controlled_vehicles = [viewer.road.ego]
-        viewer.road.show()
         frame = viewer.render()
         assert frame is not None
         return frame
