@@ -24,7 +24,7 @@ from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import summaries
 from lgmd_gym.cli.main import COMMANDS
 from lgmd_gym.envs.braking import BrakingEnv
-from lgmd_gym.envs.random_braking import RandomBrakingEnv
+from lgmd_gym.envs.episode_source import RandomLevels
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.envs.traffic.registration import traffic_id
 from lgmd_gym.gallery.cards import ScenarioCard, record_video, scenario_cards
@@ -42,7 +42,7 @@ def main(out: Path) -> None:
         if not (static / f"{card.name}.mp4").exists():
             _record(card, static)
         (pages / f"{card.name}.md").write_text(environment_page(card), encoding="utf-8")
-    for cls in (BrakingEnv, RandomBrakingEnv, TrafficEnv):
+    for cls in (BrakingEnv, RandomLevels, TrafficEnv):
         (pages / f"{cls.__name__}.md").write_text(class_page(cls), encoding="utf-8")
     (out / "commands.md").write_text(commands_page(), encoding="utf-8")
     (out / "benchmark.md").write_text(benchmark_table(), encoding="utf-8")

@@ -1,9 +1,10 @@
-"""Speed table of the README: `python tests/bench/table.py`.
+"""Speed table of the README: `python tests/bench/table.py [docs/vector.png]`.
 
 All figures are medians of interleaved rounds in one process, on one core unless a row states otherwise. A
-busy machine slows both sides of a ratio.
+busy machine slows both sides of a ratio. With a file name, the rates of the engine are also plotted.
 """
 
+import os
 import platform
 import statistics
 import subprocess
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 import lgmd_gym
 from lgmd_gym import LGMD, EgoCamera
@@ -20,17 +22,28 @@ from lgmd_gym import LGMD, EgoCamera
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
+SIZES, THREADS = (1, 16, 64, 256), (1, 2)
+ROUND = 256  # frames per round and vector environment
+PEER_ENVS = 16  # environments of highway-env in a vector
+
 
 def interleaved(*calls, rounds=21, repeats=50):
-    """Return the median time per call of each function [s], called in turns."""
+    """Return the median time per call of each function [s], called in turns.
+
+    Args:
+        *calls: Functions without arguments.
+        rounds: Number of rounds.
+        repeats: Calls of each function per round; one number, or one per function.
+    """
+    repeats = [repeats] * len(calls) if isinstance(repeats, int) else repeats
     times = [[] for _ in calls]
     for round_ in range(rounds + 1):
-        for index, call in enumerate(calls):
+        for index, (call, count) in enumerate(zip(calls, repeats, strict=True)):
             start = time.perf_counter()
-            for _ in range(repeats):
+            for _ in range(count):
                 call()
             if round_:  # the first round compiles the kernels
-                times[index].append((time.perf_counter() - start) / repeats)
+                times[index].append((time.perf_counter() - start) / count)
     return [statistics.median(part) for part in times]
 
 
@@ -64,18 +77,15 @@ def closed_loop(env_id, **arguments):
     return step
 
 
-def many(count):
-    """Return a function that steps `count` environments in one process; two threads step the neurons."""
-    from lgmd_gym.wrappers.vector import LGMDObservation
-
-    bare = gym.make_vec("LGMD/CCRs-v0", num_envs=count, vectorization_mode="sync", camera=None)
-    envs, hold = LGMDObservation(bare, threads=2), np.zeros((count, 1), np.float32)
+def engine(count, threads=1):
+    """Return a function that steps `count` environments of the engine by one camera frame."""
+    envs = gym.make_vec("LGMD/CCRs-v0", num_envs=count, threads=threads)
     envs.reset(seed=0)
-    return lambda: envs.step(hold)
+    return lambda: envs.step(np.zeros((count, 1)))
 
 
-def top_view():
-    """Return a function that steps highway-env with its grey top view: two cars, 30 Hz, 160×90."""
+def make_top_view():
+    """Return highway-env with its grey top view: two cars, 30 Hz, 160×90."""
     import highway_env  # noqa: F401
 
     config = {
@@ -91,7 +101,12 @@ def top_view():
         "vehicles_count": 1,
         "lanes_count": 3,
     }
-    env, hold = gym.make("highway-v0", config=config), np.zeros(2, np.float32)
+    return gym.make("highway-v0", config=config)
+
+
+def top_view():
+    """Return a function that steps highway-env with its grey top view."""
+    env, hold = make_top_view(), np.zeros(2, np.float32)
     env.reset(seed=0)
 
     def step():
@@ -100,6 +115,99 @@ def top_view():
             env.reset()
 
     return step
+
+
+def top_views(kind):
+    """Return a function that steps a vector of highway-env's top views, and one that closes it."""
+    envs = kind([make_top_view] * PEER_ENVS)
+    envs.reset(seed=0)
+    return lambda: envs.step(np.zeros((PEER_ENVS, 2), np.float32)), envs.close
+
+
+def engine_rates():
+    """Return the frames/s of a top view, and of the engine by number of environments and threads."""
+    kinds = [(count, threads) for count in SIZES for threads in THREADS]
+    calls = [engine(*kind) for kind in kinds]
+    repeats = [60, *(max(1, ROUND // count) for count, _ in kinds)]
+    peer, *seconds = interleaved(top_view(), *calls, rounds=11, repeats=repeats)
+    return 1 / peer, {kind: kind[0] / value for kind, value in zip(kinds, seconds, strict=True)}
+
+
+def peer_rates():
+    """Return the frames/s of one top view, of several in a `SyncVectorEnv`, and in an `AsyncVectorEnv`."""
+    vectors = [top_views(kind) for kind in (SyncVectorEnv, AsyncVectorEnv)]
+    one, *several = interleaved(top_view(), *(step for step, _ in vectors), rounds=9, repeats=[60, 4, 4])
+    for _, close in vectors:
+        close()
+    return [1 / one, *(PEER_ENVS / seconds for seconds in several)]
+
+
+def envpool_rate():
+    """Return the decisions/s of EnvPool's highway, or None if the variable ENVPOOL_PYTHON is not set."""
+    interpreter = os.environ.get("ENVPOOL_PYTHON")
+    if interpreter is None:
+        return None
+    command = [interpreter, str(HERE / "envpool_highway.py")]
+    return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+
+
+def shares(count=64):
+    """Return the shares of camera, neuron, physics and the rest in a step of the engine on one thread."""
+    from lgmd_gym.camera.batch import CameraBatch
+    from lgmd_gym.engine.simulation import Simulation
+
+    parts = {(CameraBatch, "draw"): 0.0, (LGMD, "step_range"): 0.0, (Simulation, "step"): 0.0}
+    step, originals = engine(count), {key: getattr(*key) for key in parts}
+
+    def timed(key):
+        def call(*arguments):
+            start = time.process_time()
+            originals[key](*arguments)
+            parts[key] += time.process_time() - start
+
+        return call
+
+    for key in parts:
+        setattr(*key, timed(key))
+    try:
+        step()
+        parts.update(dict.fromkeys(parts, 0.0))
+        start = time.process_time()
+        for _ in range(max(1, 10 * ROUND // count)):
+            step()
+        total = time.process_time() - start
+    finally:
+        for key, original in originals.items():
+            setattr(*key, original)
+    camera_s, neuron_s, simulation_s = parts.values()
+    seconds = camera_s, neuron_s, simulation_s - camera_s - neuron_s, total - simulation_s
+    return [value / total for value in seconds]
+
+
+def numbered(count, noun):
+    """Return a count with its noun."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def plot(peer, rates, path):
+    """Plot the rates of the engine over the number of environments."""
+    from matplotlib.figure import Figure
+
+    from lgmd_gym.plotting.style import COLOURS
+
+    figure = Figure(figsize=(7.0, 3.2), layout="constrained")
+    axis = figure.subplots()
+    for threads, colour in zip(THREADS, COLOURS[1:], strict=False):
+        label = f"engine, {numbered(threads, 'thread')}"
+        axis.plot(SIZES, [rates[count, threads] for count in SIZES], "o-", color=colour, label=label)
+    axis.axhline(peer, color=COLOURS[0], linestyle="--", label="highway-env, grey top view, one environment")
+    axis.set_xscale("log", base=2)
+    axis.set_xticks(SIZES, [str(count) for count in SIZES])
+    axis.set(xlabel="environments", ylabel="frames per second")
+    axis.set_ylim(0.0, 1.4 * max(rates.values()))  # leaves space for the legend
+    axis.grid(alpha=0.3)
+    axis.legend(frameon=False, loc="upper left")
+    figure.savefig(path, dpi=110)
 
 
 def import_seconds():
@@ -113,7 +221,27 @@ def import_seconds():
     return statistics.median(timed("import lgmd_gym") - timed("pass") for _ in range(7))
 
 
-def rows():
+def engine_rows(path):
+    """Yield the rows of the engine and of highway-env's vectors; plot the rates if there is a path."""
+    peer, rates = engine_rates()
+    if path is not None:
+        plot(peer, rates, path)
+    for (count, threads), rate in rates.items():
+        what = f"engine, {numbered(count, 'environment')}, {numbered(threads, 'thread')}"
+        yield what, f"{rate:,.0f} frames/s", f"{rate / peer:.1f}× highway-env with its grey top view"
+    names = "camera", "neuron", "physics", "rest"
+    parts = [f"{name} {share:.0%}" for name, share in zip(names, shares(), strict=True)]
+    yield "engine, 64 environments, 1 thread: shares", ", ".join(parts), ""
+    one, *several = peer_rates()
+    for kind, rate in zip(("SyncVectorEnv", "AsyncVectorEnv"), several, strict=True):
+        what = f"highway-env with its grey top view, {PEER_ENVS} environments, `{kind}`"
+        yield what, f"{rate:,.0f} frames/s", f"{rate / one:.1f}× one environment"
+    if (rate := envpool_rate()) is not None:
+        what = "EnvPool's highway-v0, 2 vehicles, no frames, 64 environments, 2 threads"
+        yield what, f"{rate:,.0f} decisions/s", f"{rate / rates[64, 2]:.1f}× the engine with frames"
+
+
+def rows(path=None):
     """Yield the rows: what is measured, its median, and the comparison."""
     from support.opencv_lgmd import OpenCVLGMD
 
@@ -132,13 +260,14 @@ def rows():
     ours, theirs = interleaved(closed_loop("LGMD/CCRs-v0"), top_view(), repeats=60)
     what = "closed loop, 2 vehicles, 160×90, physics 60 Hz"
     yield what, f"{1 / ours:,.0f} frames/s", f"{theirs / ours:.1f}× highway-env with its grey top view"
-    (seconds,) = interleaved(many(64), rounds=9, repeats=4)
-    yield "64 environments in one process", f"{64 / seconds:,.0f} frames/s", "neurons batched, two threads"
+    yield from engine_rows(path)
     yield "`import lgmd_gym`", f"{import_seconds():.2f} s", ""
 
 
 if __name__ == "__main__":
     print(f"lgmd-gym {lgmd_gym.__version__}, Python {platform.python_version()}, {platform.machine()}\n")
     print("| what | median | against |\n|---|---|---|")
-    for row in rows():
+    for row in rows(*map(Path, sys.argv[1:2])):
         print("| " + " | ".join(row) + " |", flush=True)
+    loads = ", ".join(f"{load:.1f}" for load in os.getloadavg())
+    print(f"\n{os.cpu_count()} cores; load average of the last 1, 5 and 15 minutes: {loads}")

@@ -112,3 +112,26 @@ def test_picture(tmp_path):
     film = Image.open(tmp_path / "film.gif")
     assert film.size == (800, 450)
     assert film.n_frames > 20
+
+
+def test_vector_gymnasium(capsys):
+    episodes, contacts = load("vector_gymnasium").main(num_envs=8, steps=300)
+    assert f"2400 decisions: {episodes} episodes, contact in {contacts}" in capsys.readouterr().out
+    assert 8 <= episodes < 100
+    assert contacts < episodes
+
+
+def test_vector_sb3(capsys):
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("stable_baselines3")
+    model = load("vector_sb3").main(steps=512, num_envs=4, episodes=4)
+    assert model.num_timesteps == 512
+    assert all(bool(torch.isfinite(weight).all()) for weight in model.policy.parameters())
+    assert "512 steps: return " in capsys.readouterr().out
+
+
+def test_vector_cleanrl(capsys):
+    returns = load("vector_cleanrl").main(iterations=6, num_envs=8, steps=32)
+    assert len(returns) >= 2
+    assert all(-30.0 < value < 15.0 for value in returns)
+    assert "mean return" in capsys.readouterr().out
