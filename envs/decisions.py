@@ -10,7 +10,7 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.brake import put_demand
 from lgmd_gym.envs.dynamics.episode import Physics, is_terminated, is_truncated
-from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.envs.dynamics.jit import Arrays, compiled
 from lgmd_gym.envs.info import INFO, write_info
 from lgmd_gym.envs.reward import step_reward
 from lgmd_gym.envs.simulation.world import World
@@ -68,7 +68,7 @@ def make_outcome(num: int) -> Outcome:
 
 
 @compiled
-def start_decisions(first: int, last: int, steps: int, physics: Physics, clock: Clock) -> None:
+def start_decisions(first: int, last: int, steps: int, physics: Arrays, clock: Arrays) -> None:
     """Put the demands of the environments with `remaining` >= 0 into their delay lines.
 
     Args:
@@ -93,7 +93,7 @@ def start_decisions(first: int, last: int, steps: int, physics: Physics, clock: 
 
 @compiled
 def finish_decisions(
-    first: int, last: int, policy_rate: float, physics: Physics, clock: Clock, outcome: Outcome
+    first: int, last: int, policy_rate: float, physics: Arrays, clock: Arrays, outcome: Arrays
 ) -> None:
     """Write info, reward and end of the environments with a decision.
 
@@ -122,7 +122,7 @@ def finish_decisions(
 
 @compiled
 def start_episodes(
-    first: int, last: int, selected: np.ndarray, physics: Physics, clock: Clock, outcome: Outcome
+    first: int, last: int, selected: np.ndarray, physics: Arrays, clock: Arrays, outcome: Arrays
 ) -> None:
     """Write the first info and the heading of the selected environments."""
     physics, clock, outcome = Physics(*physics), Clock(*clock), Outcome(*outcome)

@@ -8,7 +8,7 @@ import numpy as np
 from lgmd_gym.camera.objects import BRAKE_LIGHT_MPS2, MAX_RANGE, MODEL_BOX, MODEL_CAR, MODEL_MARK
 from lgmd_gym.envs.dynamics.bodies import BOX, CAR
 from lgmd_gym.envs.dynamics.episode import Physics
-from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.envs.dynamics.jit import Arrays, compiled
 
 
 class SceneArrays(NamedTuple):
@@ -26,7 +26,7 @@ class SceneArrays(NamedTuple):
 
 
 @compiled
-def write_scene(i: int, rate: float, physics: Physics, arrays: SceneArrays) -> None:
+def write_scene(i: int, rate: float, physics: Arrays, arrays: Arrays) -> None:
     """Write the present state of environment i for its cameras.
 
     Args:

@@ -7,7 +7,7 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, move, step_actor, step_ego
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
-from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.envs.dynamics.jit import Arrays, compiled
 
 PASSED_DISTANCE = 2.0  # [m] behind the ego's rear beyond which an actor has been passed
 
@@ -56,7 +56,7 @@ class Physics(NamedTuple):
 
 
 @compiled
-def step_environment(i: int, dt: float, physics: Physics) -> None:
+def step_environment(i: int, dt: float, physics: Arrays) -> None:
     """Advance environment i by `dt` [s]; see `step_bodies`."""
     physics = Physics(*physics)
     step_bodies(

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from numba import njit
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
+Arrays: TypeAlias = tuple[Any, ...]
+"""The fields of a NamedTuple of arrays, or the NamedTuple itself, which is slower to pass from Python."""
 _FOLDER = Path(__file__).parent
 # Name, mtime and size of every file of the environments.
 _STAMP = tuple(
@@ -34,7 +36,7 @@ def compiled_with_arrays(function: _F) -> _F:
 
 
 def _compile(function: _F, **options: Any) -> _F:
-    dispatcher = njit(cache=True, nogil=True, **options)(function)
+    dispatcher: Any = njit(cache=True, nogil=True, **options)(function)
     index: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):
         index._source_stamp = (index._source_stamp, _STAMP)

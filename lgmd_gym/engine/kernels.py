@@ -4,13 +4,13 @@ import numpy as np
 
 from lgmd_gym.envs.decisions import Clock
 from lgmd_gym.envs.dynamics.episode import Physics, step_environment
-from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.envs.dynamics.jit import Arrays, compiled
 from lgmd_gym.envs.scene import SceneArrays, write_scene
 
 
 @compiled
 def advance(
-    first: int, last: int, stride: int, rate: float, physics: Physics, clock: Clock, scenes: SceneArrays
+    first: int, last: int, stride: int, rate: float, physics: Arrays, clock: Arrays, scenes: Arrays
 ) -> bool:
     """Advance each environment up to its next camera frame, at most to the end of its decision.
 
@@ -45,7 +45,7 @@ def advance(
 
 @compiled
 def show_episodes(
-    first: int, last: int, rate: float, selected: np.ndarray, physics: Physics, scenes: SceneArrays
+    first: int, last: int, rate: float, selected: np.ndarray, physics: Arrays, scenes: Arrays
 ) -> None:
     """Write the present state of the selected environments for their cameras."""
     physics, scenes = Physics(*physics), SceneArrays(*scenes)
