@@ -8,10 +8,11 @@ import os
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any
 
-# More than one part, so that the other threads take over parts of a thread that the system slows down.
-_PARTS_PER_THREAD = 4
+# The rest is split into smaller parts, of which faster threads take more. Every part costs overhead.
+_LARGE_SHARE = 0.7
 
 
 class Threads:
@@ -28,8 +29,7 @@ class Threads:
 
     def run(self, kernel: Callable[..., None], num: int, args: tuple[Any, ...]) -> None:
         """Call kernel(first, last, *args) on parts of 0..num, in the calling thread and the workers."""
-        size = max(1, num // (self.count * _PARTS_PER_THREAD))
-        parts = deque((first, min(first + size, num)) for first in range(0, num, size))
+        parts = deque(self._parts(num))
 
         def work() -> None:
             while parts:
@@ -43,6 +43,14 @@ class Threads:
         work()
         for future in futures:
             future.result()
+
+    def _parts(self, num: int) -> list[tuple[int, int]]:
+        """Return first and last + 1 of each part of 0..num: a large part per thread, then a small one."""
+        large = max(1, int(num * _LARGE_SHARE / self.count))
+        small = -(-(num - large * self.count) // self.count)
+        ends = [large * k for k in range(self.count + 1)]
+        ends += [ends[-1] + small * (k + 1) for k in range(self.count)]
+        return [(first, min(last, num)) for first, last in pairwise(ends) if first < min(last, num)]
 
     def _own_pool(self) -> ThreadPoolExecutor:
         """Return the pool of this process; a forked process has none of its parent's threads."""
