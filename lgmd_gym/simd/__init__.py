@@ -29,7 +29,7 @@ from lgmd_gym.simd.arithmetic import (
     total,
 )
 from lgmd_gym.simd.partial import load_part, store_part
-from lgmd_gym.simd.vectors import LANES, copy, gather_words, lane_numbers, load, splat, store
+from lgmd_gym.simd.vectors import LANES, copy, gather_words, lane_numbers, load, splat, store, store_bytes
 
 __all__ = [
     "LANES",
@@ -54,6 +54,7 @@ __all__ = [
     "splat",
     "splat_last",
     "store",
+    "store_bytes",
     "store_part",
     "total",
 ]

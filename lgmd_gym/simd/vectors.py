@@ -126,6 +126,29 @@ def store_masked(typingctx, array, index, count, value):
 
 
 @intrinsic
+def store_bytes(typingctx, array, index, count, value):
+    """Store the first `count` lanes, 0 to below 256, to array[index : index + count] of a uint8 array.
+
+    The fractions are cut off. A count above 16 is as 16.
+    """
+
+    def codegen(context, builder, signature, args):
+        pointer = _pointer(context, builder, signature.args[0], args[0], args[1], _BYTES)
+        lanes = builder.trunc(builder.fptosi(args[3], INTS), _BYTES)
+        align, mask = ir.Constant(ir.IntType(32), 1), _first_lanes(builder, args[2])
+        name = f"llvm.masked.store.v{LANES}i8.p0"
+        whole = builder.icmp_signed(">=", args[2], ir.Constant(args[2].type, LANES))
+        with builder.if_else(whole) as (then, otherwise):
+            with then:
+                builder.store(lanes, pointer).align = 1
+            with otherwise:
+                call(builder, name, lanes, pointer, align, mask, result=ir.VoidType())
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp, vector), codegen
+
+
+@intrinsic
 def copy(typingctx, source, source_index, target, target_index):
     """Copy 16 elements between arrays of the same dtype."""
 

@@ -29,6 +29,12 @@ def copy_part(source, target, index, count):
 
 
 @nb.njit
+def store_bytes(source, target, index, count):
+    """Store the first `count` lanes as bytes."""
+    simd.store_bytes(target, index, count, simd.load(source, 0))
+
+
+@nb.njit
 def gather(data, indices, out):
     """Write the second byte at each index, plus the number of the lane, to `out`."""
     lanes = simd.lane_numbers() * simd.splat(nb.int32(indices))
@@ -55,6 +61,16 @@ def test_partial_loads_and_stores_touch_no_other_elements(count):
     expected = np.zeros(64, np.float32)
     last = 5 + min(count, 16)
     expected[5:last] = source[5:last] + 1.0
+    assert np.array_equal(target, expected)
+
+
+@pytest.mark.parametrize("count", [-1, 0, 1, 7, 15, 16, 40])
+def test_bytes_are_stored_without_fractions(count):
+    source = np.linspace(0.0, 255.9, 16, dtype=np.float32)
+    target, expected = np.full(64, 9, np.uint8), np.full(64, 9, np.uint8)
+    store_bytes(source, target, 5, count)
+    used = min(max(count, 0), 16)
+    expected[5 : 5 + used] = source[:used].astype(np.uint8)
     assert np.array_equal(target, expected)
 
 

@@ -65,7 +65,6 @@ class Buffers(NamedTuple):
         lens: The lens at one time of the exposure, a `LENS` record, shape (1,).
         ground: Coverage differences of road, paint and shadow, float32, shape (3, height, width + 2).
         solids: Coverage differences of a solid and of its grey, float32, shape (2, height, width + 2).
-        rows: float32, shape (6, width + 2).
         corners: Corners of a polygon as (depth, right, down), float64, shape (16, 3) [m].
         uv: Projected corners of a polygon, float64, shape (20, 2) [px].
         quad: x, y of four corners on the ground, float64, shape (8,) [m].
@@ -80,7 +79,6 @@ class Buffers(NamedTuple):
     lens: np.ndarray
     ground: np.ndarray
     solids: np.ndarray
-    rows: np.ndarray
     corners: np.ndarray
     uv: np.ndarray
     quad: np.ndarray
@@ -103,7 +101,6 @@ class SolidLayer(NamedTuple):
     """The `Buffers` that solids are drawn with."""
 
     coverage: np.ndarray
-    rows: np.ndarray
     corners: np.ndarray
     uv: np.ndarray
     axes: np.ndarray
@@ -119,7 +116,6 @@ def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
         lens=np.zeros(1, dtype=LENS),
         ground=np.zeros((3, height, width + 2), dtype=np.float32),
         solids=np.zeros((2, height, width + 2), dtype=np.float32),
-        rows=np.zeros((6, width + 2), dtype=np.float32),
         corners=np.zeros((16, 3)),
         uv=np.zeros((20, 2)),
         quad=np.zeros(8),

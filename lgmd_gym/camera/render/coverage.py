@@ -11,6 +11,7 @@ import math
 import numba as nb
 
 from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.simd import any_different, load_part, running_sum, splat, splat_last, store_part
 
 NEAR = 0.1
 """Depth of the near plane [m]."""
@@ -167,8 +168,9 @@ def clip_and_project(lens, corners, n, out):
             out[m, 1] = cv + f * (z0 + t * (z1 - z0)) / NEAR
             m += 1
         if d1 >= NEAR:
-            out[m, 0] = cu + f * r1 / d1
-            out[m, 1] = cv + f * z1 / d1
+            scale = f / d1
+            out[m, 0] = cu + scale * r1
+            out[m, 1] = cv + scale * z1
             m += 1
         d0, r0, z0 = d1, r1, z1
     return m
@@ -185,8 +187,33 @@ def winding(uv, n):
 
 
 @kernel
+def bounds(uv, n):
+    """Return the bounds (left, top, right, bottom) of a projected polygon [px]."""
+    left = right = uv[0, 0]
+    top = bottom = uv[0, 1]
+    for i in range(1, n):
+        left, right = min(left, uv[i, 0]), max(right, uv[i, 0])
+        top, bottom = min(top, uv[i, 1]), max(bottom, uv[i, 1])
+    return left, top, right, bottom
+
+
+@kernel
 def add_polygon(acc, k, uv, n, w, w2):
     """Add a projected polygon of positive winding; one of negative winding is subtracted."""
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
         add_edge(acc, k, uv[i, 0], uv[i, 1], uv[j, 0], uv[j, 1], w, w2)
+
+
+@kernel
+def sum_differences(plane, at, count, carry):
+    """Return sixteen coverages of a channel from its differences at index `at`, and the last of them.
+
+    `carry` is the coverage of the pixel before, in all lanes. Reads and clears at most `count` differences.
+    """
+    differences, zero = load_part(plane, at, count), splat(nb.float32(0.0))
+    if not any_different(differences, zero):
+        return carry, carry
+    store_part(plane, at, count, zero)
+    sums = running_sum(differences) + carry
+    return sums, splat_last(sums)

@@ -6,23 +6,20 @@ with one footprint, and the level of the rip-map is chosen once per row.
 
 import numba as nb
 
-from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
+from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, sum_differences, winding
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.texture_sampling import distance_ahead, fixed_line, sample, texture_line
 from lgmd_gym.camera.render.weather import row_air, through_air
 from lgmd_gym.simd import (
     LANES,
     any_above,
-    any_different,
     at_least,
     load_part,
     madd,
     maximum,
     minimum,
     replace_above,
-    running_sum,
     splat,
-    splat_last,
     store_part,
 )
 
@@ -52,20 +49,6 @@ def add_quad(layer, k, lens, weight):
     n = clip_and_project(lens, corners, 4, uv)
     if n >= 3:
         add_polygon(layer.coverage, k, uv, n, weight if winding(uv, n) > 0.0 else -weight, 0.0)
-
-
-@kernel
-def _summed(plane, at, count, carry):
-    """Return sixteen coverages of a channel from its differences at index `at`, and the last of them.
-
-    `carry` is the coverage of the pixel before, in all lanes. Reads and clears at most `count` differences.
-    """
-    differences, zero = load_part(plane, at, count), splat(nb.float32(0.0))
-    if not any_different(differences, zero):
-        return carry, carry
-    store_part(plane, at, count, zero)
-    sums = running_sum(differences) + carry
-    return sums, splat_last(sums)
 
 
 @kernel
@@ -118,9 +101,9 @@ def shade_row(image, row, part, coverage, view, tables):
     sum_road = sum_paint = sum_shadow = splat(nb.float32(0.0))
     for j in range(0, width, LANES):
         at, pixel, count = row * stride + j, row * width + j, width - j
-        cover_road, sum_road = _summed(road, at, count, sum_road)
-        cover_paint, sum_paint = _summed(paint, at, count, sum_paint)
-        cover_shadow, sum_shadow = _summed(shadow, at, count, sum_shadow)
+        cover_road, sum_road = sum_differences(road, at, count, sum_road)
+        cover_paint, sum_paint = sum_differences(paint, at, count, sum_paint)
+        cover_shadow, sum_shadow = sum_differences(shadow, at, count, sum_shadow)
         coverages = (cover_road, cover_paint, cover_shadow)
         grey = _ground_light(view.look, tables, line, x, y, coverages)
         grey = through_air(grey, air, view.beam, j)

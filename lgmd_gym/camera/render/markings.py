@@ -39,20 +39,27 @@ def _add_stroke(layer, lens, line, a, b, weight):
 
 @kernel
 def _visible_part(lens, line, length):
-    """Return the part [a, b] of a line between the near plane, the far end and the sides of the view [m]."""
+    """Return the part [a, b] of a line between the near plane, the far end and the sides of the view [m].
+
+    The lower side of the frame also bounds it: a narrow view begins tens of metres ahead.
+    """
     ahead, across, d_ahead, d_across = line
     # The half-angle of the pixel columns, widened for pitch and the width of the line.
     tan = 1.3 * lens.centre_u / lens.focal
+    low = lens.centre_v / lens.focal
+    rise, drop = low * lens.cos_pitch - lens.sin_pitch, lens.z * (lens.cos_pitch + low * lens.sin_pitch)
     a, b = 0.0, length
-    for side in range(4):
+    for side in range(5):
         if side == 0:
             p, q = ahead + 0.5, d_ahead
         elif side == 1:
             p, q = _FAR - ahead, -d_ahead
         elif side == 2:
             p, q = tan * ahead + across + 2.0, tan * d_ahead + d_across
-        else:
+        elif side == 3:
             p, q = tan * ahead - across + 2.0, tan * d_ahead - d_across
+        else:
+            p, q = rise * ahead - drop + abs(rise) * LINE_WIDTH, rise * d_ahead
         # Keep where p + q·t >= 0.
         if abs(q) < 1e-12:
             if p < 0.0:

@@ -114,9 +114,7 @@ def draw_light(view, road, tables, models, objects, count, buffers):
     ground = GroundLayer(buffers.ground, buffers.corners, buffers.uv, buffers.quad)
     add_flats(ground, lens, road, objects, order, n)
     draw_ground(image, view, buffers.ground, tables, horizon)
-    solids = SolidLayer(
-        buffers.solids, buffers.rows, buffers.corners, buffers.uv, buffers.axes, buffers.greys
-    )
+    solids = SolidLayer(buffers.solids, buffers.corners, buffers.uv, buffers.axes, buffers.greys)
     draw_solids(image, view, models, objects, order, n, solids)
 
 

@@ -3,9 +3,9 @@
 import math
 
 import numba as nb
-import numpy as np
 
 from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.simd import LANES, load_part, maximum, minimum, splat, store_bytes
 
 
 @kernel
@@ -20,7 +20,8 @@ def expose(out, image, look, noise, start):
         start: Index of this frame's first number in `noise`.
     """
     height, width = out.shape
-    zero, half, top = nb.float32(0.0), nb.float32(0.5), nb.float32(255.0)
+    zero = nb.float32(0.0)
+    black, half, white = splat(zero), splat(nb.float32(0.5)), splat(nb.float32(255.0))
     noisy = look.shot_noise > 0.0 or look.read_noise > 0.0
     shot, read = nb.float32(look.shot_noise**2 / 128.0), nb.float32(look.read_noise**2)
     mask = noise.shape[0] - 1
@@ -29,7 +30,7 @@ def expose(out, image, look, noise, start):
             for j in range(width):
                 g = noise[(start + i * width + j) & mask]
                 image[i, j] += g * math.sqrt(read + shot * max(image[i, j], zero))
-        for j in range(width):
-            grey = image[i, j]
-            grey = zero if grey < zero else top if grey > top else grey
-            out[i, j] = np.uint8(grey + half)
+        for j in range(0, width, LANES):
+            at, count = i * width + j, width - j
+            light = minimum(maximum(load_part(image, at, count), black), white)
+            store_bytes(out, at, count, light + half)

@@ -6,13 +6,16 @@ from typing import NamedTuple
 import numba as nb
 
 from lgmd_gym.camera.objects import MODEL_POST
-from lgmd_gym.camera.render.coverage import add_polygon, clip_and_project
+from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_project, sum_differences
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
 from lgmd_gym.camera.render.order import distance
 from lgmd_gym.camera.render.shadows import SUN
+from lgmd_gym.simd import LANES, any_above, load_part, madd, magnitude, maximum, minimum, splat, store_part
 
 _AMBIENT, _DIRECT = 0.62, 0.42  # light on a face turned away from the sun, and the share that the sun adds
+_HALF = 0.55  # reach of the models from their centre, as a share of their length and width
+_TRACE = nb.float32(1e-3)  # less grey comes from rounding
 
 
 class Air(NamedTuple):
@@ -68,6 +71,25 @@ def _place_corners(fractions, n, axes, corners):
 
 
 @kernel
+def _outside(lens, axes):
+    """Return whether an object is entirely beyond the left, right, upper or lower side of the frame.
+
+    The planes through the lens and the sides of the frame are tested against the box around the object.
+    """
+    for side in range(4):
+        k, way = 1 + side // 2, 1.0 - 2.0 * (side % 2)
+        focal, edge = way * lens.focal, lens.centre_u if k == 1 else lens.centre_v
+        # Scaled distance of the box's centre from the plane, then of the corner furthest inside.
+        up = 0.5 * (focal * axes[3, k] + edge * axes[3, 0])
+        inside = focal * axes[0, k] + edge * axes[0, 0] + up
+        for i in range(1, 3):
+            inside += _HALF * abs(focal * axes[i, k] + edge * axes[i, 0])
+        if inside + abs(up) < 0.0:
+            return True
+    return False
+
+
+@kernel
 def _face_light(corners, axes):
     """Return the light on a face, or a negative number if its back faces the lens."""
     ax, ay, az = corners[1, 0] - corners[0, 0], corners[1, 1] - corners[0, 1], corners[1, 2] - corners[0, 2]
@@ -97,23 +119,28 @@ def _grey(role, value, light, obj, night):
 def draw_object(image, lens, obj, models, air, layer):
     """Draw one object over the image."""
     place_object(lens, obj, layer.axes)
+    if _outside(lens, layer.axes):
+        return
     # Apparent height [px], at a distance of 1 m or more.
     size = lens.focal * obj.height / max(distance(lens, obj) - 0.5 * obj.length, 1.0)
     for solid in range(models.models[obj.model, 0], models.models[obj.model, 1]):
         u0, v0, u1, v1 = _add_solid(layer, lens, obj, models, solid, size, air)
-        height, width = image.shape
-        # Includes solids left of the frame: their edges are summed in column 0 and cancel up to rounding.
-        if v1 > 0.0 and v0 < height and u0 < width:
+        if u1 >= u0:
+            height, width = image.shape
             rows = (int(max(v0, 0.0)), int(min(math.ceil(v1), height)))
-            columns = (int(max(u0, 0.0)), int(max(min(math.ceil(u1) + 1.0, width), 0.0)))
+            columns = (int(max(u0, 0.0)), int(min(math.ceil(u1) + 1.0, width)))
             _compose(image, layer, rows, columns, air)
 
 
 @kernel
 def _add_solid(layer, lens, obj, models, solid, size, air):
-    """Add the faces and details of one solid; returns the bounds of its faces (u0, v0, u1, v1) [px]."""
+    """Add the faces and details of one solid that are in the frame.
+
+    Returns the bounds (u0, v0, u1, v1) of these faces [px]; u1 < u0 if there is none.
+    """
     corners, uv, greys = layer.corners, layer.uv, layer.greys
     night = air.night > 0.0
+    height, width = layer.coverage.shape[1], layer.coverage.shape[2] - 2
     u0, v0, u1, v1 = 1e9, 1e9, -1e9, -1e9
     for p in range(models.solids[solid, 0], models.solids[solid, 1]):
         n, parent = models.corners_used[p], models.parent[p]
@@ -131,38 +158,38 @@ def _add_solid(layer, lens, obj, models, solid, size, air):
         m = clip_and_project(lens, corners, n, uv)
         if m < 3:
             continue
+        left, top, right, bottom = bounds(uv, m)
+        # The edges of a polygon left of the frame would cancel.
+        if right <= 0.0 or bottom <= 0.0 or left >= width or top >= height:
+            continue
         grey = _grey(models.role[p], models.value[p], light, obj, night)
         greys[p, 0], greys[p, 1] = grey, light
         if parent >= 0:
             add_polygon(layer.coverage, 1, uv, m, weight * (grey - greys[parent, 0]), 0.0)
             continue
         add_polygon(layer.coverage, 0, uv, m, weight, weight * grey)
-        for i in range(m):
-            u0, u1 = min(u0, uv[i, 0]), max(u1, uv[i, 0])
-            v0, v1 = min(v0, uv[i, 1]), max(v1, uv[i, 1])
+        u0, v0, u1, v1 = min(u0, left), min(v0, top), max(u1, right), max(v1, bottom)
     return u0, v0, u1, v1
 
 
 @kernel
 def _compose(image, layer, rows, columns, air):
     """Draw the layer over a part of the image and clear it; `rows` and `columns` are (first, last + 1)."""
-    acc = layer.coverage
-    one, zero = nb.float32(1.0), nb.float32(0.0)
-    clear, murk = nb.float32(air.transmission), nb.float32((1.0 - air.transmission) * air.haze)
-    first, end = nb.uint64(columns[0]), nb.uint64(columns[1])
-    last = nb.uint64(min(columns[1] + 2, acc.shape[2]))
-    covers, greys = layer.rows[0], layer.rows[1]
-    for i in range(nb.uint64(rows[0]), nb.uint64(rows[1])):
-        # Three loops: only the first depends on the pixel before.
-        cover, grey = zero, zero
-        for j in range(first, end):
-            cover += acc[0, i, j]
-            grey += acc[1, i, j]
-            covers[j], greys[j] = cover, grey
-        for j in range(first, end):
-            a = covers[j]
-            a = one if a > one else zero if a < zero else a
-            image[i, j] = image[i, j] * (one - a) + greys[j] * clear + a * murk
-        for j in range(first, last):
-            acc[0, i, j] = zero
-            acc[1, i, j] = zero
+    width, stride = image.shape[1], layer.coverage.shape[2]
+    covers, greys = layer.coverage[0], layer.coverage[1]
+    zero, one, trace = splat(nb.float32(0.0)), splat(nb.float32(1.0)), splat(_TRACE)
+    clear = splat(nb.float32(air.transmission))
+    murk = splat(nb.float32((1.0 - air.transmission) * air.haze))
+    for i in range(rows[0], rows[1]):
+        sum_cover = sum_grey = zero
+        # The last edges may be in the two columns right of the solid.
+        for j in range(columns[0], min(columns[1] + 2, stride), LANES):
+            at, pixel = i * stride + j, i * width + j
+            cover, sum_cover = sum_differences(covers, at, stride - j, sum_cover)
+            grey, sum_grey = sum_differences(greys, at, stride - j, sum_grey)
+            if not (any_above(cover, trace) or any_above(magnitude(grey), trace)):
+                continue
+            cover = minimum(maximum(cover, zero), one)
+            behind = load_part(image, pixel, width - j)
+            light = madd(grey, clear, cover * murk)
+            store_part(image, pixel, width - j, madd(behind, one - cover, light))

@@ -1,0 +1,39 @@
+"""What is left out because it is outside the frame does not change the frame."""
+
+import math
+
+import numpy as np
+import pytest
+from support.roads import add_car, straight_env
+
+from lgmd_gym.camera import EgoCamera
+
+SHAPE = (48, 80)
+MARGIN = (96, 160)
+
+
+def _crop_and_frame(env, hfov_deg, **fields):
+    """Return the middle of a large frame, and a frame with the same focal length and the size of the crop."""
+    height, width = (SHAPE[0] + 2 * MARGIN[0], SHAPE[1] + 2 * MARGIN[1])
+    tan = math.tan(math.radians(hfov_deg / 2)) * width / SHAPE[1]
+    large = EgoCamera(
+        "wide", shape=(height, width), hfov_deg=2 * math.degrees(math.atan(tan)), **fields
+    ).render(env)
+    small = EgoCamera("wide", shape=SHAPE, hfov_deg=hfov_deg, **fields).render(env)
+    crop = large[MARGIN[0] : height - MARGIN[0], MARGIN[1] : width - MARGIN[1]]
+    return crop.astype(int), small.astype(int)
+
+
+@pytest.mark.parametrize("pitch_deg", [0.0, -12.0, 9.0])
+@pytest.mark.parametrize("hfov_deg", [5.0, 20.0, 40.0])
+def test_frame_is_the_middle_of_a_larger_frame(hfov_deg, pitch_deg):
+    rng = np.random.default_rng(4)
+    for _ in range(12):
+        env = straight_env(x=0.3)
+        env.vehicle.heading = rng.uniform(-0.15, 0.15)
+        for k in range(4):
+            add_car(env, 9.0 + 9.0 * k, rng.uniform(-5.0, 9.0), 40 + 40 * k, heading=rng.uniform(-3.0, 3.0))
+        add_car(env, 50.0, rng.uniform(-9.0, 9.0), 150, size=(16.0, 2.5, 3.5))
+        crop, frame = _crop_and_frame(env, hfov_deg, pitch_deg=pitch_deg, roadside=2.0)
+        assert np.abs(crop - frame).max() <= 1
+        assert frame.std() > 1.0
