@@ -64,6 +64,7 @@ class CameraBatch:
             sky_aims=np.full((*size, 2), np.nan),
             noise_starts=np.zeros(size, dtype=np.int64),
         )
+        # Index of the tables, camera, mount and lenses of each camera, and the fields of its view.
         self._bundle = Bundle(
             self._tables_indices, self._cameras, self._mounts, self.lenses, tuple(self._views)
         )
@@ -130,7 +131,5 @@ class CameraBatch:
         Threads may draw disjoint ranges at once, each with a workspace of its own.
         """
         for used, tables in self._tables.values():
-            draw_cameras(
-                first, last, used, frames, selected, self._bundle.native, world.native, roads.native,
-                tables.bundle.native, workspace.bundle.native,
-            )  # fmt: skip
+            inputs = workspace.join(self._bundle, world, roads, tables.bundle)
+            draw_cameras(first, last, used, frames, selected, inputs.native)

@@ -2,6 +2,14 @@
 
 from numba import njit
 
+from lgmd_gym.neuron.scalars import ALERT, FREQUENCY, K_HAT, LATENCY, SPIKES, F, K, W
+
+SIGNALS = ("spike_frequency", "membrane_potential", "ffi")
+"""The fields of `Response` in observations and infos."""
+NUMBERS = (*SIGNALS, "adapted_potential", "inhibition_weight", "excitation_latency")
+"""The fields of `Response` that are floats."""
+_COLUMNS = (FREQUENCY, K, F, K_HAT, W, LATENCY)  # of `NUMBERS` in the state of a neuron
+
 
 @njit(cache=True, nogil=True)
 def select_cameras(first, last, active, group):
@@ -44,8 +52,8 @@ def collect_outputs(first, last, selected, neurons):
         selected: Selected cameras, bool, shape (num_envs, members).
         neurons: Arrays of the members' neurons, `Bundle.native`: index of each member among all cameras,
             int64, shape (members,); `LGMD.outputs`, float64, (num_envs * members, at least 8); and written,
-            for all cameras: the fields of `Response`, float64, shape (8, num_envs, all cameras), the spikes,
-            int64, and the alerts, bool, shape (num_envs, all cameras).
+            for all cameras: `NUMBERS`, float64, shape (num_envs, 6, all cameras), the spikes, int64, and the
+            alerts, bool, shape (num_envs, all cameras).
     """
     cameras, outputs, numbers, spikes, alerts = neurons.arrays
     members = cameras.shape[0]
@@ -54,7 +62,7 @@ def collect_outputs(first, last, selected, neurons):
             if not selected[env, member]:
                 continue
             camera, row = cameras[member], env * members + member
-            for field in range(numbers.shape[0]):
-                numbers[field, env, camera] = outputs[row, field]
-            spikes[env, camera] = int(outputs[row, 1])
-            alerts[env, camera] = outputs[row, 7] > 0.0
+            for field in range(len(_COLUMNS)):
+                numbers[env, field, camera] = outputs[row, _COLUMNS[field]]
+            spikes[env, camera] = int(outputs[row, SPIKES])
+            alerts[env, camera] = outputs[row, ALERT] > 0.0

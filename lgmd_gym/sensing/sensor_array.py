@@ -12,6 +12,7 @@ from lgmd_gym.camera.world import World
 from lgmd_gym.neuron import LGMDParams, Response
 from lgmd_gym.neuron.threads import Threads
 from lgmd_gym.sensing.cameras import Variants, make_cameras
+from lgmd_gym.sensing.kernels import NUMBERS, SIGNALS
 from lgmd_gym.sensing.sensor_group import SensorGroup
 
 
@@ -46,6 +47,7 @@ class SensorArray:
         frames: The last frames, one array per frame shape, uint8, shape (num_envs, cameras of that shape,
             height, width); see `frame_of`.
         responses: The last outputs of the neurons, arrays of shape (num_envs, cameras), updated in place.
+        signals: The `SIGNALS` among them, float64, shape (num_envs, 3, cameras).
     """
 
     responses: Response
@@ -76,7 +78,7 @@ class SensorArray:
         self.enabled = np.ones(size, np.bool_)
         self._stale = np.zeros(size, np.bool_)
         self._all = np.ones(num_envs, np.bool_)
-        numbers = np.zeros((len(Response._fields), *size))
+        numbers = np.zeros((num_envs, len(NUMBERS), len(self.names)))
         self._outputs = numbers, np.zeros(size, np.int64), np.zeros(size, np.bool_)
         self._threads = Threads(threads or 1)
         by_shape: dict[tuple[int, int], list[int]] = {}
@@ -107,6 +109,9 @@ class SensorArray:
     def read(self, env: gym.Env, index: int = 0) -> None:
         """Read the present state of a highway-env environment, and render its top views.
 
+        An environment with a method `write_scene`, such as `BrakingEnv`, writes its state itself: it receives
+        `scenes`, `objects` and `object_counts` of one environment.
+
         Args:
             env: The environment, wrapped or not, after its first reset.
             index: Index of the environment.
@@ -115,8 +120,13 @@ class SensorArray:
             ValueError: If the environment has no road or ego yet, or a pose is not finite.
         """
         variant = self._used_variants[index]
-        ego = self._world.read(env, variant.view, index)
-        self._roads.assign(index, ego.road, variant.road_keys)
+        base: Any = env.unwrapped
+        write_scene = getattr(base, "write_scene", None)
+        if write_scene is None or base.road is None:
+            self._world.read(base, variant.view, index)
+        else:
+            write_scene(self._world.at(index))
+        self._roads.assign(index, base.road, variant.road_keys)
         for camera, top_view in self._top_views[index].items():
             if self.enabled[index, camera]:
                 top_view.render(env, self.frame_of(camera, index))
@@ -216,11 +226,12 @@ class SensorArray:
         self.scenes, self.objects, self.object_counts = world.scenes, world.objects, world.object_counts
         self.frames = [group.frames for group in self._groups]
         numbers, spikes, alerts = self._outputs
-        fields = dict(zip(Response._fields, numbers, strict=True))
-        self.responses = Response(**fields | {"spikes": spikes, "alert": alerts})
+        self.signals = numbers[:, : len(SIGNALS)]
+        fields = {name: numbers[:, field] for field, name in enumerate(NUMBERS)}
+        self.responses = Response(**fields, spikes=spikes, alert=alerts)
 
     def __getstate__(self) -> dict[str, Any]:
-        linked = ("scenes", "objects", "object_counts", "frames", "responses")
+        linked = ("scenes", "objects", "object_counts", "frames", "responses", "signals")
         return {name: value for name, value in self.__dict__.items() if name not in linked}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

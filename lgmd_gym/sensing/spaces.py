@@ -7,10 +7,10 @@ import numpy as np
 from gymnasium import spaces
 
 from lgmd_gym.neuron import LGMDParams
+from lgmd_gym.sensing.kernels import SIGNALS
 from lgmd_gym.sensing.sensor_array import SensorArray
 
 SPEED_BOUND = 100.0  # [m/s], above highway-env's limit of 40 m/s
-SIGNALS = ("spike_frequency", "membrane_potential", "ffi")
 
 
 def make_space(
@@ -68,11 +68,11 @@ def make_observation(
         yaw_rate: Mean yaw rate of the decision [rad/s].
         include_frame: Whether to include the frames.
     """
-    responses = sensors.responses
+    frequency, potential, ffi = sensors.signals[index].astype(np.float32)
     observation = {
-        "spike_frequency": responses.spike_frequency[index].astype(np.float32),
-        "membrane_potential": responses.membrane_potential[index].astype(np.float32),
-        "ffi": responses.ffi[index].astype(np.float32),
+        "spike_frequency": frequency,
+        "membrane_potential": potential,
+        "ffi": ffi,
         "ego_speed": np.array([speed], dtype=np.float32),
         "ego_yaw_rate": np.array([yaw_rate], dtype=np.float32),
     }
@@ -84,6 +84,19 @@ def make_observation(
 def signal_keys(names: list[str]) -> dict[str, list[str]]:
     """Return the info keys of the cameras, by signal."""
     return {signal: [f"lgmd/{camera}/{signal}" for camera in names] for signal in SIGNALS}
+
+
+def signal_info(sensors: SensorArray, index: int, keys: list[str]) -> dict[str, Any]:
+    """Return the ``lgmd/`` keys of the info of environment `index`.
+
+    Args:
+        sensors: The cameras and neurons.
+        index: Index of the environment.
+        keys: The keys of `signal_keys` in one list.
+    """
+    info: dict[str, Any] = dict(zip(keys, sensors.signals[index].ravel().tolist(), strict=True))
+    info["lgmd/alert"] = True in sensors.responses.alert[index].tolist()
+    return info
 
 
 def yaw_rate(heading: float, previous: float, elapsed: float) -> float:

@@ -13,7 +13,7 @@ from lgmd_gym.neuron import LGMDParams, NeuronSpec, Response
 from lgmd_gym.sensing.frame_rate import camera_rate
 from lgmd_gym.sensing.road_hook import check_highway_env, on_road_step
 from lgmd_gym.sensing.sensor_array import SensorArray
-from lgmd_gym.sensing.spaces import make_observation, make_space, signal_keys, yaw_rate
+from lgmd_gym.sensing.spaces import make_observation, make_space, signal_info, signal_keys, yaw_rate
 
 
 class TraceFrame(NamedTuple):
@@ -167,7 +167,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self.fps = camera_rate(self._requested_fps, self._simulation_frequency)
         self._stride = round(self._simulation_frequency / self.fps)
         self.sensors = SensorArray(self.camera, self.fps, self.params)
-        self._info_keys = signal_keys(self.sensors.names)
+        self._info_keys = [key for keys in signal_keys(self.sensors.names).values() for key in keys]
         base = self.env.observation_space if self.include_base else None
         self.observation_space = make_space(
             self.sensors, self.params, self.fps, self._simulation_frequency, self.include_frame, base
@@ -198,11 +198,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         return observation
 
     def _extend_info(self, info: dict[str, Any]) -> dict[str, Any]:
-        info = dict(info)
-        responses = self.sensors.responses
-        for signal, keys in self._info_keys.items():
-            info.update(zip(keys, getattr(responses, signal)[0].tolist(), strict=True))
-        info["lgmd/alert"] = bool(responses.alert[0].any())
+        info = info | signal_info(self.sensors, 0, self._info_keys)
         if self.trace:
             info["lgmd/trace"] = self._trace_frames
         return info

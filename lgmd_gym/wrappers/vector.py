@@ -13,7 +13,7 @@ from lgmd_gym.sensing.frame_rate import camera_rate
 from lgmd_gym.sensing.frame_recorder import FrameRecorder
 from lgmd_gym.sensing.road_hook import check_highway_env
 from lgmd_gym.sensing.sensor_array import SensorArray
-from lgmd_gym.sensing.spaces import make_observation, make_space, signal_keys
+from lgmd_gym.sensing.spaces import SIGNALS, make_space, signal_keys
 from lgmd_gym.wrappers.observation import LGMDObservation as SingleObservation
 
 
@@ -106,11 +106,12 @@ class LGMDObservation(VectorWrapper):
         self._pending[:] = False
 
     def _observation(self, base: Any) -> dict[str, Any]:
-        rows = [
-            make_observation(self.sensors, index, *recorder.motion, self.include_frame)
-            for index, recorder in enumerate(self._recorders)
-        ]
-        observation: dict[str, Any] = {key: np.stack([row[key] for row in rows]) for key in rows[0]}
+        signals = self.sensors.signals.astype(np.float32)
+        observation: dict[str, Any] = {name: signals[:, row].copy() for row, name in enumerate(SIGNALS)}
+        motions = np.array([recorder.motion for recorder in self._recorders], dtype=np.float32)
+        observation["ego_speed"], observation["ego_yaw_rate"] = motions[:, :1].copy(), motions[:, 1:].copy()
+        if self.include_frame:  # all cameras have the same shape
+            observation["frame"] = self.sensors.frames[0].transpose(0, 2, 3, 1).copy()
         if self.include_base:
             observation["base"] = base
         return observation

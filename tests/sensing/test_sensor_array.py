@@ -250,3 +250,25 @@ def test_a_full_list_of_objects_is_drawn():
     sensors.step()
     assert sensors.object_counts[0] == 512
     np.testing.assert_array_equal(sensors.frame_of(0), EgoCamera("wide").render(env))
+
+
+@pytest.mark.parametrize(
+    "identity", ["LGMD/CCRb-v0", "LGMD/CutOut-v0", "LGMD/PassBetween-v0", "LGMD/SteelPlate-v0"]
+)
+def test_a_scene_that_an_environment_writes_equals_the_scene_of_its_vehicles(identity):
+    import gymnasium as gym
+
+    env = gym.make(identity, camera=None)
+    env.reset(seed=2)
+    sensors = SensorArray(["fovea", "wide"], 30.0, LGMDParams())
+    wide, written = EgoCamera("wide"), []
+    write = env.unwrapped.write_scene
+    env.unwrapped.write_scene = lambda arrays: (written.append(1), write(arrays))
+    for _ in range(20):
+        env.step(np.array([-0.2], np.float32))
+        sensors.read(env)
+        sensors.process(0, 1)
+        np.testing.assert_array_equal(sensors.frame_of(1), wide.render(env))
+    assert len(written) == 20
+    np.testing.assert_array_equal(sensors.signals[0, 2], sensors.responses.ffi[0])
+    env.close()

@@ -18,6 +18,8 @@ from lgmd_gym.camera.render.sky import skyline
 from lgmd_gym.camera.render.texture import ground_texture
 from lgmd_gym.camera.road_geometry import RoadGeometry
 
+_MAX_JOINED = 8  # tables that a workspace remembers
+
 
 def tables_key(p: CameraParams) -> tuple[Any, ...]:
     """Return the parameters that cameras of one frame size must have in common to share `SharedTables`."""
@@ -57,24 +59,35 @@ class Workspace:
 
     Attributes:
         buffers: `Buffers`; `image` is the light of the last frame before the sensor.
-        bundle: Objects of the frame, `OBJECT` records of shape (512,), then the fields of `buffers`.
     """
 
     def __init__(self, shape: tuple[int, int]) -> None:
         self.buffers: Buffers = make_buffers(shape, len(all_models().corners_used))
-        self.bundle = Bundle(np.zeros(MAX_DRAWN, OBJECT), tuple(self.buffers))
+        self._arrays = np.zeros(MAX_DRAWN, OBJECT), tuple(self.buffers)
         self._shape = shape
+        self._scene: tuple[Bundle, ...] = ()
+        self._joined: dict[Bundle, Bundle] = {}
+
+    def join(self, batch: Bundle, world: Bundle, roads: Bundle, tables: Bundle) -> Bundle:
+        """Return the inputs of `draw_cameras`; they are remembered until a road has to move."""
+        scene = batch, world, roads
+        if scene != self._scene or len(self._joined) > _MAX_JOINED:
+            self._scene, self._joined = scene, {}
+        joined = self._joined.get(tables)
+        if joined is None:
+            joined = Bundle(batch.arrays, world.arrays, roads.arrays, tables.arrays, self._arrays)
+            self._joined[tables] = joined
+        return joined
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Workspace, (self._shape,)
 
 
 @outer_kernel
-def draw_cameras(first, last, tables_index, frames, selected, batch, world, roads, tables, space):
+def draw_cameras(first, last, tables_index, frames, selected, inputs):
     """Pose and draw the selected cameras of the environments first..last-1.
 
-    Arrays of shape (environments, members, …) hold one row per camera of this frame size. The last five
-    arguments are `Bundle.native`.
+    Arrays of shape (environments, members, …) hold one row per camera of this frame size.
 
     Args:
         first: First environment.
@@ -82,21 +95,16 @@ def draw_cameras(first, last, tables_index, frames, selected, batch, world, road
         tables_index: Index of `tables`; cameras with other tables are skipped.
         frames: Frames to draw, uint8, shape (environments, members, height, width).
         selected: Cameras to draw, bool, shape (environments, members).
-        batch: Index of the tables per camera, int64 (environments, members); camera of each member, int64
-            (members,); `MOUNT` records (environments, members); `LENS` records at the end and at the start
-            of the exposure (environments, members, 2); the fields of `Views`, with a leading axis for the
-            environments.
-        world: `SCENE` records (environments,); `OBJECT` records (environments, 512) and their number, int64
-            (environments,).
-        roads: The fields of `RoadArrays`.
-        tables: `SharedTables.bundle`.
-        space: `Workspace.bundle`.
+        inputs: Native bundle of five: that of a `CameraBatch`, of a `World`, of a `RoadPool`, of
+            `SharedTables`, and as scratch memory, `OBJECT` records of shape (512,) and the fields of
+            `Buffers`.
     """
-    tables_indices, cameras, mounts, lenses, views = batch.arrays
-    scenes, objects, counts = world.arrays
-    surface, lines, roadside, spans = roads.arrays
-    lookup_tables, models = tables.arrays
-    chosen, buffers = space.arrays
+    batch, world, roads, tables, space = inputs.arrays
+    tables_indices, cameras, mounts, lenses, views = batch
+    scenes, objects, counts = world
+    surface, lines, roadside, spans = roads
+    lookup_tables, models = tables
+    chosen, buffers = space
     views = Views(*views)
     for env in range(first, last):
         scene = scenes[env]
