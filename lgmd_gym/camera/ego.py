@@ -10,8 +10,8 @@ from lgmd_gym.camera.pinhole import project
 from lgmd_gym.camera.render.buffers import Buffers
 from lgmd_gym.camera.render.context import Workspace
 from lgmd_gym.camera.road_pool import RoadPool, road_key
+from lgmd_gym.camera.scene_table import SceneTable, view_of
 from lgmd_gym.camera.spec import CameraItem
-from lgmd_gym.camera.world import World, view_of
 
 _UINT8 = np.dtype(np.uint8)
 
@@ -118,7 +118,7 @@ class _Stage:
         self.batch = CameraBatch([p], p.shape)
         self.workspace = Workspace(p.shape)
         self._params, self._keys = p, (road_key(p),)
-        self._world, self._roads = World(), RoadPool(1, 1)
+        self._world, self._roads = SceneTable(), RoadPool(1, 1)
         self._view = view_of([p])
         self._selected = np.ones((1, 1), np.bool_)
         self._turned = False  # whether the last gaze replaced that of the parameters

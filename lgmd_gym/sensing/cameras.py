@@ -7,7 +7,7 @@ from lgmd_gym.camera import BIRDSEYE, BirdsEye, CameraItem, CameraParams, Camera
 from lgmd_gym.camera.objects import View
 from lgmd_gym.camera.params import checked_number
 from lgmd_gym.camera.road_pool import RoadKey, road_key
-from lgmd_gym.camera.world import view_of
+from lgmd_gym.camera.scene_table import view_of
 
 _MAX_KNOWN = 256  # distinct fields that are remembered
 

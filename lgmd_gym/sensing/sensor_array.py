@@ -8,7 +8,7 @@ import numpy as np
 
 from lgmd_gym.camera import BirdsEye, CameraParams, CameraSpec, EgoCamera
 from lgmd_gym.camera.road_pool import RoadPool
-from lgmd_gym.camera.world import World
+from lgmd_gym.camera.scene_table import SceneTable
 from lgmd_gym.neuron import LGMDParams, Response
 from lgmd_gym.neuron.threads import Threads
 from lgmd_gym.sensing.cameras import Variants, make_cameras
@@ -74,7 +74,7 @@ class SensorArray:
         self._textures: list[float | None] = [None] * num_envs
         self._fields: list[dict[str, Any]] = [{}] * num_envs
         size = num_envs, len(self.names)
-        self._world, self._roads = World(num_envs), RoadPool(*size)
+        self._world, self._roads = SceneTable(num_envs), RoadPool(*size)
         self.enabled = np.ones(size, np.bool_)
         self._stale = np.zeros(size, np.bool_)
         self._all = np.ones(num_envs, np.bool_)

@@ -62,7 +62,7 @@ class SensorGroup:
             first: First environment.
             last: Last environment + 1.
             active: Environments with a new frame, bool, shape (num_envs,).
-            world: `World.bundle`.
+            world: `SceneTable.bundle`.
             roads: `RoadPool.bundle`.
         """
         num_selected, num_fresh = select_cameras(first, last, active, self._selection.native)

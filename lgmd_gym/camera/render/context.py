@@ -95,7 +95,7 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
         tables_index: Index of `tables`; cameras with other tables are skipped.
         frames: Frames to draw, uint8, shape (environments, members, height, width).
         selected: Cameras to draw, bool, shape (environments, members).
-        inputs: Native bundle of five: that of a `CameraBatch`, of a `World`, of a `RoadPool`, of
+        inputs: Native bundle of five: that of a `CameraBatch`, of a `SceneTable`, of a `RoadPool`, of
             `SharedTables`, and as scratch memory, `OBJECT` records of shape (512,) and the fields of
             `Buffers`.
     """

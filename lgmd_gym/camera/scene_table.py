@@ -1,4 +1,4 @@
-"""World: what the cameras of many environments see, apart from the roads."""
+"""SceneTable: what the cameras of many environments see, apart from the roads."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ _PATH_DEG = 40.0  # bound of the gaze "path"
 _MAX_SPREAD = math.radians(170.0)
 
 
-class World:
+class SceneTable:
     """Egos, clocks and objects of many environments.
 
     Args:

@@ -1,4 +1,4 @@
-"""`World`: egos and objects as records, and the objects that are left out."""
+"""`SceneTable`: egos and objects as records, and the objects that are left out."""
 
 import copy
 
@@ -6,12 +6,12 @@ import numpy as np
 from support.roads import add_car, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
-from lgmd_gym.camera.world import World, view_of
+from lgmd_gym.camera.scene_table import SceneTable, view_of
 
 
 def read(env, *cameras):
     """Return the x of the objects that are read for these cameras."""
-    world = World()
+    world = SceneTable()
     world.read(env, view_of(cameras))
     return world.objects["x"][0, : world.object_counts[0]].tolist()
 
@@ -45,7 +45,7 @@ def test_no_object_that_is_left_out_would_be_in_the_frame():
 def test_copies_read_into_their_own_records():
     env = straight_env(x=5.0)
     add_car(env, 30.0, 0.0)
-    world = World(2)
+    world = SceneTable(2)
     world.read(env, None, 1)
     clone = copy.deepcopy(world)
     env.vehicle.position[0] = 9.0
