@@ -86,16 +86,15 @@ def test_families(family):
 @pytest.mark.parametrize("mode", MODES)
 def test_every_family(family, mode):
     for threads, draw in ((1, random_demands), (2, random_actions)):
-        compare(family, mode, threads, 1000, draw, num_envs=2, include_frame=True, trace=True)
+        compare(family, mode, threads, 400, draw, num_envs=2, include_frame=True, trace=True)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("threads", [1, 2, 4])
-def test_two_hundred_random_levels(mode, threads):
-    """Run thousands of steps in 20 environments with random demands until 200 episodes have ended."""
+def test_two_hundred_random_levels(mode):
+    """Run thousands of steps in 20 environments with random actions until 200 episodes have ended."""
     episodes, seed = 0, 0
     while episodes < 200:
-        draw = random_actions if seed % 2 else random_demands
-        episodes += compare("RandomBraking", mode, threads, 500, draw, 20, 1000 * seed, include_frame=True)
+        threads, draw = (1, 2, 4)[seed % 3], (random_demands, random_actions)[seed % 2]
+        episodes += compare("RandomBraking", mode, threads, 250, draw, 20, 1000 * seed, include_frame=True)
         seed += 1
