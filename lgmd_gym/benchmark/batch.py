@@ -1,10 +1,8 @@
 """Batches of tasks: the episodes of one agent, played at once on the engine."""
 
 from collections import deque
-from collections.abc import Hashable, Iterable, Iterator, Sequence
-from itertools import pairwise
-from typing import Any, NamedTuple
-from uuid import uuid4
+from collections.abc import Hashable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +13,7 @@ from lgmd_gym.benchmark.fcw_driver import FCWDriver
 from lgmd_gym.benchmark.recorder import SeriesRecorder
 from lgmd_gym.benchmark.rows import key_of
 from lgmd_gym.benchmark.task import Result, Task, error_result, make_result, run_task
+from lgmd_gym.benchmark.units import Unit, group_key, make_once
 from lgmd_gym.benchmark.views import Views
 from lgmd_gym.camera import BIRDSEYE
 from lgmd_gym.engine.actions import Demands
@@ -31,39 +30,6 @@ from lgmd_gym.sensing.sensor_array import SensorArray
 from lgmd_gym.sensing.spaces import SIGNALS
 
 WIDTH = 32  # environments of a simulation; more gain little, and fewer leave more time in Python
-MAX_TASKS = 64  # tasks of a unit of work, whose results leave a worker process together
-
-
-class Unit(NamedTuple):
-    """Tasks that share agent, sensors and rates.
-
-    Attributes:
-        run: Identifier of the call of `make_units`; files of agents may change between calls.
-        tasks: The tasks, at least one.
-    """
-
-    run: str
-    tasks: list[Task]
-
-
-def make_units(tasks: Iterable[Task], workers: int) -> list[Unit]:
-    """Return tasks as units of work.
-
-    Args:
-        tasks: The tasks.
-        workers: Number of processes, which determines the size of the units.
-    """
-    tasks = list(tasks)
-    groups: dict[Hashable, list[Task]] = {}
-    for task in tasks:
-        groups.setdefault(_group_key(task), []).append(task)
-    size = len(tasks) if workers == 1 else min(MAX_TASKS, -(-len(tasks) // (4 * workers)))
-    units, run = [], uuid4().hex
-    for group in groups.values():
-        count = -(-len(group) // size)
-        bounds = [len(group) * k // count for k in range(count + 1)]
-        units += [Unit(run, group[start:end]) for start, end in pairwise(bounds)]
-    return units
 
 
 def play_unit(unit: Unit) -> Iterator[Result]:
@@ -72,6 +38,7 @@ def play_unit(unit: Unit) -> Iterator[Result]:
     The results equal those of `run_task`. If the batch fails, for example because of an agent for the wrong
     cameras, the remaining tasks run one by one, so that the error belongs to the tasks that cause it.
     """
+    make_once(unit.agents)
     left = {task.key: task for task in unit.tasks}
     try:
         for result in _player(unit).play(unit.tasks):
@@ -216,18 +183,11 @@ _players: dict[Hashable, BatchPlayer] = {}  # at most one, because it is large
 def _player(unit: Unit) -> BatchPlayer:
     """Return the player for a unit: that of the unit before if it belongs to the same group and run."""
     task = unit.tasks[0]
-    key = unit.run, WIDTH, _group_key(task)
+    key = unit.run, WIDTH, group_key(task)
     if key not in _players:
         _players.clear()
         _players[key] = BatchPlayer(task, WIDTH)
     return _players[key]
-
-
-def _group_key(task: Task) -> Hashable:
-    """Return what the tasks of a simulation share."""
-    arguments = dict(task.case.arguments)
-    shared = task.sensor_config, arguments.get("config"), arguments.get("fps")
-    return task.agent, task.condition, task.has_driver, repr(shared)
 
 
 def _scenario_arguments(arguments: dict[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import gymnasium as gym
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.batch import make_units, play_unit
+from lgmd_gym.benchmark.batch import play_unit
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.episode import make_env
 from lgmd_gym.benchmark.executor import TaskMap
@@ -16,6 +16,7 @@ from lgmd_gym.benchmark.rows import Row, key_of
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
+from lgmd_gym.benchmark.units import make_units
 
 
 class Plan(ABC):
@@ -92,7 +93,7 @@ class CasePlan(Plan):
             for case in self.cases
             for seed in self.config.seed_range
         ]
-        for result in _play(run_tasks, [task for task in first if task.key not in done]):
+        for result in self._play(run_tasks, [task for task in first if task.key not in done]):
             if result.counterfactual is not None:
                 counterfactuals[key_of(result.row)[1:]] = result.counterfactual
             yield result
@@ -103,11 +104,10 @@ class CasePlan(Plan):
             for task in first
             if task.key[1:] in counterfactuals
         ]
-        yield from _play(run_tasks, [task for task in others if task.key not in done])
+        yield from self._play(run_tasks, [task for task in others if task.key not in done])
+
+    def _play(self, run_tasks: TaskMap, tasks: list[Task]) -> Iterator[Result]:
+        return run_tasks.flatten(play_unit, make_units(tasks, run_tasks.workers, self.config.agents))
 
     def _make_env(self, sensor_config: SensorConfig) -> gym.Env:
         return make_env(self.cases[0], sensor_config)
-
-
-def _play(run_tasks: TaskMap, tasks: list[Task]) -> Iterator[Result]:
-    return run_tasks.flatten(play_unit, make_units(tasks, run_tasks.workers))

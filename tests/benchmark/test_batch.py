@@ -1,6 +1,7 @@
 """Batches of tasks on the engine give the results of the same tasks run one by one."""
 
 import dataclasses
+import os
 
 import numpy as np
 import pytest
@@ -9,14 +10,18 @@ from support.runs import new_run, read_rows, sorted_rows
 from lgmd_gym.agents import AGENTS, Agent
 from lgmd_gym.agents.batch import BatchAgent
 from lgmd_gym.benchmark import batch
-from lgmd_gym.benchmark.batch import BatchPlayer, make_units, play_unit
+from lgmd_gym.benchmark.batch import BatchPlayer, play_unit
 from lgmd_gym.benchmark.case import level_case
+from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.executor import Executor
 from lgmd_gym.benchmark.folder import read_series
 from lgmd_gym.benchmark.metrics import Counterfactual
 from lgmd_gym.benchmark.rows import key_of, series_name
+from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_case
 from lgmd_gym.benchmark.task import Task, run_task
+from lgmd_gym.benchmark.units import make_units
 
 THREAT = Counterfactual(True, 5.0, 10.0)
 DEFAULT_SENSORS = SensorConfig()
@@ -220,6 +225,42 @@ def test_units_share_an_agent_and_are_spread_over_the_workers():
     assert [task for unit in units for task in unit.tasks] == tasks
     assert max(len(unit.tasks) for unit in make_units(tasks * 10, 2)) <= 64
     assert make_units([], 2) == []
+
+
+def test_several_workers_begin_with_the_units_that_take_longest():
+    tasks = [task for agent in ("no-brake", "spike-threshold", "stopping-zone") for task in make_tasks(agent)]
+    order = [unit.tasks[0].agent for unit in make_units(tasks, 2)]
+    assert order.index("stopping-zone") == 0
+    assert order[-1] != "stopping-zone"
+    assert make_units(tasks, 1)[0].tasks[0].agent == "no-brake"
+
+
+LARGE_AGENT = """
+import os, pathlib
+from lgmd_gym.agents import Agent
+
+MEMORY = b"x" * 500_000_000
+(pathlib.Path(__file__).parent / f"{os.getpid()}.pid").touch()
+
+
+class Large(Agent):
+    name = "large"
+
+    def demand(self, observation, info):
+        return 0.0
+"""
+
+
+@pytest.mark.slow
+def test_an_agent_that_needs_memory_does_not_replace_the_worker_processes(tmp_path, monkeypatch):
+    pytest.importorskip("psutil", reason="joblib replaces processes only if psutil is installed")
+    (tmp_path / "large_agent.py").write_text(LARGE_AGENT)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    config = RunConfig(suite="quick", seeds=3, agents=("large_agent:Large",))
+    assert Run.new(config, tmp_path / "run", Executor(jobs=2)).play()
+    processes = {path.stem for path in tmp_path.glob("*.pid")} - {str(os.getpid())}
+    assert len(processes) == 2
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
