@@ -243,7 +243,9 @@ def step(
             continue
         row = scalars[n]
         if row[sc.AGE] == 0.0:
-            previous[n] = frames[n, y0 : y0 + h, x0 : x0 + w]
+            for y in range(h):  # an assignment of slices would compile for seconds, for its error message
+                for x in range(w):
+                    previous[n, y, x] = frames[n, y0 + y, x0 + x]
             row[sc.AGE] = 1.0
             continue
         now, before = p[n, int(row[sc.AGE]) % 2], p[n, 1 - int(row[sc.AGE]) % 2]

@@ -5,6 +5,7 @@ with one footprint, and the level of the rip-map is chosen once per row.
 """
 
 import numba as nb
+import numpy as np
 
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, sum_differences, winding
 from lgmd_gym.camera.render.jit import kernel
@@ -23,8 +24,8 @@ from lgmd_gym.simd import (
     store_part,
 )
 
-# Channels of the ground layer.
-ROAD, PAINT, SHADOW = 0, 1, 2
+# Channels of the ground layer; int64, because kernels are compiled anew for each literal argument.
+ROAD, PAINT, SHADOW = np.int64(0), np.int64(1), np.int64(2)
 
 
 @kernel

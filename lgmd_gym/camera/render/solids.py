@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 import numba as nb
+import numpy as np
 
 from lgmd_gym.camera.objects import MODEL_POST
 from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_project, sum_differences
@@ -54,11 +55,12 @@ def place_object(lens, obj, axes):
         # Posts and trees are flat pictures that face the lens.
         away = max(math.sqrt(dx * dx + dy * dy), 1e-6)
         c, s = dx / away, dy / away
-    _to_axes(lens, dx, dy, -lens.z, axes, 0)
-    _to_axes(lens, c * obj.length, s * obj.length, 0.0, axes, 1)
-    _to_axes(lens, -s * obj.width, c * obj.width, 0.0, axes, 2)
-    _to_axes(lens, 0.0, 0.0, obj.height, axes, 3)
-    _to_axes(lens, SUN[0], SUN[1], SUN[2], axes, 4)
+    # int64, because a kernel is compiled anew for each literal argument.
+    _to_axes(lens, dx, dy, -lens.z, axes, np.int64(0))
+    _to_axes(lens, c * obj.length, s * obj.length, 0.0, axes, np.int64(1))
+    _to_axes(lens, -s * obj.width, c * obj.width, 0.0, axes, np.int64(2))
+    _to_axes(lens, 0.0, 0.0, obj.height, axes, np.int64(3))
+    _to_axes(lens, SUN[0], SUN[1], SUN[2], axes, np.int64(4))
 
 
 @kernel
@@ -165,9 +167,9 @@ def _add_solid(layer, lens, obj, models, solid, size, air):
         grey = _grey(models.role[p], models.value[p], light, obj, night)
         greys[p, 0], greys[p, 1] = grey, light
         if parent >= 0:
-            add_polygon(layer.coverage, 1, uv, m, weight * (grey - greys[parent, 0]), 0.0)
+            add_polygon(layer.coverage, np.int64(1), uv, m, weight * (grey - greys[parent, 0]), 0.0)
             continue
-        add_polygon(layer.coverage, 0, uv, m, weight, weight * grey)
+        add_polygon(layer.coverage, np.int64(0), uv, m, weight, weight * grey)
         u0, v0, u1, v1 = min(u0, left), min(v0, top), max(u1, right), max(v1, bottom)
     return u0, v0, u1, v1
 
