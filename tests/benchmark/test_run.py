@@ -104,6 +104,7 @@ def test_resume_rejects_missing_damaged_and_older_runs(tmp_path):
         Run.resume(tmp_path / "run")
 
 
+@pytest.mark.slow
 def test_python_function_and_command_write_the_same_folder(tmp_path):
     config = RunConfig(suite="r152", agents=("ttc-oracle", "spike-threshold"), seeds=1)
     table = run_benchmark(config, tmp_path / "python")

@@ -68,9 +68,9 @@ def test_any_pose_of_fifty_vehicles_renders_in_bounded_time(poses, heading, pres
         add_car(env, x, y, heading=turn, size=(length, width, 1.5))
     camera = EgoCamera(preset, pitch_deg=pitch)
     camera.render(env)
-    start = time.perf_counter()
+    start = time.process_time()
     frame = camera.render(env)
-    assert time.perf_counter() - start < 0.25
+    assert time.process_time() - start < 0.25
     assert frame.shape == (90, 160)
     assert np.array_equal(camera.render(env), frame)
 

@@ -18,18 +18,31 @@ def run(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=120)
 
 
+SUITE = """
+name = "small"
+[[cases]]
+family = "CCRs"
+speeds_kmh = [10, 20]
+[[cases]]
+family = "EmptyRoad"
+speeds_kmh = [30]
+"""
+
+
 def test_bench_writes_a_run_folder(tmp_path):
-    out = tmp_path / "deep" / "run"
-    done = run("bench", "--agents", "spike-threshold", "--seeds", "1", "--out", str(out))
+    out, suite = tmp_path / "deep" / "run", tmp_path / "small.toml"
+    suite.write_text(SUITE)
+    arguments = ("bench", "--suite", str(suite), "--agents", "spike-threshold", "--seeds", "1")
+    done = run(*arguments, "--out", str(out))
     assert done.returncode == 0, done.stderr
     assert done.stdout.rstrip().endswith(f"run folder: {out}")
     assert "spike-threshold" in done.stdout
     assert "T_sf = 30" in done.stdout
     rows = [json.loads(line) for line in (out / "episodes.jsonl").read_text().splitlines()]
     assert {row["agent"] for row in rows} == {"no-brake", "spike-threshold"}
-    assert len(list((out / "plots").glob("*.png"))) == len({row["case"] for row in rows})
+    assert len(list((out / "plots").glob("*.png"))) == len({row["case"] for row in rows}) == 3
     assert (out / "summary.csv").exists()
-    again = run("bench", "--agents", "spike-threshold", "--seeds", "1", "--out", str(out))
+    again = run(*arguments, "--out", str(out))
     assert again.returncode == 2
     assert "already exists" in again.stderr
 

@@ -84,6 +84,7 @@ def test_on_record(capsys):
     assert mean.endswith("no-brake+stopping-zone")
 
 
+@pytest.mark.slow
 def test_what_breaks_first(capsys):
     """A camera that points at the sky makes the rule miss the targets that it avoids otherwise."""
     example = load("what_breaks_first")

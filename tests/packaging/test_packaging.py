@@ -136,6 +136,7 @@ def test_import_is_light():
     assert [name for name in HEAVY if name in loaded] == []
 
 
+@pytest.mark.bench
 def test_import_is_fast():
     """The import adds under 0.5 s to the start of the interpreter (fastest of five runs)."""
 

@@ -31,7 +31,7 @@ def test_the_value_is_avoided_energy_minus_the_cost_of_false_activations():
     ("agent", "levels", "seeds"),
     [
         ("spike-threshold:threshold=60", 8, 0),
-        ("frame-difference:level=2", 8, 0),
+        pytest.param("frame-difference:level=2", 8, 0, marks=pytest.mark.slow),
         pytest.param("stopping-zone", 20, 1, marks=pytest.mark.slow),
     ],
 )

@@ -118,9 +118,9 @@ def test_closing_an_iterator_early_is_immediate(tmp_path):
     path = make_test_clip(tmp_path / "clip.mkv", source="testsrc2=size=320x240:rate=30:duration=20")
     pictures = iter(VideoReader(path))
     next(pictures)
-    start = time.perf_counter()
+    start = time.process_time()
     pictures.close()
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 0.2  # decoding the rest takes longer
 
 
 def test_find_clips_lists_the_video_files_of_folders(tmp_path, clip):
