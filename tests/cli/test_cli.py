@@ -32,7 +32,7 @@ speeds_kmh = [30]
 def test_bench_writes_a_run_folder(tmp_path):
     out, suite = tmp_path / "deep" / "run", tmp_path / "small.toml"
     suite.write_text(SUITE)
-    arguments = ("bench", "--suite", str(suite), "--agents", "spike-threshold", "--seeds", "1")
+    arguments = ("bench", "--suite", str(suite), "--agents", "spike-threshold", "--seeds", "1", "--jobs", "1")
     done = run(*arguments, "--out", str(out))
     assert done.returncode == 0, done.stderr
     assert done.stdout.rstrip().endswith(f"run folder: {out}")
