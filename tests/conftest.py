@@ -2,6 +2,7 @@
 
 import pytest
 from hypothesis import settings
+from support import moviepy_stand_in
 from support.clips import write_lossless
 
 from lgmd_gym.paper.backgrounds import Plain, Screen
@@ -22,3 +23,9 @@ def looming():
 def clip(tmp_path_factory, looming):
     """A lossless clip of `looming`."""
     return write_lossless(tmp_path_factory.mktemp("clips") / "loom.mkv", looming)
+
+
+@pytest.fixture
+def moviepy(monkeypatch):
+    """Let Gymnasium's `RecordVideo` write videos without moviepy."""
+    moviepy_stand_in.install(monkeypatch)

@@ -46,6 +46,7 @@ def pages():
     return found
 
 
+@pytest.mark.usefixtures("moviepy")
 @pytest.mark.parametrize("path", pages())
 def test_code_blocks_run(path, tmp_path, monkeypatch):
     """Run the blocks of a page in order, in one folder; Python blocks share a namespace."""

@@ -137,6 +137,7 @@ def test_quantities_missing_from_the_info_stay_undefined():
     assert not state.contact
 
 
+@pytest.mark.usefixtures("moviepy")
 def test_record_video_writes_every_picture(tmp_path):
     from imageio_ffmpeg import count_frames_and_secs
 

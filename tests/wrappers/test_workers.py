@@ -54,8 +54,8 @@ def test_traces_of_unequal_episodes_in_a_vector_env(mode):
     assert episodes[0] != episodes[1]
 
 
+@pytest.mark.usefixtures("moviepy")
 def test_record_video_keeps_every_camera_frame(tmp_path):
-    pytest.importorskip("moviepy")
     env = gym.make("LGMD/CCRs-v0", render_mode="rgb_array", config={"policy_frequency": 10}, trace=True)
     env = gym.wrappers.RecordVideo(env, str(tmp_path), episode_trigger=lambda _: True)
     infos = [info for *_, info in rollout(env, HOLD, 12)]
