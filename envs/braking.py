@@ -140,7 +140,7 @@ class BrakingEnv(EgoBrakeEnv):
         }
 
     def configure(self, config: dict[str, Any] | None) -> None:
-        """Apply a configuration.
+        """Apply a configuration; a refused one leaves the environment unchanged.
 
         Raises:
             ValueError: If a key is unknown or a value is out of range.
@@ -148,9 +148,10 @@ class BrakingEnv(EgoBrakeEnv):
         config = dict(config or {})
         reward = config.pop("reward", {})
         check_keys("key of config['reward']", reward, self.config["reward"])
+        reward = {**self.config["reward"], **reward}
+        weights = RewardParams(**reward)
         super().configure(config)
-        self.config["reward"] = {**self.config["reward"], **reward}
-        self.weights = RewardParams(**self.config["reward"]).record()[None]
+        self.config["reward"], self.weights = reward, weights.record()[None]
         self._brakes = self.brake.record(self.config["throttle"])[None]
         self._world = World(1, self.brake.max_demands(self.config["policy_frequency"]))
         self._clock, self._outcome = make_clock(1), make_outcome(1)

@@ -1,6 +1,7 @@
 """LGMDObservation: wrapper that adds cameras and LGMD neurons to a highway-env environment."""
 
 import json
+import warnings
 from dataclasses import asdict
 from typing import Any, NamedTuple, cast
 
@@ -120,7 +121,13 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Reset the environment and the neurons, and process the first frame."""
+        """Reset the environment and the neurons, and process the first frame.
+
+        Raises:
+            ValueError: If ``options["config"]`` has a simulation frequency that the camera rate does not
+                divide; the environment stays as it was.
+        """
+        self._check_frequency(options)
         base, info = self.env.reset(seed=seed, options=options)
         if self._highway_env.config["simulation_frequency"] != self._simulation_frequency:
             self._build_sensors()
@@ -163,8 +170,9 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
 
     def _build_sensors(self) -> None:
         """Build the sensors and the observation space for the current simulation frequency."""
-        self._simulation_frequency = self._highway_env.config["simulation_frequency"]
-        self.fps = camera_rate(self._requested_fps, self._simulation_frequency)
+        frequency = self._highway_env.config["simulation_frequency"]
+        self.fps = camera_rate(self._requested_fps, frequency)
+        self._simulation_frequency = frequency
         self._stride = round(self._simulation_frequency / self.fps)
         self.sensors = SensorArray(self.camera, self.fps, self.params)
         self._info_keys = [key for keys in signal_keys(self.sensors.names).values() for key in keys]
@@ -172,6 +180,14 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self.observation_space = make_space(
             self.sensors, self.params, self.fps, self._simulation_frequency, self.include_frame, base
         )
+
+    def _check_frequency(self, options: dict[str, Any] | None) -> None:
+        """Refuse a simulation frequency in the options of a reset before the environment applies it."""
+        config = (options or {}).get("config") or {}
+        if "simulation_frequency" in config:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # _build_sensors warns
+                camera_rate(self._requested_fps, config["simulation_frequency"])
 
     def _on_substep(self) -> None:
         self._substeps += 1

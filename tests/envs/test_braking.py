@@ -245,3 +245,32 @@ def test_deep_copies_are_independent():
         fork.step(BRAKE)
     assert env.vehicle.speed == pytest.approx(50 * KMH)
     assert fork.vehicle.speed < 8
+
+
+@pytest.mark.parametrize("route", ["reset", "configure"])
+@pytest.mark.parametrize(
+    ("name", "refused"),
+    [
+        ("CCRs", {"max_deceleration": 2.0, "reward": {"jerk": -1.0}}),
+        ("CCRs", {"max_deceleration": -1.0}),
+        ("Traffic-Highway", {"max_deceleration": 2.0, "policy_frequency": 7}),
+    ],
+)
+def test_a_refused_configuration_leaves_the_environment_unchanged(name, refused, route):
+    env = gym.make(f"LGMD/{name}-v0").unwrapped
+    env.reset(seed=0)
+    before, config, render_fps = {**vars(env)}, copy.deepcopy(env.config), env.metadata["render_fps"]
+    with pytest.raises(ValueError):
+        env.configure(refused) if route == "configure" else env.reset(seed=1, options={"config": refused})
+    assert (env.config, env.metadata["render_fps"]) == (config, render_fps)
+    assert vars(env).keys() == before.keys()
+    assert all(value is before[name] for name, value in vars(env).items())
+
+
+def test_a_refused_action_type_leaves_the_episode_running():
+    env = BrakingEnv(make_scenario("CCRs"))
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="unknown action type"):
+        env.reset(options={"config": {"throttle": True, "action": {"type": "Discrete"}}})
+    assert not env.config["throttle"]
+    env.step(BRAKE)

@@ -62,3 +62,12 @@ def test_reset_may_change_the_simulation_frequency():
     *_, info = env.step(1)
     assert len(info["lgmd/trace"]) == 30
     assert env.fps == 30.0
+
+
+def test_a_reset_refuses_a_frequency_that_the_camera_rate_does_not_divide():
+    env = gym.make("LGMD/CCRs-v0", fps=30)
+    env.reset(seed=0)
+    config = {"simulation_frequency": 40, "policy_frequency": 20}
+    with pytest.raises(ValueError, match="fps must divide simulation_frequency 40 Hz, got 30"):
+        env.reset(seed=0, options={"config": config})
+    assert env.unwrapped.config["simulation_frequency"] == 60
