@@ -77,7 +77,10 @@ class LGMD:
         self._frames_shape = self.shape if self.num is None else (self.num, *self.shape)
         self._all_active = np.ones(self._count, np.bool_)
 
-        self._y0, self._x0, region_shape, self._weight, n_pixels = checked_region(self.shape, mask, roi)
+        # I and Ce reach one pixel beyond the mask. A signed S is not 0 there, so its Ce reaches two pixels.
+        margin = 1 if self.params.on_off else 2
+        region = checked_region(self.shape, mask, roi, margin)
+        self._y0, self._x0, region_shape, self._weight, n_pixels = region
         self._const = pack_constants(self.params, self.fps, n_pixels)
         self._initial = initial_scalars(self.params)
         self._scalars = np.tile(self._initial, (self._count, 1))
@@ -157,7 +160,8 @@ class LGMD:
         """Maps P, E, I, S and G of the last frame; new arrays of shape (H, W), or (N, H, W) for N neurons.
 
         E is `|P|` by path, and I is that of the path which P excites (ON where P >= 0); see `LGMDParams` for
-        the equations. All maps are 0 before the first change and outside the mask.
+        the equations. All maps are 0 before the first change. Outside the mask, only I of adjacent pixels is
+        not 0; without ON and OFF paths, their S and G are not 0 either.
         """
         read = cast(Any, state if self._fast else general_kernel).layers
         maps = read(self._scalars, self._const, *self._maps)

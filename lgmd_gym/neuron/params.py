@@ -58,7 +58,7 @@ class LGMDParams:
         t_ffi: F at which K is set to 0.5, as in the earlier networks [grey levels]; default `inf`, > 0.
         ffi_delay: Delay of F [frames]; default 0, 0 or 1 (1 in Yue & Rind 2006).
         on_off: Whether P is split into ON and OFF half-waves (eq. 3); default True. If False, E = P and
-            S = E - w * I are signed, and theta_1, theta_2 and theta_3 have no effect.
+            S = E - w * I are signed, and theta_1, theta_2, theta_3 and on_off_residue have no effect.
         on_off_residue: Fraction of the last value that an ON or OFF cell keeps (eq. 3); default 0, 0 to
             0.99.
         delay: Delay of E before I (eq. 4): "recursive", a first-order low-pass, or "two-tap",

@@ -113,9 +113,10 @@ class ReferenceLGMD:
         """Return S (eq. 3 to 8)."""
         p = self.params
         half_waves = [np.maximum(photo, 0), np.maximum(-photo, 0)] if p.on_off else [photo]  # eq. 3
+        residue = p.on_off_residue if p.on_off else 0.0
         last, self.paths = (
             self.paths,
-            [now + p.on_off_residue * old for now, old in zip(half_waves, self.paths, strict=True)],
+            [now + residue * old for now, old in zip(half_waves, self.paths, strict=True)],
         )
         inhibition = [self.inhibition(i, last[i]) for i in range(len(self.paths))]
         if not p.on_off:

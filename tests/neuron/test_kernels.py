@@ -168,6 +168,31 @@ def test_mask_equals_masked_frames_over_fewer_pixels(preset):
         compare(frames, 30.0, PRESETS[preset], mask)
 
 
+@pytest.mark.parametrize("warm_start", [False, True])
+@pytest.mark.parametrize("delay", ["recursive", "two-tap"])
+@pytest.mark.parametrize("residue", [0.0, 0.5])
+@pytest.mark.parametrize("on_off", [False, True])
+def test_masks_with_every_structure_of_the_paths(on_off, residue, delay, warm_start):
+    """Without ON and OFF paths, S is negative beside the mask, and the residue has no effect."""
+    rng = np.random.default_rng(0)
+    params = LGMDParams(
+        on_off=on_off, on_off_residue=residue, delay=delay, warm_start=warm_start, sigma_1=3.0, sigma_3=10.0
+    )
+    for top, left, height, width in [(0, 0, 9, 11), (3, 4, 1, 1), (2, 5, 4, 3), (0, 9, 9, 2), (1, 1, 7, 9)]:
+        mask = np.zeros((9, 11))
+        mask[top : top + height, left : left + width] = 1
+        frames = rng.integers(0, 256, (8, 9, 11)).astype(np.uint8)
+        frames[1::3] = rng.integers(0, 256, (3, 1, 1))
+        compare(frames, 30.0, params, mask)
+        neuron = LGMD((9, 11), params=params, roi=(top, left, height, width))
+        reference = ReferenceLGMD((9, 11), params=params, mask=mask)
+        for frame in frames:
+            neuron.step(frame)
+            reference.step(frame)
+        for name, image in neuron.layers.items():
+            np.testing.assert_allclose(image, reference.layers[name], rtol=1e-4, atol=1e-2, err_msg=name)
+
+
 def test_region_at_the_edge_replicates_the_border_of_the_frame():
     mask = np.zeros((20, 30))
     mask[:9, 21:] = 1
