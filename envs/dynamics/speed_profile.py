@@ -7,7 +7,7 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.longitudinal import advance
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.segment import Segment, check_profile
 
 SCRIPT_FIELDS = [
     ("script_speed", np.float64),
@@ -64,9 +64,13 @@ class SpeedProfile:
     Args:
         speed: Initial speed [m/s].
         segments: Segments in order of their start.
+
+    Raises:
+        ValueError: If the acceleration of a segment does not lead to its final speed.
     """
 
     def __init__(self, speed: float, segments: tuple[Segment, ...] = ()) -> None:
+        check_profile(speed, segments)
         self._script = np.zeros((), SCRIPT_FIELDS)
         self._script["script_speed"], self._script["segment_end"] = speed, len(segments)
         self._segments = segment_table(segments)

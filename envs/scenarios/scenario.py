@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from lgmd_gym.envs.dynamics.bend import Bend
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.segment import Segment, check_profile
 from lgmd_gym.envs.dynamics.units import check_finite, check_speed, check_within
 from lgmd_gym.errors import unknown_name
 
@@ -57,7 +57,7 @@ class Actor:
         check_within("lateral_offset", self.lateral_offset, -500.0, 500.0, "m")
         check_finite("heading", self.heading)
         check_speed("speed", self.speed, zero=True)
-        _check_profile(self.profile)
+        check_profile(self.speed, self.profile)
         if self.kind not in ACTOR_KINDS:
             raise unknown_name("actor kind", self.kind, ACTOR_KINDS)
         if self.shade is not None:
@@ -122,7 +122,7 @@ class Scenario:
 
     def __post_init__(self) -> None:
         check_speed("ego_speed", self.ego_speed, zero=bool(self.ego_profile))
-        _check_profile(self.ego_profile)
+        check_profile(self.ego_speed, self.ego_profile)
         if check_finite("duration", self.duration) <= 0.0:
             raise ValueError(f"duration must be > 0 s, got {self.duration!r}")
 
@@ -130,9 +130,3 @@ class Scenario:
     def top_speed(self) -> float:
         """Highest scripted speed of the ego [m/s]."""
         return max(self.ego_speed, *(segment.final_speed for segment in self.ego_profile), 0.0)
-
-
-def _check_profile(profile: tuple[Segment, ...]) -> None:
-    starts = [segment.start for segment in profile]
-    if starts != sorted(starts):
-        raise ValueError(f"profile segments must be in order of their start, got starts {starts}")

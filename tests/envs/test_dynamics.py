@@ -11,6 +11,9 @@ from hypothesis import strategies as st
 from lgmd_gym.envs.dynamics.brake import BrakeParams, DelayLine
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch, touched_side
 from lgmd_gym.envs.dynamics.longitudinal import advance, time_to_stop
+from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
+from lgmd_gym.envs.scenarios.scenario import Actor, Scenario
 
 
 def drive(speed, target, jerk, dt, steps):
@@ -94,6 +97,33 @@ def test_brake_params_error_states_the_range():
 
 
 CAR = Rectangle(0.0, 0.0, 0.0, 4.3, 1.8)
+
+
+def segment(final_speed, acceleration):
+    return Segment(start=0.0, acceleration=acceleration, final_speed=final_speed)
+
+
+@pytest.mark.parametrize(
+    "profile",
+    [
+        [segment(3.0, 2.0)],
+        [segment(12.0, -2.0)],
+        [segment(3.0, 0.0)],
+        [segment(3.0, -2.0), segment(4.0, -2.0)],  # the second one begins at 3 m/s
+    ],
+)
+def test_a_segment_whose_acceleration_does_not_lead_to_its_final_speed_is_refused(profile):
+    for build in (
+        lambda: SpeedProfile(10.0, tuple(profile)),
+        lambda: Actor(gap=30.0, speed=10.0, profile=tuple(profile)),
+        lambda: Scenario(family="Own", ego_speed=10.0, duration=5.0, ego_profile=tuple(profile)),
+    ):
+        with pytest.raises(ValueError, match=r"does not lead from (10|3) to final_speed \d+ m/s; use an"):
+            build()
+
+
+def test_a_segment_may_end_at_the_speed_before_it():
+    Actor(gap=30.0, speed=10.0, profile=(segment(10.0, -2.0), segment(3.0, -2.0), segment(10.0, 2.0)))
 
 
 def test_first_touch_straight_ahead():
