@@ -43,3 +43,12 @@ def test_dive_and_vibration_pitch_the_camera():
     env.vehicle.speed = 0.0
     vibrating.render(env)
     assert vibrating.project(point)[1] == pytest.approx(45.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("light", ["day", "night"])
+def test_fog_hides_the_ground_behind_a_lens_that_points_down(light):
+    env = straight_env()
+    camera = EgoCamera(shape=(90, 40), hfov_deg=90.0, pitch_deg=-60.0, light=light, visibility_m=0.01)
+    camera.render(env)
+    haze = 18.0 if light == "night" else 200.0
+    assert camera.light[-1] == pytest.approx(np.full(40, haze), abs=0.1)

@@ -19,7 +19,7 @@ OPTIONS = st.fixed_dictionaries(
         "yaw_deg": st.floats(-360.0, 360.0),
         "mount_height": st.floats(0.05, 5.0),
         "light": st.sampled_from(["day", "night"]),
-        "visibility_m": st.sampled_from([0.0, 30.0]),
+        "visibility_m": st.sampled_from([0.0, 0.01, 1.0, 30.0]),
         "shutter_s": st.sampled_from([0.0, 0.03]),
         "vibration_deg": st.sampled_from([0.0, 2.0]),
         "heave_m": st.sampled_from([0.0, 0.1]),

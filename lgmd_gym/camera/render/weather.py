@@ -38,10 +38,10 @@ class RowAir(NamedTuple):
 
 @kernel
 def row_air(look, ahead):
-    """Return the `RowAir` of ground at the distance `ahead` [m]."""
+    """Return the `RowAir` of ground at the distance `ahead` [m], below 0 behind a lens that points down."""
     night, foggy = look.night > 0.0, look.extinction > 0.0
-    gain = _BEAM_GAIN * math.exp(-ahead / _BEAM_REACH) if night else 0.0
-    clear = math.exp(-ahead * look.extinction) if foggy else 1.0
+    gain = _BEAM_GAIN * math.exp(-max(ahead, 0.0) / _BEAM_REACH) if night else 0.0
+    clear = math.exp(-abs(ahead) * look.extinction) if foggy else 1.0
     return RowAir(night, gain, foggy, clear, look.haze)
 
 
