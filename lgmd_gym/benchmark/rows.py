@@ -20,13 +20,6 @@ def key_of(row: Row) -> RowKey:
     return row["agent"], row["case"], row["seed"], row["condition"]
 
 
-def series_name(key: RowKey) -> str:
-    """Return the file stem of the time series of a row."""
-    agent, case, seed, condition = key
-    name = f"{case}__{agent}__seed{seed}" + ("" if condition == CLEAR else f"__{condition}")
-    return name.replace("/", "_").replace(":", "_").replace(",", "_")
-
-
 def new_row(
     keys: tuple[str, ...], agent: str, case: Case, seed: int, condition: str = CLEAR, **values: Any
 ) -> Row:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
 from lgmd_gym.benchmark.executor import SERIAL, Executor, PoolLostError
+from lgmd_gym.benchmark.file_names import series_name
 from lgmd_gym.benchmark.folder import RunFolder
 from lgmd_gym.benchmark.plan import CasePlan, Plan
-from lgmd_gym.benchmark.rows import Row, key_of, series_name
+from lgmd_gym.benchmark.rows import Row, key_of
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.task import NO_BRAKE, Result
 from lgmd_gym.benchmark.traffic.plan import TrafficPlan

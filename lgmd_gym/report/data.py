@@ -8,8 +8,9 @@ import numpy as np
 
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
+from lgmd_gym.benchmark.file_names import series_name
 from lgmd_gym.benchmark.folder import read_rows, read_series, read_settings
-from lgmd_gym.benchmark.rows import Row, key_of, series_name
+from lgmd_gym.benchmark.rows import Row, key_of
 from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.report.images import CapturedFrame, capture_frames

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, load_traces, write_froc
 from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
+from lgmd_gym.benchmark.file_names import case_name, series_name
 from lgmd_gym.benchmark.folder import read_rows, read_series
-from lgmd_gym.benchmark.rows import series_name
 from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import write_summary
@@ -59,8 +59,7 @@ def _plot_cases(path: Path, config: RunConfig) -> list[Path]:
             loaded = {agent: read_series(path, name) for agent, name in names.items()}
             episodes = {agent: series for agent, series in loaded.items() if series is not None}
             if episodes:
-                stem = series_name(("", case.name, seed, condition)).replace(f"____seed{seed}", "")
-                files.append(folder / f"{stem}.png")
+                files.append(folder / f"{case_name(case.name, condition)}.png")
                 title = f"{case.name}, seed {seed}, {condition}"
                 episode_figure(files[-1], title, episodes, alert_level)
     return files

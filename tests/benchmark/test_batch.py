@@ -14,9 +14,10 @@ from lgmd_gym.benchmark.batch import BatchPlayer, play_unit
 from lgmd_gym.benchmark.case import level_case
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.executor import Executor
+from lgmd_gym.benchmark.file_names import series_name
 from lgmd_gym.benchmark.folder import read_series
 from lgmd_gym.benchmark.metrics import Counterfactual
-from lgmd_gym.benchmark.rows import key_of, series_name
+from lgmd_gym.benchmark.rows import key_of
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_case

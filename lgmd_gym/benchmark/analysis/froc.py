@@ -15,9 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lgmd_gym.benchmark.file_names import series_name
 from lgmd_gym.benchmark.folder import read_rows, read_series
 from lgmd_gym.benchmark.metrics import PREMATURE
-from lgmd_gym.benchmark.rows import key_of, series_name
+from lgmd_gym.benchmark.rows import key_of
 from lgmd_gym.benchmark.statistics import Rate, poisson_interval
 from lgmd_gym.benchmark.summary import write_csv
 from lgmd_gym.benchmark.task import NO_BRAKE
