@@ -35,10 +35,10 @@ def test_constants_by_hand():
     const = sc.pack_constants(params, FPS, PIXELS)
     expected = {
         "N_PIXELS": 10, "GAIN_F": 25 / 40, "T_F": 30, "SIGMA_1": 0.75, "SIGMA_2": 0.125, "TAU_G": 35,
-        "DT": 25, "SIGMA_3": 1.25, "KEEP": 0.8, "T_SFA": 0.0625, "SIGMA_4": 6, "T_SP": 0.625, "N_TS": 4, "RATE": 40,
-        "T_SF": 45, "T_FFI": 55, "FFI_DELAY": 1, "LATENCY_JUMPS": 1, "WARM_START": 1, "MAX_SPIKES": 7,
-        "DELTA_C": 0.5, "C_W": 5, "T_G": 40, "THETA_1": 2, "THETA_2": 3, "THETA_3": 4, "RESIDUE": 0.375,
-        "TWO_TAP": 1, "N_P": 1, "GAIN_2": 0.5, "WEIGHT": 1.5, "TAP": 1 / (1 + exp(0.5)),
+        "DT": 25, "SIGMA_3": 1.25, "KEEP": 0.8, "T_SFA": 0.0625, "SIGMA_4": 6, "T_SP": 0.625, "N_TS": 4,
+        "RATE": 40, "T_SF": 45, "T_FFI": 55, "FFI_DELAY": 1, "LATENCY_JUMPS": 1, "WARM_START": 1,
+        "MAX_SPIKES": 7, "DELTA_C": 0.5, "C_W": 5, "T_G": 40, "THETA_1": 2, "THETA_2": 3, "THETA_3": 4,
+        "RESIDUE": 0.375, "TWO_TAP": 1, "N_P": 1, "GAIN_2": 0.5, "WEIGHT": 1.5, "TAP": 1 / (1 + exp(0.5)),
     }  # fmt: skip
     assert {name: const[getattr(sc, name)] for name in expected} == pytest.approx(expected)
     assert const[sc.GAIN_2 : sc.GAIN_2 + 3] == pytest.approx([0.5, 0.25, 0.2])

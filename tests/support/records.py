@@ -1,9 +1,10 @@
-"""Records of the physics that kernels can read, compiled or not (`NUMBA_DISABLE_JIT=1`)."""
+"""Records of physics and camera that kernels can read, compiled or not (`NUMBA_DISABLE_JIT=1`)."""
 
-from math import inf
+from math import cos, inf, sin
 
 import numpy as np
 
+from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.envs.dynamics.bodies import BODY, CAR
 from lgmd_gym.envs.dynamics.brake import BRAKE
 
@@ -35,3 +36,10 @@ def brake_of(**values):
     """Return a `BRAKE` record without delay: 8 m/s² at once."""
     defaults = {"max_deceleration": 8.0, "max_acceleration": 3.0, "jerk": inf, "regain_acceleration": 2.0}
     return record(BRAKE, **(defaults | values))
+
+
+def lens_of(yaw=0.0, pitch=0.0, focal=100.0, shape=(80, 120), **position):
+    """Return a `LENS` record at a height of 1 m unless stated otherwise."""
+    angles = {"cos_yaw": cos(yaw), "sin_yaw": sin(yaw), "cos_pitch": cos(pitch), "sin_pitch": sin(pitch)}
+    centre = {"centre_u": shape[1] / 2, "centre_v": shape[0] / 2}
+    return record(LENS, focal=focal, yaw=yaw, pitch=pitch, **({"z": 1.0} | position), **angles, **centre)

@@ -1,0 +1,121 @@
+"""Projection and pose of the camera: every expected value is computed by hand."""
+
+from math import atan, cos, pi, radians, sin, sqrt, tan
+
+import numpy as np
+import pytest
+from support.records import lens_of, record
+
+from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.pinhole import LENS, project
+from lgmd_gym.camera.pose import mount_of, pose_lens
+from lgmd_gym.camera.scene import SCENE
+
+
+@pytest.mark.parametrize(
+    ("lens", "point", "pixel"),
+    [
+        # Focal length 100 px, centre at (60, 40): 10 m ahead, 1 m is 10 px.
+        ({}, (10.0, 0.0, 1.0), (60.0, 40.0)),
+        ({}, (10.0, 1.0, 1.0), (70.0, 40.0)),
+        ({}, (10.0, 0.0, 0.0), (60.0, 50.0)),
+        ({"x": 2.0, "y": 3.0, "z": 4.0}, (12.0, 4.0, 6.0), (70.0, 20.0)),
+        ({"yaw": pi / 2}, (1.0, 10.0, 1.0), (50.0, 40.0)),
+        # A lens that looks up by 45° has a point at 45° in its centre, and the horizon 100 px lower.
+        ({"pitch": pi / 4}, (10.0, 0.0, 11.0), (60.0, 40.0)),
+        ({"pitch": pi / 4}, (1e9, 0.0, 1.0), (60.0, 140.0)),
+        ({"pitch": -pi / 4}, (1e9, 0.0, 1.0), (60.0, -60.0)),
+    ],
+)
+def test_projection(lens, point, pixel):
+    assert project(lens_of(**lens), np.array(point)) == pytest.approx(pixel, abs=1e-6)
+
+
+def test_points_behind_the_lens_have_no_projection():
+    pixels = project(lens_of(), np.array([(1e-7, 0.0, 1.0), (-5.0, 0.0, 1.0), (2e-6, 0.0, 1.0)]))
+    assert np.isnan(pixels).all(axis=1).tolist() == [True, True, False]
+
+
+def posed(params=(), ago=0.0, **scene):
+    """Return the lens of a camera on a car of 4 m at 10 m/s."""
+    params = {"mount_setback": 0.5, "mount_left": 0.25, "mount_height": 1.5} | dict(params)
+    mount = mount_of(CameraParams(**params)).view(np.recarray)[()]
+    lens = record(LENS)
+    pose_lens(mount, record(SCENE, **({"length": 4.0, "speed": 10.0} | scene)), ago, lens)
+    return lens
+
+
+def test_mount_on_the_car():
+    lens = posed(x=100.0, y=50.0)
+    assert (lens.x, lens.y, lens.z) == (101.5, 49.75, 1.5)  # left is towards smaller y
+    lens = posed(x=100.0, y=50.0, heading=pi / 2)
+    assert (lens.x, lens.y) == pytest.approx((100.25, 51.5))
+    assert (lens.yaw, lens.cos_yaw, lens.sin_yaw) == pytest.approx((pi / 2, 0.0, 1.0))
+
+
+def test_gaze_of_the_mount():
+    lens = posed({"yaw_deg": 10.0, "pitch_deg": -5.0, "shape": (90, 160), "hfov_deg": 60.0}, heading=0.5)
+    assert (lens.yaw, lens.pitch) == pytest.approx((0.5 + radians(10), radians(-5)))
+    assert (lens.cos_pitch, lens.sin_pitch) == pytest.approx((cos(radians(5)), -sin(radians(5))))
+    assert (lens.sin_yaw, lens.cos_yaw) == pytest.approx((sin(lens.yaw), cos(lens.yaw)))
+    assert (lens.focal, lens.centre_u, lens.centre_v) == pytest.approx((80 / tan(radians(30)), 80.0, 45.0))
+
+
+# Bicycle model with tan(steering) = 2·tan(slip) and sin(slip) = length/2 · curvature.
+SLIP = 0.1
+STEERING = atan(2 * tan(SLIP))
+YAW_RATE = 10 * sin(SLIP) / 2  # 10 m/s, half length 2 m
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_gaze_along_the_path_is_where_the_car_is_in_one_second(sign):
+    lens = posed({"gaze": "path"}, steering=sign * STEERING)
+    assert lens.yaw == pytest.approx(sign * (SLIP + YAW_RATE / 2))
+    limited = posed({"gaze": "path"}, steering=sign * STEERING, speed=40.0)
+    assert limited.yaw == pytest.approx(sign * radians(40))  # 0.1 + 1.0 rad
+    assert posed(steering=STEERING).yaw == 0.0
+
+
+def test_earlier_pose_is_on_the_same_circle():
+    ago = 0.5
+    lens = posed({"mount_setback": 2.0, "mount_left": 0.0}, ago, heading=0.3, steering=STEERING)
+    course = 0.3 + SLIP - YAW_RATE * ago / 2
+    assert (lens.x, lens.y) == pytest.approx((-5 * cos(course), -5 * sin(course)))
+    assert lens.yaw == pytest.approx(0.3 - YAW_RATE * ago)
+
+
+@pytest.mark.parametrize(
+    ("acceleration", "clipped"), [(-6.0, -6.0), (-12.0, -12.0), (-15.0, -12.0), (4.0, 4.0), (9.0, 6.0)]
+)
+def test_body_dives_in_proportion_to_the_deceleration(acceleration, clipped):
+    lens = posed({"dive_deg": 0.25, "pitch_deg": 1.0}, acceleration=acceleration)
+    assert lens.pitch == pytest.approx(radians(1.0 + 0.25 * clipped))
+
+
+def vibration(rms, time, shift, speed, phase=0.3):
+    total = sum(
+        sin(2 * pi * (hz * time + number * shift + phase)) for number, hz in enumerate((1.1, 1.9, 3.4))
+    )
+    return rms * sqrt(speed / 14) * sqrt(2 / 3) * total
+
+
+@pytest.mark.parametrize(
+    ("speed", "effective"), [(14.0, 14.0), (-14.0, 14.0), (3.5, 3.5), (60.0, 60.0), (90.0, 60.0)]
+)
+def test_vibration_grows_with_the_root_of_the_speed(speed, effective):
+    lens = posed({"vibration_deg": 0.5, "heave_m": 0.01, "seed": 13}, time_s=0.7, speed=speed)
+    assert lens.pitch == pytest.approx(radians(vibration(0.5, 0.7, 0.37, effective)))
+    assert lens.z == pytest.approx(1.5 + vibration(0.01, 0.7, 0.61, effective))
+
+
+def test_vibration_of_an_earlier_pose():
+    lens = posed({"vibration_deg": 0.5, "seed": 13}, 0.2, time_s=0.7, speed=14.0)
+    assert lens.pitch == pytest.approx(radians(vibration(0.5, 0.5, 0.37, 14)))
+
+
+def test_lens_stays_above_the_ground():
+    heights = [
+        posed({"heave_m": 0.1, "mount_height": 0.25}, time_s=time, speed=60.0).z
+        for time in np.arange(0, 3, 0.05)
+    ]
+    assert min(heights) == pytest.approx(0.025)

@@ -1,0 +1,133 @@
+"""Distance, texture and markings of the ground: every expected value is computed by hand."""
+
+from math import atan, cos, pi, sin, tan
+
+import numpy as np
+import pytest
+from support.records import lens_of, records
+
+from lgmd_gym.camera.render.buffers import GroundLayer
+from lgmd_gym.camera.render.ground import PAINT
+from lgmd_gym.camera.render.markings import LINE_WIDTH, add_lines
+from lgmd_gym.camera.render.texture import TEXEL_M
+from lgmd_gym.camera.render.texture_sampling import distance_ahead, texture_line
+from lgmd_gym.camera.road_geometry import LINE
+
+
+@pytest.mark.parametrize("pitch", [0.0, -0.1, 0.05])
+@pytest.mark.parametrize("row", [60, 79])
+def test_distance_of_the_ground(row, pitch):
+    below = atan((row + 0.5 - 40) / 100) - pitch  # angle below the horizon
+    assert distance_ahead(lens_of(pitch=pitch), row) == pytest.approx(1 / tan(below))
+
+
+def test_distance_of_the_ground_is_limited():
+    assert distance_ahead(lens_of(), 39) == 1e5
+    assert distance_ahead(lens_of(), 40) == pytest.approx(200.0)
+
+
+LEVELS = np.arange(13 * 10, dtype=np.int64).reshape(13, 10)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.5, 2.0])
+def test_texture_is_anchored_to_the_ground(yaw):
+    """Pixel [row, column] shows the texel at the ground point of its centre, at any pose."""
+    lens = lens_of(yaw, x=31.7, y=-4.2)
+    line = texture_line(lens, 70, LEVELS)
+    ahead = 100 / 30.5
+    for column in (0, 37, 119):
+        right = (column + 0.5 - 60) / 30.5
+        x = 31.7 + ahead * cos(yaw) - right * sin(yaw)
+        y = -4.2 + ahead * sin(yaw) + right * cos(yaw)
+        # The centre of texel n of level i is at (n + 0.5)·2^i texels.
+        i, j = 12 - line.log_x, 9 - line.log_y
+        period_x, period_y = 2.0**line.log_x, 2.0**line.log_y
+        place = (line.x + column * line.dx) % period_x, (line.y + column * line.dy) % period_y
+        expected = (x / (TEXEL_M * 2**i) - 0.5) % period_x, (y / (TEXEL_M * 2**j) - 0.5) % period_y
+        assert place == pytest.approx(expected)
+    assert line.start == LEVELS[i, j]
+    assert 0 <= line.x < period_x
+    assert 0 <= line.y < period_y
+
+
+@pytest.mark.parametrize(
+    ("focal", "row", "levels"),
+    [
+        # Footprint of a pixel: Z²/(f·h) along, Z/f across; the level is its rounded log2 in texels of 4 cm.
+        (100.0, 70, (1, 0)),  # 10.75 cm = 2.7 texels, 3.3 cm = 0.8 texel
+        (100.0, 50, (3, 1)),  # 90.7 cm = 22.7 texels -> 4.5, 9.5 cm = 2.4 texels -> 1.25
+        (100.0, 40, (12, 6)),  # 400 m, 2 m
+    ],
+)
+def test_level_of_the_texture_is_the_footprint_of_a_pixel(focal, row, levels):
+    v = row + 0.5 - 40
+    along, across = focal / v**2 / TEXEL_M, 1 / v / TEXEL_M
+    if v < 1:
+        along = focal / v / 0.5 / TEXEL_M
+    expected = tuple(
+        int(np.clip(np.floor(np.log2(size) + 0.5), 0, top)) for size, top in ((along, 12), (across, 9))
+    )
+    line = texture_line(lens_of(focal=focal), row, LEVELS)
+    assert (12 - line.log_x, 9 - line.log_y) == expected
+    turned = texture_line(lens_of(pi / 2, focal=focal), row, LEVELS)
+    assert 12 - turned.log_x == min(max(int(np.floor(np.log2(across) + 0.5)), 0), 12)
+
+
+def painted(*lines, yaw=0.0, shape=(160, 120)):
+    """Return the area painted by lines (x0, y0, x1, y1, start, striped) in square metres by column [px]."""
+    coverage = np.zeros((3, shape[0], shape[1] + 2), np.float32)
+    layer = GroundLayer(coverage, np.zeros((16, 3)), np.zeros((20, 2)), np.zeros(8))
+    lens = lens_of(yaw, -pi / 2 + 1e-9, z=10.0, shape=shape)
+    names = LINE.names
+    add_lines(
+        layer, lens, records(LINE, *(dict(zip(names, map(float, line), strict=True)) for line in lines))
+    )
+    return np.cumsum(coverage[PAINT], axis=1)[:, :-2] / 100
+
+
+def test_solid_line():
+    area = painted((0.0, 1.0, 5.0, 1.0, 0.0, 0.0))
+    # Ahead is up from the middle, row 80; y = 1 m is column 70.
+    assert area.sum() == pytest.approx(5 * LINE_WIDTH, rel=1e-4)
+    rows, columns = np.flatnonzero(area.sum(axis=1) > 1e-6), np.flatnonzero(area.sum(axis=0) > 1e-6)
+    assert (rows[0], rows[-1] + 1) == (30, 80)
+    assert (columns[0], columns[-1] + 1) == (69, 71)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, pi / 2, 3.0])
+@pytest.mark.parametrize("start", [0.0, 2.0, 4.0])
+def test_stripes_are_three_metres_in_four_and_a_third_by_area(yaw, start):
+    """A line of 5 m straight ahead, from `start` of its lane on."""
+    area = painted((0.0, 0.0, 5 * cos(yaw), 5 * sin(yaw), start, 1.0), yaw=yaw)
+    painted_m = {0.0: 3.0 + 0.67, 2.0: 1.0 + 2.67, 4.0: 3.0 + 0.34}[start]
+    assert area.sum() == pytest.approx(painted_m * LINE_WIDTH, rel=2e-3)
+
+
+def test_ends_of_the_stripes():
+    area = painted((0.0, 0.0, 5.0, 0.0, 2.0, 1.0)).sum(axis=1)
+    share = area[79::-1] / area.max()  # from the near end on, 10 rows per metre
+    # 1 m, a gap of 1.33 m, then 2.67 m.
+    assert share[:10] == pytest.approx(1.0, abs=0.01)
+    assert share[10:23] == pytest.approx(0.0, abs=0.01)
+    assert share[23] == pytest.approx(0.7, abs=0.01)
+    assert share[24:50] == pytest.approx(1.0, abs=0.01)
+    assert share[50:] == pytest.approx(0.0, abs=0.01)
+
+
+def test_far_stripes_are_painted_as_their_mean():
+    """Beyond three periods per pixel, stripes are a line with 3/4.33 of its paint."""
+    shape = (80, 120)
+    coverage = np.zeros((3, shape[0], shape[1] + 2), np.float32)
+    layer = GroundLayer(coverage, np.zeros((16, 3)), np.zeros((20, 2)), np.zeros(8))
+    lens = lens_of(shape=shape)
+    solid = coverage.copy()
+    # Z²/(f·h) = 3·4.33 m at Z = 36 m; from 40 m on no stripe is separate.
+    for striped, target in ((1.0, coverage), (0.0, solid)):
+        layer = layer._replace(coverage=target)
+        add_lines(
+            layer,
+            lens,
+            records(LINE, dict(zip(LINE.names, (40.0, 0.0, 90.0, 0.0, 0.0, striped), strict=True))),
+        )
+    ratio = np.cumsum(coverage[PAINT], axis=1).sum() / np.cumsum(solid[PAINT], axis=1).sum()
+    assert ratio == pytest.approx(3 / 4.33, rel=1e-3)

@@ -1,0 +1,58 @@
+"""Bounds of scenarios: every distance, time and offset is computed by hand.
+
+The ego is 4.3 m by 1.8 m, the target car 4.023 m by 1.712 m, a lane is 3.5 m wide, and the first possible
+contact is 5 s after the start.
+"""
+
+import pytest
+
+from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
+
+
+def test_highest_scripted_speed():
+    profile = (Segment(start=1.0, acceleration=1.0, final_speed=12.0),)
+    assert Scenario(family="x", ego_speed=10.0, duration=1.0, ego_profile=profile).top_speed == 12.0
+    assert Scenario(family="x", ego_speed=14.0, duration=1.0, ego_profile=profile).top_speed == 14.0
+    assert Scenario(family="x", ego_speed=0.0, duration=1.0, ego_profile=profile).top_speed == 12.0
+    with pytest.raises(ValueError, match="ego_speed"):
+        Scenario(family="x", ego_speed=0.0, duration=1.0)
+    with pytest.raises(ValueError, match="duration must be > 0"):
+        Scenario(family="x", ego_speed=1.0, duration=0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("gap", -1000, 1000), ("lateral_offset", -500, 500), ("speed", 0, 40), ("shade", 0, 255),
+        ("length", 0, 1000), ("width", 0, 1000), ("height", 0, 1000),
+    ],
+)  # fmt: skip
+def test_bounds_of_an_actor(name, low, high):
+    for value in (low, high):
+        Actor(**{"gap": 1.0, name: value})
+    for value in (low - 0.001, high + 0.001):
+        with pytest.raises(ValueError, match=name):
+            Actor(**{"gap": 1.0, name: value})
+
+
+def test_segments_are_in_order():
+    late, early = (Segment(start=start, acceleration=1.0) for start in (2.0, 1.0))
+    assert Actor(gap=1.0, profile=(early, late)).profile == (early, late)
+    with pytest.raises(ValueError, match="order of their start"):
+        Actor(gap=1.0, profile=(late, early))
+    with pytest.raises(ValueError, match="unknown actor kind 'cr'; did you mean 'car'"):
+        Actor(gap=1.0, kind="cr")
+
+
+def test_lanes_of_a_road():
+    assert not RoadPlan().relative_to_ego
+    assert RoadPlan(kind="curve").relative_to_ego
+    assert (RoadPlan().lanes, RoadPlan().ego_lane) == (3, 1)
+    for lane in (0, 2):
+        RoadPlan(ego_lane=lane)
+    for lane in (-1, 3):
+        with pytest.raises(ValueError, match=r"ego_lane must be in \[0, 2\]"):
+            RoadPlan(ego_lane=lane)
+    with pytest.raises(ValueError, match="unknown road kind"):
+        RoadPlan(kind="curved")
