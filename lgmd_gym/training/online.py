@@ -1,15 +1,13 @@
-"""Training with the algorithms of stable-baselines3: environments, callbacks and checkpoints."""
+"""Training with the algorithms of stable-baselines3."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
+from lgmd_gym.training.config import SEED_STRIDE, TrainConfig
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
-    from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
+    from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.vec_env import VecEnv
 
 
@@ -17,6 +15,8 @@ def train_online(config: TrainConfig, folder: Path, progress: bool) -> "BaseAlgo
     """Train from the last checkpoint in the folder, if any; return the best model on the validation split."""
     import torch
     from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
+
+    from lgmd_gym.training.checkpoints import best_model, save_model
 
     torch.set_num_threads(1)
     envs = VecMonitor(DummyVecEnv([lambda: config.make_policy_env("train")] * config.n_envs))
@@ -30,17 +30,16 @@ def train_online(config: TrainConfig, folder: Path, progress: bool) -> "BaseAlgo
         if remaining > 0:
             model.learn(
                 remaining,
-                _callbacks(config, folder, eval_envs),
+                _callbacks(config, folder, eval_envs, model),
                 reset_num_timesteps=False,
                 progress_bar=progress,
                 tb_log_name="log",
             )
-        model.save(folder / "last.zip")
+        save_model(model, folder / "last.zip")
     finally:
         envs.close()
         eval_envs.close()
-    best = folder / "best" / "best_model.zip"
-    return algorithm_class(config.algo).load(best if best.exists() else folder / "last.zip", device="cpu")
+    return best_model(algorithm_class(config.algo), folder)
 
 
 def algorithm_class(algo: str) -> "type[BaseAlgorithm]":
@@ -51,13 +50,12 @@ def algorithm_class(algo: str) -> "type[BaseAlgorithm]":
 
 
 def _make_model(config: TrainConfig, folder: Path, envs: "VecEnv") -> Any:
-    """Return the newest checkpoint in a folder, or a new model."""
-    algorithm, checkpoint = algorithm_class(config.algo), newest_checkpoint(folder)
-    if checkpoint is not None:
-        model: Any = algorithm.load(checkpoint, envs, device="cpu")
-        buffer = checkpoint.with_name(checkpoint.name.replace("model_", "model_replay_buffer_"))
-        if buffer.with_suffix(".pkl").exists():
-            model.load_replay_buffer(buffer.with_suffix(".pkl"))
+    """Return the model of the newest checkpoint that opens, or a new model."""
+    from lgmd_gym.training.checkpoints import load_checkpoint
+
+    algorithm = algorithm_class(config.algo)
+    model = load_checkpoint(algorithm, folder, envs)
+    if model is not None:
         return model
     return algorithm(
         config.policy,
@@ -67,12 +65,6 @@ def _make_model(config: TrainConfig, folder: Path, envs: "VecEnv") -> Any:
         tensorboard_log=str(folder / "tensorboard"),
         **_with_schedules(config.algo_kwargs),
     )
-
-
-def newest_checkpoint(folder: Path) -> Path | None:
-    """Return the last checkpoint in a training folder, or None."""
-    found = folder.glob("checkpoints/model_*_steps.zip")
-    return max(found, key=lambda path: int(path.stem.split("_")[-2]), default=None)
 
 
 def _with_schedules(algo_kwargs: dict[str, Any]) -> dict[str, Any]:
@@ -87,39 +79,12 @@ def _with_schedules(algo_kwargs: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _callbacks(config: TrainConfig, folder: Path, eval_envs: "VecEnv") -> "list[BaseCallback]":
-    from stable_baselines3.common.callbacks import CheckpointCallback, EvalCallback
+def _callbacks(
+    config: TrainConfig, folder: Path, eval_envs: "VecEnv", model: "BaseAlgorithm"
+) -> "list[BaseCallback]":
+    from lgmd_gym.training.checkpoints import CheckpointSaver, Evaluator
 
-    class SameLevelsEvalCallback(EvalCallback):
-        """Evaluates on the same levels every time, so that evaluations are comparable."""
-
-        def _on_step(self) -> bool:
-            if self.eval_freq > 0 and self.n_calls % self.eval_freq == 0:
-                self.eval_env.seed(VALIDATION_SEED)
-            return super()._on_step()
-
-    eval_freq = max(config.eval_freq // config.n_envs, 1)
-    evaluation = SameLevelsEvalCallback(
-        eval_envs,
-        eval_freq=eval_freq,
-        n_eval_episodes=config.eval_episodes,
-        best_model_save_path=str(folder / "best"),
-        log_path=str(folder / "best"),
-        verbose=0,
-    )
-    _restore_evaluations(evaluation)
-    checkpoints = CheckpointCallback(
-        eval_freq, str(folder / "checkpoints"), "model", save_replay_buffer=config.algo != "ppo"
-    )
-    return [checkpoints, evaluation]
-
-
-def _restore_evaluations(callback: "EvalCallback") -> None:
-    """Load the evaluations of an interrupted run; only a better model then replaces its best one."""
-    file = Path(callback.log_path or "").with_suffix(".npz")
-    if file.exists():
-        with np.load(file) as log:
-            callback.evaluations_timesteps = log["timesteps"].tolist()
-            callback.evaluations_results = log["results"].tolist()
-            callback.evaluations_length = log["ep_lengths"].tolist()
-            callback.best_mean_reward = float(log["results"].mean(axis=1).max())
+    frequency = max(config.eval_freq // config.n_envs, 1)
+    evaluator = Evaluator(eval_envs, folder, frequency, config.eval_episodes)
+    evaluator.restore(model)
+    return [CheckpointSaver(folder, frequency), evaluator]

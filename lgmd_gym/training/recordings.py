@@ -16,7 +16,7 @@ from lgmd_gym.training.offline.episodes import (
     RecordFunction,
     record_parallel,
 )
-from lgmd_gym.training.offline.storage import check_file, load, save
+from lgmd_gym.training.offline.storage import check_file, is_complete, load, save
 from lgmd_gym.training.offline.traffic import TrafficRecorder
 
 FILE_SIZE = 100  # largest number of seeds in one file
@@ -78,7 +78,7 @@ def load_or_record(
 ) -> list[RecordedEpisode]:
     """Return the episodes of a split: reused if `config.recordings` is set, else recorded in the folder.
 
-    Files that exist are kept, so that an interrupted recording resumes at the first missing file.
+    Complete files are kept, so that an interrupted recording resumes at the first missing or damaged one.
     """
     episodes: list[RecordedEpisode] = []
     for recordings in recording_sets(config, split):
@@ -133,7 +133,7 @@ def _record_missing(
     with tqdm(total=len(seeds), desc=description, unit="episode", disable=not progress) as bar:
         for start in range(0, len(seeds), FILE_SIZE):
             part, file = seeds[start : start + FILE_SIZE], files / f"{start:06d}.npz"
-            if file.exists():
+            if is_complete(file):
                 bar.update(len(part))
                 continue
             by_seed = []

@@ -11,6 +11,7 @@ from lgmd_gym.agents.options import whole
 from lgmd_gym.agents.policies.policy import write_card
 from lgmd_gym.benchmark.folder import new_folder
 from lgmd_gym.errors import check_keys
+from lgmd_gym.files import complete_file
 from lgmd_gym.training.config import TrainConfig
 from lgmd_gym.training.hyperparams import OFFLINE
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
@@ -53,14 +54,16 @@ def train(config: TrainConfig, folder: Path, *, progress: bool = False, jobs: in
     whole("jobs", jobs, 1)
     check_config(config)
     new_folder(folder, "training folder")
-    (folder / CONFIG_FILE).write_text(json.dumps(config.to_dict(), indent=2) + "\n", encoding="utf-8")
+    with complete_file(folder / CONFIG_FILE) as part:
+        part.write_text(json.dumps(config.to_dict(), indent=2) + "\n", encoding="utf-8")
     return _train(config, folder, progress, jobs)
 
 
 def resume(folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
-    """Resume an interrupted training run from its last checkpoint, with the configuration in its folder.
+    """Resume an interrupted training run with the configuration in its folder.
 
-    Args and return value are those of `train`.
+    It continues from the newest checkpoint that opens; damaged files are named on stderr. Args and
+    return value are those of `train`.
 
     Raises:
         ValueError: If the folder contains no training.
@@ -106,7 +109,6 @@ def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path
 
         model = train_online(config, folder, progress)
     path = folder / "policy.zip"
-    model.save(path, exclude=EXCLUDED)
     values = config.to_dict() | {"recordings": None}  # a path on the machine that ran the training
     card = {
         "lgmd_gym": lgmd_gym.__version__,
@@ -117,7 +119,9 @@ def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path
         "config": values,
         "wall_time": round(time.perf_counter() - start, 1),
     }
-    write_card(path, card)
+    with complete_file(path) as part:
+        model.save(part, exclude=EXCLUDED)
+        write_card(part, card)
     return path
 
 

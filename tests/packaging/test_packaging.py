@@ -36,6 +36,7 @@ ORDER = (
     "camera",
     "neuron",
     "simd",
+    "files",
     "errors",
 )
 # The one exception: `lgmd_gym.benchmark.run`, the Python API of `lgmd-gym bench`, writes the report, too.
@@ -148,9 +149,9 @@ def test_import_is_fast():
     assert min(timed("import lgmd_gym") for _ in range(5)) - min(timed("pass") for _ in range(5)) < 0.5
 
 
-def test_the_package_folder_contains_four_modules_and_folders():
+def test_the_package_folder_contains_five_modules_and_folders():
     flat = {path.name for path in (ROOT / "lgmd_gym").glob("*.py")}
-    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py"}
+    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py", "files.py"}
 
 
 def test_every_package_states_its_contents_in_one_sentence():

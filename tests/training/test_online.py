@@ -1,6 +1,8 @@
 """Training with stable-baselines3: policies, seeds, checkpoints."""
 
 import json
+import shutil
+import zipfile
 
 import gymnasium as gym
 import numpy as np
@@ -10,7 +12,7 @@ from support.recordings import write_yaml
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.policy import read_card
 from lgmd_gym.training import TrainConfig, resume, train
-from lgmd_gym.training.online import newest_checkpoint
+from lgmd_gym.training.checkpoints import checkpoints_of, load_checkpoint, save_model
 
 DEMANDS = (0.0, -0.4, -1.0)
 YAML = """
@@ -85,13 +87,93 @@ def test_resume_continues_from_the_newest_checkpoint(tmp_path):
     (folder / "config.json").write_text(json.dumps(values))
     first_result = np.load(folder / "best" / "evaluations.npz")["results"].mean()
     write_yaml(tmp_path, "default: {n_envs: 7}")  # only the stored configuration counts
-    assert newest_checkpoint(folder).name == "model_32_steps.zip"
+    assert checkpoints_of(folder)[0].name == "model_32_steps.zip"
     policy = resume(folder)
-    assert newest_checkpoint(folder).name == "model_96_steps.zip"
+    assert checkpoints_of(folder)[0].name == "model_96_steps.zip"
     assert read_card(policy)["config"] == values
     evaluations = np.load(folder / "best" / "evaluations.npz")
     assert evaluations["timesteps"].tolist() == [32, 64, 96]
     assert evaluations["results"][0].mean() == first_result
+
+
+def interrupted(folder, source, *truncated):
+    """Copy a finished training, truncate files of the copy and ask for 32 more decisions."""
+    shutil.copytree(source, folder)
+    for name in truncated:
+        data = (folder / name).read_bytes()
+        (folder / name).write_bytes(data[: len(data) // 2])
+    values = json.loads((folder / "config.json").read_text())
+    (folder / "config.json").write_text(json.dumps(values | {"n_timesteps": values["n_timesteps"] + 32}))
+    return folder
+
+
+@pytest.mark.slow
+def test_resume_survives_truncated_files(tmp_path, capsys):
+    source = tmp_path / "run"
+    train(online_config(tmp_path), source)
+    assert [path.name for path in (source / "best").iterdir()].count("unfinished") == 0
+    newest, older = (f"checkpoints/model_{steps}_steps.zip" for steps in (64, 32))
+    first = np.load(source / "best" / "evaluations.npz")["results"].tolist()
+    for name, truncated, messages, start in (
+        ("a", [newest], ["model_64_steps.zip' is damaged; training resumes"], 32),
+        ("b", [newest, older], ["model_64_steps.zip' is damaged", "model_32_steps.zip' is damaged"], 0),
+        ("c", ["best/evaluations.npz"], ["evaluations.npz' is damaged"], 64),
+        ("d", ["best/best_model.zip"], ["best_model.zip' is damaged; the next evaluation"], 64),
+    ):
+        folder = interrupted(tmp_path / name, source, *truncated)
+        capsys.readouterr()
+        assert make_agent(f"policy:{resume(folder)}").name
+        lines = capsys.readouterr().err.splitlines()
+        assert len(lines) == len(messages), lines
+        assert all(message in line for message, line in zip(messages, lines, strict=True))
+        log = np.load(folder / "best" / "evaluations.npz")
+        kept = [] if name == "c" else [32, 64][: start // 32]
+        assert log["timesteps"].tolist() == kept + list(range(start + 32, 97, 32))
+        assert log["results"].tolist()[: len(kept)] == first[: len(kept)]
+
+
+def test_the_newest_checkpoint_that_opens_is_loaded(tmp_path, capsys):
+    class Algorithm:
+        load = staticmethod(lambda path, envs, device: path.name)
+
+    for steps in (8, 16, 100):
+        path = tmp_path / "checkpoints" / f"model_{steps}_steps.zip"
+        path.parent.mkdir(exist_ok=True)
+        with zipfile.ZipFile(path, "w") as file:
+            file.writestr("data", "x" * 99)
+    assert load_checkpoint(Algorithm, tmp_path, None) == "model_100_steps.zip"
+    path.write_bytes(path.read_bytes()[:-1])
+    flipped = tmp_path / "checkpoints" / "model_16_steps.zip"
+    flipped.write_bytes(flipped.read_bytes().replace(b"xx", b"xy", 1))
+    assert load_checkpoint(Algorithm, tmp_path, None) == "model_8_steps.zip"
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert "model_100_steps.zip' is damaged; training resumes from an earlier state" in lines[0]
+
+
+def test_an_interrupted_write_keeps_the_old_checkpoint(tmp_path):
+    """The model writes half of its file and is then interrupted."""
+
+    class HalfSaved:
+        def save(self, path):
+            path.write_text("half")
+            raise KeyboardInterrupt
+
+    (tmp_path / "model.zip").write_text("old")
+    with pytest.raises(KeyboardInterrupt):
+        save_model(HalfSaved(), tmp_path / "model.zip")
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("model.zip", "old")]
+
+
+@pytest.mark.slow
+def test_a_checkpoint_without_its_whole_replay_buffer_is_not_used(tmp_path, capsys):
+    text = "default: {n_envs: 2, n_timesteps: 64, learning_starts: 100, buffer_size: 200}"
+    source = tmp_path / "run"
+    train(online_config(tmp_path, "dqn", text), source)
+    resume(interrupted(tmp_path / "a", source, "checkpoints/model_replay_buffer_64_steps.pkl"))
+    assert "model_64_steps.zip' is damaged; training resumes" in capsys.readouterr().err
+    steps = np.load(tmp_path / "a" / "best" / "evaluations.npz")["timesteps"].tolist()
+    assert steps == [32, 64, 96]
 
 
 @pytest.mark.slow

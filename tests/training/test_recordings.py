@@ -102,3 +102,17 @@ def test_traffic_recordings_are_required_in_addition(tmp_path):
     with pytest.raises(ValueError, match="traffic-train' holds 3 episodes, 9 are required"):
         check_recordings(config)
     check_recordings(replace(config, traffic_episodes=3))
+
+
+def test_a_damaged_file_is_recorded_again(tmp_path, monkeypatch):
+    def record(self, seeds):
+        return [[synthetic_episode(seed=seed)] for seed in seeds]
+
+    monkeypatch.setattr(EpisodeRecorder, "record", record)
+    config = offline_config(tmp_path, n_timesteps=2)
+    load_or_record(config, "train", tmp_path)
+    (file,) = (tmp_path / "episodes" / "train").iterdir()
+    whole = file.read_bytes()
+    file.write_bytes(whole[: len(whole) // 2])
+    assert len(load_or_record(config, "train", tmp_path)) == 2
+    assert len(file.read_bytes()) == len(whole)

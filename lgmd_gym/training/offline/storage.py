@@ -8,6 +8,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from lgmd_gym.files import complete_file, is_intact_zip
 from lgmd_gym.training.offline.episodes import RecordedEpisode
 
 PER_DECISION = ("rewards", "braking_returns", "braking_contacts")
@@ -35,10 +36,13 @@ def save(by_seed: list[list[RecordedEpisode]], file: Path, origin: dict[str, Any
             arrays[name] = np.concatenate([getattr(episode, name) for episode in episodes])
         for name in episodes[0].observations:
             arrays[PREFIX + name] = np.concatenate([episode.observations[name] for episode in episodes])
-    unfinished = file.with_suffix(".part")
-    with unfinished.open("wb") as out:
+    with complete_file(file) as part, part.open("wb") as out:
         np.savez_compressed(out, **arrays)
-    unfinished.rename(file)
+
+
+def is_complete(file: Path) -> bool:
+    """Return whether `save` finished a file and nothing damaged it since."""
+    return is_intact_zip(file, "origin.npy")
 
 
 def load(file: Path) -> list[list[RecordedEpisode]]:

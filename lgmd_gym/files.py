@@ -1,0 +1,49 @@
+"""Files that are complete or absent: written beside their place, stored on the disk and renamed."""
+
+import os
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from zipfile import BadZipFile, ZipFile
+
+
+@contextmanager
+def complete_file(path: Path) -> Iterator[Path]:
+    """Yield the path of a temporary file in the same folder; at the end of the block it becomes `path`.
+
+    An interruption, a full disk or a power cut leaves the old contents of `path`, or none. The temporary name
+    ends in ".part".
+
+    Args:
+        path: File to write; its folder is made if it does not exist.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f"{path.name}.part")
+    try:
+        yield part
+        _sync(part)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    if os.name == "posix":  # elsewhere a folder cannot be opened
+        _sync(path.parent)
+
+
+def is_intact_zip(path: Path, member: str) -> bool:
+    """Return whether a zip file (.zip or .npz) contains a member and every checksum in it is right."""
+    try:
+        with ZipFile(path) as archive:
+            # The end of a truncated file may look like a zip file: torch stores zip files within zip files.
+            return member in archive.namelist() and archive.testzip() is None
+    except (OSError, ValueError, BadZipFile, EOFError, zlib.error, NotImplementedError, RuntimeError):
+        return False
+
+
+def _sync(path: Path) -> None:
+    """Store a file or the entries of a folder on the disk."""
+    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
