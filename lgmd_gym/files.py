@@ -30,6 +30,27 @@ def complete_file(path: Path) -> Iterator[Path]:
         _sync(path.parent)
 
 
+def check_new_file(path: Path, name: str) -> None:
+    """Check that a file does not exist and can be created, before the work whose result it gets.
+
+    Args:
+        path: File to write later.
+        name: Name of the file in the message, for example "--best".
+
+    Raises:
+        ValueError: If the file exists or cannot be created.
+    """
+    try:
+        path.open("xb").close()
+    except FileExistsError:
+        raise ValueError(f"{name} {str(path)!r} exists; choose another file") from None
+    except OSError as error:
+        raise ValueError(
+            f"{name} {str(path)!r} cannot be created ({error.strerror}); choose another file"
+        ) from None
+    path.unlink()
+
+
 def is_intact_zip(path: Path, member: str) -> bool:
     """Return whether a zip file (.zip or .npz) contains a member and every checksum in it is right."""
     try:

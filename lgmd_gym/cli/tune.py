@@ -1,18 +1,25 @@
 """The `tune` command: search a rule's parameters or print their sensitivity."""
 
+import sys
+from functools import partial
 from pathlib import Path
 
 from rich.table import Table
 
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Tune
+from lgmd_gym.files import check_new_file, complete_file
 from lgmd_gym.tuning.objective import Objective
 from lgmd_gym.tuning.search import evaluate, sensitivity, tune
 from lgmd_gym.tuning.space import CAMERA_KEY, Proposal, SearchSpace, neuron_params, rule_options
 
 
 def run(options: Tune) -> int:
-    """Search the parameters and write the result, or print the sensitivity table; return 0."""
+    """Search the parameters and write the result, or print the sensitivity table.
+
+    Returns:
+        0, or 130 for Ctrl-C.
+    """
     space = SearchSpace(
         agent=options.agent,
         cameras=options.cameras,
@@ -26,18 +33,14 @@ def run(options: Tune) -> int:
         console.print(_sensitivity_table(space, validation))
         return 0
     for path in (options.best, _neuron_file(options.best)):
-        if path.exists():
-            raise ValueError(f"{str(path)!r} exists; choose another --best")
+        check_new_file(path, "--best")
     train = Objective("train", options.levels, options.seeds, options.jobs)
-    best = tune(
-        space,
-        options.study,
-        options.trials,
-        train,
-        validation,
-        options.false_cost,
-        log=lambda line: console.print(line, soft_wrap=True),
-    )
+    log = partial(console.print, soft_wrap=True)
+    try:
+        best = tune(space, options.study, options.trials, train, validation, options.false_cost, log=log)
+    except KeyboardInterrupt:
+        print(f"interrupted; to resume, repeat the command with --study {options.study}", file=sys.stderr)
+        return 130
     arguments = _save(options.agent, best, options.best)
     console.print(f"options of lgmd-gym bench for the best parameters: {arguments}", soft_wrap=True)
     return 0
@@ -69,7 +72,8 @@ def _save(agent: str, proposal: Proposal, best: Path) -> str:
 
 
 def _write_toml(path: Path, values: Proposal) -> None:
-    path.write_text("".join(f"{name} = {value!r}\n" for name, value in values.items()), "utf-8")
+    with complete_file(path) as part:
+        part.write_text("".join(f"{name} = {value!r}\n" for name, value in values.items()), "utf-8")
 
 
 def _sensitivity_table(space: SearchSpace, objective: Objective) -> Table:

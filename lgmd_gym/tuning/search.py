@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lgmd_gym.tuning.objective import Objective, ObjectiveValue
 from lgmd_gym.tuning.space import Proposal, SearchSpace, agent_string, rule_options, sensor_config
 
@@ -37,36 +39,60 @@ def tune(
         log: Function that receives one line per result.
 
     Raises:
-        ValueError: If Optuna is not installed.
+        ValueError: If Optuna is not installed, or the study cannot be read or written.
     """
     try:
-        import optuna
+        from optuna.exceptions import OptunaError
+        from sqlalchemy.exc import SQLAlchemyError
     except ImportError:
         raise ValueError("tune requires Optuna; pip install 'lgmd-gym[train]'") from None
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    search = optuna.create_study(
-        study_name=f"{space.label} at {false_cost:g}",
-        storage=f"sqlite:///{study}",
-        sampler=optuna.samplers.TPESampler(seed=len(space.agent)),
-        direction="maximize",
-        load_if_exists=True,
-    )
-    if not search.trials:
-        search.enqueue_trial(space.defaults())
 
-    def run_trial(trial: Any) -> float:
-        value = evaluate(space, space.propose(trial), train)
-        log(f"trial {trial.number}: {_format_value(value, false_cost)}")
+    def evaluate_trial(number: int, proposal: Proposal) -> float:
+        value = evaluate(space, proposal, train)
+        log(f"trial {number}: {_format_value(value, false_cost)}")
         return value.total(false_cost)
 
-    search.optimize(run_trial, n_trials=trials)
-    finished = [trial for trial in search.trials if trial.value is not None]
-    best = sorted(finished, key=lambda trial: trial.value or 0.0, reverse=True)[:best_of]
-    candidates = [space.defaults(), *(dict(trial.params) for trial in best)]
+    name = f"{space.label} at {false_cost:g}"
+    try:
+        best = _best_trials(space, study, name, trials, evaluate_trial)[:best_of]
+    except (OptunaError, SQLAlchemyError) as error:
+        reason = str(getattr(error, "orig", None) or error.__cause__ or error).splitlines()[0]
+        raise ValueError(
+            f"study {str(study)!r} cannot be used ({reason}); check the path, or choose another --study"
+        ) from None
+    candidates = [space.defaults(), *best]
     evaluated = [(evaluate(space, proposal, validation), proposal) for proposal in candidates]
     for value, proposal in evaluated:
         log(f"validation: {_format_value(value, false_cost)}  {_format_proposal(space, proposal)}")
     return max(evaluated, key=lambda pair: pair[0].total(false_cost))[1]
+
+
+def _best_trials(
+    space: SearchSpace, file: Path, name: str, count: int, evaluate_trial: Callable[[int, Proposal], float]
+) -> list[Proposal]:
+    """Add `count` trials to a study and return the parameters of all its trials, best first.
+
+    The seed of each trial depends on the number of complete trials only. An interrupted and resumed study
+    therefore makes the same proposals as one without an interruption.
+    """
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)  # a warning shows the traceback of an interruption
+    study = optuna.create_study(
+        study_name=name, storage=f"sqlite:///{file}", direction="maximize", load_if_exists=True
+    )
+
+    def complete() -> list[Any]:
+        return study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,))
+
+    for number in range(done := len(complete()), done + count):
+        if number == 0:
+            study.enqueue_trial(space.defaults())
+        (seed,) = np.random.SeedSequence([len(space.agent), number]).generate_state(1)
+        study.sampler = optuna.samplers.TPESampler(seed=int(seed))
+        study.optimize(lambda trial, number=number: evaluate_trial(number, space.propose(trial)), n_trials=1)
+    ranked = sorted(complete(), key=lambda trial: trial.value or 0.0, reverse=True)
+    return [dict(trial.params) for trial in ranked]
 
 
 def sensitivity(space: SearchSpace, objective: Objective) -> list[tuple[str, float | int, ObjectiveValue]]:

@@ -5,7 +5,7 @@ import pytest
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.cli import main as cli
-from lgmd_gym.tuning.objective import ObjectiveValue
+from lgmd_gym.tuning.objective import Objective, ObjectiveValue
 from lgmd_gym.tuning.search import sensitivity, tune
 from lgmd_gym.tuning.space import SearchSpace, agent_string
 
@@ -42,6 +42,59 @@ def test_a_study_starts_at_the_defaults_finds_the_maximum_and_resumes(tmp_path):
     assert any(line.startswith("trial 22:") for line in lines)
     assert abs(best["threshold"] - 100.0) < 35.0
     assert make_agent(agent_string("spike-threshold", best)).params.threshold == best["threshold"]
+
+
+@pytest.mark.parametrize(("first", "then"), [(1, 2), pytest.param(5, 9, marks=pytest.mark.slow)])
+def test_a_resumed_study_equals_an_uninterrupted_one(first, then, tmp_path):
+    """The search is interrupted in its first trial, and again after some; it is random up to trial 10."""
+    pytest.importorskip("optuna")
+    space, whole, parts = SearchSpace(agent="spike-threshold"), ThresholdObjective(), ThresholdObjective()
+    silent = {"validation": ThresholdObjective(), "log": lambda line: None}
+    tune(space, tmp_path / "whole.db", first + then, whole, **silent)
+
+    class Interrupted:
+        def evaluate(self, agent, sensor_config):
+            raise KeyboardInterrupt
+
+    for trials in (0, first):
+        tune(space, tmp_path / "parts.db", trials, parts, **silent)
+        with pytest.raises(KeyboardInterrupt):
+            tune(space, tmp_path / "parts.db", 1, Interrupted(), **silent)
+    tune(space, tmp_path / "parts.db", then, parts, **silent)
+    assert parts.evaluated == whole.evaluated
+    assert len({agent for agent, _ in parts.evaluated}) == first + then
+
+
+def test_the_file_of_the_result_is_checked_before_the_search(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(Objective, "evaluate", None)
+    for best in (tmp_path / "nowhere" / "best.toml", tmp_path / f"{'x' * 300}.toml"):
+        assert cli.run(["tune", "--agent", "spike-threshold", "--best", str(best)]) == 2
+        printed = capsys.readouterr().err
+        assert printed.count("\n") == 1
+        assert f"--best '{best}' cannot be created" in printed
+
+
+@pytest.mark.parametrize("name", ["nowhere/study.db", "text.db"])
+def test_an_unusable_study_is_one_line(name, tmp_path):
+    pytest.importorskip("optuna")
+    (tmp_path / "text.db").write_text("not a database, " * 100)
+    objective = ThresholdObjective()
+    with pytest.raises(ValueError, match=r"study '.*' cannot be used \([^\n]+\); check the path") as error:
+        tune(SearchSpace(agent="spike-threshold"), tmp_path / name, 1, objective, objective)
+    assert "\n" not in str(error.value)
+
+
+def test_an_interrupted_search_is_one_line(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("optuna")
+
+    def interrupt(self, agent, sensor_config):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Objective, "evaluate", interrupt)
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(["tune", "--agent", "spike-threshold"]) == 130
+    assert capsys.readouterr().err == "interrupted; to resume, repeat the command with --study tune.db\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["tune.db"]
 
 
 def test_validation_chooses_between_the_defaults_and_the_best_trials(tmp_path):
@@ -89,7 +142,7 @@ def test_bench_accepts_the_options_that_tune_prints(tmp_path, monkeypatch, capsy
     assert "--params" in printed
     assert cli.run(["bench", *printed, "--suite", "r152", "--seeds", "1", "--jobs", "1"]) == 0
     assert cli.run(["tune", *small, *space]) == 2
-    assert "'best.toml' exists; choose another --best" in capsys.readouterr().err
+    assert "--best 'best.toml' exists; choose another file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
