@@ -1,6 +1,7 @@
-"""Files that are complete or absent: written beside their place, stored on the disk and renamed."""
+"""Files and folders that are complete or absent: written beside their place, stored and renamed."""
 
 import os
+import shutil
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -28,6 +29,42 @@ def complete_file(path: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
     if os.name == "posix":  # elsewhere a folder cannot be opened
         _sync(path.parent)
+
+
+@contextmanager
+def complete_folder(path: Path, kind: str) -> Iterator[Path]:
+    """Yield a temporary folder beside `path`; at the end of the block it becomes `path`.
+
+    An exception or Ctrl-C removes it, so that the same command can be repeated.
+
+    Args:
+        path: Folder to make, which must not exist.
+        kind: Kind of folder, for the messages ("run folder", ...).
+
+    Raises:
+        ValueError: If it exists, cannot be made, or an earlier command was killed before its end.
+    """
+    part = path.with_name(f"{path.name}.part") if path.name else path
+    try:
+        if path.exists():
+            raise ValueError(f"{kind} {str(path)!r} already exists; choose another --out")
+        part.mkdir(parents=True)
+    except FileExistsError:
+        raise ValueError(
+            f"{str(part)!r} belongs to a command that runs or was killed; remove it, or choose another --out"
+        ) from None
+    except OSError as error:
+        raise ValueError(
+            f"{kind} {str(path)!r} cannot be created ({error.strerror}); choose another --out"
+        ) from None
+    try:
+        yield part
+        for file in filter(Path.is_file, part.rglob("*")):
+            _sync(file)
+        part.rename(path)
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
 
 
 def check_new_file(path: Path, name: str) -> None:

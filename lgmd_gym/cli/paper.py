@@ -30,19 +30,26 @@ def run(options: Paper) -> int:
         jobs = make_jobs([options.clips], options.crashes)
         video.print_notes(jobs, options.crashes)
     settings = {"clips": [job.clip for job in jobs], "picture": options.picture}
-    out = video.make_run_folder(options.out, "paper", settings)
+    out = video.default_out(options.out, "paper")
+    with video.run_folder(out, settings) as folder:
+        clip_results = _experiments(options, jobs, folder)
+    make_console(120).print(f"claims and figures: {out}", soft_wrap=True)
+    return video.print_errors(clip_results)
+
+
+def _experiments(options: Paper, jobs: Sequence[ClipJob], folder: Path) -> list[ClipResult]:
+    """Run the experiments, write the claims and figures, and return the results of the clips."""
     with video.progress_bar("paper", experiments.STEPS) as set_progress:
         steps = iter(range(1, experiments.STEPS + 1))
         results = experiments.run_experiments(lambda: set_progress(next(steps)), options.picture)
     console, clip_results, detections = make_console(120), [], None
     if jobs:
-        clip_results, detections = _process_all_configs(out, jobs, console)
+        clip_results, detections = _process_all_configs(folder, jobs, console)
     claims = evaluate_claims(results, detections)
-    write_claims(claims, out)
-    paper_figures(results, out)
+    write_claims(claims, folder)
+    paper_figures(results, folder)
     console.print(claim_table(claims))
-    console.print(f"claims and figures: {out}", soft_wrap=True)
-    return video.print_errors(clip_results)
+    return clip_results
 
 
 def _process_all_configs(

@@ -11,10 +11,11 @@ from typing import Any
 
 from rich.console import Console
 
-from lgmd_gym.benchmark.folder import new_folder, provenance
+from lgmd_gym.benchmark.folder import provenance
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Video
 from lgmd_gym.cli.params import read_params
+from lgmd_gym.files import complete_folder
 from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.video.clips import tables
 from lgmd_gym.video.clips.batch import ClipJob, ClipResult, detect_from_trace, make_jobs, process_clip
@@ -31,8 +32,18 @@ def run(options: Video) -> int:
     print_notes(jobs, options.crashes, options.fps)
     for job in jobs:  # decode the first frame of each clip before creating the folder
         next(iter(ClipRun(job.clip, next(iter(configs.values())))))
-    out = make_run_folder(options.out, "video", {"clips": [job.clip for job in jobs], "configs": configs})
-    folders = make_clip_folders(out, jobs)
+    out = default_out(options.out, "video")
+    with run_folder(out, {"clips": [job.clip for job in jobs], "configs": configs}) as folder:
+        results = _process_all(options, jobs, configs, folder)
+    make_console(120).print(f"traces and figures: {out}", soft_wrap=True)
+    return print_errors(results)
+
+
+def _process_all(
+    options: Video, jobs: Sequence[ClipJob], configs: dict[str, PlaybackConfig], folder: Path
+) -> list[ClipResult]:
+    """Process the clips with every configuration, print the tables and return all results."""
+    folders = make_clip_folders(folder, jobs)
     console, results, detections = make_console(120), [], {}
     for name, config in configs.items():
         suffix = f"-{name}" if len(configs) > 1 else ""
@@ -50,8 +61,7 @@ def run(options: Video) -> int:
     if len(configs) > 1 and all(detections.values()):
         descriptions = {name: config.describe() for name, config in configs.items()}
         console.print(tables.config_table(detections, descriptions))
-    console.print(f"traces and figures: {out}", soft_wrap=True)
-    return print_errors(results)
+    return results
 
 
 def print_notes(jobs: Sequence[ClipJob], crashes: Path | None, fps: float | None = None) -> None:
@@ -63,12 +73,18 @@ def print_notes(jobs: Sequence[ClipJob], crashes: Path | None, fps: float | None
             _note(f"{job.clip.name} has no row in {crashes}; it is not in the detection table")
 
 
-def make_run_folder(out: Path | None, command: str, settings: dict[str, Any]) -> Path:
-    """Create the run folder with `run.json`: the settings, and the versions and machine of the run."""
-    folder = new_folder(out or Path("runs") / f"{command}-{time.strftime('%Y%m%d-%H%M%S')}", "run folder")
-    text = json.dumps(settings | provenance(), indent=2, default=str)
-    (folder / "run.json").write_text(text + "\n", encoding="utf-8")
-    return folder
+def default_out(out: Path | None, command: str) -> Path:
+    """Return the folder of --out, or one named after the command and the time."""
+    return out or Path("runs") / f"{command}-{time.strftime('%Y%m%d-%H%M%S')}"
+
+
+@contextmanager
+def run_folder(out: Path, settings: dict[str, Any]) -> Iterator[Path]:
+    """Yield an unfinished run folder with `run.json`: the settings, versions and machine of the run."""
+    with complete_folder(out, "run folder") as folder:
+        text = json.dumps(settings | provenance(), indent=2, default=str)
+        (folder / "run.json").write_text(text + "\n", encoding="utf-8")
+        yield folder
 
 
 def make_clip_folders(out: Path, jobs: Sequence[ClipJob]) -> list[Path]:

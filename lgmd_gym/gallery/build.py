@@ -1,6 +1,6 @@
 """Write the gallery: an HTML page with its videos and pictures."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +9,9 @@ from PIL import Image
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.config import DEFAULT_AGENTS
-from lgmd_gym.benchmark.folder import new_folder
 from lgmd_gym.camera.params import CONDITIONS
-from lgmd_gym.gallery.cards import record_video, scenario_cards
+from lgmd_gym.files import complete_folder
+from lgmd_gym.gallery.cards import ScenarioCard, record_video, scenario_cards
 from lgmd_gym.gallery.outcomes import evaluate_agents
 from lgmd_gym.gallery.page import render_page
 from lgmd_gym.gallery.stills import ROADS, lens_sheet, road_sheet
@@ -43,7 +43,21 @@ def make_gallery(
     make_agent(agent)  # raises for an unknown agent before the folder is created
     if seeds < 1:
         raise ValueError(f"seeds must be >= 1, got {seeds}")
-    media = new_folder(out, "gallery folder") / "media"
+    with complete_folder(out, "gallery folder") as folder:
+        _write(folder, cards, not names, agent, seeds, on_progress)
+    return out / "index.html"
+
+
+def _write(
+    folder: Path,
+    cards: Sequence[ScenarioCard],
+    with_sheets: bool,
+    agent: str,
+    seeds: int,
+    on_progress: Callable[[str], object],
+) -> None:
+    """Write the page, its videos and pictures to a folder."""
+    media = folder / "media"
     media.mkdir()
     agents = list(dict.fromkeys([*DEFAULT_AGENTS, agent]))
     outcomes = {}
@@ -53,13 +67,12 @@ def make_gallery(
         text = "traffic" if card.traffic else outcomes[card.name][agent].text
         on_progress(f"{number}/{len(cards)}  {card.target}: {text}")
     sheets = {}
-    if not names:
+    if with_sheets:
         on_progress("lenses and roads")
         sheets["lenses"] = _save_sheet(media, "lens", lens_sheet())
         sheets["roads"] = _save_sheet(media, "road", road_sheet(tuple(ROADS), tuple(CONDITIONS)))
-    index = out / "index.html"
-    index.write_text(render_page(cards, outcomes, sheets, agent, seeds), encoding="utf-8")
-    return index
+    page = render_page(cards, outcomes, sheets, agent, seeds)
+    (folder / "index.html").write_text(page, encoding="utf-8")
 
 
 def _save_sheet(media: Path, stem: str, sheet: dict[str, dict[str, np.ndarray]]) -> dict[str, dict[str, str]]:

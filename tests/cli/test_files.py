@@ -1,0 +1,87 @@
+"""Files and folders that are complete or absent, and the commands that write them."""
+
+from contextlib import suppress
+
+import pytest
+
+from lgmd_gym.cli import main as cli
+from lgmd_gym.cli import paper
+from lgmd_gym.files import check_new_file, complete_file, complete_folder
+from lgmd_gym.gallery import build
+from lgmd_gym.paper import experiments
+from lgmd_gym.video.clips import batch
+
+
+def names(folder):
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+
+
+def test_a_file_is_replaced_at_the_end_only(tmp_path):
+    file = tmp_path / "deep" / "file.txt"
+    for text in ("old", "new"):
+        with complete_file(file) as part:
+            part.write_text(text)
+            assert file.exists() is (text == "new")
+        assert (file.read_text(), names(tmp_path)) == (text, ["deep", "deep/file.txt"])
+    with suppress(OSError), complete_file(file) as part:
+        part.write_text("half")
+        raise OSError("disk full")
+    assert (file.read_text(), names(tmp_path)) == ("new", ["deep", "deep/file.txt"])
+
+
+def test_a_folder_appears_at_the_end_only(tmp_path):
+    folder = tmp_path / "deep" / "run"
+    with suppress(KeyboardInterrupt), complete_folder(folder, "run folder") as part:
+        (part / "file").write_text("x")
+        raise KeyboardInterrupt
+    assert names(tmp_path) == ["deep"]
+    with complete_folder(folder, "run folder") as part:
+        (part / "file").write_text("x")
+        assert not folder.exists()
+    assert names(tmp_path) == ["deep", "deep/run", "deep/run/file"]
+    with pytest.raises(ValueError, match="already exists; choose another --out"):
+        complete_folder(folder, "run folder").__enter__()
+
+
+def test_a_folder_of_a_killed_command_is_named_and_kept(tmp_path):
+    (tmp_path / "run.part").mkdir()
+    with pytest.raises(ValueError, match=r"run\.part' belongs to a command that runs or was killed; remove"):
+        complete_folder(tmp_path / "run", "run folder").__enter__()
+    assert names(tmp_path) == ["run.part"]
+
+
+def test_a_new_file_is_checked_and_not_made(tmp_path):
+    check_new_file(tmp_path / "new", "--best")
+    assert names(tmp_path) == []
+    (tmp_path / "old").touch()
+    for name, message in (("old", "exists"), ("no/file", "cannot be created"), ("x" * 300, "cannot be cre")):
+        with pytest.raises(ValueError, match=f"--best .* {message}"):
+            check_new_file(tmp_path / name, "--best")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "module", "function"),
+    [
+        (["gallery", "--families", "CCRs"], build, "record_video"),
+        (["paper"], experiments, "run_experiments"),
+        (["paper"], paper, "paper_figures"),
+        (["video"], batch, "csv"),
+    ],
+)
+def test_an_interrupted_command_leaves_no_folder(arguments, module, function, clip, tmp_path, monkeypatch):
+    class Interrupted:
+        def __call__(self, *_):
+            raise KeyboardInterrupt
+
+        def __getattr__(self, name):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, function, Interrupted())
+    monkeypatch.setattr(experiments, "STEPS", 1)
+    if function == "paper_figures":
+        for name in ("evaluate_claims", "write_claims"):
+            monkeypatch.setattr(paper, name, lambda *_: [])
+        monkeypatch.setattr(experiments, "run_experiments", lambda *_: None)
+    clips = [str(clip)] if arguments == ["video"] else []
+    assert cli.run([*arguments, *clips, "--out", str(tmp_path / "out")]) == 130
+    assert [name for name in names(tmp_path) if name.startswith("out")] == []
