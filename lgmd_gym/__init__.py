@@ -4,11 +4,13 @@ Importing this package registers the `LGMD/…` ids. Heavy modules are imported 
 """
 
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lgmd_gym._version import __version__
 from lgmd_gym.envs.registration import register_envs
 from lgmd_gym.envs.traffic.registration import register_traffic
+from lgmd_gym.kernel_cache import ensure_kernel_cache
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import BirdsEye, CameraParams, EgoCamera
@@ -39,6 +41,7 @@ _MODULES = {
     "LGMDView": "rendering.view",
 }
 
+ensure_kernel_cache(Path(__file__).parent)
 register_envs()
 register_traffic()
 

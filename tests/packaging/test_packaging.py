@@ -37,6 +37,7 @@ ORDER = (
     "neuron",
     "simd",
     "files",
+    "kernel_cache",
     "errors",
 )
 # The one exception: `lgmd_gym.benchmark.run`, the Python API of `lgmd-gym bench`, writes the report, too.
@@ -149,9 +150,9 @@ def test_import_is_fast():
     assert min(timed("import lgmd_gym") for _ in range(5)) - min(timed("pass") for _ in range(5)) < 0.5
 
 
-def test_the_package_folder_contains_five_modules_and_folders():
+def test_the_package_folder_contains_six_modules_and_folders():
     flat = {path.name for path in (ROOT / "lgmd_gym").glob("*.py")}
-    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py", "files.py"}
+    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py", "files.py", "kernel_cache.py"}
 
 
 def test_every_package_states_its_contents_in_one_sentence():
