@@ -22,9 +22,10 @@ def complete_file(path: Path) -> Iterator[Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.name}.part")
     try:
-        yield part
-        _sync(part)
-        part.replace(path)
+        with _naming(path):
+            yield part
+            _sync(part)
+            part.replace(path)
     finally:
         part.unlink(missing_ok=True)
     if os.name == "posix":  # elsewhere a folder cannot be opened
@@ -58,10 +59,11 @@ def complete_folder(path: Path, kind: str) -> Iterator[Path]:
             f"{kind} {str(path)!r} cannot be created ({error.strerror}); choose another --out"
         ) from None
     try:
-        yield part
-        for file in filter(Path.is_file, part.rglob("*")):
-            _sync(file)
-        part.rename(path)
+        with _naming(path):
+            yield part
+            for file in filter(Path.is_file, part.rglob("*")):
+                _sync(file)
+            part.rename(path)
     except BaseException:
         shutil.rmtree(part, ignore_errors=True)
         raise
@@ -96,6 +98,17 @@ def is_intact_zip(path: Path, member: str) -> bool:
             return member in archive.namelist() and archive.testzip() is None
     except (OSError, ValueError, BadZipFile, EOFError, zlib.error, NotImplementedError, RuntimeError):
         return False
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Add a path to input and output errors without one, such as a full disk."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None and error.errno is not None:
+            error.filename = str(path)
+        raise
 
 
 def _sync(path: Path) -> None:

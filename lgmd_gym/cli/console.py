@@ -1,4 +1,7 @@
-"""The rich console that the commands print to."""
+"""The rich console that the commands print to, and the message for a file that cannot be written."""
+
+import os
+import sys
 
 from rich.console import Console
 
@@ -7,3 +10,21 @@ def make_console(width: int = 110) -> Console:
     """Return a console for stdout; files and pipes get a fixed width [columns]."""
     console = Console()
     return console if console.is_terminal else Console(width=width)
+
+
+def io_reason(error: OSError) -> str:
+    """Return the path and the reason of an input or output error in one line."""
+    paths = [str(path) for path in (error.filename, error.filename2) if path is not None]
+    reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
+    return f"{' → '.join(map(repr, paths))}: {reason}" if paths else f"output failed: {reason}"
+
+
+def drop_output() -> None:
+    """Send what stdout still holds to nowhere if it cannot be written (full disk, closed pipe).
+
+    Python would write it again at the end of the process and print a traceback.
+    """
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -12,6 +12,7 @@ import tyro
 from tyro.conf import subcommand
 
 from lgmd_gym.cli import options
+from lgmd_gym.cli.console import drop_output, io_reason
 from lgmd_gym.errors import unknown_name
 
 DESCRIPTION = """Simulate emergency braking on the spike frequency of a locust looming neuron (LGMD).
@@ -50,9 +51,15 @@ def run(argv: list[str] | None = None) -> int:
     try:
         command = _parse(argv)
         name = next(name for name, cls in COMMANDS.items() if isinstance(command, cls))
-        return import_module(f"lgmd_gym.cli.{name}").run(command)
+        code = import_module(f"lgmd_gym.cli.{name}").run(command)
+        sys.stdout.flush()
+        return code
     except (ValueError, TypeError) as error:
         print(f"lgmd-gym: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"lgmd-gym: {io_reason(error)}", file=sys.stderr)
+        drop_output()
         return 2
     except KeyboardInterrupt:
         print("lgmd-gym: interrupted", file=sys.stderr)

@@ -62,16 +62,25 @@ class VideoWriter:
 
     def close(self) -> None:
         """Finish the file."""
-        if self._container is not None:
-            self._container.mux(self._stream.encode(None))
-            self._container.close()
-            self._container = None
+        container, self._container = self._container, None
+        if container is not None:
+            container.mux(self._stream.encode(None))
+            container.close()
 
     def __enter__(self) -> "VideoWriter":
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Finish the file, also after Ctrl-C; after an error, for example a full disk, remove it."""
+        failed = kind is not None and issubclass(kind, Exception)
+        try:
+            self.close()
+        except OSError:
+            failed = True
+            raise
+        finally:
+            if failed:
+                self.path.unlink(missing_ok=True)
 
     def _open(self, size: tuple[int, int]) -> Any:
         """Open the file and return its video stream."""

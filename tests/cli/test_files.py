@@ -1,7 +1,13 @@
 """Files and folders that are complete or absent, and the commands that write them."""
 
+import os
+import subprocess
+import sys
 from contextlib import suppress
+from errno import ENOSPC
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lgmd_gym.cli import main as cli
@@ -9,6 +15,7 @@ from lgmd_gym.cli import paper
 from lgmd_gym.files import check_new_file, complete_file, complete_folder
 from lgmd_gym.gallery import build
 from lgmd_gym.paper import experiments
+from lgmd_gym.video import VideoWriter
 from lgmd_gym.video.clips import batch
 
 
@@ -85,3 +92,38 @@ def test_an_interrupted_command_leaves_no_folder(arguments, module, function, cl
     clips = [str(clip)] if arguments == ["video"] else []
     assert cli.run([*arguments, *clips, "--out", str(tmp_path / "out")]) == 130
     assert [name for name in names(tmp_path) if name.startswith("out")] == []
+
+
+def test_an_input_or_output_error_is_one_line(monkeypatch, capsys):
+    def fail(options):
+        with complete_file(Path("/tmp/never")):
+            raise OSError(ENOSPC, os.strerror(ENOSPC))
+
+    monkeypatch.setattr("lgmd_gym.cli.list.run", fail)
+    assert cli.run(["list"]) == 2
+    assert capsys.readouterr().err == "lgmd-gym: '/tmp/never': No space left on device\n"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="the device is Linux's")
+def test_a_full_disk_behind_stdout_is_one_line():
+    command = [sys.executable, "-m", "lgmd_gym", "list", "cameras"]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stderr) == (2, "lgmd-gym: output failed: No space left on device\n")
+
+
+def test_a_video_on_a_full_disk_is_removed(tmp_path):
+    """The disk is full at the end of the file, or another error ends the block; Ctrl-C keeps the file."""
+    for number, (error, kept) in enumerate(((ValueError, False), (KeyboardInterrupt, True))):
+        path = tmp_path / f"{number}.gif"
+        with suppress(error), VideoWriter(path, 10.0) as writer:
+            writer.write(np.zeros((16, 16, 3), np.uint8))
+            raise error
+        assert path.exists() is kept
+    if Path("/dev/full").exists():
+        (tmp_path / "full.gif").symlink_to("/dev/full")
+        writer = VideoWriter(tmp_path / "other.gif", 10.0)
+        writer.path = tmp_path / "full.gif"
+        with pytest.raises(OSError, match="No space left"), writer:
+            writer.write(np.zeros((16, 16, 3), np.uint8))
+        assert not writer.path.is_symlink()
