@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import product
 
 import gymnasium as gym
 
@@ -12,7 +13,7 @@ from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.episode import make_env
 from lgmd_gym.benchmark.executor import TaskMap
 from lgmd_gym.benchmark.metrics import Counterfactual
-from lgmd_gym.benchmark.rows import Row, key_of
+from lgmd_gym.benchmark.rows import Row, RowKey, key_of
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
@@ -40,9 +41,13 @@ class Plan(ABC):
         self.sensor_configs = {name: config.sensor_config.with_condition(name) for name in config.conditions}
 
     @property
-    @abstractmethod
     def total(self) -> int:
         """Number of episodes."""
+        return len(self.keys())
+
+    @abstractmethod
+    def keys(self) -> set[RowKey]:
+        """Return the keys of all rows of the complete run."""
 
     @abstractmethod
     def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
@@ -75,11 +80,10 @@ class CasePlan(Plan):
         suite = get_suite(config.suite)
         self.suite, self.cases = suite.name, suite.cases
 
-    @property
-    def total(self) -> int:
-        """Number of episodes, those of `no-brake` included."""
-        agents = {NO_BRAKE, *self.config.agents}
-        return len(self.cases) * self.config.seeds * len(self.config.conditions) * len(agents)
+    def keys(self) -> set[RowKey]:
+        """Return the keys of all rows, those of `no-brake` included."""
+        config, cases = self.config, [case.name for case in self.cases]
+        return set(product({NO_BRAKE, *config.agents}, cases, config.seed_range, config.conditions))
 
     def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
         """Run the missing episodes, `no-brake` first, and yield their results as they finish."""

@@ -8,12 +8,10 @@ from pathlib import Path
 from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
 from lgmd_gym.benchmark.executor import SERIAL, Executor, PoolLostError
 from lgmd_gym.benchmark.file_names import series_name
-from lgmd_gym.benchmark.folder import RunFolder
-from lgmd_gym.benchmark.plan import CasePlan, Plan
 from lgmd_gym.benchmark.rows import Row, key_of
-from lgmd_gym.benchmark.suites import TRAFFIC
+from lgmd_gym.benchmark.run_folder import RunFolder
+from lgmd_gym.benchmark.stored_run import make_plan
 from lgmd_gym.benchmark.task import NO_BRAKE, Result
-from lgmd_gym.benchmark.traffic.plan import TrafficPlan
 
 INTERRUPTED = "interrupted"
 
@@ -55,13 +53,16 @@ class Run:
         """Return the incomplete run of a folder.
 
         Raises:
-            ValueError: If the folder contains no run, a damaged one, or one of another version, or if the
-                cluster is not reachable.
+            ValueError: See `RunFolder.reopen`; or if an agent is invalid or the cluster is not reachable.
         """
         folder = RunFolder.reopen(path)
-        config = RunConfig.load(path / RUN_FILE)
-        _check(config, executor)
-        return cls(config, folder, executor)
+        try:
+            config = RunConfig.load(path / RUN_FILE)
+            _check(config, executor)
+            return cls(config, folder, executor)
+        except BaseException:
+            folder.close()
+            raise
 
     @property
     def total(self) -> int:
@@ -120,11 +121,6 @@ class Run:
                 "wall_time": round(wall_time, 3),
             }
         )
-
-
-def make_plan(config: RunConfig) -> Plan:
-    """Return the plan of a configuration."""
-    return TrafficPlan(config) if config.suite == TRAFFIC else CasePlan(config)
 
 
 def _check(config: RunConfig, executor: Executor) -> None:

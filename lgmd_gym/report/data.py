@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.benchmark.case import Case
-from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
+from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.file_names import series_name
-from lgmd_gym.benchmark.folder import read_rows, read_series, read_settings
 from lgmd_gym.benchmark.rows import Row, key_of
+from lgmd_gym.benchmark.stored_run import read_run, read_series, read_settings
 from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.report.images import CapturedFrame, capture_frames
@@ -35,11 +35,11 @@ class ReportData:
         Raises:
             ValueError: If the folder contains no run or a damaged one.
         """
-        rows, config = read_rows(path)[0], RunConfig.load(path / RUN_FILE)
-        suite = get_suite(config.suite)
+        run = read_run(path)
+        config, suite = run.config, get_suite(run.config.suite)
         agents = list(dict.fromkeys([NO_BRAKE, *config.agents]))
         cases = {case.name: case for case in suite.cases}
-        return cls(path, config, read_settings(path), suite.name, rows, agents, cases)
+        return cls(path, config, read_settings(path), suite.name, run.rows, agents, cases)
 
     def series(self, row: Row) -> dict[str, np.ndarray] | None:
         """Return the time series of a row; None if they are not stored."""

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, load_traces, write_froc
-from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
+from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.file_names import case_name, series_name
-from lgmd_gym.benchmark.folder import read_rows, read_series
+from lgmd_gym.benchmark.stored_run import read_run, read_series
 from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import write_summary
@@ -29,7 +29,7 @@ def write_outputs(path: Path, plots: bool = True, report: bool = True) -> list[P
     Raises:
         ValueError: If the folder contains no run or a damaged one.
     """
-    config, rows = RunConfig.load(path / RUN_FILE), read_rows(path)[0]
+    config, rows, _ = read_run(path)
     if not rows:
         return []
     files = [path / "summary.csv"]

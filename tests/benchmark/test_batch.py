@@ -15,11 +15,11 @@ from lgmd_gym.benchmark.case import level_case
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.executor import Executor
 from lgmd_gym.benchmark.file_names import series_name
-from lgmd_gym.benchmark.folder import read_series
 from lgmd_gym.benchmark.metrics import Counterfactual
 from lgmd_gym.benchmark.rows import key_of
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.stored_run import read_series
 from lgmd_gym.benchmark.suites import find_case
 from lgmd_gym.benchmark.task import Task, run_task
 from lgmd_gym.benchmark.units import make_units

@@ -1,6 +1,9 @@
 """Runs of a suite: rows, resumption, errors, and the folder that they write."""
 
 import json
+import os
+import re
+import shutil
 
 import numpy as np
 import pytest
@@ -8,11 +11,16 @@ from support.runs import interrupt, new_run, read_rows, sorted_rows
 
 from lgmd_gym.benchmark import RunConfig
 from lgmd_gym.benchmark import run as run_benchmark
+from lgmd_gym.benchmark.analysis.compare import compare_runs
+from lgmd_gym.benchmark.analysis.trainings import compare_arms
 from lgmd_gym.benchmark.executor import Executor
 from lgmd_gym.benchmark.rows import KEYS
 from lgmd_gym.benchmark.runner import Run
+from lgmd_gym.benchmark.stored_run import read_run
 from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.cli import main as cli
+from lgmd_gym.report.outputs import write_outputs
+from lgmd_gym.report.page import write_report
 
 BOUNDS = ("no-brake", "always-brake", "ttc-oracle", "spike-threshold")
 
@@ -99,9 +107,82 @@ def test_resume_rejects_missing_damaged_and_older_runs(tmp_path):
     (tmp_path / "run" / "run.json").write_text(json.dumps(settings | {"lgmd_gym": "0.0.1"}))
     with pytest.raises(ValueError, match=r"made by lgmd-gym 0.0.1, this is .*; start a new run"):
         Run.resume(tmp_path / "run")
+    (tmp_path / "run" / "run.json").write_text(json.dumps(settings))
     (tmp_path / "run" / "episodes.jsonl").write_text("{}\nnonsense\n{}\n")
     with pytest.raises(ValueError, match="damaged in line 2"):
         Run.resume(tmp_path / "run")
+
+
+def test_second_writer_is_refused_while_the_first_runs(tmp_path, capsys):
+    folder = tmp_path / "run"
+    run = new_run(folder, agents=["no-brake"], seeds=1)
+
+    def resume_meanwhile(row):
+        assert cli.run(["bench", "--resume", str(folder)]) == 2
+        read_run(folder)  # readers need no lock
+        raise KeyboardInterrupt
+
+    assert not run.play(resume_meanwhile)
+    message = capsys.readouterr().err
+    assert f"run folder {str(folder)!r} is in use by process {os.getpid()};" in message
+    assert message.count("\n") == 1
+    assert len(read_rows(folder)) == 1
+    # The end of the first releases the folder; the file that remains holds no lock.
+    resumed = Run.resume(folder)
+    assert resumed.play()
+    assert len(read_rows(folder)) == resumed.total
+
+
+def test_failed_resume_releases_the_folder(tmp_path):
+    folder = tmp_path / "run"
+    new_run(folder, agents=["no-brake"], seeds=1).play(interrupt)
+    original = (folder / "run.toml").read_text()
+    (folder / "run.toml").write_text("nonsense")
+    with pytest.raises(ValueError, match="is not TOML") as failure:
+        Run.resume(folder)
+    (folder / "run.toml").write_text(original)
+    Run.resume(folder).folder.close()
+    assert failure.value  # its traceback keeps the objects of the failed resume
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({}, "line 77 repeats the episode of line 1"),
+        ({"agent": "eta-oracle"}, "line 77 does not belong to the run: eta-oracle, quick/"),
+        ({"seed": 1}, "line 77 does not belong to the run: no-brake, quick/"),
+        ({"condition": "fog"}, "line 77 does not belong to the run"),
+        (
+            {"case": "quick/CCRs/v31"},
+            "line 77 does not belong to the run: no-brake, quick/CCRs/v31, 0",
+        ),
+        ({"suite": "r152"}, "line 77 does not belong to the run"),
+        ({"case": ["quick"]}, "damaged in line 77"),
+        ({"extra": 1}, "line 77 has other columns than line 1, as from another version"),
+        (None, "damaged in line 77"),
+    ],
+)
+def test_repeated_and_foreign_rows_are_refused_alike(quick_run, tmp_path, change, words):
+    folder = tmp_path / "run"
+    shutil.copytree(quick_run.folder.path, folder)
+    row = quick_run.rows[0]
+    wrong = [] if change is None else row | change
+    with (folder / "episodes.jsonl").open("a") as file:
+        file.write(json.dumps(wrong) + "\n")
+    for read in (Run.resume, write_outputs, write_report, compare_runs, compare_arms):
+        with pytest.raises(ValueError, match=re.escape(words)):
+            read(folder, None) if read is compare_runs else read(folder)
+    before = (folder / "episodes.jsonl").read_bytes()
+    assert before == (quick_run.folder.path / "episodes.jsonl").read_bytes() + before.splitlines(True)[-1]
+
+
+def test_refusal_lists_all_lines(quick_run, tmp_path, capsys):
+    folder = tmp_path / "run"
+    shutil.copytree(quick_run.folder.path, folder)
+    with (folder / "episodes.jsonl").open("a") as file:
+        file.writelines(json.dumps(row) + "\n" for row in quick_run.rows[:3])
+    assert cli.run(["compare", str(folder)]) == 2
+    assert "(also to be checked: 2 lines, 78, 79)" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -178,6 +178,7 @@ def test_run_with_failed_episodes_is_rejected(run_folder, tmp_path):
     rows = [json.loads(line) for line in (run_folder / "episodes.jsonl").read_text().splitlines()]
     rows[3]["error"] = "Traceback"
     (tmp_path / "episodes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    (tmp_path / "run.json").write_text((run_folder / "run.json").read_text())
+    for name in ("run.toml", "suite.toml"):
+        (tmp_path / name).write_text((run_folder / name).read_text())
     with pytest.raises(ValueError, match="1 episodes failed; resume it with lgmd-gym bench --resume"):
         compare_arms(tmp_path)

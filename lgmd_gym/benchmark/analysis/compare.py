@@ -5,9 +5,9 @@ from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
-from lgmd_gym.benchmark.folder import read_rows, read_settings
 from lgmd_gym.benchmark.rows import Row, key_of
 from lgmd_gym.benchmark.statistics import Mean, cluster_mean, wilson
+from lgmd_gym.benchmark.stored_run import read_run
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import without_fcw_driver
 from lgmd_gym.benchmark.task import NO_BRAKE
@@ -141,10 +141,10 @@ def paired_difference(quantity: Quantity, pairs: list[tuple[Row, Row]]) -> Diffe
 
 def read_case_rows(path: Path) -> list[Row]:
     """Return the rows of a run folder; raise ValueError for a traffic run."""
-    rows, _ = read_rows(path)
-    if read_settings(path)["suite"] == TRAFFIC:
+    run = read_run(path)
+    if run.config.suite == TRAFFIC:
         raise ValueError(f"{str(path)!r} is a traffic run; its summary.csv holds the rates per 100 km")
-    return rows
+    return run.rows
 
 
 def _agent_pairs(

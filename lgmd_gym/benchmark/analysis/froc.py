@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from lgmd_gym.benchmark.file_names import series_name
-from lgmd_gym.benchmark.folder import read_rows, read_series
 from lgmd_gym.benchmark.metrics import PREMATURE
 from lgmd_gym.benchmark.rows import key_of
 from lgmd_gym.benchmark.statistics import Rate, poisson_interval
+from lgmd_gym.benchmark.stored_run import read_run, read_series
 from lgmd_gym.benchmark.summary import write_csv
 from lgmd_gym.benchmark.task import NO_BRAKE
 
@@ -86,7 +86,7 @@ def load_traces(path: Path) -> list[OpenLoopTrace]:
     Raises:
         ValueError: If the folder contains no run or a damaged one.
     """
-    rows = [row for row in read_rows(path)[0] if row["agent"] == NO_BRAKE and row["error"] is None]
+    rows = [row for row in read_run(path).rows if row["agent"] == NO_BRAKE and row["error"] is None]
     traces = []
     for row in sorted(rows, key=lambda row: (row["condition"], row["case"], row["seed"])):
         series = read_series(path, series_name(key_of(row)))

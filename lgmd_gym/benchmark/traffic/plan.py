@@ -1,13 +1,14 @@
 """The episodes of the traffic suite."""
 
 from collections.abc import Iterable, Iterator
+from itertools import product
 
 import gymnasium as gym
 
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.executor import TaskMap
 from lgmd_gym.benchmark.plan import Plan
-from lgmd_gym.benchmark.rows import Row, key_of
+from lgmd_gym.benchmark.rows import Row, RowKey, key_of
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import Result
 from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
@@ -25,11 +26,15 @@ class TrafficPlan(Plan):
         self.suite = config.suite
         self.kinds: tuple[str, ...] = config.kinds or ()
 
-    @property
-    def total(self) -> int:
-        """Number of episodes."""
+    def keys(self) -> set[RowKey]:
+        """Return the keys of all rows of the complete run."""
         config = self.config
-        return len(config.agents) * len(self.kinds) * config.seeds * len(config.conditions)
+        return {
+            (agent, traffic_case(kind, seed).name, seed, condition)
+            for agent, kind, seed, condition in product(
+                config.agents, self.kinds, config.seed_range, config.conditions
+            )
+        }
 
     def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
         """Run the missing episodes and yield their results as they finish.
