@@ -14,6 +14,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from lgmd_gym._version import __version__
+from lgmd_gym.benchmark.worker_processes import signals_blocked, worker_options
 
 if TYPE_CHECKING:
     from joblib import Parallel
@@ -43,7 +44,9 @@ class TaskMap:
         """Yield the results of `function`, which other processes import by name."""
         from joblib import delayed
 
-        yield from self._parallel(delayed(function)(task) for task in tasks)  # type: ignore[misc]
+        with signals_blocked():  # the call starts the workers
+            results = self._parallel(delayed(function)(task) for task in tasks)
+        yield from results  # type: ignore[misc]
 
     def flatten(self, function: Callable[[Any], Iterator[Any]], tasks: Iterable[Any]) -> Iterator[Any]:
         """Yield every item of the iterators that `function` returns.
@@ -110,8 +113,10 @@ def _local(jobs: int) -> Iterator[TaskMap]:
 
     # joblib replaces a worker that has grown by 300 MB, as it does by loading PyTorch, and warns of a leak.
     warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
+    # Interrupted runs say themselves how many episodes they keep.
+    warnings.filterwarnings("ignore", r"\d+ tasks which were still being processed", UserWarning)
     try:
-        with Parallel(n_jobs=jobs, return_as="generator_unordered") as parallel:
+        with Parallel(n_jobs=jobs, return_as="generator_unordered", **worker_options()) as parallel:
             yield TaskMap(parallel, jobs)
     except BrokenProcessPool:
         raise PoolLostError("a worker process was killed (possibly out of memory)") from None

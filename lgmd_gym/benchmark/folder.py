@@ -4,6 +4,7 @@ import os
 import platform
 import subprocess
 import time
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,7 @@ def provenance() -> dict[str, Any]:
     }
 
 
+@cache
 def _commit() -> str | None:
     """Return the commit of the source tree that holds this package; None for an installed package."""
     if not (Path(__file__).parents[2] / "pyproject.toml").is_file():

@@ -8,6 +8,7 @@ from pathlib import Path
 from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
 from lgmd_gym.benchmark.executor import SERIAL, Executor, PoolLostError
 from lgmd_gym.benchmark.file_names import series_name
+from lgmd_gym.benchmark.folder import provenance
 from lgmd_gym.benchmark.rows import Row, key_of
 from lgmd_gym.benchmark.run_folder import RunFolder
 from lgmd_gym.benchmark.stored_run import make_plan
@@ -45,8 +46,11 @@ class Run:
                 or cannot be created.
         """
         _check(config, executor)
+        provenance()  # slow at its first call; a kill must not leave a folder without settings meanwhile
         folder = RunFolder.create(path)
-        return cls(RunConfig.load(config.save(path)), folder, executor)
+        run = cls(RunConfig.load(config.save(path)), folder, executor)
+        run._describe(False, 0.0)
+        return run
 
     @classmethod
     def resume(cls, path: Path, executor: Executor = SERIAL) -> "Run":

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Union
 import tyro
 from tyro.conf import subcommand
 
+from lgmd_gym._signals import raise_on_signals
 from lgmd_gym.cli import options
 from lgmd_gym.cli.console import drop_output, io_reason
 from lgmd_gym.errors import unknown_name
@@ -25,6 +26,8 @@ Examples:
   lgmd-gym tune --agent nested-fields            search the parameters of a rule
 
 Arguments are in SI units; case names contain speeds in km/h. Every command has its own --help."""
+
+INTERRUPTED = 130  # exit code of a command that was interrupted
 
 # Each command's options; the module `lgmd_gym.cli.<name>` has the function `run(options) -> exit code`.
 COMMANDS: dict[str, type] = {
@@ -47,7 +50,13 @@ def main(argv: list[str] | None = None) -> None:
 
 
 def run(argv: list[str] | None = None) -> int:
-    """Run one command and return its exit code."""
+    """Run one command and return its exit code; Ctrl-C and SIGTERM interrupt it."""
+    with raise_on_signals() as interruption:
+        code = _run(argv)
+        return interruption.exit_code if code == INTERRUPTED else code
+
+
+def _run(argv: list[str] | None) -> int:
     try:
         command = _parse(argv)
         name = next(name for name, cls in COMMANDS.items() if isinstance(command, cls))
@@ -63,7 +72,7 @@ def run(argv: list[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         print("lgmd-gym: interrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
 
 
 def _parse(argv: list[str] | None) -> Any:

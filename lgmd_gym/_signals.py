@@ -1,0 +1,82 @@
+"""SIGINT (Ctrl-C) and SIGTERM for the command `lgmd-gym`: one line and an exit code, no traceback.
+
+Importing this module in the process of the command handles signals until `raise_on_signals`.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import current_thread, main_thread
+from types import FrameType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Interruption:
+    """The last signal that interrupted the command.
+
+    Attributes:
+        number: Number of the signal; 0 before any.
+    """
+
+    number = 0
+
+    def handle(self, number: int, frame: FrameType | None) -> None:
+        """Raise KeyboardInterrupt in the main thread."""
+        self.number = number
+        raise KeyboardInterrupt
+
+    @property
+    def exit_code(self) -> int:
+        """Exit code by the convention of shells: 130 for Ctrl-C, 143 for SIGTERM."""
+        return 128 + (self.number or signal.SIGINT)
+
+
+@contextmanager
+def raise_on_signals() -> Iterator[Interruption]:
+    """Turn signals into KeyboardInterrupt, so that a command keeps what is finished.
+
+    Signals that the parent process ignores, as `nohup` does, stay ignored.
+    """
+    interruption = Interruption()
+    if current_thread() is not main_thread():  # only the main thread may set handlers
+        yield interruption
+        return
+    previous = {number: signal.getsignal(number) for number in SIGNALS}
+    for number in SIGNALS:
+        _set(number, interruption.handle)
+    try:
+        yield interruption
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+def _is_command() -> bool:
+    """Return whether this process is `lgmd-gym` or `python -m lgmd_gym`."""
+    program = sys.argv[0] if sys.argv else ""
+    if program == "-m":  # Python imports the package of the module that it will run
+        return "lgmd_gym" in sys.orig_argv[sys.orig_argv.index("-m") + 1 :][:1]
+    return os.path.basename(program) == "lgmd-gym"
+
+
+def _exit_on_signals() -> None:
+    """Let the process of the command end at a signal during its imports, when there is nothing to keep."""
+    if _is_command():
+        for number in SIGNALS:
+            _set(number, _exit)
+
+
+def _set(number: int, handler: object) -> None:
+    if signal.getsignal(number) is not signal.SIG_IGN:
+        signal.signal(number, handler)  # type: ignore[arg-type]
+
+
+def _exit(number: int, frame: FrameType | None) -> None:
+    os.write(2, b"lgmd-gym: interrupted\n")
+    os._exit(128 + number)
+
+
+_exit_on_signals()

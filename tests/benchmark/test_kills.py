@@ -1,0 +1,141 @@
+"""`bench --jobs 2` that is stopped at random times loses, repeats and leaves nothing."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from support.runs import read_rows, sorted_rows
+
+from lgmd_gym.benchmark import worker_processes
+from lgmd_gym.benchmark.executor import Executor
+from lgmd_gym.cli import main as cli
+
+SUITE = """
+name = "tiny"
+[[cases]]
+family = "CCRs"
+speeds_kmh = [10, 20, 30]
+[[cases]]
+family = "EmptyRoad"
+speeds_kmh = [30]
+"""
+TAG = "LGMD_GYM_TEST_RUN"
+CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9}
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory):
+    path = tmp_path_factory.mktemp("suite") / "tiny.toml"
+    path.write_text(SUITE)
+    return path
+
+
+def bench(suite, out, tag):
+    """Start the command in a session of its own; its processes inherit the variable TAG."""
+    options = ["--agents", "spike-threshold", "ttc-oracle", "--seeds", "8", "--no-plots", "--no-report"]
+    return subprocess.Popen(
+        [sys.executable, "-m", "lgmd_gym", "bench", "--suite", suite, "--out", out, *options],
+        env=os.environ | {TAG: tag},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # The children of a shell's background job ignore SIGINT by default.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+
+
+def processes(tag):
+    """Return the running processes that have inherited a tag."""
+    entry, found = f"{TAG}={tag}\0".encode(), []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if entry in (folder / "environ").read_bytes():
+                found.append(int(folder.name))
+        except OSError:
+            continue
+    return found
+
+
+def segments(pid):
+    """Return the shared memory of a command."""
+    return [name for name in os.listdir("/dev/shm") if f"loky-{pid}-" in name or f"folder_{pid}_" in name]
+
+
+@pytest.fixture(scope="module")
+def complete(suite, tmp_path_factory):
+    """Rows of a complete run, and its duration [s]."""
+    out, started = tmp_path_factory.mktemp("runs") / "complete", time.monotonic()
+    bench(suite, out, "complete").communicate(timeout=120)
+    return sorted_rows(read_rows(out)), time.monotonic() - started
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", CODES)
+@pytest.mark.parametrize("seed", [1])
+def test_stopped_command_leaves_nothing_and_resumes(suite, complete, tmp_path, number, seed):
+    """The signal goes to the command alone (SIGTERM, SIGKILL) or to its workers, too (SIGINT)."""
+    rows, duration = complete
+    out, tag = tmp_path / "run", f"{os.getpid()}-{number}-{seed}"
+    process = bench(suite, out, tag)
+    time.sleep(random.Random(f"{number} {seed}").uniform(0.1, 1.0) * duration)
+    finished = process.poll() is not None
+    if not finished:
+        (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
+    _, errors = process.communicate(timeout=30)
+    # Python restores the default handler of SIGTERM at the very end.
+    expected = (0,) if finished else (CODES[number], -number)
+    assert process.returncode in expected, errors
+    assert "Traceback" not in errors
+    end = time.monotonic() + 10
+    while (left := (processes(tag), segments(process.pid))) != ([], []):
+        assert time.monotonic() < end, left
+        time.sleep(0.1)
+    if out.exists():
+        kept = read_rows(out)
+        assert all(row in rows for row in kept)
+        options = ["--jobs", "1", "--no-plots", "--no-report"]
+        assert cli.run(["bench", "--resume", str(out), *options]) == 0
+        assert sorted_rows(read_rows(out)) == rows
+
+
+def test_sigterm_ends_a_command_like_ctrl_c_with_its_own_code(monkeypatch, capsys):
+    from lgmd_gym.cli import list as command
+
+    for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+        monkeypatch.setattr(command, "run", lambda options, number=number: signal.raise_signal(number))
+        before = [signal.getsignal(item) for item in (signal.SIGINT, signal.SIGTERM)]
+        assert cli.run(["list", "suites"]) == code
+        assert capsys.readouterr().err == "lgmd-gym: interrupted\n"
+        assert [signal.getsignal(item) for item in (signal.SIGINT, signal.SIGTERM)] == before
+
+
+def test_ignored_signals_stay_ignored(monkeypatch):
+    """As under nohup, or in the background of a shell without job control."""
+    from lgmd_gym.cli import list as command
+
+    monkeypatch.setattr(command, "run", lambda options: signal.raise_signal(signal.SIGINT) or 0)
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        assert cli.run(["list", "suites"]) == 0
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def test_signal_that_arrives_while_workers_start_is_kept():
+    blocked = set()
+    with pytest.raises(KeyboardInterrupt), worker_processes.signals_blocked():  # noqa: PT012
+        signal.raise_signal(signal.SIGINT)
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    assert signal.SIGINT in blocked
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+def test_one_job_needs_no_worker_process():
+    with Executor(1).open() as run_tasks:
+        assert sorted(run_tasks(abs, [-2, 1])) == [1, 2]
