@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lgmd_gym._version import __version__
+from lgmd_gym.files import complete_file
 
 PACKAGES = ("numpy", "numba", "gymnasium", "highway-env", "joblib")
 
@@ -37,9 +38,8 @@ def new_folder(path: Path, kind: str) -> Path:
 
 def replace_file(file: Path, text: str) -> None:
     """Write a file atomically: an interruption leaves either the old or the new contents."""
-    fresh = file.with_name(f"{file.name}.new")
-    fresh.write_text(text, encoding="utf-8")
-    fresh.replace(file)
+    with complete_file(file) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def provenance() -> dict[str, Any]:
