@@ -8,6 +8,7 @@ import numpy as np
 from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, move, step_actor, step_ego
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.jit import Arrays, compiled
+from lgmd_gym.envs.dynamics.refined_contact import progress, touch_time
 
 PASSED_DISTANCE = 2.0  # [m] behind the ego's rear beyond which an actor has been passed
 
@@ -93,41 +94,62 @@ def step_bodies(
     step_ego(bodies[0], ego, line, pending, brake, segments, paths, dt)
     for i in range(1, episode.bodies):
         step_actor(bodies[i], segments, paths, dt)
-    fraction, touched = first_contact_of(bodies, episode.bodies, before)
+    time, touched = first_contact_of(bodies, episode.bodies, before, paths, dt)
     if touched == 0:
         return
     for i in range(episode.bodies):
         body = bodies[i]
         if body.kind != ROAD_MARKING:
-            move(body, paths, (1.0 - fraction) * (before[i, 3] - body.travelled))
-            body.speed = (1.0 - fraction) * before[i, 4] + fraction * body.speed
+            distance = body.travelled - before[i, 3]
+            share, speed = progress(before[i, 4], body.speed, distance, dt, time)
+            move(body, paths, (share - 1.0) * distance)
+            body.speed = speed
     here, other = bodies[0], bodies[touched]
     episode.touched, episode.impact_speed = touched, here.speed
     episode.relative_impact_speed = here.speed - other.speed * cos(other.heading - here.heading)
 
 
 @compiled
-def first_contact_of(bodies: np.ndarray, count: int, before: np.ndarray) -> tuple[float, int]:
-    """Return the fraction of a step at which the ego first touches a body, and its index; else `inf` and 0.
+def first_contact_of(
+    bodies: np.ndarray, count: int, before: np.ndarray, paths: np.ndarray, dt: float
+) -> tuple[float, int]:
+    """Return the time at which the ego first touches a body, and its index; else `inf` and 0.
 
     Args:
         bodies: `BODY` records after the step.
         count: Number of bodies.
-        before: x, y and heading before the step, float64, shape (bodies, >= 3).
+        before: x, y, heading, distance travelled and speed before the step, float64, shape (bodies, 5).
+        paths: Table of the paths' cells.
+        dt: Duration of the step [s].
+
+    Returns:
+        The time as a part of the step, and the index.
     """
-    ego = bodies[0]
-    start = Rectangle(before[0, 0], before[0, 1], before[0, 2], ego.length, ego.width)
-    ego_dx, ego_dy = ego.x - start.x, ego.y - start.y
     found, touched = inf, 0
     for i in range(1, count):
-        body = bodies[i]
-        if body.kind == ROAD_MARKING:
+        if bodies[i].kind == ROAD_MARKING:
             continue
-        old = Rectangle(before[i, 0], before[i, 1], before[i, 2], body.length, body.width)
-        fraction = first_touch(start, old, ego_dx - (body.x - old.x), ego_dy - (body.y - old.y))
-        if fraction < found:
-            found, touched = fraction, i
+        if _is_uniform(bodies[0], before[0]) and _is_uniform(bodies[i], before[i]):
+            time = _uniform_touch(bodies[0], bodies[i], before[0], before[i])
+        else:
+            time = touch_time(bodies[0], bodies[i], before[0], before[i], paths, dt)
+        if time < found:
+            found, touched = time, i
     return found, touched
+
+
+@compiled
+def _is_uniform(body: Any, before: Any) -> bool:
+    """Return whether a body has kept its heading and speed in a step."""
+    return body.heading == before[2] and body.speed == before[4]
+
+
+@compiled
+def _uniform_touch(ego: Any, body: Any, ego_before: Any, before: Any) -> float:
+    """Return the time of the first touch of two bodies in straight, uniform motion; see `touch_time`."""
+    start = Rectangle(ego_before[0], ego_before[1], ego_before[2], ego.length, ego.width)
+    old = Rectangle(before[0], before[1], before[2], body.length, body.width)
+    return first_touch(start, old, ego.x - start.x - (body.x - old.x), ego.y - start.y - (body.y - old.y))
 
 
 @compiled

@@ -4,11 +4,10 @@ from math import cos, inf, sin
 
 import numpy as np
 import pytest
-from support.reference_physics import PASSED_DISTANCE, Body, Ego
+from support.reference_physics import PASSED_DISTANCE, Body, Ego, Motion
 
 from lgmd_gym.envs import FAMILIES, BrakingEnv, make_scenario
 from lgmd_gym.envs.dynamics.bend import Pose
-from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH
 
 
@@ -41,24 +40,22 @@ class ReferenceEpisode:
 
     def advance(self, dt):
         everything = [self.ego, *self.bodies]
-        before = [
-            (Rectangle(b.x, b.y, b.heading, b.length, b.width), b.travelled, b.speed) for b in everything
-        ]
+        before = [(body.travelled, body.speed) for body in everything]
         for body in everything:
             body.step(dt)
-        start, found, touched = before[0][0], inf, None
-        for (old, _, _), body, solid in zip(before[1:], self.bodies, self.solid, strict=True):
-            dx = self.ego.x - start.x - (body.x - old.x)
-            dy = self.ego.y - start.y - (body.y - old.y)
-            fraction = first_touch(start, old, dx, dy) if solid else inf
-            if fraction < found:
-                found, touched = fraction, body
+        motions = [Motion(body, *start, dt) for body, start in zip(everything, before, strict=True)]
+        times = [motions[0].first_touch(motion) for motion in motions[1:]]
+        found, touched = inf, None
+        for time, body, solid in zip(times, self.bodies, self.solid, strict=True):
+            if solid and time < found:
+                found, touched = time, body
         if touched is None:
             return
-        for (_, travelled, speed), body, solid in zip(before, everything, [True, *self.solid], strict=True):
+        for motion, body, solid in zip(motions, everything, [True, *self.solid], strict=True):
             if solid:
-                body.move((1.0 - found) * (travelled - body.travelled))
-                body.speed = (1.0 - found) * speed + found * body.speed
+                share, speed = motion.progress(found)
+                body.move((share - 1.0) * motion.distance)
+                body.speed = speed
         along = touched.speed * cos(touched.heading - self.ego.heading)
         self.contact = self.ego.speed, self.ego.speed - along
 

@@ -2,9 +2,10 @@
 
 from bisect import bisect_right
 from collections import deque
-from math import asin, atan, copysign, cos, inf, sin, sqrt, tan
+from math import asin, atan, copysign, cos, hypot, inf, sin, sqrt, tan
 
 from lgmd_gym.envs.dynamics.bend import Pose
+from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, EGO_WIDTH
 
 GAUSS = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 8 / 18), (0.5 + 0.15**0.5, 5 / 18))
@@ -179,3 +180,50 @@ class Ego(Body):
     @property
     def braking(self):
         return 0.0 if self.on_script else max(0.0, self.script.acceleration - self.acceleration)
+
+
+class Motion:
+    """The motion of a body within a step, at constant acceleration up to its standstill."""
+
+    def __init__(self, body, travelled, speed, dt):
+        self.body, self.start, self.speed, self.dt = body, travelled, speed, dt
+        self.distance = body.travelled - travelled
+
+    def progress(self, part):
+        """Return the share of the distance covered at a part of the step, and the speed there."""
+        first, last = self.speed, self.body.speed
+        if first == last:
+            return part, last
+        if last == 0.0:
+            stop = min(2.0 * self.distance / (first * self.dt), 1.0)
+            rest = max(1.0 - part / stop, 0.0) if stop > 0.0 else 0.0
+            return 1.0 - rest * rest, rest * first
+        now = (1.0 - part) * first + part * last
+        return part * (first + now) / (first + last), now
+
+    def outline(self, part):
+        """Return the outline at a part of the step."""
+        share, _ = self.progress(part)
+        pose = self.body.path.pose(self.start + share * self.distance)
+        return Rectangle(*pose, self.body.length, self.body.width)
+
+    def uniform(self):
+        """Return whether heading and speed are those of the start."""
+        return self.speed == self.body.speed and self.outline(0.0).heading == self.body.heading
+
+    def first_touch(self, other):
+        """Return the time of the first touch as a part of the step, or inf."""
+        a, c = self.outline(0.0), other.outline(0.0)
+        reach = hypot(a.length, a.width) / 2 + hypot(c.length, c.width) / 2
+        if hypot(c.x - a.x, c.y - a.y) > reach + abs(self.distance) + abs(other.distance):
+            return inf
+        count = 1 if self.uniform() and other.uniform() else 16
+        for number in range(count):
+            (a, b), (c, d) = (
+                [motion.outline(part / count) for part in (number, number + 1)] for motion in (self, other)
+            )
+            a, c = (x._replace(heading=(x.heading + y.heading) / 2) for x, y in ((a, b), (c, d)))
+            touch = first_touch(a, c, (b.x - a.x) - (d.x - c.x), (b.y - a.y) - (d.y - c.y))
+            if touch <= 1.0:
+                return (number + touch) / count
+        return inf
