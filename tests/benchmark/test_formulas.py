@@ -7,7 +7,7 @@ import pytest
 from support.rows import threat_row
 
 from lgmd_gym.benchmark.analysis.bootstrap import StratifiedBootstrap, interquartile_mean
-from lgmd_gym.benchmark.analysis.compare import compare_rows
+from lgmd_gym.benchmark.analysis.compare import QUANTITIES, compare_rows
 from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.metrics import METRICS, Counterfactual, PairedEpisode, brake_onset, measure
 from lgmd_gym.benchmark.recorder import SERIES
@@ -277,6 +277,17 @@ def test_signs_units_and_interval_of_a_difference():
     assert by_name["speed reduction"].change.value == pytest.approx(-4.8)
     _, by_name = differences(a, a)
     assert by_name["speed reduction"].deviating_high == pytest.approx(wilson(0, 3)[1])
+
+
+def test_quantities_have_the_scale_of_their_unit():
+    assert {item.key: (item.unit, item.scale, item.threats) for item in QUANTITIES} == {
+        "avoided": ("% of threats", 100.0, True),
+        "speed_reduction": ("km/h", 3.6, True),
+        "premature_brake": ("% of threats", 100.0, True),
+        "false_activation": ("% of non-threats", 100.0, False),
+        "ttc_at_brake": ("s", 1.0, True),
+        "stopping_margin": ("m", 1.0, True),
+    }
 
 
 def test_false_activation_is_compared_over_non_threats():

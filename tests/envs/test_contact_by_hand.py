@@ -1,6 +1,6 @@
 """Contact of rectangles, within a step and on paths: every expected value is computed by hand."""
 
-from math import inf, pi
+from math import cos, hypot, inf, pi, sin
 
 import numpy as np
 import pytest
@@ -112,6 +112,21 @@ def test_relative_impact_speed_is_along_the_heading_of_the_ego(heading, relative
     episode, _ = collide({"x": 8.0, "heading": heading, "speed": 4.0})
     assert (episode.touched, episode.impact_speed) == (1, pytest.approx(20.0))
     assert episode.relative_impact_speed == pytest.approx(relative)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.6, pi / 2, 4.0])
+def test_contact_does_not_depend_on_the_axes(turn):
+    """A car from the left at 10 m/s: its front reaches the ego's side after 0.3 s, at 6 of 10 m."""
+
+    def turned(x, y, heading, speed):
+        c, s = cos(turn), sin(turn)
+        return {"x": 7 + x * c - y * s, "y": -9 + x * s + y * c, "heading": heading + turn, "speed": speed}
+
+    episode, table = collide(turned(6.0, -6.0, pi / 2, 10.0), turned(0.0, 0.0, 0.0, 20.0))
+    assert (episode.touched, episode.impact_speed) == (1, pytest.approx(20.0))
+    assert episode.relative_impact_speed == pytest.approx(20.0)
+    moved = hypot(table[0].x - 7, table[0].y + 9), hypot(table[0].x - table[1].x, table[0].y - table[1].y)
+    assert moved == pytest.approx((6.0, 3.0))
 
 
 def test_bodies_stop_at_the_contact():

@@ -196,12 +196,32 @@ def test_braking_costs_from_the_needed_ttc_on(ttc, cost):
     assert reward_of(braking, last, ttc, on_script=1) == pytest.approx(0.05)
 
 
+def test_the_weakest_braking_costs():
+    braking = {"acceleration": -0.08}
+    assert reward_of(braking, {"last_acceleration": -0.08}) == pytest.approx(0.05 - 2 * 0.1 * 0.01)
+
+
 def test_default_weights():
     assert RewardParams().record().tolist() == (10.0, 10.0, 1.0, 2.0, 0.05, 4.0)
     assert RewardParams(jerk=0.0, contact=1e6).record()["contact"] == 1e6
     for value in (-0.001, 1e6 + 1):
         with pytest.raises(ValueError, match=r"jerk must be in \[0, 1e\+06\]"):
             RewardParams(jerk=value)
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("max_deceleration", 0.1, 12), ("max_acceleration", 0, 12), ("latency", 0, 2), ("dead_time", 0, 2),
+        ("build_up", 0, 5), ("regain_acceleration", 0, 12),
+    ],
+)  # fmt: skip
+def test_bounds_of_the_brake(name, low, high):
+    for value in (low, high):
+        assert getattr(BrakeParams(**{name: value}), name) == value
+    for value in (low - 0.001, high + 0.001):
+        with pytest.raises(ValueError, match=name):
+            BrakeParams(**{name: value})
 
 
 def test_default_brake():

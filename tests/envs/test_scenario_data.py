@@ -7,6 +7,7 @@ contact is 5 s after the start.
 import pytest
 
 from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.scenarios.registry import make_scenario
 from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
 
 
@@ -56,3 +57,27 @@ def test_lanes_of_a_road():
             RoadPlan(ego_lane=lane)
     with pytest.raises(ValueError, match="unknown road kind"):
         RoadPlan(kind="curved")
+
+
+@pytest.mark.parametrize(
+    ("name", "ego_kmh", "target_kmh"),
+    [
+        ("CCRs", 50, 0), ("CCRm", 50, 20), ("CCRb", 50, 50), ("Following", 50, 50), ("BrakeRelease", 50, 50),
+        ("CCCscp", 30, 30), ("CrossingClears", 40, 40), ("AdjacentPass", 50, 0), ("PassBetween", 80, 0),
+        ("Overtaken", 80, 110), ("Oncoming", 80, 80), ("CutIn", 50, 55), ("CutOut", 50, 50), ("EmptyRoad", 50, 0),
+        ("SteelPlate", 80, 0), ("BridgeShadow", 80, 0), ("PedestrianPass", 30, 5), ("CurveGuardRail", 50, 0),
+        ("TurnBeforeOncoming", 30, 0), ("LeadTurnsOff", 40, 40), ("CurveObjectOutside", 30, 0),
+        ("LaneClosure", 40, 0),
+    ],
+)  # fmt: skip
+def test_default_speeds(name, ego_kmh, target_kmh):
+    made = make_scenario(name)
+    speeds = {"ego": made.ego_speed, "target": made.actors[0].speed if made.actors else 0.0}
+    assert speeds == pytest.approx({"ego": ego_kmh / 3.6, "target": target_kmh / 3.6})
+
+
+def test_default_distances():
+    assert make_scenario("Following").actors[0].gap == pytest.approx(2 * 50 / 3.6)
+    assert make_scenario("CutOut").actors[0].gap == pytest.approx(1.5 * 50 / 3.6)
+    assert make_scenario("PassBetween").actors[0].gap == pytest.approx(5 * 80 / 3.6)
+    assert make_scenario("PedestrianPass").actors[0].gap == pytest.approx(5 * 25 / 3.6)

@@ -59,7 +59,7 @@ MODULES = {
             "units",
             "episode",
         ),
-        (*_under("tests/envs", *_HAND), "tests/envs/test_formulas.py"),
+        _under("tests/envs", *_HAND, "test_path", "test_formulas"),
         ("__deepcopy__", "DelayLine", "SpeedProfile", "step_environment"),
     ),
     "contact": Module(
@@ -82,7 +82,7 @@ MODULES = {
             *_under("lgmd_gym/camera", "pinhole", "pose"),
             *_under("lgmd_gym/camera/render", "glare", "markings", "texture_sampling"),
         ),
-        tuple(f"tests/camera/test_{name}_by_hand.py" for name in ("geometry", "glare", "ground")),
+        tuple(f"tests/camera/test_{name}_by_hand.py" for name in ("geometry", "glare", "ground", "markings")),
         ("noise_start", "fixed_line", "_fixed", "sample"),
     ),
 }

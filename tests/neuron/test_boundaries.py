@@ -5,7 +5,7 @@ from math import exp, floor, inf
 import numpy as np
 import pytest
 
-from lgmd_gym.neuron import LGMDParams
+from lgmd_gym.neuron import LGMDParams, Response
 from lgmd_gym.neuron import scalars as sc
 from lgmd_gym.neuron.reference import ReferenceLGMD
 
@@ -56,6 +56,7 @@ def test_constants_of_other_options():
 
 
 def test_state_before_the_first_frame():
+    assert slice(0, len(Response._fields)) == sc.RESPONSE
     row, _ = neuron(k_0=0.25, sigma_1=0.75, tau_g=35.0, n_ts=4)
     assert row.tolist() == [0, 0, 0.25, 0.25, 0, 0.75, 35.0, *[0] * 10]
 
