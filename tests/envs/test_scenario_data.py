@@ -64,10 +64,10 @@ def test_lanes_of_a_road():
     [
         ("CCRs", 50, 0), ("CCRm", 50, 20), ("CCRb", 50, 50), ("Following", 50, 50), ("BrakeRelease", 50, 50),
         ("CCCscp", 30, 30), ("CrossingClears", 40, 40), ("AdjacentPass", 50, 0), ("PassBetween", 80, 0),
-        ("Overtaken", 80, 110), ("Oncoming", 80, 80), ("CutIn", 50, 55), ("CutOut", 50, 50), ("EmptyRoad", 50, 0),
-        ("SteelPlate", 80, 0), ("BridgeShadow", 80, 0), ("PedestrianPass", 30, 5), ("CurveGuardRail", 50, 0),
-        ("TurnBeforeOncoming", 30, 0), ("LeadTurnsOff", 40, 40), ("CurveObjectOutside", 30, 0),
-        ("LaneClosure", 40, 0),
+        ("Overtaken", 80, 110), ("Oncoming", 80, 80), ("CutIn", 50, 55), ("CutOut", 50, 50),
+        ("EmptyRoad", 50, 0), ("SteelPlate", 80, 0), ("BridgeShadow", 80, 0), ("PedestrianPass", 30, 5),
+        ("CurveGuardRail", 50, 0), ("TurnBeforeOncoming", 30, 0), ("LeadTurnsOff", 40, 40),
+        ("CurveObjectOutside", 30, 0), ("LaneClosure", 40, 0),
     ],
 )  # fmt: skip
 def test_default_speeds(name, ego_kmh, target_kmh):
