@@ -9,7 +9,17 @@ from support.rows import threat_row
 from lgmd_gym.benchmark.analysis.bootstrap import StratifiedBootstrap, interquartile_mean
 from lgmd_gym.benchmark.analysis.compare import QUANTITIES, compare_rows
 from lgmd_gym.benchmark.episode import Episode
-from lgmd_gym.benchmark.metrics import METRICS, Counterfactual, PairedEpisode, brake_onset, measure
+from lgmd_gym.benchmark.metrics import (
+    BRAKING,
+    EMERGENCY,
+    METRICS,
+    ONSET,
+    PREMATURE,
+    Counterfactual,
+    PairedEpisode,
+    brake_onset,
+    measure,
+)
 from lgmd_gym.benchmark.recorder import SERIES
 from lgmd_gym.benchmark.statistics import (
     Mean,
@@ -43,6 +53,14 @@ def pulse(value, *steps):
     series = np.zeros(STEPS)
     series[list(steps)] = value
     return series
+
+
+def test_limits_of_the_protocols():
+    assert (PREMATURE, EMERGENCY, BRAKING, ONSET) == (4.0, 5.0, 1.0, 0.3)
+    braking = np.where(np.arange(STEPS) > 3, 5.0, 0.0)
+    assert measure(PairedEpisode.of(episode(deceleration=braking), THREAT))["premature_brake"]
+    braking = np.where(np.arange(STEPS) > 4, 5.0, 0.0)
+    assert not measure(PairedEpisode.of(episode(deceleration=braking), THREAT))["premature_brake"]
 
 
 def test_counterfactual_of_an_episode_and_of_its_row():

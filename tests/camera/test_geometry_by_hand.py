@@ -53,6 +53,19 @@ def test_mount_on_the_car():
     assert (lens.yaw, lens.cos_yaw, lens.sin_yaw) == pytest.approx((pi / 2, 0.0, 1.0))
 
 
+def test_options_of_the_mount():
+    def mount(**fields):
+        return mount_of(CameraParams(**fields))
+
+    for fields in ({"shot_noise": 0.05}, {"read_noise": 0.05}, {"shot_noise": 1.0, "read_noise": 1.0}):
+        assert mount(**fields)["noisy"] == 1
+    assert mount(shot_noise=0.0, read_noise=0.0)["noisy"] == 0
+    assert [mount(gaze=gaze)["path"] for gaze in ("path", "fixed")] == [1, 0]
+    assert [mount(vehicles=kind)["box"] for kind in ("box", "car")] == [1, 0]
+    values = mount(seed=17, shutter_s=0.01)
+    assert (values["seed"], values["phase"], values["shutter_s"]) == (17, pytest.approx(0.7), 0.01)
+
+
 def test_gaze_of_the_mount():
     lens = posed({"yaw_deg": 10.0, "pitch_deg": -5.0, "shape": (90, 160), "hfov_deg": 60.0}, heading=0.5)
     assert (lens.yaw, lens.pitch) == pytest.approx((0.5 + radians(10), radians(-5)))

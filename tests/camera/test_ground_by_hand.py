@@ -73,11 +73,11 @@ def test_level_of_the_texture_is_the_footprint_of_a_pixel(focal, row, levels):
     assert 12 - turned.log_x == min(max(int(np.floor(np.log2(across) + 0.5)), 0), 12)
 
 
-def painted(*lines, yaw=0.0, shape=(160, 120)):
+def painted(*lines, yaw=0.0, x=0.0, y=0.0, shape=(160, 120)):
     """Return the area painted by lines (x0, y0, x1, y1, start, striped) in square metres by column [px]."""
     coverage = np.zeros((3, shape[0], shape[1] + 2), np.float32)
     layer = GroundLayer(coverage, np.zeros((16, 3)), np.zeros((20, 2)), np.zeros(8))
-    lens = lens_of(yaw, -pi / 2 + 1e-9, z=10.0, shape=shape)
+    lens = lens_of(yaw, -pi / 2 + 1e-9, z=10.0, x=x, y=y, shape=shape)
     names = LINE.names
     add_lines(
         layer, lens, records(LINE, *(dict(zip(names, map(float, line), strict=True)) for line in lines))
@@ -101,6 +101,21 @@ def test_stripes_are_three_metres_in_four_and_a_third_by_area(yaw, start):
     area = painted((0.0, 0.0, 5 * cos(yaw), 5 * sin(yaw), start, 1.0), yaw=yaw)
     painted_m = {0.0: 3.0 + 0.67, 2.0: 1.0 + 2.67, 4.0: 3.0 + 0.34}[start]
     assert area.sum() == pytest.approx(painted_m * LINE_WIDTH, rel=2e-3)
+
+
+def test_oblique_line():
+    area = painted((1.0, -2.0, 4.0, 2.0, 0.0, 0.0))
+    assert area.sum() == pytest.approx(5 * LINE_WIDTH, rel=1e-4)
+    # Its middle is at (2.5 m, 0): 25 px above the middle of the frame.
+    rows, columns = np.indices(area.shape) + 0.5
+    centre = (area * rows).sum() / area.sum(), (area * columns).sum() / area.sum()
+    assert centre == pytest.approx((80 - 25, 60), abs=0.01)
+
+
+def test_lines_are_relative_to_the_lens():
+    line = (3.0, 1.0, 5.0, 2.0, 0.0, 0.0)
+    moved = (3.0 + 40, 1.0 - 25, 5.0 + 40, 2.0 - 25, 0.0, 0.0)
+    np.testing.assert_allclose(painted(moved, x=40.0, y=-25.0), painted(line), atol=1e-5)
 
 
 def test_ends_of_the_stripes():

@@ -185,5 +185,6 @@ def test_gap_on_a_path_is_measured_along_its_arc():
     gap = gap_on_path(one, Rectangle(*place, 4.0, 2.0), 300.0, 1.0)
     assert gap == pytest.approx(36.0, abs=0.15)  # corners of the arc meet a little earlier
     straight = PathMotion(path_table(ORIGIN), 5.0, 0.0, 4.0, 2.0)
+    assert gap_on_path(straight, Rectangle(45.2, 0.0, 0.0, 4.0, 2.0), 300.0, 0.5) == pytest.approx(36.2)
     for x, expected in ((45.0, 36.0), (308.9, 299.9), (311.0, inf), (2.0, 0.0)):
         assert gap_on_path(straight, Rectangle(x, 0.0, 0.0, 4.0, 2.0), 300.0, 1.0) == pytest.approx(expected)

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from support.records import bodies, record
 
+from lgmd_gym.envs.dynamics.bend import Pose, arc
 from lgmd_gym.envs.dynamics.bodies import BOX, EGO_STATE, ROAD_MARKING, ego_braking
 from lgmd_gym.envs.dynamics.brake import BRAKE, BrakeParams
 from lgmd_gym.envs.dynamics.episode import EPISODE
+from lgmd_gym.envs.dynamics.path import path_table, pose_at
 from lgmd_gym.envs.info import INFO, write_info
 from lgmd_gym.envs.reward import REWARD, RewardParams, step_reward
 from lgmd_gym.envs.surrogate_safety import contact_time, headway, lead_of, rate_to_avoid_crash
@@ -136,6 +138,19 @@ def test_time_to_contact_is_the_first_of_all_bodies():
     table, paths = bodies(EGO, {"x": 44.0}, {"x": 24.0}, {"x": 14.0, "kind": ROAD_MARKING}, {"x": 34.0})
     assert contact_time(table, 5, paths) == pytest.approx(2.0)
     assert contact_time(table, 2, paths) == pytest.approx(4.0)
+
+
+def test_gap_and_time_to_contact_follow_a_bend():
+    """A car at rest 40 m along an arc of 50 m radius: 36 m between the bumpers, less where corners meet."""
+    arc_table = path_table(Pose(0.0, 0.0, 0.0), (arc(50.0, -1.2),))
+    place = pose_at(arc_table, 40.0)
+    table, starts = bodies(EGO, dict(zip(("x", "y", "heading"), place, strict=True)))
+    table[0].path_end = table[1].path = len(arc_table)
+    table[1].path_end = len(arc_table) + 1
+    paths = np.concatenate((arc_table, starts[1:]))
+    gap, lead = lead_of(table, 2, paths)
+    assert (gap, lead) == (pytest.approx(36.0, abs=0.15), 1)
+    assert contact_time(table, 2, paths) == pytest.approx(gap / 10, abs=0.01)
 
 
 def test_headway_and_drac():

@@ -126,7 +126,7 @@ def run_tests(copy: Path, tests: tuple[str, ...], bytecode: bool) -> None:
         os.dup2(nowhere.fileno(), 1)
         os.dup2(nowhere.fileno(), 2)
         options = ["-x", "-q", "-o", "addopts=--import-mode=importlib", "--noconftest"]
-        os._exit(pytest.main([*options, "-p", "no:cacheprovider", "-p", "no:xdist", *tests]))
+        os._exit(pytest.main([*options, "--tb=no", "-p", "no:cacheprovider", *tests]))
 
 
 def start(copy: Path, module: str, bytecode: bool = False) -> BaseProcess:
@@ -220,7 +220,7 @@ def main() -> None:
     total = len(tasks)
     if arguments.limit is not None and arguments.limit < total:
         tasks = random.Random(arguments.seed).sample(tasks, arguments.limit)
-    os.environ["NUMBA_DISABLE_JIT"] = "1"
+    os.environ |= {"NUMBA_DISABLE_JIT": "1", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     for name in PRELOADED:  # once, not in every process
         importlib.import_module(name)
     with tempfile.TemporaryDirectory() as folder:
