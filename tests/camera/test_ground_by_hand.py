@@ -30,13 +30,15 @@ LEVELS = np.arange(13 * 10, dtype=np.int64).reshape(13, 10)
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.5, 2.0])
-def test_texture_is_anchored_to_the_ground(yaw):
+@pytest.mark.parametrize("pitch", [0.0, -0.1, 0.1])
+def test_texture_is_anchored_to_the_ground(yaw, pitch):
     """Pixel [row, column] shows the texel at the ground point of its centre, at any pose."""
-    lens = lens_of(yaw, x=31.7, y=-4.2)
+    lens = lens_of(yaw, pitch, x=31.7, y=-4.2)
     line = texture_line(lens, 70, LEVELS)
-    ahead = 100 / 30.5
+    ahead = 1 / tan(atan(0.305) - pitch)  # row 70 is 30.5 px below the middle
+    depth = ahead * cos(pitch) - sin(pitch)
     for column in (0, 37, 119):
-        right = (column + 0.5 - 60) / 30.5
+        right = (column + 0.5 - 60) / 100 * depth
         x = 31.7 + ahead * cos(yaw) - right * sin(yaw)
         y = -4.2 + ahead * sin(yaw) + right * cos(yaw)
         # The centre of texel n of level i is at (n + 0.5)·2^i texels.

@@ -172,6 +172,8 @@ def test_time_on_paths_of_straight_motion():
     ):
         other = PathMotion(table, travelled, speed, 4.0, 2.0)
         assert time_on_paths(one, other, 10.0, 0.1) == pytest.approx(expected)
+    slow = PathMotion(table, 0.0, 0.05, 4.0, 2.0)
+    assert time_on_paths(slow, PathMotion(table, 4.25, 0.0, 4.0, 2.0), 10.0, 0.1) == pytest.approx(5.0)
     rest = PathMotion(table, 20.0, 0.0, 4.0, 2.0)
     assert time_on_paths(PathMotion(table, 0.0, 0.0, 4.0, 2.0), rest, 10.0, 0.1) == inf
     oncoming = PathMotion(path_table(Pose(30.0, 0.0, pi)), 0.0, 3.0, 4.0, 2.0)

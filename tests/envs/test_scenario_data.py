@@ -81,3 +81,13 @@ def test_default_distances():
     assert make_scenario("CutOut").actors[0].gap == pytest.approx(1.5 * 50 / 3.6)
     assert make_scenario("PassBetween").actors[0].gap == pytest.approx(5 * 80 / 3.6)
     assert make_scenario("PedestrianPass").actors[0].gap == pytest.approx(5 * 25 / 3.6)
+
+
+def test_default_sides():
+    right = {"LeadTurnsOff"}
+    for name in ("TurnBeforeOncoming", "LeadTurnsOff", "CurveObjectOutside", "LaneClosure", "CurveGuardRail"):
+        assert make_scenario(name) == make_scenario(name, left=name not in right)
+    for name in ("CCCscp", "CrossingClears"):
+        assert make_scenario(name) == make_scenario(name, side="right")
+    assert make_scenario("CCRs") == make_scenario("CCRs", beside=False)
+    assert make_scenario("CCCscp") == make_scenario("CCCscp", from_stop=False)
