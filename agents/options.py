@@ -1,22 +1,25 @@
 """Parsing of agent strings and validation of agent options."""
 
 import inspect
-from math import isfinite
+import sys
 from typing import Any
 
 from lgmd_gym.errors import check_keys
 
+MAX_FLOAT = sys.float_info.max  # YAML and JSON have longer integers
+
 
 def positive(name: str, value: Any) -> float:
     """Return `value` as a finite float > 0, or raise ValueError."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value) or value <= 0.0:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value <= MAX_FLOAT:
         raise ValueError(f"{name} must be a number > 0, got {value!r}")
     return float(value)
 
 
 def whole(name: str, value: Any, low: int) -> int:
     """Return `value` as an int >= `low`, or raise ValueError."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or value != int(value) or value < low:
+    number = not isinstance(value, bool) and isinstance(value, int | float) and low <= value <= MAX_FLOAT
+    if not number or value != int(value):
         raise ValueError(f"{name} must be a whole number >= {low}, got {value!r}")
     return int(value)
 

@@ -25,11 +25,15 @@ def check_speed(name: str, value: float, *, zero: bool = False) -> float:
 
 
 def check_finite(name: str, value: float) -> float:
-    """Return `value` as float, or raise ValueError if it is not a finite number."""
+    """Return `value` as float, or raise ValueError if it is a bool or not a finite number."""
     try:
+        if isinstance(value, bool):
+            raise TypeError
         number = float(value)
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be a number, got {value!r}") from None
+    except OverflowError:
+        raise ValueError(f"{name} must be below 1e308, got a longer integer") from None
     if not isfinite(number):
         raise ValueError(f"{name} must be finite, got {value!r}")
     return number

@@ -34,7 +34,7 @@ def run(options: "Bench") -> int:
             _print_tables(benchmark, console)
         for file in write_outputs(path, options.plots, options.report):
             if file.name == "report.html":
-                console.print(f"report: {file}", soft_wrap=True)
+                console.print(f"report: {file}", markup=False, soft_wrap=True)
     except OSError as error:
         benchmark.stop_reason = benchmark.stop_reason or f"{error.strerror} while writing the outputs"
     failed = sum(row["error"] is not None for row in benchmark.rows)
@@ -43,8 +43,10 @@ def run(options: "Bench") -> int:
     if benchmark.stop_reason:
         kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
         resume = f"continue with lgmd-gym bench --resume {path}"
-        console.print(f"{benchmark.stop_reason}: {kept}; {resume}", style="yellow", soft_wrap=True)
-    console.print(f"run folder: {path}", soft_wrap=True)
+        console.print(
+            f"{benchmark.stop_reason}: {kept}; {resume}", style="yellow", markup=False, soft_wrap=True
+        )
+    console.print(f"run folder: {path}", markup=False, soft_wrap=True)
     if not complete and benchmark.stop_reason == INTERRUPTED:
         return 130
     return int(bool(failed or benchmark.stop_reason))

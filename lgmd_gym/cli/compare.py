@@ -8,6 +8,7 @@ from lgmd_gym.benchmark.analysis.plots import difference_figure
 from lgmd_gym.benchmark.analysis.trainings import compare_arms
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Compare
+from lgmd_gym.files import check_new_file
 
 
 def run(options: Compare) -> int:
@@ -20,14 +21,14 @@ def run(options: Compare) -> int:
 
 
 def _compare_pairs(options: Compare, console: Console) -> None:
-    if options.out is not None and options.out.exists():
-        raise ValueError(f"--out {str(options.out)!r} exists; choose another file")
+    if options.out is not None:
+        check_new_file(options.out, "--out")
     comparisons = compare_runs(options.run_a, options.run_b, options.agents)
     for comparison in comparisons:
         console.print(comparison_table(comparison))
     if options.out is not None:
         difference_figure(options.out, comparisons)
-        console.print(f"figure: {options.out}", soft_wrap=True)
+        console.print(f"figure: {options.out}", markup=False, soft_wrap=True)
 
 
 def _compare_arms(options: Compare, arms: tuple[str, ...], console: Console) -> None:

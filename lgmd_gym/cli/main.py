@@ -63,7 +63,7 @@ def _run(argv: list[str] | None) -> int:
         code = import_module(f"lgmd_gym.cli.{name}").run(command)
         sys.stdout.flush()
         return code
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         print(f"lgmd-gym: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     except OSError as error:

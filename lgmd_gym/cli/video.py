@@ -35,7 +35,7 @@ def run(options: Video) -> int:
     out = default_out(options.out, "video")
     with run_folder(out, {"clips": [job.clip for job in jobs], "configs": configs}) as folder:
         results = _process_all(options, jobs, configs, folder)
-    make_console(120).print(f"traces and figures: {out}", soft_wrap=True)
+    make_console(120).print(f"traces and figures: {out}", markup=False, soft_wrap=True)
     return print_errors(results)
 
 

@@ -166,7 +166,12 @@ class TrainConfig:
             arguments["config"] = {**(arguments.get("config") or {}), "action": action}
         if FRAME in self.features.inputs:
             arguments["include_frame"] = True
-        return gym.make(self.env_id, camera=camera or self.camera, **arguments)
+        try:
+            return gym.make(self.env_id, camera=camera or self.camera, **arguments)
+        except gym.error.Error as error:
+            raise ValueError(
+                f"env {self.env_id!r} cannot be made ({error}); see lgmd-gym list envs"
+            ) from None
 
     def make_policy_env(self, split: str) -> PolicyWrapper:
         """Return an environment with the policy's observations; rewards are scaled on "train" only."""

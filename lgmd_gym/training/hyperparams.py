@@ -4,6 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from lgmd_gym.envs.dynamics.units import check_finite
 from lgmd_gym.errors import unknown_name
 
 OFFLINE = "offline"  # the algorithm of `lgmd_gym.training.offline.learner`
@@ -33,13 +34,14 @@ def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> dict[s
     if algo_kwargs.pop("normalize", False):
         raise ValueError("normalize is not supported: PolicyWrapper scales observations by constants")
     values: dict[str, Any] = {"features": _features(algo_kwargs.pop("env_wrapper", None))}
-    for name, convert in (("n_timesteps", float), ("n_envs", float), ("policy", str)):
+    if "policy" in algo_kwargs:
+        values["policy"] = algo_kwargs.pop("policy")
+    for name in ("n_timesteps", "n_envs"):
         if name in algo_kwargs:
-            value = algo_kwargs.pop(name)
-            try:
-                values[name] = value if convert is str else int(convert(value))
-            except (TypeError, ValueError):
-                raise ValueError(f"{name} must be a number, got {value!r}") from None
+            values[name] = int(check_finite(name, algo_kwargs.pop(name)))
+    for name, value in algo_kwargs.items():
+        if isinstance(value, int):
+            check_finite(name, int(value))  # YAML has integers that are no float
     return values | {"algo_kwargs": algo_kwargs}
 
 

@@ -51,6 +51,8 @@ def probe(path: str | Path) -> VideoInfo:
         raise ValueError(f"clip {str(path)!r} {'is not a file' if path.exists() else 'does not exist'}")
     if path.stat().st_size == 0:
         raise ValueError(f"clip {str(path)!r} is empty (0 bytes)")
+    if _is_playlist(path):
+        raise ValueError(f"clip {str(path)!r} is a playlist, not a video; pass the video files that it lists")
     with open_video(path) as (container, stream):
         assert stream.time_base is not None
         frames, stamps, end, file_end = _scan(container, stream)
@@ -65,6 +67,13 @@ def probe(path: str | Path) -> VideoInfo:
         elif container.duration:
             missing = container.duration / 1e6 - file_end
     return VideoInfo(path, fps, frames, variable, max(float(missing), 0.0))
+
+
+def _is_playlist(path: Path) -> bool:
+    """Return whether a file lists other files (HLS, DASH, ffconcat): ffmpeg waits for a live one for ever."""
+    with path.open("rb") as file:
+        head = file.read(4096)
+    return head.startswith((b"#EXTM3U", b"ffconcat")) or b"<MPD" in head
 
 
 @contextmanager

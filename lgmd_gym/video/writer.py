@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.files import check_new_file
+
 SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif")
 
 
@@ -28,10 +30,9 @@ class VideoWriter:
         self.fps, self.quality = fps, quality
         if self.path.suffix.lower() not in SUFFIXES:
             raise ValueError(f"video must have a suffix among {', '.join(SUFFIXES)}, got {str(path)!r}")
-        if self.path.exists():
-            raise ValueError(f"video {str(path)!r} already exists; choose another name")
         if not self.path.parent.is_dir():
             raise ValueError(f"folder {str(self.path.parent)!r} of the video does not exist; create it first")
+        check_new_file(self.path, "video")
         self._container: Any = None
         self._stream: Any = None
         self._count = 0

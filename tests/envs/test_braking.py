@@ -194,6 +194,8 @@ def test_metadata_is_not_shared_between_instances():
     [
         (lambda: make_scenario("CCRs", ego_speed=50), "50 m/s = 180 km/h.*for 50 km/h pass 13.89"),
         (lambda: make_scenario("CCRs", ego_speed=-3), r"ego_speed must be in \(0, 40\] m/s, got -3"),
+        (lambda: make_scenario("CCRs", ego_speed=True), "ego_speed must be a number, got True"),
+        (lambda: make_scenario("CCRs", ego_speed=10**400), "ego_speed must be below 1e308"),
         (lambda: make_scenario("CCRs", ego_speed="fast"), "ego_speed must be a number, got 'fast'"),
         (lambda: make_scenario("CCRs", ego_speed=float("nan")), "ego_speed must be finite"),
         (lambda: make_scenario("CCRx"), "unknown scenario 'CCRx'; did you mean 'CCR"),

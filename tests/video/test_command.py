@@ -83,6 +83,7 @@ def files(tmp_path, clip, monkeypatch):
     folder.mkdir()
     (folder / "good.mkv").write_bytes(clip.read_bytes())
     (folder / "empty.mp4").touch()
+    (folder / "LIST.m3u8").write_text("#EXTM3U\n#EXTINF:9.0,\ngood.mkv\n")
     (folder / "text.mp4").write_text("not a video, " * 50)
     make_test_clip(folder / "sound.m4a", source="sine=duration=1")
     make_test_clip(folder / "dot.mkv", "-vf", "scale=2:2", "-c:v", "ffv1")
@@ -104,6 +105,7 @@ INVALID = [  # (arguments, part of the message)
     (["empty.mp4"], "clip 'empty.mp4' is empty (0 bytes)"),
     (["text.mp4"], "clip 'text.mp4' is truncated or not a video"),
     (["sound.m4a"], "clip 'sound.m4a' has no video stream"),
+    (["LIST.m3u8"], "clip 'LIST.m3u8' is a playlist, not a video; pass the video files that it lists"),
     (["dot.mkv"], "clip 'dot.mkv' is 2×2 px; it must be at least 3×3"),
     (["headless.mp4"], "clip 'headless.mp4' is truncated"),
     (["good.mkv", "--crashes", "unknown.csv"], "line 2: clip 'other' is not among the given clips"),
