@@ -21,11 +21,11 @@ from lgmd_gym.cli import main as cli
 
 LIMIT_S = 20  # time after which a command counts as hanging [s]
 NAMES = (
-    "", " ", "-1", "0", "1e400", "nan", "-inf", "9" * 320, "true", "[red]x", "[/x]", "x" * 300, "\n", "ä€😀", ".",
-    "..", "/", "nodir/x", "nodir/x.png", "/proc/x", "/dev/null", "text.toml", "bool.toml", "list.m3u8", "a/b/c",
-    "quick", "LGMD/CCRs-v0", "spike-threshold", "policy:", "policy:text.toml", "spike-threshold:threshold=1e400",
-    "spike-threshold:threshold=", "os:getcwd", "no.such:Thing", "%s", "$HOME", "~", "*", "a=b", "ego_speed=1e400",
-    "ego_speed=nan", "shade=" + "9" * 400, "x.mp4", "x.gif", "hyper.yml",
+    "", " ", "-1", "0", "1e400", "nan", "-inf", "9" * 320, "true", "[red]x", "[/x]", "x" * 300, "\n", "ä€😀",
+    ".", "..", "/", "nodir/x", "nodir/x.png", "/proc/x", "/dev/null", "text.toml", "bool.toml", "list.m3u8",
+    "a/b/c", "quick", "LGMD/CCRs-v0", "spike-threshold", "policy:", "policy:text.toml",
+    "spike-threshold:threshold=1e400", "spike-threshold:threshold=", "os:getcwd", "no.such:Thing", "%s",
+    "$HOME", "~", "*", "a=b", "ego_speed=1e400", "ego_speed=nan", "shade=" + "9" * 400, "x.mp4", "x.gif", "hyper.yml",
 )  # fmt: skip
 FILES = {
     "text.toml": "not toml",
@@ -73,7 +73,7 @@ def finding(line: list[str]) -> str | None:
             code = cli.run(line)
     except SystemExit as stop:
         code = stop.code or 0
-    except BaseException as error:  # noqa: BLE001  (every other end is a finding)
+    except BaseException as error:  # every other end is a finding
         place = traceback.extract_tb(error.__traceback__)[-1]
         return f"{type(error).__name__}: {str(error)[:120]!r} at {place.filename}:{place.lineno}"
     finally:
