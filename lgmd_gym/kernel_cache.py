@@ -24,7 +24,7 @@ def ensure_kernel_cache(package: Path) -> None:
     try:
         folder = _temporary_folder()
     except OSError:
-        return  # numba's message tells that no folder is writable
+        return  # numba then raises its own error
     os.environ[VARIABLE] = folder
     if "numba" in sys.modules:  # it has read the variable
         sys.modules["numba"].config.CACHE_DIR = folder  # pyright: ignore

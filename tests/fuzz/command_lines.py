@@ -25,7 +25,8 @@ NAMES = (
     ".", "..", "/", "nodir/x", "nodir/x.png", "/proc/x", "/dev/null", "text.toml", "bool.toml", "list.m3u8",
     "a/b/c", "quick", "LGMD/CCRs-v0", "spike-threshold", "policy:", "policy:text.toml",
     "spike-threshold:threshold=1e400", "spike-threshold:threshold=", "os:getcwd", "no.such:Thing", "%s",
-    "$HOME", "~", "*", "a=b", "ego_speed=1e400", "ego_speed=nan", "shade=" + "9" * 400, "x.mp4", "x.gif", "hyper.yml",
+    "$HOME", "~", "*", "a=b", "ego_speed=1e400", "ego_speed=nan", "shade=" + "9" * 400, "x.mp4", "x.gif",
+    "hyper.yml",
 )  # fmt: skip
 FILES = {
     "text.toml": "not toml",
