@@ -164,7 +164,7 @@ def test_quality_sets_the_file_size(tmp_path):
 
 def test_the_writer_rejects_invalid_files_and_pictures(tmp_path, clip):
     for path, message in (
-        (clip, "already exists"),
+        (clip, "exists; choose another file"),
         (tmp_path / "clip.txt", "must have a suffix among .mp4"),
         (tmp_path / "nowhere" / "clip.mp4", "does not exist; create it first"),
     ):
