@@ -9,7 +9,7 @@ from lgmd_gym.agents.field_rules import DangerZone, NestedFields
 from lgmd_gym.agents.image_rules import FlowDivergence, FrameDifference
 from lgmd_gym.agents.options import check_options, parse_agent
 from lgmd_gym.agents.oracles import EtaOracle, StoppingDistanceOracle, TauOracle, TTCOracle
-from lgmd_gym.agents.policies.policy import Policy
+from lgmd_gym.agents.policies.policy import Policy, shipped_policies
 from lgmd_gym.agents.rule import Rule
 from lgmd_gym.agents.spike_rules import AdaptiveThreshold, Graded, SpeedGated, SpikeThreshold
 from lgmd_gym.agents.stopping_zone import StoppingZone
@@ -58,7 +58,7 @@ def make_agent(text: str) -> Agent:
         raise ValueError(f"agent {text!r} contains a comma before its options; separate agents by spaces")
     if name == Policy.name:
         return Policy(rest)
-    if name not in AGENTS and rest.partition(":")[0].isidentifier():
+    if _is_user_class(name, rest):
         return make_user_agent(text)
     name, options = parse_agent(text)
     if name not in AGENTS:
@@ -67,3 +67,23 @@ def make_agent(text: str) -> Agent:
     if not issubclass(agent, Rule):  # the parameters of a rule check their own names
         check_options(name, agent, options)
     return agent(**options)
+
+
+def outside_code(text: str) -> str | None:
+    """Return what `make_agent` would execute from outside this package; None for nothing.
+
+    Args:
+        text: Agent string, see `make_agent`.
+
+    Example:
+        >>> outside_code("my_module:MyAgent")
+        "module 'my_module'"
+    """
+    name, _, rest = text.partition(":")
+    if name == Policy.name:
+        return None if rest in shipped_policies() else f"policy file {rest!r}"
+    return f"module {name!r}" if _is_user_class(name, rest) else None
+
+
+def _is_user_class(name: str, rest: str) -> bool:
+    return name not in AGENTS and rest.partition(":")[0].isidentifier()

@@ -1,7 +1,10 @@
 """`Policy`: a stable-baselines3 model as an agent, and the card in its file."""
 
 import json
+import sys
 import zipfile
+from functools import cache
+from multiprocessing import current_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +50,8 @@ class Policy(Agent):
         self.card = read_card(file)
         self.features = FeatureConfig.from_dict(self.card["features"])
         self._history = FeatureHistory(self.features)
+        if file.parent != SHIPPED:
+            _announce(file)
         self.model = _load_model(file, self.card["algo"])
         self.reset()
 
@@ -133,6 +138,13 @@ def write_card(path: Path, card: dict[str, Any]) -> None:
     """Add a card to the zip file of a stable-baselines3 model."""
     with zipfile.ZipFile(path, "a") as file:
         file.writestr(CARD, json.dumps(card, indent=1))
+
+
+@cache
+def _announce(path: Path) -> None:
+    """Print once that a file is unpickled; worker processes leave it to their parent."""
+    if current_process().name == "MainProcess":
+        print(f"lgmd-gym: unpickling policy {str(path)!r}, which can run any code", file=sys.stderr)
 
 
 def _load_model(path: Path, algo: str) -> Any:

@@ -54,7 +54,7 @@ def run(
         benchmark = Run.new(config, Path(folder or Path(spare) / "run"), executor)
         complete = benchmark.play()
         if folder is not None:
-            write_outputs(benchmark.folder.path, plots, report)
+            write_outputs(benchmark.folder.path, plots, report, trust=True)
         if not complete:
             kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
             raise RuntimeError(f"{benchmark.stop_reason}: {kept}")

@@ -13,6 +13,7 @@ from lgmd_gym.benchmark.rows import Row, key_of
 from lgmd_gym.benchmark.run_folder import RunFolder
 from lgmd_gym.benchmark.stored_run import make_plan
 from lgmd_gym.benchmark.task import NO_BRAKE, Result
+from lgmd_gym.benchmark.trust import check_trust
 
 INTERRUPTED = "interrupted"
 
@@ -53,17 +54,26 @@ class Run:
         return run
 
     @classmethod
-    def resume(cls, path: Path, executor: Executor = SERIAL) -> "Run":
-        """Return the incomplete run of a folder.
+    def resume(cls, path: Path, executor: Executor = SERIAL, trust: bool = False) -> "Run":
+        """Return the run of a folder; that of a complete one loads no agent.
+
+        Args:
+            path: Run folder.
+            executor: Worker processes or cluster that run the missing episodes.
+            trust: Whether to load agents from modules and policy files that the folder names.
 
         Raises:
-            ValueError: See `RunFolder.reopen`; or if an agent is invalid or the cluster is not reachable.
+            ValueError: See `RunFolder.reopen`; or if an agent is invalid or not trusted, or the cluster is
+                not reachable.
         """
         folder = RunFolder.reopen(path)
         try:
             config = RunConfig.load(path / RUN_FILE)
-            _check(config, executor)
-            return cls(config, folder, executor)
+            run = cls(config, folder, executor)
+            if len(run.rows) < run.total:
+                check_trust(config.agents, path / RUN_FILE, trust)
+                _check(config, executor)
+            return run
         except BaseException:
             folder.close()
             raise

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 def run(options: "Bench") -> int:
     """Run a suite and print its summary; return 0 if complete, 1 for failed episodes, 130 for Ctrl-C."""
+    from lgmd_gym.agents.registry import outside_code
     from lgmd_gym.benchmark.executor import Executor
     from lgmd_gym.benchmark.runner import INTERRUPTED
     from lgmd_gym.report.outputs import write_outputs
@@ -32,7 +33,7 @@ def run(options: "Bench") -> int:
     try:
         if benchmark.rows:
             _print_tables(benchmark, console)
-        for file in write_outputs(path, options.plots, options.report):
+        for file in write_outputs(path, options.plots, options.report, _trust(options)):
             if file.name == "report.html":
                 console.print(f"report: {file}", markup=False, soft_wrap=True)
     except OSError as error:
@@ -43,6 +44,7 @@ def run(options: "Bench") -> int:
     if benchmark.stop_reason:
         kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
         resume = f"continue with lgmd-gym bench --resume {path}"
+        resume += " --trust" if any(map(outside_code, benchmark.config.agents)) else ""
         console.print(
             f"{benchmark.stop_reason}: {kept}; {resume}", style="yellow", markup=False, soft_wrap=True
         )
@@ -50,6 +52,11 @@ def run(options: "Bench") -> int:
     if not complete and benchmark.stop_reason == INTERRUPTED:
         return 130
     return int(bool(failed or benchmark.stop_reason))
+
+
+def _trust(options: "Bench") -> bool:
+    """Return whether agents may run code from outside the package: those of --agents may."""
+    return options.trust or (options.resume is None and options.config is None)
 
 
 def _cluster(options: "Bench") -> str | None:
@@ -65,7 +72,7 @@ def _resume(options: "Bench", executor: "Executor", console: Console) -> "Run":
     from lgmd_gym.benchmark.runner import Run
 
     assert options.resume is not None
-    benchmark = Run.resume(options.resume, executor)
+    benchmark = Run.resume(options.resume, executor, options.trust)
     repaired = " after removal of an incomplete last line" if benchmark.folder.repaired else ""
     console.print(f"resuming with {len(benchmark.rows)} of {benchmark.total} episodes{repaired}")
     return benchmark
@@ -74,6 +81,7 @@ def _resume(options: "Bench", executor: "Executor", console: Console) -> "Run":
 def _new(options: "Bench", executor: "Executor") -> "Run":
     from lgmd_gym.benchmark.config import RunConfig
     from lgmd_gym.benchmark.runner import Run
+    from lgmd_gym.benchmark.trust import check_trust
 
     names = ("suite", "agents", "seeds", "first_seed", "conditions", "camera")
     values: dict[str, Any] = {name: getattr(options, name) for name in names}
@@ -86,6 +94,7 @@ def _new(options: "Bench", executor: "Executor") -> "Run":
         raise ValueError(f"--config replaces {flags}; remove the options, or change the file")
     else:
         config = RunConfig.load(options.config)
+        check_trust(config.agents, options.config, options.trust)
     default = Path("runs") / f"{Path(config.suite).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
     return Run.new(config, options.out or default, executor)
 

@@ -48,6 +48,8 @@ class Bench:
     """run.toml of an earlier run to repeat; replaces the options above."""
     resume: File = None
     """Folder of an interrupted run; runs the missing episodes with the settings of that run."""
+    trust: bool = False
+    """Load modules and policy files of agents that --resume or --config names; they can run any code."""
     jobs: int = 2
     """Number of processes."""
     backend: Literal["processes", "dask"] = "processes"

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.agents.registry import outside_code
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.file_names import series_name
@@ -27,9 +28,10 @@ class ReportData:
     rows: list[Row]
     agents: list[str]  # no-brake first
     cases: dict[str, Case]
+    trust: bool  # whether agents from outside this package may be loaded
 
     @classmethod
-    def load(cls, path: Path) -> "ReportData":
+    def load(cls, path: Path, trust: bool = False) -> "ReportData":
         """Read a run folder.
 
         Raises:
@@ -39,13 +41,20 @@ class ReportData:
         config, suite = run.config, get_suite(run.config.suite)
         agents = list(dict.fromkeys([NO_BRAKE, *config.agents]))
         cases = {case.name: case for case in suite.cases}
-        return cls(path, config, read_settings(path), suite.name, run.rows, agents, cases)
+        return cls(path, config, read_settings(path), suite.name, run.rows, agents, cases, trust)
+
+    @property
+    def agents_not_loaded(self) -> list[str]:
+        """Agents whose code is outside this package and not trusted."""
+        return [] if self.trust else [agent for agent in self.agents if outside_code(agent)]
 
     def series(self, row: Row) -> dict[str, np.ndarray] | None:
         """Return the time series of a row; None if they are not stored."""
         return read_series(self.path, series_name(key_of(row)))
 
     def frames(self, row: Row, decisions: dict[str, int]) -> list[CapturedFrame]:
-        """Return camera frames of a row's episode, see `capture_frames`."""
+        """Return camera frames of a row's episode, see `capture_frames`; none of `agents_not_loaded`."""
+        if row["agent"] in self.agents_not_loaded:
+            return []
         sensor_config = self.config.sensor_config.with_condition(row["condition"])
         return capture_frames(self.cases[row["case"]], row["agent"], row["seed"], sensor_config, decisions)

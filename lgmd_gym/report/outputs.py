@@ -15,13 +15,14 @@ from lgmd_gym.plotting.figures import episode_figure
 from lgmd_gym.report.page import write_report
 
 
-def write_outputs(path: Path, plots: bool = True, report: bool = True) -> list[Path]:
+def write_outputs(path: Path, plots: bool = True, report: bool = True, trust: bool = False) -> list[Path]:
     """Write summary.csv, and for a suite of cases plots/, froc.csv and report.html, into a run folder.
 
     Args:
         path: Run folder; a run without rows gets no files.
         plots: Whether to draw one PNG per case.
         report: Whether to write report.html.
+        trust: See `write_report`.
 
     Returns:
         The files written.
@@ -44,7 +45,7 @@ def write_outputs(path: Path, plots: bool = True, report: bool = True) -> list[P
         files.append(path / "froc.csv")
         write_froc(files[-1], froc_curves(traces), LEAD_TIME)
     if report:
-        files.append(write_report(path))
+        files.append(write_report(path, trust))
     return files
 
 

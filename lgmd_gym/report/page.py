@@ -30,17 +30,22 @@ from lgmd_gym.report.selection import extreme_episodes, hardest_false_activation
 BANDS = ("red", "brown", "orange", "yellow", "green")
 
 
-def write_report(path: Path) -> Path:
+def write_report(path: Path, trust: bool = False) -> Path:
     """Write `report.html` into a run folder and return its path.
 
     Only the episodes whose camera frames are shown are simulated again.
+
+    Args:
+        path: Run folder.
+        trust: Whether to load agents from modules and policy files that the folder names. Otherwise the
+            report shows no camera frames of these agents.
 
     Raises:
         ValueError: If the folder contains no run or a damaged one.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    data = ReportData.load(path)
+    data = ReportData.load(path, trust)
     environment = Environment(
         loader=PackageLoader("lgmd_gym.report", "."), autoescape=True, undefined=StrictUndefined
     )
@@ -122,13 +127,13 @@ def _episodes(data: ReportData) -> list[dict[str, Any]]:
     return episodes
 
 
-def _false_activations(data: ReportData) -> list[tuple[Row, CapturedFrame]]:
-    """Return false activations with the camera frame at which braking begins."""
+def _false_activations(data: ReportData) -> list[tuple[Row, CapturedFrame | None]]:
+    """Return false activations with the camera frame at which braking begins, if it may be drawn."""
     rows = hardest_false_activations(without_fcw_driver(data.rows), data.agents, data.config.first_seed)
-    captured = []
+    captured: list[tuple[Row, CapturedFrame | None]] = []
     for row in rows:
         if (series := data.series(row)) is not None:
             decisions = key_decisions(series)
             onset = {"braking begins": decisions.get("braking begins", decisions["end"])}
-            captured += [(row, frame) for frame in data.frames(row, onset)]
+            captured += [(row, frame) for frame in data.frames(row, onset) or [None]]
     return captured

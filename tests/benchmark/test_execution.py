@@ -194,7 +194,7 @@ def test_faulty_agents_become_error_rows(short_suite, tmp_path, monkeypatch):
     for row in failed:
         assert words[row["agent"].split(":")[1]] in row["error"]
     # Resuming replays the failed episodes without duplicate rows.
-    again = Run.resume(tmp_path / "run")
+    again = Run.resume(tmp_path / "run", trust=True)
     assert len(again.rows) == 3
     assert again.play()
     assert sorted_keys(read_rows(tmp_path / "run")) == sorted_keys(run.rows)
