@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lgmd_gym import _signals  # noqa: F401  (before the other imports, which take half a second)
+from lgmd_gym import _signals  # noqa: F401  # pyright: ignore[reportUnusedImport]  (before slow imports)
 from lgmd_gym._version import __version__
 from lgmd_gym.envs.registration import register_envs
 from lgmd_gym.envs.traffic.registration import register_traffic

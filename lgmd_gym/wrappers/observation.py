@@ -183,7 +183,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
 
     def _check_frequency(self, options: dict[str, Any] | None) -> None:
         """Refuse a simulation frequency in the options of a reset before the environment applies it."""
-        config = (options or {}).get("config") or {}
+        config: dict[str, Any] = (options or {}).get("config") or {}
         if "simulation_frequency" in config:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # _build_sensors warns

@@ -153,12 +153,13 @@ def test_first_of_several_contacts():
     rows = [{"x": 12.0}, {"x": 10.0, "kind": BOX}, {"x": 7.0, "kind": ROAD_MARKING}, {"x": 11.0}]
     episode, table = collide(rows)
     assert (episode.touched, table[0].x) == (2, pytest.approx(6.0))
-    before = np.array([(0.0, 0.0, 0.0), (12.0, 0.0, 0.0), (10.0, 0.0, 0.0)])
-    table, _ = bodies({"x": 10.0}, {"x": 12.0}, {"x": 10.0})
-    assert first_contact_of(table, 3, before) == (pytest.approx(0.6), 2)
-    assert first_contact_of(table, 2, before) == (pytest.approx(0.8), 1)
-    assert first_contact_of(table, 1, before) == (inf, 0)
-    assert first_contact_of(bodies({"x": 10.0}, {"x": 18.0})[0], 2, before) == (inf, 0)
+    table, paths = bodies({"x": 10.0, "speed": 20.0}, {"x": 12.0}, {"x": 10.0})
+    before = np.array([(0.0, 0.0, 0.0, 0.0, 20.0), (12.0, 0.0, 0.0, 0.0, 0.0), (10.0, 0.0, 0.0, 0.0, 0.0)])
+    assert first_contact_of(table, 3, before, paths, 0.5) == (pytest.approx(0.6), 2)
+    assert first_contact_of(table, 2, before, paths, 0.5) == (pytest.approx(0.8), 1)
+    assert first_contact_of(table, 1, before, paths, 0.5) == (inf, 0)
+    table, paths = bodies({"x": 10.0, "speed": 20.0}, {"x": 18.0})
+    assert first_contact_of(table, 2, before, paths, 0.5) == (inf, 0)
 
 
 def test_time_on_paths_of_straight_motion():

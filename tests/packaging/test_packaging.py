@@ -153,7 +153,8 @@ def test_import_is_fast():
 def test_the_package_folder_contains_few_modules():
     flat = {path.name for path in (ROOT / "lgmd_gym").glob("*.py")}
     assert flat == {
-        "__init__.py", "__main__.py", "_signals.py", "_version.py", "errors.py", "files.py", "kernel_cache.py",
+        "__init__.py", "__main__.py", "_signals.py", "_version.py",
+        "errors.py", "files.py", "kernel_cache.py",
     }  # fmt: skip
 
 
