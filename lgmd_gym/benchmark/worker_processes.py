@@ -4,7 +4,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -31,6 +31,20 @@ def signals_blocked() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, previous)
+
+
+def run_parallel(calls: Iterable[Any], jobs: int) -> Iterator[Any]:
+    """Run calls in `jobs` worker processes and return their results in order, as they finish.
+
+    Args:
+        calls: Calls made with `joblib.delayed`.
+        jobs: Number of processes; 1 for this process.
+    """
+    from joblib import Parallel
+
+    parallel: Any = Parallel(n_jobs=jobs, return_as="generator", **worker_options())
+    with signals_blocked():
+        return parallel(calls)
 
 
 def _watch_parent(parent: int) -> None:

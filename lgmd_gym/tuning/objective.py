@@ -13,7 +13,7 @@ from math import inf
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from lgmd_gym.agents import BRAKE, HOLD, Agent, Rule, make_agent
 from lgmd_gym.benchmark.case import Case, level_case
@@ -23,6 +23,7 @@ from lgmd_gym.benchmark.rows import Row, make_row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.task import Task, run_task
+from lgmd_gym.benchmark.worker_processes import run_parallel
 
 FIRST_SEED = {"train": 1000, "validation": 2000}  # of the false-reaction suite; reports use seeds from 0
 MAX_CACHED = 4  # sensor configurations whose recordings are kept
@@ -174,8 +175,7 @@ class Objective:
         return rows
 
     def _map(self, function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]]) -> list[Any]:
-        results: Any = Parallel(n_jobs=self.jobs)(delayed(function)(*each) for each in arguments)
-        return list(results)
+        return list(run_parallel((delayed(function)(*each) for each in arguments), self.jobs))
 
 
 def is_latching(agent: Agent) -> bool:

@@ -87,7 +87,7 @@ def test_stopped_command_leaves_nothing_and_resumes(suite, complete, tmp_path, n
     finished = process.poll() is not None
     if not finished:
         (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
-    _, errors = process.communicate(timeout=30)
+    _, errors = process.communicate(timeout=120)
     # Python restores the default handler of SIGTERM at the very end.
     expected = (0,) if finished else (CODES[number], -number)
     assert process.returncode in expected, errors

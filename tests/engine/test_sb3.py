@@ -93,6 +93,7 @@ def test_ppo_trains_on_the_engine():
 
 
 @pytest.mark.filterwarnings("error")
+@pytest.mark.usefixtures("moviepy")
 def test_what_the_library_calls(tmp_path):
     engine = SB3VecEnv("LGMD/CCRs-v0", 2, render_mode="rgb_array", camera=None)
     engine.seed(1)

@@ -14,7 +14,8 @@ from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
 def test_highest_scripted_speed():
     profile = (Segment(start=1.0, acceleration=1.0, final_speed=12.0),)
     assert Scenario(family="x", ego_speed=10.0, duration=1.0, ego_profile=profile).top_speed == 12.0
-    assert Scenario(family="x", ego_speed=14.0, duration=1.0, ego_profile=profile).top_speed == 14.0
+    braking = (Segment(start=1.0, acceleration=-1.0, final_speed=12.0),)
+    assert Scenario(family="x", ego_speed=14.0, duration=1.0, ego_profile=braking).top_speed == 14.0
     assert Scenario(family="x", ego_speed=0.0, duration=1.0, ego_profile=profile).top_speed == 12.0
     with pytest.raises(ValueError, match="ego_speed"):
         Scenario(family="x", ego_speed=0.0, duration=1.0)

@@ -12,9 +12,10 @@ from typing import Any, TypeAlias
 
 import gymnasium as gym
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from lgmd_gym.agents.policies.features import FRAME, SCALES, shrink_frame
+from lgmd_gym.benchmark.worker_processes import run_parallel
 from lgmd_gym.training.offline.braking_outcomes import STRIDE, BrakingOutcome, braking_outcomes
 
 MINIMAL_CAMERA = {"name": "wide", "shape": (8, 8)}  # of the environment that is copied and replayed
@@ -54,8 +55,7 @@ RecordFunction: TypeAlias = Callable[[range], list[list[RecordedEpisode]]]
 def record_parallel(record: RecordFunction, seeds: range, jobs: int = 1) -> Iterator[list[RecordedEpisode]]:
     """Yield the episodes of each seed, recorded by `jobs` processes with the method of a recorder."""
     chunks = [seeds[start : start + CHUNK_SIZE] for start in range(0, len(seeds), CHUNK_SIZE)]
-    results: Any = Parallel(n_jobs=jobs, return_as="generator")(delayed(record)(chunk) for chunk in chunks)
-    for by_seed in results:
+    for by_seed in run_parallel((delayed(record)(chunk) for chunk in chunks), jobs):
         yield from by_seed
 
 
