@@ -3,6 +3,7 @@
 import json
 import sys
 import zipfile
+import zlib
 from functools import cache
 from multiprocessing import current_process
 from pathlib import Path
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
 
 CARD = "lgmd_gym.json"  # member of the model's zip file
+_ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError)
 SHIPPED = Path(__file__).parent  # folder of the policies in this package
 
 
@@ -53,7 +55,15 @@ class Policy(Agent):
         if file.parent != SHIPPED:
             _announce(file)
         self.model = _load_model(file, self.card["algo"])
+        self._check_model(file)
         self.reset()
+
+    def _check_model(self, file: Path) -> None:
+        """Raise ValueError unless the inputs and actions of the model are those of the card."""
+        inputs = set(getattr(self.model.observation_space, "spaces", ()))
+        actions, demands = getattr(self.model.action_space, "n", None), self.card["demands"]
+        if inputs != set(self.features.inputs) or actions != (len(demands) if demands else None):
+            raise ValueError(f"policy {str(file)!r}: model and card do not belong together; train it again")
 
     @property
     def camera(self) -> "CameraSpec":
@@ -123,15 +133,34 @@ def read_card(path: Path) -> dict[str, Any]:
     """Return the card of a policy file.
 
     Raises:
-        ValueError: If the file does not exist or has no card.
+        ValueError: If the file does not exist or has no card, or if the card is damaged.
     """
     try:
         with zipfile.ZipFile(path) as file:
-            return json.loads(file.read(CARD))
+            card = json.loads(file.read(CARD))
     except OSError as error:
         raise ValueError(f"policy {str(path)!r} cannot be read: {error.strerror or error}") from None
-    except (zipfile.BadZipFile, KeyError, ValueError):
+    except (KeyError, *_ZIP_ERRORS):
         raise ValueError(f"{str(path)!r} is not a policy file: it contains no {CARD}") from None
+    try:
+        _check_card(card)
+    except (AttributeError, TypeError, ValueError) as error:
+        raise ValueError(f"policy {str(path)!r}: the card is damaged ({error}); train it again") from None
+    return card
+
+
+def _check_card(card: Any) -> None:
+    """Raise AttributeError, TypeError or ValueError unless a card describes a policy."""
+    from lgmd_gym.sensing.cameras import make_cameras  # imports numba, which takes half a second
+
+    missing = [key for key in ("algo", "camera", "demands", "features") if key not in card]
+    if missing:
+        raise ValueError(f"{', '.join(missing)} missing")
+    FeatureConfig.from_dict(card["features"])
+    make_cameras(card["camera"])
+    for demand in card["demands"] or ():
+        if isinstance(demand, bool) or not isinstance(demand, int | float) or not -1.0 <= demand <= 1.0:
+            raise ValueError(f"demand {demand!r} is not a number in [-1, 1]")
 
 
 def write_card(path: Path, card: dict[str, Any]) -> None:
@@ -154,4 +183,8 @@ def _load_model(path: Path, algo: str) -> Any:
     except ImportError:
         raise ValueError('a policy requires stable-baselines3; pip install "lgmd-gym[train]"') from None
     torch.set_num_threads(1)  # small network; episodes run in parallel processes
-    return getattr(stable_baselines3, algo.upper()).load(path, device="cpu")
+    try:
+        return getattr(stable_baselines3, str(algo).upper()).load(path, device="cpu")
+    except Exception as error:  # of the archive, pickle, PyTorch or stable-baselines3
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        raise ValueError(f"policy {str(path)!r} cannot be loaded ({reason}); train it again") from None

@@ -77,12 +77,19 @@ def read_settings(path: Path) -> dict[str, Any]:
 
 
 def read_series(path: Path, name: str) -> dict[str, np.ndarray] | None:
-    """Return the time series in `traces/<name>.npz` of a run folder, or None if there is no such file."""
+    """Return the time series in `traces/<name>.npz` of a run folder, or None if there is no such file.
+
+    Raises:
+        ValueError: If the file is damaged.
+    """
     file = path / "traces" / f"{name}.npz"
     if not file.exists():
         return None
-    with np.load(file) as series:
-        return dict(series)
+    try:
+        with np.load(file) as series:
+            return dict(series)
+    except Exception:  # errors of the archive, its compression or its arrays, or of the file system
+        raise ValueError(f"{str(file)!r} is damaged; remove it to leave its episode out") from None
 
 
 def _parse(file: Path) -> tuple[list[Row], bool]:

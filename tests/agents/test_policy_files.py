@@ -1,0 +1,63 @@
+"""Damaged policy files are refused in one line."""
+
+import json
+import zipfile
+
+import pytest
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.policies.policy import CARD, SHIPPED
+
+SOURCE = SHIPPED / "zones.zip"
+
+
+def copy_with_card(path, **values):
+    """Copy the shipped policy with changed values of its card; None deletes a value."""
+    with zipfile.ZipFile(SOURCE) as source, zipfile.ZipFile(path, "w") as target:
+        for name in source.namelist():
+            data = source.read(name)
+            if name == CARD:
+                card = json.loads(data) | values
+                data = json.dumps({key: value for key, value in card.items() if value is not None}).encode()
+            target.writestr(name, data)
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"algo": None, "camera": None}, r"the card is damaged \(algo, camera missing\)"),
+        ({"camera": "nix"}, "unknown camera"),
+        ({"camera": 7}, "the card is damaged"),
+        ({"features": {"inputs": ["zone"]}}, "did you mean 'zones'"),
+        ({"demands": [0.0, -1.5]}, r"demand -1.5 is not a number in \[-1, 1\]"),
+        ({"demands": [0.0]}, "model and card do not belong together"),
+        ({"algo": "nix"}, "cannot be loaded"),
+    ],
+)
+def test_damaged_card(tmp_path, values, words):
+    pytest.importorskip("stable_baselines3")
+    path = tmp_path / "policy.zip"
+    copy_with_card(path, **values)
+    with pytest.raises(ValueError, match=words) as caught:
+        make_agent(f"policy:{path}")
+    assert "\n" not in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
+def test_file_that_is_cut_off(tmp_path, share):
+    path, data = tmp_path / "policy.zip", SOURCE.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    with pytest.raises(ValueError, match="is not a policy file"):
+        make_agent(f"policy:{path}")
+
+
+def test_damaged_weights(tmp_path):
+    pytest.importorskip("stable_baselines3")
+    path = tmp_path / "policy.zip"
+    with zipfile.ZipFile(SOURCE) as source, zipfile.ZipFile(path, "w") as target:
+        for name in source.namelist():
+            data = source.read(name)
+            target.writestr(name, data[: len(data) // 2] if name == "policy.pth" else data)
+    with pytest.raises(ValueError, match="cannot be loaded"):
+        make_agent(f"policy:{path}")
