@@ -8,10 +8,11 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import current_thread, main_thread
+from threading import Timer, current_thread, main_thread
 from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+REPEAT_S = 0.05  # time after which a lost signal is repeated
 
 
 class Interruption:
@@ -27,6 +28,16 @@ class Interruption:
         """Raise KeyboardInterrupt in the main thread."""
         self.number = number
         raise KeyboardInterrupt
+
+    def repeat(self, error: "sys.UnraisableHookArgs") -> None:
+        """Repeat the signal if KeyboardInterrupt was raised where it cannot end the command.
+
+        Such places are callbacks of C libraries, for example while kernels are loaded.
+        """
+        if isinstance(error.exc_value, KeyboardInterrupt) and self.number:
+            Timer(REPEAT_S, os.kill, (os.getpid(), self.number)).start()
+        else:
+            sys.__unraisablehook__(error)
 
     @property
     def exit_code(self) -> int:
@@ -44,12 +55,14 @@ def raise_on_signals() -> Iterator[Interruption]:
     if current_thread() is not main_thread():  # only the main thread may set handlers
         yield interruption
         return
-    previous = {number: signal.getsignal(number) for number in SIGNALS}
+    previous, hook = {number: signal.getsignal(number) for number in SIGNALS}, sys.unraisablehook
     for number in SIGNALS:
         _set(number, interruption.handle)
+    sys.unraisablehook = interruption.repeat
     try:
         yield interruption
     finally:
+        sys.unraisablehook = hook
         for number, handler in previous.items():
             signal.signal(number, handler)
 

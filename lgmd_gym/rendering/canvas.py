@@ -132,6 +132,7 @@ def _mask(text: str, size: int) -> np.ndarray:
     bitmap, (dx, dy) = font.getmask2(text, mode="L")
     width, height = bitmap.size
     mask = np.zeros((ascent + descent, max(dx + width, 1), 1), np.float32)
-    coverage = np.asarray(list(bitmap), np.float32).reshape(height, width)[: ascent + descent - dy]
+    values = [bitmap[k] for k in range(height * width)]  # a C object without the buffer protocol
+    coverage = np.asarray(values, np.float32).reshape(height, width)[: ascent + descent - dy]
     mask[dy : dy + coverage.shape[0], dx : dx + width, 0] = coverage / 255.0
     return mask

@@ -115,6 +115,24 @@ def test_sigterm_ends_a_command_like_ctrl_c_with_its_own_code(monkeypatch, capsy
         assert [signal.getsignal(item) for item in (signal.SIGINT, signal.SIGTERM)] == before
 
 
+def test_signal_in_a_callback_of_a_c_library_is_repeated(monkeypatch, capsys):
+    import ctypes
+
+    from lgmd_gym.cli import list as command
+
+    @ctypes.CFUNCTYPE(None)
+    def callback():
+        signal.raise_signal(signal.SIGTERM)
+
+    def run(options):
+        callback()  # ctypes reports the exception and goes on
+        time.sleep(5)
+
+    monkeypatch.setattr(command, "run", run)
+    assert cli.run(["list", "suites"]) == 143
+    assert capsys.readouterr().err == "lgmd-gym: interrupted\n"
+
+
 def test_ignored_signals_stay_ignored(monkeypatch):
     """As under nohup, or in the background of a shell without job control."""
     from lgmd_gym.cli import list as command

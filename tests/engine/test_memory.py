@@ -2,28 +2,32 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 pytestmark = pytest.mark.slow
 
 PEAK = """
-import resource, sys
+import sys
 import gymnasium as gym, numpy as np, lgmd_gym
-num_envs, threads = int(sys.argv[1]), int(sys.argv[2])
+sys.path.insert(0, sys.argv[1])
+from support.peak_memory import peak_memory
+num_envs, threads = int(sys.argv[2]), int(sys.argv[3])
 envs = gym.make_vec("LGMD/RandomBraking-v0", num_envs=num_envs, threads=threads, autoreset_mode="SameStep")
 envs.reset(seed=0)
 rng = np.random.default_rng(0)
-for steps in map(int, sys.argv[3:]):
+for steps in map(int, sys.argv[4:]):
     for _ in range(steps // num_envs):
         envs.step(rng.choice([0.0, 0.0, 0.0, -1.0], (num_envs, 1)))
-    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    print(peak_memory())
 """
+TESTS = Path(__file__).parents[1]
 
 
 def peaks(*arguments):
     """Return the peak memory of a fresh process after each number of steps [MiB]."""
-    command = [sys.executable, "-c", PEAK, *map(str, arguments)]
+    command = [sys.executable, "-c", PEAK, str(TESTS), *map(str, arguments)]
     result = subprocess.run(command, capture_output=True, text=True, check=True)
     return [float(line) for line in result.stdout.split()]
 

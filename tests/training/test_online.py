@@ -123,7 +123,7 @@ def test_resume_survives_truncated_files(tmp_path, capsys):
         folder = interrupted(tmp_path / name, source, *truncated)
         capsys.readouterr()
         assert make_agent(f"policy:{resume(folder)}").name
-        lines = capsys.readouterr().err.splitlines()
+        lines = [line for line in capsys.readouterr().err.splitlines() if "unpickling" not in line]
         assert len(lines) == len(messages), lines
         assert all(message in line for message, line in zip(messages, lines, strict=True))
         log = np.load(folder / "best" / "evaluations.npz")
