@@ -4,6 +4,7 @@ import csv
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from PIL import Image
@@ -150,7 +151,8 @@ def test_memory_does_not_depend_on_the_length_of_a_clip(tmp_path):
     """Peak memory for one minute and for five, in new processes; trace and figure included."""
     code = (
         "import sys; from lgmd_gym.cli import main; sys.path.insert(0, sys.argv[1]); "
-        "from support.peak_memory import peak_memory; code = main.run(sys.argv[2:]); print(peak_memory(), code)"
+        "from support.peak_memory import peak_memory; code = main.run(sys.argv[2:]); "
+        "print(peak_memory(), code)"
     )
     peaks = []
     for seconds in (60, 300):
