@@ -7,11 +7,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lgmd_gym import _signals  # noqa: F401  # pyright: ignore[reportUnusedImport]  (before slow imports)
+from lgmd_gym.system import signals  # noqa: F401  # pyright: ignore[reportUnusedImport]  (before slow imports)
+
+# isort: split
 from lgmd_gym._version import __version__
 from lgmd_gym.envs.registration import register_envs
 from lgmd_gym.envs.traffic.registration import register_traffic
-from lgmd_gym.kernel_cache import ensure_kernel_cache
+from lgmd_gym.system.kernel_cache import ensure_kernel_cache
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import BirdsEye, CameraParams, EgoCamera

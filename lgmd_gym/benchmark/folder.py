@@ -1,4 +1,4 @@
-"""Folders of results: creation, files that are replaced as a whole, and the origin of a run."""
+"""Folders of results: files that are replaced as a whole, and the origin of a run."""
 
 import os
 import platform
@@ -10,30 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from lgmd_gym._version import __version__
-from lgmd_gym.files import complete_file
+from lgmd_gym.system.files import complete_file
 
 PACKAGES = ("numpy", "numba", "gymnasium", "highway-env", "joblib")
-
-
-def new_folder(path: Path, kind: str) -> Path:
-    """Create a folder with its parents and return its path.
-
-    Args:
-        path: Folder to create.
-        kind: Kind of folder, for the message ("run folder", ...).
-
-    Raises:
-        ValueError: If it exists or cannot be created.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=False)
-    except FileExistsError:
-        raise ValueError(f"{kind} {str(path)!r} already exists; choose another --out") from None
-    except OSError as error:
-        raise ValueError(
-            f"{kind} {str(path)!r} cannot be created ({error.strerror}); choose another --out"
-        ) from None
-    return path
 
 
 def replace_file(file: Path, text: str) -> None:

@@ -11,10 +11,10 @@ from typing import Annotated, Any, Union
 import tyro
 from tyro.conf import subcommand
 
-from lgmd_gym._signals import raise_on_signals
 from lgmd_gym.cli import options
 from lgmd_gym.cli.console import drop_output, io_reason
 from lgmd_gym.errors import unknown_name
+from lgmd_gym.system.signals import raise_on_signals
 
 DESCRIPTION = """Simulate emergency braking on the spike frequency of a locust looming neuron (LGMD).
 

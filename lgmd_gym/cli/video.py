@@ -15,8 +15,8 @@ from lgmd_gym.benchmark.folder import provenance
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Video
 from lgmd_gym.cli.params import read_params
-from lgmd_gym.files import complete_folder
 from lgmd_gym.neuron import LGMDParams
+from lgmd_gym.system.files import complete_folder
 from lgmd_gym.video.clips import tables
 from lgmd_gym.video.clips.batch import ClipJob, ClipResult, detect_from_trace, make_jobs, process_clip
 from lgmd_gym.video.clips.detection import ClipDetection

@@ -10,11 +10,11 @@ import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.config import DEFAULT_AGENTS
 from lgmd_gym.camera.params import CONDITIONS
-from lgmd_gym.files import complete_folder
 from lgmd_gym.gallery.cards import ScenarioCard, record_video, scenario_cards
 from lgmd_gym.gallery.outcomes import evaluate_agents
 from lgmd_gym.gallery.page import render_page
 from lgmd_gym.gallery.stills import ROADS, lens_sheet, road_sheet
+from lgmd_gym.system.files import complete_folder
 
 
 def make_gallery(

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import lgmd_gym
 from lgmd_gym.agents.options import whole
 from lgmd_gym.agents.policies.policy import write_card
-from lgmd_gym.benchmark.folder import new_folder
 from lgmd_gym.errors import check_keys
-from lgmd_gym.files import complete_file
+from lgmd_gym.system.files import complete_file, new_folder
 from lgmd_gym.training.config import TrainConfig
 from lgmd_gym.training.hyperparams import OFFLINE
 from lgmd_gym.training.policy_wrapper import PolicyWrapper

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.files import check_new_file
+from lgmd_gym.system.files import check_new_file
 
 SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif")
 

@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+from support.runs import SMALL_SUITE
 
 from lgmd_gym.cli import main as cli
 from lgmd_gym.video import VideoReader
@@ -18,20 +19,9 @@ def run(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=120)
 
 
-SUITE = """
-name = "small"
-[[cases]]
-family = "CCRs"
-speeds_kmh = [10, 20]
-[[cases]]
-family = "EmptyRoad"
-speeds_kmh = [30]
-"""
-
-
 def test_bench_writes_a_run_folder(tmp_path):
     out, suite = tmp_path / "deep" / "run", tmp_path / "small.toml"
-    suite.write_text(SUITE)
+    suite.write_text(SMALL_SUITE)
     arguments = ("bench", "--suite", str(suite), "--agents", "spike-threshold", "--seeds", "1", "--jobs", "1")
     done = run(*arguments, "--out", str(out))
     assert done.returncode == 0, done.stderr

@@ -16,20 +16,11 @@ from pathlib import Path
 sys.path[:0] = [str(Path(__file__).parents[1])]
 
 from support.fuzz import run_cases
-from support.runs import interrupt, new_run
+from support.runs import SMALL_SUITE, interrupt, new_run
 
 from lgmd_gym.cli import main as cli
 from lgmd_gym.report.outputs import write_outputs
 
-SUITE = """
-name = "tiny"
-[[cases]]
-family = "CCRs"
-speeds_kmh = [10, 20]
-[[cases]]
-family = "EmptyRoad"
-speeds_kmh = [30]
-"""
 VALUES = ("null", "true", "-1", "1e400", '""', '"x"', "[]", "{}", "nan")
 
 
@@ -37,8 +28,8 @@ VALUES = ("null", "true", "-1", "1e400", '""', '"x"', "[]", "{}", "nan")
 def runs():
     """Return a complete and an interrupted run."""
     base = Path(tempfile.mkdtemp())
-    (base / "tiny.toml").write_text(SUITE)
-    values = {"suite": str(base / "tiny.toml"), "agents": ["spike-threshold"], "seeds": 1}
+    (base / "small.toml").write_text(SMALL_SUITE)
+    values = {"suite": str(base / "small.toml"), "agents": ["spike-threshold"], "seeds": 1}
     new_run(base / "complete", **values).play()
     new_run(base / "interrupted", **values).play(interrupt)
     return base / "complete", base / "interrupted"

@@ -36,8 +36,7 @@ ORDER = (
     "camera",
     "neuron",
     "simd",
-    "files",
-    "kernel_cache",
+    "system",
     "errors",
 )
 # The one exception: `lgmd_gym.benchmark.run`, the Python API of `lgmd-gym bench`, writes the report, too.
@@ -78,12 +77,12 @@ def imports_of(path):
 
 
 def test_every_folder_has_a_place_in_the_order():
-    found = {folder_of(module) for module, _ in modules()} - {"", "__main__", "_signals", "_version"}
+    found = {folder_of(module) for module, _ in modules()} - {"", "__main__", "_version"}
     assert found == set(ORDER)
 
 
 def test_folders_import_one_way():
-    """`lgmd_gym` itself, `__main__`, `_signals` and the version stand outside the order."""
+    """`lgmd_gym` itself, `__main__` and the version stand outside the order."""
     wrong = []
     for module, path in modules():
         folder = folder_of(module)
@@ -150,12 +149,9 @@ def test_import_is_fast():
     assert min(timed("import lgmd_gym") for _ in range(5)) - min(timed("pass") for _ in range(5)) < 0.5
 
 
-def test_the_package_folder_contains_few_modules():
+def test_the_package_folder_contains_four_modules_and_folders():
     flat = {path.name for path in (ROOT / "lgmd_gym").glob("*.py")}
-    assert flat == {
-        "__init__.py", "__main__.py", "_signals.py", "_version.py",
-        "errors.py", "files.py", "kernel_cache.py",
-    }  # fmt: skip
+    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py"}
 
 
 def test_every_package_states_its_contents_in_one_sentence():

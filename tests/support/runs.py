@@ -7,6 +7,16 @@ from lgmd_gym.benchmark.executor import Executor
 from lgmd_gym.benchmark.rows import key_of
 from lgmd_gym.benchmark.runner import Run
 
+SMALL_SUITE = """
+name = "small"
+[[cases]]
+family = "CCRs"
+speeds_kmh = [10, 20]
+[[cases]]
+family = "EmptyRoad"
+speeds_kmh = [30]
+"""
+
 
 def new_run(folder, jobs=1, **values):
     """Return a new run of a `RunConfig`."""

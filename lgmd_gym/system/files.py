@@ -48,16 +48,14 @@ def complete_folder(path: Path, kind: str) -> Iterator[Path]:
     part = path.with_name(f"{path.name}.part") if path.name else path
     try:
         if path.exists():
-            raise ValueError(f"{kind} {str(path)!r} already exists; choose another --out")
+            raise _refusal(path, kind, FileExistsError())
         part.mkdir(parents=True)
     except FileExistsError:
         raise ValueError(
             f"{str(part)!r} belongs to a command that runs or was killed; remove it, or choose another --out"
         ) from None
     except OSError as error:
-        raise ValueError(
-            f"{kind} {str(path)!r} cannot be created ({error.strerror}); choose another --out"
-        ) from None
+        raise _refusal(path, kind, error) from None
     try:
         with _naming(path):
             yield part
@@ -67,6 +65,22 @@ def complete_folder(path: Path, kind: str) -> Iterator[Path]:
     except BaseException:
         shutil.rmtree(part, ignore_errors=True)
         raise
+
+
+def new_folder(path: Path, kind: str) -> None:
+    """Create a folder with its parents.
+
+    Args:
+        path: Folder to create.
+        kind: Kind of folder, for the message ("run folder", ...).
+
+    Raises:
+        ValueError: If it exists or cannot be created.
+    """
+    try:
+        path.mkdir(parents=True)
+    except OSError as error:
+        raise _refusal(path, kind, error) from None
 
 
 def check_new_file(path: Path, name: str) -> None:
@@ -98,6 +112,13 @@ def is_intact_zip(path: Path, member: str) -> bool:
             return member in archive.namelist() and archive.testzip() is None
     except (OSError, ValueError, BadZipFile, EOFError, zlib.error, NotImplementedError, RuntimeError):
         return False
+
+
+def _refusal(path: Path, kind: str, error: OSError) -> ValueError:
+    """Return the error of a folder that exists or cannot be created."""
+    exists = isinstance(error, FileExistsError)
+    reason = "already exists" if exists else f"cannot be created ({error.strerror})"
+    return ValueError(f"{kind} {str(path)!r} {reason}; choose another --out")
 
 
 @contextmanager

@@ -1,0 +1,1 @@
+"""What the package needs of the operating system: whole files, signals, a folder for compiled kernels."""
