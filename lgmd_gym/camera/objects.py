@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lgmd_gym.camera.pinhole import side_tangent
 from lgmd_gym.camera.render.jit import exact_kernel
 from lgmd_gym.camera.scene import Ego
 
@@ -121,7 +122,7 @@ def _write(item: Any, x: float, y: float, place: int, records: memoryview, row: 
 
 @exact_kernel
 def choose_objects(lens, mount, objects, count, chosen):
-    """Copy the objects in front of a lens and in range; returns their number.
+    """Copy the objects that a lens may see; returns their number.
 
     Args:
         lens: `LENS` record.
@@ -130,11 +131,12 @@ def choose_objects(lens, mount, objects, count, chosen):
         count: Number of objects.
         chosen: `OBJECT` records to write, with the model and the grey that are drawn.
     """
-    n = 0
+    n, all_around = 0, side_tangent(lens) < 0.0
     for i in range(count):
         dx, dy = objects[i].x - lens.x, objects[i].y - lens.y
         ahead = dx * lens.cos_yaw + dy * lens.sin_yaw
-        if ahead <= -objects[i].length - objects[i].width or dx * dx + dy * dy > MAX_RANGE * MAX_RANGE:
+        behind = not all_around and ahead <= -objects[i].length - objects[i].width
+        if behind or dx * dx + dy * dy > MAX_RANGE * MAX_RANGE:
             continue
         chosen[n] = objects[i]
         obj = chosen[n]

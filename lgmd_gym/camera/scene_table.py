@@ -13,6 +13,8 @@ from lgmd_gym.camera.scene import SCENE, Ego, read_scene
 
 _PATH_DEG = 40.0  # bound of the gaze "path"
 _MAX_SPREAD = math.radians(170.0)
+_MAX_DECELERATION = 12.0  # bound of the deceleration in `pose` [m/s²]
+_MAX_VIBRATION = 6.0  # bound of the vibrations in `pose`, as a multiple of their RMS at 14 m/s
 
 
 class SceneTable:
@@ -70,7 +72,7 @@ class SceneTable:
 
 def view_of(cameras: Sequence[CameraParams]) -> View | None:
     """Return the directions that cameras look in; None if they look all around, or if there are none."""
-    if not cameras:
+    if not cameras or any(_may_look_behind(p) for p in cameras):
         return None
     margins = [_PATH_DEG if p.gaze == "path" else 0.0 for p in cameras]
     first = min(p.yaw_deg - margin for p, margin in zip(cameras, margins, strict=True))
@@ -79,3 +81,10 @@ def view_of(cameras: Sequence[CameraParams]) -> View | None:
         return None
     reach = max(abs(p.mount_setback) for p in cameras) + max(abs(p.mount_left) for p in cameras)
     return View(math.radians(first), math.radians(last), reach)
+
+
+def _may_look_behind(p: CameraParams) -> bool:
+    """Return whether a pitched camera may see what is straight below or above it, or behind it."""
+    motion = _MAX_DECELERATION * p.dive_deg + _MAX_VIBRATION * p.vibration_deg
+    pitch = math.radians(min(abs(p.pitch_deg) + motion, 90.0))
+    return p.focal_px * math.cos(pitch) <= (0.5 * p.shape[0] + 1.0) * math.sin(pitch)

@@ -56,7 +56,7 @@ def sample(data, level_start, lens, row, width):
 def reference_row(view, tables, coverage, row, behind, part):
     """Return a row of ground as grey levels, float64, shape (width,)."""
     look, width = view.look, len(behind)
-    road, paint, shadow = np.cumsum(coverage[:, row, :width].astype(float), axis=1)
+    road, paint, shadow = np.cumsum(coverage[:, row, :width].astype(float), axis=1) / part
     road, paint, shadow = np.clip(road, 0, 1), np.clip(paint, 0, 1), np.clip(shadow, 0, 0.75)
     grain = look["asphalt_gain"] * sample(tables.asphalt, tables.level_start, view.lens, row, width)
     verge = look["verge_gain"] * sample(tables.verge, tables.level_start, view.lens, row, width)

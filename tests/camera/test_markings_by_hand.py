@@ -17,14 +17,14 @@ from lgmd_gym.camera.render.markings import ViewedLine, _separate_stripes, _visi
         ((20.0, 0.0, 1.0, 0.0), 100.0, (0.0, 100.0)),
         ((100.0, 0.0, -1.0, 0.0), 5000.0, (0.0, 97.65)),
         ((3000.0, 0.0, -1.0, 0.0), 5000.0, (1000.0, 2997.65)),
-        # The sides of the view have the tangent 0.6, widened by 1.3 and 2 m: 41 m at 50 m.
-        ((50.0, -1000.0, 0.0, 1.0), 2000.0, (959.0, 1041.0)),
-        ((50.0, 1000.0, 0.0, -1.0), 2000.0, (959.0, 1041.0)),
-        ((2.4, -1000.0, 0.0, 1.0), 2000.0, (996.128, 1003.872)),
+        # The sides of the view have the tangent 0.6, with 2 m to spare: 32 m at 50 m.
+        ((50.0, -1000.0, 0.0, 1.0), 2000.0, (968.0, 1032.0)),
+        ((50.0, 1000.0, 0.0, -1.0), 2000.0, (968.0, 1032.0)),
+        ((2.4, -1000.0, 0.0, 1.0), 2000.0, (996.56, 1003.44)),
         ((1999.0, 0.0, 0.0, 1.0), 10.0, (0.0, 10.0)),
-        # 9.8 m beside at 10 m; the line nears the side with 0.8 - 0.78·0.6 = 0.332.
-        ((10.0, 0.0, 0.6, 0.8), 1000.0, (0.0, 9.8 / 0.332)),
-        ((10.0, 0.0, 0.6, -0.8), 1000.0, (0.0, 9.8 / 0.332)),
+        # 8 m beside at 10 m; the line nears the side with 0.8 - 0.6·0.6 = 0.44.
+        ((10.0, 0.0, 0.6, 0.8), 1000.0, (0.0, 8.0 / 0.44)),
+        ((10.0, 0.0, 0.6, -0.8), 1000.0, (0.0, 8.0 / 0.44)),
     ],
 )
 def test_visible_part_of_a_line(line, length, expected):
@@ -49,9 +49,12 @@ def test_frame_above_the_horizon_shows_no_line():
 
 
 def test_lines_right_below_a_lens_that_looks_down():
-    # Ground from half a metre behind the lens on.
+    # The frame contains the ground behind the lens.
     a, b = _visible_part(lens_of(pitch=-1.5, z=2.0), ViewedLine(10.0, 0.0, -1.0, 0.0), 100.0)
-    assert (a, b) == (0.0, pytest.approx(10.5))
+    assert (a, b) == (0.0, 100.0)
+    # With a pitch of -1 rad, the lower side of the frame is 1.38 rad below the horizon.
+    a, b = _visible_part(lens_of(pitch=-1.0, z=2.0), ViewedLine(10.0, 0.0, -1.0, 0.0), 100.0)
+    assert (a, b) == (0.0, pytest.approx(10.0 - 2.0 / tan(1.0 + atan(0.4)) + 0.15))
 
 
 # Stripes are separate where three periods of 4.33 m are at least one pixel.

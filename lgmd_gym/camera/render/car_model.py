@@ -2,6 +2,9 @@
 
 from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, ModelBuilder
 
+BODY_TOP = 0.62
+"""Height at which the cabin begins, as a share of a car's height."""
+
 
 def _car_rear(b: ModelBuilder, rear: int) -> None:
     gap = b.rect(rear, (0.0, 1.0), (0.0, 0.24), 14.0)  # gap below the bumper
@@ -98,7 +101,7 @@ def add_car(b: ModelBuilder) -> None:
     """Add a passenger car."""
     b.model()
     b.solid()
-    rear, front, left, right, top = b.box(0.0, 0.62, (-0.5, 0.5, 0.5), (-0.5, 0.5, 0.5))
+    rear, front, left, right, top = b.box(0.0, BODY_TOP, (-0.5, 0.5, 0.5), (-0.5, 0.5, 0.5))
     _car_rear(b, rear)
     _car_front(b, front)
     # From outside, the rear is on the left of the right side and on the right of the left side.
@@ -106,4 +109,4 @@ def add_car(b: ModelBuilder) -> None:
     _car_side(b, right, 0.18, 0.82)
     b.rect(top, (0.1, 0.9), (0.72, 0.98), 1.05, BODY)
     b.solid()
-    _car_cabin(b, b.box(0.62, 1.0, (-0.47, 0.24, 0.47), (-0.36, 0.06, 0.38)))
+    _car_cabin(b, b.box(BODY_TOP, 1.0, (-0.47, 0.24, 0.47), (-0.36, 0.06, 0.38)))

@@ -69,7 +69,7 @@ def _ground_light(look, tables, line, x, y, coverages):
     zero, one, half = splat(nb.float32(0.0)), splat(nb.float32(1.0)), splat(nb.float32(0.5))
     road = _without_traces(road)
     grain = verge = zero
-    if any_above(road, zero):
+    if any_above(road, zero) or any_above(paint, zero):
         grain = splat(nb.float32(look.asphalt_gain)) * sample(tables.asphalt, line, x, y)
     if any_above(one, road):
         verge = splat(nb.float32(look.verge_gain)) * sample(tables.verge, line, x, y)
@@ -98,7 +98,7 @@ def shade_row(image, row, part, coverage, view, tables):
     line = texture_line(view.lens, row, tables.level_start)
     x, y, step_x, step_y = fixed_line(line)
     air = row_air(view.look, distance_ahead(view.lens, row))
-    share, whole = splat(nb.float32(part)), part == 1.0
+    share, inverse, whole = splat(nb.float32(part)), splat(nb.float32(1.0 / max(part, 1e-3))), part == 1.0
     sum_road = sum_paint = sum_shadow = splat(nb.float32(0.0))
     for j in range(0, width, LANES):
         at, pixel, count = row * stride + j, row * width + j, width - j
@@ -106,6 +106,9 @@ def shade_row(image, row, part, coverage, view, tables):
         cover_paint, sum_paint = sum_differences(paint, at, count, sum_paint)
         cover_shadow, sum_shadow = sum_differences(shadow, at, count, sum_shadow)
         coverages = (cover_road, cover_paint, cover_shadow)
+        if not whole:
+            # As shares of the ground in this row.
+            coverages = (cover_road * inverse, cover_paint * inverse, cover_shadow * inverse)
         grey = _ground_light(view.look, tables, line, x, y, coverages)
         grey = through_air(grey, air, view.beam, j)
         if not whole:

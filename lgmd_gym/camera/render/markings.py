@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+from lgmd_gym.camera.pinhole import side_tangent
 from lgmd_gym.camera.render.ground import PAINT, add_quad
 from lgmd_gym.camera.render.jit import kernel
 
@@ -44,12 +45,11 @@ def _visible_part(lens, line, length):
     The lower side of the frame also bounds it: a narrow view begins tens of metres ahead.
     """
     ahead, across, d_ahead, d_across = line
-    # The half-angle of the pixel columns, widened for pitch and the width of the line.
-    tan = 1.3 * lens.centre_u / lens.focal
+    tan = side_tangent(lens)
     low = lens.centre_v / lens.focal
     rise, drop = low * lens.cos_pitch - lens.sin_pitch, lens.z * (lens.cos_pitch + low * lens.sin_pitch)
     a, b = 0.0, length
-    for side in range(5):
+    for side in range(5 if tan >= 0.0 else 0):
         if side == 0:
             p, q = ahead + 0.5, d_ahead
         elif side == 1:

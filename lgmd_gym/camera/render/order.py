@@ -3,6 +3,7 @@
 import math
 
 from lgmd_gym.camera.objects import MODEL_MARK, MODEL_POST, MODEL_RAIL
+from lgmd_gym.camera.pinhole import side_tangent
 from lgmd_gym.camera.render.jit import kernel
 
 
@@ -19,13 +20,13 @@ def visible(lens, obj):
     dx, dy = obj.x - lens.x, obj.y - lens.y
     if dx * dx + dy * dy > obj.range**2:
         return False
-    radius = 0.5 * math.sqrt(obj.length**2 + obj.width**2)
+    # With its shadow.
+    radius = 0.5 * math.sqrt(obj.length**2 + obj.width**2) + 0.4 + 0.1 * obj.height
     ahead = dx * lens.cos_yaw + dy * lens.sin_yaw
     across = dy * lens.cos_yaw - dx * lens.sin_yaw
-    # The horizontal half-angle grows when the lens is pitched; 1.3 covers it up to 45°.
-    tan = 1.3 * lens.centre_u / lens.focal
-    reach = radius * math.sqrt(1.0 + tan * tan) + 0.5
-    if ahead < -radius or abs(across) > max(ahead, 0.0) * tan + reach:
+    tan = side_tangent(lens)
+    reach = radius * math.sqrt(1.0 + tan * tan)
+    if tan >= 0.0 and (ahead < -radius or abs(across) > max(ahead, 0.0) * tan + reach):
         return False
     if obj.model == MODEL_MARK:
         return True

@@ -80,6 +80,8 @@ def draw_sky(image, lens, line, look, horizon):
                 )
             first = int(min(max(math.floor(top), 0.0), rows))
             for i in range(first, rows):
-                cover = min(1.0, i + 1.0 - top)
+                # Of the part of the row above the horizon.
+                bottom = min(i + 1.0, horizon)
+                cover = min(1.0, (bottom - top) / (bottom - i))
                 deep = 1.0 - 0.02 * look.leaf_gain * min(1.0, max(0.0, (i - top) / (horizon - top + 1.0)))
                 image[i, j] += nb.float32(cover) * (nb.float32(grey * deep) - image[i, j])

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from lgmd_gym.camera.objects import MODEL_POST
+from lgmd_gym.camera.objects import MODEL_CAR, MODEL_POST
+from lgmd_gym.camera.render.car_model import BODY_TOP
 from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_project, sum_differences
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
@@ -125,7 +126,11 @@ def draw_object(image, lens, obj, models, air, layer):
         return
     # Apparent height [px], at a distance of 1 m or more.
     size = lens.focal * obj.height / max(distance(lens, obj) - 0.5 * obj.length, 1.0)
-    for solid in range(models.models[obj.model, 0], models.models[obj.model, 1]):
+    first, last = models.models[obj.model, 0], models.models[obj.model, 1]
+    # From below the top of its body, a car's cabin is behind the body.
+    reverse = obj.model == MODEL_CAR and lens.z < BODY_TOP * obj.height
+    for k in range(last - first):
+        solid = last - 1 - k if reverse else first + k
         u0, v0, u1, v1 = _add_solid(layer, lens, obj, models, solid, size, air)
         if u1 >= u0:
             height, width = image.shape

@@ -1,0 +1,49 @@
+"""Frames against the slow reference; `tests/fuzz/camera_reference.py` draws random scenes."""
+
+import numpy as np
+import pytest
+from support.reference_camera import worst_error
+from support.roads import add_car, add_mark, add_obstacle, lens_x, straight_env
+
+from lgmd_gym.camera import CameraParams
+
+SMALL = {"shape": (21, 34), "hfov_deg": 70.0}
+
+
+def scene(**road):
+    """Return a road with an oncoming car, a car ahead, a truck, a barrier and marks."""
+    env = straight_env(heading=0.03, **road)
+    x = lens_x(env)
+    add_car(env, x + 7.0, 6.5, 190.0, heading=np.pi)
+    add_car(env, x + 14.0, 3.0, 60.0)
+    add_car(env, x + 30.0, 0.0, 120.0, size=(12.0, 2.5, 3.4))
+    add_obstacle(env, x + 9.0, -1.0)
+    add_mark(env, x + 6.0, 3.0)
+    add_mark(env, x + 12.0, 11.0, 160.0)  # paint on the verge
+    return env
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"light": "night", "vehicles": "box"},
+        {"visibility_m": 30.0, "guard_rail": True},
+        {"pitch_deg": 0.4},  # the horizon is within a row
+        {"pitch_deg": 20.0, "yaw_deg": 30.0},
+        {"mount_height": 0.4},  # below the cabins
+        {"mount_height": 4.0, "mount_setback": -4.0, "pitch_deg": -35.0},
+    ],
+)
+def test_light_is_that_of_many_rays(fields):
+    params = CameraParams.make({**SMALL, "roadside": 0.0, **fields})
+    assert worst_error(params, scene()) <= 1.0
+
+
+def test_lens_that_points_down_shows_what_is_behind_it():
+    env = straight_env()
+    x = lens_x(env)
+    add_car(env, x - 4.0, 0.0, 230.0)
+    add_mark(env, x - 3.0, 6.5, 200.0)
+    params = CameraParams(shape=(60, 20), hfov_deg=100.0, pitch_deg=-60.0, mount_height=5.0, roadside=0.0)
+    assert worst_error(params, env) <= 1.0
