@@ -1,0 +1,66 @@
+"""Commands that are stopped by signals, and what they leave: processes and shared memory."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+TAG = "LGMD_GYM_TEST_RUN"  # environment variable that all processes of a command inherit
+CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9}
+SHARED_MEMORY = Path("/dev/shm")
+
+
+def start(arguments, tag, **options):
+    """Start `lgmd-gym` in a session of its own; its processes inherit the variable TAG."""
+    environment = os.environ | {TAG: tag} | options.pop("env", {})
+    return subprocess.Popen(
+        [sys.executable, "-m", "lgmd_gym", *map(str, arguments)],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # The children of a shell's background job ignore SIGINT by default.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        **options,
+    )
+
+
+def processes(tag):
+    """Return the running processes that have inherited a tag."""
+    entry, found = f"{TAG}={tag}\0".encode(), []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if entry in (folder / "environ").read_bytes():
+                found.append(int(folder.name))
+        except OSError:
+            continue
+    return found
+
+
+def segments(before=()):
+    """Return this user's shared memory without a living owner, except that of `before`.
+
+    Names of segments contain the process that made them; segments of other running programs do not count.
+    """
+    found = []
+    for path in SHARED_MEMORY.iterdir():
+        numbers = re.findall(r"(?<![0-9a-f])\d+(?![0-9a-f])", path.name)
+        try:
+            own = path.stat().st_uid == os.getuid()
+        except OSError:  # removed meanwhile
+            continue
+        if own and path.name not in before and not any(Path("/proc", number).exists() for number in numbers):
+            found.append(path.name)
+    return found
+
+
+def wait_until_gone(tag, before=(), limit=15.0):
+    """Wait until a command has left no process and no shared memory; AssertionError after `limit` [s]."""
+    end = time.monotonic() + limit
+    while left := processes(tag) + segments(before):
+        assert time.monotonic() < end, f"left after {limit:g} s: {left}"
+        time.sleep(0.1)
