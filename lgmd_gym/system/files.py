@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from zipfile import BadZipFile, ZipFile
 
+from lgmd_gym.system.lock import LOCK_FILE, FolderLock
+
 
 @contextmanager
 def complete_file(path: Path) -> Iterator[Path]:
@@ -36,35 +38,52 @@ def complete_file(path: Path) -> Iterator[Path]:
 def complete_folder(path: Path, kind: str) -> Iterator[Path]:
     """Yield a temporary folder beside `path`; at the end of the block it becomes `path`.
 
-    An exception or Ctrl-C removes it, so that the same command can be repeated.
+    An exception or Ctrl-C removes it, so that the same command can be repeated. One that a killed command
+    left is emptied and used.
 
     Args:
         path: Folder to make, which must not exist.
         kind: Kind of folder, for the messages ("run folder", ...).
 
     Raises:
-        ValueError: If it exists, cannot be made, or an earlier command was killed before its end.
+        ValueError: If it exists, cannot be made, or another command is making it.
     """
     part = path.with_name(f"{path.name}.part") if path.name else path
-    try:
-        if path.exists():
-            raise _refusal(path, kind, FileExistsError())
-        part.mkdir(parents=True)
-    except FileExistsError:
-        raise ValueError(
-            f"{str(part)!r} belongs to a command that runs or was killed; remove it, or choose another --out"
-        ) from None
-    except OSError as error:
-        raise _refusal(path, kind, error) from None
+    lock = _claim(part, path, kind)
     try:
         with _naming(path):
             yield part
             for file in filter(Path.is_file, part.rglob("*")):
                 _sync(file)
             part.rename(path)
+            (path / LOCK_FILE).unlink()
     except BaseException:
         shutil.rmtree(part, ignore_errors=True)
         raise
+    finally:
+        lock.release()
+
+
+def _claim(part: Path, path: Path, kind: str) -> FolderLock:
+    """Make and lock an empty temporary folder for `path`."""
+    try:
+        if path.exists():
+            raise _refusal(path, kind, FileExistsError())
+        part.mkdir(parents=True)
+    except FileExistsError:
+        if not (part / LOCK_FILE).is_file():
+            raise ValueError(
+                f"{str(part)!r} is needed for unfinished results; remove it, or choose another --out"
+            ) from None
+    except OSError as error:
+        raise _refusal(path, kind, error) from None
+    lock = FolderLock(part, kind)
+    for item in part.iterdir():
+        if item.is_dir() and not item.is_symlink():
+            shutil.rmtree(item)
+        elif item.name != LOCK_FILE:
+            item.unlink()
+    return lock
 
 
 def new_folder(path: Path, kind: str) -> None:

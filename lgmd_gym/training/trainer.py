@@ -11,6 +11,7 @@ from lgmd_gym.agents.options import whole
 from lgmd_gym.agents.policies.policy import write_card
 from lgmd_gym.errors import check_keys
 from lgmd_gym.system.files import complete_file, new_folder
+from lgmd_gym.system.lock import FolderLock
 from lgmd_gym.training.config import TrainConfig
 from lgmd_gym.training.hyperparams import OFFLINE
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
@@ -65,7 +66,7 @@ def resume(folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
     return value are those of `train`.
 
     Raises:
-        ValueError: If the folder contains no training.
+        ValueError: If the folder contains no training, or another process trains in it.
     """
     whole("jobs", jobs, 1)
     try:
@@ -100,6 +101,15 @@ def check_config(config: TrainConfig) -> None:
 
 
 def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path:
+    """Train in a locked folder; a second process would mix its checkpoints and logs with these."""
+    lock = FolderLock(folder, "training folder")
+    try:
+        return _write_policy(config, folder, progress, jobs)
+    finally:
+        lock.release()
+
+
+def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path:
     start = time.perf_counter()
     if config.algo == OFFLINE:
         model = _train_offline(config, folder, progress, jobs)

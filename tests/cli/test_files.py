@@ -15,6 +15,7 @@ from lgmd_gym.cli import paper
 from lgmd_gym.gallery import build
 from lgmd_gym.paper import experiments
 from lgmd_gym.system.files import check_new_file, complete_file, complete_folder
+from lgmd_gym.system.lock import LOCK_FILE, FolderLock
 from lgmd_gym.video import VideoWriter
 from lgmd_gym.video.clips import batch
 
@@ -50,11 +51,38 @@ def test_a_folder_appears_at_the_end_only(tmp_path):
         complete_folder(folder, "run folder").__enter__()
 
 
-def test_a_folder_of_a_killed_command_is_named_and_kept(tmp_path):
+def test_the_folder_of_a_killed_command_is_used_again(tmp_path):
+    part = tmp_path / "run.part"
+    (part / "deep").mkdir(parents=True)
+    for name in ("old", "deep/old", LOCK_FILE):
+        (part / name).touch()
+    with complete_folder(tmp_path / "run", "run folder") as folder:
+        assert names(folder) == [LOCK_FILE]
+        (folder / "new").touch()
+    assert names(tmp_path) == ["run", "run/new"]
+
+
+def test_the_folder_of_a_running_command_is_kept(tmp_path):
+    with complete_folder(tmp_path / "run", "run folder") as folder:
+        (folder / "file").touch()
+        with pytest.raises(ValueError, match=rf"run\.part' is in use by process {os.getpid()}; wait"):
+            complete_folder(tmp_path / "run", "run folder").__enter__()
+    assert names(tmp_path) == ["run", "run/file"]
+
+
+def test_a_folder_of_another_origin_is_named_and_kept(tmp_path):
     (tmp_path / "run.part").mkdir()
-    with pytest.raises(ValueError, match=r"run\.part' belongs to a command that runs or was killed; remove"):
+    (tmp_path / "run.part" / "file").touch()
+    with pytest.raises(ValueError, match=r"run\.part' is needed for unfinished results; remove it"):
         complete_folder(tmp_path / "run", "run folder").__enter__()
-    assert names(tmp_path) == ["run.part"]
+    assert names(tmp_path) == ["run.part", "run.part/file"]
+
+
+def test_a_lock_that_was_removed_meanwhile_is_refused(tmp_path, monkeypatch):
+    """As by the end of the command that held it, between opening and locking the file."""
+    monkeypatch.setattr("fcntl.flock", lambda file, kind: (tmp_path / LOCK_FILE).unlink())
+    with pytest.raises(ValueError, match="cannot be locked"):
+        FolderLock(tmp_path)
 
 
 def test_a_new_file_is_checked_and_not_made(tmp_path):

@@ -1,8 +1,8 @@
 """Long commands that are stopped at random moments: `python tests/fuzz/kills.py --seconds 600`.
 
-A case starts one command and sends SIGTERM, SIGKILL or SIGINT to it, SIGINT also to its workers, as a terminal
-does. No process and no shared memory may remain, and no traceback. The command must then be able to resume or to
-run again, with the results of an undisturbed command.
+A case starts one command and sends SIGTERM, SIGKILL or SIGINT to it, SIGINT also to its workers, as a
+terminal does. No process and no shared memory may remain, and no traceback. The command must then be able to
+resume or to run again, with the results of an undisturbed command.
 """
 
 import argparse
@@ -39,7 +39,7 @@ default:
   env_wrapper:
     - lgmd_gym.training.PolicyWrapper: {history: 2, repeat: 4}
   n_envs: 2
-  n_timesteps: 512
+  n_timesteps: 192
   n_steps: 16
   batch_size: 16
   policy_kwargs: {net_arch: [8]}
@@ -109,7 +109,7 @@ def parameters_of(folder):
 
 BENCH = "bench --suite tiny.toml --agents spike-threshold ttc-oracle"
 OFFLINE = "train --algo offline --camera fovea --jobs 2 --eval-episodes 8 --hyperparams offline.yml"
-PPO = "train --algo ppo --camera fovea --eval-freq 128 --eval-episodes 2 --hyperparams ppo.yml"
+PPO = "train --algo ppo --camera fovea --eval-freq 64 --eval-episodes 2 --hyperparams ppo.yml"
 TUNE = "tune --agent nested-fields --trials 3 --levels 8 --seeds 0 --study out --best best.toml"
 COMMANDS = {
     "bench": Command(

@@ -1,5 +1,7 @@
 """Offline training with the command, from recording to the policy file."""
 
+import json
+import os
 from functools import partial
 
 import gymnasium as gym
@@ -9,6 +11,7 @@ from support.recordings import offline_config, write_yaml
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.policy import read_card
 from lgmd_gym.cli import main as cli
+from lgmd_gym.system.lock import FolderLock
 from lgmd_gym.training.offline import traffic
 from lgmd_gym.training.offline.episodes import EpisodeRecorder
 from lgmd_gym.training.offline.storage import load
@@ -36,6 +39,14 @@ def test_second_training_reuses_the_recordings_of_the_first(tmp_path, monkeypatc
     observation, info = gym.make("LGMD/CCRs-v0", camera=agent.camera).reset(seed=0)
     assert agent.act(observation, info).shape == (1,)
     assert cli.run(["train", "--resume", str(first)]) == 0  # from the recorded episodes
+
+
+def test_second_process_in_a_training_folder_is_refused(tmp_path, capsys):
+    (tmp_path / "config.json").write_text(json.dumps(offline_config(tmp_path).to_dict()))
+    lock = FolderLock(tmp_path)
+    assert cli.run(["train", "--resume", str(tmp_path)]) == 2
+    assert f"training folder {str(tmp_path)!r} is in use by process {os.getpid()};" in capsys.readouterr().err
+    lock.release()
 
 
 @pytest.mark.slow

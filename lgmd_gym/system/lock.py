@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+from errno import ENOENT
 from pathlib import Path
 
 LOCK_FILE = ".lock"
@@ -15,18 +16,22 @@ class FolderLock:
 
     Args:
         path: Existing folder.
+        kind: Kind of folder, for the messages.
 
     Raises:
         ValueError: If another process holds the lock, or the folder cannot be locked.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, kind: str = "run folder") -> None:
+        file = path / LOCK_FILE
         try:
-            self._file = (path / LOCK_FILE).open("a+b", buffering=0)
+            self._file = file.open("a+b", buffering=0)
         except OSError as error:
-            raise ValueError(f"run folder {str(path)!r} cannot be written ({error.strerror})") from None
+            raise ValueError(f"{kind} {str(path)!r} cannot be written ({error.strerror})") from None
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if not os.path.samestat(os.fstat(self._file.fileno()), file.stat()):
+                raise FileNotFoundError(ENOENT, os.strerror(ENOENT))  # renamed or removed meanwhile
             self._file.truncate(0)
             self._file.write(str(os.getpid()).encode())
         except BlockingIOError:
@@ -34,12 +39,12 @@ class FolderLock:
             holder = self._file.read(20).decode(errors="replace") or "(unknown)"
             self.release()
             raise ValueError(
-                f"run folder {str(path)!r} is in use by process {holder}; wait for its end, or stop it"
+                f"{kind} {str(path)!r} is in use by process {holder}; wait for its end, or stop it"
             ) from None
         except OSError as error:
             self.release()
             raise ValueError(
-                f"run folder {str(path)!r} cannot be locked ({error.strerror}); use another disk"
+                f"{kind} {str(path)!r} cannot be locked ({error.strerror}); use another disk"
             ) from None
 
     def release(self) -> None:
