@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import Mean, Rate, cluster_mean
+from lgmd_gym.system.files import complete_file
 
 COLUMNS = (
     "agent",
@@ -122,8 +123,8 @@ def write_summary(rows: list[Row], path: Path) -> None:
 
 
 def write_csv(path: Path, columns: Sequence[str], lines: Iterable[Sequence[Any]]) -> None:
-    """Write a CSV file."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    """Write a CSV file, complete or not at all."""
+    with complete_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(lines)

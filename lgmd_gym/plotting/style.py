@@ -8,6 +8,8 @@ from typing import Any, BinaryIO
 
 from PIL import ImageFont
 
+from lgmd_gym.system.files import complete_file
+
 # Palette of Okabe and Ito, which colour-blind readers can distinguish; darkest first.
 COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 STYLE = {
@@ -55,7 +57,7 @@ def saved_figure(
     """Create a figure with subplots and yield it with its axes; save and close it at the end of the block.
 
     Args:
-        file: Destination.
+        file: Destination; the file of a path is complete or absent.
         rows: Number of rows of subplots.
         columns: Number of columns of subplots.
         grid: Whether the axes have grid lines.
@@ -63,11 +65,19 @@ def saved_figure(
         **subplot_options: Further arguments of `pyplot.subplots`.
     """
     plt = load_pyplot()
-    file_format = (file.suffix.lstrip(".") or "png") if isinstance(file, Path) else "svg"
+    options = {"format": _format_of(file)} | (save_options or {})
     with plt.rc_context(STYLE | {"axes.grid": grid}):
         figure, axes = plt.subplots(rows, columns, layout="constrained", **subplot_options)
         try:
             yield figure, axes
-            figure.savefig(file, format=file_format, **(save_options or {}))
+            if isinstance(file, Path):
+                with complete_file(file) as part:
+                    figure.savefig(part, **options)
+            else:
+                figure.savefig(file, **options)
         finally:
             plt.close(figure)
+
+
+def _format_of(file: FigureFile) -> str:
+    return (file.suffix.lstrip(".") or "png") if isinstance(file, Path) else "svg"

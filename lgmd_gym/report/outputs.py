@@ -5,7 +5,7 @@ from pathlib import Path
 from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, load_traces, write_froc
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.file_names import case_name, series_name
-from lgmd_gym.benchmark.stored_run import read_run, read_series
+from lgmd_gym.benchmark.stored_run import read_run, read_series, rows_file
 from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import write_summary
@@ -13,10 +13,13 @@ from lgmd_gym.benchmark.traffic.summary import write_traffic_summary
 from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.plotting.figures import episode_figure
 from lgmd_gym.report.page import write_report
+from lgmd_gym.system.lock import FolderLock
 
 
 def write_outputs(path: Path, plots: bool = True, report: bool = True, trust: bool = False) -> list[Path]:
     """Write summary.csv, and for a suite of cases plots/, froc.csv and report.html, into a run folder.
+
+    The folder is locked meanwhile: an older state of the run does not replace the outputs of a newer one.
 
     Args:
         path: Run folder; a run without rows gets no files.
@@ -28,8 +31,17 @@ def write_outputs(path: Path, plots: bool = True, report: bool = True, trust: bo
         The files written.
 
     Raises:
-        ValueError: If the folder contains no run or a damaged one.
+        ValueError: If the folder contains no run or a damaged one, or another process writes to it.
     """
+    rows_file(path)
+    lock = FolderLock(path)
+    try:
+        return _write(path, plots, report, trust)
+    finally:
+        lock.release()
+
+
+def _write(path: Path, plots: bool, report: bool, trust: bool) -> list[Path]:
     config, rows, _ = read_run(path)
     if not rows:
         return []

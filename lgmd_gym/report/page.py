@@ -17,6 +17,7 @@ from lgmd_gym.benchmark.analysis.tables import (
     rate_text,
     success_lines,
 )
+from lgmd_gym.benchmark.folder import replace_file
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import by_condition, without_fcw_driver
@@ -62,7 +63,7 @@ def write_report(path: Path, trust: bool = False) -> Path:
         false_activations=_false_activations(data),
     )
     file = path / "report.html"
-    file.write_text(text, encoding="utf-8")
+    replace_file(file, text)
     return file
 
 

@@ -18,9 +18,12 @@ from lgmd_gym.benchmark.rows import KEYS
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.stored_run import read_run
 from lgmd_gym.benchmark.suites import SUITES
+from lgmd_gym.benchmark.summary import write_csv
 from lgmd_gym.cli import main as cli
+from lgmd_gym.plotting.style import saved_figure
 from lgmd_gym.report.outputs import write_outputs
 from lgmd_gym.report.page import write_report
+from lgmd_gym.system.lock import FolderLock
 
 BOUNDS = ("no-brake", "always-brake", "ttc-oracle", "spike-threshold")
 
@@ -242,3 +245,34 @@ def test_existing_folder_and_zero_jobs_are_rejected(tmp_path):
         new_run(tmp_path, agents=["no-brake"])
     with pytest.raises(ValueError, match="jobs must be >= 1, got 0"):
         Executor(jobs=0)
+
+
+def test_outputs_are_complete_or_absent(tmp_path, monkeypatch):
+    def draw(path):
+        with saved_figure(path, 1, 1):
+            pass
+
+    def fail(path):
+        raise OSError("disk full")
+
+    monkeypatch.setattr("lgmd_gym.system.files._sync", fail)  # at the end of each file
+    for name, write in (("summary.csv", lambda path: write_csv(path, ["x"], [])), ("case.png", draw)):
+        path = tmp_path / name
+        path.write_text("old")
+        with pytest.raises(OSError, match="disk full"):
+            write(path)
+        assert path.read_text() == "old"
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_outputs_have_one_writer(tmp_path):
+    (tmp_path / "episodes.jsonl").touch()
+    lock = FolderLock(tmp_path)
+    with pytest.raises(ValueError, match=rf"in use by process {os.getpid()}"):
+        write_outputs(tmp_path)
+    lock.release()
+    for path in (tmp_path / "episodes.jsonl", tmp_path / ".lock"):
+        path.unlink()
+    with pytest.raises(ValueError, match="contains no run"):
+        write_outputs(tmp_path)
+    assert list(tmp_path.iterdir()) == []  # no lock in a folder without a run
