@@ -52,7 +52,7 @@ def make_physics(world: World, brakes: np.ndarray, weights: np.ndarray) -> Physi
     """Return the arrays of a world; make them again after `World.load` has replaced arrays."""
     return Physics(
         world.bodies, world.episodes, world.egos, world.lines, world.pending, world.segments, world.paths,
-        world.before, brakes, weights,
+        world.before, world.parts, brakes, weights,
     )  # fmt: skip
 
 

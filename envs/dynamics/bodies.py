@@ -1,6 +1,6 @@
 """The ego and the actors of an episode as records, and their motion."""
 
-from math import asin, atan, tan
+from math import asin, atan, inf, nan, tan
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,25 @@ EGO_STATE = np.dtype([("on_script", np.int64), ("yaw_rate", np.float64)])
 + to the right [rad/s]."""
 
 
+STEP_START = np.dtype(
+    [
+        *((name, np.float64) for name in ("x", "y", "heading", "travelled", "speed", "acceleration")),
+        *SCRIPT_FIELDS,
+    ]
+)
+"""Fields of a body before a step, as in `BODY`: where it was, and what its motion in the step depends on."""
+
+
+@compiled
+def copy_motion(source: Any, target: Any) -> None:
+    """Copy what the motion of a body depends on, between `BODY` and `STEP_START` records."""
+    target.speed, target.acceleration = source.speed, source.acceleration
+    target.script_speed, target.script_acceleration = source.script_speed, source.script_acceleration
+    target.script_time, target.segment, target.segment_end = (
+        source.script_time, source.segment, source.segment_end,
+    )  # fmt: skip
+
+
 @compiled
 def outline_of(body: Any) -> Rectangle:
     """Return the outline of a body."""
@@ -68,7 +87,7 @@ def step_actor(body: Any, segments: np.ndarray, paths: np.ndarray, dt: float) ->
 @compiled
 def step_ego(
     body: Any, ego: Any, line: Any, pending: np.ndarray, brake: Any, segments: np.ndarray,
-    paths: np.ndarray, dt: float,
+    paths: np.ndarray, parts: np.ndarray, dt: float,
 ) -> None:  # fmt: skip
     """Advance the ego by `dt` [s] under its delayed demands.
 
@@ -80,14 +99,20 @@ def step_ego(
         brake: `BRAKE` record.
         segments: Table of the scripts' segments.
         paths: Table of the paths' cells.
+        parts: Output: duration [s] and target acceleration [m/s²] of each part of the step. The target is NaN
+            on the script, and the last duration is inf. Float64, shape (demands + 1, 2).
         dt: Duration [s].
     """
-    heading, end, distance = body.heading, line.time + dt, 0.0
+    heading, end, distance, number = body.heading, line.time + dt, 0.0, 0
     while True:
         duration, demand = next_part(line, pending, end)
-        distance += _advance_ego(body, ego, brake, segments, duration, demand)
+        moved, target = _advance_ego(body, ego, brake, segments, duration, demand)
+        distance += moved
+        parts[number, 0], parts[number, 1] = duration, target
         if not line.time < end:
             break
+        number += 1
+    parts[number, 0] = inf
     move(body, paths, distance)
     ego.yaw_rate = (body.heading - heading) / dt
 
@@ -95,18 +120,22 @@ def step_ego(
 @compiled
 def _advance_ego(
     body: Any, ego: Any, brake: Any, segments: np.ndarray, duration: float, demand: float
-) -> float:
-    """Advance the ego's speed under one demand and return the distance travelled [m]."""
+) -> tuple[float, float]:
+    """Advance the ego's speed under one demand.
+
+    Returns:
+        Distance travelled [m], and the target of the acceleration [m/s²]; NaN on the script.
+    """
     scripted = step_script(body, segments, duration)
     if demand != 0.0:
         ego.on_script = 0
     if ego.on_script:
         body.speed, body.acceleration = body.script_speed, body.script_acceleration
-        return scripted
+        return scripted, nan
     target = _target_acceleration(body, brake, demand)
     moved = advance(body.speed, body.acceleration, target, brake.jerk, duration)
     body.speed, body.acceleration = moved[1], moved[2]
-    return moved[0]
+    return moved[0], target
 
 
 @compiled

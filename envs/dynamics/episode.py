@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, move, step_actor, step_ego
+from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, copy_motion, move, step_actor, step_ego
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.jit import Arrays, compiled
-from lgmd_gym.envs.dynamics.refined_contact import progress, touch_time
+from lgmd_gym.envs.dynamics.refined_contact import StepMotion, progress, touch_time
 
 PASSED_DISTANCE = 2.0  # [m] behind the ego's rear beyond which an actor has been passed
 
@@ -40,6 +40,7 @@ class Physics(NamedTuple):
         segments: See `World`.
         paths: See `World`.
         before: See `World`.
+        parts: See `World`.
         brakes: `BRAKE` records, shape (N,).
         weights: `REWARD` records, shape (N,).
     """
@@ -52,6 +53,7 @@ class Physics(NamedTuple):
     segments: np.ndarray
     paths: np.ndarray
     before: np.ndarray
+    parts: np.ndarray
     brakes: np.ndarray
     weights: np.ndarray
 
@@ -62,14 +64,14 @@ def step_environment(i: int, dt: float, physics: Arrays) -> None:
     physics = Physics(*physics)
     step_bodies(
         physics.bodies[i], physics.episodes[i], physics.egos[i], physics.lines[i], physics.pending[i],
-        physics.brakes[i], physics.segments[i], physics.paths[i], physics.before[i], dt,
+        physics.brakes[i], physics.segments[i], physics.paths[i], physics.before[i], physics.parts[i], dt,
     )  # fmt: skip
 
 
 @compiled
 def step_bodies(
     bodies: np.ndarray, episode: Any, ego: Any, line: Any, pending: np.ndarray, brake: Any,
-    segments: np.ndarray, paths: np.ndarray, before: np.ndarray, dt: float,
+    segments: np.ndarray, paths: np.ndarray, before: np.ndarray, parts: np.ndarray, dt: float,
 ) -> None:  # fmt: skip
     """Advance all bodies by `dt` [s], or up to the ego's first contact; after it they do not move.
 
@@ -82,57 +84,60 @@ def step_bodies(
         brake: `BRAKE` record.
         segments: Table of the scripts' segments.
         paths: Table of the paths' cells.
-        before: Scratch memory, float64, shape (bodies, 5).
+        before: Scratch memory, `STEP_START` records, shape (bodies + 1,).
+        parts: Scratch memory, see `step_ego`.
         dt: Duration [s].
     """
     if episode.touched > 0:
         return
     for i in range(episode.bodies):
-        body = bodies[i]
-        before[i, 0], before[i, 1], before[i, 2] = body.x, body.y, body.heading
-        before[i, 3], before[i, 4] = body.travelled, body.speed
-    step_ego(bodies[0], ego, line, pending, brake, segments, paths, dt)
+        body, start = bodies[i], before[i]
+        start.x, start.y, start.heading, start.travelled = body.x, body.y, body.heading, body.travelled
+        copy_motion(body, start)
+    step_ego(bodies[0], ego, line, pending, brake, segments, paths, parts, dt)
     for i in range(1, episode.bodies):
         step_actor(bodies[i], segments, paths, dt)
-    time, touched = first_contact_of(bodies, episode.bodies, before, paths, dt)
+    step = StepMotion(before, parts, brake.jerk, segments, paths, dt)
+    time, touched = first_contact_of(bodies, episode.bodies, step)
     if touched == 0:
         return
     for i in range(episode.bodies):
-        body = bodies[i]
-        if body.kind != ROAD_MARKING:
-            distance = body.travelled - before[i, 3]
-            share, speed = progress(before[i, 4], body.speed, distance, dt, time)
-            move(body, paths, (share - 1.0) * distance)
-            body.speed = speed
+        if bodies[i].kind != ROAD_MARKING:
+            _move_back(bodies, i, step, time)
     here, other = bodies[0], bodies[touched]
     episode.touched, episode.impact_speed = touched, here.speed
     episode.relative_impact_speed = here.speed - other.speed * cos(other.heading - here.heading)
 
 
 @compiled
-def first_contact_of(
-    bodies: np.ndarray, count: int, before: np.ndarray, paths: np.ndarray, dt: float
-) -> tuple[float, int]:
+def _move_back(bodies: np.ndarray, i: int, step: Any, part: float) -> None:
+    """Move a body from the end of a step to its place after a part of it."""
+    body, before = bodies[i], step.before[i]
+    covered, changed = body.travelled - before.travelled, body.speed != before.speed
+    distance, body.speed = progress(bodies, i, step, part)
+    move(body, step.paths, distance - covered if changed else (part - 1.0) * covered)
+
+
+@compiled
+def first_contact_of(bodies: np.ndarray, count: int, step: Any) -> tuple[float, int]:
     """Return the time at which the ego first touches a body, and its index; else `inf` and 0.
 
     Args:
         bodies: `BODY` records after the step.
         count: Number of bodies.
-        before: x, y, heading, distance travelled and speed before the step, float64, shape (bodies, 5).
-        paths: Table of the paths' cells.
-        dt: Duration of the step [s].
+        step: `StepMotion`.
 
     Returns:
         The time as a part of the step, and the index.
     """
-    found, touched = inf, 0
+    found, touched, before = inf, 0, step.before
     for i in range(1, count):
         if bodies[i].kind == ROAD_MARKING:
             continue
         if _is_uniform(bodies[0], before[0]) and _is_uniform(bodies[i], before[i]):
             time = _uniform_touch(bodies[0], bodies[i], before[0], before[i])
         else:
-            time = touch_time(bodies[0], bodies[i], before[0], before[i], paths, dt)
+            time = touch_time(bodies, i, step)
         if time < found:
             found, touched = time, i
     return found, touched
@@ -141,14 +146,14 @@ def first_contact_of(
 @compiled
 def _is_uniform(body: Any, before: Any) -> bool:
     """Return whether a body has kept its heading and speed in a step."""
-    return body.heading == before[2] and body.speed == before[4]
+    return body.heading == before.heading and body.speed == before.speed
 
 
 @compiled
 def _uniform_touch(ego: Any, body: Any, ego_before: Any, before: Any) -> float:
     """Return the time of the first touch of two bodies in straight, uniform motion; see `touch_time`."""
-    start = Rectangle(ego_before[0], ego_before[1], ego_before[2], ego.length, ego.width)
-    old = Rectangle(before[0], before[1], before[2], body.length, body.width)
+    start = Rectangle(ego_before.x, ego_before.y, ego_before.heading, ego.length, ego.width)
+    old = Rectangle(before.x, before.y, before.heading, body.length, body.width)
     return first_touch(start, old, ego.x - start.x - (body.x - old.x), ego.y - start.y - (body.y - old.y))
 
 

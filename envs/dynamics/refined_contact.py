@@ -1,60 +1,100 @@
-"""Contact within a step of bodies that turn or change their speed: the step is cut into short parts."""
+"""Contact within a step of bodies that turn or change their speed: the step is cut into short parts.
 
-from math import hypot, inf
-from typing import Any
+The speeds and distances at their ends are exact: the motion of the step is repeated up to that time.
+"""
+
+from math import hypot, inf, isnan
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from lgmd_gym.envs.dynamics.bodies import copy_motion
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.envs.dynamics.longitudinal import advance
 from lgmd_gym.envs.dynamics.path import pose_at
+from lgmd_gym.envs.dynamics.speed_profile import step_script
 
 PARTS = 16  # of a step
 
 
-@compiled
-def progress(speed: float, last: float, distance: float, dt: float, part: float) -> tuple[float, float]:
-    """Return the share of a step's distance covered at a part of its time, and the speed there [m/s].
+class StepMotion(NamedTuple):
+    """What the motion of the bodies within a step depends on.
 
-    The acceleration is constant, up to the standstill if the body stops within the step.
-
-    Args:
-        speed: Speed at the start of the step [m/s].
-        last: Speed at its end [m/s].
-        distance: Distance travelled in it [m].
-        dt: Its duration [s].
-        part: Time as a part of the step, in [0, 1].
-    """
-    if speed == last:
-        return part, last
-    if last == 0.0:
-        stop = min(2.0 * distance / (speed * dt), 1.0)
-        rest = max(1.0 - part / stop, 0.0) if stop > 0.0 else 0.0
-        return 1.0 - rest * rest, rest * speed
-    now = (1.0 - part) * speed + part * last
-    return part * (speed + now) / (speed + last), now
-
-
-@compiled
-def touch_time(ego: Any, body: Any, ego_before: Any, before: Any, paths: np.ndarray, dt: float) -> float:
-    """Return the time of the first touch of two bodies as a part of a step; `inf` if they do not touch.
-
-    Args:
-        ego: `BODY` record after the step.
-        body: The other one.
-        ego_before: x, y, heading, distance travelled and speed of the ego before the step.
-        before: The same of the other body.
+    Attributes:
+        before: `STEP_START` records of the bodies, and one more as scratch memory.
+        parts: See `step_ego`.
+        jerk: Slope of every change of the ego's acceleration [m/s³].
+        segments: Table of the scripts' segments.
         paths: Table of the paths' cells.
         dt: Duration of the step [s].
     """
-    moved = abs(ego.travelled - ego_before[3]) + abs(body.travelled - before[3])
+
+    before: np.ndarray
+    parts: np.ndarray
+    jerk: float
+    segments: np.ndarray
+    paths: np.ndarray
+    dt: float
+
+
+@compiled
+def progress(bodies: np.ndarray, i: int, step: Any, part: float) -> tuple[float, float]:
+    """Return the distance [m] that a body has covered after a part of a step, and its speed there [m/s].
+
+    Args:
+        bodies: `BODY` records after the step, the ego first.
+        i: Index of the body.
+        step: `StepMotion`.
+        part: Time as a part of the step, in [0, 1].
+    """
+    body, before = bodies[i], step.before[i]
+    if before.speed == body.speed:
+        return part * (body.travelled - before.travelled), body.speed
+    moving = step.before[len(step.before) - 1]
+    copy_motion(before, moving)
+    if i > 0:
+        distance = step_script(moving, step.segments, part * step.dt)
+        return distance, moving.script_speed
+    return _ego_progress(moving, step, part * step.dt)
+
+
+@compiled
+def _ego_progress(moving: Any, step: Any, time: float) -> tuple[float, float]:
+    """Advance the motion of the ego by a time [s] as `step_ego` did; return distance [m] and speed [m/s]."""
+    distance, row = 0.0, 0
+    while time > 0.0:
+        duration, target = min(step.parts[row, 0], time), step.parts[row, 1]
+        if isnan(target):
+            distance += step_script(moving, step.segments, duration)
+            moving.speed, moving.acceleration = moving.script_speed, moving.script_acceleration
+        else:
+            moved = advance(moving.speed, moving.acceleration, target, step.jerk, duration)
+            distance += moved[0]
+            moving.speed, moving.acceleration = moved[1], moved[2]
+        time -= duration
+        row += 1
+    return distance, moving.speed
+
+
+@compiled
+def touch_time(bodies: np.ndarray, i: int, step: Any) -> float:
+    """Return the time of the first touch of the ego and body i as a part of a step; `inf` without a touch.
+
+    Args:
+        bodies: `BODY` records after the step, the ego first.
+        i: Index of the other body.
+        step: `StepMotion`.
+    """
+    ego, body, ego_before, before = bodies[0], bodies[i], step.before[0], step.before[i]
+    moved = abs(ego.travelled - ego_before.travelled) + abs(body.travelled - before.travelled)
     reach = hypot(ego.length, ego.width) / 2 + hypot(body.length, body.width) / 2
-    if hypot(ego_before[0] - before[0], ego_before[1] - before[1]) > reach + moved:
+    if hypot(ego_before.x - before.x, ego_before.y - before.y) > reach + moved:
         return inf
-    a, c = _outline_at(ego, ego_before, paths, dt, 0.0), _outline_at(body, before, paths, dt, 0.0)
+    a, c = _outline_at(bodies, 0, step, 0.0), _outline_at(bodies, i, step, 0.0)
     for number in range(PARTS):
         later = (number + 1.0) / PARTS
-        b, d = _outline_at(ego, ego_before, paths, dt, later), _outline_at(body, before, paths, dt, later)
+        b, d = _outline_at(bodies, 0, step, later), _outline_at(bodies, i, step, later)
         dx, dy = (b.x - a.x) - (d.x - c.x), (b.y - a.y) - (d.y - c.y)
         touch = first_touch(_turned_half(a, b), _turned_half(c, d), dx, dy)
         if touch <= 1.0:
@@ -64,13 +104,13 @@ def touch_time(ego: Any, body: Any, ego_before: Any, before: Any, paths: np.ndar
 
 
 @compiled
-def _outline_at(body: Any, before: Any, paths: np.ndarray, dt: float, part: float) -> Rectangle:
+def _outline_at(bodies: np.ndarray, i: int, step: Any, part: float) -> Rectangle:
     """Return the outline of a body at a part of a step."""
-    distance = body.travelled - before[3]
-    if distance == 0.0:
+    body, start = bodies[i], step.before[i].travelled
+    if body.travelled == start:
         return Rectangle(body.x, body.y, body.heading, body.length, body.width)
-    share, _ = progress(before[4], body.speed, distance, dt, part)
-    pose = pose_at(paths[body.path : body.path_end], before[3] + share * distance)
+    distance, _ = progress(bodies, i, step, part)
+    pose = pose_at(step.paths[body.path : body.path_end], start + distance)
     return Rectangle(pose.x, pose.y, pose.heading, body.length, body.width)
 
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgmd_gym.envs.dynamics.bend import Pose
-from lgmd_gym.envs.dynamics.bodies import BODY, BOX, CAR, EGO, EGO_STATE, ROAD_MARKING
+from lgmd_gym.envs.dynamics.bodies import BODY, BOX, CAR, EGO, EGO_STATE, ROAD_MARKING, STEP_START
 from lgmd_gym.envs.dynamics.brake import DELAY_LINE
 from lgmd_gym.envs.dynamics.episode import EPISODE
 from lgmd_gym.envs.dynamics.path import path_table
@@ -89,7 +89,8 @@ class World:
         pending: Demands in the delay lines, float64, shape (N, demands, 2).
         segments: Tables of the scripts' segments, float64, shape (N, segments, 4).
         paths: Tables of the paths' cells, float64, shape (N, cells, 6).
-        before: Scratch memory, float64, shape (N, bodies, 5).
+        before: Scratch memory, `STEP_START` records, shape (N, bodies + 1).
+        parts: Scratch memory, see `step_ego`; float64, shape (N, demands + 1, 2).
     """
 
     def __init__(self, num: int, max_demands: int) -> None:
@@ -100,7 +101,8 @@ class World:
         self.pending = np.zeros((num, max_demands, 2))
         self.segments = np.zeros((num, 1, 4))
         self.paths = np.zeros((num, 1, 6))
-        self.before = np.zeros((num, 1, 5))
+        self.before = np.zeros((num, 2), STEP_START)
+        self.parts = np.zeros((num, max_demands + 1, 2))
 
     def load(self, index: int, placement: Placement) -> bool:
         """Start an episode in environment `index`; returns whether arrays were replaced by larger ones."""
@@ -120,7 +122,7 @@ class World:
     def _reserve(self, bodies: int, segments: int, cells: int) -> bool:
         """Enlarge the arrays to at least these numbers of rows."""
         grown = False
-        needed = (("bodies", bodies), ("before", bodies), ("segments", segments), ("paths", cells))
+        needed = (("bodies", bodies), ("before", bodies + 1), ("segments", segments), ("paths", cells))
         for name, rows in needed:
             old = getattr(self, name)
             if old.shape[1] < rows:

@@ -1,17 +1,18 @@
 """Contact of rectangles, within a step and on paths: every expected value is computed by hand."""
 
-from math import cos, hypot, inf, pi, sin
+from math import cos, hypot, inf, nan, pi, sin
 
 import numpy as np
 import pytest
-from support.records import bodies, brake_of, record
+from support.records import bodies, brake_of, record, records
 
 from lgmd_gym.envs.dynamics.bend import Pose, arc
-from lgmd_gym.envs.dynamics.bodies import BOX, EGO_STATE, ROAD_MARKING
+from lgmd_gym.envs.dynamics.bodies import BOX, EGO_STATE, ROAD_MARKING, STEP_START
 from lgmd_gym.envs.dynamics.brake import DELAY_LINE
 from lgmd_gym.envs.dynamics.contact import Contact, Rectangle, first_touch, touched_side
 from lgmd_gym.envs.dynamics.episode import EPISODE, first_contact_of, step_bodies
 from lgmd_gym.envs.dynamics.path import path_table, pose_at
+from lgmd_gym.envs.dynamics.refined_contact import StepMotion
 from lgmd_gym.envs.dynamics.swept_contact import PathMotion, gap_on_path, time_on_paths
 
 NO_SEGMENTS = np.zeros((0, 4))
@@ -92,6 +93,11 @@ def test_contact_of_road_objects():
         assert contact.relative_impact_speed == pytest.approx(relative)
 
 
+def scratch(count):
+    """Return the scratch memory of a step of `count` bodies."""
+    return records(STEP_START, *[{}] * (count + 1)), np.zeros((9, 2))
+
+
 def collide(other, ego=(), kind=(), dt=0.5):
     """Return the episode and bodies after a step of `dt` [s] with an ego at 20 m/s."""
     moving = {"speed": 20.0, "script_speed": 20.0} | dict(ego)
@@ -99,9 +105,10 @@ def collide(other, ego=(), kind=(), dt=0.5):
     rows = [row | {"script_speed": row.get("speed", 0.0)} for row in rows]
     table, paths = bodies(*rows)
     episode = record(EPISODE, bodies=len(rows), impact_speed=inf, relative_impact_speed=inf)
-    line, pending, before = record(DELAY_LINE), np.zeros((8, 2)), np.zeros((len(rows), 5))
-    state = record(EGO_STATE, on_script=1)
-    step_bodies(table, episode, state, line, pending, brake_of(), NO_SEGMENTS, paths, before, dt)
+    step_bodies(
+        table, episode, record(EGO_STATE, on_script=1), record(DELAY_LINE), np.zeros((8, 2)), brake_of(),
+        NO_SEGMENTS, paths, *scratch(len(rows)), dt,
+    )  # fmt: skip
     return episode, table
 
 
@@ -136,10 +143,9 @@ def test_bodies_stop_at_the_contact():
     assert (table[0].x, table[1].x) == pytest.approx((20 * 5 / 16, 9 + 4 * 5 / 16))
     assert (table[0].speed, table[1].speed) == pytest.approx((20.0, 4.0))
     touched, places = episode.touched, table.x.copy()
-    collide_again = np.zeros((2, 5))
     step_bodies(
         table, episode, record(EGO_STATE, on_script=1), record(DELAY_LINE), np.zeros((8, 2)), brake_of(),
-        NO_SEGMENTS, bodies({}, {})[1], collide_again, 0.5,
+        NO_SEGMENTS, bodies({}, {})[1], *scratch(2), 0.5,
     )  # fmt: skip
     assert (episode.touched, table.x.tolist()) == (touched, places.tolist())
 
@@ -154,12 +160,17 @@ def test_first_of_several_contacts():
     episode, table = collide(rows)
     assert (episode.touched, table[0].x) == (2, pytest.approx(6.0))
     table, paths = bodies({"x": 10.0, "speed": 20.0}, {"x": 12.0}, {"x": 10.0})
-    before = np.array([(0.0, 0.0, 0.0, 0.0, 20.0), (12.0, 0.0, 0.0, 0.0, 0.0), (10.0, 0.0, 0.0, 0.0, 0.0)])
-    assert first_contact_of(table, 3, before, paths, 0.5) == (pytest.approx(0.6), 2)
-    assert first_contact_of(table, 2, before, paths, 0.5) == (pytest.approx(0.8), 1)
-    assert first_contact_of(table, 1, before, paths, 0.5) == (inf, 0)
+    starts = records(STEP_START, {"speed": 20.0}, {"x": 12.0}, {"x": 10.0}, {})
+
+    def first_of(table, count):
+        parts = np.array([(inf, nan)])
+        return first_contact_of(table, count, StepMotion(starts, parts, inf, NO_SEGMENTS, paths, 0.5))
+
+    assert first_of(table, 3) == (pytest.approx(0.6), 2)
+    assert first_of(table, 2) == (pytest.approx(0.8), 1)
+    assert first_of(table, 1) == (inf, 0)
     table, paths = bodies({"x": 10.0, "speed": 20.0}, {"x": 18.0})
-    assert first_contact_of(table, 2, before, paths, 0.5) == (inf, 0)
+    assert first_of(table, 2) == (inf, 0)
 
 
 def test_time_on_paths_of_straight_motion():

@@ -60,7 +60,8 @@ def drive(demand, body=(), brake=(), segments=NO_SEGMENTS, on_script=0, dt=0.5, 
     table[0].path_end = len(paths)
     state = record(EGO_STATE, on_script=on_script)
     line, pending = record(DELAY_LINE, demand=demand, last_put=demand), np.zeros((8, 2))
-    step_ego(table[0], state, line, pending, brake_of(**dict(brake)), segments, paths, dt)
+    parts = np.zeros((9, 2))
+    step_ego(table[0], state, line, pending, brake_of(**dict(brake)), segments, paths, parts, dt)
     return table[0], state
 
 

@@ -40,10 +40,9 @@ class ReferenceEpisode:
 
     def advance(self, dt):
         everything = [self.ego, *self.bodies]
-        before = [(body.travelled, body.speed) for body in everything]
+        motions = [Motion(body, dt) for body in everything]
         for body in everything:
             body.step(dt)
-        motions = [Motion(body, *start, dt) for body, start in zip(everything, before, strict=True)]
         times = [motions[0].first_touch(motion) for motion in motions[1:]]
         found, touched = inf, None
         for time, body, solid in zip(times, self.bodies, self.solid, strict=True):
@@ -53,8 +52,8 @@ class ReferenceEpisode:
             return
         for motion, body, solid in zip(motions, everything, [True, *self.solid], strict=True):
             if solid:
-                share, speed = motion.progress(found)
-                body.move((share - 1.0) * motion.distance)
+                distance, speed = motion.progress(found)
+                body.move(distance - motion.distance)
                 body.speed = speed
         along = touched.speed * cos(touched.heading - self.ego.heading)
         self.contact = self.ego.speed, self.ego.speed - along

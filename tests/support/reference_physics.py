@@ -2,6 +2,7 @@
 
 from bisect import bisect_right
 from collections import deque
+from copy import copy
 from math import asin, atan, copysign, cos, hypot, inf, sin, sqrt, tan
 
 from lgmd_gym.envs.dynamics.bend import Pose
@@ -148,6 +149,7 @@ class Ego(Body):
 
     def step(self, dt):
         heading, end, distance = self.heading, self.time + dt, 0.0
+        self.parts = []
         while self.pending and self.pending[0][0] < end - 1e-9:
             due, demand = self.pending.popleft()
             if due > self.time:
@@ -164,6 +166,7 @@ class Ego(Body):
         self.on_script = self.on_script and demand == 0.0
         if self.on_script:
             self.speed, self.acceleration = self.script.speed, self.script.acceleration
+            self.parts.append((duration, None))
             return scripted
         if demand < 0.0:
             target = min(demand * brake.max_deceleration, self.script.acceleration)
@@ -175,6 +178,7 @@ class Ego(Body):
         distance, self.speed, self.acceleration = advance(
             self.speed, self.acceleration, target, brake.jerk, duration
         )
+        self.parts.append((duration, target))
         return distance
 
     @property
@@ -183,28 +187,39 @@ class Ego(Body):
 
 
 class Motion:
-    """The motion of a body within a step, at constant acceleration up to its standstill."""
+    """The motion of a body within a step, made before it; used after it."""
 
-    def __init__(self, body, travelled, speed, dt):
-        self.body, self.start, self.speed, self.dt = body, travelled, speed, dt
-        self.distance = body.travelled - travelled
+    def __init__(self, body, dt):
+        self.body, self.start, self.speed, self.dt = body, body.travelled, body.speed, dt
+        self.acceleration, self.script = body.acceleration, copy(body.script)
+        self.script.left = list(body.script.left)
+
+    @property
+    def distance(self):
+        """Distance travelled in the step [m]."""
+        return self.body.travelled - self.start
 
     def progress(self, part):
-        """Return the share of the distance covered at a part of the step, and the speed there."""
-        first, last = self.speed, self.body.speed
-        if first == last:
-            return part, last
-        if last == 0.0:
-            stop = min(2.0 * self.distance / (first * self.dt), 1.0)
-            rest = max(1.0 - part / stop, 0.0) if stop > 0.0 else 0.0
-            return 1.0 - rest * rest, rest * first
-        now = (1.0 - part) * first + part * last
-        return part * (first + now) / (first + last), now
+        """Return the distance covered at a part of the step, and the speed there."""
+        if self.speed == self.body.speed:
+            return part * self.distance, self.speed
+        script, speed, acceleration = copy(self.script), self.speed, self.acceleration
+        script.left, rest, distance = list(self.script.left), part * self.dt, 0.0
+        for duration, target in getattr(self.body, "parts", [(inf, None)]):
+            duration = min(duration, rest)
+            rest -= duration
+            if target is None:
+                distance += script.step(duration)
+                speed, acceleration = script.speed, script.acceleration
+            else:
+                jerk = self.body.brake.jerk
+                moved, speed, acceleration = advance(speed, acceleration, target, jerk, duration)
+                distance += moved
+        return distance, speed
 
     def outline(self, part):
         """Return the outline at a part of the step."""
-        share, _ = self.progress(part)
-        pose = self.body.path.pose(self.start + share * self.distance)
+        pose = self.body.path.pose(self.start + self.progress(part)[0])
         return Rectangle(*pose, self.body.length, self.body.width)
 
     def uniform(self):
