@@ -1,8 +1,9 @@
 """Long commands that are stopped at random moments: `python tests/fuzz/kills.py --seconds 600`.
 
-A case starts one command and sends SIGTERM, SIGKILL or SIGINT to it, SIGINT also to its workers, as a
-terminal does. No process and no shared memory may remain, and no traceback. The command must then be able to
-resume or to run again, with the results of an undisturbed command.
+A case starts one command, and sends SIGTERM, SIGKILL or SIGINT to it, SIGINT also to its workers, as a
+terminal does. It continues the command and stops it several times. No process and no shared memory may
+remain, and no traceback. The command must then be able to resume or to run again, with the results of an
+undisturbed command.
 """
 
 import argparse
@@ -28,6 +29,8 @@ from support.fuzz import run_cases
 from support.recordings import OFFLINE_YAML
 from support.runs import read_rows, sorted_rows
 
+STROKES = 4  # of a command, each followed by its continuation
+RESULTS = ("out.png", "best.toml")  # complete if they exist
 FIRST_S = 0.3  # [s] after which the command handles signals; before, Python itself starts
 FILES = {
     "tiny.toml": 'name = "tiny"\n[[cases]]\nfamily = "CCRs"\nspeeds_kmh = [10, 20, 30]\n'
@@ -45,6 +48,14 @@ default:
   policy_kwargs: {net_arch: [8]}
 """,
 }
+
+
+class Stroke(NamedTuple):
+    """A signal, whether it goes to the workers, too, and its moment as a part of the duration."""
+
+    number: signal.Signals
+    to_all: bool
+    part: float
 
 
 class Command(NamedTuple):
@@ -162,56 +173,57 @@ def complete(line, folder):
     assert process.returncode == 0, (line, process.returncode, errors)
 
 
-def stop(name, folder, number, to_all, moment):
-    """Stop a command after a time [s], and check its end; return whether the signal came before it."""
-    tag, before = f"{os.getpid()}-{folder.name}", kills.segments()
-    temporary = folder / "tmp"
-    temporary.mkdir()
-    line = COMMANDS[name].arguments.split()
-    process = kills.start(line, tag, cwd=folder, env={"TMPDIR": str(temporary)})
-    time.sleep(moment)
-    running = process.poll() is None
+def next_line(name, folder):
+    """Return the command line that starts or continues a command; None if it is complete."""
+    command = COMMANDS[name]
+    if any((folder / path).exists() for path in RESULTS):
+        return None
+    return command.repeat if (folder / "out").exists() else command.arguments
+
+
+def stop(line, folder, stroke, duration):
+    """Stop a command at a moment, and check its end; return whether the signal came before it."""
+    tag, temporary = f"{os.getpid()}-{folder.name}-{time.monotonic_ns()}", folder / "tmp"
+    temporary.mkdir(exist_ok=True)
+    process = kills.start(line.split(), tag, cwd=folder, env={"TMPDIR": str(temporary)})
+    time.sleep(FIRST_S + stroke.part * (duration - FIRST_S))
+    owners, running = {process.pid, *kills.processes(tag)}, process.poll() is None
     if running:
-        (os.killpg if to_all else os.kill)(process.pid, number)
+        (os.killpg if stroke.to_all else os.kill)(process.pid, stroke.number)
     _, errors = process.communicate(timeout=1200)
     # Python restores the default handler of SIGTERM at the very end.
-    expected = (kills.CODES[number], -number) if running else (0,)
+    expected = (kills.CODES[stroke.number], -stroke.number) if running else (0,)
     assert process.returncode in expected, (process.returncode, errors)
     assert "Traceback" not in errors, errors
-    kills.wait_until_gone(tag, before)
-    assert number == signal.SIGKILL or not (left := os.listdir(temporary)), f"temporary files: {left}"
+    kills.wait_until_gone(tag, owners)
+    killed = stroke.number == signal.SIGKILL
+    assert killed or not (left := os.listdir(temporary)), f"temporary files: {left}"
+    shutil.rmtree(temporary)
     return running
 
 
-def finish(name, folder):
-    """Complete a stopped command: resume it, or run it again."""
-    command = COMMANDS[name]
-    made = any((folder / path).exists() for path in ("out", "out.png", "best.toml"))
-    if not made:
-        complete(command.arguments, folder)
-    elif command.repeat is not None and not (folder / "best.toml").exists():
-        complete(command.repeat, folder)
-
-
 def draw_case(names, rng):
-    """Return a description and the check of one stopped command."""
-    name, number = str(rng.choice(names)), signal.Signals(rng.choice(list(kills.CODES)))
-    to_all, part = number == signal.SIGINT and bool(rng.integers(2)), rng.uniform()
+    """Return a description and the check of one command that is stopped several times."""
+    name, strokes = str(rng.choice(names)), []
+    for _ in range(STROKES):
+        number, to_all, part = signal.Signals(rng.choice(list(kills.CODES))), rng.integers(2), rng.uniform()
+        strokes.append(Stroke(number, number == signal.SIGINT and bool(to_all), part))
 
     def check():
         results, duration = undisturbed(name)
-        folder = new_folder(name)
-        moment = FIRST_S + part * (duration - FIRST_S)
-        running = stop(name, folder, number, to_all, moment)
-        finish(name, folder)
+        folder, stopped = new_folder(name), []
+        for stroke in strokes:
+            if (line := next_line(name, folder)) and stop(line, folder, stroke, duration):
+                stopped.append(f"{stroke.number.name}{' to all' * stroke.to_all} at {stroke.part:.2f}")
+        if line := next_line(name, folder):
+            complete(line, folder)
         assert COMMANDS[name].results(folder) == results
         left = [str(path) for path in folder.rglob("*.part")]
         assert not left, left
-        print(f"{name}, {number.name}{' to all' * to_all} after {moment:.1f} of {duration:.1f} s: "
-              f"{'clean' if running else 'too late'}", flush=True)  # fmt: skip
+        print(f"{name} ({duration:.1f} s), {len(stopped)} stops: {', '.join(stopped)}", flush=True)
         shutil.rmtree(folder)
 
-    return f"{name}, {number.name}", check
+    return f"{name}, {strokes}", check
 
 
 if __name__ == "__main__":

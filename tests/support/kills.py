@@ -10,7 +10,7 @@ from pathlib import Path
 
 TAG = "LGMD_GYM_TEST_RUN"  # environment variable that all processes of a command inherit
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9}
-SHARED_MEMORY = Path("/dev/shm")
+SHARED_MEMORY = "/dev/shm"
 
 
 def start(arguments, tag, **options):
@@ -41,26 +41,22 @@ def processes(tag):
     return found
 
 
-def segments(before=()):
-    """Return this user's shared memory without a living owner, except that of `before`.
+def segments(owners):
+    """Return the shared memory that processes have made; its names contain their numbers."""
+    numbers = re.compile(r"(?<![0-9a-f])\d+(?![0-9a-f])")
+    names = os.listdir(SHARED_MEMORY)
+    return [name for name in names if owners & {int(number) for number in numbers.findall(name)}]
 
-    Names of segments contain the process that made them; segments of other running programs do not count.
+
+def wait_until_gone(tag, owners, limit=15.0):
+    """Wait until a command has left no process and no shared memory; AssertionError after `limit` [s].
+
+    Args:
+        tag: Tag of the command.
+        owners: Numbers of its processes while it ran.
+        limit: Time limit [s].
     """
-    found = []
-    for path in SHARED_MEMORY.iterdir():
-        numbers = re.findall(r"(?<![0-9a-f])\d+(?![0-9a-f])", path.name)
-        try:
-            own = path.stat().st_uid == os.getuid()
-        except OSError:  # removed meanwhile
-            continue
-        if own and path.name not in before and not any(Path("/proc", number).exists() for number in numbers):
-            found.append(path.name)
-    return found
-
-
-def wait_until_gone(tag, before=(), limit=15.0):
-    """Wait until a command has left no process and no shared memory; AssertionError after `limit` [s]."""
     end = time.monotonic() + limit
-    while left := processes(tag) + segments(before):
+    while left := processes(tag) + segments(owners):
         assert time.monotonic() < end, f"left after {limit:g} s: {left}"
         time.sleep(0.1)
