@@ -95,8 +95,7 @@ def touch_time(bodies: np.ndarray, i: int, step: Any) -> float:
     for number in range(PARTS):
         later = (number + 1.0) / PARTS
         b, d = _outline_at(bodies, 0, step, later), _outline_at(bodies, i, step, later)
-        dx, dy = (b.x - a.x) - (d.x - c.x), (b.y - a.y) - (d.y - c.y)
-        touch = first_touch(_turned_half(a, b), _turned_half(c, d), dx, dy)
+        touch = touch_between(a, b, c, d)
         if touch <= 1.0:
             return (number + touch) / PARTS
         a, c = b, d
@@ -112,6 +111,13 @@ def _outline_at(bodies: np.ndarray, i: int, step: Any, part: float) -> Rectangle
     distance, _ = progress(bodies, i, step, part)
     pose = pose_at(step.paths[body.path : body.path_end], start + distance)
     return Rectangle(pose.x, pose.y, pose.heading, body.length, body.width)
+
+
+@compiled
+def touch_between(a: Rectangle, b: Rectangle, c: Rectangle, d: Rectangle) -> float:
+    """Return the first touch of bodies that move from outline a to b and from c to d; see `first_touch`."""
+    dx, dy = (b.x - a.x) - (d.x - c.x), (b.y - a.y) - (d.y - c.y)
+    return first_touch(_turned_half(a, b), _turned_half(c, d), dx, dy)
 
 
 @compiled

@@ -50,6 +50,8 @@ class TrafficEgo(TrafficCar):
         self.yaw_rate = self.travelled = 0.0
         self._delay_line = DelayLine(self.brake.delay)
         self._by_driver = True
+        self._start = (0.0, 0.0)  # speed and acceleration before the last step
+        self._parts: list[tuple[float, float]] = []  # of that step: duration [s], target acceleration [m/s²]
 
     def demand(self, value: float) -> None:
         """Set the longitudinal demand: −1 full brake, 0 and above no braking beyond the driver's."""
@@ -67,6 +69,7 @@ class TrafficEgo(TrafficCar):
         self.timer += dt
         action = cast(dict[str, float], self.action)
         slip = atan(tan(action["steering"]) / 2)
+        self._start, self._parts = (self.speed, self.current_acceleration), []
         distance = sum(self._advance(duration, demand) for duration, demand in self._delay_line.advance(dt))
         course = self.heading + slip
         self.position = self.position + distance * np.array([cos(course), sin(course)])
@@ -82,7 +85,18 @@ class TrafficEgo(TrafficCar):
         self._by_driver = demand == 0.0 and (self._by_driver or before >= target)
         if demand < 0.0:
             target = min(demand * self.brake.max_deceleration, target)
+        self._parts.append((duration, target))
         distance, self.speed, self.current_acceleration = advance(
             self.speed, before, target, self.brake.jerk, duration
         )
         return distance
+
+    def progress(self, time: float) -> tuple[float, float]:
+        """Return the distance covered [m] and the speed [m/s] at a time of the last step [s]."""
+        covered, (speed, acceleration) = 0.0, self._start
+        for duration, target in self._parts:
+            duration = min(duration, time)
+            time -= duration
+            moved, speed, acceleration = advance(speed, acceleration, target, self.brake.jerk, duration)
+            covered += moved
+        return covered, speed

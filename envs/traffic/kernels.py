@@ -10,6 +10,7 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.envs.dynamics.refined_contact import touch_between
 from lgmd_gym.envs.traffic.places import (
     ALL_DONE,
     END_MARGIN,
@@ -225,8 +226,16 @@ def outline_of(car: Any) -> Rectangle:
 
 
 @compiled
+def outline_between(before: Any, after: Any, part: float) -> Rectangle:
+    """Return the outline of a car after a part of the way from one `CAR` record to another."""
+    rest = 1.0 - part
+    x, y = rest * before.x + part * after.x, rest * before.y + part * after.y
+    return Rectangle(x, y, rest * before.heading + part * after.heading, before.length, before.width)
+
+
+@compiled
 def find_contact(before: Any, after: Any, ego: int) -> Any:
-    """Return when the ego first touches another car or object within a step.
+    """Return whether the ego touches another car or object within a step, and which one first.
 
     Args:
         before: `CAR` records at the start of the step.
@@ -234,7 +243,7 @@ def find_contact(before: Any, after: Any, ego: int) -> Any:
         ego: Index of the ego.
 
     Returns:
-        The fraction of the step, `inf` without contact, and the index of the touched record.
+        The index of the touched record; that of the ego without contact.
     """
     start, end = before[ego], after[ego]
     dx, dy = end.x - start.x, end.y - start.y
@@ -246,7 +255,33 @@ def find_contact(before: Any, after: Any, ego: int) -> Any:
         fraction = first_touch(outline_of(start), outline_of(old), dx - (new.x - old.x), dy - (new.y - old.y))
         if fraction < found:
             found, index = fraction, i
-    return found, index
+    return index
+
+
+@compiled
+def contact_time(before: Any, after: Any, ego: int, other: int, shares: np.ndarray) -> float:
+    """Return the time at which the ego touches another record, as a part of the step.
+
+    Args:
+        before: `CAR` records at the start of the step.
+        after: The same records at its end.
+        ego: Index of the ego.
+        other: Index of the touched record.
+        shares: Shares of its way that the ego has covered at equal times from start to end of the step.
+
+    Returns:
+        The time; `inf` if a turn within the step avoids the touch.
+    """
+    count = len(shares) - 1
+    for k in range(count):
+        a = outline_between(before[ego], after[ego], shares[k])
+        b = outline_between(before[ego], after[ego], shares[k + 1])
+        c = outline_between(before[other], after[other], k / count)
+        d = outline_between(before[other], after[other], (k + 1) / count)
+        touch = touch_between(a, b, c, d)
+        if touch <= 1.0:
+            return (k + touch) / count
+    return inf
 
 
 @compiled

@@ -12,8 +12,16 @@ from highway_env.vehicle.objects import Landmark
 
 from lgmd_gym.envs.dynamics.bodies import BODY, BOX
 from lgmd_gym.envs.dynamics.contact import Contact
+from lgmd_gym.envs.dynamics.refined_contact import PARTS
 from lgmd_gym.envs.traffic.ego import TrafficEgo
-from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, decide, find_contact, mark_collisions, move
+from lgmd_gym.envs.traffic.kernels import (
+    TAU_PURSUIT,
+    contact_time,
+    decide,
+    find_contact,
+    mark_collisions,
+    move,
+)
 from lgmd_gym.envs.traffic.lanes import LaneTable
 from lgmd_gym.envs.traffic.places import ALL_DONE, CAR, CAR_STATE, locate
 
@@ -118,9 +126,7 @@ class TrafficRoad(RegulatedRoad):
         self._write(cars)
         if ego is None:
             return
-        fraction, index = find_contact(before, cars, self.vehicles.index(ego))
-        if fraction <= 1.0:
-            self._stop_at_contact(before, fraction, index, travelled)
+        if self._stop_at_contact(before, cars, dt, travelled):
             cars = self.read()
         crashed = cars["crashed"].copy()
         mark_collisions(cars, number)
@@ -128,16 +134,30 @@ class TrafficRoad(RegulatedRoad):
             for i in np.flatnonzero(cars["crashed"][:number]):
                 self.vehicles[i].crashed = True
 
-    def _stop_at_contact(self, before: np.ndarray, fraction: float, index: int, travelled: float) -> None:
-        """Move all cars back to the ego's first contact, at a fraction of the step."""
+    def _stop_at_contact(self, before: np.ndarray, after: np.ndarray, dt: float, travelled: float) -> bool:
+        """Move all cars back to the ego's first contact in a step of `dt` [s], if any; return if there is."""
+        ego, own = self.ego, self.vehicles.index(self.ego)
+        index = find_contact(before, after, own)
+        if index == own:
+            return False
+        whole = ego.travelled - travelled
+        covered = np.array([ego.progress(dt * part / PARTS)[0] for part in range(PARTS + 1)])
+        shares = covered / whole if whole > 0.0 else covered
+        part = contact_time(before, after, own, index, shares)
+        if part > 1.0:
+            return False
+        way, speed = ego.progress(part * dt)
+        own_share = way / whole if whole > 0.0 else 0.0
         for car, record in zip(self.vehicles, before, strict=False):
+            share = own_share if car is ego else part
             for axis, place in enumerate((record["x"], record["y"])):
-                car.position[axis] = (1 - fraction) * place + fraction * car.position[axis]
-            car.speed = float((1 - fraction) * record["speed"] + fraction * car.speed)
-        ego, other = self.ego, self.items[index]
-        ego.travelled = (1 - fraction) * travelled + fraction * ego.travelled
-        self.contact = Contact.between(ego, other)
-        ego.crashed = other.crashed = True
+                car.position[axis] = (1 - share) * place + share * car.position[axis]
+            car.heading = float((1 - share) * record["heading"] + share * car.heading)
+            car.speed = float((1 - part) * record["speed"] + part * car.speed)
+        ego.speed, ego.travelled = speed, travelled + way
+        self.contact = Contact.between(ego, self.items[index])
+        ego.crashed = self.items[index].crashed = True
+        return True
 
     def read(self) -> np.ndarray:
         """Return all cars, then the solid objects, as `CAR` records."""

@@ -3,6 +3,7 @@
 import copy
 import subprocess
 import sys
+from math import cos, inf, pi
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,12 @@ from highway_env.envs.intersection_env import IntersectionEnv
 from highway_env.road.regulation import RegulatedRoad
 from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.behavior import IDMVehicle
+from support.records import records
 from support.traffic import BRAKE, HOLD, BlockedHighway, EmptyHighway, car_states, run_for
 
-from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, idm, steer
+from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, contact_time, idm, steer
 from lgmd_gym.envs.traffic.lanes import LaneTable
-from lgmd_gym.envs.traffic.places import neighbours
+from lgmd_gym.envs.traffic.places import CAR, neighbours
 from lgmd_gym.envs.traffic.registration import KINDS, find_kind, make_traffic
 from lgmd_gym.envs.traffic.road import TrafficRoad
 
@@ -192,6 +194,38 @@ def test_contact_keeps_the_speeds_and_stops_the_road():
     env.step(HOLD)
     assert env.ego.position.tolist() == position.tolist()
     assert env.ego.speed == last["impact_speed"]
+
+
+@pytest.mark.parametrize("hz", [15, 30])
+@pytest.mark.parametrize("speed", [0.3, 1.0, 3.0])
+def test_impact_speed_while_braking_equals_the_closed_form(speed, hz):
+    env, deceleration = BlockedHighway(), 9.0
+    for part in (0.1, 0.5, 0.9):
+        env.reset(seed=0)
+        ego, other = env.ego, env.road.vehicles[1]
+        ego.speed, ego.current_acceleration = speed, -deceleration
+        ego.demand(-1.0)
+        ego._delay_line.advance(1.0)
+        time = min(1 / hz, speed / deceleration)
+        gap = part * (speed * time - deceleration / 2 * time**2)
+        other.position[:] = ego.position + np.array([gap + (ego.LENGTH + other.LENGTH) / 2, 0.0])
+        env.road.act()
+        env.road.step(1 / hz)
+        expected = (speed**2 - 2 * deceleration * gap) ** 0.5
+        assert env.road.contact.impact_speed == ego.speed == pytest.approx(expected, abs=0.01 / 3.6)
+        assert ego.travelled == pytest.approx(gap, abs=1e-4)
+
+
+def test_turn_within_a_step_belongs_to_the_contact():
+    """A corner at 45° reaches 2.83 m ahead, a side 2 m: a car at 3.25 m is touched amid a turn."""
+    ego = {"length": 4.0, "width": 4.0}
+    before = records(CAR, ego, {"x": 5.25, "length": 4.0, "width": 4.0})
+    after = records(CAR, ego | {"heading": pi / 2, "x": 1.0}, {"x": 5.25, "length": 4.0, "width": 4.0})
+    shares = np.linspace(0.0, 1.0, 17)
+    time = contact_time(before, after, 0, 1, shares)
+    # The corner of the ego is at x = t + 2.83 cos(45° - 90° t).
+    assert time + 8**0.5 * cos(pi / 4 - pi / 2 * time) == pytest.approx(3.25, abs=0.01)
+    assert contact_time(before, before, 0, 1, shares) == inf
 
 
 def test_errors_state_the_value_and_suggest_a_fix():
