@@ -6,9 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, copy_motion, move, step_actor, step_ego
-from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.jit import Arrays, compiled
-from lgmd_gym.envs.dynamics.refined_contact import StepMotion, progress, touch_time
+from lgmd_gym.envs.dynamics.refined_contact import StepMotion, progress, touch_time, uniform_touch
 
 PASSED_DISTANCE = 2.0  # [m] behind the ego's rear beyond which an actor has been passed
 
@@ -135,7 +134,7 @@ def first_contact_of(bodies: np.ndarray, count: int, step: Any) -> tuple[float, 
         if bodies[i].kind == ROAD_MARKING:
             continue
         if _is_uniform(bodies[0], before[0]) and _is_uniform(bodies[i], before[i]):
-            time = _uniform_touch(bodies[0], bodies[i], before[0], before[i])
+            time = uniform_touch(bodies[0], bodies[i], before[0], before[i])
         else:
             time = touch_time(bodies, i, step)
         if time < found:
@@ -147,14 +146,6 @@ def first_contact_of(bodies: np.ndarray, count: int, step: Any) -> tuple[float, 
 def _is_uniform(body: Any, before: Any) -> bool:
     """Return whether a body has kept its heading and speed in a step."""
     return body.heading == before.heading and body.speed == before.speed
-
-
-@compiled
-def _uniform_touch(ego: Any, body: Any, ego_before: Any, before: Any) -> float:
-    """Return the time of the first touch of two bodies in straight, uniform motion; see `touch_time`."""
-    start = Rectangle(ego_before.x, ego_before.y, ego_before.heading, ego.length, ego.width)
-    old = Rectangle(before.x, before.y, before.heading, body.length, body.width)
-    return first_touch(start, old, ego.x - start.x - (body.x - old.x), ego.y - start.y - (body.y - old.y))
 
 
 @compiled

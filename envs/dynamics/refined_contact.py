@@ -78,6 +78,21 @@ def _ego_progress(moving: Any, step: Any, time: float) -> tuple[float, float]:
 
 
 @compiled
+def uniform_touch(ego: Any, body: Any, ego_before: Any, before: Any) -> float:
+    """Return the first touch of two bodies in straight, uniform motion in a step as a part of it; else `inf`.
+
+    Args:
+        ego: Record of the ego after the step: position, heading and size.
+        body: The same of the other body.
+        ego_before: Record of the ego before the step: position and heading.
+        before: The same of the other body.
+    """
+    start = Rectangle(ego_before.x, ego_before.y, ego_before.heading, ego.length, ego.width)
+    old = Rectangle(before.x, before.y, before.heading, body.length, body.width)
+    return first_touch(start, old, ego.x - start.x - (body.x - old.x), ego.y - start.y - (body.y - old.y))
+
+
+@compiled
 def touch_time(bodies: np.ndarray, i: int, step: Any) -> float:
     """Return the time of the first touch of the ego and body i as a part of a step; `inf` without a touch.
 

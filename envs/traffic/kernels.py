@@ -3,14 +3,12 @@
 See `places` for the arithmetic.
 """
 
-from math import asin, atan, cos, inf, pi, pow, sin, sqrt, tan
+from math import asin, atan, cos, pi, pow, sin, sqrt, tan
 from typing import Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.jit import compiled
-from lgmd_gym.envs.dynamics.refined_contact import touch_between
 from lgmd_gym.envs.traffic.places import (
     ALL_DONE,
     END_MARGIN,
@@ -27,7 +25,6 @@ TAU_PURSUIT, KP_HEADING, KP_LATERAL = 0.5 * 0.2, 1 / 0.2, 1 / 0.6  # [s], [1/s],
 LANE_CHANGE_DELAY, MIN_GAIN, MAX_IMPOSED = 1.0, 0.2, 2.0  # [s], [m/s²], [m/s²]
 MAX_SPEED = 40.0  # [m/s]
 COMFORT_DECELERATION = 3.0  # [m/s²], limit of the ego's deceleration towards its target speed
-MAX_APART = 8.0  # [m], sum of both coordinates beyond which two cars are not tested for a touch
 
 
 @compiled
@@ -217,80 +214,3 @@ def move(cars: Any, number: int, slip: Any, dt: float) -> None:
         car.y += car.speed * sin(course) * dt
         car.heading += car.speed * sin(beta) / (car.length / 2) * dt
         car.speed = max(car.speed + car.acceleration * dt, 0.0)  # an Euler step can overshoot zero
-
-
-@compiled
-def outline_of(car: Any) -> Rectangle:
-    """Return the outline of a car."""
-    return Rectangle(car.x, car.y, car.heading, car.length, car.width)
-
-
-@compiled
-def outline_between(before: Any, after: Any, part: float) -> Rectangle:
-    """Return the outline of a car after a part of the way from one `CAR` record to another."""
-    rest = 1.0 - part
-    x, y = rest * before.x + part * after.x, rest * before.y + part * after.y
-    return Rectangle(x, y, rest * before.heading + part * after.heading, before.length, before.width)
-
-
-@compiled
-def find_contact(before: Any, after: Any, ego: int) -> Any:
-    """Return whether the ego touches another car or object within a step, and which one first.
-
-    Args:
-        before: `CAR` records at the start of the step.
-        after: The same records at its end.
-        ego: Index of the ego.
-
-    Returns:
-        The index of the touched record; that of the ego without contact.
-    """
-    start, end = before[ego], after[ego]
-    dx, dy = end.x - start.x, end.y - start.y
-    found, index = inf, ego
-    for i in range(len(before)):
-        if i == ego:
-            continue
-        old, new = before[i], after[i]
-        fraction = first_touch(outline_of(start), outline_of(old), dx - (new.x - old.x), dy - (new.y - old.y))
-        if fraction < found:
-            found, index = fraction, i
-    return index
-
-
-@compiled
-def contact_time(before: Any, after: Any, ego: int, other: int, shares: np.ndarray) -> float:
-    """Return the time at which the ego touches another record, as a part of the step.
-
-    Args:
-        before: `CAR` records at the start of the step.
-        after: The same records at its end.
-        ego: Index of the ego.
-        other: Index of the touched record.
-        shares: Shares of its way that the ego has covered at equal times from start to end of the step.
-
-    Returns:
-        The time; `inf` if a turn within the step avoids the touch.
-    """
-    count = len(shares) - 1
-    for k in range(count):
-        a = outline_between(before[ego], after[ego], shares[k])
-        b = outline_between(before[ego], after[ego], shares[k + 1])
-        c = outline_between(before[other], after[other], k / count)
-        d = outline_between(before[other], after[other], (k + 1) / count)
-        touch = touch_between(a, b, c, d)
-        if touch <= 1.0:
-            return (k + touch) / count
-    return inf
-
-
-@compiled
-def mark_collisions(cars: Any, number: int) -> None:
-    """Mark the cars other than the ego that touch each other as crashed."""
-    for i in range(number):
-        for j in range(i):
-            one, other = cars[i], cars[j]
-            if one.is_ego or other.is_ego or abs(other.x - one.x) + abs(other.y - one.y) > MAX_APART:
-                continue
-            if first_touch(outline_of(one), outline_of(other), 0.0, 0.0) == 0.0:
-                one.crashed = other.crashed = 1.0

@@ -15,7 +15,8 @@ from highway_env.vehicle.behavior import IDMVehicle
 from support.records import records
 from support.traffic import BRAKE, HOLD, BlockedHighway, EmptyHighway, car_states, run_for
 
-from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, contact_time, idm, steer
+from lgmd_gym.envs.traffic.contacts import contact_time
+from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, idm, steer
 from lgmd_gym.envs.traffic.lanes import LaneTable
 from lgmd_gym.envs.traffic.places import CAR, neighbours
 from lgmd_gym.envs.traffic.registration import KINDS, find_kind, make_traffic
