@@ -3,12 +3,10 @@
 import os
 import random
 import signal
-import subprocess
-import sys
 import time
-from pathlib import Path
 
 import pytest
+from support import kills
 from support.runs import read_rows, sorted_rows
 
 from lgmd_gym.benchmark import worker_processes
@@ -24,8 +22,6 @@ speeds_kmh = [10, 20, 30]
 family = "EmptyRoad"
 speeds_kmh = [30]
 """
-TAG = "LGMD_GYM_TEST_RUN"
-CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -9}
 
 
 @pytest.fixture(scope="module")
@@ -36,35 +32,9 @@ def suite(tmp_path_factory):
 
 
 def bench(suite, out, tag):
-    """Start the command in a session of its own; its processes inherit the variable TAG."""
+    """Start the command."""
     options = ["--agents", "spike-threshold", "ttc-oracle", "--seeds", "8", "--no-plots", "--no-report"]
-    return subprocess.Popen(
-        [sys.executable, "-m", "lgmd_gym", "bench", "--suite", suite, "--out", out, *options],
-        env=os.environ | {TAG: tag},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        # The children of a shell's background job ignore SIGINT by default.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )
-
-
-def processes(tag):
-    """Return the running processes that have inherited a tag."""
-    entry, found = f"{TAG}={tag}\0".encode(), []
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            if entry in (folder / "environ").read_bytes():
-                found.append(int(folder.name))
-        except OSError:
-            continue
-    return found
-
-
-def segments(pid):
-    """Return the shared memory of a command."""
-    return [name for name in os.listdir("/dev/shm") if f"loky-{pid}-" in name or f"folder_{pid}_" in name]
+    return kills.start(["bench", "--suite", suite, "--out", out, *options], tag)
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +46,7 @@ def complete(suite, tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", CODES)
+@pytest.mark.parametrize("number", kills.CODES)
 @pytest.mark.parametrize("seed", [1])
 def test_stopped_command_leaves_nothing_and_resumes(suite, complete, tmp_path, number, seed):
     """The signal goes to the command alone (SIGTERM, SIGKILL) or to its workers, too (SIGINT)."""
@@ -84,18 +54,15 @@ def test_stopped_command_leaves_nothing_and_resumes(suite, complete, tmp_path, n
     out, tag = tmp_path / "run", f"{os.getpid()}-{number}-{seed}"
     process = bench(suite, out, tag)
     time.sleep(random.Random(f"{number} {seed}").uniform(0.1, 1.0) * duration)
-    finished = process.poll() is not None
+    owners, finished = {process.pid, *kills.processes(tag)}, process.poll() is not None
     if not finished:
         (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
     _, errors = process.communicate(timeout=120)
     # Python restores the default handler of SIGTERM at the very end.
-    expected = (0,) if finished else (CODES[number], -number)
+    expected = (0,) if finished else (kills.CODES[number], -number)
     assert process.returncode in expected, errors
     assert "Traceback" not in errors
-    end = time.monotonic() + 10
-    while (left := (processes(tag), segments(process.pid))) != ([], []):
-        assert time.monotonic() < end, left
-        time.sleep(0.1)
+    kills.wait_until_gone(tag, owners)
     if out.exists():
         kept = read_rows(out)
         assert all(row in rows for row in kept)
