@@ -9,6 +9,7 @@ import numpy as np
 
 from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.options import check_options, parse_agent
+from lgmd_gym.errors import shown
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -78,10 +79,10 @@ def make_user_agent(text: str) -> AgentAdapter:
         sys.path.append(os.getcwd())
     try:
         agent_class = getattr(import_module(module), class_name)
-    except (ImportError, AttributeError) as error:
-        raise ValueError(f"agent {name!r} cannot be imported ({error}); write module:Class") from None
+    except (ImportError, AttributeError, ValueError, TypeError) as error:
+        raise ValueError(f"agent {shown(name)} cannot be imported ({error}); write module:Class") from None
     if not hasattr(agent_class, "act"):
-        raise ValueError(f"agent {name!r} has no method act(observation, info)")
+        raise ValueError(f"agent {shown(name)} has no method act(observation, info)")
     options = parse_agent(f"{module}:{''.join(rest)}")[1]
     check_options(name, agent_class, options)
     return AgentAdapter(name, agent_class(**options))

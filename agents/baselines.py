@@ -7,7 +7,7 @@ import numpy as np
 
 from lgmd_gym.agents.base import BRAKE, FPS, HOLD, Agent
 from lgmd_gym.agents.batch import BatchAgent
-from lgmd_gym.agents.options import positive
+from lgmd_gym.errors import check_positive
 
 
 class NoBrake(Agent):
@@ -49,8 +49,8 @@ class RandomBrake(Agent):
     name = "random-brake"
 
     def __init__(self, rate: float = 0.2, fps: float = FPS) -> None:
-        self.rate = positive("rate", rate)
-        self.fps = positive("fps", fps)
+        self.rate = check_positive("rate", rate)
+        self.fps = check_positive("fps", fps)
         self.reset()
 
     def batch(self, num_envs: int) -> BatchAgent:

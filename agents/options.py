@@ -1,27 +1,9 @@
 """Parsing of agent strings and validation of agent options."""
 
 import inspect
-import sys
 from typing import Any
 
-from lgmd_gym.errors import check_keys
-
-MAX_FLOAT = sys.float_info.max  # YAML and JSON have longer integers
-
-
-def positive(name: str, value: Any) -> float:
-    """Return `value` as a finite float > 0, or raise ValueError."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value <= MAX_FLOAT:
-        raise ValueError(f"{name} must be a number > 0, got {value!r}")
-    return float(value)
-
-
-def whole(name: str, value: Any, low: int) -> int:
-    """Return `value` as an int >= `low`, or raise ValueError."""
-    number = not isinstance(value, bool) and isinstance(value, int | float) and low <= value <= MAX_FLOAT
-    if not number or value != int(value):
-        raise ValueError(f"{name} must be a whole number >= {low}, got {value!r}")
-    return int(value)
+from lgmd_gym.errors import check_keys, shown
 
 
 def parse_agent(text: str) -> tuple[str, dict[str, Any]]:
@@ -36,7 +18,9 @@ def parse_agent(text: str) -> tuple[str, dict[str, Any]]:
     for part in filter(None, rest.split(",")):
         key, equals, value = part.partition("=")
         if not equals:
-            raise ValueError(f"agent option {part!r} in {text!r} has no value; write {key}=VALUE")
+            raise ValueError(
+                f"agent option {shown(part)} in {shown(text)} has no value; write {shown(key)}=VALUE"
+            )
         options[key.strip()] = _parse_value(value.strip())
     return name.strip(), options
 

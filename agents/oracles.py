@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.agents.base import FPS, LatchingAgent
-from lgmd_gym.agents.options import positive
 from lgmd_gym.agents.zones import FULL_DECELERATION, LENS_SETBACK, stopping_distance
+from lgmd_gym.errors import check_positive
 
 TARGET_WIDTH = 1.712  # ISO 19206-3 [m]; `info` has no width
 DECISION_INTERVAL = 1 / FPS  # [s]
@@ -27,7 +27,7 @@ class TTCOracle(LatchingAgent):
     name = "ttc-oracle"
 
     def __init__(self, ttc: float = 2.0) -> None:
-        self.ttc = positive("ttc", ttc)
+        self.ttc = check_positive("ttc", ttc)
 
     def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
         """Return whether the time to contact is at or below the threshold; False without a contact ahead."""
@@ -55,9 +55,9 @@ class StoppingDistanceOracle(LatchingAgent):
     def __init__(
         self, deceleration: float = FULL_DECELERATION, reaction: float = 0.4, margin: float = 1.5
     ) -> None:
-        self.deceleration = positive("deceleration", deceleration)
-        self.reaction = positive("reaction", reaction)
-        self.margin = positive("margin", margin)
+        self.deceleration = check_positive("deceleration", deceleration)
+        self.reaction = check_positive("reaction", reaction)
+        self.margin = check_positive("margin", margin)
         self._previous_target_speed = inf
 
     def reset(self, seed: int | None = None) -> None:
@@ -105,7 +105,7 @@ class EtaOracle(LatchingAgent):
     name = "eta-oracle"
 
     def __init__(self, threshold: float = 0.03, alpha: float = 2.0) -> None:
-        self.threshold, self.alpha = positive("threshold", threshold), positive("alpha", alpha)
+        self.threshold, self.alpha = check_positive("threshold", threshold), check_positive("alpha", alpha)
 
     def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
         """Return whether η is at or above the threshold."""
@@ -127,7 +127,7 @@ class TauOracle(LatchingAgent):
     name = "tau-oracle"
 
     def __init__(self, tau: float = 1.8) -> None:
-        self.tau = positive("tau", tau)
+        self.tau = check_positive("tau", tau)
 
     def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
         """Return whether τ is at or below the threshold; False unless θ grows."""

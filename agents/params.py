@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Self
 
-from lgmd_gym.agents.options import positive, whole
-from lgmd_gym.errors import check_keys
+from lgmd_gym.errors import check_keys, check_positive, check_whole, shown
 
 
 def parameter(default: float, low: float, high: float, *, affects_camera: bool = False) -> Any:
@@ -29,7 +28,9 @@ class RuleParams:
     def __post_init__(self) -> None:
         for item in fields(self):
             name, value = item.name, getattr(self, item.name)
-            checked = whole(name, value, 1) if isinstance(item.default, int) else positive(name, value)
+            checked = (
+                check_whole(name, value, 1) if isinstance(item.default, int) else check_positive(name, value)
+            )
             object.__setattr__(self, name, checked)
 
     @classmethod
@@ -55,6 +56,6 @@ def _read_toml(path: Any) -> dict[str, Any]:
     try:
         return tomllib.loads(Path(str(path)).read_text(encoding="utf-8"))
     except OSError as error:
-        raise ValueError(f"agent file {str(path)!r} cannot be read: {error.strerror}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"agent file {str(path)!r} is not TOML: {error}") from None
+        raise ValueError(f"agent file {shown(str(path))} cannot be read: {error.strerror}") from None
+    except ValueError as error:  # also of a path with a null character
+        raise ValueError(f"agent file {shown(str(path))} is not TOML: {error}") from None

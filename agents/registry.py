@@ -13,7 +13,7 @@ from lgmd_gym.agents.policies.policy import Policy, shipped_policies
 from lgmd_gym.agents.rule import Rule
 from lgmd_gym.agents.spike_rules import AdaptiveThreshold, Graded, SpeedGated, SpikeThreshold
 from lgmd_gym.agents.stopping_zone import StoppingZone
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_known, check_text, shown
 
 AGENTS: dict[str, type[Agent]] = {}
 
@@ -24,6 +24,8 @@ def register_agent(agent: type[Agent]) -> type[Agent]:
     Raises:
         ValueError: If the name is taken.
     """
+    if not isinstance(agent, type) or not issubclass(agent, Agent):
+        raise TypeError(f"agent must be a subclass of Agent, got {shown(agent)}")
     if agent.name in AGENTS:
         raise ValueError(f"agent {agent.name!r} is already registered; choose another name")
     AGENTS[agent.name] = agent
@@ -53,16 +55,17 @@ def make_agent(text: str) -> Agent:
     Raises:
         ValueError: For an unknown agent or option, or a value out of bounds.
     """
-    name, _, rest = text.partition(":")
+    name, _, rest = check_text("agent", text).partition(":")
     if "," in name:
-        raise ValueError(f"agent {text!r} contains a comma before its options; separate agents by spaces")
+        raise ValueError(
+            f"agent {shown(text)} contains a comma before its options; separate agents by spaces"
+        )
     if name == Policy.name:
         return Policy(rest)
     if _is_user_class(name, rest):
         return make_user_agent(text)
     name, options = parse_agent(text)
-    if name not in AGENTS:
-        raise unknown_name("agent", name, AGENTS)
+    check_known("agent", name, AGENTS)
     agent: Any = AGENTS[name]
     if not issubclass(agent, Rule):  # the parameters of a rule check their own names
         check_options(name, agent, options)

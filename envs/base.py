@@ -8,7 +8,30 @@ from typing import Any, ClassVar
 from highway_env.envs.common.abstract import AbstractEnv
 
 from lgmd_gym.envs.dynamics.brake import BrakeParams
-from lgmd_gym.errors import check_keys
+from lgmd_gym.errors import (
+    check_finite,
+    check_flag,
+    check_keys,
+    check_known,
+    check_text,
+    check_type,
+    check_whole,
+    check_within,
+    is_number,
+)
+
+_NUMBERS = {
+    "simulation_frequency": (1e-3, 1e5, "Hz"),
+    "policy_frequency": (1e-3, 1e5, "Hz"),
+    "scaling": (1e-3, 1e3, "px/m"),
+    "duration": (0.0, 1e6, "s"),
+}
+_WHOLE = {
+    "screen_width": (1, 16384),
+    "screen_height": (1, 16384),
+    "lanes_count": (1, 100),
+    "vehicles_count": (0, 1000),
+}
 
 
 class EgoBrakeEnv(AbstractEnv):
@@ -22,6 +45,8 @@ class EgoBrakeEnv(AbstractEnv):
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"]}
 
     def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
+        if render_mode is not None:
+            check_known("render mode", render_mode, type(self).metadata["render_modes"])
         self.metadata = {**type(self).metadata}  # type: ignore[misc]
         super().__init__(config=config, render_mode=render_mode)  # type: ignore[arg-type]
 
@@ -42,6 +67,7 @@ class EgoBrakeEnv(AbstractEnv):
         Raises:
             ValueError: If a configuration key is unknown or a value is out of range.
         """
+        check_type("options", options, dict, type(None))
         with self._unchanged_if_refused():
             return super().reset(seed=seed, options=options)
 
@@ -51,13 +77,15 @@ class EgoBrakeEnv(AbstractEnv):
         Raises:
             ValueError: If a key is unknown or a value is out of range.
         """
-        config = dict(config or {})
+        config = dict(check_type("config", config, dict, type(None)) or {})
         check_keys("config key", config, self.config)
+        for key, value in config.items():
+            _check_like(key, value, self.config[key])
         with self._unchanged_if_refused():
             super().configure(config)
             self.brake = BrakeParams(**{field.name: self.config[field.name] for field in fields(BrakeParams)})
             simulation, policy = self.config["simulation_frequency"], self.config["policy_frequency"]
-            if policy <= 0 or simulation % policy:
+            if simulation % policy:
                 raise ValueError(
                     f"policy_frequency {policy} Hz does not divide simulation_frequency {simulation} Hz; "
                     f"choose a divisor, for example {simulation} or {simulation / 2:g} Hz"
@@ -77,3 +105,19 @@ class EgoBrakeEnv(AbstractEnv):
                 present.clear()
                 present.update(before)
             raise
+
+
+def _check_like(key: str, value: Any, present: Any) -> None:
+    """Raise ValueError unless a value of the configuration is of the kind of the present one."""
+    if key in _WHOLE:
+        check_whole(key, value, *_WHOLE[key])
+    elif key in _NUMBERS:
+        check_within(key, value, *_NUMBERS[key])
+    elif isinstance(present, bool):
+        check_flag(key, value)
+    elif is_number(present):
+        check_finite(key, value)
+    elif isinstance(present, dict):
+        check_type(key, value, dict)
+    elif isinstance(present, str):
+        check_text(key, value)

@@ -24,7 +24,7 @@ from lgmd_gym.envs.simulation.road import BrakingRoad
 from lgmd_gym.envs.simulation.vehicles import EgoCar
 from lgmd_gym.envs.simulation.world import World
 from lgmd_gym.envs.spaces import EgoState, make_action
-from lgmd_gym.errors import check_keys
+from lgmd_gym.errors import check_keys, check_type, shown
 
 _SELECTED = np.ones(1, np.bool_)
 
@@ -122,6 +122,8 @@ class BrakingEnv(EgoBrakeEnv):
         config: dict[str, Any] | None = None,
         render_mode: str | None = None,
     ) -> None:
+        if not isinstance(scenario, Scenario) and not hasattr(scenario, "draw"):
+            raise TypeError(f"scenario must be a Scenario or a source of scenarios, got {shown(scenario)}")
         self._source = FixedScenario(scenario) if isinstance(scenario, Scenario) else scenario
         self.scenario = self._source.first
         self.camera_fields: dict[str, Any] = {}
@@ -145,8 +147,8 @@ class BrakingEnv(EgoBrakeEnv):
         Raises:
             ValueError: If a key is unknown or a value is out of range.
         """
-        config = dict(config or {})
-        reward = config.pop("reward", {})
+        config = dict(check_type("config", config, dict, type(None)) or {})
+        reward = check_type("reward", config.pop("reward", {}), dict)
         check_keys("key of config['reward']", reward, self.config["reward"])
         reward = {**self.config["reward"], **reward}
         weights = RewardParams(**reward)

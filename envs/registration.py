@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 
 from lgmd_gym.envs.scenarios import FAMILIES, make_scenario
-from lgmd_gym.errors import check_keys, unknown_name
+from lgmd_gym.errors import check_keys, check_known, check_text
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -21,7 +21,7 @@ _LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions")
 
 def env_id(family: str) -> str:
     """Return the Gymnasium id of a scenario family."""
-    return f"LGMD/{family}-v0"
+    return f"LGMD/{check_text('family', family)}-v0"
 
 
 def register_envs() -> None:
@@ -105,8 +105,7 @@ def make_source(
 def _argument_names(family: str) -> Iterable[str]:
     if family == RANDOM:
         return _LEVEL_ARGUMENTS
-    if family not in FAMILIES:
-        raise unknown_name("scenario", family, FAMILIES)
+    check_known("scenario", family, FAMILIES)
     return *inspect.signature(FAMILIES[family]).parameters, "condition"
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.bodies import ego_braking
 from lgmd_gym.envs.dynamics.jit import compiled
-from lgmd_gym.envs.dynamics.units import check_within
+from lgmd_gym.errors import check_within
 
 REWARD = np.dtype(
     [(name, np.float64) for name in ("contact", "impact", "progress", "brake", "jerk", "need_ttc")]

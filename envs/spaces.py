@@ -1,6 +1,7 @@
 """Action and observation types of `BrakingEnv`."""
 
 from collections.abc import Callable, Sequence
+from numbers import Real
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -8,9 +9,9 @@ from gymnasium import spaces
 from highway_env.envs.common.action import ActionType
 from highway_env.envs.common.observation import ObservationType
 
-from lgmd_gym.envs.dynamics.units import MAX_SPEED, check_within
+from lgmd_gym.envs.dynamics.units import MAX_SPEED
 from lgmd_gym.envs.simulation.vehicles import EgoCar
-from lgmd_gym.errors import check_keys, unknown_name
+from lgmd_gym.errors import check_items, check_keys, check_known, check_within
 
 if TYPE_CHECKING:
     from lgmd_gym.envs.braking import BrakingEnv
@@ -50,7 +51,7 @@ class DiscreteDemand(ContinuousDemand):
 
     def __init__(self, env: "BrakingEnv", demands: Sequence[float] = (0.0, -0.5, -1.0)) -> None:
         super().__init__(env)
-        if not demands:
+        if not check_items("demands", demands, Real, "numbers"):
             raise ValueError("demands must contain at least one number in [-1, 1], got none")
         self.demands = tuple(check_within("demands", demand, -1.0, 1.0) for demand in demands)
 
@@ -97,8 +98,7 @@ def make_action(env: "BrakingEnv", config: dict[str, Any]) -> ActionType:
     """
     arguments = dict(config)
     name = arguments.pop("type", None)
-    if name not in ACTIONS:
-        raise unknown_name("action type", name, ACTIONS)
+    check_known("action type", name, ACTIONS)
     known = {"demands"} if name == "DiscreteDemand" else set()
     check_keys(f"key of config['action'] for {name}", arguments, known)
     return ACTIONS[name](env, **arguments)

@@ -1,9 +1,137 @@
-"""Error messages that state the offending value and suggest a fix."""
+"""Checks of arguments, and error messages of one line that state the offending value and suggest a fix."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
+from math import inf, isinf, isnan
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
 
 MAX_LISTED = 40  # names that a message lists in full
+MAX_SHOWN = 160  # characters of a value in a message
+
+
+def shown(value: object) -> str:
+    """Return a value for a message: its `repr` in one line, shortened to `MAX_SHOWN` characters."""
+    try:
+        text = " ".join(repr(value).split("\n"))
+    except ValueError:  # of an integer with more than 4300 digits
+        return f"a very long {type(value).__name__}"
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 20]}… ({len(text)} characters)"
+
+
+def check_number(name: str, value: Any) -> float:
+    """Return `value` as float, which may be infinite.
+
+    Raises:
+        ValueError: If it is a bool, not a real number, NaN, or an integer beyond the range of float.
+    """
+    if type(value) is not float:
+        if isinstance(value, bool) or not isinstance(value, Real):
+            raise ValueError(f"{name} must be a number, got {shown(value)}")
+        try:
+            value = float(value)
+        except OverflowError:
+            raise ValueError(f"{name} must be below 1e308, got a longer integer") from None
+    if isnan(value):
+        raise ValueError(f"{name} must be finite, got nan")
+    return value
+
+
+def check_finite(name: str, value: Any) -> float:
+    """Return `value` as float, or raise ValueError if it is not a finite number."""
+    number = check_number(name, value)
+    if isinf(number):
+        raise ValueError(f"{name} must be finite, got {shown(value)}")
+    return number
+
+
+def check_within(name: str, value: Any, low: float, high: float, unit: str = "") -> float:
+    """Return `value` as float if it is in [low, high], or raise ValueError."""
+    number = check_finite(name, value)
+    if not low <= number <= high:
+        text = f"[{low:g}, {high:g}]{f' {unit}' if unit else ''}"
+        raise ValueError(f"{name} must be in {text}, got {shown(value)}")
+    return number
+
+
+def check_positive(name: str, value: Any) -> float:
+    """Return `value` as float if it is a finite number > 0, or raise ValueError."""
+    if not is_number(value) or not check_finite(name, value) > 0.0:
+        raise ValueError(f"{name} must be a number > 0, got {shown(value)}")
+    return float(value)
+
+
+def check_whole(name: str, value: Any, low: int, high: float = inf) -> int:
+    """Return `value` as int if it is a whole number in [low, high], or raise ValueError."""
+    if not is_number(value) or check_finite(name, value) != int(value) or not low <= value <= high:
+        interval = f">= {low}" if high == inf else f"in [{low}, {high:g}]"
+        raise ValueError(f"{name} must be a whole number {interval}, got {shown(value)}")
+    return int(value)
+
+
+def check_flag(name: str, value: Any) -> bool:
+    """Return `value` as bool if it is one, or raise ValueError."""
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False, got {shown(value)}")
+    return bool(value)
+
+
+def check_flags(**flags: Any) -> None:
+    """Raise ValueError for the first argument that is not a bool."""
+    for name, value in flags.items():
+        check_flag(name, value)
+
+
+def check_text(name: str, value: Any) -> str:
+    """Return `value` if it is a string, or raise ValueError."""
+    if not isinstance(value, str):
+        raise ValueError(f"{name} must be a string, got {shown(value)}")
+    return value
+
+
+def check_type(name: str, value: Any, *types: type) -> Any:
+    """Return `value` if it is an instance of one of the types, or raise TypeError."""
+    if not isinstance(value, types):
+        expected = " or ".join(item.__name__ for item in types)
+        raise TypeError(f"{name} must be {expected}, got {shown(value)}")
+    return value
+
+
+def check_items(name: str, values: Any, types: type, kind: str = "") -> tuple[Any, ...]:
+    """Return a sequence as a tuple if it is a list or tuple of instances of a type, or raise ValueError."""
+    if not isinstance(values, list | tuple) or not all(isinstance(item, types) for item in values):
+        raise ValueError(f"{name} must be a list of {kind or types.__name__}, got {shown(values)}")
+    return tuple(values)
+
+
+def check_size(name: str, value: Any, low: int, high: int, axes: str = "(height, width)") -> tuple[int, int]:
+    """Return two integers in [low, high], or raise ValueError."""
+    message = f"{name} must be {axes}, each {low} to {high} px, got {shown(value)}"
+    if not isinstance(value, list | tuple) or len(value) != 2 or not all(map(is_integer, value)):
+        raise ValueError(message)
+    first, second = value
+    if not (low <= first <= high and low <= second <= high):
+        raise ValueError(message)
+    return int(first), int(second)
+
+
+def is_number(value: object) -> bool:
+    """Return whether a value is a real number; bools are not."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def is_integer(value: object) -> bool:
+    """Return whether a value is an integer; bools are not."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
+def check_known(kind: str, name: Any, known: Collection[str]) -> str:
+    """Return `name` if it is one of the known strings, or raise `unknown_name`."""
+    if not isinstance(name, str) or name not in known:
+        raise unknown_name(kind, name, known)
+    return name
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str]) -> ValueError:
@@ -18,15 +146,15 @@ def unknown_name(kind: str, name: object, known: Iterable[str]) -> ValueError:
         >>> unknown_name("agent", "spike-treshold", ["no-brake", "spike-threshold"])
         ValueError("unknown agent 'spike-treshold'; did you mean 'spike-threshold'?")
     """
-    names = sorted(known)
-    if closest := get_close_matches(str(name), names, n=1, cutoff=0.5):
+    names, text = sorted(known), name[:MAX_SHOWN] if isinstance(name, str) else shown(name)
+    if closest := get_close_matches(text, names, n=1, cutoff=0.5):
         fix = f"did you mean {closest[0]!r}?"
     elif len(names) > MAX_LISTED:
-        closest = get_close_matches(str(name), names, n=5, cutoff=0.0)
+        closest = get_close_matches(text, names, n=5, cutoff=0.0)
         fix = f"closest of {len(names)} names: {', '.join(closest)}"
     else:
         fix = f"known: {', '.join(names) or 'none'}"
-    return ValueError(f"unknown {kind} {name!r}; {fix}")
+    return ValueError(f"unknown {kind} {shown(name)}; {fix}")
 
 
 def check_keys(kind: str, given: Iterable[str], known: Iterable[str]) -> None:
@@ -37,5 +165,4 @@ def check_keys(kind: str, given: Iterable[str], known: Iterable[str]) -> None:
     """
     names = set(known)
     for key in given:
-        if key not in names:
-            raise unknown_name(kind, key, names)
+        check_known(kind, key, names)

@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.options import positive, whole
 from lgmd_gym.agents.policies.zone_features import (
     NUM_ZONE_FEATURES,
     ZONE_INPUTS,
     ZoneFeatures,
     check_zone_shape,
 )
-from lgmd_gym.errors import check_keys, unknown_name
+from lgmd_gym.errors import check_flag, check_items, check_keys, check_known, check_positive, check_whole
 
 # Offset and scale of each observation: (value - offset) / scale is near [-1, 1].
 SCALES = {
@@ -59,17 +58,15 @@ class FeatureConfig:
     reward_scale: float = 1.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "inputs", tuple(self.inputs))
+        object.__setattr__(self, "inputs", check_items("inputs", self.inputs, str, "names"))
         if not self.inputs:
             raise ValueError("inputs must contain at least one policy input, got none")
         for name in self.inputs:
-            if name not in INPUTS:
-                raise unknown_name("policy input", name, INPUTS)
+            check_known("policy input", name, INPUTS)
         for name in ("history", "repeat", "shrink"):
-            object.__setattr__(self, name, whole(name, getattr(self, name), 1))
-        if not isinstance(self.latch, bool):
-            raise ValueError(f"latch must be true or false, got {self.latch!r}")
-        object.__setattr__(self, "reward_scale", positive("reward_scale", self.reward_scale))
+            object.__setattr__(self, name, check_whole(name, getattr(self, name), 1))
+        object.__setattr__(self, "latch", check_flag("latch", self.latch))
+        object.__setattr__(self, "reward_scale", check_positive("reward_scale", self.reward_scale))
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "FeatureConfig":

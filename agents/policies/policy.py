@@ -15,7 +15,7 @@ from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.batch import BatchAgent
 from lgmd_gym.agents.policies.batch import PolicyBatch
 from lgmd_gym.agents.policies.features import FRAME, FeatureConfig, FeatureHistory
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_text, shown, unknown_name
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -47,7 +47,7 @@ class Policy(Agent):
     name = "policy"
 
     def __init__(self, path: str) -> None:
-        self.name = f"policy:{path}"
+        self.name = f"policy:{check_text('path', path)}"
         file = find_policy(path)
         self.card = read_card(file)
         self.features = FeatureConfig.from_dict(self.card["features"])
@@ -139,13 +139,15 @@ def read_card(path: Path) -> dict[str, Any]:
         with zipfile.ZipFile(path) as file:
             card = json.loads(file.read(CARD))
     except OSError as error:
-        raise ValueError(f"policy {str(path)!r} cannot be read: {error.strerror or error}") from None
+        raise ValueError(f"policy {shown(str(path))} cannot be read: {error.strerror or error}") from None
     except (KeyError, *_ZIP_ERRORS):
-        raise ValueError(f"{str(path)!r} is not a policy file: it contains no {CARD}") from None
+        raise ValueError(f"{shown(str(path))} is not a policy file: it contains no {CARD}") from None
     try:
         _check_card(card)
     except (AttributeError, TypeError, ValueError) as error:
-        raise ValueError(f"policy {str(path)!r}: the card is damaged ({error}); train it again") from None
+        raise ValueError(
+            f"policy {shown(str(path))}: the card is damaged ({error}); train it again"
+        ) from None
     return card
 
 
@@ -173,7 +175,7 @@ def write_card(path: Path, card: dict[str, Any]) -> None:
 def _announce(path: Path) -> None:
     """Print once that a file is unpickled; worker processes leave it to their parent."""
     if current_process().name == "MainProcess":
-        print(f"lgmd-gym: unpickling policy {str(path)!r}, which can run any code", file=sys.stderr)
+        print(f"lgmd-gym: unpickling policy {shown(str(path))}, which can run any code", file=sys.stderr)
 
 
 def _load_model(path: Path, algo: str) -> Any:
@@ -187,4 +189,4 @@ def _load_model(path: Path, algo: str) -> Any:
         return getattr(stable_baselines3, str(algo).upper()).load(path, device="cpu")
     except Exception as error:  # of the archive, pickle, PyTorch or stable-baselines3
         reason = (str(error) or type(error).__name__).splitlines()[0]
-        raise ValueError(f"policy {str(path)!r} cannot be loaded ({reason}); train it again") from None
+        raise ValueError(f"policy {shown(str(path))} cannot be loaded ({reason}); train it again") from None

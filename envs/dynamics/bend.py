@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from lgmd_gym.envs.dynamics.units import check_finite, check_within
+from lgmd_gym.errors import check_finite, check_within, shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,8 @@ class Bend:
 
     def __post_init__(self) -> None:
         if check_finite("length", self.length) <= 0.0:
-            raise ValueError(f"length of a Bend must be > 0 m, got {self.length!r}")
+            raise ValueError(f"length of a Bend must be > 0 m, got {shown(self.length)}")
+        check_within("length", self.length, 0.0, 1e6, "m")
         check_within("curvature", self.curvature, -1.0, 1.0, "1/m")
         check_within("end_curvature", self.last_curvature, -1.0, 1.0, "1/m")
 

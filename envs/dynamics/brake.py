@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.envs.dynamics.jit import compiled
-from lgmd_gym.envs.dynamics.units import check_within
+from lgmd_gym.errors import check_within
 
 DELAY_LINE = np.dtype(
     [("time", np.float64), ("demand", np.float64), ("last_put", np.float64), ("count", np.int64)]

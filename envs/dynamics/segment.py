@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lgmd_gym.envs.dynamics.units import check_speed, check_within
+from lgmd_gym.envs.dynamics.units import check_speed
+from lgmd_gym.errors import check_within
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

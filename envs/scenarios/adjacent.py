@@ -3,7 +3,7 @@
 from math import pi
 
 from lgmd_gym.envs.dynamics.bend import Bend, lane_change
-from lgmd_gym.envs.dynamics.units import KMH, MAX_SPEED, check_speed, check_within
+from lgmd_gym.envs.dynamics.units import KMH, MAX_SPEED, check_speed
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (
     EGO_LENGTH,
@@ -16,6 +16,7 @@ from lgmd_gym.envs.scenarios.scenario import (
     RoadPlan,
     Scenario,
 )
+from lgmd_gym.errors import check_whole, check_within, shown
 
 CONTACT_OFFSET = (EGO_WIDTH + TARGET_WIDTH) / 2  # [m], lateral offset up to which the cars touch
 QUEUE_SPACING = 2.0  # [m] between the cars of a queue
@@ -42,9 +43,9 @@ def pass_standing(
     if abs(check_within("lateral_offset", lateral_offset, -20.0, 20.0, "m")) <= CONTACT_OFFSET:
         raise ValueError(
             f"lateral_offset must exceed {CONTACT_OFFSET:g} m to either side in AdjacentPass, "
-            f"got {lateral_offset!r}; for a car in the ego's path use CCRs"
+            f"got {shown(lateral_offset)}; for a car in the ego's path use CCRs"
         )
-    count = int(check_within("cars", cars, 1, 20))
+    count = check_whole("cars", cars, 1, 20)
     pitch = TARGET_LENGTH + QUEUE_SPACING
     queue = tuple(
         Actor(gap=START_TTC * speed + number * pitch, lateral_offset=lateral_offset, shade=shade)

@@ -3,7 +3,7 @@
 from math import pi
 
 from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.dynamics.units import KMH, check_speed, check_within
+from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (
     AFTERMATH,
@@ -16,7 +16,7 @@ from lgmd_gym.envs.scenarios.scenario import (
     RoadPlan,
     Scenario,
 )
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_flag, check_known, check_within
 
 SIDES = {"right": 1.0, "left": -1.0}
 START_GAP = 2.9  # [m] from a stopped ego to the target's path (AEB C2C v4.3.1, 8.2.5)
@@ -44,7 +44,7 @@ def cross_straight(
         shade: Grey level of the target in [0, 255]; None to draw it from the seed.
     """
     speed, across = check_speed("ego_speed", ego_speed), check_speed("target_speed", target_speed)
-    if from_stop:
+    if check_flag("from_stop", from_stop):
         distance, profile = START_GAP, (Segment(start=WAITING, acceleration=PULL_AWAY, final_speed=speed),)
         contact = _time_to_cover(distance, profile)
     else:
@@ -102,8 +102,7 @@ def _crossing_car(distance: float, before: float, speed: float, side: str, shade
         side: Side from which the car comes.
         shade: Grey level; None to draw it from the seed.
     """
-    if side not in SIDES:
-        raise unknown_name("side", side, SIDES)
+    check_known("side", side, SIDES)
     to_left = SIDES[side]
     return Actor(
         gap=distance + TARGET_WIDTH / 2 - TARGET_LENGTH / 2,

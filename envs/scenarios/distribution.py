@@ -9,7 +9,7 @@ from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.scenarios.registry import make_scenario
 from lgmd_gym.envs.scenarios.scenario import Scenario
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_items, check_known, check_whole
 
 SPLITS = ("train", "validation", "test")
 LEVELS = 1_000_000  # per split
@@ -24,22 +24,18 @@ def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequ
     Raises:
         ValueError: If the split or a condition is unknown, or levels are outside the split.
     """
-    if split not in SPLITS:
-        raise unknown_name("split", split, SPLITS)
+    check_known("split", split, SPLITS)
     check_conditions(conditions)
-    if not 0 <= start_level < LEVELS:
-        raise ValueError(f"start_level must be in [0, {LEVELS - 1}], got {start_level!r}")
-    if not 0 <= num_levels <= LEVELS - start_level:
-        raise ValueError(f"num_levels must be in [0, {LEVELS - start_level}] (0 for all), got {num_levels!r}")
+    check_whole("start_level", start_level, 0, LEVELS - 1)
+    check_whole("num_levels", num_levels, 0, LEVELS - start_level)  # 0 for all
 
 
 def check_conditions(conditions: Sequence[str]) -> None:
     """Raise ValueError for an unknown camera condition or an empty sequence."""
-    if not conditions:
+    if not check_items("conditions", conditions, str):
         raise ValueError("conditions needs at least one name, got none")
     for condition in conditions:
-        if condition not in CONDITIONS:
-            raise unknown_name("condition", condition, CONDITIONS)
+        check_known("condition", condition, CONDITIONS)
 
 
 def level_generator(split: str, level: int, part: int = 0) -> np.random.Generator:

@@ -4,7 +4,7 @@ from math import atan2, cos, hypot, pi, sin
 from typing import TYPE_CHECKING
 
 from lgmd_gym.envs.dynamics.bend import Bend, Pose, arc
-from lgmd_gym.envs.dynamics.units import KMH, check_speed, check_within
+from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (
     EGO_LENGTH,
@@ -15,6 +15,7 @@ from lgmd_gym.envs.scenarios.scenario import (
     RoadPlan,
     Scenario,
 )
+from lgmd_gym.errors import check_flag, check_within
 
 if TYPE_CHECKING:
     from lgmd_gym.envs.dynamics.path import Path
@@ -126,7 +127,7 @@ def drive_along_rail(ego_speed: float = 50 * KMH, radius: float = 60.0, left: bo
     # A module that loads numba; the registration of the scenario families must not.
     from lgmd_gym.envs.dynamics.path import Path
 
-    side = 1.0 if left else -1.0
+    side = 1.0 if check_flag("left", left) else -1.0
     entry = 3.0 * speed
     curve = arc(bend_radius, side * min(pi / 2, CURVE_LENGTH / bend_radius))
     # The outside of a left curve is next to the ego's lane; of a right curve, beyond the oncoming lane.

@@ -4,7 +4,7 @@ from dataclasses import replace
 from math import copysign, pi
 
 from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.dynamics.units import KMH, check_speed, check_within
+from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (
     AFTERMATH,
@@ -15,6 +15,7 @@ from lgmd_gym.envs.scenarios.scenario import (
     Actor,
     Scenario,
 )
+from lgmd_gym.errors import check_flag, check_within, shown
 
 LEAD_IN = (
     3.0  # [s] at constant distance before the lead car brakes; T0 is 1 s before (AEB C2C v4.3.1, 8.2.2.3)
@@ -200,13 +201,13 @@ def _gap(speed: float, gap: float | None, headway: float | None) -> float:
     if headway is None:
         return check_within("gap", 40.0 if gap is None else gap, 1.0, 200.0, "m")
     if gap is not None:
-        raise ValueError(f"gap={gap!r} and headway={headway!r} both set the distance; pass one")
+        raise ValueError(f"gap={shown(gap)} and headway={shown(headway)} both set the distance; pass one")
     return speed * check_within("headway", headway, 0.3, 10.0, "s")
 
 
 def _with_second_car(target: Actor, beside: bool) -> tuple[Actor, ...]:
     """Return the target, with a copy of it in the lane to the left if `beside`."""
-    if not beside:
+    if not check_flag("beside", beside):
         return (target,)
     return target, replace(target, lateral_offset=LANE_WIDTH, heading=0.0, shade=None)
 
@@ -220,14 +221,14 @@ def _offset(lateral_offset: float | None, overlap: float | None, impact_location
         if value is not None
     }
     if len(given) > 1:
-        text = " and ".join(f"{name}={value!r}" for name, value in given.items())
+        text = " and ".join(f"{name}={shown(value)}" for name, value in given.items())
         raise ValueError(f"{text} both set the lateral position; pass one")
     if overlap is not None:
         return _offset_from_overlap(overlap)
     if impact_location is not None:
         # As in the OpenSCENARIO files of Euro NCAP 2026: 0 and 1 are the ego's sides, 0.5 its centreline.
         return (check_within("impact_location", impact_location, -0.25, 1.25) - 0.5) * EGO_WIDTH
-    return check_within("lateral_offset", lateral_offset or 0.0, -20.0, 20.0, "m")
+    return check_within("lateral_offset", 0.0 if lateral_offset is None else lateral_offset, -20.0, 20.0, "m")
 
 
 def _offset_from_overlap(overlap: float) -> float:

@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Callable
 
 from lgmd_gym.envs.scenarios.scenario import Scenario
-from lgmd_gym.errors import check_keys, unknown_name
+from lgmd_gym.errors import check_keys, check_known
 
 Family = Callable[..., Scenario]
 FAMILIES: dict[str, Family] = {}
@@ -37,8 +37,7 @@ def make_scenario(name: str, **arguments: object) -> Scenario:
     Raises:
         ValueError: If the family or an argument is unknown, or a value is out of range.
     """
-    if name not in FAMILIES:
-        raise unknown_name("scenario", name, FAMILIES)
+    check_known("scenario", name, FAMILIES)
     function = FAMILIES[name]
     check_keys(f"argument of {name}", arguments, inspect.signature(function).parameters)
     return function(**arguments)

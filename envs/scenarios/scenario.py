@@ -4,8 +4,17 @@ from dataclasses import dataclass, field
 
 from lgmd_gym.envs.dynamics.bend import Bend
 from lgmd_gym.envs.dynamics.segment import Segment, check_profile
-from lgmd_gym.envs.dynamics.units import check_finite, check_speed, check_within
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.envs.dynamics.units import check_speed
+from lgmd_gym.errors import (
+    check_finite,
+    check_items,
+    check_known,
+    check_text,
+    check_type,
+    check_whole,
+    check_within,
+    shown,
+)
 
 EGO_LENGTH, EGO_WIDTH = 4.3, 1.8  # [m]
 # Global Vehicle Target of ISO 19206-3, bounding box of Euro NCAP's OpenSCENARIO catalogue.
@@ -13,6 +22,7 @@ TARGET_LENGTH, TARGET_WIDTH, TARGET_HEIGHT = 4.023, 1.712, 1.427  # [m]
 LANE_WIDTH = 3.5  # [m], Euro NCAP AEB C2C v4.3.1, 7.1
 ACTOR_KINDS = ("car", "box", "road_marking")
 ROAD_KINDS = ("straight", "two-way", "curve", "crossing")
+MAX_LANES = 100
 START_TTC = 5.0
 """Time from the start to the first possible contact at the scripted speeds [s]: 1 s more than the protocols'
 T0 of 4 s, so that braking from the start counts as premature."""
@@ -57,11 +67,12 @@ class Actor:
         check_within("lateral_offset", self.lateral_offset, -500.0, 500.0, "m")
         check_finite("heading", self.heading)
         check_speed("speed", self.speed, zero=True)
+        check_items("profile", self.profile, Segment)
+        check_items("path", self.path, Bend)
         check_profile(self.speed, self.profile)
-        if self.kind not in ACTOR_KINDS:
-            raise unknown_name("actor kind", self.kind, ACTOR_KINDS)
+        check_known("actor kind", self.kind, ACTOR_KINDS)
         if self.shade is not None:
-            check_within("shade", self.shade, 0, 255)
+            check_whole("shade", self.shade, 0, 255)
         for name in ("length", "width", "height"):
             check_within(name, getattr(self, name), 0.0, 1000.0, "m")
 
@@ -87,10 +98,11 @@ class RoadPlan:
     bends: tuple[Bend, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.kind not in ROAD_KINDS:
-            raise unknown_name("road kind", self.kind, ROAD_KINDS)
-        if not 0 <= self.ego_lane < self.lanes:
-            raise ValueError(f"ego_lane must be in [0, {self.lanes - 1}], got {self.ego_lane!r}")
+        check_known("road kind", self.kind, ROAD_KINDS)
+        check_whole("lanes", self.lanes, 1, MAX_LANES)
+        check_whole("ego_lane", self.ego_lane, 0, self.lanes - 1)
+        check_within("distance", self.distance, -1e4, 1e4, "m")
+        check_items("bends", self.bends, Bend)
 
     @property
     def relative_to_ego(self) -> bool:
@@ -121,10 +133,15 @@ class Scenario:
     road: RoadPlan = field(default_factory=RoadPlan)
 
     def __post_init__(self) -> None:
+        check_text("family", self.family)
+        check_items("actors", self.actors, Actor)
+        check_items("ego_profile", self.ego_profile, Segment)
+        check_items("ego_path", self.ego_path, Bend)
+        check_type("road", self.road, RoadPlan)
         check_speed("ego_speed", self.ego_speed, zero=bool(self.ego_profile))
         check_profile(self.ego_speed, self.ego_profile)
         if check_finite("duration", self.duration) <= 0.0:
-            raise ValueError(f"duration must be > 0 s, got {self.duration!r}")
+            raise ValueError(f"duration must be > 0 s, got {shown(self.duration)}")
 
     @property
     def top_speed(self) -> float:

@@ -4,9 +4,10 @@ from math import pi
 
 from lgmd_gym.envs.dynamics.bend import Bend, arc, lane_change, turn
 from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.dynamics.units import KMH, check_within
+from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, LANE_WIDTH, TARGET_LENGTH, Actor, RoadPlan, Scenario
+from lgmd_gym.errors import check_flag, check_within
 
 APPROACH = 4.0  # [s] at constant speed before the ego or the lead car slows down or steers
 
@@ -22,6 +23,7 @@ def turn_before_oncoming(left: bool = True, shade: int | None = None) -> Scenari
         left: Whether the ego turns left, across the front of the other car; otherwise right.
         shade: Grey level of the stationary car in [0, 255]; None to draw it from the seed.
     """
+    check_flag("left", left)
     approach, slow, slowing = 30 * KMH, 17 * KMH, 2.5
     slowing_distance = (approach**2 - slow**2) / (2 * slowing)
     onset = APPROACH * approach + slowing_distance + 1.0
@@ -53,6 +55,7 @@ def lead_turns_off(left: bool = False, shade: int | None = None) -> Scenario:
         left: Whether the lead car turns left; otherwise right.
         shade: Grey level of the lead car in [0, 255]; None to draw it from the seed.
     """
+    check_flag("left", left)
     both, lead_slow, slow, slowing = 40 * KMH, 10 * KMH, 27 * KMH, 3.0
     lead_time = (both - lead_slow) / slowing
     lead_distance = APPROACH * both + (both**2 - lead_slow**2) / (2 * slowing)
@@ -90,6 +93,7 @@ def curve_with_car_outside(left: bool = True, shade: int | None = None) -> Scena
         left: Whether the curve turns left; otherwise right.
         shade: Grey level of the stationary car in [0, 255]; None to draw it from the seed.
     """
+    check_flag("left", left)
     approach, slow, slowing = 30 * KMH, 22.5 * KMH, 2.0
     onset = APPROACH * approach + (approach**2 - slow**2) / (2 * slowing) + 1.0
     curve = arc(25.0, (1.0 if left else -1.0) * pi / 2)
@@ -119,7 +123,7 @@ def change_lane_before_sign(ego_speed: float = 40 * KMH, left: bool = True) -> S
     """
     speed = check_within("ego_speed", ego_speed, 20 * KMH, 60 * KMH, "m/s")
     onset = APPROACH * speed
-    shift = lane_change(3.3 * speed, LANE_WIDTH if left else -LANE_WIDTH)
+    shift = lane_change(3.3 * speed, LANE_WIDTH if check_flag("left", left) else -LANE_WIDTH)
     gap = onset + 4.1 * speed
     sign = Actor(gap=gap, kind="box", shade=225, length=0.3, width=1.5, height=1.8)
     return Scenario(

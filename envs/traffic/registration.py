@@ -6,7 +6,7 @@ import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 
 from lgmd_gym.envs.registration import env_id, with_camera
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_known
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -41,8 +41,7 @@ def find_kind(kind: str) -> "type[TrafficEnv]":
     Raises:
         ValueError: If the kind is unknown.
     """
-    if kind not in KINDS:
-        raise unknown_name("kind of traffic", kind, KINDS)
+    check_known("kind of traffic", kind, KINDS)
     return load_env_creator(KINDS[kind])  # type: ignore[return-value]
 
 

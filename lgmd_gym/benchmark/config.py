@@ -1,6 +1,6 @@
 """The configuration of a run, stored as `run.toml` in its folder."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,10 @@ from lgmd_gym.benchmark.suite_file import copy_suite, read_toml
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.camera import CLEAR, CONDITIONS, CameraSpec
+from lgmd_gym.camera.spec import check_camera
 from lgmd_gym.envs.traffic.registration import KINDS
-from lgmd_gym.errors import check_keys, unknown_name
-from lgmd_gym.neuron import NeuronSpec
+from lgmd_gym.errors import check_items, check_keys, check_known, check_text, check_whole, shown
+from lgmd_gym.neuron import LGMDParams, NeuronSpec
 
 RUN_FILE = "run.toml"
 SUITE_FILE = "suite.toml"  # copy of a user's own suite next to it
@@ -58,16 +59,16 @@ class RunConfig:
     kinds: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.suite, str):
-            raise ValueError(f"suite must be a string, got {self.suite!r}")
-        for name, low in (("seeds", 1), ("first_seed", 0)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < low:
-                raise ValueError(f"{name} must be a whole number >= {low}, got {value!r}")
+        check_text("suite", self.suite)
         if self.kinds is not None and self.suite != TRAFFIC:
-            raise ValueError(f"kinds applies to suite 'traffic' only, got suite {self.suite!r}")
+            raise ValueError(f"kinds applies to suite 'traffic' only, got suite {shown(self.suite)}")
+        if self.camera is not None:
+            check_camera(self.camera)
+        LGMDParams.make(self.params)
         plain = SensorConfig(self.camera, self.params).plain
         values: dict[str, Any] = {
+            "seeds": check_whole("seeds", self.seeds, 1),
+            "first_seed": check_whole("first_seed", self.first_seed, 0),
             "agents": _names("agents", self.agents),
             "conditions": _names("conditions", self.conditions, "camera condition", CONDITIONS),
             "camera": plain.camera,
@@ -130,14 +131,12 @@ class RunConfig:
         return asdict(self) | ({"suite": SUITE_FILE} if self.own_suite else {})
 
 
-def _names(name: str, values: Iterable[str], kind: str = "", known: Iterable[str] = ()) -> tuple[str, ...]:
+def _names(name: str, values: Iterable[str], kind: str = "", known: Collection[str] = ()) -> tuple[str, ...]:
     """Return the distinct names; raise ValueError for an unknown one, or if there are none."""
-    if isinstance(values, str) or not all(isinstance(value, str) for value in values):
-        raise ValueError(f"{name} must be a list of strings, got {values!r}")
-    names = tuple(dict.fromkeys(values))
+    names = tuple(dict.fromkeys(check_items(name, values, str, "strings")))
     if not names:
         raise ValueError(f"{name} must contain at least one name, got none")
     for value in names:
-        if kind and value not in known:
-            raise unknown_name(kind, value, known)
+        if kind:
+            check_known(kind, value, known)
     return names

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from lgmd_gym._version import __version__
 from lgmd_gym.benchmark.worker_processes import signals_blocked, worker_options
+from lgmd_gym.errors import check_text, check_whole
 
 if TYPE_CHECKING:
     from joblib import Parallel
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 CONNECT = 5.0  # [s] limit for reaching the scheduler
 WORKERS = 10.0  # [s] limit for the first worker
 PATIENCE = 20.0  # [s] without scheduler or worker after which a cluster counts as lost
+MAX_JOBS = 1024
 KILLED = "a task killed worker after worker"
 
 
@@ -79,8 +81,9 @@ class Executor:
     cluster: str | None = None
 
     def __post_init__(self) -> None:
-        if self.jobs < 1:
-            raise ValueError(f"jobs must be >= 1, got {self.jobs!r}")
+        check_whole("jobs", self.jobs, 1, MAX_JOBS)
+        if self.cluster is not None:
+            check_text("cluster", self.cluster)
 
     def check(self) -> None:
         """Check that the cluster, if any, is reachable and has workers with this version of the package.

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lgmd_gym.benchmark import protocols
 from lgmd_gym.benchmark.case import Case, level_case, make_case, speed_cases
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_known, unknown_name
 
 TRAFFIC = "traffic"  # the suite without cases, see `lgmd_gym.benchmark.traffic`
 RANDOM_LEVELS = 60
@@ -138,6 +138,5 @@ def find_case(name: str) -> Case:
         ValueError: If the name is unknown.
     """
     known = {case.name: case for suite in SUITES.values() for case in suite.cases}
-    if name not in known:
-        raise unknown_name("case", name, known)
+    check_known("case", name, known)
     return known[name]

@@ -6,6 +6,7 @@ import numpy as np
 
 from lgmd_gym.camera.ego import check_frame
 from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.errors import check_within
 
 
 class BirdsEye:
@@ -22,8 +23,8 @@ class BirdsEye:
 
     def __init__(self, shape: tuple[int, int] = (90, 160), scaling: float | None = None) -> None:
         self._shape = CameraParams(shape=shape).shape
-        if scaling is not None and not scaling > 0.0:
-            raise ValueError(f"scaling must be above 0 px/m, got {scaling!r}")
+        if scaling is not None:
+            check_within("scaling", scaling, 1e-3, 1e3, "px/m")
         self._scaling = scaling
         self._viewer: Any = None
         self._oversampling = 1

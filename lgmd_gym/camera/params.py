@@ -6,10 +6,17 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from numbers import Integral, Real
 from typing import Any, NamedTuple
 
-from lgmd_gym.errors import check_keys, unknown_name
+from lgmd_gym.errors import (
+    check_finite,
+    check_flag,
+    check_keys,
+    check_known,
+    check_size,
+    is_integer,
+    shown,
+)
 
 
 class _Interval(NamedTuple):
@@ -108,14 +115,13 @@ class CameraParams:
     def __post_init__(self) -> None:
         """Check every field."""
         if not isinstance(self.name, str) or not self.name:
-            raise ValueError(f"camera name must be a non-empty string, got {self.name!r}")
-        object.__setattr__(self, "shape", _checked_shape(self.shape))
+            raise ValueError(f"camera name must be a non-empty string, got {shown(self.name)}")
+        object.__setattr__(self, "shape", check_size("camera shape", self.shape, 4, 4096))
         for name, bound in _BOUNDS.items():
             object.__setattr__(self, name, _checked_number(name, getattr(self, name), bound))
         _check_surroundings(self)
         for name, known in _CHOICES.items():
-            if getattr(self, name) not in known:
-                raise unknown_name(f"camera {name}", getattr(self, name), known)
+            check_known(f"camera {name}", getattr(self, name), known)
 
     @property
     def focal_px(self) -> float:
@@ -135,8 +141,7 @@ class CameraParams:
             >>> CameraParams.preset("fovea").hfov_deg
             10.0
         """
-        if name not in PRESETS:
-            raise unknown_name("camera preset", name, PRESETS)
+        check_known("camera preset", name, PRESETS)
         return cls.make(PRESETS[name], **changes)
 
     @classmethod
@@ -160,9 +165,11 @@ class CameraParams:
         elif isinstance(value, CameraParams):
             base = value
         elif isinstance(value, Mapping):
-            base = replace(PRESETS.get(value.get("name", ""), cls()), **_with_condition(value))
+            name = value.get("name")
+            base = PRESETS[name] if isinstance(name, str) and name in PRESETS else cls()
+            base = replace(base, **_with_condition(value))
         else:
-            raise TypeError(f"camera must be a preset name, CameraParams or a dict, got {value!r}")
+            raise TypeError(f"camera must be a preset name, CameraParams or a dict, got {shown(value)}")
         return replace(base, **_with_condition(changes)) if changes else base
 
     def with_condition(self, condition: str) -> CameraParams:
@@ -175,8 +182,7 @@ def _with_condition(changes: Mapping[str, Any]) -> dict[str, Any]:
     check_keys("camera field", changes, [*_field_names(), "condition"])
     others = dict(changes)
     condition = others.pop("condition", CLEAR)
-    if condition not in CONDITIONS:
-        raise unknown_name("camera condition", condition, CONDITIONS)
+    check_known("camera condition", condition, CONDITIONS)
     return {**CONDITIONS[condition], **others}
 
 
@@ -185,21 +191,13 @@ def _check_surroundings(p: CameraParams) -> None:
         object.__setattr__(p, "panorama", os.fspath(p.panorama))
     if not isinstance(p.panorama, str) or not p.panorama:
         raise ValueError(
-            f"camera panorama must be 'skyline', 'natural' or the path of an image, got {p.panorama!r}"
+            f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
         )
-    if not isinstance(p.guard_rail, bool):
-        raise ValueError(f"camera guard_rail must be true or false, got {p.guard_rail!r}")
+    object.__setattr__(p, "guard_rail", check_flag("camera guard_rail", p.guard_rail))
 
 
 def _field_names() -> list[str]:
     return [field.name for field in fields(CameraParams)]
-
-
-def _checked_shape(shape: Any) -> tuple[int, int]:
-    ok = isinstance(shape, tuple | list) and len(shape) == 2 and all(isinstance(n, Integral) for n in shape)
-    if not ok or not all(4 <= n <= 4096 for n in shape):
-        raise ValueError(f"camera shape must be (height, width), each 4 to 4096 px, got {shape!r}")
-    return int(shape[0]), int(shape[1])
 
 
 def checked_number(name: str, value: Any) -> float | int:
@@ -212,18 +210,19 @@ def checked_number(name: str, value: Any) -> float | int:
 
 
 def _checked_number(name: str, value: Any, bound: _Interval) -> float | int:
-    if not isinstance(value, Real) or isinstance(value, bool):
-        raise ValueError(f"camera {name} must be a number, got {value!r}")
-    value = int(value) if isinstance(value, Integral) else float(value)
+    check_finite(f"camera {name}", value)
+    value = int(value) if is_integer(value) else float(value)
     above = value >= bound.low if bound.low_allowed else value > bound.low
     below = value <= bound.high if bound.high_allowed else value < bound.high
     if not (above and below):
         opening, closing = "[" if bound.low_allowed else "(", "]" if bound.high_allowed else ")"
         interval = f"{opening}{bound.low:g}, {bound.high:g}{closing}"
-        raise ValueError(f"camera {name} must be in {interval} {bound.unit}".rstrip() + f", got {value!r}")
+        raise ValueError(
+            f"camera {name} must be in {interval} {bound.unit}".rstrip() + f", got {shown(value)}"
+        )
     if name == "seed":
         if not isinstance(value, int):
-            raise ValueError(f"camera seed must be an integer, got {value!r}")
+            raise ValueError(f"camera seed must be an integer, got {shown(value)}")
         return value
     return float(value)
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias, cast
 
 from lgmd_gym.camera.params import CLEAR, CONDITIONS, CameraParams
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_known
 
 BIRDSEYE = "birdseye"
 """The camera name of highway-env's top view."""
@@ -32,8 +32,7 @@ def with_condition(camera: CameraSpec, condition: str) -> CameraSpec:
         >>> with_condition("fovea", "fog").visibility_m
         120.0
     """
-    if condition not in CONDITIONS:
-        raise unknown_name("camera condition", condition, CONDITIONS)
+    check_known("camera condition", condition, CONDITIONS)
     if condition == CLEAR:
         return camera
     if isinstance(camera, list | tuple):
@@ -41,8 +40,29 @@ def with_condition(camera: CameraSpec, condition: str) -> CameraSpec:
     return _item_with_condition(cast(CameraItem, camera), condition)
 
 
+def check_camera(camera: CameraSpec) -> None:
+    """Check a camera argument without building the cameras.
+
+    Raises:
+        ValueError: For an unknown preset or field, a value out of range, or an empty sequence.
+        TypeError: For a camera of another type.
+    """
+    items = camera if isinstance(camera, list | tuple) else [camera]
+    if not items:
+        raise ValueError(f"camera must have at least one element, got {camera!r}; use camera='fovea'")
+    for item in items:
+        if not is_top_view(cast(CameraItem, item)):
+            CameraParams.make(cast(CameraItem, item))
+
+
+def is_top_view(camera: CameraItem) -> bool:
+    """Return whether a camera is highway-env's top view."""
+    name = camera.get("name") if isinstance(camera, Mapping) else camera
+    return isinstance(name, str) and name == BIRDSEYE
+
+
 def _item_with_condition(camera: CameraItem, condition: str) -> CameraParams:
-    if camera == BIRDSEYE or (isinstance(camera, Mapping) and camera.get("name") == BIRDSEYE):
+    if is_top_view(camera):
         raise ValueError(f"camera 'birdseye' does not support condition {condition!r}; use 'clear'")
     if isinstance(camera, Mapping):
         return CameraParams.make({**camera, "condition": condition})

@@ -35,7 +35,7 @@ def run(options: "Bench") -> int:
             _print_tables(benchmark, console)
         for file in write_outputs(path, options.plots, options.report, _trust(options)):
             if file.name == "report.html":
-                console.print(f"report: {file}", markup=False, soft_wrap=True)
+                console.print(f"report: {file}", soft_wrap=True)
     except OSError as error:
         benchmark.stop_reason = benchmark.stop_reason or f"{error.strerror} while writing the outputs"
     failed = sum(row["error"] is not None for row in benchmark.rows)
@@ -45,10 +45,8 @@ def run(options: "Bench") -> int:
         kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
         resume = f"continue with lgmd-gym bench --resume {path}"
         resume += " --trust" if any(map(outside_code, benchmark.config.agents)) else ""
-        console.print(
-            f"{benchmark.stop_reason}: {kept}; {resume}", style="yellow", markup=False, soft_wrap=True
-        )
-    console.print(f"run folder: {path}", markup=False, soft_wrap=True)
+        console.print(f"{benchmark.stop_reason}: {kept}; {resume}", style="yellow", soft_wrap=True)
+    console.print(f"run folder: {path}", soft_wrap=True)
     if not complete and benchmark.stop_reason == INTERRUPTED:
         return 130
     return int(bool(failed or benchmark.stop_reason))
@@ -138,12 +136,12 @@ def _progress(benchmark: "Run") -> Iterator[Callable[[dict[str, Any]], None]]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=20),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
+        TextColumn("{task.fields[rate]}", markup=False),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[tally]}"),
+        TextColumn("{task.fields[tally]}", markup=False),
     )
     tally = Tally(time.perf_counter())
     for row in benchmark.rows:

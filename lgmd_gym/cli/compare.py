@@ -28,7 +28,7 @@ def _compare_pairs(options: Compare, console: Console) -> None:
         console.print(comparison_table(comparison))
     if options.out is not None:
         difference_figure(options.out, comparisons)
-        console.print(f"figure: {options.out}", markup=False, soft_wrap=True)
+        console.print(f"figure: {options.out}", soft_wrap=True)
 
 
 def _compare_arms(options: Compare, arms: tuple[str, ...], console: Console) -> None:

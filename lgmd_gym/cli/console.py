@@ -7,9 +7,12 @@ from rich.console import Console
 
 
 def make_console(width: int = 110) -> Console:
-    """Return a console for stdout; files and pipes get a fixed width [columns]."""
-    console = Console()
-    return console if console.is_terminal else Console(width=width)
+    """Return a console for stdout; files and pipes get a fixed width [columns].
+
+    It prints text as it is: names of users may look like rich's markup or emoji codes.
+    """
+    console = Console(markup=False, emoji=False)
+    return console if console.is_terminal else Console(markup=False, emoji=False, width=width)
 
 
 def io_reason(error: OSError) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.markup import escape
+from rich.text import Text
 
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Doctor
@@ -67,10 +67,11 @@ def print_findings(findings: Iterable[Finding], console: Console) -> int:
     colours = {OK: "green", NOTE: "yellow", FAULT: "red"}
     faults = 0
     for item in findings:
-        head = f"[{colours[item.state]}]{item.state:5}[/] {item.check:11}"
-        console.print(f"{head} {escape(item.message)}", soft_wrap=True, highlight=False)
+        head = (f"{item.state:5}", colours[item.state])
+        line = Text.assemble(head, f" {item.check:11} {item.message}")
+        console.print(line, soft_wrap=True, highlight=False)
         if item.fix:
-            console.print(f"{'':17} [bold]→ {escape(item.fix)}[/]", soft_wrap=True, highlight=False)
+            console.print(Text(f"{'':18}→ {item.fix}", "bold"), soft_wrap=True, highlight=False)
         faults += item.state == FAULT
     return faults
 

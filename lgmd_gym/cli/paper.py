@@ -33,7 +33,7 @@ def run(options: Paper) -> int:
     out = video.default_out(options.out, "paper")
     with video.run_folder(out, settings) as folder:
         clip_results = _experiments(options, jobs, folder)
-    make_console(120).print(f"claims and figures: {out}", markup=False, soft_wrap=True)
+    make_console(120).print(f"claims and figures: {out}", soft_wrap=True)
     return video.print_errors(clip_results)
 
 

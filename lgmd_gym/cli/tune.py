@@ -35,16 +35,14 @@ def run(options: Tune) -> int:
     for path in (options.best, _neuron_file(options.best)):
         check_new_file(path, "--best")
     train = Objective("train", options.levels, options.seeds, options.jobs)
-    log = partial(console.print, markup=False, soft_wrap=True)
+    log = partial(console.print, soft_wrap=True)
     try:
         best = tune(space, options.study, options.trials, train, validation, options.false_cost, log=log)
     except KeyboardInterrupt:
         print(f"interrupted; to resume, repeat the command with --study {options.study}", file=sys.stderr)
         return 130
     arguments = _save(options.agent, best, options.best)
-    console.print(
-        f"options of lgmd-gym bench for the best parameters: {arguments}", markup=False, soft_wrap=True
-    )
+    console.print(f"options of lgmd-gym bench for the best parameters: {arguments}", soft_wrap=True)
     return 0
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.text import Text
 
 from lgmd_gym.benchmark.folder import provenance
 from lgmd_gym.cli.console import make_console
@@ -35,7 +36,7 @@ def run(options: Video) -> int:
     out = default_out(options.out, "video")
     with run_folder(out, {"clips": [job.clip for job in jobs], "configs": configs}) as folder:
         results = _process_all(options, jobs, configs, folder)
-    make_console(120).print(f"traces and figures: {out}", markup=False, soft_wrap=True)
+    make_console(120).print(f"traces and figures: {out}", soft_wrap=True)
     return print_errors(results)
 
 
@@ -53,7 +54,7 @@ def _process_all(
         results += batch
         rates = sorted({result.summary.fps for result in batch})
         description = ", ".join(config.describe(rate) for rate in rates[:3])
-        console.print(f"[bold]{name}[/]: {description}", highlight=False)
+        console.print(Text.assemble((name, "bold"), f": {description}"), highlight=False)
         console.print(tables.clip_table(batch))
         detections[name] = detect_clips(jobs, batch)
         if detections[name]:
@@ -140,7 +141,12 @@ def progress_bar(name: str, total: float) -> Iterator[Callable[[float], None]]:
     """Show a progress bar on stderr and yield the function that sets its value."""
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(name, total=total)
         yield lambda completed: bar.update(task, completed=completed)

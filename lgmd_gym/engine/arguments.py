@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from lgmd_gym.camera import BirdsEye, CameraSpec
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_known, is_integer, shown
 from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.sensing.cameras import make_cameras
 from lgmd_gym.sensing.sensor_array import SensorArray
@@ -36,30 +36,23 @@ def make_sensors(camera: CameraSpec, fps: float, neuron: LGMDParams, num_envs: i
     return SensorArray(camera, fps, neuron, num_envs)
 
 
-def at_least_one(name: str, value: int) -> int:
-    """Return a count, an argument called `name`; raise ValueError if it is no integer >= 1."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise ValueError(f"{name} must be an integer >= 1, got {value!r}")
-    return int(value)
-
-
 def autoreset_mode_of(mode: AutoresetMode | str) -> AutoresetMode:
     """Return an autoreset mode; raise ValueError for an unknown one."""
-    if not isinstance(mode, AutoresetMode) and mode not in _MODES:
-        raise unknown_name("autoreset_mode", mode, _MODES)
-    return AutoresetMode(mode)
+    if isinstance(mode, AutoresetMode):
+        return mode
+    return AutoresetMode(check_known("autoreset_mode", mode, _MODES))
 
 
 def seeds_of(seed: Any, num_envs: int) -> list[int | None]:
     """Return one seed per environment; raise ValueError for another number of seeds, or an invalid seed."""
     if seed is None:
         return [None] * num_envs
-    seeds = [seed + index for index in range(num_envs)] if isinstance(seed, int | np.integer) else seed
+    seeds = [seed + index for index in range(num_envs)] if is_integer(seed) else seed
     if not isinstance(seeds, Sequence | np.ndarray) or len(seeds) != num_envs:
-        raise ValueError(f"seed must be one number or {num_envs} numbers, got {seed!r}")
+        raise ValueError(f"seed must be one number or {num_envs} numbers, got {shown(seed)}")
     for value in seeds:
-        if value is not None and (not isinstance(value, int | np.integer) or value < 0):
-            raise ValueError(f"seed must be None or integers >= 0, got {value!r}")
+        if value is not None and (not is_integer(value) or value < 0):
+            raise ValueError(f"seed must be None or integers >= 0, got {shown(value)}")
     return [None if value is None else int(value) for value in seeds]
 
 
@@ -72,7 +65,9 @@ def mask_of(mask: Any, num_envs: int) -> np.ndarray:
     if mask is None:
         return np.ones(num_envs, np.bool_)
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (num_envs,):
-        raise ValueError(f"options['reset_mask'] must be a bool array of shape ({num_envs},), got {mask!r}")
+        raise ValueError(
+            f"options['reset_mask'] must be a bool array of shape ({num_envs},), got {shown(mask)}"
+        )
     if not mask.any():
         raise ValueError("options['reset_mask'] must select at least one environment, got none")
     return mask

@@ -10,7 +10,7 @@ from gymnasium.vector.utils import batch_space
 
 from lgmd_gym.camera import CameraSpec
 from lgmd_gym.engine.actions import Demands
-from lgmd_gym.engine.arguments import at_least_one, autoreset_mode_of, make_sensors, mask_of, seeds_of
+from lgmd_gym.engine.arguments import autoreset_mode_of, make_sensors, mask_of, seeds_of
 from lgmd_gym.engine.episodes import EpisodeQueue, Prepared
 from lgmd_gym.engine.infos import InfoArrays
 from lgmd_gym.engine.observations import Observations
@@ -18,8 +18,9 @@ from lgmd_gym.engine.simulation import Rates, Simulation
 from lgmd_gym.engine.top_view import TopViews
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.registration import make_source
-from lgmd_gym.errors import check_keys
+from lgmd_gym.errors import check_flags, check_keys, check_type, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
+from lgmd_gym.neuron.validation import MAX_THREADS
 from lgmd_gym.sensing.frame_rate import camera_rate
 from lgmd_gym.sensing.spaces import make_space
 
@@ -27,6 +28,8 @@ _NAMES = (
     *("num_envs", "camera", "params", "fps", "include_frame", "include_base", "trace", "config"),
     *("render_mode", "threads", "autoreset_mode", "copy"),
 )
+
+MAX_ENVS = 65536
 
 
 class BrakingVectorEnv(VectorEnv):
@@ -86,10 +89,13 @@ class BrakingVectorEnv(VectorEnv):
         copy: bool = True,
         **arguments: Any,
     ) -> None:
-        self.num_envs = at_least_one("num_envs", num_envs)
+        self.num_envs = check_whole("num_envs", num_envs, 1, MAX_ENVS)
         source, self._camera_fields = make_source(family, arguments, _NAMES)
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode must be None or 'rgb_array' for a vector, got {render_mode!r}")
+        check_flags(include_frame=include_frame, include_base=include_base, trace=trace, copy=copy)
+        if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
+            raise ValueError(
+                f"render_mode must be None or 'rgb_array' for a vector, got {shown(render_mode)}"
+            )
         self._single = BrakingEnv(source, config=config)
         self.render_mode, self.copy = render_mode, copy
         mode = autoreset_mode_of(autoreset_mode)
@@ -103,7 +109,9 @@ class BrakingVectorEnv(VectorEnv):
         neuron = LGMDParams.make(params)
         sensors = None if camera is None else make_sensors(camera, rates.camera, neuron, self.num_envs)
         demands = self._single.brake.max_demands(rates.policy)
-        self.simulation = Simulation(self.num_envs, rates, sensors, demands, at_least_one("threads", threads))
+        self.simulation = Simulation(
+            self.num_envs, rates, sensors, demands, check_whole("threads", threads, 1, MAX_THREADS)
+        )
         self.simulation.brakes[:] = self._single.brake.record(settings["throttle"])
         self.simulation.weights[:] = self._single.weights
         self._queue = EpisodeQueue([source] * self.num_envs, ahead=threads > 1)
@@ -130,7 +138,7 @@ class BrakingVectorEnv(VectorEnv):
         Raises:
             ValueError: If the seeds or the mask have another length, or an option is unknown.
         """
-        options = dict(options or {})
+        options = dict(check_type("options", options, dict, type(None)) or {})
         check_keys("option", options, ("reset_mask",))
         mask = mask_of(options.get("reset_mask"), self.num_envs)
         for index, value in enumerate(seeds_of(seed, self.num_envs)):

@@ -12,7 +12,7 @@ from lgmd_gym.envs import FAMILIES, env_id
 from lgmd_gym.envs.episode_source import RandomLevels
 from lgmd_gym.envs.registration import RANDOM
 from lgmd_gym.envs.traffic.registration import KINDS, find_kind
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_known
 from lgmd_gym.gallery.docstrings import ParsedDocstring, parse_docstring
 from lgmd_gym.rendering.playback import make_target
 from lgmd_gym.rendering.view import LGMDView
@@ -52,8 +52,7 @@ def scenario_cards(names: tuple[str, ...] = ()) -> list[ScenarioCard]:
     for kind in KINDS:
         cards[kind] = ScenarioCard(kind, f"traffic/{kind}", parse_docstring(find_kind(kind)), traffic=True)
     for name in names:
-        if name not in cards:
-            raise unknown_name("scenario family or kind of traffic", name, cards)
+        check_known("scenario family or kind of traffic", name, cards)
     return [card for name, card in cards.items() if not names or name in names]
 
 

@@ -3,6 +3,8 @@
 import math
 from typing import Any, NamedTuple
 
+from lgmd_gym.errors import check_flag, check_number, is_integer, is_number, shown
+
 
 class _Bound(NamedTuple):
     """Range of a field; `exclusive` excludes `low` itself."""
@@ -50,29 +52,25 @@ def checked_field(name: str, default: Any, value: Any) -> Any:
         TypeError: For a value of another type.
     """
     if isinstance(default, str):
-        if value not in _CHOICES[name]:
-            raise ValueError(f"{name} must be one of {', '.join(map(repr, _CHOICES[name]))}, got {value!r}")
+        if not isinstance(value, str) or value not in _CHOICES[name]:
+            raise ValueError(
+                f"{name} must be one of {', '.join(map(repr, _CHOICES[name]))}, got {shown(value)}"
+            )
         return value
     if isinstance(default, bool):
-        if not isinstance(value, bool):
-            raise TypeError(f"{name} must be True or False, got {value!r}")
-        return value
+        return check_flag(name, value)
     if isinstance(default, tuple):
         if not isinstance(value, list | tuple) or len(value) != len(default):
-            raise ValueError(f"{name} must be 3 numbers (centre, nearest, diagonal), got {value!r}")
+            raise ValueError(f"{name} must be 3 numbers (centre, nearest, diagonal), got {shown(value)}")
         return tuple(_checked_number(name, item, float) for item in value)
     return _checked_number(name, value, type(default))
 
 
 def _checked_number(name: str, value: Any, kind: type) -> float:
     """Return a number in range as the given type, int or float."""
-    try:
-        number = float(value)
-        if isinstance(value, bool | str) or (kind is int and number != int(number)):
-            raise TypeError
-    except (TypeError, ValueError, OverflowError):
-        expected = "an integer" if kind is int else "a number"
-        raise TypeError(f"{name} must be {expected}, got {value!r}") from None
+    if not is_number(value) or (kind is int and not is_integer(value) and value != math.floor(value)):
+        raise TypeError(f"{name} must be {'an integer' if kind is int else 'a number'}, got {shown(value)}")
+    number = check_number(name, value)
     if not _BOUNDS[name].contains(number):
         raise ValueError(f"{name} must be {_BOUNDS[name]}, got {number:g}")
     return int(number) if kind is int else number

@@ -5,6 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lgmd_gym.errors import check_finite, check_number, check_size, check_within
+from lgmd_gym.neuron.validation import MAX_SIDE
+
 # Sub-rows and sub-columns per pixel, for anti-aliased edges.
 _OVERSAMPLING = 4
 
@@ -47,7 +50,8 @@ def danger_zone(
         >>> [float(zone[row].max()) for row in (44, 60)]  # above and below the horizon
         [0.0, 1.0]
     """
-    height, width = shape
+    height, width = check_size("shape", shape, 1, MAX_SIDE)
+    check_within("pitch_deg", pitch_deg, -89.0, 89.0, "deg")
     _check_arguments(hfov_deg, width_m, height_m, near_m, far_m, clearance_m)
     focal = width / 2.0 / math.tan(math.radians(hfov_deg) / 2.0)
     step = 1.0 / _OVERSAMPLING
@@ -90,6 +94,10 @@ def _nearest_section(
 def _check_arguments(
     hfov: float, width: float, height: float, near: float, far: float, clearance: float
 ) -> None:
+    for name, value in (("hfov_deg", hfov), ("width_m", width), ("height_m", height), ("near_m", near)):
+        check_finite(name, value)
+    check_finite("clearance_m", clearance)
+    check_number("far_m", far)
     if not 0.0 < hfov < 180.0:
         raise ValueError(f"hfov_deg must be > 0 and < 180, got {hfov:g}")
     for name, value in (("width_m", width), ("height_m", height)):

@@ -71,7 +71,7 @@ class LGMD:
         self.shape = checked_shape(shape)
         self.fps = checked_fps(fps)
         self.params = LGMDParams.make(params)
-        self.num = checked_num(num)
+        self.num = checked_num(num, self.shape)
         self._threads = Threads(checked_threads(threads))
         self._count = 1 if self.num is None else self.num
         self._frames_shape = self.shape if self.num is None else (self.num, *self.shape)

@@ -10,7 +10,7 @@ from typing import Any, Literal, Self, TypeAlias
 
 import tomli_w
 
-from lgmd_gym.errors import check_keys
+from lgmd_gym.errors import check_keys, check_type, shown
 from lgmd_gym.neuron.bounds import checked_field
 
 
@@ -198,7 +198,7 @@ class LGMDParams:
             return spec
         if isinstance(spec, Mapping):
             return cls.from_dict(spec)
-        raise TypeError(f"params must be LGMDParams, a mapping or None, got {spec!r}")
+        raise TypeError(f"params must be LGMDParams, a mapping or None, got {shown(spec)}")
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -222,9 +222,12 @@ class LGMDParams:
             ValueError: For a file that is not TOML, an unknown key or a value out of range.
         """
         try:
-            values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-        except tomllib.TOMLDecodeError as error:
-            raise ValueError(f"{path} must be a TOML file: {error}") from error
+            text = Path(check_type("path", path, str, Path)).read_text(encoding="utf-8")
+            values = tomllib.loads(text)
+        except OSError as error:
+            raise ValueError(f"{shown(str(path))} cannot be read: {error.strerror}") from None
+        except (tomllib.TOMLDecodeError, ValueError) as error:
+            raise ValueError(f"{shown(str(path))} must be a TOML file: {error}") from None
         return cls.from_dict(values)
 
     def to_toml(self, path: str | Path) -> None:

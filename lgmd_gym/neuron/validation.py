@@ -5,48 +5,58 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lgmd_gym.errors import check_finite, check_size, check_whole, check_within, is_integer, shown
+
+MAX_PIXELS = 2**31  # of all neurons, bounds the memory
+MAX_SIDE = 16384  # [px]
+MAX_THREADS = 1024
+
 
 def checked_shape(shape: Any) -> tuple[int, int]:
-    """Return (height, width) as integers >= 1."""
-    try:
-        height, width = (int(side) for side in shape)
-    except (TypeError, ValueError):
-        raise ValueError(f"shape must be (height, width) in pixels, got {shape!r}") from None
-    if height < 1 or width < 1:
-        raise ValueError(f"shape must have height and width >= 1, got {(height, width)}")
-    return height, width
+    """Return (height, width) as integers."""
+    return check_size("shape", shape, 1, MAX_SIDE)
 
 
 def checked_fps(fps: Any) -> float:
     """Return the frame rate [Hz] as a finite float > 0."""
-    value = float(fps)
-    if not 0.0 < value < np.inf:
+    value = check_finite("fps", fps)
+    if not value > 0.0:
         raise ValueError(f"fps must be > 0 and finite, got {value:g}")
-    return value
+    return check_within("fps", value, 1e-3, 1e6, "Hz")
 
 
-def checked_num(num: int | None) -> int | None:
+def checked_num(num: int | None, shape: tuple[int, int]) -> int | None:
     """Return the number of neurons, >= 1, or None for a single neuron."""
     if num is None:
         return None
-    if isinstance(num, bool) or int(num) != num:
-        raise TypeError(f"num must be an integer or None, got {num!r}")
+    if not is_integer(num):
+        raise TypeError(f"num must be an integer or None, got {shown(num)}")
     if num < 1:
-        raise ValueError(f"num must be >= 1, got {num}; pass None for a single neuron with scalar outputs")
-    return int(num)
+        raise ValueError(
+            f"num must be >= 1, got {shown(num)}; pass None for a single neuron with scalar outputs"
+        )
+    return check_whole("num", num, 1, MAX_PIXELS // (shape[0] * shape[1]))
 
 
 def checked_threads(threads: int | None) -> int:
-    """Return the number of threads, >= 1."""
-    count = 1 if threads is None else int(threads)
-    if count < 1:
-        raise ValueError(f"threads must be >= 1, got {threads}; pass None for the calling thread alone")
-    return count
+    """Return the number of threads, >= 1; None is the calling thread alone."""
+    return 1 if threads is None else check_whole("threads", threads, 1, MAX_THREADS)
+
+
+def checked_array(name: str, values: Any) -> NDArray[Any]:
+    """Return an array of bools or real numbers."""
+    try:
+        array = np.asarray(values)
+    except ValueError:  # of nested lists of different lengths
+        raise ValueError(f"{name} must be an array of numbers, got {shown(values)}") from None
+    if array.dtype.kind not in "buif":
+        raise TypeError(f"{name} must be an array of numbers, got {shown(values)}")
+    return array
 
 
 def checked_mask(mask: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
     """Return pixel weights as float32 of `shape`, in [0, 1] and not all 0."""
-    weight = np.array(mask, np.float32)
+    weight = checked_array("mask", mask).astype(np.float32)
     if weight.shape != shape:
         raise ValueError(
             f"mask must have the shape {shape} (height, width) of the frames, got {weight.shape}"
@@ -70,10 +80,12 @@ def checked_region(
     if mask is not None and roi is not None:
         raise ValueError("mask and roi must not both be given; set the mask to 0 outside the region instead")
     if roi is not None:
-        top, left, height, width = (int(side) for side in roi)
+        if not isinstance(roi, list | tuple) or len(roi) != 4 or not all(map(is_integer, roi)):
+            raise ValueError(f"roi must be 4 integers (top, left, height, width), got {shown(roi)}")
+        top, left, height, width = roi
         if min(top, left) < 0 or min(height, width) < 1 or top + height > shape[0] or left + width > shape[1]:
             raise ValueError(
-                f"roi (top, left, height, width) must be inside frames of shape {shape}, got {tuple(roi)}"
+                f"roi (top, left, height, width) must be inside frames of shape {shape}, got {shown(roi)}"
             )
         mask = np.zeros(shape, np.float32)
         mask[top : top + height, left : left + width] = 1.0
@@ -88,7 +100,7 @@ def checked_region(
 
 def checked_selection(name: str, selection: ArrayLike, count: int) -> NDArray[np.bool_]:
     """Return a selection of neurons as a contiguous bool array of shape (count,)."""
-    selected = np.asarray(selection)
+    selected = checked_array(name, selection)
     if selected.dtype != np.bool_ or selected.shape != (count,):
         given = f"dtype {selected.dtype} and shape {selected.shape}"
         raise ValueError(f"{name} must be a bool array of shape ({count},), got {given}")
@@ -105,7 +117,7 @@ def checked_frames(
         shape: Expected shape, (H, W) or (N, H, W).
         active: Selection of the frames to check, shape (N,); None for all.
     """
-    frames = np.asarray(frames)
+    frames = checked_array("frame", frames)
     if frames.shape != shape:
         raise ValueError(_shape_message(frames.shape, shape))
     if frames.dtype == np.uint8:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
+from rich.text import Text
 
 from lgmd_gym.paper.experiments import (
     CONTACT,
@@ -253,7 +254,7 @@ def claim_table(rows: Sequence[ClaimResult]) -> Table:
     for name, ratio in (("claim", 5), ("measured", 9), ("result", 2), ("depends on", 5)):
         table.add_column(name, ratio=ratio)
     for row in rows:
-        table.add_row(row.claim, row.measured, f"[{colours[row.result]}]{row.result}[/]", row.factor)
+        table.add_row(row.claim, row.measured, Text(row.result, colours[row.result]), row.factor)
     return table
 
 

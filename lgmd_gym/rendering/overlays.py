@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.camera import EgoCamera
-from lgmd_gym.errors import check_keys
+from lgmd_gym.errors import check_items, check_keys
 
 OVERLAYS = ("zone", "targets")
 ZONE_WIDTH = 3.5  # [m], as by default in `lgmd_gym.neuron.danger_zone`
@@ -18,7 +18,7 @@ DEFAULT_HEIGHT = 1.5  # [m], of bodies without a height
 
 def checked_overlays(names: Iterable[str]) -> tuple[str, ...]:
     """Return names of overlays as a tuple; raise ValueError for an unknown name."""
-    names = tuple(names)
+    names = check_items("overlays", names, str, "names")
     check_keys("overlay", names, OVERLAYS)
     return names
 

@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_known, unknown_name
 from lgmd_gym.rendering.overlays import OVERLAYS, checked_overlays
 from lgmd_gym.rendering.state import DisplayState
 from lgmd_gym.wrappers.observation import LGMDObservation
@@ -60,8 +60,7 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
             self, render_mode=render_mode, title=title, overlays=list(overlays), camera=camera
         )
         gym.Wrapper.__init__(self, env)
-        if render_mode not in MODES:
-            raise unknown_name("render mode", render_mode, MODES)
+        check_known("render mode", render_mode, MODES)
         if env.render_mode == "human":
             raise ValueError(
                 "env must not have render_mode 'human', which opens a second window; pass "

@@ -8,6 +8,8 @@ from lgmd_gym.camera.objects import View
 from lgmd_gym.camera.params import checked_number
 from lgmd_gym.camera.road_pool import RoadKey, road_key
 from lgmd_gym.camera.scene_table import view_of
+from lgmd_gym.camera.spec import is_top_view
+from lgmd_gym.errors import check_keys
 
 _MAX_KNOWN = 256  # distinct fields that are remembered
 
@@ -23,7 +25,7 @@ def make_cameras(camera: CameraSpec) -> dict[str, Camera]:
     Raises:
         ValueError: For an unknown preset, an empty sequence, or a repeated name.
     """
-    several = isinstance(camera, Sequence) and not isinstance(camera, str)
+    several = isinstance(camera, Sequence) and not isinstance(camera, str | bytes)
     items: Sequence[CameraItem] = camera if several else [camera]  # type: ignore[assignment, list-item]
     if not items:
         raise ValueError(f"camera must have at least one element, got {camera!r}; use camera='fovea'")
@@ -37,9 +39,10 @@ def make_cameras(camera: CameraSpec) -> dict[str, Camera]:
 
 
 def _make_camera(item: CameraItem) -> tuple[str, Camera]:
-    if item == BIRDSEYE:
-        return BIRDSEYE, BirdsEye()
-    if isinstance(item, Mapping) and item.get("name") == BIRDSEYE:
+    if is_top_view(item):
+        if not isinstance(item, Mapping):
+            return BIRDSEYE, BirdsEye()
+        check_keys("field of the top view", item, ("name", "shape", "scaling"))
         return BIRDSEYE, BirdsEye(**{key: value for key, value in item.items() if key != "name"})
     params = CameraParams.make(item)
     return params.name, params

@@ -3,6 +3,8 @@
 import warnings
 from math import ceil
 
+from lgmd_gym.errors import check_finite, shown
+
 DEFAULT_FPS = 30.0  # [Hz]
 MIN_FPS = 15.0  # [Hz], for defaults; lower rates bound the spike frequency too much (5 spikes/s at 5 Hz)
 
@@ -36,8 +38,10 @@ def camera_rate(fps: float | None, simulation_frequency: float) -> float:
 
 
 def _checked_rate(fps: float, simulation_frequency: float) -> float:
-    if not fps > 0.0:
-        raise ValueError(f"fps must be > 0, got {fps!r}")
+    if not check_finite("fps", fps) > 0.0:
+        raise ValueError(f"fps must be > 0, got {shown(fps)}")
+    if fps > simulation_frequency:
+        raise ValueError(f"fps must be <= simulation_frequency {simulation_frequency:g} Hz, got {shown(fps)}")
     ratio = simulation_frequency / fps
     if abs(ratio - round(ratio)) > 1e-9:
         raise ValueError(

@@ -5,6 +5,8 @@ from typing import Any
 
 import gymnasium as gym
 
+from lgmd_gym.errors import shown
+
 
 class HookedStep:
     """Wrapper of `Road.step` that calls a bound method afterwards; it supports deep copies of the road."""
@@ -32,6 +34,6 @@ def on_road_step(env: gym.Env, callback: Callable[[], None]) -> None:
 
 def check_highway_env(env: gym.Env) -> None:
     """Raise ValueError for an environment that is not a highway-env environment."""
-    base: Any = env.unwrapped
+    base: Any = getattr(env, "unwrapped", None)
     if not hasattr(base, "road") or "simulation_frequency" not in getattr(base, "config", {}):
-        raise ValueError(f"env must be a highway-env environment, got {base!r}")
+        raise ValueError(f"env must be a highway-env environment, got {shown(env if base is None else base)}")

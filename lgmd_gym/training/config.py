@@ -2,17 +2,25 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 
 from lgmd_gym.agents import HOLD, make_agent
-from lgmd_gym.agents.options import whole
 from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
 from lgmd_gym.camera import CameraSpec
-from lgmd_gym.envs.dynamics.units import check_within
-from lgmd_gym.errors import check_keys, unknown_name
+from lgmd_gym.camera.spec import check_camera
+from lgmd_gym.errors import (
+    check_items,
+    check_keys,
+    check_known,
+    check_text,
+    check_type,
+    check_whole,
+    check_within,
+)
 from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
 
@@ -70,12 +78,18 @@ class TrainConfig:
     traffic_episodes: int = 0
 
     def __post_init__(self) -> None:
-        if self.algo not in ALGORITHMS:
-            raise unknown_name("algorithm", self.algo, ALGORITHMS)
+        check_known("algorithm", self.algo, ALGORITHMS)
         for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes", "traffic_episodes", "seed"):
             low = 0 if name in ("traffic_episodes", "seed") else 1
-            object.__setattr__(self, name, whole(name, getattr(self, name), low))
-        for demand in self.demands:
+            object.__setattr__(self, name, check_whole(name, getattr(self, name), low))
+        check_text("env_id", self.env_id)
+        check_text("policy", self.policy)
+        check_camera(self.camera)
+        check_type("env_kwargs", self.env_kwargs, dict)
+        check_type("algo_kwargs", self.algo_kwargs, dict)
+        check_type("features", self.features, FeatureConfig)
+        check_type("recordings", self.recordings, str, type(None))
+        for demand in check_items("demands", self.demands, Real, "numbers"):
             check_within("demands", demand, -1.0, 1.0)
         if self.algo == "dqn" and not self.demands:
             raise ValueError("dqn requires discrete demands; use for example --demands 0 -1")

@@ -4,8 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from lgmd_gym.envs.dynamics.units import check_finite
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_finite, check_known, unknown_name
 
 OFFLINE = "offline"  # the algorithm of `lgmd_gym.training.offline.learner`
 ALGORITHMS = ("ppo", "sac", "dqn", OFFLINE)
@@ -23,8 +22,7 @@ def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> dict[s
     Raises:
         ValueError: For an unknown algorithm, a file that cannot be read, or one without a matching entry.
     """
-    if algo not in ALGORITHMS:
-        raise unknown_name("algorithm", algo, ALGORITHMS)
+    check_known("algorithm", algo, ALGORITHMS)
     path = file or Path(str(files("lgmd_gym.training") / f"{algo}.yml"))
     entries = _read_yaml(path)
     entry = entries.get(env_id, entries.get("default"))

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import lgmd_gym
-from lgmd_gym.agents.options import whole
 from lgmd_gym.agents.policies.policy import write_card
-from lgmd_gym.errors import check_keys
+from lgmd_gym.errors import check_keys, check_whole
 from lgmd_gym.system.files import complete_file, new_folder
 from lgmd_gym.system.lock import FolderLock
 from lgmd_gym.training.config import TrainConfig
@@ -51,7 +50,7 @@ def train(config: TrainConfig, folder: Path, *, progress: bool = False, jobs: in
     Raises:
         ValueError: If the configuration is invalid or the folder exists; nothing is written in that case.
     """
-    whole("jobs", jobs, 1)
+    check_whole("jobs", jobs, 1)
     check_config(config)
     new_folder(folder, "training folder")
     with complete_file(folder / CONFIG_FILE) as part:
@@ -68,7 +67,7 @@ def resume(folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
     Raises:
         ValueError: If the folder contains no training, or another process trains in it.
     """
-    whole("jobs", jobs, 1)
+    check_whole("jobs", jobs, 1)
     try:
         values = json.loads((folder / CONFIG_FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError):

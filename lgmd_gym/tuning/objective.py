@@ -24,8 +24,11 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.task import Task, run_task
 from lgmd_gym.benchmark.worker_processes import run_parallel
+from lgmd_gym.envs.scenarios.distribution import LEVELS
+from lgmd_gym.errors import check_known, check_whole
 
 FIRST_SEED = {"train": 1000, "validation": 2000}  # of the false-reaction suite; reports use seeds from 0
+MAX_SEEDS = 1000  # the seeds of the splits do not overlap
 MAX_CACHED = 4  # sensor configurations whose recordings are kept
 TEXTURE_RANGE = (0.5, 1.6)  # asphalt contrast, relative to the natural one
 AGENT_SENSORS = SensorConfig()  # each agent's own cameras
@@ -122,7 +125,10 @@ class Objective:
     """
 
     def __init__(self, split: str, levels: int, seeds: int, jobs: int = 1) -> None:
-        self.jobs = jobs
+        check_known("split", split, FIRST_SEED)
+        self.jobs = check_whole("jobs", jobs, 1)
+        check_whole("levels", levels, 0, LEVELS)
+        check_whole("seeds", seeds, 0, MAX_SEEDS)
         self.episodes = [(level_case(split, split, number), number) for number in range(levels)]
         cases = find_suite("false-reaction").cases
         first = FIRST_SEED[split]

@@ -7,7 +7,7 @@ from typing import Any
 from lgmd_gym.agents import AGENTS, Rule, make_agent
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.camera import PRESETS
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_flag, check_items, check_known
 from lgmd_gym.neuron import LGMDParams
 
 CAMERA_KEY, NEURON_PREFIX = "camera", "neuron."  # keys of a proposal in addition to the rule's parameters
@@ -41,17 +41,16 @@ class SearchSpace:
 
     def __post_init__(self) -> None:
         rule_class(self.agent)
-        for camera in self.cameras:
-            if camera not in PRESETS:
-                raise unknown_name("camera", camera, PRESETS)
+        check_flag("camera_geometry", self.camera_geometry)
+        for camera in check_items("cameras", self.cameras, str, "names"):
+            check_known("camera", camera, PRESETS)
         if self.cameras and isinstance(make_agent(self.agent).camera, list):
             raise ValueError(
                 f"{self.agent} has several cameras of its own, got cameras {list(self.cameras)}; "
                 "use camera_geometry instead"
             )
-        for name in self.neuron:
-            if name not in neuron_defaults():
-                raise unknown_name("neuron parameter", name, neuron_defaults())
+        for name in check_items("neuron", self.neuron, str, "names"):
+            check_known("neuron parameter", name, neuron_defaults())
 
     @property
     def label(self) -> str:
@@ -76,7 +75,7 @@ class SearchSpace:
             proposal[item.name] = suggest(item.name, low, high)
         if self.cameras:
             proposal[CAMERA_KEY] = trial.suggest_categorical(CAMERA_KEY, self.cameras)
-        for name in self.neuron:
+        for name in check_items("neuron", self.neuron, str, "names"):
             key, default = NEURON_PREFIX + name, neuron_defaults()[name]
             low, high = default / NEURON_FACTOR, default * NEURON_FACTOR
             proposal[key] = trial.suggest_float(key, low, high, log=True)
@@ -133,8 +132,7 @@ def rule_class(agent: str) -> type[Rule]:
         ValueError: If there is no rule with this name.
     """
     rules = {name: cls for name, cls in AGENTS.items() if issubclass(cls, Rule)}
-    if agent not in rules:
-        raise unknown_name("rule", agent, rules)
+    check_known("rule", agent, rules)
     return rules[agent]
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgmd_gym.errors import check_finite, check_size, check_type, shown
 from lgmd_gym.video.probe import open_video, probe
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from av.video.stream import VideoStream
 
 CLIP_SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif", ".webm", ".m4v", ".mpg", ".ts")
+MAX_SIZE = 16384  # [px]
 MIN_SIZE = 3  # width of the neuron's neighbourhood [px]
 _MOST_MISSING = 2.0  # a file that ends up to this many frames early counts as complete
 # Rotation in the file's metadata [deg, counterclockwise] to the filters that undo it.
@@ -56,10 +58,10 @@ class VideoReader:
     def __init__(
         self, path: str | Path, fps: float | None = None, size: tuple[int, int] | None = None
     ) -> None:
-        if fps is not None and not 0.0 < fps <= 1000.0:
-            raise ValueError(f"fps must be in (0, 1000], got {fps:g}")
-        if size is not None and min(size) < MIN_SIZE:
-            raise ValueError(f"size must be (width, height), each at least {MIN_SIZE} px, got {size}")
+        if fps is not None and not 0.0 < check_finite("fps", fps) <= 1000.0:
+            raise ValueError(f"fps must be in (0, 1000], got {shown(fps)}")
+        if size is not None:
+            check_size("size", size, MIN_SIZE, MAX_SIZE, "(width, height)")
         self.info = probe(path)
         self.fps = fps or self.info.fps
         self.total = max(round(self.info.duration * self.fps), 1)
@@ -160,6 +162,8 @@ def luma(picture: np.ndarray) -> np.ndarray:
         >>> luma(np.full((1, 1, 3), 200, np.uint8))
         array([[200]], dtype=uint8)
     """
+    if getattr(picture, "dtype", None) != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3:
+        raise ValueError(f"picture must be uint8 of shape (height, width, 3), got {shown(picture)}")
     grey = np.empty(picture.shape[:2], np.uint8)
     _luma_kernel()(np.ascontiguousarray(picture).reshape(-1), grey.reshape(-1))
     return grey
@@ -171,8 +175,10 @@ def find_clips(paths: Iterable[str | Path]) -> list[Path]:
     Raises:
         ValueError: For a path that does not exist, or a folder without a video file.
     """
+    if not isinstance(paths, list | tuple):
+        raise TypeError(f"paths must be a list, got {shown(paths)}")
     found: list[Path] = []
-    for path in map(Path, paths):
+    for path in (Path(check_type("path", path, str, Path)) for path in paths):
         if path.is_dir():
             clips = sorted(file for file in path.iterdir() if file.suffix.lower() in CLIP_SUFFIXES)
             if not clips:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.errors import check_type, check_within, shown
 from lgmd_gym.system.files import check_new_file
 
 SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif")
@@ -26,10 +27,11 @@ class VideoWriter:
     """
 
     def __init__(self, path: str | Path, fps: float, quality: float = 7.0) -> None:
-        self.path = Path(path)
-        self.fps, self.quality = fps, quality
+        self.path = Path(check_type("path", path, str, Path))
+        self.fps = check_within("fps", fps, 1e-3, 1000.0, "Hz")
+        self.quality = check_within("quality", quality, 0.0, 10.0)
         if self.path.suffix.lower() not in SUFFIXES:
-            raise ValueError(f"video must have a suffix among {', '.join(SUFFIXES)}, got {str(path)!r}")
+            raise ValueError(f"video must have a suffix among {', '.join(SUFFIXES)}, got {shown(str(path))}")
         if not self.path.parent.is_dir():
             raise ValueError(f"folder {str(self.path.parent)!r} of the video does not exist; create it first")
         check_new_file(self.path, "video")

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from lgmd_gym.camera import CameraParams, CameraSpec
+from lgmd_gym.errors import check_flags
 from lgmd_gym.neuron import LGMDParams, NeuronSpec, Response
 from lgmd_gym.sensing.frame_rate import camera_rate
 from lgmd_gym.sensing.road_hook import check_highway_env, on_road_step
@@ -97,17 +98,9 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         include_base: bool = False,
         trace: bool = False,
     ) -> None:
-        RecordConstructorArgs.__init__(
-            self,
-            camera=_to_json(camera),
-            params=_to_json(params),
-            fps=fps,
-            include_frame=include_frame,
-            include_base=include_base,
-            trace=trace,
-        )
-        gym.Wrapper.__init__(self, env)
         check_highway_env(env)
+        gym.Wrapper.__init__(self, env)
+        check_flags(include_frame=include_frame, include_base=include_base, trace=trace)
         self.params = LGMDParams.make(params)
         self.camera = camera
         self.include_frame, self.include_base, self.trace = include_frame, include_base, trace
@@ -117,6 +110,16 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self._substeps, self._heading = 0, 0.0
         self.rendering_paused = False
         self._build_sensors()
+        # After the checks of the arguments, because JSON has no other values.
+        RecordConstructorArgs.__init__(
+            self,
+            camera=_to_json(camera),
+            params=_to_json(params),
+            fps=fps,
+            include_frame=include_frame,
+            include_base=include_base,
+            trace=trace,
+        )
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -228,4 +231,9 @@ def _to_json(value: Any) -> Any:
         value = value.to_dict()
     elif isinstance(value, list | tuple):
         value = [_to_json(item) for item in cast(list[Any], value)]
-    return json.loads(json.dumps(value))
+    return json.loads(json.dumps(value, default=_number_to_json))
+
+
+def _number_to_json(value: Any) -> Any:
+    """Return a number or path that JSON does not know."""
+    return value.item() if isinstance(value, np.generic) else str(value)

@@ -8,7 +8,9 @@ from gymnasium.vector import SyncVectorEnv, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 
 from lgmd_gym.camera import CameraSpec
+from lgmd_gym.errors import check_flags
 from lgmd_gym.neuron import LGMDParams, NeuronSpec, Response
+from lgmd_gym.neuron.validation import checked_threads
 from lgmd_gym.sensing.frame_rate import camera_rate
 from lgmd_gym.sensing.frame_recorder import FrameRecorder
 from lgmd_gym.sensing.road_hook import check_highway_env
@@ -58,13 +60,14 @@ class LGMDObservation(VectorWrapper):
         include_base: bool = False,
         threads: int | None = None,
     ) -> None:
-        super().__init__(env)
         simulation_frequency = _check_envs(env)
+        super().__init__(env)
+        check_flags(include_frame=include_frame, include_base=include_base)
         assert isinstance(env, SyncVectorEnv)
         self.params = LGMDParams.make(params)
         self.include_frame, self.include_base = include_frame, include_base
         self.fps = camera_rate(fps, simulation_frequency)
-        self.sensors = SensorArray(camera, self.fps, self.params, self.num_envs, threads)
+        self.sensors = SensorArray(camera, self.fps, self.params, self.num_envs, checked_threads(threads))
         self._info_keys = signal_keys(self.sensors.names)
         self._pending = np.zeros(self.num_envs, np.bool_)
         stride = round(simulation_frequency / self.fps)

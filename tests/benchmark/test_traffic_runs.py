@@ -63,7 +63,7 @@ def test_summary_file_has_one_line_per_agent_and_kind(summary_rows, tmp_path):
 
 
 def test_table_shows_rates_with_intervals(summary_rows):
-    console = Console(width=120, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
+    console = Console(width=120, markup=False, record=True, file=open(os.devnull, "w"))  # noqa: SIM115
     console.print(traffic_table(summary_rows, ["a", "b"], "title"))
     text = console.export_text()
     assert "0.3 [0.0–1.9]" in text

@@ -11,7 +11,7 @@ from lgmd_gym.benchmark.stored_run import read_run
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import without_fcw_driver
 from lgmd_gym.benchmark.task import NO_BRAKE
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_known
 
 
 class Quantity(NamedTuple):
@@ -157,8 +157,7 @@ def _agent_pairs(
         if len(agents) != 2:
             raise ValueError(f"agents must be two, one of A and one of B, got {len(agents)}")
         for agent, known in zip(agents, (agents_a, agents_b), strict=True):
-            if agent not in known:
-                raise unknown_name("agent of the run", agent, known)
+            check_known("agent of the run", agent, known)
         return [(agents[0], agents[1])]
     if within:
         pairs = list(combinations([agent for agent in agents_a if agent != NO_BRAKE], 2))

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from rich.box import SIMPLE_HEAD
-from rich.markup import escape
 from rich.table import Table
 
 from lgmd_gym.benchmark.analysis.compare import Comparison, Difference
@@ -27,7 +26,7 @@ def comparison_table(comparison: Comparison) -> Table:
     if comparison.unpaired:
         caption += f"; {comparison.unpaired} episodes without a pair (missing, failed, or threat to one only)"
     title = f"A = {comparison.name_a}   B = {comparison.name_b}   {comparison.pairs} pairs"
-    table = Table(title=f"{title} {comparison.condition}".rstrip(), caption=escape(caption), box=SIMPLE_HEAD)
+    table = Table(title=f"{title} {comparison.condition}".rstrip(), caption=caption, box=SIMPLE_HEAD)
     table.add_column("quantity")
     for heading in ("A", "B", "B − A", "higher / lower of n"):
         table.add_column(heading, justify="right")
@@ -40,7 +39,7 @@ def comparison_table(comparison: Comparison) -> Table:
             change_text(item),
             pairs,
         )
-        table.add_row(*map(escape, cells))
+        table.add_row(*cells)
     return table
 
 
@@ -58,7 +57,7 @@ def change_text(item: Difference) -> str:
 def arm_table(results: Sequence[ArmResult], title: str) -> Table:
     """Return a table with one line per arm; all arms have the same condition."""
     keys = [key for key in SHARE_HEADINGS if key in results[0].shares]
-    table = Table(title=title, caption=escape(ARM_CAPTION), box=SIMPLE_HEAD)
+    table = Table(title=title, caption=ARM_CAPTION, box=SIMPLE_HEAD)
     table.add_column("arm", min_width=15, overflow="fold")
     for heading in ("training\nruns", "return", "difference\nto the first"):
         table.add_column(heading, justify="right")
@@ -73,7 +72,7 @@ def arm_table(results: Sequence[ArmResult], title: str) -> Table:
         difference = "–" if result.difference is None else _interval_text(result.difference, "+.1f")
         shares = (_interval_text(result.shares[key], ".0f", 100.0) for key in keys)
         cells = (result.name, str(result.trainings), mean_return, difference, *shares)
-        table.add_row(*map(escape, cells))
+        table.add_row(*cells)
     return table
 
 

@@ -7,7 +7,7 @@ from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.traffic.summary import TrafficSummary, traffic_summaries
 
 CAPTION = (
-    "false: without it, no contact and no hard braking by the driver within 10 s; \\[exact Poisson 95 % "
+    "false: without it, no contact and no hard braking by the driver within 10 s; [exact Poisson 95 % "
     "interval]; premature: emergency more than 4 s away; contacts (of these rear-ended)"
 )
 HEADINGS = (

@@ -18,8 +18,7 @@ import torch
 from torch.nn.functional import logsigmoid
 
 from lgmd_gym.agents.base import HOLD
-from lgmd_gym.agents.options import positive, whole
-from lgmd_gym.envs.dynamics.units import check_within
+from lgmd_gym.errors import check_positive, check_whole, check_within
 from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset
 
 if TYPE_CHECKING:
@@ -85,11 +84,11 @@ class OfflineLearner:
         logit_decay: float = 0.0,
         policy_kwargs: dict[str, Any] | None = None,
     ) -> None:
-        self.n_epochs = whole("n_epochs", n_epochs, 1)
-        self.batch_size = whole("batch_size", batch_size, 1)
-        self.learning_rate = positive("learning_rate", learning_rate)
+        self.n_epochs = check_whole("n_epochs", n_epochs, 1)
+        self.batch_size = check_whole("batch_size", batch_size, 1)
+        self.learning_rate = check_positive("learning_rate", learning_rate)
         self.weight_decay = check_within("weight_decay", weight_decay, 0.0, 1.0)
-        self.false_cost = positive("false_cost", false_cost)
+        self.false_cost = check_positive("false_cost", false_cost)
         self.logit_decay = check_within("logit_decay", logit_decay, 0.0, 1.0)
         check_within("initial_brake_probability", initial_brake_probability, 1e-6, 0.999)
         self._seed = seed

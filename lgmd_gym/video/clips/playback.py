@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import check_known
 from lgmd_gym.neuron import LGMD, LGMDParams, Response
 from lgmd_gym.video import VideoReader, luma
 from lgmd_gym.video.clips.detection import SILENCE_S
@@ -80,8 +80,7 @@ def named_config(name: str) -> PlaybackConfig:
     Raises:
         ValueError: For an unknown name, with the nearest known one.
     """
-    if name not in PLAYBACK_CONFIGS:
-        raise unknown_name("configuration", name, PLAYBACK_CONFIGS)
+    check_known("configuration", name, PLAYBACK_CONFIGS)
     return PLAYBACK_CONFIGS[name]
 
 
