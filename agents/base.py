@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgmd_gym.agents.batch import BatchAgent
+from lgmd_gym.errors import check_within
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -18,7 +19,7 @@ FPS = 30.0  # frame and decision rate for which all agents are tuned [Hz]
 
 def to_action(demand: float) -> np.ndarray:
     """Return a longitudinal demand in [-1, 1] as an action of `ContinuousDemand`: float32, shape (1,)."""
-    return np.array([demand], dtype=np.float32)
+    return np.array([check_within("demand", demand, -1.0, 1.0)], dtype=np.float32)
 
 
 class Agent:

@@ -8,6 +8,7 @@ import numpy as np
 
 from lgmd_gym.agents.base import LatchingAgent
 from lgmd_gym.agents.params import RuleParams
+from lgmd_gym.errors import check_type
 
 
 class SensorReading(NamedTuple):
@@ -102,7 +103,11 @@ class Rule(LatchingAgent):
     latching: ClassVar[bool] = True
 
     def __init__(self, params: RuleParams | None = None, **options: Any) -> None:
-        self.params: Any = self.Params.from_options(self.name, options) if params is None else params
+        if params is None:
+            params = self.Params.from_options(self.name, options)
+        elif options:
+            raise ValueError(f"params and options exclude each other, got params and {', '.join(options)}")
+        self.params: Any = check_type("params", params, self.Params)
         self.reset()
 
     @classmethod

@@ -3,12 +3,14 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, fields
+from numbers import Real
 from typing import Any, ClassVar
 
+import numpy as np
 from highway_env.envs.common.abstract import AbstractEnv
 
 from lgmd_gym.envs.dynamics.brake import BrakeParams
-from lgmd_gym.errors import (
+from lgmd_gym.errors import (, check_items, check_mapping, shown
     check_finite,
     check_flag,
     check_keys,
@@ -32,6 +34,7 @@ _WHOLE = {
     "lanes_count": (1, 100),
     "vehicles_count": (0, 1000),
 }
+_PAIRS = ("centering_position",)
 
 
 class EgoBrakeEnv(AbstractEnv):
@@ -67,7 +70,8 @@ class EgoBrakeEnv(AbstractEnv):
         Raises:
             ValueError: If a configuration key is unknown or a value is out of range.
         """
-        check_type("options", options, dict, type(None))
+        check_mapping("options", options)
+        seed = None if seed is None else check_whole("seed", seed, 0)
         with self._unchanged_if_refused():
             return super().reset(seed=seed, options=options)
 
@@ -77,10 +81,10 @@ class EgoBrakeEnv(AbstractEnv):
         Raises:
             ValueError: If a key is unknown or a value is out of range.
         """
-        config = dict(check_type("config", config, dict, type(None)) or {})
+        config = check_mapping("config", config)
         check_keys("config key", config, self.config)
         for key, value in config.items():
-            _check_like(key, value, self.config[key])
+            config[key] = _checked_like(key, value, self.config[key])
         with self._unchanged_if_refused():
             super().configure(config)
             self.brake = BrakeParams(**{field.name: self.config[field.name] for field in fields(BrakeParams)})
@@ -107,17 +111,25 @@ class EgoBrakeEnv(AbstractEnv):
             raise
 
 
-def _check_like(key: str, value: Any, present: Any) -> None:
-    """Raise ValueError unless a value of the configuration is of the kind of the present one."""
+def _checked_like(key: str, value: Any, present: Any) -> Any:
+    """Return a value of the configuration; raise ValueError unless it is of the kind of the present one."""
     if key in _WHOLE:
         check_whole(key, value, *_WHOLE[key])
     elif key in _NUMBERS:
         check_within(key, value, *_NUMBERS[key])
-    elif isinstance(present, bool):
-        check_flag(key, value)
+    elif isinstance(present, bool | str | dict):
+        _check_kind(key, value, present)
     elif is_number(present):
         check_finite(key, value)
-    elif isinstance(present, dict):
-        check_type(key, value, dict)
+    elif key in _PAIRS and len(check_items(key, value, Real, "two numbers")) != 2:
+        raise ValueError(f"{key} must be a list of two numbers, got {shown(value)}")
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _check_kind(key: str, value: Any, present: bool | str | dict[str, Any]) -> None:
+    if isinstance(present, bool):
+        check_flag(key, value)
     elif isinstance(present, str):
         check_text(key, value)
+    else:
+        check_type(key, value, dict)

@@ -24,7 +24,7 @@ from lgmd_gym.envs.simulation.road import BrakingRoad
 from lgmd_gym.envs.simulation.vehicles import EgoCar
 from lgmd_gym.envs.simulation.world import World
 from lgmd_gym.envs.spaces import EgoState, make_action
-from lgmd_gym.errors import check_keys, check_type, shown
+from lgmd_gym.errors import check_keys, check_mapping, shown
 
 _SELECTED = np.ones(1, np.bool_)
 
@@ -147,8 +147,8 @@ class BrakingEnv(EgoBrakeEnv):
         Raises:
             ValueError: If a key is unknown or a value is out of range.
         """
-        config = dict(check_type("config", config, dict, type(None)) or {})
-        reward = check_type("reward", config.pop("reward", {}), dict)
+        config = check_mapping("config", config)
+        reward = check_mapping("reward", config.pop("reward", None))
         check_keys("key of config['reward']", reward, self.config["reward"])
         reward = {**self.config["reward"], **reward}
         weights = RewardParams(**reward)

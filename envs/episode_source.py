@@ -85,7 +85,7 @@ class RandomLevels:
         num_levels: int = 0,
         conditions: Sequence[str] = tuple(CONDITIONS),
     ) -> None:
-        check_levels(split, start_level, num_levels, conditions)
+        start_level, num_levels = check_levels(split, start_level, num_levels, conditions)
         self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
         self.num_levels = num_levels or LEVELS - start_level
         self.first = draw_scenario(level_generator(split, start_level))

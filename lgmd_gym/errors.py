@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from math import inf, isinf, isnan
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -92,11 +93,30 @@ def check_text(name: str, value: Any) -> str:
 
 
 def check_type(name: str, value: Any, *types: type) -> Any:
-    """Return `value` if it is an instance of one of the types, or raise TypeError."""
+    """Return `value` if it is an instance of one of the types, or raise ValueError.
+
+    Not a TypeError, which `gym.make` repeats in several lines with all arguments.
+    """
     if not isinstance(value, types):
         expected = " or ".join(item.__name__ for item in types)
-        raise TypeError(f"{name} must be {expected}, got {shown(value)}")
+        raise ValueError(f"{name} must be {expected}, got {shown(value)}")
     return value
+
+
+def check_mapping(name: str, value: Any) -> dict[str, Any]:
+    """Return a copy of a dict, {} for None, or raise ValueError."""
+    return {} if value is None else dict(check_type(name, value, dict))
+
+
+def check_path(name: str, value: Any) -> Path:
+    """Return a path, or raise ValueError if the value is no path, or one that no file can have."""
+    path = Path(check_type(name, value, str, Path))
+    try:
+        path.exists()
+    except (OSError, ValueError) as error:  # too long, or with a null character
+        reason = getattr(error, "strerror", None) or error
+        raise ValueError(f"{name} {shown(str(path))} is not a path: {reason}") from None
+    return path
 
 
 def check_items(name: str, values: Any, types: type, kind: str = "") -> tuple[Any, ...]:

@@ -33,6 +33,8 @@ CLIP = 5.0  # limit of scaled values
 FRAME = "frame"  # not scaled; reduced by `shrink`
 INPUTS = (*SCALES, *DERIVED_INPUTS, *ZONE_INPUTS, FRAME)
 
+MAX_HISTORY = 1000  # decisions; also the limit of `repeat` and `shrink`
+
 
 @dataclass(frozen=True)
 class FeatureConfig:
@@ -64,7 +66,7 @@ class FeatureConfig:
         for name in self.inputs:
             check_known("policy input", name, INPUTS)
         for name in ("history", "repeat", "shrink"):
-            object.__setattr__(self, name, check_whole(name, getattr(self, name), 1))
+            object.__setattr__(self, name, check_whole(name, getattr(self, name), 1, MAX_HISTORY))
         object.__setattr__(self, "latch", check_flag("latch", self.latch))
         object.__setattr__(self, "reward_scale", check_positive("reward_scale", self.reward_scale))
 

@@ -15,7 +15,7 @@ from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.batch import BatchAgent
 from lgmd_gym.agents.policies.batch import PolicyBatch
 from lgmd_gym.agents.policies.features import FRAME, FeatureConfig, FeatureHistory
-from lgmd_gym.errors import check_text, shown, unknown_name
+from lgmd_gym.errors import check_path, check_text, shown, unknown_name
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -121,7 +121,7 @@ def find_policy(text: str) -> Path:
     """
     if text in shipped_policies():
         return SHIPPED / f"{text}.zip"
-    path = Path(text)
+    path = check_path("policy", text)
     if (path / "policy.zip").is_file():
         raise ValueError(f"policy {text!r} is a folder; did you mean 'policy:{path / 'policy.zip'}'?")
     if not path.suffix and not path.is_file():

@@ -3,6 +3,7 @@
 from lgmd_gym.errors import check_finite, shown
 
 MAX_SPEED = 40.0  # [m/s], highway-env's limit, 144 km/h
+MIN_SPEED = 1e-3  # [m/s], apart from 0; lower speeds have no finite duration
 KMH = 1.0 / 3.6  # one km/h in m/s
 
 
@@ -16,6 +17,8 @@ def check_speed(name: str, value: float, *, zero: bool = False) -> float:
     low = "[" if zero else "("
     if speed < 0.0 or (speed == 0.0 and not zero):
         raise ValueError(f"{name} must be in {low}0, {MAX_SPEED:g}] m/s, got {shown(value)}")
+    if 0.0 < speed < MIN_SPEED:
+        raise ValueError(f"{name} must be >= {MIN_SPEED:g} m/s, got {shown(value)}")
     if speed > MAX_SPEED:
         raise ValueError(
             f"{name}: {speed:g} m/s = {speed / KMH:g} km/h, beyond {MAX_SPEED:g} m/s; "

@@ -18,16 +18,16 @@ SPEED_KMH = (10.0, 80.0)
 HEADWAY = (0.5, 3.0)  # [s]; in FMVSS 127 a lead car brakes 12 m ahead at 80 km/h, a headway of 0.54 s
 
 
-def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> None:
-    """Check the arguments of `RandomLevels`.
+def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> tuple[int, int]:
+    """Check the arguments of `RandomLevels`, and return the first level and the number of levels.
 
     Raises:
         ValueError: If the split or a condition is unknown, or levels are outside the split.
     """
     check_known("split", split, SPLITS)
     check_conditions(conditions)
-    check_whole("start_level", start_level, 0, LEVELS - 1)
-    check_whole("num_levels", num_levels, 0, LEVELS - start_level)  # 0 for all
+    first = check_whole("start_level", start_level, 0, LEVELS - 1)
+    return first, check_whole("num_levels", num_levels, 0, LEVELS - first)  # 0 for all
 
 
 def check_conditions(conditions: Sequence[str]) -> None:

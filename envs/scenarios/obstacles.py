@@ -15,7 +15,7 @@ from lgmd_gym.envs.scenarios.scenario import (
     RoadPlan,
     Scenario,
 )
-from lgmd_gym.errors import check_flag, check_within
+from lgmd_gym.errors import check_flag, check_whole, check_within
 
 if TYPE_CHECKING:
     from lgmd_gym.envs.dynamics.path import Path
@@ -47,7 +47,12 @@ def drive_over_plate(ego_speed: float = 80 * KMH, shade: int = STEEL) -> Scenari
     """
     speed = check_speed("ego_speed", ego_speed)
     plate = Actor(
-        gap=START_TTC * speed, kind="road_marking", shade=shade, length=3.7, width=2.4, height=0.025
+        gap=START_TTC * speed,
+        kind="road_marking",
+        shade=check_whole("shade", shade, 0, 255),
+        length=3.7,
+        width=2.4,
+        height=0.025,
     )
     return Scenario(family="SteelPlate", ego_speed=speed, duration=START_TTC + 2.0, actors=(plate,))
 
@@ -64,7 +69,12 @@ def drive_through_shadow(ego_speed: float = 80 * KMH, length: float = 12.0, shad
     speed = check_speed("ego_speed", ego_speed)
     shadow_length = check_within("length", length, 1.0, 100.0, "m")
     shadow = Actor(
-        gap=START_TTC * speed, kind="road_marking", shade=shade, length=shadow_length, width=40.0, height=0.0
+        gap=START_TTC * speed,
+        kind="road_marking",
+        shade=check_whole("shade", shade, 0, 255),
+        length=shadow_length,
+        width=40.0,
+        height=0.0,
     )
     duration = START_TTC + shadow_length / speed + 2.0
     return Scenario(family="BridgeShadow", ego_speed=speed, duration=duration, actors=(shadow,))

@@ -67,8 +67,8 @@ class Actor:
         check_within("lateral_offset", self.lateral_offset, -500.0, 500.0, "m")
         check_finite("heading", self.heading)
         check_speed("speed", self.speed, zero=True)
-        check_items("profile", self.profile, Segment)
-        check_items("path", self.path, Bend)
+        object.__setattr__(self, "profile", check_items("profile", self.profile, Segment))
+        object.__setattr__(self, "path", check_items("path", self.path, Bend))
         check_profile(self.speed, self.profile)
         check_known("actor kind", self.kind, ACTOR_KINDS)
         if self.shade is not None:
@@ -102,7 +102,7 @@ class RoadPlan:
         check_whole("lanes", self.lanes, 1, MAX_LANES)
         check_whole("ego_lane", self.ego_lane, 0, self.lanes - 1)
         check_within("distance", self.distance, -1e4, 1e4, "m")
-        check_items("bends", self.bends, Bend)
+        object.__setattr__(self, "bends", check_items("bends", self.bends, Bend))
 
     @property
     def relative_to_ego(self) -> bool:
@@ -134,9 +134,9 @@ class Scenario:
 
     def __post_init__(self) -> None:
         check_text("family", self.family)
-        check_items("actors", self.actors, Actor)
-        check_items("ego_profile", self.ego_profile, Segment)
-        check_items("ego_path", self.ego_path, Bend)
+        object.__setattr__(self, "actors", check_items("actors", self.actors, Actor))
+        object.__setattr__(self, "ego_profile", check_items("ego_profile", self.ego_profile, Segment))
+        object.__setattr__(self, "ego_path", check_items("ego_path", self.ego_path, Bend))
         check_type("road", self.road, RoadPlan)
         check_speed("ego_speed", self.ego_speed, zero=bool(self.ego_profile))
         check_profile(self.ego_speed, self.ego_profile)

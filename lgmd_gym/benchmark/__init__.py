@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.executor import SERIAL, Executor
+from lgmd_gym.errors import shown
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,7 +45,9 @@ def run(
         >>> table = run(config)  # doctest: +SKIP
     """
     if not isinstance(config, RunConfig):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise TypeError(f"config must be a RunConfig, got {config!r}; use RunConfig(suite=..., agents=...)")
+        raise TypeError(
+            f"config must be a RunConfig, got {shown(config)}; use RunConfig(suite=..., agents=...)"
+        )
     import pandas as pd
 
     from lgmd_gym.benchmark.runner import Run

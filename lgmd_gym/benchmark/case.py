@@ -8,6 +8,7 @@ from lgmd_gym.envs.registration import RANDOM
 from lgmd_gym.envs.scenarios.distribution import draw_scenario, level_generator
 from lgmd_gym.envs.scenarios.registry import make_scenario
 from lgmd_gym.envs.scenarios.scenario import Scenario
+from lgmd_gym.errors import check_flag, check_items, check_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +27,13 @@ class Case:
     family: str
     arguments: tuple[tuple[str, Any], ...] = ()
     fcw_driver: bool = False
+
+    def __post_init__(self) -> None:
+        check_text("name", self.name)
+        check_text("family", self.family)
+        check_flag("fcw_driver", self.fcw_driver)
+        for item in check_items("arguments", self.arguments, tuple, "tuples"):
+            check_text("arguments: name", item[0] if len(item) == 2 else item)
 
     @property
     def suite(self) -> str:

@@ -25,7 +25,7 @@ import tomli_w
 
 from lgmd_gym.benchmark.case import Case, to_mps
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, Suite, find_suite
-from lgmd_gym.errors import check_keys
+from lgmd_gym.errors import check_keys, check_path, check_text
 
 SUITE_KEYS = ("name", "about", "cases")
 CASE_KEYS = ("family", "name", "speeds_kmh", "fcw_driver", "arguments")
@@ -38,7 +38,11 @@ def get_suite(text: str) -> Suite:
     Raises:
         ValueError: If the name is unknown or the file is not a valid suite.
     """
-    return load_suite(Path(text)) if text.endswith(".toml") else find_suite(text)
+    return (
+        load_suite(check_path("suite", text))
+        if check_text("suite", text).endswith(".toml")
+        else find_suite(text)
+    )
 
 
 def load_suite(path: Path) -> Suite:

@@ -23,9 +23,8 @@ class BirdsEye:
 
     def __init__(self, shape: tuple[int, int] = (90, 160), scaling: float | None = None) -> None:
         self._shape = CameraParams(shape=shape).shape
-        if scaling is not None:
-            check_within("scaling", scaling, 1e-3, 1e3, "px/m")
-        self._scaling = scaling
+        in_range = None if scaling is None else check_within("scaling", scaling, 1e-3, 1e3, "px/m")
+        self._scaling = in_range
         self._viewer: Any = None
         self._oversampling = 1
         self._env: Any = None

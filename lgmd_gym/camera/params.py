@@ -169,7 +169,7 @@ class CameraParams:
             base = PRESETS[name] if isinstance(name, str) and name in PRESETS else cls()
             base = replace(base, **_with_condition(value))
         else:
-            raise TypeError(f"camera must be a preset name, CameraParams or a dict, got {shown(value)}")
+            raise ValueError(f"camera must be a preset name, CameraParams or a dict, got {shown(value)}")
         return replace(base, **_with_condition(changes)) if changes else base
 
     def with_condition(self, condition: str) -> CameraParams:

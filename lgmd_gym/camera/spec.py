@@ -44,8 +44,7 @@ def check_camera(camera: CameraSpec) -> None:
     """Check a camera argument without building the cameras.
 
     Raises:
-        ValueError: For an unknown preset or field, a value out of range, or an empty sequence.
-        TypeError: For a camera of another type.
+        ValueError: For an unknown preset or field, a value out of range, an empty sequence, or another type.
     """
     items = camera if isinstance(camera, list | tuple) else [camera]
     if not items:

@@ -18,7 +18,7 @@ from lgmd_gym.engine.simulation import Rates, Simulation
 from lgmd_gym.engine.top_view import TopViews
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.registration import make_source
-from lgmd_gym.errors import check_flags, check_keys, check_type, check_whole, shown
+from lgmd_gym.errors import check_flags, check_keys, check_mapping, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.validation import MAX_THREADS
 from lgmd_gym.sensing.frame_rate import camera_rate
@@ -138,7 +138,7 @@ class BrakingVectorEnv(VectorEnv):
         Raises:
             ValueError: If the seeds or the mask have another length, or an option is unknown.
         """
-        options = dict(check_type("options", options, dict, type(None)) or {})
+        options = check_mapping("options", options)
         check_keys("option", options, ("reset_mask",))
         mask = mask_of(options.get("reset_mask"), self.num_envs)
         for index, value in enumerate(seeds_of(seed, self.num_envs)):

@@ -3,7 +3,7 @@
 import math
 from typing import Any, NamedTuple
 
-from lgmd_gym.errors import check_flag, check_number, is_integer, is_number, shown
+from lgmd_gym.errors import check_flag, check_number, shown
 
 
 class _Bound(NamedTuple):
@@ -48,8 +48,7 @@ def checked_field(name: str, default: Any, value: Any) -> Any:
     """Return a field's value in the type of its default.
 
     Raises:
-        ValueError: For a value out of range.
-        TypeError: For a value of another type.
+        ValueError: For a value out of range or of another type.
     """
     if isinstance(default, str):
         if not isinstance(value, str) or value not in _CHOICES[name]:
@@ -68,9 +67,9 @@ def checked_field(name: str, default: Any, value: Any) -> Any:
 
 def _checked_number(name: str, value: Any, kind: type) -> float:
     """Return a number in range as the given type, int or float."""
-    if not is_number(value) or (kind is int and not is_integer(value) and value != math.floor(value)):
-        raise TypeError(f"{name} must be {'an integer' if kind is int else 'a number'}, got {shown(value)}")
     number = check_number(name, value)
+    if kind is int and not number.is_integer():
+        raise ValueError(f"{name} must be an integer, got {shown(value)}")
     if not _BOUNDS[name].contains(number):
         raise ValueError(f"{name} must be {_BOUNDS[name]}, got {number:g}")
     return int(number) if kind is int else number

@@ -10,7 +10,7 @@ from typing import Any, Literal, Self, TypeAlias
 
 import tomli_w
 
-from lgmd_gym.errors import check_keys, check_type, shown
+from lgmd_gym.errors import check_keys, check_path, shown
 from lgmd_gym.neuron.bounds import checked_field
 
 
@@ -72,8 +72,7 @@ class LGMDParams:
         k_0: K and adapted K before the first change; default 0.5, 0 to 0.5.
 
     Raises:
-        ValueError: For a value out of range.
-        TypeError: For a value of another type.
+        ValueError: For a value out of range or of another type.
 
     Example:
         >>> LGMDParams(t_sp=0.78).t_sp
@@ -189,8 +188,7 @@ class LGMDParams:
         """Return the parameters for a `params` argument: an instance, a mapping, or None for the defaults.
 
         Raises:
-            ValueError: For an unknown key or a value out of range.
-            TypeError: For another type.
+            ValueError: For an unknown key, a value out of range, or another type.
         """
         if spec is None:
             return cls()
@@ -198,7 +196,7 @@ class LGMDParams:
             return spec
         if isinstance(spec, Mapping):
             return cls.from_dict(spec)
-        raise TypeError(f"params must be LGMDParams, a mapping or None, got {shown(spec)}")
+        raise ValueError(f"params must be LGMDParams, a mapping or None, got {shown(spec)}")
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -222,7 +220,7 @@ class LGMDParams:
             ValueError: For a file that is not TOML, an unknown key or a value out of range.
         """
         try:
-            text = Path(check_type("path", path, str, Path)).read_text(encoding="utf-8")
+            text = check_path("path", path).read_text(encoding="utf-8")
             values = tomllib.loads(text)
         except OSError as error:
             raise ValueError(f"{shown(str(path))} cannot be read: {error.strerror}") from None

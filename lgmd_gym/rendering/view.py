@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from lgmd_gym.errors import check_known, unknown_name
+from lgmd_gym.errors import check_known, check_text, unknown_name
 from lgmd_gym.rendering.overlays import OVERLAYS, checked_overlays
 from lgmd_gym.rendering.state import DisplayState
 from lgmd_gym.wrappers.observation import LGMDObservation
@@ -56,9 +56,7 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
         overlays: tuple[str, ...] = OVERLAYS,
         camera: str | None = None,
     ) -> None:
-        RecordConstructorArgs.__init__(
-            self, render_mode=render_mode, title=title, overlays=list(overlays), camera=camera
-        )
+        self._observer = find_observation_wrapper(env)
         gym.Wrapper.__init__(self, env)
         check_known("render mode", render_mode, MODES)
         if env.render_mode == "human":
@@ -66,12 +64,18 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
                 "env must not have render_mode 'human', which opens a second window; pass "
                 "render_mode='human' to LGMDView only"
             )
-        self._observer = find_observation_wrapper(env)
         if camera is not None and camera not in self._observer.sensors.names:
             raise unknown_name("camera", camera, self._observer.sensors.names)
         self._mode, self._camera = render_mode, camera
         self._overlays = checked_overlays(overlays)
-        self._title = title if title is not None else (env.spec.id if env.spec is not None else str(env))
+        RecordConstructorArgs.__init__(
+            self, render_mode=render_mode, title=title, overlays=list(overlays), camera=camera
+        )
+        self._title = (
+            check_text("title", title)
+            if title is not None
+            else (env.spec.id if env.spec is not None else str(env))
+        )
         self._dashboard: Any = None
         self._window: Any = None
         self._info: dict[str, Any] = {}

@@ -149,7 +149,7 @@ class TrainConfig:
                 )
             given["camera"] = _cameras_of(sensors_of)
         values = read_hyperparams(algo, env_id, file)
-        if inputs:
+        if check_items("inputs", inputs, str, "names"):
             values["features"] |= {"inputs": inputs}
         values["features"] = FeatureConfig.from_dict(values["features"])
         defaults = {"demands": DEMANDS[algo], "eval_episodes": 600 if algo == OFFLINE else 60}

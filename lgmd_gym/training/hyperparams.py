@@ -4,7 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from lgmd_gym.errors import check_finite, check_known, unknown_name
+from lgmd_gym.errors import check_finite, check_known, check_path, check_text, unknown_name
 
 OFFLINE = "offline"  # the algorithm of `lgmd_gym.training.offline.learner`
 ALGORITHMS = ("ppo", "sac", "dqn", OFFLINE)
@@ -23,7 +23,12 @@ def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> dict[s
         ValueError: For an unknown algorithm, a file that cannot be read, or one without a matching entry.
     """
     check_known("algorithm", algo, ALGORITHMS)
-    path = file or Path(str(files("lgmd_gym.training") / f"{algo}.yml"))
+    check_text("env_id", env_id)
+    path = (
+        check_path("file", file)
+        if file is not None
+        else Path(str(files("lgmd_gym.training") / f"{algo}.yml"))
+    )
     entries = _read_yaml(path)
     entry = entries.get(env_id, entries.get("default"))
     if not isinstance(entry, dict):

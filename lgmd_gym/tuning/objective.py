@@ -127,8 +127,7 @@ class Objective:
     def __init__(self, split: str, levels: int, seeds: int, jobs: int = 1) -> None:
         check_known("split", split, FIRST_SEED)
         self.jobs = check_whole("jobs", jobs, 1)
-        check_whole("levels", levels, 0, LEVELS)
-        check_whole("seeds", seeds, 0, MAX_SEEDS)
+        levels, seeds = check_whole("levels", levels, 0, LEVELS), check_whole("seeds", seeds, 0, MAX_SEEDS)
         self.episodes = [(level_case(split, split, number), number) for number in range(levels)]
         cases = find_suite("false-reaction").cases
         first = FIRST_SEED[split]

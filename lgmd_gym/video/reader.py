@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgmd_gym.errors import check_finite, check_size, check_type, shown
+from lgmd_gym.errors import check_finite, check_path, check_size, shown
 from lgmd_gym.video.probe import open_video, probe
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ def find_clips(paths: Iterable[str | Path]) -> list[Path]:
     if not isinstance(paths, list | tuple):
         raise TypeError(f"paths must be a list, got {shown(paths)}")
     found: list[Path] = []
-    for path in (Path(check_type("path", path, str, Path)) for path in paths):
+    for path in (check_path("path", path) for path in paths):
         if path.is_dir():
             clips = sorted(file for file in path.iterdir() if file.suffix.lower() in CLIP_SUFFIXES)
             if not clips:

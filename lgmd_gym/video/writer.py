@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.errors import check_type, check_within, shown
+from lgmd_gym.errors import check_path, check_within, shown
 from lgmd_gym.system.files import check_new_file
 
 SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif")
@@ -27,7 +27,7 @@ class VideoWriter:
     """
 
     def __init__(self, path: str | Path, fps: float, quality: float = 7.0) -> None:
-        self.path = Path(check_type("path", path, str, Path))
+        self.path = check_path("path", path)
         self.fps = check_within("fps", fps, 1e-3, 1000.0, "Hz")
         self.quality = check_within("quality", quality, 0.0, 10.0)
         if self.path.suffix.lower() not in SUFFIXES:

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from lgmd_gym.camera import CameraParams, CameraSpec
-from lgmd_gym.errors import check_flags
+from lgmd_gym.errors import check_flags, check_mapping
 from lgmd_gym.neuron import LGMDParams, NeuronSpec, Response
 from lgmd_gym.sensing.frame_rate import camera_rate
 from lgmd_gym.sensing.road_hook import check_highway_env, on_road_step
@@ -186,7 +186,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
 
     def _check_frequency(self, options: dict[str, Any] | None) -> None:
         """Refuse a simulation frequency in the options of a reset before the environment applies it."""
-        config: dict[str, Any] = (options or {}).get("config") or {}
+        config = check_mapping("config", check_mapping("options", options).get("config"))
         if "simulation_frequency" in config:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # _build_sensors warns

@@ -84,7 +84,7 @@ def test_errors_name_the_field_the_value_and_the_fix():
 
 
 def test_camera_of_a_wrong_type_is_an_error():
-    with pytest.raises(TypeError, match="preset name"):
+    with pytest.raises(ValueError, match="preset name"):
         CameraParams.make(3.0)
 
 

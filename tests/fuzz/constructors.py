@@ -28,6 +28,7 @@ from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.envs.dynamics.brake import BrakeParams
+from lgmd_gym.errors import shown
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.training import PolicyWrapper, TrainConfig
 from lgmd_gym.tuning.objective import Objective
@@ -36,6 +37,9 @@ from lgmd_gym.video import VideoReader, VideoWriter, find_clips, luma
 from lgmd_gym.wrappers import LGMDObservation
 from lgmd_gym.wrappers.vector import LGMDObservation as VectorObservation
 
+NAMES = {"spec": ["params"], "text": ["agent", "suite"], "paths": ["path", "clip"], "sensors_of": ["agent"]}
+NAMES |= {"path": ["policy", "clip", "video"], "family": ["scenario"], "name": ["scenario", "suite"]}
+NAMES |= {"agent": ["rule"], "algo": ["algorithm"], "seeds": ["seed"]}  # other names of arguments
 LIMIT_S = 20  # time after which a call counts as hanging [s]
 VALUES = (
     None, True, False, "", "nix", "1", "[red]", "x" * 5000, "a\nb", "fog", b"", b"1", -1, 0, 1, 2, 7, 1.5, -0.5,
@@ -198,7 +202,7 @@ def targets():
     add("reset config", lambda **config: reset(options={"config": config}), {}, dict.fromkeys(CONFIG, ""))
     add("reset vector", stepped_vector, {}, {"seed": "", "options": ""})
     add("reset mask", lambda mask: stepped_vector(options={"reset_mask": mask}), {"mask": None}, {"mask": ""})
-    add("BrakingVectorEnv", engine.BrakingVectorEnv, {"family": "CCRs", "camera": None}, None, made)
+    add("BrakingVectorEnv", engine.BrakingVectorEnv, {"family": "CCRs", "camera": SMALL}, None, made)
     add("LGMDObservation", partial(wrapped, LGMDObservation), {"camera": SMALL},
         _without_env(LGMDObservation), made)  # fmt: skip
     add("LGMDObservation env", LGMDObservation, {"env": None}, {"env": "int"})
@@ -250,7 +254,7 @@ def targets():
         "TrainConfig", TrainConfig, {"algo": "ppo", "demands": (0.0, -1.0)}, None, lambda made: made.to_dict()
     )
     add("TrainConfig.from_hyperparams", TrainConfig.from_hyperparams, {"algo": "ppo"},
-        {**signature_of(TrainConfig), **signature_of(TrainConfig.from_hyperparams)})  # fmt: skip
+        dict.fromkeys([*signature_of(TrainConfig), *signature_of(TrainConfig.from_hyperparams)], ""))  # fmt: skip
     add("FeatureConfig", FeatureConfig, {})
     add("PolicyWrapper", lambda **features: PolicyWrapper(gym.make("LGMD/CCRs-v0", camera=SMALL), **features), {},
         signature_of(FeatureConfig), made)  # fmt: skip
@@ -284,7 +288,7 @@ def _option_types(agent):
 
 
 def _agent_string(agent, **options):
-    return agents.make_agent(agent + ":" + ",".join(f"{name}={value}" for name, value in options.items()))
+    return agents.make_agent(agent + ":" + ",".join(f"{name}={_text(value)}" for name, value in options.items()))
 
 
 def acceptable(name, annotation, value):
@@ -320,8 +324,17 @@ def check_message(error, changes):
     message = str(error)
     assert message.strip() and len(message.splitlines()) == 1, f"{type(error).__name__}: {message!r}"
     assert len(message) < 600, f"{len(message)} characters: {message[:80]}"
-    values = [part for name, value in changes.items() for part in (name, _text(value)[:12])]
-    assert any(part in message for part in values if part), f"names no argument: {message}"
+    parts = [part for item in changes.items() for part in _parts(*item)]
+    assert any(part in message for part in parts), f"names no argument: {message}"
+
+
+def _parts(name, value):
+    """Yield texts of which a message about an argument contains one: names, and the starts of values."""
+    yield from {name, name.replace("_", " "), name.removesuffix("s"), *NAMES.get(name, ())}
+    yield shown(value)[:12]
+    if isinstance(value, dict | list | tuple):
+        for item in value:
+            yield shown(item)[:12]
 
 
 def _text(value):
@@ -344,16 +357,17 @@ def draw_case(rng):
                 warnings.simplefilter("ignore")
                 warnings.simplefilter("error", RuntimeWarning)
                 result = function(**{**valid, **changes})
+                for item, value in changes.items():
+                    ignored = changes.get("camera", 0) is None  # without a camera
+                    assert ignored or acceptable(item, types[item], value), f"{item} accepted"
+                if use is not None:
+                    use(result)
         except (ValueError, TypeError) as error:
             if type(error).__mro__[1] not in (Exception, ValueError):
                 raise
             return check_message(error, changes)
         finally:
             signal.alarm(0)
-        for item, value in changes.items():
-            assert acceptable(item, types[item], value), f"{item} accepted"
-        if use is not None:
-            use(result)
         return None
 
     return f"{name}({', '.join(f'{item}={_text(value)[:60]!r}' for item, value in changes.items())})", check
