@@ -10,16 +10,19 @@ import numpy as np
 from highway_env.envs.common.abstract import AbstractEnv
 
 from lgmd_gym.envs.dynamics.brake import BrakeParams
-from lgmd_gym.errors import (, check_items, check_mapping, shown
+from lgmd_gym.errors import (
     check_finite,
     check_flag,
+    check_items,
     check_keys,
     check_known,
+    check_mapping,
     check_text,
     check_type,
     check_whole,
     check_within,
     is_number,
+    shown,
 )
 
 _NUMBERS = {

@@ -38,11 +38,9 @@ def get_suite(text: str) -> Suite:
     Raises:
         ValueError: If the name is unknown or the file is not a valid suite.
     """
-    return (
-        load_suite(check_path("suite", text))
-        if check_text("suite", text).endswith(".toml")
-        else find_suite(text)
-    )
+    if check_text("suite", text).endswith(".toml"):
+        return load_suite(check_path("suite", text))
+    return find_suite(text)
 
 
 def load_suite(path: Path) -> Suite:

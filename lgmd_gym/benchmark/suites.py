@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lgmd_gym.benchmark import protocols
 from lgmd_gym.benchmark.case import Case, level_case, make_case, speed_cases
-from lgmd_gym.errors import check_known, unknown_name
+from lgmd_gym.errors import check_known, check_text, unknown_name
 
 TRAFFIC = "traffic"  # the suite without cases, see `lgmd_gym.benchmark.traffic`
 RANDOM_LEVELS = 60
@@ -126,7 +126,7 @@ def find_suite(name: str) -> Suite:
     Raises:
         ValueError: If the name is unknown.
     """
-    if name not in SUITES:
+    if check_text("suite", name) not in SUITES:
         raise unknown_name("suite", name, (*SUITES, TRAFFIC))
     return SUITES[name]
 

@@ -18,6 +18,8 @@ from lgmd_gym.errors import (
     shown,
 )
 
+MAX_PATH = 4096  # characters
+
 
 class _Interval(NamedTuple):
     low: float
@@ -189,7 +191,7 @@ def _with_condition(changes: Mapping[str, Any]) -> dict[str, Any]:
 def _check_surroundings(p: CameraParams) -> None:
     if isinstance(p.panorama, os.PathLike):
         object.__setattr__(p, "panorama", os.fspath(p.panorama))
-    if not isinstance(p.panorama, str) or not p.panorama:
+    if not isinstance(p.panorama, str) or not 0 < len(p.panorama) <= MAX_PATH:
         raise ValueError(
             f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
         )

@@ -69,8 +69,9 @@ def danger_zone(
     zone = inside.reshape(height, _OVERSAMPLING, width, _OVERSAMPLING).mean((1, 3), dtype=np.float32)
     if not zone.any():
         raise ValueError(
-            f"the danger zone must overlap the image, got width_m {width_m:g}, height_m {height_m:g}, near_m {near_m:g}, far_m {far_m:g} and "
-            f"hfov_deg {hfov_deg:g}; lower near_m, raise far_m or widen hfov_deg"
+            f"the danger zone must overlap the image, got width_m {width_m:g}, height_m {height_m:g}, "
+            f"near_m {near_m:g}, far_m {far_m:g} and hfov_deg {hfov_deg:g}; lower near_m, raise far_m or "
+            "widen hfov_deg"
         )
     return zone
 

@@ -71,11 +71,9 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
         RecordConstructorArgs.__init__(
             self, render_mode=render_mode, title=title, overlays=list(overlays), camera=camera
         )
-        self._title = (
-            check_text("title", title)
-            if title is not None
-            else (env.spec.id if env.spec is not None else str(env))
-        )
+        if title is None:
+            title = env.spec.id if env.spec is not None else str(env)
+        self._title = " ".join(check_text("title", title).split())
         self._dashboard: Any = None
         self._window: Any = None
         self._info: dict[str, Any] = {}

@@ -24,11 +24,8 @@ def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> dict[s
     """
     check_known("algorithm", algo, ALGORITHMS)
     check_text("env_id", env_id)
-    path = (
-        check_path("file", file)
-        if file is not None
-        else Path(str(files("lgmd_gym.training") / f"{algo}.yml"))
-    )
+    own = Path(str(files("lgmd_gym.training") / f"{algo}.yml"))
+    path = own if file is None else check_path("file", file)
     entries = _read_yaml(path)
     entry = entries.get(env_id, entries.get("default"))
     if not isinstance(entry, dict):

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from lgmd_gym.errors import check_path
+
 if TYPE_CHECKING:
     from av.container import InputContainer
     from av.video.stream import VideoStream
@@ -46,7 +48,7 @@ def probe(path: str | Path) -> VideoInfo:
     Raises:
         ValueError: For a file that is missing, empty, not a video, or without a video stream.
     """
-    path = Path(path)
+    path = check_path("clip", path)
     if not path.is_file():
         raise ValueError(f"clip {str(path)!r} {'is not a file' if path.exists() else 'does not exist'}")
     if path.stat().st_size == 0:

@@ -288,7 +288,9 @@ def _option_types(agent):
 
 
 def _agent_string(agent, **options):
-    return agents.make_agent(agent + ":" + ",".join(f"{name}={_text(value)}" for name, value in options.items()))
+    return agents.make_agent(
+        agent + ":" + ",".join(f"{name}={_text(value)}" for name, value in options.items())
+    )
 
 
 def acceptable(name, annotation, value):
