@@ -19,7 +19,7 @@ def parse_agent(text: str) -> tuple[str, dict[str, Any]]:
         key, equals, value = part.partition("=")
         if not equals:
             raise ValueError(
-                f"agent option {shown(part)} in {shown(text)} has no value; write {shown(key)}=VALUE"
+                f"agent option {shown(part)} in {shown(text)} has no value; write {shown(key)[1:-1]}=VALUE"
             )
         options[key.strip()] = _parse_value(value.strip())
     return name.strip(), options

@@ -103,7 +103,7 @@ def make_source(
 
 
 def _argument_names(family: str) -> Iterable[str]:
-    if family == RANDOM:
+    if check_text("family", family) == RANDOM:
         return _LEVEL_ARGUMENTS
     check_known("scenario", family, FAMILIES)
     return *inspect.signature(FAMILIES[family]).parameters, "condition"

@@ -75,7 +75,7 @@ def check_whole(name: str, value: Any, low: int, high: float = inf) -> int:
 def check_flag(name: str, value: Any) -> bool:
     """Return `value` as bool if it is one, or raise ValueError."""
     if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{name} must be True or False, got {shown(value)}")
+        raise ValueError(f"{name} must be true or false, got {shown(value)}")
     return bool(value)
 
 

@@ -48,7 +48,8 @@ def seeds_of(seed: Any, num_envs: int) -> list[int | None]:
     if seed is None:
         return [None] * num_envs
     seeds = [seed + index for index in range(num_envs)] if is_integer(seed) else seed
-    if not isinstance(seeds, Sequence | np.ndarray) or len(seeds) != num_envs:
+    seeds = seeds.tolist() if isinstance(seeds, np.ndarray) else seeds
+    if not isinstance(seeds, Sequence) or len(seeds) != num_envs:
         raise ValueError(f"seed must be one number or {num_envs} numbers, got {shown(seed)}")
     for value in seeds:
         if value is not None and (not is_integer(value) or value < 0):

@@ -90,6 +90,7 @@ class BrakingVectorEnv(VectorEnv):
         **arguments: Any,
     ) -> None:
         self.num_envs = check_whole("num_envs", num_envs, 1, MAX_ENVS)
+        threads = check_whole("threads", threads, 1, MAX_THREADS)
         source, self._camera_fields = make_source(family, arguments, _NAMES)
         check_flags(include_frame=include_frame, include_base=include_base, trace=trace, copy=copy)
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):

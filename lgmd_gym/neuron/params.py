@@ -219,13 +219,13 @@ class LGMDParams:
         Raises:
             ValueError: For a file that is not TOML, an unknown key or a value out of range.
         """
+        file = check_path("path", path)
         try:
-            text = check_path("path", path).read_text(encoding="utf-8")
-            values = tomllib.loads(text)
+            values = tomllib.loads(file.read_text(encoding="utf-8"))
         except OSError as error:
-            raise ValueError(f"{shown(str(path))} cannot be read: {error.strerror}") from None
-        except (tomllib.TOMLDecodeError, ValueError) as error:
-            raise ValueError(f"{shown(str(path))} must be a TOML file: {error}") from None
+            raise ValueError(f"params file {str(file)!r} cannot be read: {error.strerror}") from None
+        except ValueError as error:
+            raise ValueError(f"params file {str(file)!r} must be a TOML file: {error}") from None
         return cls.from_dict(values)
 
     def to_toml(self, path: str | Path) -> None:

@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from lgmd_gym.errors import check_known, check_text, unknown_name
+from lgmd_gym.errors import check_known, check_text
 from lgmd_gym.rendering.overlays import OVERLAYS, checked_overlays
 from lgmd_gym.rendering.state import DisplayState
 from lgmd_gym.wrappers.observation import LGMDObservation
@@ -64,8 +64,8 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
                 "env must not have render_mode 'human', which opens a second window; pass "
                 "render_mode='human' to LGMDView only"
             )
-        if camera is not None and camera not in self._observer.sensors.names:
-            raise unknown_name("camera", camera, self._observer.sensors.names)
+        if camera is not None:
+            check_known("camera", camera, self._observer.sensors.names)
         self._mode, self._camera = render_mode, camera
         self._overlays = checked_overlays(overlays)
         RecordConstructorArgs.__init__(

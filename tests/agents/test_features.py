@@ -157,7 +157,7 @@ def test_shrink_frame_averages_blocks():
         ),
         ({"inputs": []}, "inputs must contain at least one policy input, got none"),
         ({"histry": 3}, "unknown policy feature 'histry'; did you mean 'history'"),
-        ({"history": 0}, "history must be a whole number >= 1, got 0"),
+        ({"history": 0}, "history must be a whole number in \\[1, 1000\\], got 0"),
         ({"latch": 1}, "latch must be true or false, got 1"),
         ({"reward_scale": 0.0}, "reward_scale must be a number > 0, got 0.0"),
     ],

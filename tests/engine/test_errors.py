@@ -8,11 +8,11 @@ import lgmd_gym  # noqa: F401
 
 TWO_SHAPES = ["wide", {"name": "small", "shape": [40, 60]}]
 CONSTRUCTION = [
-    ({"num_envs": 0}, r"num_envs must be an integer >= 1, got 0"),
-    ({"num_envs": 2.5}, r"num_envs must be an integer >= 1, got 2.5"),
-    ({"threads": 0}, r"threads must be an integer >= 1, got 0"),
-    ({"threads": None}, r"threads must be an integer >= 1, got None"),
-    ({"threads": True}, r"threads must be an integer >= 1, got True"),
+    ({"num_envs": 0}, r"num_envs must be a whole number in \[1, 65536\], got 0"),
+    ({"num_envs": 2.5}, r"num_envs must be a whole number in \[1, 65536\], got 2.5"),
+    ({"threads": 0}, r"threads must be a whole number in \[1, 1024\], got 0"),
+    ({"threads": None}, r"threads must be a whole number in \[1, 1024\], got None"),
+    ({"threads": True}, r"threads must be a whole number in \[1, 1024\], got True"),
     ({"autoreset_mode": "same"}, r"unknown autoreset_mode 'same'; did you mean 'SameStep'\?"),
     ({"autoreset_mode": "same_step"}, r"unknown autoreset_mode 'same_step'; did you mean 'SameStep'\?"),
     ({"render_mode": "human"}, r"render_mode must be None or 'rgb_array' for a vector, got 'human'"),

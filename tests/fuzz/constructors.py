@@ -39,6 +39,7 @@ from lgmd_gym.wrappers.vector import LGMDObservation as VectorObservation
 
 NAMES = {"spec": ["params"], "text": ["agent", "suite"], "paths": ["path", "clip"], "sensors_of": ["agent"]}
 NAMES |= {"path": ["policy", "clip", "video"], "family": ["scenario"], "name": ["scenario", "suite"]}
+NAMES |= {"fps": ["clip"], "size": ["clip"], "file": ["hyperparameters"], "ego_speed": ["speed"]}
 NAMES |= {"agent": ["rule"], "algo": ["algorithm"], "seeds": ["seed"]}  # other names of arguments
 LIMIT_S = 20  # time after which a call counts as hanging [s]
 VALUES = (

@@ -53,7 +53,7 @@ def test_unknown_key_suggests_the_closest_one(tmp_path):
 def test_error_for_an_invalid_toml_file_contains_its_path(tmp_path):
     path = tmp_path / "p.toml"
     path.write_text("t_sp: 0.7\n")
-    with pytest.raises(ValueError, match=r"p\.toml must be a TOML file"):
+    with pytest.raises(ValueError, match=r"p\.toml' must be a TOML file"):
         LGMDParams.from_toml(path)
 
 
@@ -86,7 +86,7 @@ def test_every_number_is_checked(value):
         ({"n_ts": 0}, "n_ts must be >= 1 and <= 256, got 0"),
         ({"weights": (1.0, 2.0)}, "weights must be 3 numbers (centre, nearest, diagonal), got (1.0, 2.0)"),
         ({"delay": "none"}, "delay must be one of 'recursive', 'two-tap', got 'none'"),
-        ({"on_off": 1}, "on_off must be True or False, got 1"),
+        ({"on_off": 1}, "on_off must be true or false, got 1"),
         ({"u": 0.0}, "must sum to < 1, got 1 from u = 0 and n_p = 2; raise u or lower n_p"),
     ],
 )

@@ -1,0 +1,44 @@
+"""The console prints names of users as they are, also those that look like rich's markup or emoji codes."""
+
+import pytest
+from rich.table import Table
+from support.rows import threat_row
+
+from lgmd_gym.benchmark.analysis.tables import case_table, score_tables
+from lgmd_gym.benchmark.traffic.rows import KEYS
+from lgmd_gym.benchmark.traffic.tables import traffic_table
+from lgmd_gym.cli.console import make_console
+from lgmd_gym.cli.doctor import FAULT, Finding, print_findings
+
+NAMES = ["[red]a", "b[/]", ":x:"]
+
+
+def scores():
+    values = {"avoided": True, "premature_brake": False, "speed_reduction": 3.0, "fcw_driver": False}
+    rows = [threat_row(agent=name, case=f"s/CCRs/{name}", **values) for name in NAMES]
+    return [*score_tables(rows, NAMES, NAMES[1]), case_table(rows, NAMES)]
+
+
+def traffic():
+    zeros = dict.fromkeys(KEYS, 0) | {"case": "traffic/merge/s0", "condition": "clear", "error": None}
+    rows = [zeros | {"agent": name, "kind": "merge", "distance": 1000.0, "side": ""} for name in NAMES]
+    return [traffic_table(rows, NAMES, NAMES[1])]
+
+
+def plain():
+    table = Table(title=NAMES[0], caption=NAMES[1])
+    table.add_column(NAMES[2])
+    return [table]
+
+
+@pytest.mark.parametrize("tables", [scores, traffic, plain])
+def test_tables_show_names_literally(tables, capsys):
+    for table in tables():
+        make_console().print(table)
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in NAMES)
+
+
+def test_findings_show_messages_literally(capsys):
+    print_findings([Finding("check", FAULT, NAMES[0], NAMES[1])], make_console())
+    assert capsys.readouterr().out.splitlines() == ["fault check       [red]a", f"{'':18}→ b[/]"]
