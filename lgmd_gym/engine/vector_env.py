@@ -110,9 +110,7 @@ class BrakingVectorEnv(VectorEnv):
         neuron = LGMDParams.make(params)
         sensors = None if camera is None else make_sensors(camera, rates.camera, neuron, self.num_envs)
         demands = self._single.brake.max_demands(rates.policy)
-        self.simulation = Simulation(
-            self.num_envs, rates, sensors, demands, check_whole("threads", threads, 1, MAX_THREADS)
-        )
+        self.simulation = Simulation(self.num_envs, rates, sensors, demands, threads)
         self.simulation.brakes[:] = self._single.brake.record(settings["throttle"])
         self.simulation.weights[:] = self._single.weights
         self._queue = EpisodeQueue([source] * self.num_envs, ahead=threads > 1)

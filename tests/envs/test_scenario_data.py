@@ -54,7 +54,7 @@ def test_lanes_of_a_road():
     for lane in (0, 2):
         RoadPlan(ego_lane=lane)
     for lane in (-1, 3):
-        with pytest.raises(ValueError, match=r"ego_lane must be in \[0, 2\]"):
+        with pytest.raises(ValueError, match=r"ego_lane must be a whole number in \[0, 2\]"):
             RoadPlan(ego_lane=lane)
     with pytest.raises(ValueError, match="unknown road kind"):
         RoadPlan(kind="curved")

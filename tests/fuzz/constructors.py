@@ -7,9 +7,11 @@ be of the annotated type (no bool or string as a number, no NaN), and the result
 
 import inspect
 import math
+import os
 import re
 import signal
 import sys
+import tempfile
 import warnings
 from functools import cache, partial
 from numbers import Integral, Real
@@ -28,8 +30,8 @@ from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.envs.dynamics.brake import BrakeParams
-from lgmd_gym.errors import shown
 from lgmd_gym.envs.reward import RewardParams
+from lgmd_gym.errors import shown
 from lgmd_gym.training import PolicyWrapper, TrainConfig
 from lgmd_gym.tuning.objective import Objective
 from lgmd_gym.tuning.space import SearchSpace
@@ -43,14 +45,15 @@ NAMES |= {"fps": ["clip"], "size": ["clip"], "file": ["hyperparameters"], "ego_s
 NAMES |= {"agent": ["rule"], "algo": ["algorithm"], "seeds": ["seed"]}  # other names of arguments
 LIMIT_S = 20  # time after which a call counts as hanging [s]
 VALUES = (
-    None, True, False, "", "nix", "1", "[red]", "x" * 5000, "a\nb", "fog", b"", b"1", -1, 0, 1, 2, 7, 1.5, -0.5,
-    1e400, -1e400, math.nan, 10**9, 10**19, 10**400, -(10**400), 10**5000, 1e-320, 1e300, 1j, [], [1], [None],
-    ["fovea"], [[]], (), (1, 2), (0, 0), (-1, 4), (10**9, 4), (1.5, 2.5), (8, 8, 8), ("a", "b"), {}, {"a": 1},
-    {None: 1}, {"name": "wide"}, {"shape": [8, 8]}, {1, 2}, object(), object, print, Path("nodir/x"), np.nan,
-    np.float32(1.5), np.float64(np.nan), np.int64(3), np.uint8(200), np.bool_(True), np.array(2.0), np.zeros(0),
-    np.zeros((2, 2)), np.full((8, 8), 2, np.int8), np.ones((8, 8), np.bool_), np.ones((90, 160), np.float16),
+    None, True, False, "", "nix", "1", "[red]", "x" * 5000, "a\nb", "fog", b"", b"1", -1, 0, 1, 2, 7, 1.5,
+    -0.5, 1e400, -1e400, math.nan, 10**9, 10**19, 10**400, -(10**400), 10**5000, 1e-320, 1e300, 1j, [], [1],
+    [None], ["fovea"], [[]], (), (1, 2), (0, 0), (-1, 4), (10**9, 4), (1.5, 2.5), (8, 8, 8), ("a", "b"), {},
+    {"a": 1}, {None: 1}, {"name": "wide"}, {"shape": [8, 8]}, {1, 2}, object(), object, print, Path("nodir/x"),
+    np.nan, np.float32(1.5), np.float64(np.nan), np.int64(3), np.uint8(200), np.bool_(True), np.array(2.0),
+    np.zeros(0), np.zeros((2, 2)), np.full((8, 8), 2, np.int8), np.ones((8, 8), np.bool_), np.ones((90, 160), np.float16),
     np.array(["a"]), np.array([None, 1], object), np.zeros((8, 8), np.complex128), range(3), "birdseye",
-    ["fovea", "fovea"], {"camera": "fovea"}, {"seed": -1}, slice(3), Ellipsis, NotImplemented, ValueError("x"),
+    ["fovea", "fovea"], {"camera": "fovea"}, {"seed": -1}, slice(3), Ellipsis,
+    NotImplemented, ValueError("x"),
 )  # fmt: skip
 INFINITE = {"tau_1", "tau_2", "tau_s", "t_f", "t_ffi", "max_spikes", "far_m"}  # where infinity is documented
 CONFIG = (
@@ -168,21 +171,43 @@ def targets():
     def add(name, function, valid, types=None, use=None):
         items.append((name, function, valid, signature_of(function) if types is None else types, use))
 
+    for group in (_add_scenarios, _add_environments, _add_sensors, _add_agents, _add_runs):
+        group(add)
+    return items
+
+
+def _add_scenarios(add):
+    """Add the functions of scenarios."""
     for family, function in envs.FAMILIES.items():
         add(family, partial(envs.make_scenario, family), {}, signature_of(function), driven)
     actor = envs.Actor(gap=20.0)
     add("Actor", envs.Actor, {"gap": 30.0}, None, lambda made: driven(scenario(actors=(made,))))
-    add("Segment", envs.Segment, {"start": 1.0, "acceleration": -2.0}, None,
-        lambda made: driven(scenario(actors=(envs.Actor(gap=30.0, speed=5.0, profile=(made,)),))))  # fmt: skip
+    add(
+        "Segment",
+        envs.Segment,
+        {"start": 1.0, "acceleration": -2.0},
+        None,
+        lambda made: driven(scenario(actors=(envs.Actor(gap=30.0, speed=5.0, profile=(made,)),))),
+    )
     add("Bend", envs.Bend, {"length": 20.0}, None, lambda made: driven(scenario(ego_path=(made,))))
     add("RoadPlan", envs.RoadPlan, {}, None, lambda made: driven(scenario(road=made)))
-    add("Scenario", envs.Scenario, {"family": "x", "ego_speed": 10.0, "duration": 5.0, "actors": (actor,)},
-        None, driven)  # fmt: skip
+    add(
+        "Scenario",
+        envs.Scenario,
+        {"family": "x", "ego_speed": 10.0, "duration": 5.0, "actors": (actor,)},
+        None,
+        driven,
+    )
     add("make_scenario", envs.make_scenario, {"name": "CCRs"}, {"name": "str"})
     add("env_id", envs.env_id, {"family": "CCRs"})
-    for name, types in (("CCRs", {"lateral_offset": "float | None", "condition": "str"}),
-                        ("RandomBraking", {"split": "str", "start_level": "int", "num_levels": "int",
-                                           "conditions": ""})):  # fmt: skip
+
+
+def _add_environments(add):
+    """Add the functions of environments and wrappers."""
+    for name, types in (
+        ("CCRs", {"lateral_offset": "float | None", "condition": "str"}),
+        ("RandomBraking", {"split": "str", "start_level": "int", "num_levels": "int", "conditions": ""}),
+    ):
         add(f"gym.make {name}", partial(gym.make, envs.env_id(name)), ENV, ENV_TYPES | types, made)
         more = {"num_envs": "int", "threads": "int", "autoreset_mode": "", "copy": "bool", "config": ""}
         valid = {**ENV, "num_envs": 2}
@@ -197,18 +222,32 @@ def targets():
     add("config", braking, {}, dict.fromkeys(CONFIG, ""), made)
     add("reward", lambda **reward: braking(reward=reward), {}, signature_of(RewardParams), made)
     add("brake", braking, {}, signature_of(BrakeParams), made)
-    add("demands", lambda demands: braking(action={"type": "DiscreteDemand", "demands": demands}),
-        {"demands": [0.0]}, {"demands": ""}, made)  # fmt: skip
+    add(
+        "demands",
+        lambda demands: braking(action={"type": "DiscreteDemand", "demands": demands}),
+        {"demands": [0.0]},
+        {"demands": ""},
+        made,
+    )
     add("reset", reset, {}, {"seed": "int | None", "options": ""})
     add("reset config", lambda **config: reset(options={"config": config}), {}, dict.fromkeys(CONFIG, ""))
     add("reset vector", stepped_vector, {}, {"seed": "", "options": ""})
     add("reset mask", lambda mask: stepped_vector(options={"reset_mask": mask}), {"mask": None}, {"mask": ""})
     add("BrakingVectorEnv", engine.BrakingVectorEnv, {"family": "CCRs", "camera": SMALL}, None, made)
-    add("LGMDObservation", partial(wrapped, LGMDObservation), {"camera": SMALL},
-        _without_env(LGMDObservation), made)  # fmt: skip
+    add(
+        "LGMDObservation",
+        partial(wrapped, LGMDObservation),
+        {"camera": SMALL},
+        _without_env(LGMDObservation),
+        made,
+    )
     add("LGMDObservation env", LGMDObservation, {"env": None}, {"env": "int"})
     add("vector LGMDObservation", vector, {"camera": SMALL}, _without_env(VectorObservation), made)
     add("LGMDView", viewed, {}, _without_env(lgmd_gym.LGMDView), made)
+
+
+def _add_sensors(add):
+    """Add the functions of neurons and cameras."""
     add("LGMD", lgmd_gym.LGMD, {"shape": (8, 8)}, None, stepped)
     add("LGMD step", lambda frame: lgmd_gym.LGMD((8, 8)).step(frame), {"frame": None}, {"frame": ""})
     add("LGMDParams", lgmd_gym.LGMDParams, {}, None, lambda made: stepped(lgmd_gym.LGMD((8, 8), params=made)))
@@ -231,6 +270,10 @@ def targets():
     )
     add("BirdsEye", camera.BirdsEye, {"shape": (8, 8)}, None, rendered)
     add("with_condition", camera.with_condition, {"camera": "wide", "condition": "fog"})
+
+
+def _add_agents(add):
+    """Add the functions of agents."""
     for agent in agents.AGENTS.values():
         types = _option_types(agent) | ({"params": "None"} if issubclass(agent, agents.Rule) else {})
         add(agent.name, agent, {}, types, acted)
@@ -245,6 +288,10 @@ def targets():
     add("Policy", agents.Policy, {"path": "x"})
     add("register_agent", agents.register_agent, {"agent": agents.NoBrake}, {"agent": "int"})
     add("to_action", agents.to_action, {"demand": 0.0})
+
+
+def _add_runs(add):
+    """Add the functions of runs, trainings and videos."""
     add("RunConfig", benchmark.RunConfig, {}, None, lambda made: made.to_dict())
     add("Executor", benchmark.Executor, {})
     add("run", lambda config: benchmark.run(config), {"config": None}, {"config": "int"})
@@ -254,18 +301,26 @@ def targets():
     add(
         "TrainConfig", TrainConfig, {"algo": "ppo", "demands": (0.0, -1.0)}, None, lambda made: made.to_dict()
     )
-    add("TrainConfig.from_hyperparams", TrainConfig.from_hyperparams, {"algo": "ppo"},
-        dict.fromkeys([*signature_of(TrainConfig), *signature_of(TrainConfig.from_hyperparams)], ""))  # fmt: skip
+    add(
+        "TrainConfig.from_hyperparams",
+        TrainConfig.from_hyperparams,
+        {"algo": "ppo"},
+        dict.fromkeys([*signature_of(TrainConfig), *signature_of(TrainConfig.from_hyperparams)], ""),
+    )
     add("FeatureConfig", FeatureConfig, {})
-    add("PolicyWrapper", lambda **features: PolicyWrapper(gym.make("LGMD/CCRs-v0", camera=SMALL), **features), {},
-        signature_of(FeatureConfig), made)  # fmt: skip
+    add(
+        "PolicyWrapper",
+        lambda **features: PolicyWrapper(gym.make("LGMD/CCRs-v0", camera=SMALL), **features),
+        {},
+        signature_of(FeatureConfig),
+        made,
+    )
     add("SearchSpace", SearchSpace, {"agent": "spike-threshold"}, None, lambda made: made.defaults())
     add("Objective", Objective, {"split": "train", "levels": 1, "seeds": 0})
     add("VideoReader", VideoReader, {"path": "x"})
     add("VideoWriter", VideoWriter, {"path": "x.mp4", "fps": 30.0})
     add("find_clips", find_clips, {"paths": ["x"]})
     add("luma", luma, {"picture": np.zeros((2, 2, 3), np.uint8)})
-    return items
 
 
 def scenario(**arguments):
@@ -296,12 +351,8 @@ def _agent_string(agent, **options):
 
 def acceptable(name, annotation, value):
     """Return whether a value is of the annotated type; True for annotations other than of plain values."""
-    kinds = set(
-        re.split(
-            r"\s*\|\s*",
-            annotation if isinstance(annotation, str) else getattr(annotation, "__name__", str(annotation)),
-        )
-    )
+    text = annotation if isinstance(annotation, str) else getattr(annotation, "__name__", str(annotation))
+    kinds = set(re.split(r"\s*\|\s*", text))
     if not kinds <= {"float", "int", "bool", "str", "None"} or kinds == {""}:
         return True
     checks = {
@@ -325,7 +376,7 @@ def _is_number(value):
 def check_message(error, changes):
     """Assert that a message has one line and contains one of the changed arguments or values."""
     message = str(error)
-    assert message.strip() and len(message.splitlines()) == 1, f"{type(error).__name__}: {message!r}"
+    assert len(message.strip().splitlines()) == 1, f"{type(error).__name__}: {message!r}"
     assert len(message) < 600, f"{len(message)} characters: {message[:80]}"
     parts = [part for item in changes.items() for part in _parts(*item)]
     assert any(part in message for part in parts), f"names no argument: {message}"
@@ -381,5 +432,8 @@ def _hang(*_):
 
 
 if __name__ == "__main__":
+    made(gym.make("LGMD/CCRs-v0", render_mode="rgb_array"))  # compile the kernels without a time limit
+    made(gym.make_vec("LGMD/CCRs-v0", num_envs=2, camera=SMALL))
+    os.chdir(tempfile.mkdtemp())
     signal.signal(signal.SIGALRM, _hang)
     sys.exit(run_cases(draw_case, __doc__))
