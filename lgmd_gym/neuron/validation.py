@@ -56,7 +56,7 @@ def checked_array(name: str, values: Any) -> NDArray[Any]:
 
 def checked_mask(mask: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
     """Return pixel weights as float32 of `shape`, in [0, 1] and not all 0."""
-    weight = checked_array("mask", mask).astype(np.float32)
+    weight = checked_array("mask", mask)
     if weight.shape != shape:
         raise ValueError(
             f"mask must have the shape {shape} (height, width) of the frames, got {weight.shape}"
@@ -64,6 +64,7 @@ def checked_mask(mask: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
     if not ((weight >= 0.0) & (weight <= 1.0)).all():
         span = f"{float(weight.min()):g} to {float(weight.max()):g}"
         raise ValueError(f"mask must have weights in [0, 1], got {span}")
+    weight = weight.astype(np.float32)
     if not weight.any():
         raise ValueError("mask must have a weight > 0, got 0 everywhere; pass mask=None for all pixels")
     return weight

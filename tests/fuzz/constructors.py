@@ -40,7 +40,7 @@ from lgmd_gym.wrappers import LGMDObservation
 from lgmd_gym.wrappers.vector import LGMDObservation as VectorObservation
 
 NAMES = {"spec": ["params"], "text": ["agent", "suite"], "paths": ["path", "clip"], "sensors_of": ["agent"]}
-NAMES |= {"path": ["policy", "clip", "video"], "family": ["scenario"], "name": ["scenario", "suite"]}
+NAMES |= {"path": ["policy", "clip", "video", "file"], "family": ["scenario"], "name": ["scenario", "suite"]}
 NAMES |= {"fps": ["clip"], "size": ["clip"], "file": ["hyperparameters"], "ego_speed": ["speed"]}
 NAMES |= {"agent": ["rule"], "algo": ["algorithm"], "seeds": ["seed"]}  # other names of arguments
 LIMIT_S = 20  # time after which a call counts as hanging [s]
@@ -48,12 +48,12 @@ VALUES = (
     None, True, False, "", "nix", "1", "[red]", "x" * 5000, "a\nb", "fog", b"", b"1", -1, 0, 1, 2, 7, 1.5,
     -0.5, 1e400, -1e400, math.nan, 10**9, 10**19, 10**400, -(10**400), 10**5000, 1e-320, 1e300, 1j, [], [1],
     [None], ["fovea"], [[]], (), (1, 2), (0, 0), (-1, 4), (10**9, 4), (1.5, 2.5), (8, 8, 8), ("a", "b"), {},
-    {"a": 1}, {None: 1}, {"name": "wide"}, {"shape": [8, 8]}, {1, 2}, object(), object, print, Path("nodir/x"),
-    np.nan, np.float32(1.5), np.float64(np.nan), np.int64(3), np.uint8(200), np.bool_(True), np.array(2.0),
-    np.zeros(0), np.zeros((2, 2)), np.full((8, 8), 2, np.int8), np.ones((8, 8), np.bool_), np.ones((90, 160), np.float16),
-    np.array(["a"]), np.array([None, 1], object), np.zeros((8, 8), np.complex128), range(3), "birdseye",
-    ["fovea", "fovea"], {"camera": "fovea"}, {"seed": -1}, slice(3), Ellipsis,
-    NotImplemented, ValueError("x"),
+    {"a": 1}, {None: 1}, {"name": "wide"}, {"shape": [8, 8]}, {1, 2}, object(), object, print,
+    Path("nodir/x"), np.nan, np.float32(1.5), np.float64(np.nan), np.int64(3), np.uint8(200),
+    np.bool_(True), np.array(2.0), np.zeros(0), np.zeros((2, 2)), np.full((8, 8), 2, np.int8),
+    np.ones((8, 8), np.bool_), np.ones((90, 160), np.float16), np.array(["a"]), np.array([None, 1], object),
+    np.zeros((8, 8), np.complex128), range(3), "birdseye", ["fovea", "fovea"], {"camera": "fovea"},
+    {"seed": -1}, slice(3), Ellipsis, NotImplemented, ValueError("x"),
 )  # fmt: skip
 INFINITE = {"tau_1", "tau_2", "tau_s", "t_f", "t_ffi", "max_spikes", "far_m"}  # where infinity is documented
 CONFIG = (

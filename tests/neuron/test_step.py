@@ -107,7 +107,7 @@ def test_constant_float_frames_are_valid():
         ({"fps": float("nan")}, "fps must be finite, got nan"),
         ({"num": 0}, "num must be >= 1, got 0; pass None for a single neuron"),
         ({"num": 2.5}, "num must be an integer or None, got 2.5"),
-        ({"threads": 0}, "threads must be a whole number in \[1, 1024\], got 0"),
+        ({"threads": 0}, r"threads must be a whole number in \[1, 1024\], got 0"),
         ({"params": {"tsp": 0.7}}, "unknown LGMD parameter 'tsp'; did you mean 't_sp'?"),
         ({"params": 0.7}, "params must be LGMDParams, a mapping or None, got 0.7"),
         ({"mask": np.zeros(SHAPE)}, "mask must have a weight > 0, got 0 everywhere"),
