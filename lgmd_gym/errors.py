@@ -67,7 +67,7 @@ def check_positive(name: str, value: Any) -> float:
 def check_whole(name: str, value: Any, low: int, high: float = inf) -> int:
     """Return `value` as int if it is a whole number in [low, high], or raise ValueError."""
     if not is_number(value) or check_finite(name, value) != int(value) or not low <= value <= high:
-        interval = f">= {low}" if high == inf else f"in [{low}, {high:g}]"
+        interval = f">= {low}" if high == inf else f"in [{low}, {high}]"
         raise ValueError(f"{name} must be a whole number {interval}, got {shown(value)}")
     return int(value)
 

@@ -140,8 +140,8 @@ def test_vector_environment_equals_single_environments():
     ("arguments", "words"),
     [
         ({"split": "tain"}, "unknown split 'tain'; did you mean 'train'"),
-        ({"start_level": -1}, r"start_level must be in \[0, 999999\], got -1"),
-        ({"start_level": LEVELS - 1, "num_levels": 2}, r"num_levels must be in \[0, 1\]"),
+        ({"start_level": -1}, r"start_level must be a whole number in \[0, 999999\], got -1"),
+        ({"start_level": LEVELS - 1, "num_levels": 2}, r"num_levels must be a whole number in \[0, 1\]"),
         ({"levels": 3}, "'num_levels'"),
         ({"conditions": ["clear", "foggy"]}, "unknown condition 'foggy'; did you mean 'fog'"),
         ({"conditions": []}, "conditions needs at least one name"),

@@ -11,7 +11,8 @@ from lgmd_gym.envs.dynamics.longitudinal import advance, time_to_stop
 from lgmd_gym.envs.dynamics.path import path_table, pose_at
 from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.speed_profile import SCRIPT_FIELDS, segment_table, step_script
-from lgmd_gym.envs.dynamics.units import check_speed, check_within
+from lgmd_gym.envs.dynamics.units import check_speed
+from lgmd_gym.errors import check_within
 
 NO_SEGMENTS = np.zeros((0, 4))
 ORIGIN = Pose(0.0, 0.0, 0.0)
