@@ -243,7 +243,7 @@ def test_invalid_configuration_is_rejected_before_the_folder_is_created(tmp_path
 def test_existing_folder_and_zero_jobs_are_rejected(tmp_path):
     with pytest.raises(ValueError, match="already exists"):
         new_run(tmp_path, agents=["no-brake"])
-    with pytest.raises(ValueError, match="jobs must be >= 1, got 0"):
+    with pytest.raises(ValueError, match=r"jobs must be a whole number in \[1, 1024\], got 0"):
         Executor(jobs=0)
 
 
