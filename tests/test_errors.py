@@ -119,3 +119,7 @@ def test_odd_arguments_of_reset_are_refused(arguments):
     (name,) = arguments
     with pytest.raises(ValueError, match=rf"^{name} must be [^\n]*, got"):
         env.reset(**arguments)
+
+
+def test_small_integers_of_numpy_do_not_overflow():
+    assert -envs.Actor(gap=np.uint8(200), heading=np.uint8(2)).heading == -2.0

@@ -63,9 +63,13 @@ class Actor:
     height: float = TARGET_HEIGHT
 
     def __post_init__(self) -> None:
-        check_within("gap", self.gap, -1000.0, 1000.0, "m")
-        check_within("lateral_offset", self.lateral_offset, -500.0, 500.0, "m")
-        check_finite("heading", self.heading)
+        # As float, because small integers of numpy overflow in calculations.
+        gap = check_within("gap", self.gap, -1000.0, 1000.0, "m")
+        lateral_offset = check_within("lateral_offset", self.lateral_offset, -500.0, 500.0, "m")
+        heading = check_finite("heading", self.heading)
+        object.__setattr__(self, "gap", gap)
+        object.__setattr__(self, "lateral_offset", lateral_offset)
+        object.__setattr__(self, "heading", heading)
         check_speed("speed", self.speed, zero=True)
         object.__setattr__(self, "profile", check_items("profile", self.profile, Segment))
         object.__setattr__(self, "path", check_items("path", self.path, Bend))
