@@ -1,99 +1,37 @@
 """Mutation test: plant small errors in the source, one at a time, and count those that the tests notice.
 
-    python tests/mutation/run.py [MODULE ...] [--limit N] [--seed S] [--jobs N]
+    python tests/mutation/run.py [MODULE ...] [--limit N] [--seed S] [--jobs N] [--out FILE]
 
 Each mutant is written to a temporary copy of the sources, and the tests of its module are run without
 compilation (`NUMBA_DISABLE_JIT=1`), which takes a second. A mutant survives if they pass. The exit code is 0
-if at least 90 % are killed.
+if all were played and at least 90 % killed. Ctrl-C and SIGTERM end the test with the score so far.
 """
 
 import argparse
+import contextlib
 import importlib
 import multiprocessing
 import os
 import random
 import shutil
+import signal
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from itertools import product
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
-from mutants import Mutant, mutants_of
+from modules import MODULES
+from mutants import mutants_of
+from score import Score, Task
 
 ROOT = Path(__file__).resolve().parents[2]
 COPIED = ("lgmd_gym", "envs", "agents", "tests", "pyproject.toml")
 PRELOADED = ("numpy", "numba", "gymnasium", "highway_env.envs", "hypothesis", "rich.console", "tyro")
-GOAL = 0.9
-
-
-class Module(NamedTuple):
-    """Sources, their tests, and functions that cannot run without compilation."""
-
-    sources: tuple[str, ...]
-    tests: tuple[str, ...]
-    skipped: tuple[str, ...] = ()
-
-
-def _under(folder: str, *names: str) -> tuple[str, ...]:
-    return tuple(f"{folder}/{name}.py" for name in names)
-
-
-_HAND = ("test_motion_by_hand", "test_ego_by_hand", "test_contact_by_hand", "test_episode_end")
-_FAMILIES = ("rear", "crossing", "turning", "adjacent", "obstacle")
-MODULES = {
-    "reward": Module(("envs/reward.py",), ("tests/envs/test_formulas.py",)),
-    "info": Module(("envs/info.py", "envs/surrogate_safety.py"), ("tests/envs/test_formulas.py",)),
-    "dynamics": Module(
-        _under(
-            "envs/dynamics",
-            "longitudinal",
-            "brake",
-            "bodies",
-            "speed_profile",
-            "path",
-            "bend",
-            "units",
-            "episode",
-        ),
-        _under("tests/envs", *_HAND, "test_path", "test_formulas"),
-        ("__deepcopy__", "DelayLine", "SpeedProfile", "step_environment"),
-    ),
-    "contact": Module(
-        _under("envs/dynamics", "contact", "swept_contact"), ("tests/envs/test_contact_by_hand.py",)
-    ),
-    "scenarios": Module(
-        _under("envs/scenarios", "adjacent", "crossing", "obstacles", "rear", "scenario", "turning"),
-        (*_under("tests/envs", *(f"test_{name}_scenarios" for name in _FAMILIES), "test_scenario_data"),),
-        ("_time_to_cover",),
-    ),
-    "metrics": Module(("lgmd_gym/benchmark/metrics.py",), ("tests/benchmark/test_formulas.py",)),
-    "statistics": Module(
-        ("lgmd_gym/benchmark/statistics.py", *_under("lgmd_gym/benchmark/analysis", "bootstrap", "compare")),
-        ("tests/benchmark/test_formulas.py", "tests/benchmark/test_statistics.py"),
-        ("compare_runs", "read_case_rows", "_agent_pairs"),
-    ),
-    "neuron": Module(("lgmd_gym/neuron/scalars.py",), ("tests/neuron/test_boundaries.py",)),
-    "camera": Module(
-        (
-            *_under("lgmd_gym/camera", "pinhole", "pose"),
-            *_under("lgmd_gym/camera/render", "glare", "markings", "texture_sampling"),
-        ),
-        tuple(f"tests/camera/test_{name}_by_hand.py" for name in ("geometry", "glare", "ground", "markings")),
-        ("noise_start", "fixed_line", "_fixed", "sample"),
-    ),
-}
-
-
-class Task(NamedTuple):
-    """One mutant of one source."""
-
-    module: str
-    source: str
-    mutant: Mutant
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 def all_tasks(names: list[str]) -> list[Task]:
@@ -118,6 +56,9 @@ def make_copy(folder: Path) -> None:
 
 def run_tests(copy: Path, tests: tuple[str, ...], bytecode: bool) -> None:
     """Run tests in a copy of the sources and exit with the code of pytest; runs in a process of its own."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     os.chdir(copy)
     sys.path.insert(0, str(copy))
     # The bytecode of a mutant may be as old and as long as that of the next one.
@@ -133,7 +74,9 @@ def start(copy: Path, module: str, bytecode: bool = False) -> BaseProcess:
     """Return a process that runs the tests of a module in a copy of the sources."""
     arguments = copy, MODULES[module].tests, bytecode
     process = multiprocessing.get_context("fork").Process(target=run_tests, args=arguments)
+    signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # an exception in a callback of fork() would be lost
     process.start()
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     return process
 
 
@@ -177,10 +120,10 @@ class Slot:
         return "survived" if self.process.exitcode == 0 else "timeout" if late else "killed"
 
 
-def play_all(tasks: list[Task], copies: list[Path]) -> list[tuple[Task, str]]:
-    """Play all mutants and print each outcome other than "killed"."""
+def play_all(tasks: list[Task], copies: list[Path]) -> Iterator[tuple[Task, str]]:
+    """Play all mutants and yield each with its outcome, in the order in which their tests end."""
     limits = time_limits(sorted({task.module for task in tasks}), copies)
-    idle, busy, waiting, outcomes = [Slot(copy) for copy in copies], [], list(tasks), []
+    idle, busy, waiting = [Slot(copy) for copy in copies], [], list(tasks)
     while waiting or busy:
         while waiting and idle:
             slot, task = idle.pop(), waiting.pop(0)
@@ -192,20 +135,32 @@ def play_all(tasks: list[Task], copies: list[Path]) -> list[tuple[Task, str]]:
             if outcome is not None:
                 busy.remove(slot)
                 idle.append(slot)
-                outcomes.append((slot.task, outcome))
-                report(slot.task, outcome)
-    return outcomes
+                yield slot.task, outcome
 
 
-def report(task: Task, outcome: str) -> None:
-    """Print the place and the change of a mutant that was not killed by a failed test."""
-    if outcome != "killed":
-        mutant = task.mutant
-        print(f"{outcome}  {task.source}:{mutant.line}\n  - {mutant.before}\n  + {mutant.after}", flush=True)
+def play_in_copies(tasks: list[Task], jobs: int, score: Score) -> None:
+    """Play all mutants in temporary copies of the sources and count them.
+
+    No test and no copy is left at the end, also after Ctrl-C and SIGTERM.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with tempfile.TemporaryDirectory(prefix="lgmd-gym-mutants-") as folder:
+        try:
+            copies = [Path(folder) / str(number) for number in range(jobs)]
+            for copy in copies:
+                make_copy(copy)
+            for task, outcome in play_all(tasks, copies):
+                score.add(task, outcome)
+        finally:
+            for number in SIGNALS:  # a second one would interrupt the removal
+                signal.signal(number, signal.SIG_IGN)
+            for process in multiprocessing.active_children():
+                process.kill()
+                process.join()
 
 
-def main() -> None:
-    """Parse the command line, play the mutants and print the score."""
+def parse() -> argparse.Namespace:
+    """Parse the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -213,9 +168,16 @@ def main() -> None:
     parser.add_argument("--limit", type=int, help="number of mutants, drawn at random; default: all")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--out", type=Path, help="file for the outcomes, written as they come, as JSON lines")
     arguments = parser.parse_args()
     if unknown := [name for name in arguments.modules if name not in MODULES]:
         parser.error(f"unknown module {unknown[0]!r}; choose from {', '.join(MODULES)}")
+    return arguments
+
+
+def main() -> None:
+    """Play the mutants that the command line selects and print the score."""
+    arguments = parse()
     tasks = all_tasks(arguments.modules or list(MODULES))
     total = len(tasks)
     if arguments.limit is not None and arguments.limit < total:
@@ -223,17 +185,13 @@ def main() -> None:
     os.environ |= {"NUMBA_DISABLE_JIT": "1", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
     for name in PRELOADED:  # once, not in every process
         importlib.import_module(name)
-    with tempfile.TemporaryDirectory() as folder:
-        copies = [Path(folder) / str(number) for number in range(arguments.jobs)]
-        for copy in copies:
-            make_copy(copy)
-        outcomes = play_all(tasks, copies)
-    for name in arguments.modules or MODULES:
-        found = [outcome for task, outcome in outcomes if task.module == name]
-        print(f"{name:12} {sum(outcome != 'survived' for outcome in found):4} of {len(found):4} killed")
-    killed = sum(outcome != "survived" for _, outcome in outcomes)
-    print(f"killed {killed} of {len(tasks)} mutants ({killed / max(len(tasks), 1):.1%}); {total} in all")
-    sys.exit(killed < GOAL * len(tasks))
+    with open(arguments.out or os.devnull, "w") as file:
+        score = Score(len(tasks), file)
+        with contextlib.suppress(KeyboardInterrupt):  # the score of a part is printed, too
+            play_in_copies(tasks, arguments.jobs, score)
+    score.show_result()
+    print(f"{total} mutants in all")
+    sys.exit(not score.reaches_goal)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,61 @@
+"""Modules of the mutation test: their sources and the tests that must notice a mutant."""
+
+from typing import NamedTuple
+
+
+class Module(NamedTuple):
+    """Sources, their tests, and functions that cannot run without compilation."""
+
+    sources: tuple[str, ...]
+    tests: tuple[str, ...]
+    skipped: tuple[str, ...] = ()
+
+
+def _under(folder: str, *names: str) -> tuple[str, ...]:
+    return tuple(f"{folder}/{name}.py" for name in names)
+
+
+_HAND = ("test_motion_by_hand", "test_ego_by_hand", "test_contact_by_hand", "test_episode_end")
+_FAMILIES = ("rear", "crossing", "turning", "adjacent", "obstacle")
+MODULES = {
+    "reward": Module(("envs/reward.py",), ("tests/envs/test_formulas.py",)),
+    "info": Module(("envs/info.py", "envs/surrogate_safety.py"), ("tests/envs/test_formulas.py",)),
+    "dynamics": Module(
+        _under(
+            "envs/dynamics",
+            "longitudinal",
+            "brake",
+            "bodies",
+            "speed_profile",
+            "path",
+            "bend",
+            "units",
+            "episode",
+        ),
+        _under("tests/envs", *_HAND, "test_path", "test_formulas"),
+        ("__deepcopy__", "DelayLine", "SpeedProfile", "step_environment"),
+    ),
+    "contact": Module(
+        _under("envs/dynamics", "contact", "swept_contact"), ("tests/envs/test_contact_by_hand.py",)
+    ),
+    "scenarios": Module(
+        _under("envs/scenarios", "adjacent", "crossing", "obstacles", "rear", "scenario", "turning"),
+        (*_under("tests/envs", *(f"test_{name}_scenarios" for name in _FAMILIES), "test_scenario_data"),),
+        ("_time_to_cover",),
+    ),
+    "metrics": Module(("lgmd_gym/benchmark/metrics.py",), ("tests/benchmark/test_formulas.py",)),
+    "statistics": Module(
+        ("lgmd_gym/benchmark/statistics.py", *_under("lgmd_gym/benchmark/analysis", "bootstrap", "compare")),
+        ("tests/benchmark/test_formulas.py", "tests/benchmark/test_statistics.py"),
+        ("compare_runs", "read_case_rows", "_agent_pairs"),
+    ),
+    "neuron": Module(("lgmd_gym/neuron/scalars.py",), ("tests/neuron/test_boundaries.py",)),
+    "camera": Module(
+        (
+            *_under("lgmd_gym/camera", "pinhole", "pose"),
+            *_under("lgmd_gym/camera/render", "glare", "markings", "texture_sampling"),
+        ),
+        tuple(f"tests/camera/test_{name}_by_hand.py" for name in ("geometry", "glare", "ground", "markings")),
+        ("noise_start", "fixed_line", "_fixed", "sample"),
+    ),
+}
