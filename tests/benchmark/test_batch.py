@@ -119,12 +119,19 @@ def _no_fallback(monkeypatch):
 @pytest.mark.usefixtures("_no_fallback")
 @pytest.mark.parametrize("agent", ["no-brake", "random-brake", "spike-threshold", "ttc-oracle", "graded"])
 def test_batch_gives_the_results_of_single_tasks(agent):
-    tasks = make_tasks(agent)
+    tasks = make_tasks(agent, seeds=(1,))
     assert_equal_results(play_batches(tasks), list(map(run_task, tasks)))
 
 
 @pytest.mark.usefixtures("_no_fallback")
-@pytest.mark.parametrize("agent", ["stopping-zone", "nested-fields", "frame-difference"])
+@pytest.mark.parametrize(
+    "agent",
+    [
+        "stopping-zone",
+        pytest.param("nested-fields", marks=pytest.mark.slow),
+        pytest.param("frame-difference", marks=pytest.mark.slow),
+    ],
+)
 def test_batch_with_the_cameras_of_an_agent_gives_the_results_of_single_tasks(agent):
     tasks = make_tasks(agent, CASES[1:4], seeds=(0,))
     assert_equal_results(play_batches(tasks), list(map(run_task, tasks)))
@@ -264,7 +271,7 @@ def test_an_agent_that_needs_memory_does_not_replace_the_worker_processes(tmp_pa
     assert len(processes) == 2
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_run_gives_the_rows_and_series_of_single_tasks(tmp_path, jobs):
     agents = ("spike-threshold", "ttc-oracle")
     run = new_run(tmp_path / "run", jobs=jobs, suite="r152", agents=agents, seeds=1)

@@ -200,6 +200,7 @@ def test_faulty_agents_become_error_rows(short_suite, tmp_path, monkeypatch):
     assert sorted_keys(read_rows(tmp_path / "run")) == sorted_keys(run.rows)
 
 
+@pytest.mark.slow
 def test_full_disk_loses_only_the_episode_in_flight(short_suite, tmp_path):
     """A limit on the file size emulates a full disk: writing the row that exceeds it fails halfway."""
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (30000, resource.RLIM_INFINITY)); "

@@ -87,7 +87,10 @@ def test_case_counts_match_the_documents():
     assert find_case("ncap2023/CCRs/v30/overlap-50").arguments == (("ego_speed", 8.333333), ("overlap", -0.5))
 
 
-@pytest.mark.parametrize("suite", SUITES)
+@pytest.mark.parametrize(
+    "suite",
+    [pytest.param(name, marks=[pytest.mark.slow] if name == "ncap2023" else []) for name in SUITES],
+)
 def test_bounding_agents_in_every_case(suite):
     assert [line for case in SUITES[suite].cases for line in violations(case)] == []
 

@@ -19,6 +19,7 @@ def run(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=120)
 
 
+@pytest.mark.slow
 def test_bench_writes_a_run_folder(tmp_path):
     out, suite = tmp_path / "deep" / "run", tmp_path / "small.toml"
     suite.write_text(SMALL_SUITE)
@@ -37,6 +38,7 @@ def test_bench_writes_a_run_folder(tmp_path):
     assert "already exists" in again.stderr
 
 
+@pytest.mark.slow
 def test_drive_writes_a_video(tmp_path):
     video = tmp_path / "out.mp4"
     done = run(
@@ -51,17 +53,16 @@ def test_drive_writes_a_video(tmp_path):
     assert (pictures[0] != pictures[-1]).any()
 
 
-def test_drive_prints_the_result_of_a_case():
-    done = run("drive", "quick/CCRs/v20", "--agent", "no-brake")
-    assert done.returncode == 0, done.stderr
-    assert "contact at 20.0 km/h" in done.stdout
+def test_drive_prints_the_result_of_a_case(capsys):
+    assert cli.run(["drive", "quick/CCRs/v20", "--agent", "no-brake"]) == 0
+    assert "contact at 20.0 km/h" in capsys.readouterr().out
 
 
-def test_drive_reports_an_empty_road():
-    done = run("drive", "LGMD/EmptyRoad-v0", "--agent", "no-brake")
-    assert done.returncode == 0, done.stderr
-    assert "no contact" in done.stdout
-    assert "no vehicle ahead" in done.stdout
+def test_drive_reports_an_empty_road(capsys):
+    assert cli.run(["drive", "LGMD/EmptyRoad-v0", "--agent", "no-brake"]) == 0
+    printed = capsys.readouterr().out
+    assert "no contact" in printed
+    assert "no vehicle ahead" in printed
 
 
 def test_list_prints_every_table(capsys):

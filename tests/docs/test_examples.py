@@ -20,6 +20,7 @@ def load(name):
     return module
 
 
+@pytest.mark.slow
 def test_braking_benchmark(tmp_path, capsys):
     load("braking_benchmark").main(tmp_path / "run", tmp_path / "picture.png")
     lines = capsys.readouterr().out.splitlines()
@@ -38,6 +39,7 @@ def test_scenario_evaluation(capsys, tmp_path):
     assert (tmp_path / "picture.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_rl_training(capsys, tmp_path):
     """PPO with MultiInputPolicy updates its parameters, which stay finite, in 2,000 steps."""
     torch = pytest.importorskip("torch")
@@ -57,6 +59,7 @@ def test_contact_sheet(tmp_path):
     assert 10_000 < (tmp_path / "sheet.png").stat().st_size < 200_000
 
 
+@pytest.mark.slow
 def test_on_record(capsys):
     """The result on recorded episodes equals that of the closed loop."""
     example = load("on_record")

@@ -58,8 +58,17 @@ def compare(family, mode, threads, steps, draw=random_demands, num_envs=3, seed=
     return episodes
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize(
+    ("mode", "threads"),
+    [
+        ("NextStep", 2),
+        ("SameStep", 1),
+        ("Disabled", 2),
+        pytest.param("NextStep", 1, marks=pytest.mark.slow),
+        pytest.param("SameStep", 2, marks=pytest.mark.slow),
+        pytest.param("Disabled", 1, marks=pytest.mark.slow),
+    ],
+)
 def test_random_levels(mode, threads):
     assert compare("RandomBraking", mode, threads, 260, include_frame=True, trace=True) >= 3
 

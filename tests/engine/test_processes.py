@@ -40,7 +40,7 @@ def test_forked_child_continues_the_episodes_of_its_parent(threads):
     envs.close()
 
 
-@pytest.mark.parametrize("context", ["fork", "spawn"])
+@pytest.mark.parametrize("context", ["fork", pytest.param("spawn", marks=pytest.mark.slow)])
 def test_async_vector_env_after_use(context):
     engine = gym.make_vec(ENV, num_envs=2, threads=2)
     first, _ = engine.reset(seed=3)
@@ -71,6 +71,7 @@ def test_stable_baselines_workers_after_use():
     engine.close()
 
 
+@pytest.mark.slow
 def test_the_engine_leaves_no_threads_behind():
     """An interpreter that does not close the engine ends, and one thread starts no pool."""
     code = (

@@ -145,6 +145,7 @@ def test_a_vector_of_single_environments_is_accepted():
     assert len(assert_equal_rollouts(SB3VecEnv(sync), SB3VecEnv(engine), 40, brake)) == 4
 
 
+@pytest.mark.slow
 def test_torch_is_loaded_with_the_adapter_only():
     code = (
         "import sys, gymnasium, lgmd_gym, lgmd_gym.engine\n"

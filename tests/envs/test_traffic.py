@@ -25,6 +25,7 @@ from lgmd_gym.envs.traffic.road import TrafficRoad
 TESTS = Path(__file__).parents[1]
 
 
+@pytest.mark.slow
 def test_traffic_does_not_depend_on_the_process_or_on_other_environments():
     command = [sys.executable, "-m", "support.traffic"]
     other = subprocess.run(command, cwd=TESTS, capture_output=True, text=True, check=True).stdout

@@ -114,15 +114,19 @@ def test_subfolders_import_one_way():
     assert wrong == []
 
 
+@pytest.fixture(scope="module")
+def bare():
+    """Modules that `lgmd_gym` itself loads; it loads Gymnasium to register the ids."""
+    return set(run("import sys, lgmd_gym; print(*sys.modules)").split())
+
+
 @pytest.mark.parametrize(("folder", "unrelated"), [
     ("neuron", ("gymnasium", "highway_env", "lgmd_gym.camera")),
     ("camera", ("gymnasium", "pandas", "lgmd_gym.neuron")),
     ("agents", ("gymnasium", "highway_env", "lgmd_gym.envs", "lgmd_gym.neuron")),
 ])  # fmt: skip
-def test_low_level_folders_load_no_unrelated_package(folder, unrelated):
+def test_low_level_folders_load_no_unrelated_package(folder, unrelated, bare):
     loaded = run(f"import sys, lgmd_gym.{folder}; print(*sys.modules)").split()
-    # lgmd_gym/__init__ itself loads Gymnasium to register the ids.
-    bare = set(run("import sys, lgmd_gym; print(*sys.modules)").split())
     assert [name for name in unrelated if name in loaded and name not in bare] == []
 
 
@@ -132,9 +136,8 @@ def run(code, **kwargs):
     ).stdout
 
 
-def test_import_is_light():
-    loaded = run("import sys, lgmd_gym; print(*sys.modules)").split()
-    assert [name for name in HEAVY if name in loaded] == []
+def test_import_is_light(bare):
+    assert [name for name in HEAVY if name in bare] == []
 
 
 @pytest.mark.bench

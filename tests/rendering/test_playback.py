@@ -35,6 +35,7 @@ env.close()
 """
 
 
+@pytest.mark.slow
 def test_window_shows_the_picture_until_it_is_closed():
     variables = {name: value for name, value in os.environ.items() if name not in DISPLAY_VARIABLES}
     result = subprocess.run(

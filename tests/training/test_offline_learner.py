@@ -152,6 +152,7 @@ def test_evaluation_separates_levels_and_traffic(tmp_path):
     assert evaluation.mean_return == pytest.approx(np.mean(returns), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_evaluation_equals_closed_loop_returns(tmp_path):
     features = FeatureConfig(inputs=("spike_peak", "ffi", "ego_speed"), history=3, repeat=5, latch=True)
     config, seeds = replace(offline_config(tmp_path), features=features), range(5)

@@ -23,6 +23,7 @@ def arguments(folder, out, *options):
     return [*common, "--hyperparams", str(write_yaml(folder)), "--out", str(out), *options]
 
 
+@pytest.mark.slow
 def test_second_training_reuses_the_recordings_of_the_first(tmp_path, monkeypatch):
     first, second = tmp_path / "first", tmp_path / "second"
     assert cli.run(arguments(tmp_path, first, "--eval-episodes", "4")) == 0

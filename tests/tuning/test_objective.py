@@ -30,7 +30,8 @@ def test_the_value_is_avoided_energy_minus_the_cost_of_false_activations():
 @pytest.mark.parametrize(
     ("agent", "levels", "seeds"),
     [
-        ("spike-threshold:threshold=60", 8, 0),
+        ("spike-threshold:threshold=60", 3, 0),
+        pytest.param("spike-threshold:threshold=60", 8, 0, marks=pytest.mark.slow),
         pytest.param("frame-difference:level=2", 8, 0, marks=pytest.mark.slow),
         pytest.param("stopping-zone", 20, 1, marks=pytest.mark.slow),
     ],

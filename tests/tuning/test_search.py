@@ -1,6 +1,7 @@
 """Search with Optuna on objectives with a known maximum, and the `tune` command."""
 
 import pytest
+from support.runs import SMALL_SUITE
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.sensors import SensorConfig
@@ -134,13 +135,14 @@ def test_sensitivity_evaluates_every_shift():
 def test_bench_accepts_the_options_that_tune_prints(tmp_path, monkeypatch, capsys):
     pytest.importorskip("optuna")
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.toml").write_text(SMALL_SUITE)
     small = ["--levels", "2", "--seeds", "0", "--trials", "2", "--jobs", "1"]
     space = ["--agent", "spike-threshold", "--cameras", "tele", "fovea", "--neuron", "sigma_3"]
     assert cli.run(["tune", *small, *space]) == 0
     printed = capsys.readouterr().out.splitlines()[-1].split(": ", 1)[1].split()
     assert printed[0] == "--agents"
     assert "--params" in printed
-    assert cli.run(["bench", *printed, "--suite", "r152", "--seeds", "1", "--jobs", "1"]) == 0
+    assert cli.run(["bench", *printed, "--suite", "small.toml", "--seeds", "1", "--jobs", "1"]) == 0
     assert cli.run(["tune", *small, *space]) == 2
     assert "--best 'best.toml' exists; choose another file" in capsys.readouterr().err
 

@@ -34,8 +34,17 @@ def assert_infos_equal(got, expected):
             )
 
 
-@pytest.mark.parametrize("mode", list(AutoresetMode))
-@pytest.mark.parametrize("threads", [None, 2])
+@pytest.mark.parametrize(
+    ("mode", "threads"),
+    [
+        (AutoresetMode.NEXT_STEP, None),
+        (AutoresetMode.SAME_STEP, 2),
+        (AutoresetMode.DISABLED, 2),
+        pytest.param(AutoresetMode.NEXT_STEP, 2, marks=pytest.mark.slow),
+        pytest.param(AutoresetMode.SAME_STEP, None, marks=pytest.mark.slow),
+        pytest.param(AutoresetMode.DISABLED, None, marks=pytest.mark.slow),
+    ],
+)
 def test_vector_wrapper_equals_wrapped_single_environments(mode, threads):
     wrapped = LGMDObservation(
         SyncVectorEnv([bare(v) for v in SPEEDS], autoreset_mode=mode), threads=threads, **SENSORS
