@@ -144,7 +144,7 @@ def test_user_agent_is_called_for_each_environment():
 
 
 @pytest.mark.usefixtures("_no_fallback")
-@pytest.mark.parametrize("width", [1, 3, 40])
+@pytest.mark.parametrize("width", [1, 40])
 def test_width_of_a_batch_does_not_change_the_results(monkeypatch, width):
     tasks = make_tasks("spike-threshold", CASES[:3])
     monkeypatch.setattr(batch, "WIDTH", width)

@@ -105,6 +105,7 @@ def test_config_is_the_same_after_saving(tmp_path):
     assert RunConfig.load(config.save(tmp_path)) == config
 
 
+@pytest.mark.slow
 def test_first_seed_selects_the_later_seeds_of_a_longer_run(short_suite, tmp_path, capsys):
     whole = new_run(tmp_path / "whole", suite=str(short_suite), agents=["spike-threshold"], seeds=3)
     assert whole.play()

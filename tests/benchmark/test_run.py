@@ -84,7 +84,9 @@ def test_interrupted_run_keeps_its_rows(tmp_path):
     assert json.loads((tmp_path / "run" / "run.json").read_text())["complete"] is False
 
 
-@pytest.mark.parametrize("fraction", [0.3, 0.6, 0.9])
+@pytest.mark.parametrize(
+    "fraction", [0.6, *(pytest.param(value, marks=pytest.mark.slow) for value in (0.3, 0.9))]
+)
 def test_resumed_run_has_the_rows_of_a_complete_one(quick_run, tmp_path, fraction):
     """The folder is left as by kill -9: some rows, the last one incomplete."""
     folder = tmp_path / "run"

@@ -12,6 +12,7 @@ from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.envs.dynamics.units import KMH
 
+SLOW_SUITES = ("ncap2023", "speeds")
 THREAT_SUITES = ("quick", "speeds", "ncap2023", "ncap2026", "r152", "fmvss127", "random")
 APPROACH = ("CCRs", "CCRm", "CCRb", "CCCscp")
 
@@ -89,7 +90,7 @@ def test_case_counts_match_the_documents():
 
 @pytest.mark.parametrize(
     "suite",
-    [pytest.param(name, marks=[pytest.mark.slow] if name == "ncap2023" else []) for name in SUITES],
+    [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW_SUITES else []) for name in SUITES],
 )
 def test_bounding_agents_in_every_case(suite):
     assert [line for case in SUITES[suite].cases for line in violations(case)] == []

@@ -77,6 +77,7 @@ def test_further_seeds_of_a_case_do_not_narrow_the_interval():
     assert repeated.shares["avoided"] == pytest.approx(once.shares["avoided"])
 
 
+@pytest.mark.slow
 def test_interval_contains_the_true_return_with_its_nominal_frequency():
     rng, trainings = np.random.default_rng(5), [f"p{index}" for index in range(8)]
     hits = 0

@@ -64,7 +64,13 @@ def lane_changes(road):
     )
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(kind, marks=[] if kind in ("highway", "intersection") else [pytest.mark.slow])
+        for kind in KINDS
+    ],
+)
 def test_cars_move_as_on_a_road_of_highway_env(kind):
     """Positions, lanes, lane changes and yielding of all cars but the ego, over twelve seconds."""
     env = make_traffic(kind, camera=None)

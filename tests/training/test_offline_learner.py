@@ -105,6 +105,7 @@ def test_learner_converges_to_the_optimum(tmp_path):
     assert after.mean_return == pytest.approx(np.mean(optimum), abs=1e-4)
 
 
+@pytest.mark.slow
 def test_logit_decay_keeps_the_braking_probability_above_zero(tmp_path):
     """Where braking is always wrong, the penalty keeps the expected return below that of never braking."""
     non_threats = [synthetic_episode(8, seed=seed, threat=False) for seed in range(12)]

@@ -74,7 +74,7 @@ def test_segments_exclude_the_ten_seconds_before_an_emergency(monkeypatch, emerg
         assert emergencies.time_until(float(round(time * 30) / 30)) is None
 
 
-@pytest.mark.parametrize("seed", [HIGHWAY, INTERSECTION])
+@pytest.mark.parametrize("seed", [HIGHWAY, pytest.param(INTERSECTION, marks=pytest.mark.slow)])
 def test_observations_equal_those_of_the_benchmark(monkeypatch, seed):
     config = {"duration": 12}
     monkeypatch.setattr(traffic, "make_traffic", partial(traffic.make_traffic, config=config))

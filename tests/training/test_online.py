@@ -33,7 +33,10 @@ def online_config(folder, algo="ppo", text=YAML, **options):
     return TrainConfig.from_hyperparams(algo, "LGMD/CCRs-v0", write_yaml(folder, text), **options)
 
 
-@pytest.mark.parametrize(("demands", "latch"), [((), False), (DEMANDS, False), ((-1.0, 0.0), True)])
+@pytest.mark.parametrize(
+    ("demands", "latch"),
+    [((), False), pytest.param(DEMANDS, False, marks=pytest.mark.slow), ((-1.0, 0.0), True)],
+)
 def test_trained_policy_acts_as_the_model_predicts(tmp_path, demands, latch):
     """With a latch, the first demand is full braking: an untrained network chooses it within 6 decisions."""
     from stable_baselines3 import PPO

@@ -114,6 +114,7 @@ def test_validation_chooses_between_the_defaults_and_the_best_trials(tmp_path):
     assert best == space.defaults()
 
 
+@pytest.mark.slow
 def test_camera_and_neuron_are_searched_on_request(tmp_path):
     pytest.importorskip("optuna")
     space = SearchSpace(agent="spike-threshold", cameras=("fovea", "tele"), neuron=("sigma_3",))
