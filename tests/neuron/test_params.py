@@ -1,4 +1,5 @@
 import dataclasses
+import inspect
 import math
 import re
 
@@ -102,4 +103,4 @@ def test_make_accepts_every_spec(spec):
 
 def test_docstring_describes_every_field():
     for field in dataclasses.fields(LGMDParams):
-        assert re.search(rf"^        {field.name}: ", LGMDParams.__doc__ or "", re.MULTILINE), field.name
+        assert re.search(rf"^    {field.name}: ", inspect.getdoc(LGMDParams) or "", re.MULTILINE), field.name
