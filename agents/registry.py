@@ -24,7 +24,8 @@ def register_agent(agent: type[Agent]) -> type[Agent]:
     Raises:
         ValueError: If the name is taken.
     """
-    if not isinstance(agent, type) or not issubclass(agent, Agent):
+    given: Any = agent
+    if not isinstance(given, type) or not issubclass(given, Agent):
         raise TypeError(f"agent must be a subclass of Agent, got {shown(agent)}")
     if agent.name in AGENTS:
         raise ValueError(f"agent {agent.name!r} is already registered; choose another name")

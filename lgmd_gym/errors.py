@@ -5,7 +5,7 @@ from difflib import get_close_matches
 from math import inf, isinf, isnan
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -76,7 +76,7 @@ def check_flag(name: str, value: Any) -> bool:
     """Return `value` as bool if it is one, or raise ValueError."""
     if not isinstance(value, bool | np.bool_):
         raise ValueError(f"{name} must be true or false, got {shown(value)}")
-    return bool(value)
+    return bool(cast(Any, value))
 
 
 def check_flags(**flags: Any) -> None:
@@ -121,30 +121,37 @@ def check_path(name: str, value: Any) -> Path:
 
 def check_items(name: str, values: Any, types: type, kind: str = "") -> tuple[Any, ...]:
     """Return a sequence as a tuple if it is a list or tuple of instances of a type, or raise ValueError."""
-    if not isinstance(values, list | tuple) or not all(isinstance(item, types) for item in values):
+    items = as_tuple(values)
+    if items is None or not all(isinstance(item, types) for item in items):
         raise ValueError(f"{name} must be a list of {kind or types.__name__}, got {shown(values)}")
-    return tuple(values)
+    return items
 
 
 def check_size(name: str, value: Any, low: int, high: int, axes: str = "(height, width)") -> tuple[int, int]:
     """Return two integers in [low, high], or raise ValueError."""
     message = f"{name} must be {axes}, each {low} to {high} px, got {shown(value)}"
-    if not isinstance(value, list | tuple) or len(value) != 2 or not all(map(is_integer, value)):
+    items = as_tuple(value)
+    if items is None or len(items) != 2 or not all(map(is_integer, items)):
         raise ValueError(message)
-    first, second = value
+    first, second = items
     if not (low <= first <= high and low <= second <= high):
         raise ValueError(message)
     return int(first), int(second)
 
 
+def as_tuple(value: Any) -> tuple[Any, ...] | None:
+    """Return a list or tuple as a tuple, None for other values."""
+    return tuple(cast(Iterable[Any], value)) if isinstance(value, list | tuple) else None
+
+
 def is_number(value: object) -> bool:
     """Return whether a value is a real number; bools are not."""
-    return isinstance(value, Real) and not isinstance(value, bool)
+    return not isinstance(value, bool) and isinstance(value, Real)
 
 
 def is_integer(value: object) -> bool:
     """Return whether a value is an integer; bools are not."""
-    return isinstance(value, Integral) and not isinstance(value, bool)
+    return not isinstance(value, bool) and isinstance(value, Integral)
 
 
 def check_known(kind: str, name: Any, known: Collection[str]) -> str:

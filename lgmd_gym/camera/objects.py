@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.camera.pinhole import side_tangent
+from lgmd_gym.camera.pose import side_tangent
 from lgmd_gym.camera.render.jit import exact_kernel
 from lgmd_gym.camera.scene import Ego
 

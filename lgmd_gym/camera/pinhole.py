@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.camera.render.jit import exact_kernel
-
 LENS = np.dtype(
     [
         (name, np.float64)
@@ -22,16 +20,6 @@ LENS = np.dtype(
     ]
 )
 """A posed lens, as the kernels read it: position [m], angles [rad], focal length and image centre [px]."""
-
-
-@exact_kernel
-def side_tangent(lens):
-    """Return the tangent of the largest horizontal angle between a point of the frame and the lens's yaw.
-
-    It is -1.0 if the frame contains directions straight below or above the lens, or behind it.
-    """
-    nearest = lens.focal * lens.cos_pitch - lens.centre_v * abs(lens.sin_pitch)
-    return lens.centre_u / nearest if nearest > 1e-3 * lens.focal else -1.0
 
 
 def project(lens: Any, points_m: np.ndarray) -> np.ndarray:

@@ -113,6 +113,16 @@ def pose_lens(mount, scene, ago_s, lens):
 
 
 @exact_kernel
+def side_tangent(lens):
+    """Return the tangent of the largest horizontal angle between a point of the frame and the lens's yaw.
+
+    It is -1.0 if the frame contains directions straight below or above the lens, or behind it.
+    """
+    nearest = lens.focal * lens.cos_pitch - lens.centre_v * abs(lens.sin_pitch)
+    return lens.centre_u / nearest if nearest > 1e-3 * lens.focal else -1.0
+
+
+@exact_kernel
 def noise_start(mount, scene, lens):
     """Return the index of a frame's first number in the noise table, a function of seed and road state."""
     return hash((mount.seed, scene.steps, lens.x, lens.y, lens.yaw)) & ((1 << NOISE_LOG2) - 1)

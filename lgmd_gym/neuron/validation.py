@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lgmd_gym.errors import check_finite, check_size, check_whole, check_within, is_integer, shown
+from lgmd_gym.errors import as_tuple, check_finite, check_size, check_whole, check_within, is_integer, shown
 
 MAX_PIXELS = 2**31  # of all neurons, bounds the memory
 MAX_SIDE = 16384  # [px]
@@ -81,7 +81,8 @@ def checked_region(
     if mask is not None and roi is not None:
         raise ValueError("mask and roi must not both be given; set the mask to 0 outside the region instead")
     if roi is not None:
-        if not isinstance(roi, list | tuple) or len(roi) != 4 or not all(map(is_integer, roi)):
+        given = as_tuple(roi)
+        if given is None or len(given) != 4 or not all(map(is_integer, given)):
             raise ValueError(f"roi must be 4 integers (top, left, height, width), got {shown(roi)}")
         top, left, height, width = roi
         if min(top, left) < 0 or min(height, width) < 1 or top + height > shape[0] or left + width > shape[1]:

@@ -236,4 +236,4 @@ def _to_json(value: Any) -> Any:
 
 def _number_to_json(value: Any) -> Any:
     """Return a number or path that JSON does not know."""
-    return value.item() if isinstance(value, np.generic) else str(value)
+    return cast(Any, value).item() if isinstance(value, np.generic) else str(value)

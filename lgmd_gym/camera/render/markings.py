@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from lgmd_gym.camera.pinhole import side_tangent
+from lgmd_gym.camera.pose import side_tangent
 from lgmd_gym.camera.render.ground import PAINT, add_quad
 from lgmd_gym.camera.render.jit import kernel
 

@@ -3,7 +3,7 @@
 import math
 
 from lgmd_gym.camera.objects import MODEL_MARK, MODEL_POST, MODEL_RAIL
-from lgmd_gym.camera.pinhole import side_tangent
+from lgmd_gym.camera.pose import side_tangent
 from lgmd_gym.camera.render.jit import kernel
 
 
