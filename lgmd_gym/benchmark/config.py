@@ -75,7 +75,7 @@ class RunConfig:
             "params": plain.params,
         }
         if self.suite == TRAFFIC:
-            kinds = KINDS if self.kinds is None else self.kinds
+            kinds = tuple(KINDS) if self.kinds is None else self.kinds
             values["kinds"] = _names("kinds", kinds, "kind of traffic", KINDS)
         for name, value in values.items():
             object.__setattr__(self, name, value)

@@ -120,7 +120,7 @@ def test_help_of_a_command_is_readable(command, capsys):
         (["drive", "LGMD/CCRs-v0", "--set", "ego_speed"], "must be NAME=NUMBER"),
         (["drive", "LGMD/CCRs-v0", "--video", "out.txt"], "must have a suffix among .mp4"),
         (["drive", "LGMD/CCRs-v0", "--video", "nowhere/out.mp4"], "does not exist; create it first"),
-        (["drive", "LGMD/CCRs-v0", "--video", "x" * 300 + ".mp4"], "cannot be created (File name too long)"),
+        (["drive", "LGMD/CCRs-v0", "--video", "x" * 300 + ".mp4"], "is not a path: File name too long"),
         (["train", "--env", "nix"], "env 'nix' cannot be made"),
         (["list", "agent"], "agent"),
     ],

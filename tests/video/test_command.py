@@ -118,7 +118,7 @@ INVALID = [  # (arguments, part of the message)
     (["good.mkv", "dot.mkv", "--crash-frame", "3"], "--crash-frame 3 applies to a single clip"),
     (["good.mkv", "--configs", "papr"], "did you mean 'paper'?"),
     (["good.mkv", "--fps", "0"], "fps must be in (0, 1000], got 0"),
-    (["good.mkv", "--size", "2", "9"], "each at least 3 px, got (2, 9)"),
+    (["good.mkv", "--size", "2", "9"], "each 3 to 16384 px, got (2, 9)"),
     (["good.mkv", "--roi", "0", "0", "99", "9"], "(0, 0, 99, 9)"),
     (["good.mkv", "--drop-duplicates", "1"], "drop_duplicates must be in [0, 1), got 1"),
     (["good.mkv", "--threshold", "-3"], "t_sf must be > 0"),
