@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import Any
 
 INTERVAL = 0.5  # [s] between two looks at the parent
@@ -26,6 +27,8 @@ def signals_blocked() -> Iterator[None]:
     This process receives a signal at the end of the block. A terminal sends Ctrl-C to all processes, and some
     schedulers send SIGTERM to all; workers would end with tracebacks before this process stops them.
     """
+    # Joblib starts this with the first worker, and its start unblocks both signals.
+    resource_tracker.ensure_running()
     previous = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield

@@ -3,6 +3,8 @@
 import os
 import random
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
@@ -119,6 +121,20 @@ def test_signal_that_arrives_while_workers_start_is_kept():
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [])
     assert signal.SIGINT in blocked
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+@pytest.mark.slow
+def test_worker_processes_leave_signals_to_the_command():
+    """In a new process: joblib starts processes with its first workers that change the blocked signals."""
+    code = """
+import signal
+from joblib import delayed
+from lgmd_gym.benchmark.worker_processes import run_parallel
+calls = [delayed(signal.pthread_sigmask)(signal.SIG_BLOCK, []) for _ in range(4)]
+print([sorted(map(int, blocked)) for blocked in run_parallel(calls, 2)])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == str([[int(signal.SIGINT), int(signal.SIGTERM)]] * 4)
 
 
 def test_one_job_needs_no_worker_process():
