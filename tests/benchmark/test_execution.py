@@ -227,7 +227,7 @@ def test_full_disk_loses_only_the_episode_in_flight(short_suite, tmp_path):
 
 def wait_for_rows(out, count, process):
     file = out / "episodes.jsonl"
-    end = time.monotonic() + 120
+    end = time.monotonic() + 600
     while not file.exists() or file.read_bytes().count(b"\n") < count:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < end
