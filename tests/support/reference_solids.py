@@ -71,13 +71,13 @@ def _solid(scene, item, solid, rays):
         covered = _covered(lens, corners, rays)
         if normal @ corners[0] >= 0.0 or not covered.any():
             continue
-        grey = _detailed_grey(scene, item, models, face, _face_light(scene, item, normal), rays)
+        grey = _covered_grey(scene, item, models, face, _face_light(scene, item, normal), rays)
         distance = np.full(rays.v.shape, away / lens.focal)
         if item.model < MODEL_POST:
             with np.errstate(divide="ignore"):
                 distance = (normal @ corners[0]) / (rays.direction @ normal)
         covers = covers + rays.mean(covered)
-        light = light + rays.mean(covered * grey)
+        light = light + rays.mean(grey)
         contrast = np.maximum(contrast, np.ptp(grey, axis=1) * (rays.mean(covered) > 0.0))
         distances[covered] = distance[covered]
     if not np.any(covers):
@@ -133,12 +133,15 @@ def _face_light(scene, item, normal):
     return light
 
 
-def _detailed_grey(scene, item, models, face, light, rays):
-    """Return the grey of a face with its details at each ray; details grow visible with the object."""
+def _covered_grey(scene, item, models, face, light, rays):
+    """Return the grey of a face with its details at each ray, 0 beside it; details fade in with the size.
+
+    Details of a tree protrude from its crown by 1 % of its height, where they change what is behind it.
+    """
     away = math.hypot(item.x - scene.lens.x, item.y - scene.lens.y)
     size = scene.lens.focal * item.height / max(away - 0.5 * item.length, 1.0)
     greys = {face: _grey(scene, item, models, face, light)}
-    out = np.full(rays.v.shape, greys[face])
+    out = greys[face] * _covered(scene.lens, _corners(scene, item, models, face), rays)
     for detail in range(face + 1, len(models.parent)):
         parent = models.parent[detail]
         if parent not in greys:
