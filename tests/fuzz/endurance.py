@@ -19,8 +19,14 @@ from lgmd_gym import LGMDObservation
 
 ALLOWED_MIB = 10.0  # growth of the resident memory
 SAMPLES = 20
-# One frame per step of highway-v0 [Hz], and few vehicles: 200,000 steps with 50 of them take an hour.
-HIGHWAY = {"simulation_frequency": 15, "policy_frequency": 15, "vehicles_count": 10}
+# One frame per step of highway-v0 [Hz], few vehicles, and an observation without pandas: 200,000 steps of the
+# defaults take hours.
+HIGHWAY = {
+    "simulation_frequency": 15,
+    "policy_frequency": 15,
+    "vehicles_count": 10,
+    "observation": {"type": "LidarObservation", "cells": 4},
+}
 
 
 class Usage(NamedTuple):
