@@ -1,6 +1,7 @@
 """`SceneTable`: egos and objects as records, and the objects that are left out."""
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 from support.roads import add_car, straight_env
@@ -51,3 +52,13 @@ def test_copies_read_into_their_own_records():
     env.vehicle.position[0] = 9.0
     clone.read(env, None, 1)
     assert (world.scenes["x"][1], clone.scenes["x"][1], clone.bundle.arrays[0]["x"][1]) == (5.0, 9.0, 9.0)
+
+
+def test_cameras_that_may_see_the_ground_right_below_them_look_all_around():
+    """With a row to spare, the lower side of these frames is straight down at a pitch of 15.1°."""
+    camera = CameraParams(shape=(60, 20), hfov_deg=100.0)
+    assert view_of([replace(camera, pitch_deg=-15.0)]) is not None
+    for fields in ({"pitch_deg": -15.3}, {"pitch_deg": 15.3}, {"dive_deg": 0.1}, {"vibration_deg": 0.1}):
+        assert (
+            view_of([CameraParams(shape=(60, 20)), replace(camera, **{"pitch_deg": -15.0, **fields})]) is None
+        )
