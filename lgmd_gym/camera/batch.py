@@ -91,7 +91,7 @@ class CameraBatch:
         self._views.beams[index, member] = prepared.beam
         self._views.sky_aims[index, member] = np.nan  # redraw the sky
         if texture is not None:
-            for name, gain in texture_gains(texture).items():
+            for name, gain in texture_gains(p, texture).items():
                 self._views.looks[name][index, member] = gain
         if prepared.tables_key not in self._tables:
             self._tables[prepared.tables_key] = self._next_index, SharedTables(p)

@@ -6,24 +6,34 @@ from functools import lru_cache
 import numpy as np
 
 from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.worlds import World, draw_world
 
 LOOK = np.dtype(
     [
         (name, np.float64)
         for name in (
-            *("asphalt", "asphalt_gain", "verge", "verge_gain", "paint"),
-            *("zenith", "horizon", "hills", "trees", "leaf_gain"),
-            *("haze", "extinction", "night", "paved", "shot_noise", "read_noise", "shutter_s"),
+            *("asphalt", "asphalt_gain", "verge", "verge_gain", "paint", "line_width", "dash", "dash_period"),
+            *("zenith", "horizon", "hills", "trees", "leaf_gain", "hill_scale", "tree_scale"),
+            *("sun_x", "sun_y", "sun_z", "ambient", "direct", "cast", "code_power"),
+            *("under_body", "under_lean", "under_first", "under_step", "under_rings", "under_box", "shadow_limit"),
+            *("haze", "extinction", "night", "night_light", "beam_gain", "wet", "paved"),
+            *("shot_noise", "read_noise", "shutter_s"),
         )
     ]
 )
 """Appearance of the world for one camera, as the kernels read it.
 
-Grey levels (`…_gain`: per stored unit of a texture or skyline), extinction of the air [1/m], 1.0 for night
-and for an all-paved ground, sensor noise [grey levels], exposure time [s].
+Light (`…_gain`: per stored unit of a texture or skyline); width of markings, length and period of dashes [m];
+scale of the skyline's elevations; direction of the sun; light on a face from the sky, and from the sun where
+it is at right angles, as shares of the light on the road; share of light that a cast shadow removes; power of
+the display code that is proportional to light; the soft shadow below an object, see `shadows.add_shadow`;
+extinction of the air [1/m]; 1.0 for night, for a wet and for an all-paved ground; light at night apart from
+the low beam, and its peak; sensor noise [grey levels]; exposure time [s].
 """
-ASPHALT_GREY, PAINT_GREY = 104.0, 208.0  # by day
+ASPHALT_GREY, PAINT_GREY = 104.0, 208.0  # of the laboratory by day
 BEAM_WIDTH = 0.26  # the low beam falls to 1/e at this tangent of the angle from straight ahead
+WHITE = 255.0
+_LABORATORY_SUN = (-0.48, 0.36, 0.80)
 _TEXTURE_GAIN = 1.0 / 36.0  # textures store 36 per standard deviation
 NOISE_LOG2 = 17
 """Binary logarithm of the length of the noise table."""
@@ -31,15 +41,20 @@ NOISE_LOG2 = 17
 
 def look_of(p: CameraParams) -> np.ndarray:
     """Return the appearance of the world for a camera, a `LOOK` record of shape ()."""
-    look = np.zeros((), LOOK)
-    look["asphalt"], look["verge"], look["paint"] = ASPHALT_GREY, 76.0, PAINT_GREY
-    for name, gain in texture_gains(p.texture).items():
+    look, world = np.zeros((), LOOK), draw_world(p.world)
+    look["code_power"] = 2.0 if world.drawn else 1.0
+    look["asphalt"], look["verge"] = (
+        to_light(world, _wet(p, world.asphalt_grey, 0.78)),
+        to_light(world, _wet(p, world.verge_grey, 0.85)),
+    )
+    look["paint"] = to_light(world, _wet(p, world.paint_grey, 0.9))
+    for name, gain in texture_gains(p, p.texture).items():
         look[name] = gain
-    night = p.light == "night"
-    sky = (6.0, 14.0, 7.0, 4.0, 1.0) if night else (172.0, 214.0, 128.0, 78.0, 12.0)
-    for name, grey in zip(("zenith", "horizon", "hills", "trees", "leaf_gain"), sky, strict=True):
-        look[name] = grey
-    look["haze"], look["night"] = haze_grey(p), float(night)
+    look["line_width"], (look["dash"], look["dash_period"]) = world.line_width, world.dash
+    _set_sky(look, p, world)
+    _set_sun(look, p, world)
+    look["night"], look["wet"] = float(p.light == "night"), float(p.wet)
+    look["night_light"], look["beam_gain"] = (world.street_light, 0.6) if world.drawn else (0.04, 1.25)
     if p.visibility_m > 0.0:
         # Koschmieder: 5 % of the contrast remains at the visibility.
         look["extinction"] = math.log(20.0) / p.visibility_m
@@ -52,12 +67,87 @@ def look_of(p: CameraParams) -> np.ndarray:
     return look
 
 
-def texture_gains(texture: float) -> dict[str, float]:
-    """Return the fields of `LOOK` that the contrast of asphalt and verge determines."""
-    return {
-        "asphalt_gain": 9.0 * texture * _TEXTURE_GAIN,
-        "verge_gain": 16.0 * texture * _TEXTURE_GAIN,
-    }
+def to_light(world: World, grey: float) -> float:
+    """Return the light of a display-coded grey level; both are 255 for white.
+
+    In drawn worlds the display code is the square root of light. In the laboratory it is light itself.
+    """
+    return grey * grey / WHITE if world.drawn else grey
+
+
+def texture_gains(p: CameraParams, texture: float) -> dict[str, float]:
+    """Return the fields of `LOOK` that the contrast of asphalt and verge determines.
+
+    Args:
+        p: Parameters of the camera.
+        texture: Contrast, in place of that of `p`.
+    """
+    world = draw_world(p.world)
+    gains = {}
+    for name, std, grey, contrast in (
+        ("asphalt_gain", 9.0, _wet(p, world.asphalt_grey, 0.78), world.asphalt_contrast),
+        ("verge_gain", 16.0, _wet(p, world.verge_grey, 0.85), world.verge_contrast),
+    ):
+        slope = 2.0 * grey / WHITE if world.drawn else 1.0  # of light over the display code
+        gains[name] = std * contrast * texture * _TEXTURE_GAIN * slope
+    return gains
+
+
+def _wet(p: CameraParams, grey: float, darkening: float) -> float:
+    """Return the grey of a surface, darker if it is wet."""
+    return grey * darkening if p.wet else grey
+
+
+def _set_sky(look: np.ndarray, p: CameraParams, world: World) -> None:
+    """Set the light of sky, skyline and fog."""
+    greys = (*world.greys, world.leaf_contrast)
+    if p.light == "night":
+        greys = (6.0, 14.0, 7.0, 4.0, 1.0)
+    names = ("zenith", "horizon", "hills", "trees")
+    for name, grey in zip(names, greys, strict=False):
+        look[name] = to_light(world, grey)
+    look["leaf_gain"] = greys[4] * (2.0 * greys[3] / WHITE if world.drawn else 1.0)
+    look["hill_scale"], look["tree_scale"] = world.hill_scale, world.tree_scale
+    look["haze"] = to_light(world, haze_grey(p))
+
+
+def _set_sun(look: np.ndarray, p: CameraParams, world: World) -> None:
+    """Set the direction of the sun, the light on faces, and shadows."""
+    if not world.drawn:
+        look["sun_x"], look["sun_y"], look["sun_z"] = _LABORATORY_SUN
+        look["ambient"], look["direct"] = 0.62, 0.42
+        # Three rings of 0.22 around a shadow that leans away from the sun.
+        values = (0.22, -0.12 / _LABORATORY_SUN[2], -0.08, 0.16, 3.0, 1.0, 0.75)
+    else:
+        azimuth, elevation, share = sun_of(p, world)
+        level = math.cos(elevation)
+        look["sun_x"], look["sun_y"] = level * math.cos(azimuth), level * math.sin(azimuth)
+        look["sun_z"] = math.sin(elevation)
+        # A vertical face receives light from half of the sky and from the ground.
+        look["ambient"], look["direct"] = 0.12 + 0.55 * (1.0 - share), share / math.sin(elevation)
+        look["cast"] = share
+        # From 0.5 m inside the outline of a car to 0.28 m outside it; a box has a shadow at its edges only.
+        rings, missing = 7, world.under_body * (0.6 if p.light == "night" else 1.0)
+        values = (missing / rings, 0.0, -0.5, 0.13, rings, 0.2, 0.95)
+    names = (
+        *("under_body", "under_lean", "under_first", "under_step", "under_rings", "under_box"),
+        "shadow_limit",
+    )
+    for name, value in zip(names, values, strict=True):
+        look[name] = value
+
+
+def sun_of(p: CameraParams, world: World) -> tuple[float, float, float]:
+    """Return azimuth and elevation of the sun [rad], and its share of the light on the road."""
+    azimuth, elevation, share = world.sun_azimuth_deg, world.sun_elevation_deg, world.sun_share
+    if p.light == "night" or p.wet or p.visibility_m > 0.0:
+        share = 0.0
+    elif p.light == "low_sun":
+        # Within 25° of +x, where roads lead, 4° to 12° above the horizon.
+        azimuth = 25.0 * (azimuth / 180.0 - 1.0)
+        elevation = 4.0 + 8.0 * (elevation - 18.0) / 44.0
+        share = 0.6
+    return math.radians(azimuth), math.radians(elevation), share
 
 
 def haze_grey(p: CameraParams) -> float:

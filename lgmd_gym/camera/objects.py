@@ -126,7 +126,7 @@ def choose_objects(lens, mount, objects, count, chosen):
 
     Args:
         lens: `LENS` record.
-        mount: `MOUNT` record, for `box` and `seed`.
+        mount: `MOUNT` record, for `box`, `seed` and `code_power`.
         objects: `OBJECT` records.
         count: Number of objects.
         chosen: `OBJECT` records to write, with the model and the grey that are drawn.
@@ -148,7 +148,15 @@ def choose_objects(lens, mount, objects, count, chosen):
                 obj.model, obj.height = MODEL_TRUCK, max(obj.height, _TRUCK_HEIGHT_M)
         if obj.shade <= FIRST_INDEXED:
             obj.shade = index_shade(mount.seed, FIRST_INDEXED - obj.shade)
+        if obj.model != MODEL_MARK:
+            obj.shade = light_of_code(obj.shade, mount.code_power)
     return n
+
+
+@exact_kernel
+def light_of_code(grey, code_power):
+    """Return the light of a display-coded grey level, 255 for white; see `effects.to_light`."""
+    return grey * grey * (1.0 / 255.0) if code_power == 2.0 else grey
 
 
 def _default_appearance(cls: type) -> tuple[int, float]:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
+from lgmd_gym.camera.worlds import check_world
 from lgmd_gym.errors import (
     check_finite,
     check_flag,
@@ -47,7 +48,7 @@ _BOUNDS = {
     "heave_m": _Interval(0.0, 0.1, True, True, "m"),
     "shutter_s": _Interval(0.0, 0.1, True, True, "s"),
 }
-_CHOICES = {"gaze": ("fixed", "path"), "vehicles": ("car", "box"), "light": ("day", "night")}
+_CHOICES = {"gaze": ("fixed", "path"), "vehicles": ("car", "box"), "light": ("day", "night", "low_sun")}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,8 +78,13 @@ class CameraParams:
             converted to grey and wrapped around 360°, with its middle row at the horizon and its left
             edge in the direction +x.
         guard_rail: Whether steel rails, 0.75 m high on posts, run along the outer edges of the road.
-        seed: Seed of textures, skyline and the grey of vehicles without a `shade`.
-        light: `"day"` or `"night"`; at night, the ego's headlights and the lights of other cars are on.
+        world: Number of the world that determines the appearance of road, surroundings and light, see
+            `World`; None for the laboratory.
+        seed: Seed of textures and skyline of the laboratory, and of the grey of vehicles without a `shade`.
+        light: `"day"`, `"night"` or `"low_sun"`. At night, the ego's headlights and the lights of other cars
+            are on. A low sun is 4° to 12° above the horizon, near the direction +x; in the laboratory it
+            equals day.
+        wet: Whether the road is wet: darker, and lighter towards the horizon, where it reflects the sky.
         visibility_m: Meteorological visibility in fog (5 % contrast, Koschmieder); 0 is clear air [m].
         shot_noise: Standard deviation of photon noise at grey 128, growing with √grey [grey levels].
         read_noise: Standard deviation of the sensor's read noise [grey levels].
@@ -104,8 +110,10 @@ class CameraParams:
     vehicles: str = "car"
     panorama: str = "skyline"
     guard_rail: bool = False
+    world: int | None = None
     seed: int = 0
     light: str = "day"
+    wet: bool = False
     visibility_m: float = 0.0
     shot_noise: float = 0.0
     read_noise: float = 0.0
@@ -122,6 +130,7 @@ class CameraParams:
         for name, bound in _BOUNDS.items():
             object.__setattr__(self, name, _checked_number(name, getattr(self, name), bound))
         _check_surroundings(self)
+        object.__setattr__(self, "world", None if self.world is None else check_world(self.world))
         for name, known in _CHOICES.items():
             check_known(f"camera {name}", getattr(self, name), known)
 
@@ -195,7 +204,8 @@ def _check_surroundings(p: CameraParams) -> None:
         raise ValueError(
             f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
         )
-    object.__setattr__(p, "guard_rail", check_flag("camera guard_rail", p.guard_rail))
+    for name in ("guard_rail", "wet"):
+        object.__setattr__(p, name, check_flag(f"camera {name}", getattr(p, name)))
 
 
 def _field_names() -> list[str]:

@@ -7,19 +7,20 @@ import numpy as np
 from lgmd_gym.camera.effects import NOISE_LOG2
 from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.render.jit import exact_kernel
+from lgmd_gym.camera.worlds import draw_world
 
 MOUNT = np.dtype(
     [
         *((name, np.float64) for name in ("setback", "left", "height", "yaw_deg", "pitch_deg")),
         *((name, np.float64) for name in ("heave_m", "vibration_deg", "dive_deg", "phase", "shutter_s")),
-        *((name, np.float64) for name in ("focal", "centre_u", "centre_v")),
+        *((name, np.float64) for name in ("focal", "centre_u", "centre_v", "code_power")),
         *((name, np.int64) for name in ("path", "noisy", "box", "seed")),
     ]
 )
 """How a camera sits on the car and moves with it, as the kernels read it.
 
 The fields of `CameraParams`; phase of the vibrations [turns]; focal length and image centre [px]; 1 for the
-gaze `"path"`, for sensor noise and for `vehicles="box"`.
+gaze `"path"`, for sensor noise and for `vehicles="box"`; `LOOK`'s power of the display code.
 """
 
 _PATH_S = 1.0  # look-ahead time of the gaze "path" [s]
@@ -30,13 +31,20 @@ _BODY_HZ = (1.1, 1.9, 3.4)  # bounce, pitch and wheel-hop side band of a sprung 
 def mount_of(p: CameraParams) -> np.ndarray:
     """Return the `MOUNT` record of a camera, shape ()."""
     height, width = p.shape
+    world = draw_world(p.world)
     values = (
-        *(p.mount_setback, p.mount_left, p.mount_height, p.yaw_deg, p.pitch_deg),
-        *(p.heave_m, p.vibration_deg, p.dive_deg, 0.1 * (p.seed % 10), p.shutter_s),
-        *(p.focal_px, 0.5 * width, 0.5 * height),
-        *(p.gaze == "path", p.shot_noise > 0.0 or p.read_noise > 0.0, p.vehicles == "box", p.seed),
+        *(p.mount_setback, p.mount_left, max(p.mount_height + world.mount_height_error, 0.05)),
+        *(p.yaw_deg + world.yaw_error_deg, p.pitch_deg + world.pitch_error_deg),
+        *(p.heave_m, p.vibration_deg, p.dive_deg, 0.1 * (seed_of(p) % 10), p.shutter_s),
+        *(p.focal_px, 0.5 * width, 0.5 * height, 2.0 if world.drawn else 1.0),
+        *(p.gaze == "path", p.shot_noise > 0.0 or p.read_noise > 0.0, p.vehicles == "box", seed_of(p)),
     )
     return np.array(values, dtype=MOUNT)
+
+
+def seed_of(p: CameraParams) -> int:
+    """Return the seed of a camera's noise and of vehicles without a `shade`: its world, or `seed`."""
+    return p.seed if p.world is None else p.world
 
 
 @exact_kernel

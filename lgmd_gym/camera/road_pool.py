@@ -9,8 +9,10 @@ import numpy as np
 
 from lgmd_gym.camera.objects import OBJECT
 from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.pose import seed_of
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.road_geometry import LINE, RoadGeometry, network_of, road_geometry
+from lgmd_gym.camera.worlds import draw_world
 
 RoadKey: TypeAlias = tuple[float, int, bool]
 """What the geometry depends on besides the lanes: `roadside`, `seed` and `guard_rail` of `CameraParams`."""
@@ -20,7 +22,8 @@ Span: TypeAlias = tuple[int, ...]
 
 def road_key(p: CameraParams) -> RoadKey:
     """Return the parameters of a camera that its road depends on."""
-    return p.roadside, p.seed, p.guard_rail
+    world = draw_world(p.world)
+    return p.roadside * world.roadside, seed_of(p), p.guard_rail or world.guard_rail
 
 
 class RoadArrays(NamedTuple):

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from support.records import lens_of, records
 
+from lgmd_gym.camera import CameraParams
+from lgmd_gym.camera.effects import look_of
 from lgmd_gym.camera.render.buffers import GroundLayer
 from lgmd_gym.camera.render.ground import PAINT
-from lgmd_gym.camera.render.markings import LINE_WIDTH, add_lines
+from lgmd_gym.camera.render.markings import add_lines
 from lgmd_gym.camera.render.texture import TEXEL_M
 from lgmd_gym.camera.render.texture_sampling import distance_ahead, texture_line
 from lgmd_gym.camera.road_geometry import LINE
@@ -75,15 +77,18 @@ def test_level_of_the_texture_is_the_footprint_of_a_pixel(focal, row, levels):
     assert 12 - turned.log_x == min(max(int(np.floor(np.log2(across) + 0.5)), 0), 12)
 
 
+LOOK = look_of(CameraParams())[()]
+LINE_WIDTH = 0.15
+
+
 def painted(*lines, yaw=0.0, x=0.0, y=0.0, shape=(160, 120)):
     """Return the area painted by lines (x0, y0, x1, y1, start, striped) in square metres by column [px]."""
-    coverage = np.zeros((3, shape[0], shape[1] + 2), np.float32)
+    coverage = np.zeros((4, shape[0], shape[1] + 2), np.float32)
     layer = GroundLayer(coverage, np.zeros((16, 3)), np.zeros((20, 2)), np.zeros(8))
     lens = lens_of(yaw, -pi / 2 + 1e-9, z=10.0, x=x, y=y, shape=shape)
     names = LINE.names
-    add_lines(
-        layer, lens, records(LINE, *(dict(zip(names, map(float, line), strict=True)) for line in lines))
-    )
+    pieces = records(LINE, *(dict(zip(names, map(float, line), strict=True)) for line in lines))
+    add_lines(layer, lens, pieces, LOOK)
     return np.cumsum(coverage[PAINT], axis=1)[:, :-2] / 100
 
 
@@ -134,7 +139,7 @@ def test_ends_of_the_stripes():
 def test_far_stripes_are_painted_as_their_mean():
     """Beyond three periods per pixel, stripes are a line with 3/4.33 of its paint."""
     shape = (80, 120)
-    coverage = np.zeros((3, shape[0], shape[1] + 2), np.float32)
+    coverage = np.zeros((4, shape[0], shape[1] + 2), np.float32)
     layer = GroundLayer(coverage, np.zeros((16, 3)), np.zeros((20, 2)), np.zeros(8))
     lens = lens_of(shape=shape)
     solid = coverage.copy()
@@ -145,6 +150,7 @@ def test_far_stripes_are_painted_as_their_mean():
             layer,
             lens,
             records(LINE, dict(zip(LINE.names, (40.0, 0.0, 90.0, 0.0, 0.0, striped), strict=True))),
+            LOOK,
         )
     ratio = np.cumsum(coverage[PAINT], axis=1).sum() / np.cumsum(solid[PAINT], axis=1).sum()
     assert ratio == pytest.approx(3 / 4.33, rel=1e-3)

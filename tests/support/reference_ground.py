@@ -6,8 +6,6 @@ import numpy as np
 
 from lgmd_gym.camera import objects as kinds
 from lgmd_gym.camera.effects import ASPHALT_GREY, BEAM_WIDTH, PAINT_GREY
-from lgmd_gym.camera.render.markings import LINE_WIDTH, STRIPE_LENGTH, STRIPE_PERIOD
-from lgmd_gym.camera.render.shadows import SUN
 from lgmd_gym.camera.render.texture import TEXEL_M, ground_texture
 
 
@@ -28,7 +26,7 @@ def ground_light(scene, rays, row, column):
     for quad in scene.road.surface:
         road += rays.shown & inside(x, y, quad.reshape(-1, 2))
     paint, shadow = _marks_and_shadows(scene, x, y)
-    paint += _markings(scene.road.lines, x, y)
+    paint += _markings(scene.road.lines, look, x, y)
     share = np.maximum(rays.mean(rays.fall > 0.0), 1e-9)
     road, paint, shadow = (
         rays.mean(np.where(rays.fall > 0.0, cover, 0.0)) / share
@@ -40,11 +38,11 @@ def ground_light(scene, rays, row, column):
     road = np.minimum(road, 1.0)
     grey = road * (look.asphalt + grain) + (1.0 - road) * verge
     grey += np.clip(paint, 0.0, 1.0) * (look.paint + 0.5 * grain - grey)
-    grey *= 1.0 - np.clip(shadow, 0.0, 0.75)
+    grey *= 1.0 - np.clip(shadow, 0.0, look.shadow_limit)
     return _through_air(scene, grey, row, column), partial * (look.paint - look.verge)
 
 
-def _markings(lines, x, y):
+def _markings(lines, look, x, y):
     """Return the paint of the markings at points: the number of strokes that cover each one."""
     paint = np.zeros(x.shape)
     for piece in lines:
@@ -54,9 +52,9 @@ def _markings(lines, x, y):
             continue
         rx, ry = x - piece["x0"], y - piece["y0"]
         along, beside = (rx * dx + ry * dy) / length, (ry * dx - rx * dy) / length
-        covered = (along >= 0.0) & (along <= length) & (np.abs(beside) <= 0.5 * LINE_WIDTH)
+        covered = (along >= 0.0) & (along <= length) & (np.abs(beside) <= 0.5 * look.line_width)
         if piece["striped"]:
-            covered &= (piece["start"] + along) % STRIPE_PERIOD < STRIPE_LENGTH
+            covered &= (piece["start"] + along) % look.dash_period < look.dash
         paint += covered
     return paint
 
@@ -64,9 +62,10 @@ def _markings(lines, x, y):
 def _marks_and_shadows(scene, x, y):
     """Return the paint of marks and the shadow of objects at points."""
     paint, shadow = np.zeros(x.shape), np.zeros(x.shape)
-    lean = -0.12 / SUN[2]
+    look = scene.look
     for item in scene.objects:
-        model, at = item.model, (item.x + lean * item.height * SUN[0], item.y + lean * item.height * SUN[1])
+        lean, model = look.under_lean * item.height, item.model
+        at = item.x + lean * look.sun_x, item.y + lean * look.sun_y
         if model == kinds.MODEL_MARK and item.shade >= 0.0:
             covered = _footprint(x, y, item, (item.x, item.y), 0.0)
             if item.shade > ASPHALT_GREY:
@@ -82,7 +81,9 @@ def _marks_and_shadows(scene, x, y):
             dark = max(min(0.4, 0.8 - away / 60.0), 0.0)
             shadow += dark * _footprint(x, y, item, at, -0.2 * item.width)
         elif model not in (kinds.MODEL_POST, kinds.MODEL_RAIL):
-            shadow += sum(0.22 * _footprint(x, y, item, at, grow) for grow in (-0.08, 0.08, 0.24))
+            for ring in range(int(look.under_rings)):
+                grow = max(look.under_first + look.under_step * ring, -0.5 * min(item.length, item.width))
+                shadow += look.under_body * _footprint(x, y, item, at, grow)
     return paint, shadow
 
 

@@ -11,7 +11,6 @@ from lgmd_gym.camera.objects import MODEL_MARK, MODEL_POST
 from lgmd_gym.camera.render.coverage import NEAR
 from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
 from lgmd_gym.camera.render.models import all_models
-from lgmd_gym.camera.render.shadows import SUN
 
 
 def ordered_solids(scene, rays):
@@ -24,7 +23,7 @@ def ordered_solids(scene, rays):
     Returns:
         Triples of arrays, shape (pixels,). The order of two solids may differ from pixel to pixel.
     """
-    models, found = all_models(), []
+    models, found = all_models(linear=False), []
     for item in scene.objects:
         if item.model != MODEL_MARK:
             solids = [_solid(scene, item, solid, rays) for solid in range(*models.models[item.model])]
@@ -58,7 +57,7 @@ def _solid(scene, item, solid, rays):
 
     None if it is in no pixel.
     """
-    models, lens = all_models(), scene.lens
+    models, lens = all_models(linear=False), scene.lens
     away = math.hypot(item.x - lens.x, item.y - lens.y)
     opacity, clear = min(1.0, 6.0 * (1.0 - away / item.range)), math.exp(-away * scene.look.extinction)
     covers = light = contrast = 0.0
@@ -123,8 +122,8 @@ def _covered(lens, corners, rays):
 def _face_light(scene, item, normal):
     """Return the light on a face: from the sky, the sun and, at night, the low beam."""
     lens = scene.lens
-    sun = _camera_axes(lens, *SUN)
-    light = 0.62 + 0.42 * max(0.0, float(normal @ sun) / np.linalg.norm(normal))
+    sun = _camera_axes(lens, scene.look.sun_x, scene.look.sun_y, scene.look.sun_z)
+    light = scene.look.ambient + scene.look.direct * max(0.0, float(normal @ sun) / np.linalg.norm(normal))
     if scene.look.night:
         dx, dy = item.x - lens.x, item.y - lens.y
         ahead, across = dx * lens.cos_yaw + dy * lens.sin_yaw, dy * lens.cos_yaw - dx * lens.sin_yaw

@@ -63,7 +63,8 @@ class Buffers(NamedTuple):
         image: Light of the last frame, float32, shape (height, width) [grey levels].
         exposure: Light summed over the exposure, float32, shape (height, width).
         lens: The lens at one time of the exposure, a `LENS` record, shape (1,).
-        ground: Coverage differences of road, paint and shadow, float32, shape (3, height, width + 2).
+        ground: Coverage differences of road, paint, soft shadows and shadows that the sun casts, float32,
+            shape (4, height, width + 2).
         solids: Coverage differences of a solid and of its grey, float32, shape (2, height, width + 2).
         corners: Corners of a polygon as (depth, right, down), float64, shape (16, 3) [m].
         uv: Projected corners of a polygon, float64, shape (20, 2) [px].
@@ -114,7 +115,7 @@ def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
         image=np.zeros((height, width), dtype=np.float32),
         exposure=np.zeros((height, width), dtype=np.float32),
         lens=np.zeros(1, dtype=LENS),
-        ground=np.zeros((3, height, width + 2), dtype=np.float32),
+        ground=np.zeros((4, height, width + 2), dtype=np.float32),
         solids=np.zeros((2, height, width + 2), dtype=np.float32),
         corners=np.zeros((16, 3)),
         uv=np.zeros((20, 2)),

@@ -17,14 +17,19 @@ from lgmd_gym.camera.render.raster import draw_frames
 from lgmd_gym.camera.render.sky import skyline
 from lgmd_gym.camera.render.texture import ground_texture
 from lgmd_gym.camera.road_geometry import RoadGeometry
+from lgmd_gym.camera.worlds import draw_world
 
 _MAX_JOINED = 8  # tables that a workspace remembers
 
 
 def tables_key(p: CameraParams) -> tuple[Any, ...]:
     """Return the parameters that cameras of one frame size must have in common to share `SharedTables`."""
+    world = draw_world(p.world)
+    ground = (world.asphalt, world.verge, world.skyline) if world.drawn else (p.seed,)
+    if p.panorama == "skyline":
+        return ground
     # The table of a panorama includes light and fog, at the resolution of the lens.
-    return (p.seed,) if p.panorama == "skyline" else (p.seed, p.panorama, p.light, p.visibility_m, p.focal_px)
+    return *ground, p.panorama, p.seed, p.light, p.visibility_m, p.focal_px
 
 
 class SharedTables:
@@ -36,16 +41,18 @@ class SharedTables:
 
     def __init__(self, p: CameraParams) -> None:
         self._params = p
-        asphalt, verge = ground_texture("asphalt", p.seed), ground_texture("verge", p.seed)
+        world = draw_world(p.world)
+        grounds = (world.asphalt, world.verge) if world.drawn else (("asphalt", p.seed), ("verge", p.seed))
+        asphalt, verge = (ground_texture(*ground) for ground in grounds)
         tables = Tables(
             asphalt=asphalt.data,
             verge=verge.data,
             level_start=asphalt.level_start,
-            skyline=skyline(p.seed),
-            noise=noise_table(p.seed),
+            skyline=skyline(100_000 + world.skyline if world.drawn else p.seed),
+            noise=noise_table(0 if world.drawn else p.seed),
             panorama=panorama_table(p),
         )
-        self.bundle = Bundle(tuple(tables), tuple(all_models()))
+        self.bundle = Bundle(tuple(tables), tuple(all_models(linear=world.drawn)))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "SharedTables":
         return self
@@ -62,7 +69,7 @@ class Workspace:
     """
 
     def __init__(self, shape: tuple[int, int]) -> None:
-        self.buffers: Buffers = make_buffers(shape, len(all_models().corners_used))
+        self.buffers: Buffers = make_buffers(shape, len(all_models(linear=False).corners_used))
         self._arrays = np.zeros(MAX_DRAWN, OBJECT), tuple(self.buffers)
         self._shape = shape
         self._scene: tuple[Bundle, ...] = ()

@@ -25,7 +25,7 @@ from lgmd_gym.simd import (
 )
 
 # Channels of the ground layer; int64, because kernels are compiled anew for each literal argument.
-ROAD, PAINT, SHADOW = np.int64(0), np.int64(1), np.int64(2)
+ROAD, PAINT, SHADOW, CAST = np.int64(0), np.int64(1), np.int64(2), np.int64(3)
 
 
 @kernel
@@ -65,7 +65,7 @@ def _without_traces(road):
 @kernel
 def _ground_light(look, tables, line, x, y, coverages):
     """Return the light of sixteen pixels by day: verge, asphalt, paint and shadow by their coverage."""
-    road, paint, shadow = coverages
+    road, paint, shadow, cast = coverages
     zero, one, half = splat(nb.float32(0.0)), splat(nb.float32(1.0)), splat(nb.float32(0.5))
     road = _without_traces(road)
     grain = verge = zero
@@ -78,7 +78,11 @@ def _ground_light(look, tables, line, x, y, coverages):
     # Worn paint shows half of the asphalt's grain.
     paint = minimum(maximum(paint, zero), one)
     grey = madd(paint, madd(half, grain, splat(nb.float32(look.paint))) - grey, grey)
-    return grey * (one - minimum(maximum(shadow, zero), splat(nb.float32(0.75))))
+    grey = grey * (one - minimum(maximum(shadow, zero), splat(nb.float32(look.shadow_limit))))
+    if look.cast > 0.0:
+        # Shadows that overlap are no darker than one.
+        grey = grey * (one - splat(nb.float32(look.cast)) * minimum(maximum(cast, zero), one))
+    return grey
 
 
 @kernel
@@ -94,21 +98,26 @@ def shade_row(image, row, part, coverage, view, tables):
         tables: `Tables`.
     """
     width, stride = image.shape[1], coverage.shape[2]
-    road, paint, shadow = coverage[ROAD], coverage[PAINT], coverage[SHADOW]
+    road, paint, shadow, cast = coverage[ROAD], coverage[PAINT], coverage[SHADOW], coverage[CAST]
+    sunny = view.look.cast > 0.0
     line = texture_line(view.lens, row, tables.level_start)
     x, y, step_x, step_y = fixed_line(line)
-    air = row_air(view.look, distance_ahead(view.lens, row))
+    air = row_air(view.look, distance_ahead(view.lens, row), view.lens.z)
     share, inverse, whole = splat(nb.float32(part)), splat(nb.float32(1.0 / max(part, 1e-3))), part == 1.0
-    sum_road = sum_paint = sum_shadow = splat(nb.float32(0.0))
+    sum_road = sum_paint = sum_shadow = sum_cast = cover_cast = splat(nb.float32(0.0))
     for j in range(0, width, LANES):
         at, pixel, count = row * stride + j, row * width + j, width - j
         cover_road, sum_road = sum_differences(road, at, count, sum_road)
         cover_paint, sum_paint = sum_differences(paint, at, count, sum_paint)
         cover_shadow, sum_shadow = sum_differences(shadow, at, count, sum_shadow)
-        coverages = (cover_road, cover_paint, cover_shadow)
+        if sunny:
+            cover_cast, sum_cast = sum_differences(cast, at, count, sum_cast)
+        coverages = (cover_road, cover_paint, cover_shadow, cover_cast)
         if not whole:
             # As shares of the ground in this row.
-            coverages = (cover_road * inverse, cover_paint * inverse, cover_shadow * inverse)
+            coverages = (
+                cover_road * inverse, cover_paint * inverse, cover_shadow * inverse, cover_cast * inverse,
+            )  # fmt: skip
         grey = _ground_light(view.look, tables, line, x, y, coverages)
         grey = through_air(grey, air, view.beam, j)
         if not whole:
@@ -118,4 +127,4 @@ def shade_row(image, row, part, coverage, view, tables):
         x, y = x + step_x, y + step_y
     # Edges at the right side of the frame.
     for j in range(width, width + 2):
-        road[row, j] = paint[row, j] = shadow[row, j] = nb.float32(0.0)
+        road[row, j] = paint[row, j] = shadow[row, j] = cast[row, j] = nb.float32(0.0)

@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lgmd_gym.camera.effects import WHITE
 from lgmd_gym.camera.render.car_model import add_car
-from lgmd_gym.camera.render.model_builder import ModelBuilder
+from lgmd_gym.camera.render.model_builder import BODY, ModelBuilder
 from lgmd_gym.camera.render.plain_models import (
     add_barrier,
     add_plain_box,
@@ -32,6 +33,7 @@ class Models(NamedTuple):
             that height, float64, shape (polygons,) [px].
         solids: First and last + 1 polygon of each solid, int64, shape (solids, 2).
         models: First and last + 1 solid of each model, int64, shape (models, 2).
+        overhead: Free height below each model, as a share of its height, float64, shape (models,).
     """
 
     corners: np.ndarray
@@ -42,11 +44,16 @@ class Models(NamedTuple):
     fine: np.ndarray
     solids: np.ndarray
     models: np.ndarray
+    overhead: np.ndarray
 
 
-@lru_cache(maxsize=1)
-def all_models() -> Models:
-    """Return the tables of all models, in the order of `objects.MODEL_…`."""
+@lru_cache(maxsize=2)
+def all_models(linear: bool) -> Models:
+    """Return the tables of all models, in the order of `objects.MODEL_…`.
+
+    Args:
+        linear: Whether values are light, proportional to the square of the display code.
+    """
     b = ModelBuilder()
     add_car(b)
     add_truck(b)
@@ -64,8 +71,15 @@ def all_models() -> Models:
         corners_used=np.array([len(points) for points in b.corners], dtype=np.int64),
         parent=np.array(b.parent, dtype=np.int64),
         role=np.array(b.role, dtype=np.int64),
-        value=np.array(b.value, dtype=np.float64),
+        value=_light_of(b) if linear else np.array(b.value, dtype=np.float64),
         fine=np.array(b.fine, dtype=np.float64),
         solids=np.array(b.solids),
         models=np.array(b.models),
+        overhead=np.zeros(len(b.models)),
     )
+
+
+def _light_of(b: ModelBuilder) -> np.ndarray:
+    """Return the values of all polygons as light: multiples of the body's light, or light up to 255."""
+    value = np.array(b.value, dtype=np.float64)
+    return value * value / np.where(np.array(b.role) == BODY, 1.0, WHITE)

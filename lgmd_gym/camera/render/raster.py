@@ -4,7 +4,7 @@ import math
 
 import numba as nb
 
-from lgmd_gym.camera.objects import MODEL_MARK
+from lgmd_gym.camera.objects import MODEL_MARK, light_of_code
 from lgmd_gym.camera.render.blur import add_weighted, blur_steps, lens_before, move_objects, overwrite
 from lgmd_gym.camera.render.buffers import Buffers, GroundLayer, SolidLayer, Tables, View, Views
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
@@ -15,6 +15,7 @@ from lgmd_gym.camera.render.models import Models
 from lgmd_gym.camera.render.order import distance, order_objects, visible
 from lgmd_gym.camera.render.panorama import draw_panorama
 from lgmd_gym.camera.render.sensor import expose
+from lgmd_gym.camera.render.cast_shadows import add_cast_shadows
 from lgmd_gym.camera.render.shadows import add_shadow
 from lgmd_gym.camera.render.sky import draw_sky
 from lgmd_gym.camera.render.solids import Air, draw_object
@@ -23,7 +24,7 @@ from lgmd_gym.camera.roadside import PLANT_RANGE
 
 
 @kernel
-def append_roadside(lens, roadside, objects, count):
+def append_roadside(lens, roadside, look, objects, count):
     """Append the roadside within range to the objects; returns the new count."""
     n = roadside.shape[0]
     low, high = 0, n
@@ -38,6 +39,8 @@ def append_roadside(lens, roadside, objects, count):
         dx, dy = roadside[low].x - lens.x, roadside[low].y - lens.y
         if dx * dx + dy * dy < PLANT_RANGE * PLANT_RANGE and visible(lens, roadside[low]):
             objects[count] = roadside[low]
+            if objects[count].model != MODEL_MARK:
+                objects[count].shade = light_of_code(objects[count].shade, look.code_power)
             count += 1
         low += 1
     return count
@@ -59,13 +62,14 @@ def draw_distance(image, view, tables, horizon):
 
 
 @kernel
-def add_flats(layer, lens, road, objects, order, n):
+def add_flats(layer, view, road, objects, order, n):
     """Add roads, markings, shadows and marks to the ground layer."""
+    lens, look = view.lens, view.look
     for i in range(road.surface.shape[0]):
         add_ground_quad(layer, ROAD, lens, road.surface[i], 1.0)
-    add_lines(layer, lens, road.lines)
+    add_lines(layer, lens, road.lines, look)
     for i in range(n):
-        add_shadow(layer, lens, objects[order[i]])
+        add_shadow(layer, lens, objects[order[i]], look)
 
 
 @kernel
@@ -94,11 +98,11 @@ def draw_solids(image, view, models, objects, order, n, layer):
             continue
         dx, dy = obj.x - lens.x, obj.y - lens.y
         away, ahead = distance(lens, obj), dx * lens.cos_yaw + dy * lens.sin_yaw
-        light = light_at(ahead, dy * lens.cos_yaw - dx * lens.sin_yaw, look.night)
+        light = light_at(ahead, dy * lens.cos_yaw - dx * lens.sin_yaw, look)
         # Objects fade in over the last sixth of their range.
         opacity = min(1.0, 6.0 * (1.0 - away / obj.range))
         clear = math.exp(-away * look.extinction) if look.extinction > 0.0 else 1.0
-        draw_object(image, lens, obj, models, Air(light, clear, look.haze, look.night, opacity), layer)
+        draw_object(image, lens, look, obj, models, Air(light, clear, opacity), layer)
         if look.night > 0.0:
             budget = add_glare(image, lens, obj, clear * opacity, budget)
 
@@ -107,12 +111,16 @@ def draw_solids(image, view, models, objects, order, n, layer):
 def draw_light(view, road, tables, models, objects, count, buffers):
     """Draw the light at one time of the exposure to `buffers.image`; see `draw_frames`."""
     image, lens, order = buffers.image, view.lens, buffers.order
-    count = append_roadside(lens, road.roadside, objects, count)
+    cast_shadows = view.look.cast > 0.0
+    vehicles = count
+    count = append_roadside(lens, road.roadside, view.look, objects, count)
     n = order_objects(lens, objects, count, order, buffers.distances)
     horizon = lens.centre_v + lens.focal * lens.sin_pitch / lens.cos_pitch
     draw_distance(image, view, tables, horizon)
     ground = GroundLayer(buffers.ground, buffers.corners, buffers.uv, buffers.quad)
-    add_flats(ground, lens, road, objects, order, n)
+    add_flats(ground, view, road, objects, order, n)
+    if cast_shadows:
+        add_cast_shadows(ground, view, models, objects, vehicles, road.roadside)
     draw_ground(image, view, buffers.ground, tables, horizon)
     solids = SolidLayer(buffers.solids, buffers.corners, buffers.uv, buffers.axes, buffers.greys)
     draw_solids(image, view, models, objects, order, n, solids)

@@ -1,13 +1,19 @@
 """Kernels of the shadows of objects and of marks on the ground."""
 
 from lgmd_gym.camera.effects import ASPHALT_GREY, PAINT_GREY
-from lgmd_gym.camera.objects import MODEL_MARK, MODEL_POST, MODEL_RAIL, MODEL_TREE
+from lgmd_gym.camera.objects import (
+    MODEL_BARRIER,
+    MODEL_BOX,
+    MODEL_MARK,
+    MODEL_POST,
+    MODEL_RAIL,
+    MODEL_TREE,
+    light_of_code,
+)
 from lgmd_gym.camera.render.ground import PAINT, SHADOW, add_ground_quad
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.order import distance
 
-SUN = (-0.48, 0.36, 0.80)
-"""Direction towards the sun (world x, y, up)."""
 
 
 @kernel
@@ -25,7 +31,7 @@ def _add_footprint(layer, k, lens, obj, centre, grow, weight):
 
 
 @kernel
-def _add_mark(layer, lens, obj):
+def _add_mark(layer, lens, obj, look):
     """Add a ground mark: filled if it has a shade, else a painted outline."""
     centre = (obj.x, obj.y)
     if obj.shade >= 0.0:
@@ -34,7 +40,8 @@ def _add_mark(layer, lens, obj):
         if paint > 0.0:
             _add_footprint(layer, PAINT, lens, obj, centre, 0.0, min(paint, 1.0))
         else:
-            _add_footprint(layer, SHADOW, lens, obj, centre, 0.0, 1.0 - obj.shade / ASPHALT_GREY)
+            left = light_of_code(obj.shade, look.code_power) / light_of_code(ASPHALT_GREY, look.code_power)
+            _add_footprint(layer, SHADOW, lens, obj, centre, 0.0, 1.0 - left)
         return
     _add_footprint(layer, PAINT, lens, obj, centre, 0.0, 0.8)
     inset = -min(0.2, 0.25 * min(obj.length, obj.width))
@@ -42,19 +49,23 @@ def _add_mark(layer, lens, obj):
 
 
 @kernel
-def add_shadow(layer, lens, obj):
-    """Add the mark or the soft shadow (three nested quads) of an object to the ground layer."""
+def add_shadow(layer, lens, obj, look):
+    """Add the mark of an object, or the soft shadow below it, to the ground layer."""
     if obj.model == MODEL_MARK:
-        _add_mark(layer, lens, obj)
+        _add_mark(layer, lens, obj, look)
         return
     if obj.model == MODEL_POST or obj.model == MODEL_RAIL:
         return
-    lean = -0.12 * obj.height / SUN[2]
-    centre = (obj.x + lean * SUN[0], obj.y + lean * SUN[1])
+    lean = look.under_lean * obj.height
+    centre = (obj.x + lean * look.sun_x, obj.y + lean * look.sun_y)
     if obj.model == MODEL_TREE:
         dark = min(0.4, 0.8 - distance(lens, obj) / 60.0)
         if dark > 0.0:
             _add_footprint(layer, SHADOW, lens, obj, centre, -0.2 * obj.width, dark)
         return
-    for ring in range(3):
-        _add_footprint(layer, SHADOW, lens, obj, centre, 0.16 * ring - 0.08, 0.22)
+    # Nested rectangles: the light falls off from the outer one to the inner one.
+    spread = look.under_box if obj.model == MODEL_BOX or obj.model == MODEL_BARRIER else 1.0
+    inmost = -0.5 * min(obj.length, obj.width)
+    for ring in range(int(look.under_rings)):
+        grow = max(spread * (look.under_first + look.under_step * ring), inmost)
+        _add_footprint(layer, SHADOW, lens, obj, centre, grow, look.under_body)

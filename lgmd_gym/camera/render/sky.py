@@ -12,7 +12,7 @@ _LOG2 = 15  # 0.011° per entry, finer than a pixel of a 5° lens at 160 px
 _HILLS, _TREES, _LEAVES = 0, 1, 2
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def skyline(seed: int) -> np.ndarray:
     """Return the skyline over 360°, natural 1/f^k profiles periodic in azimuth; float32, shape (3, 32768).
 
@@ -65,7 +65,8 @@ def draw_sky(image, lens, line, look, horizon):
         w = at - cell
         a, b = int(cell) & (n - 1), (int(cell) + 1) & (n - 1)
         for layer in range(2):
-            tan = line[layer, a] + w * (line[layer, b] - line[layer, a])
+            scale = look.hill_scale if layer == _HILLS else look.tree_scale
+            tan = scale * (line[layer, a] + w * (line[layer, b] - line[layer, a]))
             # Row of the direction with elevation atan(tan) in this column.
             away = math.hypot(f, u)
             top = (

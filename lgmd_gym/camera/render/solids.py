@@ -12,10 +12,8 @@ from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_projec
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
 from lgmd_gym.camera.render.order import distance
-from lgmd_gym.camera.render.shadows import SUN
 from lgmd_gym.simd import LANES, any_above, load_part, madd, magnitude, maximum, minimum, splat, store_part
 
-_AMBIENT, _DIRECT = 0.62, 0.42  # light on a face turned away from the sun, and the share that the sun adds
 _HALF = 0.55  # reach of the models from their centre, as a share of their length and width
 _TRACE = nb.float32(1e-3)  # less grey comes from rounding
 
@@ -26,15 +24,11 @@ class Air(NamedTuple):
     Attributes:
         light: Light on the object; 1 by day.
         transmission: Share of the object's contrast that remains behind the fog.
-        haze: Grey level of the fog.
-        night: 1.0 at night.
         opacity: Share of the object that is drawn; below 1 near the end of its range.
     """
 
     light: float
     transmission: float
-    haze: float
-    night: float
     opacity: float
 
 
@@ -48,7 +42,7 @@ def _to_axes(lens, x, y, z, out, i):
 
 
 @kernel
-def place_object(lens, obj, axes):
+def place_object(lens, look, obj, axes):
     """Write an object in camera axes: ground centre, length, width and height [m], direction of the sun."""
     c, s = obj.cos, obj.sin
     dx, dy = obj.x - lens.x, obj.y - lens.y
@@ -61,7 +55,7 @@ def place_object(lens, obj, axes):
     _to_axes(lens, c * obj.length, s * obj.length, 0.0, axes, np.int64(1))
     _to_axes(lens, -s * obj.width, c * obj.width, 0.0, axes, np.int64(2))
     _to_axes(lens, 0.0, 0.0, obj.height, axes, np.int64(3))
-    _to_axes(lens, SUN[0], SUN[1], SUN[2], axes, np.int64(4))
+    _to_axes(lens, look.sun_x, look.sun_y, look.sun_z, axes, np.int64(4))
 
 
 @kernel
@@ -93,7 +87,7 @@ def _outside(lens, axes):
 
 
 @kernel
-def _face_light(corners, axes):
+def _face_light(corners, axes, look):
     """Return the light on a face, or a negative number if its back faces the lens."""
     ax, ay, az = corners[1, 0] - corners[0, 0], corners[1, 1] - corners[0, 1], corners[1, 2] - corners[0, 2]
     bx, by, bz = corners[2, 0] - corners[1, 0], corners[2, 1] - corners[1, 1], corners[2, 2] - corners[1, 2]
@@ -102,7 +96,7 @@ def _face_light(corners, axes):
     if nx * corners[0, 0] + ny * corners[0, 1] + nz * corners[0, 2] >= 0.0:
         return -1.0
     norm = math.sqrt(nx * nx + ny * ny + nz * nz)
-    return _AMBIENT + _DIRECT * max(0.0, (nx * axes[4, 0] + ny * axes[4, 1] + nz * axes[4, 2]) / norm)
+    return look.ambient + look.direct * max(0.0, (nx * axes[4, 0] + ny * axes[4, 1] + nz * axes[4, 2]) / norm)
 
 
 @kernel
@@ -119,9 +113,9 @@ def _grey(role, value, light, obj, night):
 
 
 @kernel
-def draw_object(image, lens, obj, models, air, layer):
+def draw_object(image, lens, look, obj, models, air, layer):
     """Draw one object over the image."""
-    place_object(lens, obj, layer.axes)
+    place_object(lens, look, obj, layer.axes)
     if _outside(lens, layer.axes):
         return
     # Apparent height [px], at a distance of 1 m or more.
@@ -131,22 +125,22 @@ def draw_object(image, lens, obj, models, air, layer):
     reverse = obj.model == MODEL_CAR and lens.z < BODY_TOP * obj.height
     for k in range(last - first):
         solid = last - 1 - k if reverse else first + k
-        u0, v0, u1, v1 = _add_solid(layer, lens, obj, models, solid, size, air)
+        u0, v0, u1, v1 = _add_solid(layer, lens, look, obj, models, solid, size, air)
         if u1 >= u0:
             height, width = image.shape
             rows = (int(max(v0, 0.0)), int(min(math.ceil(v1), height)))
             columns = (int(max(u0, 0.0)), int(min(math.ceil(u1) + 1.0, width)))
-            _compose(image, layer, rows, columns, air)
+            _compose(image, layer, rows, columns, air, look.haze)
 
 
 @kernel
-def _add_solid(layer, lens, obj, models, solid, size, air):
+def _add_solid(layer, lens, look, obj, models, solid, size, air):
     """Add the faces and details of one solid that are in the frame.
 
     Returns the bounds (u0, v0, u1, v1) of these faces [px]; u1 < u0 if there is none.
     """
     corners, uv, greys = layer.corners, layer.uv, layer.greys
-    night = air.night > 0.0
+    night = look.night > 0.0
     height, width = layer.coverage.shape[1], layer.coverage.shape[2] - 2
     u0, v0, u1, v1 = 1e9, 1e9, -1e9, -1e9
     for p in range(models.solids[solid, 0], models.solids[solid, 1]):
@@ -159,7 +153,7 @@ def _add_solid(layer, lens, obj, models, solid, size, air):
             if greys[parent, 1] == 0.0 or weight <= 0.0:
                 continue
         _place_corners(models.corners[p], n, layer.axes, corners)
-        light = greys[parent, 1] if parent >= 0 else _face_light(corners, layer.axes) * air.light
+        light = greys[parent, 1] if parent >= 0 else _face_light(corners, layer.axes, look) * air.light
         if light <= 0.0:
             continue
         m = clip_and_project(lens, corners, n, uv)
@@ -180,13 +174,13 @@ def _add_solid(layer, lens, obj, models, solid, size, air):
 
 
 @kernel
-def _compose(image, layer, rows, columns, air):
+def _compose(image, layer, rows, columns, air, haze):
     """Draw the layer over a part of the image and clear it; `rows` and `columns` are (first, last + 1)."""
     width, stride = image.shape[1], layer.coverage.shape[2]
     covers, greys = layer.coverage[0], layer.coverage[1]
     zero, one, trace = splat(nb.float32(0.0)), splat(nb.float32(1.0)), splat(_TRACE)
     clear = splat(nb.float32(air.transmission))
-    murk = splat(nb.float32((1.0 - air.transmission) * air.haze))
+    murk = splat(nb.float32((1.0 - air.transmission) * haze))
     for i in range(rows[0], rows[1]):
         sum_cover = sum_grey = zero
         # The last edges may be in the two columns right of the solid.

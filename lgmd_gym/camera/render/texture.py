@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lgmd_gym.camera.render.ground_features import EXPONENTS, STREAMS, add_features
+
 TEXEL_M = 0.04
 """Size of a texel [m]. The near ground of a 60° lens at 160 px has 3 to 8 cm per pixel."""
 _LONG_LOG2, _WIDE_LOG2 = 12, 9  # 164 m along x, 20 m along y
@@ -30,21 +32,23 @@ class Texture(NamedTuple):
     level_start: np.ndarray
 
 
-@lru_cache(maxsize=8)
-def ground_texture(kind: str, seed: int) -> Texture:
-    """Return the texture of `"asphalt"` or `"verge"`, built once per seed and process."""
-    rng = np.random.default_rng([seed, {"asphalt": 1, "verge": 2}[kind]])
-    if kind == "asphalt":
-        tile = _noise(rng, exponent=0.85)
-        _add_seams(tile, rng)
-    else:
-        tile = _noise(rng, exponent=1.1)
-    tile -= tile.mean()
-    tile /= tile.std()
-    np.clip(tile, -3.4, 3.4, out=tile)
-    tile *= _STD_CODE
-    tile += 128.0
-    return _ripmap(tile)
+@lru_cache(maxsize=24)
+def ground_texture(kind: str, tile: int) -> Texture:
+    """Return a ground texture, built once per process.
+
+    Args:
+        kind: A kind of ground: "asphalt" or "verge" of the laboratory, or a kind of drawn worlds.
+        tile: Number of the texture.
+    """
+    rng = np.random.default_rng([tile, STREAMS[kind]])
+    deviations = _noise(rng, EXPONENTS[kind])
+    add_features(kind, deviations, rng)
+    deviations -= deviations.mean()
+    deviations /= deviations.std()
+    np.clip(deviations, -3.4, 3.4, out=deviations)
+    deviations *= _STD_CODE
+    deviations += 128.0
+    return _ripmap(deviations)
 
 
 def _noise(rng: np.random.Generator, exponent: float) -> np.ndarray:
@@ -64,23 +68,6 @@ def _noise(rng: np.random.Generator, exponent: float) -> np.ndarray:
     tile = np.fft.irfft2(spectrum, shape).astype(np.float32, copy=False)
     tile /= tile.std()
     return tile
-
-
-def _add_seams(tile: np.ndarray, rng: np.random.Generator) -> None:
-    """Add the sealed cracks and patches of an older road."""
-    long, wide = tile.shape
-    for _ in range(14):
-        x, y = int(rng.integers(long)), int(rng.integers(wide))
-        span, thick = int(rng.integers(60, 220)), int(rng.integers(2, 4))
-        wander = np.cumsum(rng.integers(-1, 2, span))
-        for step in range(span):
-            rows = (x + wander[step] + np.arange(thick)) % long
-            tile[rows, (y + step) % wide] -= 2.2
-    for _ in range(8):
-        x, y = int(rng.integers(long)), int(rng.integers(wide))
-        rows = (x + np.arange(int(rng.integers(40, 160)))) % long
-        cols = (y + np.arange(int(rng.integers(25, 80)))) % wide
-        tile[np.ix_(rows, cols)] += float(rng.choice((-0.9, 0.8)))
 
 
 def _ripmap(tile: np.ndarray) -> Texture:

@@ -10,39 +10,51 @@ from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.simd import load_part, madd, splat
 
 _BEAM_REACH = 26.0  # the low beam falls to 1/e over this distance [m]
-_BEAM_GAIN, _NIGHT_LIGHT = 1.25, 0.04
 
 
 @kernel
-def light_at(ahead, across, night):
+def light_at(ahead, across, look):
     """Return the light at a point `ahead` and `across` of the lens [m]: 1 by day, the low beam at night."""
-    if night == 0.0:
+    if look.night == 0.0:
         return 1.0
     tan = across / max(ahead, 1.0)
     beam = math.exp(-max(ahead, 0.0) / _BEAM_REACH - (tan / BEAM_WIDTH) ** 2)
-    return _NIGHT_LIGHT + _BEAM_GAIN * beam
+    return look.night_light + look.beam_gain * beam
 
 
 class RowAir(NamedTuple):
-    """Headlights (if `night`) and fog (if `foggy`) on a row of ground.
+    """Headlights (if `night`), reflections (if `wet`) and fog (if `foggy`) on a row of ground.
 
-    The light grows by `gain` times the low beam; the fog leaves the share `clear` of the contrast to `haze`.
+    The light is `dark` plus `gain` times the low beam; the share `gloss` of it is replaced by `mirrored`; the
+    fog leaves the share `clear` of the contrast to `haze`.
     """
 
     night: bool
+    dark: float
     gain: float
+    wet: bool
+    gloss: float
+    mirrored: float
     foggy: bool
     clear: float
     haze: float
 
 
 @kernel
-def row_air(look, ahead):
-    """Return the `RowAir` of ground at the distance `ahead` [m], below 0 behind a lens that points down."""
+def row_air(look, ahead, height):
+    """Return the `RowAir` of ground at the distance `ahead` of a lens of this height [m].
+
+    The distance is below 0 behind a lens that points down.
+    """
     night, foggy = look.night > 0.0, look.extinction > 0.0
-    gain = _BEAM_GAIN * math.exp(-max(ahead, 0.0) / _BEAM_REACH) if night else 0.0
+    gain = look.beam_gain * math.exp(-max(ahead, 0.0) / _BEAM_REACH) if night else 0.0
     clear = math.exp(-abs(ahead) * look.extinction) if foggy else 1.0
-    return RowAir(night, gain, foggy, clear, look.haze)
+    # A rough wet surface reflects the sky as water does, by Schlick's approximation, and half of the water
+    # stands on it: at 20 m from a lens 1.2 m high a quarter of the light.
+    grazing = 1.0 - height / math.sqrt(height * height + ahead * ahead)
+    gloss = 0.5 * (0.02 + 0.98 * grazing**5) if look.wet > 0.0 else 0.0
+    mirrored = look.horizon
+    return RowAir(night, look.night_light, gain, look.wet > 0.0, gloss, mirrored, foggy, clear, look.haze)
 
 
 @kernel
@@ -50,7 +62,9 @@ def through_air(grey, air, beam, column):
     """Return sixteen pixels of ground, from a column, under headlights and fog; see `Views.beams`."""
     if air.night:
         fall_off = load_part(beam, column, beam.shape[0] - column)
-        grey = grey * madd(splat(nb.float32(air.gain)), fall_off, splat(nb.float32(_NIGHT_LIGHT)))
+        grey = grey * madd(splat(nb.float32(air.gain)), fall_off, splat(nb.float32(air.dark)))
+    if air.wet:
+        grey = madd(splat(nb.float32(air.gloss)), splat(nb.float32(air.mirrored)) - grey, grey)
     if air.foggy:
         haze = splat(nb.float32(air.haze))
         grey = madd(splat(nb.float32(air.clear)), grey - haze, haze)

@@ -1,0 +1,143 @@
+"""Kernels of the shadows that the sun casts on the ground.
+
+The shadow of a box is the convex hull of its outline at two heights, each shifted away from the sun. That of
+a tree's crown is an ellipse, drawn out along the same direction.
+"""
+
+import math
+
+from lgmd_gym.camera.objects import MODEL_BARRIER, MODEL_BOX, MODEL_MARK, MODEL_TREE
+from lgmd_gym.camera.pose import side_tangent
+from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
+from lgmd_gym.camera.render.ground import CAST
+from lgmd_gym.camera.render.jit import kernel
+
+_FADE_START, _FADE_END = 100.0, 150.0  # shadows fade out between these distances from the lens [m]
+_CROWN_CORNERS = 8
+_MOST_SHIFT = 8.0  # length of a shadow per height; at lower elevations of the sun, shadows end there
+
+
+@kernel
+def add_cast_shadows(layer, view, models, objects, count, roadside):
+    """Add the cast shadows of the first `count` objects and of the roadside within range.
+
+    Marks have none. Boxes and barriers have their soft shadow only.
+    """
+    lens, look = view.lens, view.look
+    stretch = min(1.0 / look.sun_z, _MOST_SHIFT)
+    away = (-look.sun_x * stretch, -look.sun_y * stretch)
+    for i in range(count):
+        if objects[i].model != MODEL_MARK:
+            _add_shadow_of(layer, lens, models, objects[i], away)
+    n = roadside.shape[0]
+    low, high = 0, n
+    start = lens.x - _FADE_END
+    while low < high:
+        middle = (low + high) // 2
+        if roadside[middle].x < start:
+            low = middle + 1
+        else:
+            high = middle
+    while low < n and roadside[low].x < lens.x + _FADE_END:
+        if roadside[low].model != MODEL_MARK:
+            _add_shadow_of(layer, lens, models, roadside[low], away)
+        low += 1
+
+
+@kernel
+def _add_shadow_of(layer, lens, models, obj, away):
+    """Add the shadow of one object; `away` is the shift of a point 1 m above the ground [m]."""
+    if obj.model == MODEL_BOX or obj.model == MODEL_BARRIER:
+        return
+    dx, dy = obj.x - lens.x, obj.y - lens.y
+    distance = math.sqrt(dx * dx + dy * dy)
+    if distance > _FADE_END:
+        return
+    # A circle around the object and its shadow.
+    shift = obj.height * math.sqrt(away[0] * away[0] + away[1] * away[1])
+    mx, my = dx + 0.5 * obj.height * away[0], dy + 0.5 * obj.height * away[1]
+    radius = 0.5 * (obj.length + obj.width + shift)
+    ahead, across = mx * lens.cos_yaw + my * lens.sin_yaw, my * lens.cos_yaw - mx * lens.sin_yaw
+    tan = side_tangent(lens)
+    if tan >= 0.0 and (
+        ahead < -radius or abs(across) > max(ahead, 0.0) * tan + radius * math.sqrt(1.0 + tan * tan)
+    ):
+        return
+    weight = min(1.0, (_FADE_END - distance) / (_FADE_END - _FADE_START))
+    if obj.model == MODEL_TREE:
+        n = _crown_outline(layer, lens, obj, away)
+        _add_outline(layer, lens, n, weight)
+        n = _box_outline(layer, lens, obj, away, 0.12 * obj.width, 0.0, 0.3 * obj.height)
+        _add_outline(layer, lens, n, weight)
+        return
+    low = models.overhead[obj.model]
+    n = _box_outline(layer, lens, obj, away, 0.0, low * obj.height, obj.height)
+    _add_outline(layer, lens, n, weight)
+
+
+@kernel
+def _write_corner(layer, lens, i, x, y):
+    """Write corner i, relative to the lens on the ground [m], in camera axes."""
+    ahead = x * lens.cos_yaw + y * lens.sin_yaw
+    layer.corners[i, 0] = ahead * lens.cos_pitch - lens.z * lens.sin_pitch
+    layer.corners[i, 1] = y * lens.cos_yaw - x * lens.sin_yaw
+    layer.corners[i, 2] = ahead * lens.sin_pitch + lens.z * lens.cos_pitch
+
+
+@kernel
+def _box_outline(layer, lens, obj, away, size, low, high):
+    """Write the outline of a box's shadow, between two heights [m]; returns the number of its corners.
+
+    `size` replaces length and width unless it is 0 [m].
+    """
+    hx, hy = 0.5 * (size if size > 0.0 else obj.length), 0.5 * (size if size > 0.0 else obj.width)
+    dx, dy = obj.x - lens.x, obj.y - lens.y
+    along, across = away[0] * obj.cos + away[1] * obj.sin, away[1] * obj.cos - away[0] * obj.sin
+    n = 0
+    for k in range(4):
+        # Corners in turn; the edges that begin and end here face (-1, 0), (0, 1), (1, 0), (0, -1) in turn.
+        lx = -hx if k == 0 or k == 1 else hx
+        ly = -hy if k == 0 or k == 3 else hy
+        before = -across if k == 0 else -along if k == 1 else across if k == 2 else along
+        after = -along if k == 0 else across if k == 1 else along if k == 2 else -across
+        # An edge that faces away from the sun is shifted by the upper height, another by the lower one.
+        for part in range(2):
+            facing = before if part == 0 else after
+            if part == 1 and (before > 0.0) == (after > 0.0):
+                continue
+            height = high if facing > 0.0 else low
+            x = dx + lx * obj.cos - ly * obj.sin + height * away[0]
+            y = dy + lx * obj.sin + ly * obj.cos + height * away[1]
+            _write_corner(layer, lens, n, x, y)
+            n += 1
+    return n
+
+
+@kernel
+def _crown_outline(layer, lens, obj, away):
+    """Write the outline of the shadow of a tree's crown; returns the number of its corners."""
+    middle, half = 0.6 * obj.height, 0.37 * obj.height
+    x, y = obj.x - lens.x + middle * away[0], obj.y - lens.y + middle * away[1]
+    radius = 0.46 * obj.width
+    shift = math.sqrt(away[0] * away[0] + away[1] * away[1])
+    c, s = (away[0] / shift, away[1] / shift) if shift > 1e-9 else (1.0, 0.0)
+    long = math.sqrt(radius * radius + (half * shift) ** 2)
+    for k in range(_CROWN_CORNERS):
+        angle = 2.0 * math.pi * k / _CROWN_CORNERS
+        a, b = long * math.cos(angle), radius * math.sin(angle)
+        _write_corner(layer, lens, k, x + a * c - b * s, y + a * s + b * c)
+    return _CROWN_CORNERS
+
+
+@kernel
+def _add_outline(layer, lens, n, weight):
+    """Add the polygon of the first n corners, of either winding."""
+    deepest = layer.corners[0, 0]
+    for k in range(1, n):
+        deepest = max(deepest, layer.corners[k, 0])
+    if deepest < NEAR:
+        return
+    m = clip_and_project(lens, layer.corners, n, layer.uv)
+    if m >= 3:
+        signed = weight if winding(layer.uv, m) > 0.0 else -weight
+        add_polygon(layer.coverage, CAST, layer.uv, m, signed, 0.0)

@@ -1,0 +1,223 @@
+"""Worlds: the appearance of road, surroundings, light and vehicles, drawn from one integer."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from lgmd_gym.errors import check_known, check_whole
+
+LABORATORY = "laboratory"
+"""The name of the plain world: one asphalt, one skyline, no sun shadows, and a lens without errors."""
+WORLDS = 10_000
+"""Number of drawn worlds; they are numbered from 0."""
+SPLIT_WORLDS = {
+    "train": range(0, 6000),
+    "validation": range(6000, 8000),
+    "test": range(8000, 9000),
+    "held-out": range(9000, 10_000),
+}
+"""Disjoint ranges of worlds; those held out are for final evaluations only."""
+
+ASPHALTS = ("fresh", "worn", "patched", "cracked", "coarse", "concrete")
+VERGES = ("grass", "gravel", "soil", "paving")
+TILES = 2
+"""Number of different textures per kind of ground."""
+SKYLINES = 64
+"""Number of different skylines."""
+
+# Mean grey of a new to a weathered surface, display-coded. Asphalt reflects 5 % (new) to 15 % (aged) and
+# concrete 20 % to 35 % of the light (Levinson and Akbari 2002, Cement and Concrete Research 32).
+_ASPHALT_GREYS = {
+    "fresh": (66.0, 92.0),
+    "worn": (92.0, 132.0),
+    "patched": (84.0, 122.0),
+    "cracked": (96.0, 138.0),
+    "coarse": (84.0, 124.0),
+    "concrete": (124.0, 162.0),
+}
+_ASPHALT_CONTRASTS = {
+    "fresh": (0.4, 0.9),
+    "worn": (0.6, 1.3),
+    "patched": (0.8, 1.6),
+    "cracked": (0.8, 1.6),
+    "coarse": (0.8, 1.7),
+    "concrete": (0.5, 1.2),
+}
+_VERGE_GREYS = {"grass": (52.0, 104.0), "gravel": (92.0, 150.0), "soil": (70.0, 128.0), "paving": (92.0, 146.0)}
+_ASPHALT_SHARES = (0.16, 0.26, 0.18, 0.14, 0.14, 0.12)
+_VERGE_SHARES = (0.5, 0.15, 0.2, 0.15)
+# Length and period of the dashes of a lane line [m]: highway-env's, and those of several countries.
+_DASHES = ((3.0, 4.33), (3.0, 9.0), (3.0, 12.0), (6.0, 18.0), (4.0, 12.0), (6.0, 9.0))
+_LANE_WIDTHS = (3.25, 3.5, 3.75)
+_OVERCAST_SHARE = 0.4  # of all daylight worlds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """The appearance of an episode.
+
+    Grey levels are display-coded, 0 to 255, in the light of a clear or overcast day.
+
+    Attributes:
+        number: Number of the world; -1 for the laboratory.
+        asphalt: Kind of the road's texture and its tile.
+        verge: Kind of the verge's texture and its tile.
+        asphalt_grey: Mean grey of the road.
+        asphalt_contrast: Contrast of the road, as a multiple of 9 grey levels per standard deviation.
+        verge_grey: Mean grey of the verge.
+        verge_contrast: Contrast of the verge, as a multiple of 16 grey levels per standard deviation.
+        paint_grey: Grey of road markings.
+        line_width: Width of the markings [m].
+        dash: Length and period of a lane line's dashes [m].
+        lane_width: Width of the lanes of braking scenarios [m].
+        skyline: Number of the skyline.
+        hill_scale: Height of the hills, as a multiple of the laboratory's.
+        tree_scale: Height of the tree line, as a multiple of the laboratory's.
+        greys: Grey of the sky at the zenith and at the horizon, of hills and of trees.
+        leaf_contrast: Standard deviation of the grey of the trees.
+        roadside: Density of posts and plants, as a multiple of the natural density.
+        guard_rail: Whether guard rails run along the outer edges of the road.
+        sun_azimuth_deg: Direction of the sun, from +x towards +y [degrees].
+        sun_elevation_deg: Elevation of the sun [degrees].
+        sun_share: Share of the light on a horizontal surface that comes directly from the sun; 0 under an
+            overcast sky.
+        street_light: Light at night apart from headlights, as a share of daylight.
+        under_body: Share of the light that is missing below the middle of a vehicle.
+        mount_height_error: Height of the lens above that of its mount [m].
+        pitch_error_deg: Upward tilt of the optical axis relative to its mount [degrees].
+        yaw_error_deg: Turn of the optical axis to the right relative to its mount [degrees].
+        noise: Sensor noise as a multiple of the usual noise.
+        exposure_s: Time constant of the automatic exposure [s]; 0 for a fixed exposure.
+    """
+
+    number: int = -1
+    asphalt: tuple[str, int] = ("asphalt", 0)
+    verge: tuple[str, int] = ("verge", 0)
+    asphalt_grey: float = 104.0
+    asphalt_contrast: float = 1.0
+    verge_grey: float = 76.0
+    verge_contrast: float = 1.0
+    paint_grey: float = 208.0
+    line_width: float = 0.15
+    dash: tuple[float, float] = (3.0, 4.33)
+    lane_width: float = 3.5
+    skyline: int = -1
+    hill_scale: float = 1.0
+    tree_scale: float = 1.0
+    greys: tuple[float, float, float, float] = (172.0, 214.0, 128.0, 78.0)
+    leaf_contrast: float = 12.0
+    roadside: float = 1.0
+    guard_rail: bool = False
+    sun_azimuth_deg: float = 143.13
+    sun_elevation_deg: float = 53.13
+    sun_share: float = 0.0
+    street_light: float = 0.04
+    under_body: float = 0.66
+    mount_height_error: float = 0.0
+    pitch_error_deg: float = 0.0
+    yaw_error_deg: float = 0.0
+    noise: float = 0.0
+    exposure_s: float = 0.0
+
+    @property
+    def drawn(self) -> bool:
+        """Whether this is not the laboratory."""
+        return self.number >= 0
+
+
+@lru_cache(maxsize=256)
+def draw_world(number: int | None) -> World:
+    """Return a world; None for the laboratory.
+
+    Args:
+        number: Number of the world, from 0 to 9,999; the same in every process.
+
+    Raises:
+        ValueError: If there is no such world.
+    """
+    if number is None:
+        return World()
+    check_world(number)
+    rng = np.random.default_rng([number, 10])
+    return World(
+        number=number,
+        **_draw_ground(rng),
+        **_draw_markings(rng),
+        **_draw_surroundings(rng),
+        **_draw_sun(rng),
+        **_draw_camera(rng),
+    )
+
+
+def check_world(value: object) -> int | None:
+    """Return the number of a world, or None for `LABORATORY`.
+
+    Raises:
+        ValueError: If there is no such world.
+    """
+    if isinstance(value, str):
+        check_known("world", value, (LABORATORY,))
+        return None
+    return check_whole("world", value, 0, WORLDS - 1)
+
+
+def _draw_ground(rng: np.random.Generator) -> dict[str, object]:
+    road, verge = str(rng.choice(ASPHALTS, p=_ASPHALT_SHARES)), str(rng.choice(VERGES, p=_VERGE_SHARES))
+    return {
+        "asphalt": (road, int(rng.integers(TILES))),
+        "verge": (verge, int(rng.integers(TILES))),
+        "asphalt_grey": float(rng.uniform(*_ASPHALT_GREYS[road])),
+        "asphalt_contrast": float(rng.uniform(*_ASPHALT_CONTRASTS[road])),
+        "verge_grey": float(rng.uniform(*_VERGE_GREYS[verge])),
+        "verge_contrast": float(rng.uniform(0.6, 1.4)),
+    }
+
+
+def _draw_markings(rng: np.random.Generator) -> dict[str, object]:
+    return {
+        "paint_grey": float(rng.uniform(150.0, 232.0)),
+        "line_width": float(rng.uniform(0.10, 0.20)),
+        "dash": _DASHES[int(rng.integers(len(_DASHES)))],
+        "lane_width": _LANE_WIDTHS[int(rng.integers(len(_LANE_WIDTHS)))],
+    }
+
+
+def _draw_surroundings(rng: np.random.Generator) -> dict[str, object]:
+    horizon = float(rng.uniform(190.0, 250.0))
+    return {
+        "skyline": int(rng.integers(SKYLINES)),
+        "hill_scale": float(rng.uniform(0.0, 2.0)),
+        "tree_scale": float(np.exp(rng.uniform(np.log(0.5), np.log(4.0)))),
+        "greys": (
+            float(rng.uniform(120.0, 205.0)), horizon, float(rng.uniform(90.0, 150.0)),
+            float(rng.uniform(34.0, 92.0)),
+        ),
+        "leaf_contrast": float(rng.uniform(3.0, 10.0)),
+        "roadside": float(rng.uniform(0.0, 2.0)),
+        "guard_rail": bool(rng.random() < 0.25),
+    }  # fmt: skip
+
+
+def _draw_sun(rng: np.random.Generator) -> dict[str, object]:
+    overcast = rng.random() < _OVERCAST_SHARE
+    share = 0.0 if overcast else float(rng.uniform(0.45, 0.85))
+    return {
+        "sun_azimuth_deg": float(rng.uniform(0.0, 360.0)),
+        "sun_elevation_deg": float(rng.uniform(18.0, 62.0)),
+        "sun_share": share,
+        "street_light": float(np.exp(rng.uniform(np.log(0.001), np.log(0.02)))),
+        # Display-coded, 0.49 to 0.58 of the road's grey was measured on a real overcast road, and 0.41 to
+        # 0.85 in a tunnel; light is the square of the display code.
+        "under_body": float(rng.uniform(0.62, 0.80)),
+    }
+
+
+def _draw_camera(rng: np.random.Generator) -> dict[str, object]:
+    return {
+        "mount_height_error": float(rng.uniform(-0.1, 0.1)),
+        "pitch_error_deg": float(rng.uniform(-0.5, 0.5)),
+        "yaw_error_deg": float(rng.uniform(-0.5, 0.5)),
+        "noise": float(rng.uniform(0.5, 1.5)),
+        "exposure_s": float(rng.uniform(0.2, 1.0)),
+    }
