@@ -19,7 +19,6 @@ from lgmd_gym.envs.info import INFO_KEYS
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.envs.scene import SceneArrays, write_scene
-from lgmd_gym.envs.simulation.network import road_network
 from lgmd_gym.envs.simulation.road import BrakingRoad
 from lgmd_gym.envs.simulation.vehicles import EgoCar
 from lgmd_gym.envs.simulation.world import World
@@ -231,9 +230,8 @@ class BrakingEnv(EgoBrakeEnv):
         self.scenario, self._episode_info = placement.scenario, draw.info
         self.camera_fields = self.camera_fields | draw.camera_fields
         self._world.load(0, placement)
-        network = road_network(placement.scenario.road, placement.start)
         physics = tuple(make_physics(self._world, self._brakes, self.weights))
-        self.road = BrakingRoad(network, self.np_random, physics, self._clock.demands)
+        self.road = BrakingRoad(draw.make_network(), self.np_random, physics, self._clock.demands)
         self.controlled_vehicles = [self.road.ego]
         start_episodes(0, 1, _SELECTED, physics, tuple(self._clock), tuple(self._outcome))
 

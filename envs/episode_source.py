@@ -5,7 +5,11 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from highway_env.road.road import RoadNetwork
+
 from lgmd_gym.camera import CONDITIONS
+from lgmd_gym.camera.worlds import draw_world
+from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.scenarios.distribution import (
     LEVELS,
     check_levels,
@@ -14,6 +18,7 @@ from lgmd_gym.envs.scenarios.distribution import (
     level_generator,
 )
 from lgmd_gym.envs.scenarios.scenario import Scenario
+from lgmd_gym.envs.simulation.network import road_network
 from lgmd_gym.envs.simulation.world import Placement, place
 
 
@@ -22,13 +27,18 @@ class Draw(NamedTuple):
 
     Attributes:
         placement: The scenario, placed on the road.
-        camera_fields: Fields of `CameraParams` and `condition` that the episode sets.
+        camera_fields: Fields of `CameraParams`, `world` among them, and `condition` of the episode.
         info: Additional keys of the episode's info.
     """
 
     placement: Placement
     camera_fields: dict[str, Any]
     info: dict[str, Any]
+
+    def make_network(self) -> RoadNetwork:
+        """Return the highway-env road network of the episode, with the lane width of its world."""
+        width = draw_world(self.camera_fields["world"]).lane_width
+        return road_network(self.placement.scenario.road, self.placement.start, width)
 
 
 class EpisodeSource(Protocol):
@@ -45,18 +55,24 @@ class EpisodeSource(Protocol):
 
 
 class FixedScenario:
-    """The same scenario in every episode, with a random start and random grey levels.
+    """The same scenario in every episode, with a random start, random grey levels and a random world.
+
+    `info` adds `world`, the number of the world, or -1 in the laboratory.
 
     Args:
         scenario: The scenario.
+        appearance: World and camera condition.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, appearance: Appearance | None = None) -> None:
         self.first = scenario
+        self.appearance = appearance or Appearance()
 
     def draw(self, rng: np.random.Generator) -> Draw:
         """Return the next episode."""
-        return Draw(place(self.first, rng), {}, {})
+        placement = place(self.first, rng)
+        fields = self.appearance.draw(rng)
+        return Draw(placement, fields, {"world": world_number(fields)})
 
 
 class RandomLevels:
@@ -64,18 +80,20 @@ class RandomLevels:
 
     A level is a random scenario with a number. Half of the levels are threats (CCRs, CCRm, CCRb, CCCscp),
     half are non-threats (all other families). A level fixes the family and its arguments, the grey levels,
-    the camera condition (night, fog, …) and the contrast of the road texture, in every process. The splits
-    are disjoint: training never uses a level of validation or test. The environment's seed selects the
-    levels; `info` adds `level` (the number) and `condition` (the camera condition).
+    the world, the camera condition (night, fog, …) and the contrast of the road texture, in every process.
+    The splits are disjoint, and so are their worlds: training never uses a level or a world of validation or
+    test. The environment's seed selects the levels; `info` adds `level` (the number), `world` (its number, or
+    -1 in the laboratory) and `condition` (the camera condition).
 
     Args:
         split: Set of levels: "train", "validation" or "test", with 1,000,000 levels each.
         start_level: First level in use.
         num_levels: Number of levels in use; 0 for all from `start_level` on.
         conditions: Camera conditions, drawn with equal probability: "clear", "night", "fog", "degraded".
+        world: Number of the world of all levels, or "laboratory"; None for the world of each level.
 
     Raises:
-        ValueError: If the split or a condition is unknown, or levels are outside the split.
+        ValueError: If the split, a condition or the world is unknown, or levels are outside the split.
     """
 
     def __init__(
@@ -84,10 +102,12 @@ class RandomLevels:
         start_level: int = 0,
         num_levels: int = 0,
         conditions: Sequence[str] = tuple(CONDITIONS),
+        world: int | str | None = None,
     ) -> None:
         start_level, num_levels = check_levels(split, start_level, num_levels, conditions)
         self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
         self.num_levels = num_levels or LEVELS - start_level
+        self.appearance = Appearance(world=world, split=split)
         self.first = draw_scenario(level_generator(split, start_level))
 
     def draw(self, rng: np.random.Generator) -> Draw:
@@ -95,5 +115,11 @@ class RandomLevels:
         level = self.start_level + int(rng.integers(self.num_levels))
         generator = level_generator(self.split, level)
         placement = place(draw_scenario(generator), generator)
-        fields = draw_camera_fields(self.split, level, self.conditions)
-        return Draw(placement, fields, {"level": level, "condition": fields["condition"]})
+        fields = draw_camera_fields(self.split, level, self.conditions, self.appearance)
+        info = {"level": level, "condition": fields["condition"], "world": world_number(fields)}
+        return Draw(placement, fields, info)
+
+
+def world_number(fields: dict[str, Any]) -> int:
+    """Return the number of the world among camera fields, -1 in the laboratory."""
+    return -1 if fields["world"] is None else fields["world"]

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 RANDOM = "RandomBraking"
 _OTHERS = ("camera", "params", "fps", "include_frame", "include_base", "trace", "config", "render_mode")
-_LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions")
+_LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions", "world")
+_APPEARANCE = ("world", "condition")
 
 
 def env_id(family: str) -> str:
@@ -61,24 +62,23 @@ def make_braking(
         trace: See `LGMDObservation`.
         config: Configuration of `BrakingEnv`.
         render_mode: None, "rgb_array" or "human".
-        **arguments: Arguments of the family in SI units, and `condition`, the camera condition: "clear",
-            "night", "fog" or "degraded". For "RandomBraking", arguments of `RandomLevels`.
+        **arguments: Arguments of the family in SI units; `world`, the number of the world, 0 to 9,999, or
+            "laboratory", by default drawn from the training worlds at each reset; `condition`, the camera
+            condition, see `CONDITIONS`, or "mixed" for that of the world. For "RandomBraking", arguments of
+            `RandomLevels`.
 
     Raises:
         ValueError: If an argument, key or name is unknown, or a value is out of range.
     """
     from lgmd_gym.envs.braking import BrakingEnv
 
-    source, camera_fields = make_source(family, arguments, _OTHERS)
+    source = make_source(family, arguments, _OTHERS)
     env = BrakingEnv(source, config=config, render_mode=render_mode)
-    env.camera_fields = camera_fields | env.camera_fields
     return with_camera(env, camera, params, fps, include_frame, include_base, trace)
 
 
-def make_source(
-    family: str, arguments: dict[str, Any], others: Iterable[str] = ()
-) -> "tuple[EpisodeSource, dict[str, Any]]":
-    """Return the source of the episodes of a family and their constant camera fields.
+def make_source(family: str, arguments: dict[str, Any], others: Iterable[str] = ()) -> "EpisodeSource":
+    """Return the source of the episodes of a family.
 
     Args:
         family: See `make_braking`.
@@ -88,25 +88,22 @@ def make_source(
     Raises:
         ValueError: If an argument or name is unknown, or a value is out of range.
     """
-    from lgmd_gym.camera import CLEAR
+    from lgmd_gym.envs.appearance import Appearance
     from lgmd_gym.envs.episode_source import FixedScenario, RandomLevels
-    from lgmd_gym.envs.scenarios.distribution import check_conditions
 
     check_keys(f"argument of {family}", arguments, {*_argument_names(family), *others})
     if family == RANDOM:
-        return RandomLevels(**arguments), {}
-    arguments = dict(arguments)
-    condition = arguments.pop("condition", CLEAR)
-    check_conditions([condition])
-    fields = {} if condition == CLEAR else {"condition": condition}
-    return FixedScenario(make_scenario(family, **arguments)), fields
+        return RandomLevels(**arguments)
+    chosen = {name: arguments[name] for name in _APPEARANCE if name in arguments}
+    others = {name: value for name, value in arguments.items() if name not in _APPEARANCE}
+    return FixedScenario(make_scenario(family, **others), Appearance(**chosen))
 
 
 def _argument_names(family: str) -> Iterable[str]:
     if check_text("family", family) == RANDOM:
         return _LEVEL_ARGUMENTS
     check_known("scenario", family, FAMILIES)
-    return *inspect.signature(FAMILIES[family]).parameters, "condition"
+    return *inspect.signature(FAMILIES[family]).parameters, *_APPEARANCE
 
 
 def with_camera(env: gym.Env, camera: "CameraSpec | None", *observation: Any) -> gym.Env:

@@ -16,41 +16,46 @@ Point = tuple[float, float]
 NONE, STRIPED, SOLID = LineType.NONE, LineType.STRIPED, LineType.CONTINUOUS_LINE
 
 
-def road_network(plan: RoadPlan, start: Pose) -> RoadNetwork:
+def road_network(plan: RoadPlan, start: Pose, lane_width: float = LANE_WIDTH) -> RoadNetwork:
     """Return the road network of a plan; straight roads are built once per process.
 
     Args:
         plan: The road plan.
         start: Initial pose of the ego; curves and crossings are placed relative to it.
+        lane_width: Width of the lanes of straight roads [m]; the ego's lane stays where it is.
     """
     if plan.kind == "curve":
         return _curve(plan, start)
     if plan.kind == "crossing":
         return _crossing(plan, start)
-    return _straight(plan)
+    return _straight(plan, lane_width)
 
 
-@lru_cache(maxsize=16)
-def _straight(plan: RoadPlan) -> RoadNetwork:
-    """Return parallel lanes along x; lane 0 is the leftmost, at y = 0."""
-    network = RoadNetwork()
+@lru_cache(maxsize=48)
+def _straight(plan: RoadPlan, width: float) -> RoadNetwork:
+    """Return parallel lanes along x; lane 0 is the leftmost, and that of the ego at a fixed y."""
+    network, ego_y = RoadNetwork(), plan.ego_lane * LANE_WIDTH
+
+    def add(first: str, last: str, lane: int, x: Point, lines: tuple[int, int]) -> None:
+        y = ego_y + (lane - plan.ego_lane) * width
+        network.add_lane(first, last, _straight_lane((x[0], y), (x[1], y), *lines, width))
+
     if plan.kind == "two-way":
-        network.add_lane("end", "start", _straight_lane((ROAD_END, 0.0), (ROAD_START, 0.0), STRIPED, SOLID))
-        network.add_lane(
-            "start", "end", _straight_lane((ROAD_START, LANE_WIDTH), (ROAD_END, LANE_WIDTH), NONE, SOLID)
-        )
+        add("end", "start", 0, (ROAD_END, ROAD_START), (STRIPED, SOLID))
+        add("start", "end", 1, (ROAD_START, ROAD_END), (NONE, SOLID))
         return network
     for index in range(plan.lanes):
         left = SOLID if index == 0 else STRIPED
         right = SOLID if index == plan.lanes - 1 else NONE
-        y = index * LANE_WIDTH
-        network.add_lane("start", "end", _straight_lane((ROAD_START, y), (ROAD_END, y), left, right))
+        add("start", "end", index, (ROAD_START, ROAD_END), (left, right))
     return network
 
 
-def _straight_lane(start: Point, end: Point, left: int, right: int) -> StraightLane:
+def _straight_lane(
+    start: Point, end: Point, left: int, right: int, width: float = LANE_WIDTH
+) -> StraightLane:
     lines = [left, right]
-    return StraightLane(start, end, width=LANE_WIDTH, line_types=lines, speed_limit=40)  # type: ignore[arg-type]
+    return StraightLane(start, end, width=width, line_types=lines, speed_limit=40)  # type: ignore[arg-type]
 
 
 def _curve(plan: RoadPlan, start: Pose) -> RoadNetwork:

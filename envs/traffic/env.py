@@ -1,7 +1,9 @@
 """`TrafficEnv`: base of the traffic environments, with an IDM driver and an agent that can brake."""
 
+from collections.abc import Mapping
 from functools import partial
 from math import cos, inf
+from types import MappingProxyType
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -9,6 +11,7 @@ from gymnasium import spaces
 from highway_env.envs.common.abstract import AbstractEnv
 
 from lgmd_gym.envs import surrogate_safety
+from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.envs.spaces import ContinuousDemand, EgoState
 from lgmd_gym.envs.traffic.ego import TrafficEgo
@@ -103,6 +106,10 @@ class TrafficEnv(EgoBrakeEnv):
     """
 
     road: TrafficRoad
+    appearance: Appearance = Appearance()
+    """World and camera condition of the next episodes."""
+    camera_overrides: Mapping[str, Any] = MappingProxyType({})
+    """Camera fields in place of those that `appearance` draws."""
     regulated: ClassVar[bool] = False
     """Whether cars give way at intersections of their routes (highway-env's rules)."""
     warm_up: ClassVar[float] = 4.0
@@ -174,6 +181,8 @@ class TrafficEnv(EgoBrakeEnv):
                 break
         self.ego.travelled = 0.0
         self.steps = self._jam_steps = 0
+        # A generator of its own: the traffic of a seed is the same in every world.
+        self.camera_fields = self.appearance.draw(self.np_random.spawn(1)[0]) | self.camera_overrides
 
     def _build(self) -> None:
         super()._reset()

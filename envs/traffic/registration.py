@@ -55,6 +55,8 @@ def make_traffic(
     trace: bool = False,
     config: dict[str, Any] | None = None,
     render_mode: str | None = None,
+    world: int | str | None = None,
+    condition: str = "clear",
 ) -> gym.Env:
     """Return a traffic environment inside `LGMDObservation`, or without it for `camera=None`.
 
@@ -70,9 +72,14 @@ def make_traffic(
         trace: See `LGMDObservation`.
         config: Configuration of `TrafficEnv`.
         render_mode: None, "rgb_array" or "human".
+        world: Number of the world, 0 to 9,999, or "laboratory"; None to draw a training world at each reset.
+        condition: Camera condition, see `lgmd_gym.camera.CONDITIONS`, or "mixed" for that of the world.
 
     Raises:
         ValueError: If a kind, key or name is unknown, or a value is out of range.
     """
+    from lgmd_gym.envs.appearance import Appearance
+
     env = find_kind(kind)(config=config, render_mode=render_mode)
+    env.appearance = Appearance(world=world, condition=condition)
     return with_camera(env, camera, params, fps, include_frame, include_base, trace)

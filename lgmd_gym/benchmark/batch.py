@@ -63,7 +63,7 @@ class BatchPlayer:
         arguments = dict(task.case.arguments)
         agent = make_agent(task.agent)
         self._sensor_config = task.sensor_config.for_agent(agent)
-        source, _ = make_source(task.case.family, _scenario_arguments(arguments))
+        source = make_source(task.case.family, _scenario_arguments(arguments))
         env = BrakingEnv(source, config=arguments.get("config"))
         if BIRDSEYE in make_cameras(self._sensor_config.arguments["camera"]):
             raise ValueError("the engine does not draw top views")
@@ -107,13 +107,11 @@ class BatchPlayer:
         for index in np.flatnonzero(~self._active).tolist()[: len(waiting)]:
             task = waiting.popleft()
             arguments = _scenario_arguments(dict(task.case.arguments))
-            self._queue.sources[index], fields = make_source(task.case.family, arguments)
+            self._queue.sources[index] = make_source(task.case.family, arguments)
             self._queue.seed(index, task.seed)
             prepared = self._queue.next(index)
-            draw = prepared.draw
-            fields = fields | draw.camera_fields
-            self._simulation.load(index, draw._replace(camera_fields=fields), prepared.network)
-            self._views.start(index, draw.info)
+            self._simulation.load(index, prepared.draw, prepared.network)
+            self._views.start(index, prepared.draw.info)
             self._slots.start(index, task.seed)
             self._recorder.start(index)
             self._returns[index] = 0.0

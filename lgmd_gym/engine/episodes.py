@@ -10,7 +10,6 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from lgmd_gym.envs.episode_source import Draw, EpisodeSource
-from lgmd_gym.envs.simulation.network import road_network
 
 
 class Prepared(NamedTuple):
@@ -87,5 +86,4 @@ class EpisodeQueue:
 
 def _prepare(source: EpisodeSource, generator: np.random.Generator) -> Prepared:
     draw = source.draw(generator)
-    network = road_network(draw.placement.scenario.road, draw.placement.start)
-    return Prepared(draw, network, generator)
+    return Prepared(draw, draw.make_network(), generator)

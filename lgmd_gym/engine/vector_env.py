@@ -91,7 +91,7 @@ class BrakingVectorEnv(VectorEnv):
     ) -> None:
         self.num_envs = check_whole("num_envs", num_envs, 1, MAX_ENVS)
         threads = check_whole("threads", threads, 1, MAX_THREADS)
-        source, self._camera_fields = make_source(family, arguments, _NAMES)
+        source = make_source(family, arguments, _NAMES)
         check_flags(include_frame=include_frame, include_base=include_base, trace=trace, copy=copy)
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
@@ -211,11 +211,9 @@ class BrakingVectorEnv(VectorEnv):
         for index in np.flatnonzero(selected).tolist():
             self._queue.seed(index, None)
             prepared = self._queue.next(index)
-            draw = prepared.draw
-            fields = self._camera_fields | draw.camera_fields
-            self.simulation.load(index, draw._replace(camera_fields=fields), prepared.network)
+            self.simulation.load(index, prepared.draw, prepared.network)
             self._episodes[index] = prepared
-            self._infos.set_episode(index, draw.info)
+            self._infos.set_episode(index, prepared.draw.info)
         self.simulation.start(selected)
 
     def _end_episodes(self, ended: np.ndarray) -> dict[str, Any]:

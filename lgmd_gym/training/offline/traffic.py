@@ -16,6 +16,7 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.episode import rollout
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.camera import CONDITIONS, CameraSpec
+from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.scenarios.distribution import draw_camera_fields
@@ -49,7 +50,8 @@ class TrafficRecorder:
         kind = list(KINDS)[seed % len(KINDS)]
         env = make_traffic(kind, camera=self.camera, include_frame=self.shrink is not None)
         base: Any = env.unwrapped
-        base.camera_fields = draw_camera_fields(self.split, seed, tuple(CONDITIONS))
+        appearance = Appearance(split=self.split)
+        base.camera_overrides = draw_camera_fields(self.split, seed, tuple(CONDITIONS), appearance)
         try:
             observations, emergencies = run_episode(env, seed, self.shrink)
         finally:
