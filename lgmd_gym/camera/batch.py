@@ -111,9 +111,9 @@ class CameraBatch:
             p: Its parameters.
             gaze: Turn to the right and upwards [degrees]; None for the gaze of the parameters.
         """
-        mount = self._mounts[index, member]
+        mount, mounted = self._mounts[index, member], _prepare(p).mount
         right, up = gaze or (0.0, 0.0)
-        mount["yaw_deg"], mount["pitch_deg"] = p.yaw_deg + right, p.pitch_deg + up
+        mount["yaw_deg"], mount["pitch_deg"] = mounted["yaw_deg"] + right, mounted["pitch_deg"] + up
         mount["path"] = gaze is None and p.gaze == "path"
 
     def draw(

@@ -43,12 +43,21 @@ _BOUNDS = {
     "visibility_m": _Interval(0.0, 1e6, True, True, "m (0 is clear air)"),
     "shot_noise": _Interval(0.0, 10.0, True, True, "grey levels at mid-grey"),
     "read_noise": _Interval(0.0, 50.0, True, True, "grey levels"),
-    "vibration_deg": _Interval(0.0, 5.0, True, True, "degrees"),
     "dive_deg": _Interval(0.0, 2.0, True, True, "degrees per m/s²"),
-    "heave_m": _Interval(0.0, 0.1, True, True, "m"),
     "shutter_s": _Interval(0.0, 0.1, True, True, "s"),
 }
-_CHOICES = {"gaze": ("fixed", "path"), "vehicles": ("car", "box"), "light": ("day", "night", "low_sun")}
+ROADS = {"still": 0.0, "smooth": 0.5, "normal": 1.0, "rough": 2.0}
+"""Motion of the car's body on each road, as a multiple of the measured motion in `body_motion`.
+
+`smooth`, `normal` and `rough` are ISO 8608 classes A, B and C; each class has twice the amplitude of the one
+before.
+"""
+_CHOICES = {
+    "gaze": ("fixed", "path"),
+    "vehicles": ("car", "box"),
+    "light": ("day", "night", "low_sun"),
+    "road": tuple(ROADS),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,10 +97,10 @@ class CameraParams:
         visibility_m: Meteorological visibility in fog (5 % contrast, Koschmieder); 0 is clear air [m].
         shot_noise: Standard deviation of photon noise at grey 128, growing with √grey [grey levels].
         read_noise: Standard deviation of the sensor's read noise [grey levels].
-        vibration_deg: RMS pitch of the body on an uneven road at 14 m/s, growing with √speed [degrees].
+        road: Motion of the body (pitch, roll, yaw and heave): `"still"` for none, or that of a car on a
+            `"smooth"`, `"normal"` or `"rough"` road (ISO 8608 classes A, B and C): 0.5, 1 and 2 times the
+            motion measured on a drive, which has 0.14° of pitch (RMS) at 17 m/s; it grows with √speed.
         dive_deg: Nose-down pitch per braking deceleration [degrees per m/s²]; 0.05 to 0.15 for sprung cars.
-        heave_m: RMS vertical motion of the body on an uneven road at 14 m/s, growing with √speed [m];
-            0.0015 to 0.006 above 1 Hz on ISO 8608 class A to C roads.
         shutter_s: Exposure time, which ends at the time of the frame; 0 disables motion blur [s].
             Automotive cameras that must capture 90 Hz pulsed lights expose for 0.011 s or more by day.
     """
@@ -117,9 +126,8 @@ class CameraParams:
     visibility_m: float = 0.0
     shot_noise: float = 0.0
     read_noise: float = 0.0
-    vibration_deg: float = 0.0
+    road: str = "still"
     dive_deg: float = 0.0
-    heave_m: float = 0.0
     shutter_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -256,9 +264,8 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "degraded": {
         "read_noise": 1.5,
         "shot_noise": 2.0,
-        "vibration_deg": 0.1,
+        "road": "normal",
         "dive_deg": 0.1,
-        "heave_m": 0.005,
         "shutter_s": 0.011,
     },
 }

@@ -2,6 +2,7 @@
 
 World axes: x forward and y to the right of a car that heads along +x (highway-env's y axis points down on its
 screen), z up. Headings grow from +x towards +y. Camera axes: depth along the optical axis, right, down.
+A lens is turned by its yaw, then pitched upwards, then rolled clockwise (right side down) about its axis.
 Pixels: u to the right, v down. (0, 0) is the outer corner of the top left pixel; pixel [row, column] covers
 column <= u < column + 1 and row <= v < row + 1.
 """
@@ -14,8 +15,8 @@ LENS = np.dtype(
     [
         (name, np.float64)
         for name in (
-            *("x", "y", "z", "cos_yaw", "sin_yaw", "cos_pitch", "sin_pitch"),
-            *("focal", "centre_u", "centre_v", "yaw", "pitch"),
+            *("x", "y", "z", "cos_yaw", "sin_yaw", "cos_pitch", "sin_pitch", "cos_roll", "sin_roll"),
+            *("focal", "centre_u", "centre_v", "yaw", "pitch", "roll"),
         )
     ]
 )
@@ -38,5 +39,9 @@ def project(lens: Any, points_m: np.ndarray) -> np.ndarray:
     right = dy * lens["cos_yaw"] - dx * lens["sin_yaw"]
     depth = ahead * lens["cos_pitch"] + dz * lens["sin_pitch"]
     down = ahead * lens["sin_pitch"] - dz * lens["cos_pitch"]
+    right, down = (
+        right * lens["cos_roll"] + down * lens["sin_roll"],
+        down * lens["cos_roll"] - right * lens["sin_roll"],
+    )
     scale = lens["focal"] / np.where(depth > 1e-6, depth, np.nan)
     return np.stack((lens["centre_u"] + right * scale, lens["centre_v"] + down * scale), axis=-1)

@@ -4,28 +4,29 @@ import math
 
 import numpy as np
 
+from lgmd_gym.camera.body_motion import HEAVE, PITCH, ROLL, YAW, body_motion, road_gain
 from lgmd_gym.camera.effects import NOISE_LOG2
-from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.params import ROADS, CameraParams
 from lgmd_gym.camera.render.jit import exact_kernel
 from lgmd_gym.camera.worlds import draw_world
 
 MOUNT = np.dtype(
     [
         *((name, np.float64) for name in ("setback", "left", "height", "yaw_deg", "pitch_deg")),
-        *((name, np.float64) for name in ("heave_m", "vibration_deg", "dive_deg", "phase", "shutter_s")),
+        *((name, np.float64) for name in ("road", "dive_deg", "shutter_s")),
         *((name, np.float64) for name in ("focal", "centre_u", "centre_v", "code_power")),
         *((name, np.int64) for name in ("path", "noisy", "box", "seed")),
     ]
 )
 """How a camera sits on the car and moves with it, as the kernels read it.
 
-The fields of `CameraParams`; phase of the vibrations [turns]; focal length and image centre [px]; 1 for the
-gaze `"path"`, for sensor noise and for `vehicles="box"`; `LOOK`'s power of the display code.
+The fields of `CameraParams`; amplitude of the road in `ROADS`; focal length and image centre [px]; power of
+the display code that is proportional to light; 1 for the gaze `"path"`, for sensor noise and for
+`vehicles="box"`.
 """
 
 _PATH_S = 1.0  # look-ahead time of the gaze "path" [s]
 _PATH_MAX = math.radians(40.0)
-_BODY_HZ = (1.1, 1.9, 3.4)  # bounce, pitch and wheel-hop side band of a sprung body
 
 
 def mount_of(p: CameraParams) -> np.ndarray:
@@ -35,7 +36,7 @@ def mount_of(p: CameraParams) -> np.ndarray:
     values = (
         *(p.mount_setback, p.mount_left, max(p.mount_height + world.mount_height_error, 0.05)),
         *(p.yaw_deg + world.yaw_error_deg, p.pitch_deg + world.pitch_error_deg),
-        *(p.heave_m, p.vibration_deg, p.dive_deg, 0.1 * (seed_of(p) % 10), p.shutter_s),
+        *(ROADS[p.road], p.dive_deg, p.shutter_s),
         *(p.focal_px, 0.5 * width, 0.5 * height, 2.0 if world.drawn else 1.0),
         *(p.gaze == "path", p.shot_noise > 0.0 or p.read_noise > 0.0, p.vehicles == "box", seed_of(p)),
     )
@@ -62,28 +63,25 @@ def _path_yaw(scene):
 
 
 @exact_kernel
-def _vibration(rms, phase, scene, time_s, shift):
-    """Return the sum of the body's natural vibrations, RMS `rms` at 14 m/s; `shift` offsets the phases.
+def _tilt(mount, scene, time_s, turn, gain):
+    """Return the pitch upwards and the roll to the right of a camera due to the road and braking [rad].
 
-    The spectrum of a road's height falls with the square of the spatial frequency (ISO 8608). The variance
-    above the body's frequency is therefore proportional to the speed, and the RMS to its square root.
+    Args:
+        mount: `MOUNT` record.
+        scene: `SCENE` record.
+        time_s: Time [s].
+        turn: Direction of the camera relative to the car [rad]; to its side, the pitch of the body is roll.
+        gain: See `road_gain`.
     """
-    rms = rms * math.sqrt(min(abs(scene.speed), 60.0) / 14.0)
-    total = 0.0
-    for k in range(len(_BODY_HZ)):
-        total += math.sin(2.0 * math.pi * (_BODY_HZ[k] * time_s + shift * k + phase))
-    return rms * math.sqrt(2.0 / 3.0) * total
-
-
-@exact_kernel
-def _body_pitch(mount, scene, time_s):
-    """Return the upward pitch of the car's body due to an uneven road and braking [rad]."""
-    pitch = 0.0
-    if mount.vibration_deg > 0.0:
-        pitch += _vibration(mount.vibration_deg, mount.phase, scene, time_s, 0.37)
+    pitch = roll = 0.0
+    if gain > 0.0:
+        body_pitch = gain * body_motion(mount.seed, PITCH, time_s)
+        body_roll = gain * body_motion(mount.seed, ROLL, time_s)
+        c, s = math.cos(turn), math.sin(turn)
+        pitch, roll = body_pitch * c - body_roll * s, body_roll * c + body_pitch * s
     if mount.dive_deg > 0.0:
         pitch += mount.dive_deg * max(-12.0, min(6.0, scene.acceleration))
-    return math.radians(pitch)
+    return math.radians(pitch), math.radians(roll)
 
 
 @exact_kernel
@@ -105,19 +103,23 @@ def pose_lens(mount, scene, ago_s, lens):
     forward = 0.5 * scene.length - mount.setback
     c, s = math.cos(heading), math.sin(heading)
     z = mount.height
-    if mount.heave_m > 0.0:
-        # Above the ground.
-        z = max(z + _vibration(mount.heave_m, mount.phase, scene, time_s, 0.61), 0.1 * z)
     yaw_deg = mount.yaw_deg
     if mount.path != 0:
         yaw_deg += math.degrees(_path_yaw(scene))
+    gain = road_gain(mount.road, scene.speed)
+    tilt, roll = _tilt(mount, scene, time_s, math.radians(yaw_deg), gain)
+    if gain > 0.0:
+        # Above the ground.
+        z = max(z + gain * body_motion(mount.seed, HEAVE, time_s), 0.1 * z)
+        yaw_deg += gain * body_motion(mount.seed, YAW, time_s)
     yaw = heading + math.radians(yaw_deg)
-    pitch = math.radians(mount.pitch_deg) + _body_pitch(mount, scene, time_s)
+    pitch = math.radians(mount.pitch_deg) + tilt
     lens.x, lens.y, lens.z = x + forward * c + mount.left * s, y + forward * s - mount.left * c, z
     lens.cos_yaw, lens.sin_yaw = math.cos(yaw), math.sin(yaw)
     lens.cos_pitch, lens.sin_pitch = math.cos(pitch), math.sin(pitch)
     lens.focal, lens.centre_u, lens.centre_v = mount.focal, mount.centre_u, mount.centre_v
-    lens.yaw, lens.pitch = yaw, pitch
+    lens.cos_roll, lens.sin_roll = math.cos(roll), math.sin(roll)
+    lens.yaw, lens.pitch, lens.roll = yaw, pitch, roll
 
 
 @exact_kernel

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.camera.body_motion import MAX_DEG, PITCH, ROLL, YAW
 from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, View, read_objects
-from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.params import ROADS, CameraParams
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.scene import SCENE, Ego, read_scene
 
 _PATH_DEG = 40.0  # bound of the gaze "path"
 _MAX_SPREAD = math.radians(170.0)
 _MAX_DECELERATION = 12.0  # bound of the deceleration in `pose` [m/s²]
-_MAX_VIBRATION = 6.0  # bound of the vibrations in `pose`, as a multiple of their RMS at 14 m/s
 
 
 class SceneTable:
@@ -74,7 +74,7 @@ def view_of(cameras: Sequence[CameraParams]) -> View | None:
     """Return the directions that cameras look in; None if they look all around, or if there are none."""
     if not cameras or any(_may_look_behind(p) for p in cameras):
         return None
-    margins = [_PATH_DEG if p.gaze == "path" else 0.0 for p in cameras]
+    margins = [(_PATH_DEG if p.gaze == "path" else 0.0) + ROADS[p.road] * MAX_DEG[YAW] for p in cameras]
     first = min(p.yaw_deg - margin for p, margin in zip(cameras, margins, strict=True))
     last = max(p.yaw_deg + margin for p, margin in zip(cameras, margins, strict=True))
     if math.radians(last - first) > _MAX_SPREAD:
@@ -85,6 +85,8 @@ def view_of(cameras: Sequence[CameraParams]) -> View | None:
 
 def _may_look_behind(p: CameraParams) -> bool:
     """Return whether a pitched camera may see what is straight below or above it, or behind it."""
-    motion = _MAX_DECELERATION * p.dive_deg + _MAX_VIBRATION * p.vibration_deg
-    pitch = math.radians(min(abs(p.pitch_deg) + motion, 90.0))
-    return p.focal_px * math.cos(pitch) <= (0.5 * p.shape[0] + 1.0) * math.sin(pitch)
+    # To the side of the car, its pitch is roll.
+    roll = ROADS[p.road] * (MAX_DEG[PITCH] + MAX_DEG[ROLL])
+    pitch = math.radians(min(abs(p.pitch_deg) + _MAX_DECELERATION * p.dive_deg + roll, 90.0))
+    half_height = 0.5 * (p.shape[0] + p.shape[1] * math.sin(math.radians(roll)))
+    return p.focal_px * math.cos(pitch) <= (half_height + 1.0) * math.sin(pitch)

@@ -50,9 +50,8 @@ def draw_camera(rng, name, shape):
         seed=int(rng.integers(2)),
         light=str(choice(["day", "night"])),
         visibility_m=float(choice([0.0, 0.0, 1e-3, 1.0, 5.0, 100.0])),
-        vibration_deg=float(choice([0.0, 2.0])),
+        road=str(choice(["still", "rough"])),
         dive_deg=float(choice([0.0, 0.1])),
-        heave_m=float(choice([0.0, 0.1])),
         shutter_s=float(choice([0.0, 0.0, 0.03])),
     )
 

@@ -23,7 +23,7 @@ OPTIONS = {
     "rail": {"guard_rail": True, "texture": 2.0},
     "panorama": {"panorama": "natural", "pitch_deg": 7.0, "roadside": 3.0},
     "mount": {"gaze": "path", "mount_height": 1.6, "mount_left": 0.4, "pitch_deg": -8.0, "yaw_deg": 12.0},
-    "motion": {"vibration_deg": 1.0, "heave_m": 0.05, "dive_deg": 0.3, "shutter_s": 0.03},
+    "motion": {"road": "rough", "dive_deg": 0.3, "shutter_s": 0.03},
     "night-rail": {"light": "night", "guard_rail": True},
 }
 """Camera fields that the golden frames cover in addition to the named conditions."""

@@ -38,8 +38,9 @@ def brake_of(**values):
     return record(BRAKE, **(defaults | values))
 
 
-def lens_of(yaw=0.0, pitch=0.0, focal=100.0, shape=(80, 120), **position):
+def lens_of(yaw=0.0, pitch=0.0, focal=100.0, shape=(80, 120), roll=0.0, **position):
     """Return a `LENS` record at a height of 1 m unless stated otherwise."""
-    angles = {"cos_yaw": cos(yaw), "sin_yaw": sin(yaw), "cos_pitch": cos(pitch), "sin_pitch": sin(pitch)}
+    angles = {"yaw": yaw, "pitch": pitch, "roll": roll}
+    turns = {f"{name}_{key}": f(x) for key, x in angles.items() for name, f in (("cos", cos), ("sin", sin))}
     centre = {"centre_u": shape[1] / 2, "centre_v": shape[0] / 2}
-    return record(LENS, focal=focal, yaw=yaw, pitch=pitch, **({"z": 1.0} | position), **angles, **centre)
+    return record(LENS, focal=focal, **({"z": 1.0} | position), **angles, **turns, **centre)
