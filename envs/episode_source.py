@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-
 from highway_env.road.road import RoadNetwork
 
 from lgmd_gym.camera import CONDITIONS
@@ -89,8 +88,10 @@ class RandomLevels:
         split: Set of levels: "train", "validation" or "test", with 1,000,000 levels each.
         start_level: First level in use.
         num_levels: Number of levels in use; 0 for all from `start_level` on.
-        conditions: Camera conditions, drawn with equal probability: "clear", "night", "fog", "degraded".
+        conditions: Camera conditions, drawn with equal probability: "clear", "night", "fog", "rain",
+            "low_sun".
         world: Number of the world of all levels, or "laboratory"; None for the world of each level.
+        road: See `Appearance`.
 
     Raises:
         ValueError: If the split, a condition or the world is unknown, or levels are outside the split.
@@ -103,11 +104,12 @@ class RandomLevels:
         num_levels: int = 0,
         conditions: Sequence[str] = tuple(CONDITIONS),
         world: int | str | None = None,
+        road: str | None = None,
     ) -> None:
         start_level, num_levels = check_levels(split, start_level, num_levels, conditions)
         self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
         self.num_levels = num_levels or LEVELS - start_level
-        self.appearance = Appearance(world=world, split=split)
+        self.appearance = Appearance(world=world, road=road, split=split)
         self.first = draw_scenario(level_generator(split, start_level))
 
     def draw(self, rng: np.random.Generator) -> Draw:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 RANDOM = "RandomBraking"
 _OTHERS = ("camera", "params", "fps", "include_frame", "include_base", "trace", "config", "render_mode")
-_LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions", "world")
-_APPEARANCE = ("world", "condition")
+_LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions", "world", "road")
+_APPEARANCE = ("world", "condition", "road")
 
 
 def env_id(family: str) -> str:
@@ -64,8 +64,8 @@ def make_braking(
         render_mode: None, "rgb_array" or "human".
         **arguments: Arguments of the family in SI units; `world`, the number of the world, 0 to 9,999, or
             "laboratory", by default drawn from the training worlds at each reset; `condition`, the camera
-            condition, see `CONDITIONS`, or "mixed" for that of the world. For "RandomBraking", arguments of
-            `RandomLevels`.
+            condition, see `CONDITIONS`, or "mixed" for that of the world; `road`, see `Appearance`. For
+            "RandomBraking", arguments of `RandomLevels`.
 
     Raises:
         ValueError: If an argument, key or name is unknown, or a value is out of range.

@@ -57,6 +57,7 @@ def make_traffic(
     render_mode: str | None = None,
     world: int | str | None = None,
     condition: str = "clear",
+    road: str | None = None,
 ) -> gym.Env:
     """Return a traffic environment inside `LGMDObservation`, or without it for `camera=None`.
 
@@ -74,6 +75,7 @@ def make_traffic(
         render_mode: None, "rgb_array" or "human".
         world: Number of the world, 0 to 9,999, or "laboratory"; None to draw a training world at each reset.
         condition: Camera condition, see `lgmd_gym.camera.CONDITIONS`, or "mixed" for that of the world.
+        road: See `lgmd_gym.envs.appearance.Appearance`.
 
     Raises:
         ValueError: If a kind, key or name is unknown, or a value is out of range.
@@ -81,5 +83,5 @@ def make_traffic(
     from lgmd_gym.envs.appearance import Appearance
 
     env = find_kind(kind)(config=config, render_mode=render_mode)
-    env.appearance = Appearance(world=world, condition=condition)
+    env.appearance = Appearance(world=world, condition=condition, road=road)
     return with_camera(env, camera, params, fps, include_frame, include_base, trace)

@@ -60,7 +60,7 @@ class BatchPlayer:
     """
 
     def __init__(self, task: Task, num_envs: int) -> None:
-        arguments = dict(task.case.arguments)
+        arguments = task.arguments
         agent = make_agent(task.agent)
         self._sensor_config = task.sensor_config.for_agent(agent)
         source = make_source(task.case.family, _scenario_arguments(arguments))
@@ -106,7 +106,7 @@ class BatchPlayer:
         fresh = np.zeros(len(self._tasks), np.bool_)
         for index in np.flatnonzero(~self._active).tolist()[: len(waiting)]:
             task = waiting.popleft()
-            arguments = _scenario_arguments(dict(task.case.arguments))
+            arguments = _scenario_arguments(task.arguments)
             self._queue.sources[index] = make_source(task.case.family, arguments)
             self._queue.seed(index, task.seed)
             prepared = self._queue.next(index)
@@ -140,6 +140,7 @@ class BatchPlayer:
             float(solid[0]["shade"]) if len(solid) else float("nan"),
             self._simulation.rates.camera,
             float(self._returns[index]),
+            prepared.draw.info["world"],
         )
         return make_result(self._release(index), episode, self._sensor_config)
 

@@ -14,11 +14,14 @@ from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.camera import CLEAR, CONDITIONS, CameraSpec
 from lgmd_gym.camera.spec import check_camera
+from lgmd_gym.camera.worlds import SPLIT_WORLDS, WORLDS
+from lgmd_gym.envs.appearance import MIXED, Appearance
 from lgmd_gym.envs.traffic.registration import KINDS
 from lgmd_gym.errors import check_items, check_keys, check_known, check_text, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
 
 RUN_FILE = "run.toml"
+_WORLD_STEP = 7  # worlds between the first seeds of one case and of the next
 SUITE_FILE = "suite.toml"  # copy of a user's own suite next to it
 DEFAULT_AGENTS = (
     NO_BRAKE,
@@ -40,7 +43,10 @@ class RunConfig:
         agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
         seeds: Number of seeds, >= 1; for traffic, of every kind.
         first_seed: First seed, >= 0.
-        conditions: Camera conditions by name; the suite is run under each.
+        conditions: Camera conditions by name, or "mixed" for that of each world; the suite is run under each.
+        worlds: Number of worlds, over which the runs of each case are distributed; 0 for the laboratory.
+        first_world: Number of the first world.
+        road: Road that moves the car's body, see `Appearance`.
         camera: See `LGMDObservation`; None for each agent's own, see `Agent.camera`.
         params: See `LGMDObservation`; None for each agent's own or the defaults.
         kinds: Kinds of traffic; None for all. Only for the suite "traffic".
@@ -54,6 +60,9 @@ class RunConfig:
     seeds: int = 3
     first_seed: int = 0
     conditions: tuple[str, ...] = (CLEAR,)
+    worlds: int = 20
+    first_world: int = SPLIT_WORLDS["test"].start
+    road: str | None = None
     camera: CameraSpec | None = None
     params: NeuronSpec = None
     kinds: tuple[str, ...] | None = None
@@ -70,10 +79,13 @@ class RunConfig:
             "seeds": check_whole("seeds", self.seeds, 1),
             "first_seed": check_whole("first_seed", self.first_seed, 0),
             "agents": _names("agents", self.agents),
-            "conditions": _names("conditions", self.conditions, "camera condition", CONDITIONS),
+            "conditions": _names("conditions", self.conditions, "camera condition", (*CONDITIONS, MIXED)),
+            "worlds": check_whole("worlds", self.worlds, 0, WORLDS),
+            "first_world": check_whole("first_world", self.first_world, 0, WORLDS - max(self.worlds, 1)),
             "camera": plain.camera,
             "params": plain.params,
         }
+        Appearance(road=self.road)  # checks it
         if self.suite == TRAFFIC:
             kinds = tuple(KINDS) if self.kinds is None else self.kinds
             values["kinds"] = _names("kinds", kinds, "kind of traffic", KINDS)
@@ -85,10 +97,28 @@ class RunConfig:
         """The seeds."""
         return range(self.first_seed, self.first_seed + self.seeds)
 
+    def world(self, seed: int, case_index: int) -> int | None:
+        """Return the world of a run; None for the laboratory.
+
+        With as many seeds as worlds, each case is run once in each world. With fewer, the cases are run in
+        different ones.
+        """
+        if self.worlds == 0:
+            return None
+        return self.first_world + (seed + _WORLD_STEP * case_index) % self.worlds
+
     @property
     def sensor_config(self) -> SensorConfig:
         """Camera and neuron parameters, without a condition."""
         return SensorConfig(self.camera, self.params)
+
+    def sensors(self, condition: str) -> SensorConfig:
+        """Return camera and neuron parameters under a condition; the environment sets a mixed one.
+
+        Raises:
+            ValueError: If the condition is unknown or the camera supports none.
+        """
+        return self.sensor_config.with_condition(CLEAR if condition == MIXED else condition)
 
     @property
     def own_suite(self) -> bool:

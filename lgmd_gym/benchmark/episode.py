@@ -39,6 +39,7 @@ class Episode:
         fps: Camera frame rate [Hz].
         target_shade: Grey level of the first actor in [0, 255]; NaN on an empty road.
         reward_sum: Undiscounted return of the environment.
+        world: Number of the world; None for the laboratory.
     """
 
     series: dict[str, np.ndarray]
@@ -49,6 +50,7 @@ class Episode:
     fps: float
     target_shade: float = float("nan")
     reward_sum: float = float("nan")
+    world: int | None = None
 
     @classmethod
     def of(
@@ -59,10 +61,11 @@ class Episode:
         shade: float,
         fps: float,
         reward_sum: float,
+        world: int,
     ) -> "Episode":
-        """Return an episode from its series, last info, scenario and return.
+        """Return an episode from its series, last info, scenario, return and world.
 
-        `shade` is the grey level of the first solid actor, or NaN.
+        `shade` is the grey level of the first solid actor, or NaN; `world` is -1 for the laboratory.
         """
         return cls(
             series=series,
@@ -73,13 +76,20 @@ class Episode:
             fps=fps,
             target_shade=shade,
             reward_sum=reward_sum,
+            world=None if world < 0 else world,
         )
 
 
-def make_env(case: Case, sensor_config: SensorConfig) -> gym.Env:
-    """Return the environment of a case."""
-    arguments = sensor_config.for_agent().arguments | dict(case.arguments)
-    return gym.make(env_id(case.family), trace=True, **arguments)
+def make_env(case: Case, sensor_config: SensorConfig, arguments: Mapping[str, Any] | None = None) -> gym.Env:
+    """Return the environment of a case.
+
+    Args:
+        case: The case.
+        sensor_config: Camera and neuron parameters.
+        arguments: Arguments of the environment; None for those of the case.
+    """
+    chosen = dict(case.arguments) if arguments is None else dict(arguments)
+    return gym.make(env_id(case.family), trace=True, **sensor_config.for_agent().arguments | chosen)
 
 
 def rollout(env: gym.Env, agent: Agent, seed: int) -> Iterator[tuple[Step, np.ndarray]]:
@@ -119,4 +129,4 @@ def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
     bodies = base.road.obstacles
     shade = float(bodies[0].shade) if bodies else float("nan")
     fps = env.get_wrapper_attr("fps")
-    return Episode.of(recorder.series(0), info, base.scenario, shade, fps, total)
+    return Episode.of(recorder.series(0), info, base.scenario, shade, fps, total, info["world"])

@@ -38,7 +38,7 @@ class Plan(ABC):
 
     def __init__(self, config: RunConfig) -> None:
         self.config = config
-        self.sensor_configs = {name: config.sensor_config.with_condition(name) for name in config.conditions}
+        self.sensor_configs = {name: config.sensors(name) for name in config.conditions}
 
     @property
     def total(self) -> int:
@@ -92,9 +92,9 @@ class CasePlan(Plan):
             key[1:]: Counterfactual.of_row(row) for key, row in done.items() if key[0] == NO_BRAKE
         }
         first = [
-            Task(NO_BRAKE, case, seed, sensor_config, condition=condition)
-            for condition, sensor_config in self.sensor_configs.items()
-            for case in self.cases
+            self._first_task(index, seed, condition)
+            for condition in self.sensor_configs
+            for index in range(len(self.cases))
             for seed in self.config.seed_range
         ]
         for result in self._play(run_tasks, [task for task in first if task.key not in done]):
@@ -109,6 +109,19 @@ class CasePlan(Plan):
             if task.key[1:] in counterfactuals
         ]
         yield from self._play(run_tasks, [task for task in others if task.key not in done])
+
+    def _first_task(self, index: int, seed: int, condition: str) -> Task:
+        """Return the task of `no-brake` in a case."""
+        config = self.config
+        return Task(
+            NO_BRAKE,
+            self.cases[index],
+            seed,
+            self.sensor_configs[condition],
+            condition=condition,
+            world=config.world(seed, index),
+            road=config.road,
+        )
 
     def _play(self, run_tasks: TaskMap, tasks: list[Task]) -> Iterator[Result]:
         return run_tasks.flatten(play_unit, make_units(tasks, run_tasks.workers, self.config.agents))

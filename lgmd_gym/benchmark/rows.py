@@ -11,8 +11,10 @@ Row = dict[str, Any]
 RowKey = tuple[str, str, int, str]
 
 ID_KEYS = ("agent", "suite", "case", "fcw_driver", "seed", "condition")
+WORLD = "world"
+"""Key of a row's world: its number, or null in the laboratory."""
 # Every key of a row of a suite of cases, in order; null where undefined. The metrics' docstrings define them.
-KEYS = (*ID_KEYS, "camera", *METRICS, "error")
+KEYS = (*ID_KEYS, WORLD, "camera", *METRICS, "error")
 
 
 def key_of(row: Row) -> RowKey:
@@ -51,4 +53,4 @@ def make_row(
         camera: Camera names.
     """
     pair = PairedEpisode.of(episode, counterfactual, premature)
-    return new_row(KEYS, agent, case, seed, condition, camera=camera, **measure(pair))
+    return new_row(KEYS, agent, case, seed, condition, world=episode.world, camera=camera, **measure(pair))

@@ -19,7 +19,7 @@ class SensorConfig:
         camera: See `LGMDObservation`. None selects the agent's own camera (`Agent.camera`), or "fovea" for
             an agent without one.
         params: See `LGMDObservation`. None selects the agent's own parameters if the camera is its own.
-        condition: Named condition applied to every camera: "clear", "night", "fog" or "degraded".
+        condition: Named condition applied to every camera: "clear", "night", "fog", "rain" or "low_sun".
         include_frame: Whether the frames are part of the observation.
     """
 

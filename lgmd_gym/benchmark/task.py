@@ -14,6 +14,9 @@ from lgmd_gym.benchmark.metrics import Counterfactual
 from lgmd_gym.benchmark.rows import KEYS, Row, RowKey, make_row, new_row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.camera import CLEAR
+from lgmd_gym.camera.worlds import LABORATORY
+from lgmd_gym.envs.appearance import MIXED
+from lgmd_gym.envs.registration import RANDOM
 
 NO_BRAKE = "no-brake"
 
@@ -29,6 +32,8 @@ class Task:
         sensor_config: Camera and neuron parameters under the condition.
         counterfactual: Outcome of `no-brake`; None for `no-brake` itself.
         condition: Name of the camera condition, for the row.
+        world: Number of the world; None for the laboratory.
+        road: Road that moves the car's body, see `Appearance`.
     """
 
     agent: str
@@ -37,6 +42,23 @@ class Task:
     sensor_config: SensorConfig
     counterfactual: Counterfactual | None = None
     condition: str = CLEAR
+    world: int | None = None
+    road: str | None = None
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Arguments of the environment: those of the case, world, road, and a mixed condition."""
+        chosen: dict[str, Any] = {"world": LABORATORY if self.world is None else self.world}
+        if self.road is not None:
+            chosen["road"] = self.road
+        if self.case.family == RANDOM:
+            # A level has a world and a condition of its own.
+            return {name: value for name, value in chosen.items() if value != self.world} | dict(
+                self.case.arguments
+            )
+        if self.condition == MIXED:
+            chosen["condition"] = MIXED
+        return chosen | dict(self.case.arguments)
 
     @property
     def key(self) -> RowKey:
@@ -92,11 +114,12 @@ def make_result(task: Task, episode: Episode, sensor_config: SensorConfig) -> Re
 
 def error_result(task: Task, error: str) -> Result:
     """Return the result of a task that failed with a traceback."""
-    return Result(new_row(KEYS, task.agent, task.case, task.seed, task.condition, error=error))
+    row = new_row(KEYS, task.agent, task.case, task.seed, task.condition, world=task.world, error=error)
+    return Result(row)
 
 
 def _play(task: Task, agent: Any, sensor_config: SensorConfig) -> Episode:
-    env = make_env(task.case, sensor_config)
+    env = make_env(task.case, sensor_config, task.arguments)
     try:
         if task.has_driver:
             config = env.unwrapped.config  # type: ignore[attr-defined]

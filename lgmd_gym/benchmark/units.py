@@ -56,7 +56,7 @@ def make_units(tasks: Iterable[Task], workers: int, agents: tuple[str, ...] = ()
 
 def group_key(task: Task) -> Hashable:
     """Return what the tasks of a unit share."""
-    arguments = dict(task.case.arguments)
+    arguments = task.arguments
     shared = task.sensor_config, arguments.get("config"), arguments.get("fps")
     return task.agent, task.condition, task.has_driver, repr(shared)
 

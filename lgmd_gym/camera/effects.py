@@ -15,7 +15,15 @@ LOOK = np.dtype(
             *("asphalt", "asphalt_gain", "verge", "verge_gain", "paint", "line_width", "dash", "dash_period"),
             *("zenith", "horizon", "hills", "trees", "leaf_gain", "hill_scale", "tree_scale"),
             *("sun_x", "sun_y", "sun_z", "ambient", "direct", "cast", "code_power"),
-            *("under_body", "under_lean", "under_first", "under_step", "under_rings", "under_box", "shadow_limit"),
+            *(
+                "under_body",
+                "under_lean",
+                "under_first",
+                "under_step",
+                "under_rings",
+                "under_box",
+                "shadow_limit",
+            ),
             *("haze", "extinction", "night", "night_light", "beam_gain", "wet", "paved"),
             *("shot_noise", "read_noise", "shutter_s"),
         )

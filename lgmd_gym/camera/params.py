@@ -192,7 +192,7 @@ class CameraParams:
         return replace(base, **_with_condition(changes)) if changes else base
 
     def with_condition(self, condition: str) -> CameraParams:
-        """Return this camera under a named condition (`clear`, `night`, `fog`, `degraded`)."""
+        """Return this camera under a named condition (`clear`, `night`, `fog`, `rain`, `low_sun`)."""
         return CameraParams.make(self, condition=condition)
 
 
@@ -261,12 +261,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     CLEAR: {},
     "night": {"light": "night", "read_noise": 2.0, "shot_noise": 3.0},
     "fog": {"visibility_m": 120.0},
-    "degraded": {
-        "read_noise": 1.5,
-        "shot_noise": 2.0,
-        "road": "normal",
-        "dive_deg": 0.1,
-        "shutter_s": 0.011,
-    },
+    "rain": {"wet": True, "visibility_m": 600.0, "read_noise": 1.0, "shot_noise": 2.0},
+    "low_sun": {"light": "low_sun"},
 }
 """Named conditions: the fields of `CameraParams` that each one sets."""

@@ -44,7 +44,12 @@ _ASPHALT_CONTRASTS = {
     "coarse": (0.8, 1.7),
     "concrete": (0.5, 1.2),
 }
-_VERGE_GREYS = {"grass": (52.0, 104.0), "gravel": (92.0, 150.0), "soil": (70.0, 128.0), "paving": (92.0, 146.0)}
+_VERGE_GREYS = {
+    "grass": (52.0, 104.0),
+    "gravel": (92.0, 150.0),
+    "soil": (70.0, 128.0),
+    "paving": (92.0, 146.0),
+}
 _ASPHALT_SHARES = (0.16, 0.26, 0.18, 0.14, 0.14, 0.12)
 _VERGE_SHARES = (0.5, 0.15, 0.2, 0.15)
 # Length and period of the dashes of a lane line [m]: highway-env's, and those of several countries.

@@ -81,7 +81,17 @@ def _new(options: "Bench", executor: "Executor") -> "Run":
     from lgmd_gym.benchmark.runner import Run
     from lgmd_gym.benchmark.trust import check_trust
 
-    names = ("suite", "agents", "seeds", "first_seed", "conditions", "camera")
+    names = (
+        "suite",
+        "agents",
+        "seeds",
+        "first_seed",
+        "conditions",
+        "worlds",
+        "first_world",
+        "road",
+        "camera",
+    )
     values: dict[str, Any] = {name: getattr(options, name) for name in names}
     values["params"] = read_params(options.params)
     values = {name: value for name, value in values.items() if value is not None}
@@ -127,7 +137,9 @@ def _title(benchmark: "Run") -> str:
     fps = next((f"{row['fps']:g} Hz" for row in benchmark.rows if row["fps"]), "?")
     first = f" from {config.first_seed} on" if config.first_seed else ""
     camera = f"camera {config.sensor_config.label} at {fps}"
-    return f"{benchmark.plan.suite}: {camera}, T_sf = {level:g} spikes/s, {config.seeds} seeds{first}"
+    worlds = f"{config.worlds} worlds" if config.worlds else "the laboratory"
+    seeds = f"{config.seeds} seeds{first} in {worlds}"
+    return f"{benchmark.plan.suite}: {camera}, T_sf = {level:g} spikes/s, {seeds}"
 
 
 @contextmanager

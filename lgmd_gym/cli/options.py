@@ -39,7 +39,14 @@ class Bench:
     first_seed: Count = None
     """First seed. Default: 0."""
     conditions: Names = None
-    """Camera conditions, each run separately: clear, night, fog, degraded. Default: clear."""
+    """Camera conditions, each run separately: clear, night, fog, rain, low_sun, or mixed for the condition of
+    each world. Default: clear."""
+    worlds: Count = None
+    """Number of worlds (asphalt, light, surroundings, brake); 0 for the plain laboratory. Default: 20."""
+    first_world: Count = None
+    """First world; 8000 to 8999 are the test worlds. Default: 8000."""
+    road: Name = None
+    """Road that moves the lens: still, smooth, normal or rough. Default: normal, in the laboratory still."""
     camera: Name = None
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
     params: File = None

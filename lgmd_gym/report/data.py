@@ -13,7 +13,7 @@ from lgmd_gym.benchmark.file_names import series_name
 from lgmd_gym.benchmark.rows import Row, key_of
 from lgmd_gym.benchmark.stored_run import read_run, read_series, read_settings
 from lgmd_gym.benchmark.suite_file import get_suite
-from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.benchmark.task import NO_BRAKE, Task
 from lgmd_gym.report.images import CapturedFrame, capture_frames
 
 
@@ -56,5 +56,9 @@ class ReportData:
         """Return camera frames of a row's episode, see `capture_frames`; none of `agents_not_loaded`."""
         if row["agent"] in self.agents_not_loaded:
             return []
-        sensor_config = self.config.sensor_config.with_condition(row["condition"])
-        return capture_frames(self.cases[row["case"]], row["agent"], row["seed"], sensor_config, decisions)
+        case, condition = self.cases[row["case"]], row["condition"]
+        task = Task(
+            row["agent"], case, row["seed"], self.config.sensors(condition), condition=condition,
+            world=row["world"], road=self.config.road,
+        )  # fmt: skip
+        return capture_frames(task, decisions)

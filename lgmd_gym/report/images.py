@@ -8,10 +8,9 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import make_env, rollout
 from lgmd_gym.benchmark.metrics import brake_onset
-from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.task import Task
 
 
 class CapturedFrame(NamedTuple):
@@ -52,23 +51,18 @@ def key_decisions(series: Mapping[str, np.ndarray]) -> dict[str, int]:
     return decisions | {"end": len(series["time"]) - 1}
 
 
-def capture_frames(
-    case: Case, agent: str, seed: int, sensor_config: SensorConfig, decisions: Mapping[str, int]
-) -> list[CapturedFrame]:
+def capture_frames(task: Task, decisions: Mapping[str, int]) -> list[CapturedFrame]:
     """Repeat an episode and return frames of the first camera.
 
     Args:
-        case: Case without an FCW driver.
-        agent: Agent string.
-        seed: Seed of the environment and the agent.
-        sensor_config: Camera and neuron parameters.
+        task: The episode, without an FCW driver.
         decisions: Index of the decision of each frame, by caption.
     """
-    actor = make_agent(agent)
-    env = make_env(case, sensor_config.for_agent(actor))
+    actor = make_agent(task.agent)
+    env = make_env(task.case, task.sensor_config.for_agent(actor), task.arguments)
     frames, last = [], max(decisions.values())
     try:
-        for decision, (step, _) in enumerate(rollout(env, actor, seed)):
+        for decision, (step, _) in enumerate(rollout(env, actor, task.seed)):
             if labels := [label for label, index in decisions.items() if index == decision]:
                 time = decision / env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
                 gap = f", gap {step.info['gap']:.1f} m" if np.isfinite(step.info["gap"]) else ""

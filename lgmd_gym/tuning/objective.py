@@ -24,6 +24,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.task import Task, run_task
 from lgmd_gym.benchmark.worker_processes import run_parallel
+from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.scenarios.distribution import LEVELS
 from lgmd_gym.errors import check_known, check_whole
 
@@ -225,7 +226,7 @@ def with_texture(sensors: SensorConfig, seed: int) -> SensorConfig:
 
 
 def _simulate(case: Case, seed: int, sensors: SensorConfig, agent: Agent) -> Episode:
-    env = make_env(case, sensors)
+    env = make_env(case, sensors, {"world": LABORATORY} | dict(case.arguments))
     try:
         return play(env, agent, seed)
     finally:

@@ -230,7 +230,7 @@ def run_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     (folder / "three-cases.toml").write_text(SUITE)
     config = benchmark.RunConfig(
-        suite=str(folder / "three-cases.toml"), agents=AGENTS, seeds=2, conditions=("clear", "degraded")
+        suite=str(folder / "three-cases.toml"), agents=AGENTS, seeds=2, conditions=("clear", "rain")
     )
     benchmark.run(config, folder / "run", plots=False)
     return folder / "run"
@@ -263,7 +263,7 @@ def test_report_is_one_page_without_external_files(run_folder):
         "Configuration",
     ]
     scores = page.split("<h2>")[1]
-    assert re.findall(r"<h3>(.*?)</h3>", scores) == ["clear", "degraded"]
+    assert re.findall(r"<h3>(.*?)</h3>", scores) == ["clear", "rain"]
     assert scores.count("<tr><td>ttc-oracle</td>") == 2
     assert "<h3>smallest stopping margin: three-cases/CCRs/v" in page
     assert page.count("data:image/png") >= 4
@@ -287,7 +287,7 @@ def test_report_of_an_interrupted_run_states_that_it_is_incomplete(tmp_path):
 def test_command_compares_agents_within_a_run(run_folder, tmp_path, capsys):
     assert cli.run(["compare", str(run_folder), "--out", str(tmp_path / "d.png")]) == 0
     text = capsys.readouterr().out
-    assert "A = spike-threshold   B = ttc-oracle   6 pairs degraded" in text
+    assert "A = spike-threshold   B = ttc-oracle   6 pairs rain" in text
     assert re.search(r"TTC at braking \[s\] .* of \d", text)
     assert (tmp_path / "d.png").read_bytes().startswith(b"\x89PNG")
 

@@ -69,7 +69,7 @@ def test_invalid_suite_file_gives_one_line_with_a_suggestion(short_suite, old, n
 
 
 def test_run_toml_repeats_the_run_without_the_original_suite_file(short_suite, tmp_path):
-    agents, conditions = ["spike-threshold:threshold=45"], ["clear", "degraded"]
+    agents, conditions = ["spike-threshold:threshold=45"], ["clear", "rain"]
     first = new_run(tmp_path / "a", suite=str(short_suite), agents=agents, seeds=2, conditions=conditions)
     assert first.play()
     assert first.total == len(first.rows) == 2 * 3 * 2 * 2
@@ -77,10 +77,10 @@ def test_run_toml_repeats_the_run_without_the_original_suite_file(short_suite, t
     again = Run.new(RunConfig.load(tmp_path / "a" / "run.toml"), tmp_path / "b")
     assert again.play()
     assert again.rows == first.rows
-    clear, degraded = (
+    clear, rain = (
         [row["ttc_at_brake"] for row in again.rows if row["condition"] == name] for name in conditions
     )
-    assert clear != degraded
+    assert clear != rain
     run_tomls = [(tmp_path / name / "run.toml").read_text().splitlines() for name in ("a", "b")]
     assert run_tomls[0][1:] == run_tomls[1][1:]  # the first line is a comment with the commit
     assert load_suite(tmp_path / "b" / "suite.toml") == load_suite(tmp_path / "a" / "suite.toml")

@@ -16,7 +16,7 @@ from lgmd_gym.camera import EgoCamera, CameraParams
 digest = hashlib.sha256()
 for name in ("wide", "fovea"):
     env = straight_env(); add_car(env, 25.0, 3.5); add_car(env, 40.0, 7.0, heading=0.3)
-    camera = EgoCamera(CameraParams.preset(name, seed=5).with_condition("degraded"))
+    camera = EgoCamera(CameraParams.preset(name, seed=5).with_condition("rain"))
     for k in range(5):
         env.vehicle.position[0] = k * 0.4
         digest.update(camera.render(env).tobytes())

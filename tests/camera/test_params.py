@@ -31,7 +31,7 @@ def test_focal_length_of_a_right_angle():
 
 
 def test_params_are_hashable_and_round_trip_through_json():
-    for params in (*PRESETS.values(), CameraParams.preset("tele").with_condition("degraded")):
+    for params in (*PRESETS.values(), CameraParams.preset("tele").with_condition("rain")):
         plain = json.loads(json.dumps(dataclasses.asdict(params)))
         assert CameraParams.make(plain) == params
         assert hash(CameraParams.make(plain)) == hash(params)
@@ -43,7 +43,7 @@ def test_make_accepts_name_params_and_dict():
     assert CameraParams.make(fovea) is fovea
     assert CameraParams.make({"name": "fovea", "seed": 7}) == CameraParams.preset("fovea", seed=7)
     assert CameraParams.make({"name": "mine", "hfov_deg": 7.0}).hfov_deg == 7.0
-    assert CameraParams.make({"name": "fovea", "condition": "degraded"}) == fovea.with_condition("degraded")
+    assert CameraParams.make({"name": "fovea", "condition": "rain"}) == fovea.with_condition("rain")
     assert CameraParams.make(fovea, condition="fog", seed=7) == CameraParams.preset(
         "fovea", visibility_m=120.0, seed=7
     )
@@ -67,7 +67,7 @@ BAD_VALUES = [
     (lambda: CameraParams(seed=1.5), ["seed", "1.5"]),
     (lambda: CameraParams(seed=-1), ["seed", "-1"]),
     (lambda: CameraParams(texture=-0.1), ["texture", "-0.1"]),
-    (lambda: CameraParams().with_condition("robots"), ["robots", "degraded"]),
+    (lambda: CameraParams().with_condition("robots"), ["robots", "rain"]),
     (lambda: EgoCamera("fove"), ["fove", "fovea"]),
 ]
 

@@ -18,8 +18,8 @@ def test_clear_returns_the_argument():
 
 
 def test_explicit_fields_of_a_dict_take_precedence():
-    camera = with_condition({"name": "tele", "read_noise": 0.0, "condition": "night"}, "degraded")
-    assert camera == CameraParams.preset("tele", **{**CONDITIONS["degraded"], "read_noise": 0.0})
+    camera = with_condition({"name": "tele", "read_noise": 0.0, "condition": "night"}, "rain")
+    assert camera == CameraParams.preset("tele", **{**CONDITIONS["rain"], "read_noise": 0.0})
 
 
 def test_every_camera_of_a_sequence_is_changed():

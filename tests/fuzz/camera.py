@@ -110,8 +110,8 @@ def check(env, cameras, noise):
         assert np.array_equal(camera.render(env), frame)
         frames.append(EgoCamera(params, read_noise=noise, shot_noise=noise).render(env))
         assert noise or np.array_equal(frames[-1], frame)
-    degraded = [replace(params, read_noise=noise, shot_noise=noise) for params in cameras]
-    array = SensorArray(degraded, 30.0, None)
+    noisy = [replace(params, read_noise=noise, shot_noise=noise) for params in cameras]
+    array = SensorArray(noisy, 30.0, None)
     for _ in range(2):
         array.read(env)
         array.process(0, 1)

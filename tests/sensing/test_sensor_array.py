@@ -25,7 +25,7 @@ CAMERAS = [
 FIELDS = [
     {},
     {"condition": "night", "texture": 0.7},
-    {"condition": "degraded", "texture": 1.4},
+    {"condition": "rain", "texture": 1.4},
     {"condition": "fog", "seed": 5, "roadside": 2.0},
 ]
 

@@ -2,10 +2,11 @@
 
 import traceback
 from dataclasses import dataclass
+from typing import Any
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.episode import Step
-from lgmd_gym.benchmark.rows import Row, new_row
+from lgmd_gym.benchmark.rows import WORLD, Row, new_row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.observer import Observer
 from lgmd_gym.benchmark.traffic.reader import Moment
@@ -24,11 +25,13 @@ class Drive:
         kind: Kind of traffic.
         seed: Seed of the traffic and the agents.
         agents: Agent strings.
+        camera_fields: Fields that set the world of the cameras, see `camera_fields`.
     """
 
     kind: str
     seed: int
     agents: tuple[str, ...]
+    camera_fields: tuple[tuple[str, Any], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +103,7 @@ class _PlayedDrive:
         num_cameras = len(observer.sensors.names)
         self.schedule = CameraSchedule((), (), num_cameras)
         try:
+            observer.sensors.set_camera_fields(index, dict(drive.camera_fields))
             recording = record_traffic(drive.kind, drive.seed, observer.sensors, index, observer.fps)
             playing = {name: make_agent(name) for name in agents}
             self.schedule = CameraSchedule(recording.moments, list(playing.values()), num_cameras)
@@ -133,7 +137,8 @@ class _PlayedDrive:
         self.replays.pop(agent, None)
         drive = self.drive
         case = traffic_case(drive.kind, drive.seed)
-        self.rows[agent] = new_row(KEYS, agent, case, drive.seed, self._condition, **values)
+        world = dict(drive.camera_fields).get(WORLD)
+        self.rows[agent] = new_row(KEYS, agent, case, drive.seed, self._condition, world=world, **values)
 
 
 def _play(task: TrafficTask, sensor_config: SensorConfig, agents: set[str]) -> list[_PlayedDrive]:

@@ -7,13 +7,14 @@ from typing import Any
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.metrics import NUISANCE, PREMATURE
-from lgmd_gym.benchmark.rows import ID_KEYS
+from lgmd_gym.benchmark.rows import ID_KEYS, WORLD
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.traffic.recording import TrafficRecording
 
 # Every key of a row, in order; null where undefined. SI units.
 KEYS = (
     *ID_KEYS,
+    WORLD,
     "camera",
     "threat",
     "collision",

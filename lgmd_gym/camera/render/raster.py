@@ -7,6 +7,7 @@ import numba as nb
 from lgmd_gym.camera.objects import MODEL_MARK, light_of_code
 from lgmd_gym.camera.render.blur import add_weighted, blur_steps, lens_before, move_objects, overwrite
 from lgmd_gym.camera.render.buffers import Buffers, GroundLayer, SolidLayer, Tables, View, Views
+from lgmd_gym.camera.render.cast_shadows import add_cast_shadows
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
 from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
 from lgmd_gym.camera.render.jit import kernel
@@ -15,7 +16,6 @@ from lgmd_gym.camera.render.models import Models
 from lgmd_gym.camera.render.order import distance, order_objects, visible
 from lgmd_gym.camera.render.panorama import draw_panorama
 from lgmd_gym.camera.render.sensor import expose
-from lgmd_gym.camera.render.cast_shadows import add_cast_shadows
 from lgmd_gym.camera.render.shadows import add_shadow
 from lgmd_gym.camera.render.sky import draw_sky
 from lgmd_gym.camera.render.solids import Air, draw_object

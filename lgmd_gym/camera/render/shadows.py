@@ -15,7 +15,6 @@ from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.order import distance
 
 
-
 @kernel
 def _add_footprint(layer, k, lens, obj, centre, grow, weight):
     """Add an object's rectangle on the ground, around `centre` and grown on all sides, to channel k."""
