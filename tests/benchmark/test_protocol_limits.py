@@ -9,8 +9,8 @@ from support.rows import suite_rows, threat_row
 from lgmd_gym.benchmark.analysis.compare import compare_rows
 from lgmd_gym.benchmark.analysis.ncap_points import points_2023, points_2026, row_colour_2023
 from lgmd_gym.benchmark.analysis.protocol_limits import (
+    check_fmvss127,
     check_green,
-    check_no_contact,
     check_r152,
     colour_2026,
     limit_results,
@@ -109,11 +109,21 @@ def test_suite_without_limits_has_no_limit_table():
 
 def test_contact_and_colour_checks():
     contact, avoided = impact_row("CCRs/v50", 50, 0, 5), impact_row("CCRs/v50", 50, 0, 0)
-    assert (check_no_contact(contact), check_no_contact(avoided)) == (
+    assert (check_fmvss127(contact), check_fmvss127(avoided)) == (
         (False, "no contact"),
         (True, "no contact"),
     )
     assert (check_green(contact), check_green(avoided)) == ((False, "green"), (True, "green"))
+
+
+def test_premature_braking_fails_fmvss127():
+    """In 49 CFR 571.127 the brakes are applied when a collision is imminent (S5.1.3)."""
+    premature = impact_row("CCRs/v50", 50, 0, 0, premature_brake=True)
+    timely = impact_row("CCRs/v50", 50, 0, 0, premature_brake=False)
+    assert [check_fmvss127(row) for row in (premature, timely)] == [
+        (False, "no contact"),
+        (True, "no contact"),
+    ]
 
 
 def test_colours_2026_match_the_published_bands():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.analysis.protocol_limits import LIMIT_CHECKS
 from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.metrics import Counterfactual
 from lgmd_gym.benchmark.recorder import GROUND_TRUTH, SERIES
@@ -67,6 +68,9 @@ def violations(case):
         "the oracle brakes for threats only": threat or oracle["peak_deceleration"] == 0.0,
         "the oracle has no false activation": not oracle["false_activation"],
     }
+    if case.suite in ("r152", "fmvss127"):
+        met = LIMIT_CHECKS[case.suite]
+        expectations["the oracle meets the limit, always-brake does not"] = met(oracle)[0] > met(always)[0]
     return [f"{case.name}: {expectation}" for expectation, met in expectations.items() if not met]
 
 

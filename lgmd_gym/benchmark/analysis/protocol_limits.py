@@ -96,9 +96,15 @@ def check_r152(row: Row) -> tuple[bool, str]:
     return met, f"≤ {limit:g} km/h {load}"
 
 
-def check_no_contact(row: Row) -> tuple[bool, str]:
-    """Check a row of suite fmvss127 for contact (49 CFR 571.127 S5.1.3)."""
-    return not row["collision"], "no contact"
+def check_fmvss127(row: Row) -> tuple[bool, str]:
+    """Check a row of suite fmvss127 for contact and for premature braking.
+
+    49 CFR 571.127 S5.1.3 requires that the brakes are applied when a collision is imminent, and that no
+    contact follows. Until then the test speed is maintained: from a time to collision of 5.0 s on (S7.2,
+    S7.3.2, S7.4.2), or from 3 s before the lead vehicle brakes (S7.5.2). The standard sets no time for
+    "imminent"; as in `check_r152`, braking more than 4 s before the contact of `no-brake` fails.
+    """
+    return not row["collision"] and not row["premature_brake"], "no contact"
 
 
 def check_green(row: Row) -> tuple[bool, str]:
@@ -106,7 +112,7 @@ def check_green(row: Row) -> tuple[bool, str]:
     return colour_2026(row["ego_speed"] / KMH, relative_impact(row) / KMH) == "green", "green"
 
 
-LIMIT_CHECKS = {"r152": check_r152, "fmvss127": check_no_contact, "ncap2026": check_green}
+LIMIT_CHECKS = {"r152": check_r152, "fmvss127": check_fmvss127, "ncap2026": check_green}
 
 
 def limit_results(rows: list[Row], agent: str, check: LimitCheck) -> list[LimitResult]:

@@ -16,8 +16,8 @@ SCORE_CAPTION = (
     "in s; premature: more than 4 s before contact, does not count as avoided"
 )
 LIMIT_CAPTION = (
-    "runs that meet the limit, of n (highest relative impact speed in km/h); derived from the protocol, "
-    "no rating"
+    "runs that meet the limit, of n (highest relative impact speed in km/h); premature braking fails r152 "
+    "and fmvss127; derived from the protocol, no rating"
 )
 
 
