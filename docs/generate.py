@@ -21,7 +21,7 @@ from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.executor import Executor
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.statistics import Rate
-from lgmd_gym.benchmark.summary import summaries
+from lgmd_gym.benchmark.summary import INTERVAL_TEXT, Sample, summaries
 from lgmd_gym.cli.main import COMMANDS
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.episode_source import RandomLevels
@@ -127,7 +127,7 @@ def benchmark_table() -> str:
         reduction = f"{mean_kmh(item.speed_reduction)} km/h"
         rates = [_rate(rate) for rate in (item.avoided, item.premature, item.false_activations)]
         rows.append(f"| `{item.agent}` | {rates[0]} | {reduction} | {rates[1]} | {rates[2]} |")
-    return "\n".join(rows) + "\n"
+    return "\n".join(rows) + f"\n\n{Sample.of(run.rows)}; {INTERVAL_TEXT}.\n"
 
 
 def _rate(rate: Rate) -> str:

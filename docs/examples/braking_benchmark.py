@@ -34,7 +34,7 @@ def main(folder: Path, picture: Path | None = None, seeds: int = 1) -> list[Agen
 
 
 def draw(found: list[AgentSummary], picture: Path) -> None:
-    """Plot the rates of each agent with Wilson's 95 % intervals."""
+    """Plot the rates of each agent with their 95 % intervals."""
     figure = Figure(figsize=(8.0, 2.6), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True)
     columns = (("threats avoided", "avoided", 2), ("false activations", "false_activations", 1))

@@ -6,7 +6,7 @@ The first table changes the camera, the weather or the target. It lists how many
 are avoided (no contact and no premature braking), and the false activations in the false-reaction cases.
 The second table combines dark, asphalt-grey and light targets with day, night and fog and three asphalt
 textures, and lists how many cases of R152 are avoided.
-Rates have Wilson's 95 % interval. The second argument is the number of seeds.
+Rates have a 95 % interval that clusters by case and world. The second argument is the number of seeds.
 """
 
 import sys
@@ -16,10 +16,11 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.sensors import DEFAULT_CAMERA, SensorConfig
-from lgmd_gym.benchmark.statistics import wilson
 from lgmd_gym.benchmark.suites import find_suite
+from lgmd_gym.benchmark.summary import Sample, rate_of
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
 from lgmd_gym.camera import CameraParams
 
@@ -81,11 +82,7 @@ def play(agent: str, cases: Sequence[Case], seeds: int, change: Change, jobs: in
 
 def rate(rows: Sequence[Row], key: str) -> str:
     """Return k/n of a boolean row key with its interval in per cent; a dash without rows."""
-    values = [bool(row[key]) for row in rows if row[key] is not None]
-    if not values:
-        return "–"
-    low, high = wilson(sum(values), len(values))
-    return f"{sum(values)}/{len(values)} [{100 * low:.0f}–{100 * high:.0f}]"
+    return rate_text(rate_of([row for row in rows if row[key] is not None], key))
 
 
 def with_arguments(cases: Sequence[Case], **arguments: Any) -> list[Case]:
@@ -99,7 +96,7 @@ def first_table(
     """Print the table of changed cameras, weather and targets."""
     threats = [*find_suite("r152").cases, *find_suite("fmvss127").cases][::every]
     non_threats = find_suite("false-reaction").cases[::every]
-    print("| change | avoided | premature | false activations |\n|---|---|---|---|")
+    print("| change | sample | avoided | premature | false activations |\n|---|---|---|---|---|")
     for name in names:
         change, arguments = CHANGES[name]
         rows = play(agent, with_arguments(threats, **arguments), seeds, change, jobs)
@@ -110,13 +107,15 @@ def first_table(
             rate(rows, "premature_brake"),
             rate(false_reaction, "false_activation"),
         )
-        print(f"| {name} | {' | '.join(cells)} |", flush=True)
+        sample = f"{Sample.of(rows)}, {Sample.of(false_reaction)}" if false_reaction else str(Sample.of(rows))
+        print(f"| {name} | {sample} | {' | '.join(cells)} |", flush=True)
 
 
 def second_table(agent: str, seeds: int, jobs: int, every: int = 1) -> None:
     """Print avoided contacts by target shade, light and asphalt texture."""
     cases = find_suite("r152").cases[::every]
-    print(f"| target, texture | {' | '.join(AIR)} |\n|---|{'---|' * len(AIR)}")
+    sample = Sample.of({"case": case.name} for case in cases)
+    print(f"| target, texture: {sample} | {' | '.join(AIR)} |\n|---|{'---|' * len(AIR)}")
     for name, shade in SHADES.items():
         for texture in TEXTURES:
             changes = [with_fields(condition=air, texture=texture) for air in AIR.values()]

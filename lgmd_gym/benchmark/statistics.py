@@ -1,7 +1,8 @@
 """Intervals of rates, counts and means.
 
-Rates have Wilson's interval, counts Garwood's exact Poisson interval, and means a bootstrap that draws whole
-cases: seeds of one case are correlated, so drawing single episodes would give an interval that is too narrow.
+Rates have Wilson's interval for an effective sample size, see `effective_size`; counts have Garwood's exact
+Poisson interval, and means a bootstrap that draws whole cases and whole worlds: runs of one case or of one
+world are correlated, so drawing single episodes would give an interval that is too narrow.
 """
 
 import math
@@ -9,6 +10,8 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+
+from lgmd_gym.benchmark.effective_size import Z95, effective_size
 
 DRAWS = 4000
 
@@ -23,10 +26,30 @@ class Rate(NamedTuple):
 
     @classmethod
     def of(cls, flags: Iterable[bool]) -> "Rate":
-        """Return the rate of True among `flags`."""
+        """Return the rate of True among independent outcomes."""
         values = list(flags)
         k, n = sum(values), len(values)
         return cls(k, n, *wilson(k, n))
+
+    @classmethod
+    def clustered(
+        cls, flags: Iterable[bool], cases: Sequence[Hashable], worlds: Sequence[Hashable] | None = None
+    ) -> "Rate":
+        """Return the rate of True among outcomes that are correlated within a case and within a world.
+
+        Args:
+            flags: Outcome of each trial.
+            cases: Case of each trial.
+            worlds: World of each trial; None for one world.
+
+        Example:
+            >>> [round(bound, 2) for bound in Rate.clustered([False] * 60, list(range(6)) * 10)]
+            [0, 60, 0.0, 0.39]
+        """
+        values = list(flags)
+        k, n = sum(values), len(values)
+        size = effective_size(values, cases, worlds)
+        return cls(k, n, *wilson(k / n * size if n else 0.0, size))
 
 
 class Mean(NamedTuple):
@@ -34,10 +57,10 @@ class Mean(NamedTuple):
 
     Attributes:
         value: Mean; None without values.
-        low: Lower bound; None for fewer than two clusters.
-        high: Upper bound; None for fewer than two clusters.
+        low: Lower bound; None for one case in one world.
+        high: Upper bound; None for one case in one world.
         n: Number of values.
-        clusters: Number of clusters.
+        clusters: Number of cases.
     """
 
     value: float | None
@@ -47,8 +70,8 @@ class Mean(NamedTuple):
     clusters: int
 
 
-def wilson(k: float, n: int, z: float = 1.959964) -> tuple[float, float]:
-    """Return the Wilson score interval of k successes in n trials; (0, 1) for n = 0.
+def wilson(k: float, n: float, z: float = Z95) -> tuple[float, float]:
+    """Return the Wilson score interval of k successes in n independent trials; (0, 1) for n = 0.
 
     Example:
         >>> [round(bound, 3) for bound in wilson(0, 10)]
@@ -90,33 +113,55 @@ def binomial_tail(k: int, n: int, p: float) -> float:
     return math.fsum(math.comb(n, i) * p**i * (1.0 - p) ** (n - i) for i in range(k, n + 1))
 
 
-def cluster_mean(values: Sequence[float], clusters: Sequence[Hashable], draws: int = DRAWS) -> Mean:
-    """Return the mean over all values, and a percentile bootstrap interval over clusters.
+def cluster_mean(
+    values: Sequence[float],
+    clusters: Sequence[Hashable],
+    worlds: Sequence[Hashable] | None = None,
+    draws: int = DRAWS,
+) -> Mean:
+    """Return the mean over all values, and a percentile bootstrap interval over cases and worlds.
 
-    The draws depend only on the number of clusters. The result does not depend on the order of the values.
+    Cases and worlds are drawn independently of each other (Owen 2007, Annals of Applied Statistics 1). The
+    draws depend only on the numbers of cases and worlds. The result does not depend on the order of values.
 
     Args:
         values: One value per episode.
-        clusters: Cluster of each value, such as its case.
+        clusters: Case of each value.
+        worlds: World of each value; None for one world.
         draws: Number of bootstrap samples.
 
     Example:
         >>> cluster_mean([1.0, 3.0], ["a", "a"])
         Mean(value=2.0, low=None, high=None, n=2, clusters=1)
     """
-    groups: dict[Hashable, list[float]] = {}
-    for value, cluster in zip(values, clusters, strict=True):
-        groups.setdefault(cluster, []).append(value)
-    if not groups:
+    if not len(values):
         return Mean(None, None, None, 0, 0)
-    ordered = sorted(sorted(group) for group in groups.values())
-    sums, counts = np.array([sum(group) for group in ordered]), np.array([len(group) for group in ordered])
-    mean, k = float(sums.sum() / counts.sum()), len(ordered)
-    if k == 1:
+    rows = _places(values, clusters)
+    columns = _places(values, worlds or [None] * len(values))
+    sums = np.zeros((max(rows) + 1, max(columns) + 1))
+    counts = np.zeros(sums.shape)
+    for row, column, value in sorted(zip(rows, columns, values, strict=True)):
+        sums[row, column] += value
+        counts[row, column] += 1
+    mean, k = float(sums.sum() / counts.sum()), len(sums)
+    if sums.size == 1:
         return Mean(mean, None, None, len(values), 1)
-    weights = np.random.default_rng(0).multinomial(k, np.full(k, 1.0 / k), size=draws)
-    low, high = np.percentile((weights @ sums) / (weights @ counts), (2.5, 97.5))
+    rng = np.random.default_rng(0)
+    drawn = [rng.multinomial(size, np.full(size, 1.0 / size), size=draws) for size in sums.shape]
+    totals, weights = (((drawn[0] @ table) * drawn[1]).sum(axis=1) for table in (sums, counts))
+    filled = weights > 0  # with missing cells, a draw may contain none
+    low, high = np.percentile(totals[filled] / weights[filled], (2.5, 97.5))
     return Mean(mean, float(low), float(high), len(values), k)
+
+
+def _places(values: Sequence[float], labels: Sequence[Hashable]) -> list[int]:
+    """Return the number of the label of each value; labels are ordered by their values."""
+    groups: dict[Hashable, list[float]] = {}
+    for value, label in zip(values, labels, strict=True):
+        groups.setdefault(label, []).append(value)
+    ordered = sorted(groups, key=lambda label: (sorted(groups[label]), str(label)))
+    places = {label: place for place, label in enumerate(ordered)}
+    return [places[label] for label in labels]
 
 
 def _poisson_cdf(count: int, mean: float) -> float:

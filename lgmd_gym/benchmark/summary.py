@@ -15,6 +15,8 @@ COLUMNS = (
     "agent",
     "condition",
     "case",
+    "cases",
+    "worlds",
     "threats",
     "avoided",
     "avoided_low",
@@ -32,14 +34,35 @@ COLUMNS = (
 )
 
 
+INTERVAL_TEXT = "95 % interval, clustered by case and world"
+
+
+class Sample(NamedTuple):
+    """Numbers of cases and worlds of a group of rows, between which outcomes may be independent."""
+
+    cases: int
+    worlds: int
+
+    @classmethod
+    def of(cls, rows: Iterable[Row]) -> "Sample":
+        """Return the numbers of distinct cases and worlds of rows."""
+        pairs = [(row["case"], row.get("world")) for row in rows]
+        return cls(len({case for case, _ in pairs}), len({world for _, world in pairs}))
+
+    def __str__(self) -> str:
+        words = ("case" if self.cases == 1 else "cases", "world" if self.worlds == 1 else "worlds")
+        return f"{self.cases} {words[0]} × {self.worlds} {words[1]}"
+
+
 class AgentSummary(NamedTuple):
     """Summary of one agent over a group of episodes.
 
     Attributes:
         agent: Agent string.
         group: Name of the group.
+        sample: Numbers of cases and worlds.
         avoided: Threats avoided without premature braking.
-        speed_reduction: Mean over threats, bootstrapped by case [m/s].
+        speed_reduction: Mean over threats, bootstrapped by case and world [m/s].
         ttc_at_brake: Median over threats with braking [s]; None without one.
         premature: Threats with premature braking.
         false_activations: Episodes without a threat but with a false activation.
@@ -48,6 +71,7 @@ class AgentSummary(NamedTuple):
 
     agent: str
     group: str
+    sample: Sample
     avoided: Rate
     speed_reduction: Mean
     ttc_at_brake: float | None
@@ -65,13 +89,25 @@ def summarise(agent: str, group: str, rows: list[Row]) -> AgentSummary:
     return AgentSummary(
         agent,
         group,
-        Rate.of(row["avoided"] for row in threats),
-        cluster_mean([row["speed_reduction"] for row in threats], [row["case"] for row in threats]),
+        Sample.of(played),
+        rate_of(threats, "avoided"),
+        cluster_mean([row["speed_reduction"] for row in threats], *cases_and_worlds(threats)),
         median(ttcs) if ttcs else None,
-        Rate.of(row["premature_brake"] for row in threats),
-        Rate.of(row["false_activation"] for row in non_threats),
+        rate_of(threats, "premature_brake"),
+        rate_of(non_threats, "false_activation"),
         len(rows) - len(played),
     )
+
+
+def rate_of(rows: Sequence[Row], key: str) -> Rate:
+    """Return the rate of a boolean row key, with an interval that clusters by case and world."""
+    return Rate.clustered([row[key] for row in rows], *cases_and_worlds(rows))
+
+
+def cases_and_worlds(rows: Iterable[Row]) -> tuple[list[str], list[int | None]]:
+    """Return the case and the world of each row; None for the laboratory world."""
+    pairs = [(row["case"], row.get("world")) for row in rows]
+    return [case for case, _ in pairs], [world for _, world in pairs]
 
 
 def summaries(rows: Iterable[Row], group: Callable[[Row], str]) -> list[AgentSummary]:
@@ -135,7 +171,17 @@ def _line(item: AgentSummary, condition: str) -> list[Any]:
     threats = [avoided.n, avoided.k, _bound(avoided, "low"), _bound(avoided, "high")]
     non_threats = [false.n, false.k, _bound(false, "low"), _bound(false, "high")]
     means = [_round(value) for value in (speed.value, speed.low, speed.high, item.ttc_at_brake)]
-    return [item.agent, condition, item.group, *threats, *means, item.premature.k, *non_threats, item.errors]
+    return [
+        item.agent,
+        condition,
+        item.group,
+        *item.sample,
+        *threats,
+        *means,
+        item.premature.k,
+        *non_threats,
+        item.errors,
+    ]
 
 
 def _bound(rate: Rate, bound: str) -> str:

@@ -20,7 +20,7 @@ from lgmd_gym.benchmark.analysis.tables import (
 from lgmd_gym.benchmark.folder import replace_file
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import Rate
-from lgmd_gym.benchmark.summary import by_condition, without_fcw_driver
+from lgmd_gym.benchmark.summary import INTERVAL_TEXT, Sample, by_condition, without_fcw_driver
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.report.case_grids import case_grids
@@ -53,6 +53,7 @@ def write_report(path: Path, trust: bool = False) -> Path:
     environment.filters |= {"band": band, "rate_band": rate_band, "rate": rate_text, "kmh": mean_kmh}
     text = environment.get_template("page.html").render(
         data=data,
+        interval=INTERVAL_TEXT,
         failed=sum(row["error"] is not None for row in data.rows),
         conditions=[_condition(data, name, rows) for name, rows in by_condition(data.rows).items()],
         froc=_froc(data),
@@ -87,6 +88,7 @@ def _condition(data: ReportData, name: str, rows: list[Row]) -> dict[str, Any]:
     met = [agent for agent in data.agents if meets_r152(rows, agent)] if data.suite == "r152" else None
     return {
         "name": name,
+        "sample": Sample.of(rows),
         "summaries": agent_summaries(without_fcw_driver(rows), data.agents),
         "limits": limit_lines(rows, data.agents, data.suite),
         "meet_r152": met,

@@ -10,10 +10,11 @@ from support.rows import suite_rows, threat_row
 
 from lgmd_gym import benchmark
 from lgmd_gym.benchmark.analysis.compare import compare_rows, compare_runs
-from lgmd_gym.benchmark.analysis.compare_tables import change_text
+from lgmd_gym.benchmark.analysis.compare_tables import change_text, comparison_table
 from lgmd_gym.benchmark.analysis.froc import OpenLoopTrace, alarm_onsets, froc_curves, load_traces
 from lgmd_gym.benchmark.analysis.plots import difference_figure, froc_figure, trace_figure
 from lgmd_gym.benchmark.runner import Run
+from lgmd_gym.benchmark.statistics import wilson
 from lgmd_gym.cli import main as cli
 from lgmd_gym.report import write_report
 from lgmd_gym.report.case_grids import case_grids
@@ -51,6 +52,21 @@ def test_pairs_with_equal_differences_have_a_wilson_bound():
     (avoided,) = compare_rows(rows, rows, ("a", "a")).differences
     assert avoided.deviating_high == pytest.approx(0.39, abs=0.01)
     assert change_text(avoided) == "+0.00 in all pairs (95 %: at most 39 % of pairs differ)"
+
+
+def test_pairs_of_several_worlds_cluster_by_world():
+    """Ten seeds of two cases in the laboratory are two trials, in ten worlds twenty."""
+    bounds = {}
+    for name in ("laboratory", "worlds"):
+        rows = [
+            threat_row("a", f"s/F/v{n % 2}", seed=n, world=n // 2 if name == "worlds" else None, avoided=True)
+            for n in range(20)
+        ]
+        comparison = compare_rows(rows, rows, ("a", "a"))
+        (avoided,) = comparison.differences
+        bounds[str(comparison.sample)] = avoided.deviating_high
+        assert str(comparison.sample) in comparison_table(comparison).caption
+    assert bounds == {"2 cases × 1 world": wilson(0, 2)[1], "2 cases × 10 worlds": wilson(0, 20)[1]}
 
 
 def test_one_case_has_no_interval():
@@ -94,8 +110,11 @@ def curves():
     late[95] = 60
     non_threat[[10, 50]] = 35
     threats = ((40, early), (100, timely), (200, late))
-    traces = [OpenLoopTrace("clear", shade, 10.0, make_series(levels)) for shade, levels in threats]
-    traces.append(OpenLoopTrace("clear", None, inf, make_series(non_threat)))
+    traces = [
+        OpenLoopTrace("clear", f"case{number}", None, shade, 10.0, make_series(levels))
+        for number, (shade, levels) in enumerate(threats)
+    ]
+    traces.append(OpenLoopTrace("clear", "empty", None, None, inf, make_series(non_threat)))
     return froc_curves(traces, 1.0, (50.0, 30.0))
 
 
@@ -112,6 +131,15 @@ def test_detection_curve_of_hand_made_traces(curves):
     assert [curve.points[0].detected[:2] for curve in (dark, asphalt, light)] == [(0, 1), (1, 1), (0, 1)]
     assert 0.0 < low.chance < 1.0
     assert high.chance == 0.0
+
+
+@pytest.mark.parametrize(("worlds", "trials"), [((None,) * 4, 1), ((1, 2, 3, 4), 4), ((1, 1, 2, 2), 2)])
+def test_detections_cluster_by_case_and_world(worlds, trials):
+    levels = np.zeros(101)
+    levels[80] = 60
+    traces = [OpenLoopTrace("clear", "case", world, 40, 10.0, make_series(levels)) for world in worlds]
+    (point,) = froc_curves(traces, 1.0, (50.0,))["clear"][0].points
+    assert point.detected == (4, 4, *wilson(trials, trials))
 
 
 def test_lead_time_of_4_seconds_is_rejected():
@@ -263,7 +291,9 @@ def test_report_is_one_page_without_external_files(run_folder):
         "Configuration",
     ]
     scores = page.split("<h2>")[1]
-    assert re.findall(r"<h3>(.*?)</h3>", scores) == ["clear", "rain"]
+    headings = [f"{condition}: 3 cases × 1 world" for condition in ("clear", "rain")]
+    assert re.findall(r"<h3>(.*?)</h3>", scores) == headings
+    assert "k/n [95 % interval, clustered by case and world, in %]" in scores
     assert scores.count("<tr><td>ttc-oracle</td>") == 2
     assert "<h3>smallest stopping margin: three-cases/CCRs/v" in page
     assert page.count("data:image/png") >= 4

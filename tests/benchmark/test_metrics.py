@@ -5,13 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.rows import threat_row
 
+from lgmd_gym.benchmark.analysis.tables import case_table, limit_table, score_tables
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.metrics import METRICS, Counterfactual, brake_onset, metric
 from lgmd_gym.benchmark.recorder import SERIES
 from lgmd_gym.benchmark.rows import KEYS, make_row
-from lgmd_gym.benchmark.summary import COLUMNS, summaries, summarise, write_summary
+from lgmd_gym.benchmark.statistics import wilson
+from lgmd_gym.benchmark.summary import COLUMNS, Sample, summaries, summarise, write_summary
 
 SLOW_APPROACH = Case("test/CCRs/v20", "CCRs", (("ego_speed", 5.556),))
 THREAT = Counterfactual(True, 5.0, 10.0)
@@ -128,7 +131,44 @@ def test_summary_orders_cases_by_number(tmp_path):
     write_summary(rows, tmp_path / "summary.csv")
     lines = [line.split(",") for line in (tmp_path / "summary.csv").read_text().splitlines()]
     assert tuple(lines[0]) == COLUMNS
-    assert [line[:5] for line in lines[1:]] == [
-        *(["a", "clear", case, "1", "1"] for case in cases),
-        ["a", "clear", "all", "3", "3"],
+    assert [line[:7] for line in lines[1:]] == [
+        *(["a", "clear", case, "1", "1", "1", "1"] for case in cases),
+        ["a", "clear", "all", "3", "1", "3", "3"],
     ]
+
+
+@pytest.mark.parametrize(
+    ("worlds", "trials", "text"), [(1, 2, "2 cases × 1 world"), (4, 8, "2 cases × 4 worlds")]
+)
+def test_rates_cluster_by_case_and_world(worlds, trials, text):
+    """Repeats of a case in a world are one trial."""
+    values = {"avoided": True, "premature_brake": False, "speed_reduction": 3.0}
+    rows = [
+        threat_row(case=f"s/F/v{case}", seed=seed, world=seed % worlds, **values)
+        for case in range(2)
+        for seed in range(8)
+    ]
+    item = summarise("a", "", rows)
+    assert item.avoided == (16, 16, *wilson(trials, trials))
+    assert item.premature == (0, 16, *wilson(0, trials))
+    assert str(item.sample) == text
+    (table,) = score_tables(rows, ["a"], "title")
+    assert table.caption.startswith(f"{text}; k/n [95 % interval, clustered by case and world, in %]")
+    assert case_table(rows, ["a"]).caption == text
+    assert limit_table([row | impact() for row in rows], ["a"], "fmvss127").caption.startswith(f"{text}; ")
+
+
+def impact():
+    """Return the values of a run without contact that the limits read."""
+    return {"collision": False, "relative_impact_speed": None}
+
+
+def test_sample_has_singular_and_plural():
+    rows = [threat_row(case="a", world=1), threat_row(case="a", world=2)]
+    assert [str(Sample.of(part)) for part in (rows, rows[:1], [])] == [
+        "1 case × 2 worlds",
+        "1 case × 1 world",
+        "0 cases × 0 worlds",
+    ]
+    without = {key: value for key, value in rows[0].items() if key != "world"}  # rows of an earlier version
+    assert Sample.of([without, without | {"case": "b"}]) == (2, 1)

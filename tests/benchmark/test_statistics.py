@@ -53,6 +53,38 @@ def test_cluster_interval_does_not_depend_on_copies_within_a_cluster():
     assert independent.high - independent.low < 0.5 * (copies.high - copies.low)
 
 
+def test_cluster_interval_does_not_depend_on_copies_within_a_world():
+    """Worlds that differ widen the interval as cases do; a single world does not change it."""
+    values, cases, worlds = [0.0, 1.0, 2.0, 9.0], list("aaaa"), [1, 2, 3, 4]
+    by_world = cluster_mean(values * 10, cases * 10, worlds * 10)
+    assert (by_world.n, by_world.clusters) == (40, 1)
+    by_case = cluster_mean(values * 10, worlds * 10)
+    assert by_world[:3] == pytest.approx(by_case[:3])
+    assert cluster_mean(values, worlds, [7] * 4) == cluster_mean(values, worlds)
+
+
+def test_cluster_mean_of_crossed_cases_and_worlds_is_wider_than_of_either():
+    table = np.add.outer([0.0, 1.0, 5.0], [0.0, 2.0, 3.0, 7.0])
+    cases, worlds = (part.ravel().tolist() for part in np.indices(table.shape))
+    values = table.ravel().tolist()
+    widths = [
+        mean.high - mean.low
+        for mean in (
+            cluster_mean(values, cases, worlds),
+            cluster_mean(values, cases),
+            cluster_mean(values, worlds),
+        )
+    ]
+    assert widths[0] > max(widths[1:])
+    assert cluster_mean(values[::-1], cases[::-1], worlds[::-1]) == cluster_mean(values, cases, worlds)
+
+
+def test_draws_without_any_value_are_left_out():
+    """Of case a in world 1 and case b in world 2, a quarter of the draws contain neither."""
+    mean = cluster_mean([1.0, 3.0], ["a", "b"], [1, 2])
+    assert mean == (2.0, 1.0, 3.0, 2, 2)
+
+
 def test_cluster_mean_does_not_depend_on_the_order():
     values, clusters = [0.0, 1.0, 2.0, 9.0], list("abac")
     assert cluster_mean(values[::-1], clusters[::-1]) == cluster_mean(values, clusters)

@@ -9,7 +9,9 @@ from support.rows import threat_row
 
 from lgmd_gym import benchmark
 from lgmd_gym.benchmark.analysis.bootstrap import interquartile_mean
+from lgmd_gym.benchmark.analysis.compare_tables import arm_table
 from lgmd_gym.benchmark.analysis.trainings import Arm, arm_results, compare_arms, parse_arm
+from lgmd_gym.benchmark.statistics import wilson
 from lgmd_gym.cli import main as cli
 
 AGENTS = ("spike-threshold", "spike-threshold:frames=2", "ttc-oracle")
@@ -39,6 +41,19 @@ def test_interquartile_mean_drops_the_outer_quarters():
     assert interquartile_mean([5.0, -100.0, 1.0, 100.0, 3.0]) == 3.0
     assert interquartile_mean([1.0, 2.0, 6.0]) == 3.0
     assert interquartile_mean([[0, 1, 3, 9], [9, 5, 5, 0]]).tolist() == [2.0, 5.0]
+
+
+def test_shares_cluster_by_case_and_world():
+    """All shares are equal, so the interval is Wilson's for one trial per case and world."""
+    rows = [
+        return_row("a", case, 1.0) | {"seed": seed, "world": seed} for case in (0, 1) for seed in range(5)
+    ]
+    (worlds,) = results_of(rows, ("a", "a"))
+    (laboratory,) = results_of([row | {"world": None} for row in rows], ("a", "a"))
+    assert [str(arm.sample) for arm in (worlds, laboratory)] == ["2 cases × 5 worlds", "2 cases × 1 world"]
+    assert worlds.shares["avoided"].low == pytest.approx(wilson(10, 10)[0])
+    assert laboratory.shares["avoided"].low == pytest.approx(wilson(2, 2)[0])
+    assert arm_table([worlds], "title").caption.startswith("2 cases × 5 worlds; ")
 
 
 def test_results_of_one_and_two_trainings():

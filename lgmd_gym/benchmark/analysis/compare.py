@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lgmd_gym.benchmark.rows import Row, key_of
-from lgmd_gym.benchmark.statistics import Mean, cluster_mean, wilson
+from lgmd_gym.benchmark.statistics import Mean, Rate, cluster_mean
 from lgmd_gym.benchmark.stored_run import read_run
 from lgmd_gym.benchmark.suites import TRAFFIC
-from lgmd_gym.benchmark.summary import without_fcw_driver
+from lgmd_gym.benchmark.summary import Sample, cases_and_worlds, without_fcw_driver
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.errors import check_known
 
@@ -38,7 +38,7 @@ class Difference(NamedTuple):
     """Paired difference B - A of one quantity.
 
     If all pairs differ by the same value, a bootstrap interval has no width. `deviating_high` is then the
-    upper Wilson bound of the share of pairs with another difference; else it is None.
+    upper bound of the share of pairs with another difference, see `Rate.clustered`; else it is None.
     """
 
     name: str
@@ -57,6 +57,7 @@ class Comparison(NamedTuple):
     name_a: str
     name_b: str
     condition: str  # "" if the run has only one
+    sample: Sample  # of the pairs
     pairs: int  # episodes that both completed
     unpaired: int  # other episodes of either
     differences: tuple[Difference, ...]  # of the quantities that are defined for any pair
@@ -112,7 +113,8 @@ def compare_rows(
     pairs = [(a, b) for a, b in pairs if a["threat"] == b["threat"]]
     unpaired = len({key_of(row)[1:] for row in (*rows_a, *rows_b)}) - len(pairs)
     differences = (paired_difference(quantity, pairs) for quantity in QUANTITIES)
-    return Comparison(*names, condition, len(pairs), unpaired, tuple(filter(None, differences)))
+    sample = Sample.of(a for a, _ in pairs)
+    return Comparison(*names, condition, sample, len(pairs), unpaired, tuple(filter(None, differences)))
 
 
 def paired_difference(quantity: Quantity, pairs: list[tuple[Row, Row]]) -> Difference | None:
@@ -127,15 +129,16 @@ def paired_difference(quantity: Quantity, pairs: list[tuple[Row, Row]]) -> Diffe
         return None
     values = [(scale * a[key], scale * b[key]) for a, b in defined]
     changes, n = [b - a for a, b in values], len(values)
+    clusters = cases_and_worlds(a for a, _ in defined)
     return Difference(
         quantity.name,
         quantity.unit,
         sum(a for a, _ in values) / n,
         sum(b for _, b in values) / n,
-        cluster_mean(changes, [a["case"] for a, _ in defined]),
+        cluster_mean(changes, *clusters),
         sum(change > 0 for change in changes),
         sum(change < 0 for change in changes),
-        wilson(0, n)[1] if len(set(changes)) == 1 else None,
+        Rate.clustered([False] * n, *clusters).high if len(set(changes)) == 1 else None,
     )
 
 

@@ -8,21 +8,23 @@ from rich.table import Table
 from lgmd_gym.benchmark.analysis.compare import Comparison, Difference
 from lgmd_gym.benchmark.analysis.trainings import ArmResult, Estimate
 from lgmd_gym.benchmark.statistics import Mean
+from lgmd_gym.benchmark.summary import INTERVAL_TEXT
 
 DIFFERENCE_CAPTION = (
-    "B − A [95 % interval, bootstrap over cases]; number of pairs in which B is higher / lower, of n"
+    "B − A [95 % interval, bootstrap over cases and worlds]; number of pairs in which B is higher / lower, "
+    "of n"
 )
 ARM_CAPTION = (
     "return: interquartile mean over trainings [95 % interval, bootstrap over trainings and cases; of one "
     "training over cases only, of two to four none], below it the lowest and highest training; difference: "
-    "to the first arm, paired by case; shares: means over trainings"
+    f"to the first arm, paired by case; shares: means over trainings [{INTERVAL_TEXT}]"
 )
 SHARE_HEADINGS = {"avoided": "avoided", "premature_brake": "premature", "false_activation": "false"}
 
 
 def comparison_table(comparison: Comparison) -> Table:
     """Return a table with one line per quantity: A, B, their difference, and how many pairs differ."""
-    caption = DIFFERENCE_CAPTION
+    caption = f"{comparison.sample}; {DIFFERENCE_CAPTION}"
     if comparison.unpaired:
         caption += f"; {comparison.unpaired} episodes without a pair (missing, failed, or threat to one only)"
     title = f"A = {comparison.name_a}   B = {comparison.name_b}   {comparison.pairs} pairs"
@@ -57,7 +59,7 @@ def change_text(item: Difference) -> str:
 def arm_table(results: Sequence[ArmResult], title: str) -> Table:
     """Return a table with one line per arm; all arms have the same condition."""
     keys = [key for key in SHARE_HEADINGS if key in results[0].shares]
-    table = Table(title=title, caption=ARM_CAPTION, box=SIMPLE_HEAD)
+    table = Table(title=title, caption=f"{results[0].sample}; {ARM_CAPTION}", box=SIMPLE_HEAD)
     table.add_column("arm", min_width=15, overflow="fold")
     for heading in ("training\nruns", "return", "difference\nto the first"):
         table.add_column(heading, justify="right")

@@ -9,6 +9,7 @@ and any alarm in an episode without contact, is false. A later alarm is neither.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import compress
 from math import inf
 from pathlib import Path
 from typing import NamedTuple
@@ -41,6 +42,8 @@ class OpenLoopTrace:
     """Time series of one `no-brake` episode."""
 
     condition: str
+    case: str
+    world: int | None  # None in the laboratory
     shade: float | None  # grey level of the first actor; None on an empty road
     contact_time: float  # [s]; inf without contact
     series: dict[str, np.ndarray]  # keys: lgmd_gym.benchmark.episode.SERIES
@@ -92,7 +95,8 @@ def load_traces(path: Path) -> list[OpenLoopTrace]:
         series = read_series(path, series_name(key_of(row)))
         if series is not None:
             contact_time = row["duration"] if row["collision"] else inf
-            traces.append(OpenLoopTrace(row["condition"], row["target_shade"], contact_time, series))
+            identity = (row["condition"], row["case"], row.get("world"))
+            traces.append(OpenLoopTrace(*identity, row["target_shade"], contact_time, series))
     return traces
 
 
@@ -140,18 +144,20 @@ def _points(
     traces: list[OpenLoopTrace], onsets: dict[float, list[np.ndarray]], lead_time: float, contrast: str
 ) -> Iterator[FrocPoint]:
     distance = sum(_distance(trace) for trace in traces)
+    chosen = [trace.contact_time < inf and contrast in ("all", trace.contrast) for trace in traces]
+    threats = list(compress(traces, chosen))
+    cases, worlds = [trace.case for trace in threats], [trace.world for trace in threats]
     for threshold, starts in onsets.items():
         detections = [
             bool(np.any((times >= trace.false_alarm_end) & (times <= trace.contact_time - lead_time)))
-            for trace, times in zip(traces, starts, strict=True)
-            if trace.contact_time < inf and contrast in ("all", trace.contrast)
+            for trace, times in zip(threats, compress(starts, chosen), strict=True)
         ]
         false_alarms = sum(
             int(np.sum(times < trace.false_alarm_end)) for trace, times in zip(traces, starts, strict=True)
         )
         yield FrocPoint(
             threshold,
-            Rate.of(detections),
+            Rate.clustered(detections, cases, worlds),
             false_alarms,
             distance,
             *(_per_km(count, distance) for count in (false_alarms, *poisson_interval(false_alarms))),

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import Rate
-from lgmd_gym.benchmark.summary import case_order
+from lgmd_gym.benchmark.summary import case_order, cases_and_worlds
 from lgmd_gym.envs.dynamics.units import KMH
 
 # UN R152 Rev.2, 5.2.1.4, M1: relative speed -> highest relative impact speed, both in km/h. Between two
@@ -123,7 +123,8 @@ def limit_results(rows: list[Row], agent: str, check: LimitCheck) -> list[LimitR
         of_case = [row for row in threats if row["case"] == case]
         met, limits = zip(*map(check, of_case), strict=True)
         limit, worst = " / ".join(sorted(set(limits))), max(map(relative_impact, of_case))
-        results.append(LimitResult(agent, case, limit, Rate.of(met), worst))
+        rate = Rate.clustered(met, *cases_and_worlds(of_case))
+        results.append(LimitResult(agent, case, limit, rate, worst))
     return results
 
 

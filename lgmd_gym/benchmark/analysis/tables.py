@@ -8,12 +8,19 @@ from rich.table import Table
 from lgmd_gym.benchmark.analysis.protocol_limits import LIMIT_CHECKS, limit_results, meets_r152
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import Mean, Rate
-from lgmd_gym.benchmark.summary import AgentSummary, case_order, summaries, without_fcw_driver
+from lgmd_gym.benchmark.summary import (
+    INTERVAL_TEXT,
+    AgentSummary,
+    Sample,
+    case_order,
+    summaries,
+    without_fcw_driver,
+)
 from lgmd_gym.envs.dynamics.units import KMH
 
 SCORE_CAPTION = (
-    "k/n [Wilson 95 % interval in %]; mean speed reduction in km/h [95 %, bootstrap over cases]; median TTC "
-    "in s; premature: more than 4 s before contact, does not count as avoided"
+    f"k/n [{INTERVAL_TEXT}, in %]; mean speed reduction in km/h [95 %, bootstrap over cases and worlds]; "
+    "median TTC in s; premature: more than 4 s before contact, does not count as avoided"
 )
 LIMIT_CAPTION = (
     "runs that meet the limit, of n (highest relative impact speed in km/h); premature braking fails r152 "
@@ -89,7 +96,7 @@ def score_tables(rows: list[Row], agents: list[str], title: str) -> list[Table]:
 
 
 def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
-    table = Table(title=title, caption=SCORE_CAPTION, box=SIMPLE_HEAD)
+    table = Table(title=title, caption=f"{Sample.of(rows)}; {SCORE_CAPTION}", box=SIMPLE_HEAD)
     table.add_column("agent", overflow="fold", min_width=15)
     for heading in ("avoided", "speed\nreduction", "TTC at\nbraking", "premature", "false\nactivation"):
         table.add_column(heading, justify="right")
@@ -109,9 +116,8 @@ def case_table(rows: list[Row], agents: list[str]) -> Table:
     """Return a table of the successful episodes per case."""
     present = {row["agent"] for row in rows}
     shown = [agent for agent in agents if agent in present]
-    table = Table(
-        title="per case: threats avoided, or non-threats without false activation, of n", box=SIMPLE_HEAD
-    )
+    title = "per case: threats avoided, or non-threats without false activation, of n"
+    table = Table(title=title, caption=str(Sample.of(rows)), box=SIMPLE_HEAD)
     table.add_column("case", overflow="fold")
     _add_agent_columns(table, shown)
     for line in success_lines(rows, shown):
@@ -125,7 +131,7 @@ def limit_table(rows: list[Row], agents: list[str], suite: str) -> Table | None:
         return None
     threatened = {row["agent"] for row in rows if row["threat"] and row["error"] is None}
     shown = [agent for agent in agents if agent in threatened]
-    caption = LIMIT_CAPTION
+    caption = f"{Sample.of(rows)}; {LIMIT_CAPTION}"
     if suite == "r152":
         met = ", ".join(agent for agent in shown if meets_r152(rows, agent)) or "none"
         caption += f"\nmeets the impact speed limits of UN R152 5.2.1.4 in simulation: {met}"

@@ -14,9 +14,10 @@ import numpy as np
 
 from lgmd_gym.benchmark.analysis.bootstrap import StratifiedBootstrap, interquartile_mean
 from lgmd_gym.benchmark.analysis.compare import read_case_rows
+from lgmd_gym.benchmark.effective_size import effective_size
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import wilson
-from lgmd_gym.benchmark.summary import without_fcw_driver
+from lgmd_gym.benchmark.summary import Sample, cases_and_worlds, without_fcw_driver
 from lgmd_gym.errors import unknown_name
 
 RETURN = "episode_return"
@@ -52,6 +53,7 @@ class ArmResult(NamedTuple):
 
     name: str
     condition: str
+    sample: Sample
     trainings: int
     mean_return: Estimate  # interquartile mean over training runs of the mean return
     return_range: tuple[float, float]  # lowest and highest mean return of a training run
@@ -147,24 +149,29 @@ def _arm_result(
     for key, threats in SHARES.items():
         values = _case_means(groups, bootstrap.cases, key, threats)
         if np.isfinite(values).any():
-            shares[key] = _share(values, bootstrap.means(values, seed).mean(axis=1))
+            rows = [row for group in groups for row in group if row["threat"] == threats]
+            shares[key] = _share(values, bootstrap.means(values, seed).mean(axis=1), rows, key)
     mean_return = Estimate(float(interquartile_mean(means)), *bounds, len(bootstrap.cases))
     return_range = (float(means.min()), float(means.max()))
-    return ArmResult(arm.name, condition, len(groups), mean_return, return_range, None, shares), samples
+    result = ArmResult(
+        arm.name, condition, Sample.of(groups[0]), len(groups), mean_return, return_range, None, shares
+    )
+    return result, samples
 
 
-def _share(values: np.ndarray, samples: np.ndarray) -> Estimate:
-    """Return a share with the union of its bootstrap and Wilson intervals, one trial per case.
+def _share(values: np.ndarray, samples: np.ndarray, rows: list[Row], key: str) -> Estimate:
+    """Return a share with the union of its bootstrap interval and Wilson's for the effective sample size.
 
-    The bootstrap of shares that are all 0 or all 1 has no width. Wilson's interval does not include the
-    variation over training runs.
+    The bootstrap of shares that are all 0 or all 1 has no width, and draws no worlds. Wilson's interval does
+    not include the variation over training runs.
     """
     n = int(np.isfinite(values[0]).sum())
     value = float(np.nanmean(values))
     low, high = _bounds(samples, len(values))
     if low is None or high is None:
         return Estimate(value, None, None, n)
-    wilson_low, wilson_high = wilson(value * n, n)
+    size = effective_size([bool(row[key]) for row in rows], *cases_and_worlds(rows))
+    wilson_low, wilson_high = wilson(value * size, size)
     return Estimate(value, min(low, wilson_low), max(high, wilson_high), n)
 
 

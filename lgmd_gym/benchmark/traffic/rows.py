@@ -16,6 +16,7 @@ KEYS = (
     *ID_KEYS,
     WORLD,
     "camera",
+    "world",
     "threat",
     "collision",
     "avoided",

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import Rate, poisson_interval
-from lgmd_gym.benchmark.summary import by_agent, by_condition, write_csv
+from lgmd_gym.benchmark.summary import by_agent, by_condition, rate_of, write_csv
 
 PER = 100_000.0  # [m], reference distance of the rates
 COLUMNS = (
@@ -87,7 +87,7 @@ def summarise_traffic(agent: str, kind: str, rows: list[Row]) -> TrafficSummary:
         brakes=sum(row["brakes"] for row in played),
         false_activations=sum(row["false_activations"] for row in played),
         premature=sum(row["premature_brakes"] for row in played),
-        avoided=Rate.of(row["avoided"] for row in played if row["threat"]),
+        avoided=rate_of([row for row in played if row["threat"]], "avoided"),
         contacts=sum(row["collision"] for row in played),
         rear_ended=sum(row["side"] == "rear" for row in played),
         peak=max((row["peak_deceleration"] for row in played), default=0.0),

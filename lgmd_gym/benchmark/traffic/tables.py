@@ -4,6 +4,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.summary import Sample
 from lgmd_gym.benchmark.traffic.summary import TrafficSummary, traffic_summaries
 
 CAPTION = (
@@ -29,7 +30,7 @@ def traffic_table(rows: list[Row], agents: list[str], title: str, by_kind: bool 
         title: Title of the table.
         by_kind: Whether each kind of traffic has its own line.
     """
-    table = Table(title=title, caption=CAPTION, box=SIMPLE_HEAD)
+    table = Table(title=title, caption=f"{Sample.of(rows)}; {CAPTION}", box=SIMPLE_HEAD)
     table.add_column("agent", overflow="fold", min_width=15)
     if by_kind:
         table.add_column("traffic")
