@@ -75,7 +75,8 @@ def approach_slower(
 ) -> Scenario:
     """The ego approaches a slower car from behind (Car-to-Car Rear moving).
 
-    Source: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.2, with a target speed of 20 km/h.
+    Source: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.2, with a target speed of 20 km/h; Euro NCAP Frontal
+    Collisions v1.1, 3.1, also with an ego speed of 90 to 130 km/h and a target that is 60 km/h slower.
 
     Args:
         ego_speed: Ego speed, in (0, 40] [m/s].

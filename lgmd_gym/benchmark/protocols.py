@@ -10,6 +10,8 @@ from typing import Any
 from lgmd_gym.benchmark.case import Case, make_case, speed_cases, to_mps
 
 OVERLAPS = (-50, -75, 100, 75, 50)  # N1 8.2.2: per cent of the ego's width; the sign is the side
+# Ego and target speeds of CCRm in km/h, 2026: a target at 20 up to 80, above it 60 slower than the ego.
+CCRM_SPEEDS_2026 = tuple((speed, max(20, speed - 60)) for speed in range(30, 140, 10))
 LOCATIONS_2026 = (100, 75, 50, 25, 0)  # per cent of the ego's width; the extended range adds 125 and -25
 R152_TARGET = 20  # km/h, UN R152 6.5
 
@@ -34,18 +36,21 @@ def ncap2023() -> tuple[Case, ...]:
 def ncap2026() -> tuple[Case, ...]:
     """Return the rear scenarios of Euro NCAP Crash Avoidance - Frontal Collisions v1.1, 3.1.
 
-    The standard range is covered. An impact location of p per cent places the target's centre (p - 50) per
-    cent of the ego's width from the ego's centreline, + left, as in the OpenSCENARIO files of the protocol;
-    the official calculator does not define the geometry. CCRb: headway 1.0 s, 4 m/s² within 1.0 s. The
-    robustness layer (5.2.1.3) adds, aligned: a rotated target, a car next to the target, night, and for CCRb
-    ±2 m/s² of deceleration and ±0.5 s of headway. Its glare condition is not implemented.
+    The standard range is covered: CCRs 25 AEB and 15 FCW, CCRm 55, CCRb 30. An impact location of p per cent
+    places the target's centre (p - 50) per cent of the ego's width from the ego's centreline, + left, as in
+    the OpenSCENARIO files of the protocol; the official calculator does not define the geometry. CCRb:
+    headway 1.0 s, 4 m/s² within 1.0 s. The robustness layer (5.2.1.3) adds, aligned: a rotated target, a car
+    next to the target, night, and for CCRb ±2 m/s² of deceleration and ±0.5 s of headway. Its glare condition
+    is not implemented.
     """
     suite = "ncap2026"
     rows: list[Case] = []
     for per_cent in LOCATIONS_2026:
         tail, where = f"/location{per_cent}", per_cent / 100
         rows += speed_cases(suite, "CCRs", list(range(10, 60, 10)), tail, impact_location=where)
-        rows += speed_cases(suite, "CCRm", list(range(30, 90, 10)), tail, impact_location=where)
+        for ego, target in CCRM_SPEEDS_2026:
+            speeds = {"target_speed": to_mps(target), "impact_location": where}
+            rows += speed_cases(suite, "CCRm", [ego], tail, **speeds)
         rows += speed_cases(
             suite, "CCRb", list(range(30, 90, 10)), tail, headway=1.0, deceleration=4.0, impact_location=where
         )

@@ -85,7 +85,7 @@ def test_case_counts_match_the_documents():
     assert count("ncap2023", "CCCscp") == 30
     assert count("ncap2026", "CCRs") == 5 * 5 + 8 + 2 + 2
     assert count("ncap2026", "CCRs", fcw=True) == 3 * 5
-    assert count("ncap2026", "CCRm") == 6 * 5 + 2 + 2
+    assert count("ncap2026", "CCRm") == 11 * 5 + 2 + 2
     assert count("ncap2026", "CCRb") == 6 * 5 + 2 + 2 + 4
     assert count("r152", "CCRs") == 4
     assert count("r152", "CCRm") == 2
@@ -116,6 +116,20 @@ def test_ncap2026_impact_locations(per_cent):
     env.reset(seed=0)
     ego, target = env.road.vehicles
     assert ego.position[1] - target.position[1] == pytest.approx((per_cent / 100 - 0.5) * ego.WIDTH)
+
+
+def test_ncap2026_slower_targets_match_the_protocol():
+    """Euro NCAP Frontal Collisions v1.1, 3.1: 30 to 80 km/h behind 20 km/h, then 90/30 to 130/70 km/h."""
+    above = [(90, 30), (100, 40), (110, 50), (120, 60), (130, 70)]
+    expected = [(speed, 20) for speed in range(30, 90, 10)] + above
+    for per_cent in (0, 25, 50, 75, 100):
+        speeds = []
+        for case in SUITES["ncap2026"].cases:
+            if case.family == "CCRm" and case.name.endswith(f"/location{per_cent}"):
+                made = case.scenario
+                speeds.append((round(made.ego_speed / KMH, 4), round(made.actors[0].speed / KMH, 4)))
+                assert case.name == f"ncap2026/CCRm/v{speeds[-1][0]:.0f}/location{per_cent}"
+        assert speeds == expected
 
 
 def test_ncap2026_braking_lead_starts_at_a_headway_of_one_second():
