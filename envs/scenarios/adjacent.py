@@ -11,7 +11,9 @@ from lgmd_gym.envs.scenarios.scenario import (
     LANE_WIDTH,
     START_TTC,
     TARGET_LENGTH,
+    TARGET_TRACK,
     TARGET_WIDTH,
+    TYRE_WIDTH,
     Actor,
     RoadPlan,
     Scenario,
@@ -58,22 +60,40 @@ def pass_standing(
 
 
 @family("PassBetween")
-def pass_between(ego_speed: float = 80 * KMH, inner_gap: float = 4.5, shade: int | None = None) -> Scenario:
+def pass_between(
+    ego_speed: float = 80 * KMH,
+    wheel_gap: float | None = None,
+    inner_gap: float | None = None,
+    shade: int | None = None,
+) -> Scenario:
     """The ego drives between two parked cars with aligned rears; not a threat.
 
-    Source: 49 CFR 571.127 S9.3 at 80 km/h, GB 39901-2025 at 60 km/h.
+    Source: 49 CFR 571.127 S9.3.1 at 80 km/h, with 4.5 m between the closest front wheels of the parked cars;
+    GB 39901-2025 at 60 km/h, with 4.5 m between their inner sides. At most one of both gaps can be given.
 
     Args:
         ego_speed: Ego speed, in (0, 40] [m/s].
+        wheel_gap: Distance between the facing outer sides of the parked cars' closest front tyres, in [2, 10]
+            [m]; 4.5 m without `wheel_gap` and `inner_gap`.
         inner_gap: Distance between the inner sides of the parked cars, in [2, 10] [m].
         shade: Grey level of the parked cars in [0, 255]; None to draw each from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
-    aside = check_within("inner_gap", inner_gap, 2.0, 10.0, "m") / 2 + TARGET_WIDTH / 2
+    aside = _parked_offset(wheel_gap, inner_gap)
     gap = max(START_TTC * speed, 50.0)
     parked = tuple(Actor(gap=gap, lateral_offset=side * aside, shade=shade) for side in (1, -1))
     duration = (gap + TARGET_LENGTH + EGO_LENGTH) / speed + AFTER_PASSING
     return Scenario(family="PassBetween", ego_speed=speed, duration=duration, actors=parked)
+
+
+def _parked_offset(wheel_gap: float | None, inner_gap: float | None) -> float:
+    """Return the distance of each parked car's centreline from the ego's [m]."""
+    if inner_gap is None:
+        between = check_within("wheel_gap", 4.5 if wheel_gap is None else wheel_gap, 2.0, 10.0, "m")
+        return between / 2 + (TARGET_TRACK + TYRE_WIDTH) / 2
+    if wheel_gap is not None:
+        raise ValueError("wheel_gap and inner_gap cannot both be given in PassBetween; remove one")
+    return check_within("inner_gap", inner_gap, 2.0, 10.0, "m") / 2 + TARGET_WIDTH / 2
 
 
 @family("Overtaken")

@@ -19,6 +19,7 @@ from lgmd_gym.errors import (
 EGO_LENGTH, EGO_WIDTH = 4.3, 1.8  # [m]
 # Global Vehicle Target of ISO 19206-3, bounding box of Euro NCAP's OpenSCENARIO catalogue.
 TARGET_LENGTH, TARGET_WIDTH, TARGET_HEIGHT = 4.023, 1.712, 1.427  # [m]
+TARGET_TRACK, TYRE_WIDTH = 1.434, 0.205  # [m]; the track is of that catalogue, the tyre of a common size
 LANE_WIDTH = 3.5  # [m], Euro NCAP AEB C2C v4.3.1, 7.1
 ACTOR_KINDS = ("car", "box", "road_marking")
 ROAD_KINDS = ("straight", "two-way", "curve", "crossing")

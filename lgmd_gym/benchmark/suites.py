@@ -60,7 +60,8 @@ def _false_reaction() -> tuple[Case, ...]:
     return (
         *turns,
         *(make_case(suite, "LaneClosure", f"v40/{side}", left=side == "left") for side in SIDES),
-        *speed_cases(suite, "PassBetween", [60, 80]),
+        *speed_cases(suite, "PassBetween", [60], inner_gap=4.5),  # GB 39901-2025
+        *speed_cases(suite, "PassBetween", [80], wheel_gap=4.5),  # 49 CFR 571.127 S9.3
         *speed_cases(suite, "SteelPlate", [60, 80]),
         *speed_cases(suite, "Overtaken", [50, 80, 110]),
         *speed_cases(suite, "Oncoming", [50, 80]),

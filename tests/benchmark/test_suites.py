@@ -258,12 +258,13 @@ def test_r152_false_reaction_4_lane_closure(side):
     assert distance_ahead(ego, sign) / (40 * KMH) <= 3.3
 
 
-@pytest.mark.parametrize("kmh", [60, 80])
-def test_pass_between_has_a_gap_of_4_5_m(kmh):
+@pytest.mark.parametrize(("kmh", "inset"), [(60, 0.0), (80, (1.712 - 1.434 - 0.205) / 2)])
+def test_pass_between_has_a_gap_of_4_5_m(kmh, inset):
+    """GB 39901-2025 has the gap between the inner sides, 49 CFR 571.127 S9.3 between the front wheels."""
     env = BrakingEnv(find_case(f"false-reaction/PassBetween/v{kmh}").scenario)
     env.reset(seed=0)
     ego, one, other = env.road.vehicles
-    assert abs(one.position[1] - other.position[1]) - one.WIDTH == pytest.approx(4.5)
+    assert abs(one.position[1] - other.position[1]) - one.WIDTH + 2 * inset == pytest.approx(4.5)
     assert one.position[0] == other.position[0]
     assert one.position[1] + other.position[1] == pytest.approx(2 * ego.position[1])
     assert one.position[0] - one.LENGTH / 2 - ego.position[0] - ego.LENGTH / 2 >= 50

@@ -37,7 +37,11 @@ def test_parked_cars_on_both_sides():
     check_actor(right, gap=100.0, lateral_offset=-(2 + 0.856))
     assert (made.ego_speed, made.duration) == (20.0, pytest.approx((100 + 4.023 + 4.3) / 20 + 2))
     assert scenario("PassBetween", ego_speed=5.0).actors[0].gap == 50.0  # at least
-    assert scenario("PassBetween").actors[0].lateral_offset == pytest.approx(2.25 + 0.856)
+    # 49 CFR 571.127 S9.3: 4.5 m between front wheels with a track of 1.434 m and tyres of 0.205 m
+    assert scenario("PassBetween").actors[0].lateral_offset == pytest.approx(2.25 + 0.717 + 0.1025)
+    assert scenario("PassBetween", wheel_gap=4.0).actors[1].lateral_offset == pytest.approx(-2.8195)
+    invalid("PassBetween", "wheel_gap and inner_gap cannot both be given", wheel_gap=4.5, inner_gap=4.5)
+    invalid("PassBetween", "wheel_gap", wheel_gap=1.999)
     for gap in (1.999, 10.001):
         invalid("PassBetween", "inner_gap", inner_gap=gap)
     for gap in (2.0, 10.0):
