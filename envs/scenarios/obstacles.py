@@ -143,7 +143,7 @@ def drive_along_rail(ego_speed: float = 50 * KMH, radius: float = 60.0, left: bo
     # The outside of a left curve is next to the ego's lane; of a right curve, beyond the oncoming lane.
     outside = LANE_WIDTH / 2 + 1.0 + (0.0 if left else LANE_WIDTH)
     path = Path(Pose(0.0, 0.0, 0.0), (Bend(entry), curve))
-    rails = _rail(path, entry - 15.0, entry + curve.length + 15.0, side * outside)
+    rails = rail_along(path, entry - 15.0, entry + curve.length + 15.0, side * outside)
     return Scenario(
         family="CurveGuardRail",
         ego_speed=speed,
@@ -154,18 +154,36 @@ def drive_along_rail(ego_speed: float = 50 * KMH, radius: float = 60.0, left: bo
     )
 
 
-def _rail(path: "Path", start: float, end: float, to_right: float) -> tuple[Actor, ...]:
-    """Return boxes in a row along a path, shifted to its right by `to_right` [m]."""
+def rail_along(
+    path: "Path",
+    start: float,
+    end: float,
+    to_right: float,
+    piece: float = RAIL_PIECE,
+    height: float = RAIL_HEIGHT,
+    depth: float = RAIL_DEPTH,
+) -> tuple[Actor, ...]:
+    """Return boxes in a row along a path.
+
+    Args:
+        path: The path, from the ego's initial centre on.
+        start: Distance along the path at which the row begins [m].
+        end: Distance at which it ends [m].
+        to_right: Distance of the boxes' centre line from the path, + right [m].
+        piece: Length of a box along the path [m].
+        height: Height [m].
+        depth: Width of the boxes [m].
+    """
 
     def shifted(distance: float) -> tuple[float, float]:
         pose = path.pose(distance)
         return pose.x - to_right * sin(pose.heading), pose.y + to_right * cos(pose.heading)
 
     pieces: list[Actor] = []
-    count = int((end - start) / RAIL_PIECE)
+    count = int((end - start) / piece)
     for number in range(count):
-        x0, y0 = shifted(start + number * RAIL_PIECE)
-        x1, y1 = shifted(start + (number + 1) * RAIL_PIECE)
+        x0, y0 = shifted(start + number * piece)
+        x1, y1 = shifted(start + (number + 1) * piece)
         length = hypot(x1 - x0, y1 - y0)
         pieces.append(
             Actor(
@@ -175,8 +193,8 @@ def _rail(path: "Path", start: float, end: float, to_right: float) -> tuple[Acto
                 kind="box",
                 shade=RAIL,
                 length=length,
-                width=RAIL_DEPTH,
-                height=RAIL_HEIGHT,
+                width=depth,
+                height=height,
             )
         )
     return tuple(pieces)

@@ -1,14 +1,26 @@
 """False-reaction scenarios of UN R152 Rev.2, Annex 3 Appendix 2: scripted driving without contact."""
 
-from math import pi
+from math import pi, sqrt
 
-from lgmd_gym.envs.dynamics.bend import Bend, arc, lane_change, turn
+from lgmd_gym.envs.dynamics.bend import Bend, Pose, arc, lane_change, turn
 from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.units import KMH
+from lgmd_gym.envs.scenarios.obstacles import rail_along
 from lgmd_gym.envs.scenarios.registry import family
-from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, LANE_WIDTH, TARGET_LENGTH, Actor, RoadPlan, Scenario
+from lgmd_gym.envs.scenarios.scenario import (
+    EGO_LENGTH,
+    LANE_WIDTH,
+    TARGET_LENGTH,
+    TARGET_WIDTH,
+    Actor,
+    RoadPlan,
+    Scenario,
+)
 from lgmd_gym.errors import check_flag, check_within
 
+OUTER_RADIUS = 25.0  # [m] of the outer side of the road in case 3, the largest allowed
+PIPE_PIECE, PIPE_HEIGHT, PIPE_DEPTH = 2.0, 0.8, 0.11  # [m]
+PIPE_CLEARANCE, CAR_CLEARANCE = 0.25, 0.1  # [m] between lane edge and pipes, and between pipes and car
 APPROACH = 4.0  # [s] at constant speed before the ego or the lead car slows down or steers
 
 
@@ -84,26 +96,39 @@ def lead_turns_off(left: bool = False, shade: int | None = None) -> Scenario:
 
 @family("CurveObjectOutside")
 def curve_with_car_outside(left: bool = True, shade: int | None = None) -> Scenario:
-    """The ego drives through a tight curve past a stationary car on its outside; not a threat.
+    """The ego drives through a tight curve with guard pipes and a stationary car behind them; not a threat.
 
-    The ego slows from 30 to 22.5 km/h before a curve of 25 m radius; at its entry the car is within 1.6 s.
-    Source: UN R152 Rev.2, Annex 3 Appendix 2, case 3.
+    The ego slows from 30 to 22.5 km/h before a curve whose outer side has a radius of 25 m. Guard pipes stand
+    along the outer side, and the car just behind them, on the extension of the lane's centre: within 1.6 s at
+    the entry of the curve. The pipes are drawn as a closed rail. A right curve is the mirror image, for
+    driving on the left; the road drawn is for driving on the right, so the pipes are on its centre line.
+    Source: UN R152 Rev.2, Annex 3 Appendix 2, case 3, with a stationary vehicle.
 
     Args:
         left: Whether the curve turns left; otherwise right.
         shade: Grey level of the stationary car in [0, 255]; None to draw it from the seed.
     """
-    check_flag("left", left)
+    # A module that loads numba; the registration of the scenario families must not.
+    from lgmd_gym.envs.dynamics.path import Path
+
+    side = 1.0 if check_flag("left", left) else -1.0
     approach, slow, slowing = 30 * KMH, 22.5 * KMH, 2.0
     onset = APPROACH * approach + (approach**2 - slow**2) / (2 * slowing) + 1.0
-    curve = arc(25.0, (1.0 if left else -1.0) * pi / 2)
-    aside = -1.1 if left else 1.1
-    standing = Actor(gap=onset - EGO_LENGTH / 2 + 10.0, lateral_offset=aside, shade=shade)
+    radius = OUTER_RADIUS - LANE_WIDTH / 2
+    curve, aside = arc(radius, side * pi / 2), LANE_WIDTH / 2 + PIPE_CLEARANCE + PIPE_DEPTH / 2
+    path = Path(Pose(0.0, 0.0, 0.0), (Bend(onset), curve))
+    pipes = rail_along(
+        path, onset - 10.0, onset + curve.length + 10.0, side * aside, PIPE_PIECE, PIPE_HEIGHT, PIPE_DEPTH
+    )
+    # The car's rear corner on the inside of the curve is the closest to the pipes.
+    behind_pipes = radius + aside + PIPE_DEPTH / 2 + CAR_CLEARANCE
+    ahead = sqrt(behind_pipes**2 - (radius - TARGET_WIDTH / 2) ** 2)
+    standing = Actor(gap=onset - EGO_LENGTH / 2 + ahead, shade=shade)
     return Scenario(
         family="CurveObjectOutside",
         ego_speed=approach,
         duration=APPROACH + (approach - slow) / slowing + (curve.length + 10.0) / slow,
-        actors=(standing,),
+        actors=(standing, *pipes),
         ego_profile=(Segment(start=APPROACH, acceleration=-slowing, final_speed=slow),),
         ego_path=(Bend(onset), curve),
         road=RoadPlan(kind="curve", distance=onset, bends=(curve,)),

@@ -199,6 +199,18 @@ def first(flags):
     return int(np.argmax(flags))
 
 
+def distance_to_curve(scenario, actor, corner=(0, 0)):
+    """Return how far a point of an actor, by default its centre, is outside the arc of the ego's path [m].
+
+    The result is NaN before and after the arc.
+    """
+    straight, curve = scenario.ego_path
+    radius, side = 1 / abs(curve.curvature), np.sign(curve.curvature)
+    ahead = 4.3 / 2 + actor.gap + (1 + corner[0]) * actor.length / 2 - straight.length
+    to_centre = radius - side * (actor.lateral_offset + corner[1] * actor.width / 2)
+    return np.hypot(ahead, to_centre) - radius if ahead > 0 < to_centre else np.nan
+
+
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_r152_false_reaction_1_turn_before_an_oncoming_car(side):
     speed, heading, overlap, ahead, *_ = trajectory(f"false-reaction/TurnBeforeOncoming/{side}").T
@@ -241,6 +253,18 @@ def test_r152_false_reaction_3_car_outside_a_curve(side):
     clear = entry + first(overlap[entry:] == 0)
     assert speed[entry:clear].min() >= 21
     assert 0 < ahead[clear] / (speed[clear] * KMH) <= 1.1
+    made = find_case(f"false-reaction/CurveObjectOutside/{side}").scenario
+    curve = made.ego_path[1]
+    assert 1 / abs(curve.curvature) + 3.5 / 2 == pytest.approx(25.0)  # at the outer side of the road
+    car, *pipes = made.actors
+    assert car.lateral_offset == 0.0  # on the extension of the lane's centre
+    beside = [distance_to_curve(made, pipe) for pipe in pipes]
+    assert sum(np.isfinite(beside)) > 15
+    assert all(
+        2.0 < distance < 2.1 for distance in beside if np.isfinite(distance)
+    )  # the lane ends at 1.75 m
+    corners = [distance_to_curve(made, car, corner) for corner in ((-1, -1), (-1, 1), (1, -1), (1, 1))]
+    assert 2.055 + pipes[0].width / 2 < min(corners) < 2.3  # just outside the pipes
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

@@ -4,7 +4,7 @@ The ego is 4.3 m by 1.8 m, the target car 4.023 m by 1.712 m, a lane is 3.5 m wi
 contact is 5 s after the start.
 """
 
-from math import pi
+from math import pi, sqrt
 
 import pytest
 from support.scenarios import check_actor, invalid, scenario, shape
@@ -61,13 +61,21 @@ def test_lead_car_that_turns_off(left, sign):
 def test_curve_with_a_car_outside(left, sign):
     made = scenario("CurveObjectOutside", left=left)
     onset = 4 * kmh(30) + (kmh(30) ** 2 - kmh(22.5) ** 2) / 4 + 1
-    check_actor(made.actors[0], gap=onset - 2.15 + 10, lateral_offset=-sign * 1.1)
+    # The pipes' outer side is 1.75 + 0.25 + 0.11 m from the ego's path, the car's corner 0.1 m further out.
+    ahead = sqrt((23.25 + 2.11 + 0.1) ** 2 - (23.25 - 0.856) ** 2)
+    check_actor(made.actors[0], gap=onset - 2.15 + ahead)
     curve = made.ego_path[1]
-    assert shape(made.ego_path) == [(onset, 0.0, 0.0), (12.5 * pi, sign / 25, sign / 25)]
+    length = 23.25 * pi / 2
+    assert shape(made.ego_path) == [(onset, 0.0, 0.0), (pytest.approx(length), sign / 23.25, sign / 23.25)]
+    pipes = made.actors[1:]
+    assert len(pipes) == int((length + 20) / 2)
+    assert pipes[0].gap == pytest.approx(onset - 10 - 2.15)
+    assert [pipe.lateral_offset for pipe in pipes[:5]] == pytest.approx([-sign * 2.055] * 5)
+    assert {(pipe.kind, pipe.width, pipe.height) for pipe in pipes} == {("box", 0.11, 0.8)}
     assert (made.road.kind, made.road.distance, made.road.bends) == ("curve", pytest.approx(onset), (curve,))
     (slowing,) = made.ego_profile
     assert (slowing.start, slowing.acceleration, slowing.final_speed) == (4.0, -2.0, kmh(22.5))
-    assert made.duration == pytest.approx(4 + kmh(7.5) / 2 + (12.5 * pi + 10) / kmh(22.5))
+    assert made.duration == pytest.approx(4 + kmh(7.5) / 2 + (length + 10) / kmh(22.5))
     assert made.ego_speed == kmh(30)
 
 
