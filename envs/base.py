@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from numbers import Real
 from typing import Any, ClassVar
 
@@ -38,14 +38,18 @@ _WHOLE = {
     "vehicles_count": (0, 1000),
 }
 _PAIRS = ("centering_position",)
+_BRAKE_KEYS = frozenset(field.name for field in fields(BrakeParams))
 
 
 class EgoBrakeEnv(AbstractEnv):
     """A highway-env environment with a strictly checked configuration and `BrakeParams` for the ego.
 
     Attributes:
-        brake: Response of the ego to demands, from the configuration.
+        brake: Response of the ego to demands in the present episode; that of the configuration unless the
+            episode brings its own.
     """
+
+    _given_brake_keys: frozenset[str] = frozenset()  # fields of `BrakeParams` in the configurations so far
 
     # highway-env writes render_fps into this dict, hence the copy for each instance.
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"]}
@@ -90,13 +94,24 @@ class EgoBrakeEnv(AbstractEnv):
             config[key] = _checked_like(key, value, self.config[key])
         with self._unchanged_if_refused():
             super().configure(config)
-            self.brake = BrakeParams(**{field.name: self.config[field.name] for field in fields(BrakeParams)})
+            self._given_brake_keys |= _BRAKE_KEYS & config.keys()
+            self.brake = self.episode_brake(None)
             simulation, policy = self.config["simulation_frequency"], self.config["policy_frequency"]
             if simulation % policy:
                 raise ValueError(
                     f"policy_frequency {policy} Hz does not divide simulation_frequency {simulation} Hz; "
                     f"choose a divisor, for example {simulation} or {simulation / 2:g} Hz"
                 )
+
+    def episode_brake(self, drawn: BrakeParams | None) -> BrakeParams:
+        """Return the brake of an episode.
+
+        Args:
+            drawn: Brake that the source of episodes has drawn; None for that of the configuration. Keys given
+                in the configuration take precedence over it.
+        """
+        keys = _BRAKE_KEYS if drawn is None else self._given_brake_keys
+        return replace(drawn or BrakeParams(), **{key: self.config[key] for key in keys})
 
     @contextmanager
     def _unchanged_if_refused(self) -> Iterator[None]:

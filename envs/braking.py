@@ -45,6 +45,8 @@ class BrakingEnv(EgoBrakeEnv):
     throttle (only with `config={"throttle": True}`). With
     `config={"action": {"type": "DiscreteDemand", "demands": [0.0, -1.0]}}` the action is an index into
     `demands`. The deceleration builds up after one camera frame of latency and the dead time of the brake.
+    A source of episodes may draw another brake for each episode. Neither the observation nor `info` contains
+    the brake or whether the road is wet.
 
     ## Observation Space
 
@@ -64,8 +66,8 @@ class BrakingEnv(EgoBrakeEnv):
     | impact | `impact` = 10 | − (v_rel / v_script)², with the relative impact speed v_rel |
 
     Here v_script is the highest scripted ego speed, a the deceleration beyond the script, Δa the change of
-    the ego's acceleration, and a_max = `max_deceleration`. A contact costs more than any braking, and
-    standing still earns nothing.
+    the ego's acceleration, and a_max the `max_deceleration` of the episode's brake. A contact costs more than
+    any braking, and standing still earns nothing.
 
     ## Episode End
 
@@ -96,9 +98,10 @@ class BrakingEnv(EgoBrakeEnv):
 
     Args:
         scenario: The scenario, or a source of scenarios.
-        config: highway-env's configuration keys; the fields of `BrakeParams`; `throttle`, whether demands
-            above 0 have an effect (False); `action`, see Action Space; `reward`, fields of `RewardParams`.
-            Defaults of `simulation_frequency` and `policy_frequency`: 60 and 30 Hz.
+        config: highway-env's configuration keys; the fields of `BrakeParams`, which take precedence over a
+            brake that the source draws; `throttle`, whether demands above 0 have an effect (False); `action`,
+            see Action Space; `reward`, fields of `RewardParams`. Defaults of `simulation_frequency` and
+            `policy_frequency`: 60 and 30 Hz.
         render_mode: None, "rgb_array" or "human" (highway-env's top view).
 
     Raises:
@@ -153,8 +156,7 @@ class BrakingEnv(EgoBrakeEnv):
         weights = RewardParams(**reward)
         super().configure(config)
         self.config["reward"], self.weights = reward, weights.record()[None]
-        self._brakes = self.brake.record(self.config["throttle"])[None]
-        self._world = World(1, self.brake.max_demands(self.config["policy_frequency"]))
+        self._world = World(1)
         self._clock, self._outcome = make_clock(1), make_outcome(1)
 
     def define_spaces(self) -> None:
@@ -229,8 +231,10 @@ class BrakingEnv(EgoBrakeEnv):
         placement = draw.placement
         self.scenario, self._episode_info = placement.scenario, draw.info
         self.camera_fields = self.camera_fields | draw.camera_fields
-        self._world.load(0, placement)
-        physics = tuple(make_physics(self._world, self._brakes, self.weights))
+        self.brake = self.episode_brake(draw.brake)
+        brakes = self.brake.record(self.config["throttle"])[None]
+        self._world.load(0, placement, self.brake.max_demands(self.config["policy_frequency"]))
+        physics = tuple(make_physics(self._world, brakes, self.weights))
         self.road = BrakingRoad(draw.make_network(), self.np_random, physics, self._clock.demands)
         self.controlled_vehicles = [self.road.ego]
         start_episodes(0, 1, _SELECTED, physics, tuple(self._clock), tuple(self._outcome))

@@ -9,6 +9,7 @@ from highway_env.road.road import RoadNetwork
 from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.camera.worlds import draw_world
 from lgmd_gym.envs.appearance import Appearance
+from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.scenarios.distribution import (
     LEVELS,
     check_levels,
@@ -28,11 +29,14 @@ class Draw(NamedTuple):
         placement: The scenario, placed on the road.
         camera_fields: Fields of `CameraParams`, `world` among them, and `condition` of the episode.
         info: Additional keys of the episode's info.
+        brake: Brake of the ego in this episode; None for that of the environment's configuration. Keys given
+            in the configuration take precedence.
     """
 
     placement: Placement
     camera_fields: dict[str, Any]
     info: dict[str, Any]
+    brake: BrakeParams | None = None
 
     def make_network(self) -> RoadNetwork:
         """Return the highway-env road network of the episode, with the lane width of its world."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.envs.dynamics.jit import compiled
-from lgmd_gym.errors import check_within
+from lgmd_gym.errors import check_flag, check_whole, check_within
 
 DELAY_LINE = np.dtype(
     [("time", np.float64), ("demand", np.float64), ("last_put", np.float64), ("count", np.int64)]
@@ -78,6 +78,44 @@ class BrakeParams:
         """Return the parameters as a `BRAKE` record of shape ()."""
         values = (self.max_deceleration, self.max_acceleration, self.jerk, self.delay)
         return np.array((*values, self.regain_acceleration, float(throttle)), BRAKE)
+
+
+# Ranges of `draw_brake`.
+DRY_DECELERATION, WET_DECELERATION = (7.5, 9.5), (5.0, 7.0)  # [m/s²]
+DEAD_TIMES, BUILD_UPS = (0.05, 0.25), (0.15, 0.45)  # [s]
+_STREAM = 7  # second part of the seed, which separates the brake from other draws of the same world
+
+
+def draw_brake(world: int, wet: bool) -> BrakeParams:
+    """Return the brake of a world: a pure function of its number and of the state of the road.
+
+    Drawn uniformly: `max_deceleration` in 7.5-9.5 m/s² on a dry and 5-7 m/s² on a wet road, `dead_time` in
+    0.05-0.25 s, `build_up` in 0.15-0.45 s; the other fields keep their defaults. A world has the same dead
+    time and build-up on both roads, and the same place in the range of decelerations.
+
+    The decelerations are those of friction coefficients of 0.76-0.97 and 0.51-0.71. UN R152 Rev.2, Annex 3,
+    tests on a dry road with a peak braking coefficient of at least 0.9; ABS reaches most of it. Wet asphalt
+    has 0.5-0.7. The load of the car is a part of the range: mass does not change the friction limit, but a
+    laden car loses about 5 % of its deceleration. UN R152 5.2.1.4 requires a car to avoid contact up to
+    42 km/h in running order and up to 40 km/h laden; braking from the same time to collision needs a
+    deceleration in proportion to the speed, and 40/42 is 5 % less. The ranges of dead time and build-up
+    surround the 0.1 s and 0.2 s of `BrakeParams`; they are assumptions.
+
+    Args:
+        world: Number of the world, >= 0.
+        wet: Whether the road is wet.
+
+    Raises:
+        ValueError: If the number is negative or not whole, or `wet` is no bool.
+
+    Example:
+        >>> draw_brake(3, wet=False) == draw_brake(3, wet=False)
+        True
+    """
+    rng = np.random.default_rng([check_whole("world", world, 0), _STREAM])
+    deceleration = WET_DECELERATION if check_flag("wet", wet) else DRY_DECELERATION
+    values = [float(rng.uniform(*limits)) for limits in (deceleration, DEAD_TIMES, BUILD_UPS)]
+    return BrakeParams(max_deceleration=values[0], dead_time=values[1], build_up=values[2])
 
 
 @compiled

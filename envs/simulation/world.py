@@ -79,7 +79,6 @@ class World:
 
     Args:
         num: Number of environments N.
-        max_demands: Maximum number of demands in a delay line, see `BrakeParams.max_demands`.
 
     Attributes:
         bodies: `BODY` records, shape (N, bodies).
@@ -93,21 +92,33 @@ class World:
         parts: Scratch memory, see `step_ego`; float64, shape (N, demands + 1, 2).
     """
 
-    def __init__(self, num: int, max_demands: int) -> None:
+    def __init__(self, num: int) -> None:
         self.bodies = np.zeros((num, 1), BODY)
         self.episodes = np.zeros(num, EPISODE)
         self.egos = np.zeros(num, EGO_STATE)
         self.lines = np.zeros(num, DELAY_LINE)
-        self.pending = np.zeros((num, max_demands, 2))
+        self.pending = np.zeros((num, 1, 2))
         self.segments = np.zeros((num, 1, 4))
         self.paths = np.zeros((num, 1, 6))
         self.before = np.zeros((num, 2), STEP_START)
-        self.parts = np.zeros((num, max_demands + 1, 2))
+        self.parts = np.zeros((num, 2, 2))
 
-    def load(self, index: int, placement: Placement) -> bool:
-        """Start an episode in environment `index`; returns whether arrays were replaced by larger ones."""
+    def load(self, index: int, placement: Placement, max_demands: int) -> bool:
+        """Start an episode in an environment.
+
+        Args:
+            index: Index of the environment.
+            placement: The scenario.
+            max_demands: Maximum number of demands in its delay line, see `BrakeParams.max_demands`.
+
+        Returns:
+            Whether arrays were replaced by larger ones.
+        """
         scenario, count = placement.scenario, len(placement.bodies)
-        grown = self._reserve(count, len(placement.segments), len(placement.paths))
+        grown = self._reserve(
+            bodies=count, before=count + 1, segments=len(placement.segments), paths=len(placement.paths),
+            pending=max_demands, parts=max_demands + 1,
+        )  # fmt: skip
         self.bodies[index, :count] = placement.bodies
         self.segments[index, : len(placement.segments)] = placement.segments
         self.paths[index, : len(placement.paths)] = placement.paths
@@ -119,11 +130,10 @@ class World:
         )  # fmt: skip
         return grown
 
-    def _reserve(self, bodies: int, segments: int, cells: int) -> bool:
-        """Enlarge the arrays to at least these numbers of rows."""
+    def _reserve(self, **needed: int) -> bool:
+        """Enlarge the named arrays to at least these numbers of rows; returns whether one was replaced."""
         grown = False
-        needed = (("bodies", bodies), ("before", bodies + 1), ("segments", segments), ("paths", cells))
-        for name, rows in needed:
+        for name, rows in needed.items():
             old = getattr(self, name)
             if old.shape[1] < rows:
                 new = np.zeros((old.shape[0], rows, *old.shape[2:]), old.dtype)

@@ -36,14 +36,14 @@ class SingleSlots:
     """One agent per environment, made anew for every episode.
 
     Args:
-        make: Makes an agent.
+        make: Makes an agent for the environment with a given index.
         views: Observations and infos.
 
     Attributes:
         failures: Tracebacks of the agents that failed in the last `act`, by environment.
     """
 
-    def __init__(self, make: Callable[[], Any], views: Views) -> None:
+    def __init__(self, make: Callable[[int], Any], views: Views) -> None:
         self._make, self._views = make, views
         num_envs = views.num_envs
         self._agents: list[Any] = [None] * num_envs
@@ -53,7 +53,7 @@ class SingleSlots:
 
     def start(self, index: int, seed: int) -> None:
         """Start an episode in environment `index`."""
-        self._agents[index] = self._make()
+        self._agents[index] = self._make(index)
         self._agents[index].reset(seed)
 
     def act(self, active: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

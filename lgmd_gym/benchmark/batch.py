@@ -64,7 +64,7 @@ class BatchPlayer:
         agent = make_agent(task.agent)
         self._sensor_config = task.sensor_config.for_agent(agent)
         source = make_source(task.case.family, _scenario_arguments(arguments))
-        env = BrakingEnv(source, config=arguments.get("config"))
+        self._env = env = BrakingEnv(source, config=arguments.get("config"))
         if BIRDSEYE in make_cameras(self._sensor_config.arguments["camera"]):
             raise ValueError("the engine does not draw top views")
         self._simulation = self._make_simulation(env, arguments.get("fps"), num_envs)
@@ -72,7 +72,7 @@ class BatchPlayer:
         self._recorder = SeriesRecorder(num_envs, self._simulation.rates.policy)
         params = LGMDParams.make(self._sensor_config.params)
         self._views = Views(self._simulation, params, self._sensor_config.include_frame)
-        self._slots = self._make_slots(task, agent, env.config)
+        self._slots = self._make_slots(task, agent)
         self._queue = EpisodeQueue([source] * num_envs, ahead=False)
         self._tasks: list[Task | None] = [None] * num_envs
         self._episodes: list[Prepared | None] = [None] * num_envs
@@ -110,8 +110,10 @@ class BatchPlayer:
             self._queue.sources[index] = make_source(task.case.family, arguments)
             self._queue.seed(index, task.seed)
             prepared = self._queue.next(index)
-            self._simulation.load(index, prepared.draw, prepared.network)
-            self._views.start(index, prepared.draw.info)
+            draw = prepared.draw
+            brake = self._env.episode_brake(draw.brake)
+            self._simulation.load(index, draw, prepared.network, brake)
+            self._views.start(index, draw.info)
             self._slots.start(index, task.seed)
             self._recorder.start(index)
             self._returns[index] = 0.0
@@ -156,24 +158,25 @@ class BatchPlayer:
         rates = Rates(simulation=simulation_frequency, policy=policy, camera=camera)
         params = LGMDParams.make(arguments["params"])
         sensors = SensorArray(arguments["camera"], camera, params, num_envs)
-        simulation = Simulation(num_envs, rates, sensors, env.brake.max_demands(policy))
-        simulation.brakes[:] = env.brake.record(settings["throttle"])
+        simulation = Simulation(num_envs, rates, sensors, settings["throttle"])
         simulation.weights[:] = env.weights
         return simulation
 
-    def _make_slots(self, task: Task, agent: Any, settings: dict[str, Any]) -> BatchSlots | SingleSlots:
-        def with_driver(agent: Any) -> Any:
+    def _make_slots(self, task: Task, agent: Any) -> BatchSlots | SingleSlots:
+        rates, limits = self._simulation.rates, self._simulation.brakes["max_deceleration"]
+
+        def with_driver(agent: Any, envs: slice) -> Any:
             if not task.has_driver:
                 return agent
-            return FCWDriver(agent, settings["max_deceleration"], settings["policy_frequency"])
+            return FCWDriver(agent, lambda: limits[envs], rates.policy)
 
-        rates = self._simulation.rates
-        batch = (
-            with_driver(agent).batch(len(self._simulation.brakes)) if rates.steps == rates.stride else None
-        )
+        every = slice(None)
+        batch = with_driver(agent, every).batch(len(limits)) if rates.steps == rates.stride else None
         if batch is not None:
             return BatchSlots(batch, self._views)
-        return SingleSlots(lambda: with_driver(make_agent(task.agent)), self._views)
+        return SingleSlots(
+            lambda index: with_driver(make_agent(task.agent), slice(index, index + 1)), self._views
+        )
 
 
 _players: dict[Hashable, BatchPlayer] = {}  # at most one, because it is large

@@ -1,6 +1,6 @@
 """The driver model of Euro NCAP's forward collision warning (FCW) tests."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from lgmd_gym.agents.batch import BatchAgent
 
 REACTION = 1.2  # [s] from the alert to braking, Euro NCAP AEB C2C v4.3.1, 8.4.6
 DECELERATION = 4.0  # [m/s²], same section
+Limits = Callable[[], np.ndarray]
 
 
 class FCWDriver:
@@ -17,11 +18,11 @@ class FCWDriver:
 
     Args:
         agent: Agent that raises the alert.
-        max_deceleration: Deceleration of full braking [m/s²].
+        max_deceleration: Returns the deceleration of full braking in the present episodes, shape (N,) [m/s²].
         decision_hz: Decision rate [Hz].
     """
 
-    def __init__(self, agent: Agent, max_deceleration: float, decision_hz: float) -> None:
+    def __init__(self, agent: Agent, max_deceleration: Limits, decision_hz: float) -> None:
         self.agent = agent
         self.name = f"{agent.name} (FCW driver)"
         self._arguments = max_deceleration, decision_hz
@@ -70,8 +71,8 @@ class _FCWDriverBatch(BatchAgent):
 class _Reaction:
     """Reaction of N drivers to alerts."""
 
-    def __init__(self, num_envs: int, max_deceleration: float, decision_hz: float) -> None:
-        self._demand = -DECELERATION / max_deceleration
+    def __init__(self, num_envs: int, max_deceleration: Limits, decision_hz: float) -> None:
+        self._max_deceleration = max_deceleration
         self._delay = round(REACTION * decision_hz)
         self._since_alert = np.full(num_envs, -1)  # decisions; -1 before the first alert
 
@@ -82,4 +83,5 @@ class _Reaction:
         """Process one decision; return the drivers' demands."""
         waiting = self._since_alert < 0
         self._since_alert = np.where(waiting, np.where(alerts, 0, -1), self._since_alert + 1)
-        return np.where(self._since_alert >= self._delay, self._demand, 0.0)
+        limits, braking = self._max_deceleration(), self._since_alert >= self._delay
+        return np.divide(-DECELERATION, limits, out=np.zeros(len(limits)), where=braking)

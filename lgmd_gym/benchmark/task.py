@@ -122,8 +122,10 @@ def _play(task: Task, agent: Any, sensor_config: SensorConfig) -> Episode:
     env = make_env(task.case, sensor_config, task.arguments)
     try:
         if task.has_driver:
-            config = env.unwrapped.config  # type: ignore[attr-defined]
-            agent = FCWDriver(agent, config["max_deceleration"], config["policy_frequency"])
+            base: Any = env.unwrapped
+            agent = FCWDriver(
+                agent, lambda: np.array([base.brake.max_deceleration]), base.config["policy_frequency"]
+            )
         return play(env, agent, task.seed)
     finally:
         env.close()

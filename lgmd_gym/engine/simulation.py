@@ -15,7 +15,7 @@ from lgmd_gym.envs.decisions import (
     start_decisions,
     start_episodes,
 )
-from lgmd_gym.envs.dynamics.brake import BRAKE
+from lgmd_gym.envs.dynamics.brake import BRAKE, BrakeParams
 from lgmd_gym.envs.episode_source import Draw
 from lgmd_gym.envs.reward import REWARD
 from lgmd_gym.envs.scene import SceneArrays
@@ -56,12 +56,12 @@ class Simulation:
         num_envs: Number of environments N.
         rates: Frequencies.
         sensors: Cameras and neurons of the environments; None for physics only.
-        max_demands: Maximum number of demands in a delay line, see `BrakeParams.max_demands`.
+        throttle: Whether demands above 0 have an effect.
         threads: Number of threads that share the environments of a step, including the calling one.
 
     Attributes:
         world: State of the episodes.
-        brakes: `BRAKE` records, shape (N,); set them before the first `load`.
+        brakes: `BRAKE` records of the present episodes, shape (N,).
         weights: `REWARD` records, shape (N,); set them before the first `load`.
         outcome: Results of the last step or start of each environment.
         clock: Progress of the decisions.
@@ -75,11 +75,12 @@ class Simulation:
         num_envs: int,
         rates: Rates,
         sensors: SensorArray | None,
-        max_demands: int,
+        throttle: bool,
         threads: int = 1,
     ) -> None:
         self.num_envs, self.rates, self.sensors = num_envs, rates, sensors
-        self.world = World(num_envs, max_demands)
+        self.world = World(num_envs)
+        self._throttle = throttle
         self.brakes, self.weights = np.zeros(num_envs, BRAKE), np.zeros(num_envs, REWARD)
         self.clock, self.outcome = make_clock(num_envs), make_outcome(num_envs)
         self.on_frames: Callable[[int, int, np.ndarray], None] | None = None
@@ -90,16 +91,18 @@ class Simulation:
         self._link()
         self._threads = Threads(threads)
 
-    def load(self, index: int, draw: Draw, network: Any) -> None:
+    def load(self, index: int, draw: Draw, network: Any, brake: BrakeParams) -> None:
         """Load an episode into environment `index`; `start` begins it.
 
         Args:
             index: Index of the environment.
             draw: The episode.
             network: Its highway-env road network; not used without sensors.
+            brake: Its brake, see `EgoBrakeEnv.episode_brake`.
         """
-        if self.world.load(index, draw.placement):
+        if self.world.load(index, draw.placement, brake.max_demands(self.rates.policy)):
             self._link()
+        self.brakes[index] = brake.record(self._throttle)
         if self.sensors is not None:
             self.sensors.set_camera_fields(index, draw.camera_fields)
             self.sensors.set_road(index, network)

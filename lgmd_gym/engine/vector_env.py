@@ -109,9 +109,7 @@ class BrakingVectorEnv(VectorEnv):
         )
         neuron = LGMDParams.make(params)
         sensors = None if camera is None else make_sensors(camera, rates.camera, neuron, self.num_envs)
-        demands = self._single.brake.max_demands(rates.policy)
-        self.simulation = Simulation(self.num_envs, rates, sensors, demands, threads)
-        self.simulation.brakes[:] = self._single.brake.record(settings["throttle"])
+        self.simulation = Simulation(self.num_envs, rates, sensors, settings["throttle"], threads)
         self.simulation.weights[:] = self._single.weights
         self._queue = EpisodeQueue([source] * self.num_envs, ahead=threads > 1)
         self._episodes: list[Prepared | None] = [None] * self.num_envs
@@ -211,7 +209,8 @@ class BrakingVectorEnv(VectorEnv):
         for index in np.flatnonzero(selected).tolist():
             self._queue.seed(index, None)
             prepared = self._queue.next(index)
-            self.simulation.load(index, prepared.draw, prepared.network)
+            brake = self._single.episode_brake(prepared.draw.brake)
+            self.simulation.load(index, prepared.draw, prepared.network, brake)
             self._episodes[index] = prepared
             self._infos.set_episode(index, prepared.draw.info)
         self.simulation.start(selected)

@@ -5,6 +5,7 @@ import os
 
 import numpy as np
 import pytest
+from support.brakes import draw_all_brakes
 from support.runs import new_run, read_rows, sorted_rows
 
 from lgmd_gym.agents import AGENTS, Agent
@@ -161,6 +162,26 @@ def test_fcw_driver_brakes_in_a_batch(agent):
     driver, rule = (result.series["deceleration"].max() for result in sorted(results, key=_has_no_driver))
     assert driver == pytest.approx(4.0)
     assert rule == pytest.approx(9.0)
+
+
+@pytest.mark.usefixtures("_no_fallback")
+@pytest.mark.parametrize("agent", ["ttc-oracle", "stopping-zone", f"{__name__}:Cautious:limit=1.5"])
+def test_brakes_of_episodes_in_a_batch(monkeypatch, agent):
+    """Results with drawn brakes are equal, and the FCW driver decelerates by 4 m/s² with each of them."""
+    draw_all_brakes(monkeypatch)
+    case = dataclasses.replace(find_case("quick/CCRs/v50"), name="test/CCRs/fcw", fcw_driver=True)
+    tasks = make_tasks(agent, (case, CASES[1]), seeds=(0, 1))
+    results = play_batches(tasks)
+    assert_equal_results(results, list(map(run_task, tasks)))
+    limits = set()
+    for result in results:
+        peak = result.series["deceleration"].max()
+        if result.row["fcw_driver"]:
+            assert peak == pytest.approx(4.0) or (peak < 4.0 and agent != "ttc-oracle")
+        else:
+            limits.add(round(float(peak), 3))
+    assert len(limits) == 2
+    assert 9.0 not in limits
 
 
 def _has_no_driver(result):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.brakes import draw_all_brakes
 from support.vectors import assert_equal_steps, make_pair, random_demands
 
 from lgmd_gym.envs import FAMILIES, env_id
@@ -78,6 +79,18 @@ def test_arguments(case):
     arguments = ARGUMENTS[case]
     rate = arguments.get("config", {}).get("policy_frequency", 30)
     assert compare("CCRs", "SameStep", 2, int(5.3 * rate), hold_or_brake, **arguments, **FAST) >= 3
+
+
+@pytest.mark.parametrize("rate", [10, 30])
+def test_drawn_brakes(monkeypatch, rate):
+    draw_all_brakes(monkeypatch)
+    config = {"policy_frequency": rate, "build_up": 0.3}
+    assert compare("CCRs", "SameStep", 2, 8 * rate, hold_or_brake, 4, config=config, **FAST) >= 6
+
+
+def test_drawn_brakes_of_random_levels(monkeypatch):
+    draw_all_brakes(monkeypatch)
+    assert compare("RandomBraking", "NextStep", 1, 260, camera=None) >= 3
 
 
 def test_discrete_actions():

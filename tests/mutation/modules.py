@@ -32,7 +32,7 @@ MODULES = {
             "units",
             "episode",
         ),
-        _under("tests/envs", *_HAND, "test_path", "test_formulas"),
+        _under("tests/envs", *_HAND, "test_path", "test_formulas", "test_drawn_brake"),
         ("__deepcopy__", "DelayLine", "SpeedProfile", "step_environment"),
     ),
     "contact": Module(
