@@ -8,6 +8,7 @@ import numpy as np
 from lgmd_gym.camera import CLEAR, CONDITIONS
 from lgmd_gym.camera.params import ROADS
 from lgmd_gym.camera.worlds import SPLIT_WORLDS, check_world
+from lgmd_gym.envs.dynamics.brake import BrakeParams, draw_brake
 from lgmd_gym.errors import check_known
 
 MIXED = "mixed"
@@ -63,6 +64,16 @@ def camera_fields(world: int | None, condition: str, road: str | None) -> dict[s
     if road is None:
         road = "still" if world is None else "normal"
     return {"world": world, "condition": condition, "road": road}
+
+
+def brake_of(fields: dict[str, Any]) -> BrakeParams | None:
+    """Return the brake of the world among camera fields; None in the laboratory.
+
+    The road is wet under the condition "rain".
+    """
+    world = fields["world"]
+    wet = bool(CONDITIONS[fields["condition"]].get("wet", False))
+    return None if world is None else draw_brake(world, wet)
 
 
 def world_condition(world: int) -> str:

@@ -8,7 +8,7 @@ from highway_env.road.road import RoadNetwork
 
 from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.camera.worlds import draw_world
-from lgmd_gym.envs.appearance import Appearance
+from lgmd_gym.envs.appearance import Appearance, brake_of
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.scenarios.distribution import (
     LEVELS,
@@ -75,7 +75,7 @@ class FixedScenario:
         """Return the next episode."""
         placement = place(self.first, rng)
         fields = self.appearance.draw(rng)
-        return Draw(placement, fields, {"world": world_number(fields)})
+        return Draw(placement, fields, {"world": world_number(fields)}, brake_of(fields))
 
 
 class RandomLevels:
@@ -123,7 +123,7 @@ class RandomLevels:
         placement = place(draw_scenario(generator), generator)
         fields = draw_camera_fields(self.split, level, self.conditions, self.appearance)
         info = {"level": level, "condition": fields["condition"], "world": world_number(fields)}
-        return Draw(placement, fields, info)
+        return Draw(placement, fields, info, brake_of(fields))
 
 
 def world_number(fields: dict[str, Any]) -> int:

@@ -15,7 +15,6 @@ from lgmd_gym.benchmark.rows import KEYS, Row, RowKey, make_row, new_row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.camera.worlds import LABORATORY
-from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.envs.registration import RANDOM
 
 NO_BRAKE = "no-brake"
@@ -47,17 +46,12 @@ class Task:
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """Arguments of the environment: those of the case, world, road, and a mixed condition."""
-        chosen: dict[str, Any] = {"world": LABORATORY if self.world is None else self.world}
-        if self.road is not None:
-            chosen["road"] = self.road
-        if self.case.family == RANDOM:
-            # A level has a world and a condition of its own.
-            return {name: value for name, value in chosen.items() if value != self.world} | dict(
-                self.case.arguments
-            )
-        if self.condition == MIXED:
-            chosen["condition"] = MIXED
+        """Arguments of the environment: those of the case, and world, road and condition of the run."""
+        chosen: dict[str, Any] = {} if self.road is None else {"road": self.road}
+        if self.world is None:
+            chosen["world"] = LABORATORY
+        elif self.case.family != RANDOM:  # a level has a world and a condition of its own
+            chosen |= {"world": self.world, "condition": self.condition}
         return chosen | dict(self.case.arguments)
 
     @property

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgmd_gym.camera.pose import side_tangent
-from lgmd_gym.camera.render.jit import exact_kernel
+from lgmd_gym.camera.render.jit import exact_kernel, kernel
 from lgmd_gym.camera.scene import Ego
 
 MAX_RANGE = 600.0
@@ -19,7 +19,7 @@ MAX_DRAWN = 512
 """Maximum number of objects in a frame; the first ones of the road's lists are kept."""
 
 MODEL_CAR, MODEL_TRUCK, MODEL_BOX, MODEL_MARK, MODEL_BARRIER, MODEL_RAIL = 0, 1, 2, 3, 4, 5
-MODEL_POST, MODEL_TREE = 6, 7  # flat pictures that face the lens
+MODEL_POST, MODEL_TREE, MODEL_CROWN = 6, 7, 8  # flat pictures that face the lens
 OUTLINE = -1.0
 """Shade of a ground mark that is painted as an outline; other shades fill it."""
 FIRST_INDEXED = -2.0
@@ -29,13 +29,15 @@ OBJECT = np.dtype(
     [
         *((name, np.float64) for name in ("x", "y", "cos", "sin", "length", "width", "height", "shade")),
         *(("braking", np.int64), ("model", np.int64), ("range", np.float64), ("speed", np.float64)),
+        ("base", np.float64),
     ]
 )
-"""An object: centre [m], heading, size [m], grey of the body, brake lights, model, range [m], speed [m/s].
+"""An object: centre [m], heading, size [m], grey of the body, brake lights, model, range [m], speed [m/s],
+height of the underside, 0 for all that stands on the ground [m]; `height` is that of the top.
 
 A vehicle has the model `MODEL_CAR`; `choose_objects` draws large ones as trucks.
 """
-_RECORD = struct.Struct("=8d2q2d")  # packing is twice as fast as assigning a record
+_RECORD = struct.Struct("=8d2q3d")  # packing is twice as fast as assigning a record
 
 BRAKE_LIGHT_MPS2 = -0.5
 """Acceleration below which the brake lights are on [m/s²]."""
@@ -116,8 +118,14 @@ def _write(item: Any, x: float, y: float, place: int, records: memoryview, row: 
     _RECORD.pack_into(
         records, row * _RECORD.size,
         x, y, math.cos(heading), math.sin(heading), item.LENGTH, item.WIDTH, getattr(item, "HEIGHT", height),
-        shade, braking, model, MAX_RANGE, getattr(item, "speed", 0.0),
+        shade, braking, model, MAX_RANGE, getattr(item, "speed", 0.0), 0.0,
     )  # fmt: skip
+
+
+@kernel
+def is_picture(model):
+    """Return whether a model is a flat picture that faces the lens."""
+    return MODEL_POST <= model <= MODEL_CROWN
 
 
 @exact_kernel

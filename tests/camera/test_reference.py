@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from support.reference_camera import worst_error
-from support.roads import add_car, add_mark, add_obstacle, lens_x, straight_env
+from support.reference_camera import separate_boxes, worst_error
+from support.roads import add_car, add_mark, add_obstacle, box_record, lens_x, set_roadside, straight_env
 
 from lgmd_gym.camera import CameraParams
 
@@ -46,4 +46,38 @@ def test_lens_that_points_down_shows_what_is_behind_it():
     add_car(env, x - 4.0, 0.0, 230.0)
     add_mark(env, x - 3.0, 6.5, 200.0)
     params = CameraParams(shape=(60, 20), hfov_deg=100.0, pitch_deg=-60.0, mount_height=5.0, roadside=0.0)
+    assert worst_error(params, env) <= 1.0
+
+
+def cross_traffic(seed):
+    """Return a road with trailers, walls and cars in any direction that do not touch."""
+    rng = np.random.default_rng(seed)
+    env = straight_env(lanes=1, y=0.0)
+    x = lens_x(env)
+    for size in [
+        (16.0, 2.5, 4.0),
+        (50.0, 0.3, 3.0),
+        *3 * [(22.0, 2.5, 3.0), (4.0, 1.8, 1.5), (8.0, 2.5, 3.0)],
+    ]:
+        heading = float(rng.uniform(-3.0, 3.0))
+        add_car(env, x + rng.uniform(3.0, 45.0), rng.uniform(-16.0, 16.0), heading=heading, size=size)
+    return env
+
+
+@pytest.mark.parametrize("seed", [0, 8, 16, 33, 74, 233, 299])
+def test_long_boxes_hide_each_other_as_along_the_rays(seed):
+    env, params = cross_traffic(seed), CameraParams.make({**SMALL, "roadside": 0.0, "vehicles": "box"})
+    separate_boxes(env)
+    assert worst_error(params, env) <= 1.0
+
+
+@pytest.mark.parametrize("ahead", [-3.0, 4.0, 14.0])
+@pytest.mark.parametrize("pitch_deg", [0.0, 25.0])
+def test_bridge_is_above_what_is_below_it(ahead, pitch_deg):
+    env = scene()
+    x = lens_x(env)
+    params = CameraParams.make({**SMALL, "pitch_deg": pitch_deg})
+    deck = box_record(x + ahead, 3.5, (10.0, 30.0, 7.0), base=5.0)
+    wall = box_record(x + 20.0, 14.0, (50.0, 0.3, 3.0))
+    set_roadside(env, params, np.concatenate((deck, wall)))
     assert worst_error(params, env) <= 1.0

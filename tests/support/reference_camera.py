@@ -66,7 +66,9 @@ class ReferenceCamera:
         along, across = dx * item.cos + dy * item.sin, dy * item.cos - dx * item.sin
         inside = abs(along) < 0.5 * item.length and abs(across) < 0.5 * item.width
         solid = item.model != kinds.MODEL_MARK
-        return math.hypot(dx, dy) <= item.range and not (solid and inside and self.lens.z < item.height)
+        return math.hypot(dx, dy) <= item.range and not (
+            solid and inside and item.base <= self.lens.z < item.height
+        )
 
     def _sky(self, rays, row, column):
         """Return the light above the horizon in each pixel, and the contrast of sky, hills and trees."""
@@ -152,6 +154,37 @@ def separate_objects(env, params):
                 kept.append((x, y, size))
 
 
+def separate_boxes(env):
+    """Remove vehicles of a road that touch another, and the ego's place: exact for long boxes."""
+    kept = [_outline(env.vehicle)]
+    for car in [car for car in env.road.vehicles if car is not env.vehicle]:
+        outline = _outline(car)
+        if any(_apart(outline, other) <= 0.1 for other in kept):
+            env.road.vehicles.remove(car)
+        else:
+            kept.append(outline)
+
+
+def _outline(car):
+    """Return the corners of a vehicle, shape (4, 2) [m]."""
+    along, across = np.array([math.cos(car.heading), math.sin(car.heading)]), np.zeros(2)
+    across[:] = -along[1], along[0]
+    signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+    return np.array(
+        [car.position + 0.5 * (a * car.LENGTH * along + b * car.WIDTH * across) for a, b in signs]
+    )
+
+
+def _apart(one, other):
+    """Return the largest gap between two rectangles across one of their sides; below 0 if they overlap."""
+    gaps = []
+    for corners in (one, other):
+        for side in (corners[1] - corners[0], corners[2] - corners[1]):
+            a, b = one @ side, other @ side
+            gaps.append(max(a.min() - b.max(), b.min() - a.max()) / np.linalg.norm(side))
+    return max(gaps)
+
+
 def objects_of(env, p):
     """Return the vehicles and objects of a road as they are drawn, except the ego."""
     return [
@@ -187,6 +220,7 @@ def _appearance(item, place, p):
         braking=(getattr(item, "action", None) or {}).get("acceleration", 0.0) < -0.5,
         model=model,
         range=kinds.MAX_RANGE,
+        base=0.0,
     )
 
 

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 from support.reference_ground import inside
 
-from lgmd_gym.camera.objects import MODEL_MARK, MODEL_POST
+from lgmd_gym.camera.objects import MODEL_MARK, is_picture
 from lgmd_gym.camera.render.coverage import NEAR
 from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
 from lgmd_gym.camera.render.models import all_models
@@ -72,7 +72,7 @@ def _solid(scene, item, solid, rays):
             continue
         grey = _covered_grey(scene, item, models, face, _face_light(scene, item, normal), rays)
         distance = np.full(rays.v.shape, away / lens.focal)
-        if item.model < MODEL_POST:
+        if not is_picture(item.model):
             with np.errstate(divide="ignore"):
                 distance = (normal @ corners[0]) / (rays.direction @ normal)
         covers = covers + rays.mean(covered)
@@ -91,12 +91,12 @@ def _corners(scene, item, models, polygon):
     a, b, c = models.corners[polygon, : models.corners_used[polygon]].T
     lens, cos, sin = scene.lens, item.cos, item.sin
     dx, dy = item.x - lens.x, item.y - lens.y
-    if item.model >= MODEL_POST:
+    if is_picture(item.model):
         away = max(math.hypot(dx, dy), 1e-6)
         cos, sin = dx / away, dy / away
     x = dx + a * item.length * cos - b * item.width * sin
     y = dy + a * item.length * sin + b * item.width * cos
-    return _camera_axes(lens, x, y, c * item.height - lens.z)
+    return _camera_axes(lens, x, y, item.base + c * (item.height - item.base) - lens.z)
 
 
 def _camera_axes(lens, x, y, z):
@@ -138,7 +138,7 @@ def _covered_grey(scene, item, models, face, light, rays):
     Details of a tree protrude from its crown by 1 % of its height, where they change what is behind it.
     """
     away = math.hypot(item.x - scene.lens.x, item.y - scene.lens.y)
-    size = scene.lens.focal * item.height / max(away - 0.5 * item.length, 1.0)
+    size = scene.lens.focal * (item.height - item.base) / max(away - 0.5 * item.length, 1.0)
     greys = {face: _grey(scene, item, models, face, light)}
     out = greys[face] * _covered(scene.lens, _corners(scene, item, models, face), rays)
     for detail in range(face + 1, len(models.parent)):

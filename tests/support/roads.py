@@ -8,6 +8,11 @@ from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Landmark, Obstacle
 
+from lgmd_gym.camera import road_geometry
+from lgmd_gym.camera.objects import MODEL_BOX, OBJECT
+from lgmd_gym.camera.road_pool import road_key
+from lgmd_gym.camera.roadside import PLANT_RANGE
+
 EGO_LENGTH = 4.3
 CAR_SIZE = (4.023, 1.712, 1.427)
 """Length, width and height of the default car [m]."""
@@ -77,3 +82,21 @@ def add_obstacle(env, x, y, shade=None):
 def lens_x(env):
     """World x of the default lens of an ego that heads along +x."""
     return env.vehicle.position[0] + EGO_LENGTH / 2 - 1.7
+
+
+def set_roadside(env, params, roadside):
+    """Set what cameras with these parameters draw along a road: `OBJECT` records, sorted by x."""
+    key = road_key(params)
+    geometry = road_geometry.road_geometry(env.road, *key)
+    order = np.argsort(roadside["x"], kind="stable")
+    road_geometry._CACHE[env.road.network][key] = geometry._replace(roadside=roadside[order])
+
+
+def box_record(x, y, size, heading=0.0, shade=150.0, **fields):
+    """Return an `OBJECT` record of a plain box of length, width and height; other fields by name."""
+    out = np.zeros(1, OBJECT)
+    values = {"model": MODEL_BOX, "range": PLANT_RANGE, "cos": np.cos(heading), "sin": np.sin(heading)}
+    values |= {"x": x, "y": y, "shade": shade, "length": size[0], "width": size[1], "height": size[2]}
+    for name, value in (values | fields).items():
+        out[name] = value
+    return out

@@ -73,6 +73,8 @@ class Buffers(NamedTuple):
         greys: Grey and light of the polygons of all models, float64, shape (polygons, 2).
         order: Indices of the objects in drawing order, int64, shape (512,).
         distances: Distances of the objects from the lens, float64, shape (512,) [m].
+        extents: Middle and half of an object's azimuths [quarter turns] and its least and greatest distance
+            [m] as seen from the lens, float64, shape (512, 4).
     """
 
     image: np.ndarray
@@ -87,6 +89,7 @@ class Buffers(NamedTuple):
     greys: np.ndarray
     order: np.ndarray
     distances: np.ndarray
+    extents: np.ndarray
 
 
 class GroundLayer(NamedTuple):
@@ -124,4 +127,5 @@ def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
         greys=np.zeros((polygons, 2)),
         order=np.zeros(MAX_DRAWN, dtype=np.int64),
         distances=np.zeros(MAX_DRAWN),
+        extents=np.zeros((MAX_DRAWN, 4)),
     )

@@ -18,7 +18,7 @@ _MOST_SHIFT = 8.0  # length of a shadow per height; at lower elevations of the s
 
 
 @kernel
-def add_cast_shadows(layer, view, models, objects, count, roadside):
+def add_cast_shadows(layer, view, objects, count, roadside):
     """Add the cast shadows of the first `count` objects and of the roadside within range.
 
     Marks have none. Boxes and barriers have their soft shadow only.
@@ -28,7 +28,7 @@ def add_cast_shadows(layer, view, models, objects, count, roadside):
     away = (-look.sun_x * stretch, -look.sun_y * stretch)
     for i in range(count):
         if objects[i].model != MODEL_MARK:
-            _add_shadow_of(layer, lens, models, objects[i], away)
+            _add_shadow_of(layer, lens, objects[i], away)
     n = roadside.shape[0]
     low, high = 0, n
     start = lens.x - _FADE_END
@@ -40,12 +40,12 @@ def add_cast_shadows(layer, view, models, objects, count, roadside):
             high = middle
     while low < n and roadside[low].x < lens.x + _FADE_END:
         if roadside[low].model != MODEL_MARK:
-            _add_shadow_of(layer, lens, models, roadside[low], away)
+            _add_shadow_of(layer, lens, roadside[low], away)
         low += 1
 
 
 @kernel
-def _add_shadow_of(layer, lens, models, obj, away):
+def _add_shadow_of(layer, lens, obj, away):
     """Add the shadow of one object; `away` is the shift of a point 1 m above the ground [m]."""
     if obj.model == MODEL_BOX or obj.model == MODEL_BARRIER:
         return
@@ -70,8 +70,7 @@ def _add_shadow_of(layer, lens, models, obj, away):
         n = _box_outline(layer, lens, obj, away, 0.12 * obj.width, 0.0, 0.3 * obj.height)
         _add_outline(layer, lens, n, weight)
         return
-    low = models.overhead[obj.model]
-    n = _box_outline(layer, lens, obj, away, 0.0, low * obj.height, obj.height)
+    n = _box_outline(layer, lens, obj, away, 0.0, obj.base, obj.height)
     _add_outline(layer, lens, n, weight)
 
 

@@ -10,6 +10,7 @@ from lgmd_gym.camera.render.car_model import add_car
 from lgmd_gym.camera.render.model_builder import BODY, ModelBuilder
 from lgmd_gym.camera.render.plain_models import (
     add_barrier,
+    add_crown,
     add_plain_box,
     add_post,
     add_rail,
@@ -33,7 +34,6 @@ class Models(NamedTuple):
             that height, float64, shape (polygons,) [px].
         solids: First and last + 1 polygon of each solid, int64, shape (solids, 2).
         models: First and last + 1 solid of each model, int64, shape (models, 2).
-        overhead: Free height below each model, as a share of its height, float64, shape (models,).
     """
 
     corners: np.ndarray
@@ -44,7 +44,6 @@ class Models(NamedTuple):
     fine: np.ndarray
     solids: np.ndarray
     models: np.ndarray
-    overhead: np.ndarray
 
 
 @lru_cache(maxsize=2)
@@ -63,6 +62,7 @@ def all_models(linear: bool) -> Models:
     add_rail(b)
     add_post(b)
     add_tree(b)
+    add_crown(b)
     corners = np.zeros((len(b.corners), _MAX_CORNERS, 3))
     for index, points in enumerate(b.corners):
         corners[index, : len(points)] = points
@@ -75,7 +75,6 @@ def all_models(linear: bool) -> Models:
         fine=np.array(b.fine, dtype=np.float64),
         solids=np.array(b.solids),
         models=np.array(b.models),
-        overhead=np.zeros(len(b.models)),
     )
 
 

@@ -1,8 +1,9 @@
 """Kernels of visibility: culling and drawing order."""
 
 import math
+from typing import NamedTuple
 
-from lgmd_gym.camera.objects import MODEL_MARK, MODEL_POST, MODEL_RAIL
+from lgmd_gym.camera.objects import MODEL_MARK, is_picture
 from lgmd_gym.camera.pose import side_tangent
 from lgmd_gym.camera.render.jit import kernel
 
@@ -33,7 +34,27 @@ def visible(lens, obj):
     lx = -dx * obj.cos - dy * obj.sin
     ly = dx * obj.sin - dy * obj.cos
     inside = abs(lx) < 0.5 * obj.length and abs(ly) < 0.5 * obj.width
-    return not (inside and lens.z < obj.height)
+    return not (inside and obj.base <= lens.z < obj.height)
+
+
+class Box(NamedTuple):
+    """A rectangle on the ground: centre, heading, size [m]."""
+
+    x: float
+    y: float
+    cos: float
+    sin: float
+    length: float
+    width: float
+
+
+@kernel
+def _footprint(lens, obj, away):
+    """Return the rectangle that an object covers; that of a flat picture is a line across the view."""
+    if not is_picture(obj.model):
+        return Box(obj.x, obj.y, obj.cos, obj.sin, obj.length, obj.width)
+    scale = 1.0 / max(away, 1e-6)
+    return Box(obj.x, obj.y, scale * (obj.x - lens.x), scale * (obj.y - lens.y), 0.0, obj.width)
 
 
 @kernel
@@ -63,29 +84,124 @@ def _separating_side(a, b, px, py):
 
 @kernel
 def _hides(a, b, lens, away_a, away_b):
-    """Return whether box a must be drawn after box b."""
-    rail = a.model == MODEL_RAIL or b.model == MODEL_RAIL
-    if not rail and (a.model >= MODEL_POST or b.model >= MODEL_POST):
-        return away_a < away_b  # thin objects apart from all others
-    side = _separating_side(a, b, lens.x, lens.y)
+    """Return whether object a must be drawn after object b: a plane between them has the lens on a's side."""
+    if a.base > 0.0 and a.base >= b.height:
+        return lens.z > 0.5 * (a.base + b.height)
+    if b.base > 0.0 and b.base >= a.height:
+        return lens.z < 0.5 * (b.base + a.height)
+    if is_picture(a.model) and is_picture(b.model):
+        return away_a < away_b
+    box_a, box_b = _footprint(lens, a, away_a), _footprint(lens, b, away_b)
+    side = _separating_side(box_a, box_b, lens.x, lens.y)
     if side == 0:
-        side = -_separating_side(b, a, lens.x, lens.y)
+        side = -_separating_side(box_b, box_a, lens.x, lens.y)
     if side == 0:
         return away_a < away_b
     return side > 0
 
 
 @kernel
-def order_objects(lens, objects, count, order, distances):
-    """Sort the visible objects from far to near.
+def _turn(x, y):
+    """Return a number from 0 to 4 that grows with the azimuth of a vector; each quarter turn adds 1."""
+    size = abs(x) + abs(y)
+    if size == 0.0:
+        return 0.0
+    return 1.0 - x / size if y >= 0.0 else 3.0 + x / size
 
-    Writes the indices of the visible objects to `order` and the distances of their centres [m] to
-    `distances`; returns the number of visible objects.
+
+@kernel
+def _wrapped(turn):
+    """Return a difference of two turns between -2 and 2."""
+    return turn - 4.0 if turn > 2.0 else turn + 4.0 if turn < -2.0 else turn
+
+
+@kernel
+def _write_extent(lens, obj, away, extent):
+    """Write the middle and the half of an object's azimuths, and bounds of its distance."""
+    box = _footprint(lens, obj, away)
+    dx, dy = box.x - lens.x, box.y - lens.y
+    radius = 0.5 * math.sqrt(box.length * box.length + box.width * box.width)
+    extent[2], extent[3] = away - radius, away + radius
+    along, across = abs(dx * box.cos + dy * box.sin), abs(dy * box.cos - dx * box.sin)
+    if along <= 0.5 * box.length and across <= 0.5 * box.width:
+        extent[0], extent[1] = 0.0, 4.0  # all around the lens
+        return
+    centre, low, high = _turn(dx, dy), 0.0, 0.0
+    for i in range(4):
+        lx = (0.5 if i < 2 else -0.5) * box.length
+        ly = (0.5 if i % 2 == 0 else -0.5) * box.width
+        turn = _turn(dx + lx * box.cos - ly * box.sin, dy + lx * box.sin + ly * box.cos)
+        low, high = min(low, _wrapped(turn - centre)), max(high, _wrapped(turn - centre))
+    # Half a pixel on both sides: objects next to each other share pixels.
+    extent[0], extent[1] = centre + 0.5 * (low + high), 0.5 * (high - low) + 0.5 / lens.focal
+
+
+@kernel
+def _meets_view(one, other):
+    """Return whether the azimuths of two extents overlap, and the first is not entirely beyond the other."""
+    if one[2] > other[3]:
+        return False
+    apart = abs(one[0] - other[0]) % 4.0
+    return min(apart, 4.0 - apart) < one[1] + other[1]
+
+
+@kernel
+def _farther(lens, objects, order, first, n, at, distances, extents):
+    """Return the place, from `first` on, of an object to be drawn before that at place `at`; -1 if none."""
+    i = order[at]
+    for k in range(first, n):
+        j = order[k]
+        if (
+            k != at
+            and _meets_view(extents[i], extents[j])
+            and _hides(objects[i], objects[j], lens, distances[i], distances[j])
+        ):
+            return k
+    return -1
+
+
+@kernel
+def _correct_order(lens, objects, order, n, distances, extents):
+    """Move objects that are drawn too early behind those they hide; the others stay in order.
+
+    Only objects with common azimuths hide each other, so that this order exists unless three or more long
+    objects hide each other in turn.
+    """
+    for i in range(n):
+        j = order[i]
+        _write_extent(lens, objects[j], distances[j], extents[j])
+    for first in range(n - 1):
+        at = first
+        for _ in range(n):
+            behind = _farther(lens, objects, order, first, n, at, distances, extents)
+            if behind < 0:
+                break
+            at = behind
+        moved = order[at]
+        for k in range(at, first, -1):
+            order[k] = order[k - 1]
+        order[first] = moved
+
+
+@kernel
+def order_objects(lens, objects, count, order, distances, extents):
+    """Sort the visible objects from far to near; marks, which lie flat, come last.
+
+    Args:
+        lens: `LENS` record.
+        objects: `OBJECT` records.
+        count: Number of objects.
+        order: Output: indices of the visible objects.
+        distances: Output: distances of their centres [m], by index.
+        extents: Output: see `Buffers`.
+
+    Returns:
+        Number of visible objects.
     """
     n = 0
     # From the end: the roadside comes last, sorted by x, so that driving along x meets the far ones first.
     for i in range(count - 1, -1, -1):
-        if not visible(lens, objects[i]):
+        if objects[i].model == MODEL_MARK or not visible(lens, objects[i]):
             continue
         distances[i] = distance(lens, objects[i])
         k = n
@@ -97,4 +213,10 @@ def order_objects(lens, objects, count, order, distances):
             k -= 1
         order[k] = i
         n += 1
+    # The insertion compares neighbours only, and objects side by side are not in a transitive order.
+    _correct_order(lens, objects, order, n, distances, extents)
+    for i in range(count - 1, -1, -1):
+        if objects[i].model == MODEL_MARK and visible(lens, objects[i]):
+            order[n] = i
+            n += 1
     return n

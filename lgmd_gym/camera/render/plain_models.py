@@ -94,3 +94,15 @@ def add_tree(b: ModelBuilder) -> None:
     ):  # fmt: skip
         b.face(_blob(y, z, r, 0.8 * r, 6), value, BODY, crown)
         b.fine[-1] = 12.0
+
+
+def add_crown(b: ModelBuilder) -> None:
+    """Add the crown of a tree without its trunk."""
+    b.model()
+    b.solid()
+    crown = b.face(_blob(0.0, 0.5, 0.47, 0.47, 8), 0.95)
+    for y, z, r, value in (
+        (-0.2, 0.66, 0.16, 1.35), (0.18, 0.72, 0.13, 1.2), (0.2, 0.36, 0.17, 0.68), (-0.14, 0.26, 0.15, 0.6),
+    ):  # fmt: skip
+        b.face(_blob(y, z, r, r, 6), value, BODY, crown)
+        b.fine[-1] = 12.0

@@ -114,13 +114,13 @@ def draw_light(view, road, tables, models, objects, count, buffers):
     cast_shadows = view.look.cast > 0.0
     vehicles = count
     count = append_roadside(lens, road.roadside, view.look, objects, count)
-    n = order_objects(lens, objects, count, order, buffers.distances)
+    n = order_objects(lens, objects, count, order, buffers.distances, buffers.extents)
     horizon = lens.centre_v + lens.focal * lens.sin_pitch / lens.cos_pitch
     draw_distance(image, view, tables, horizon)
     ground = GroundLayer(buffers.ground, buffers.corners, buffers.uv, buffers.quad)
     add_flats(ground, view, road, objects, order, n)
     if cast_shadows:
-        add_cast_shadows(ground, view, models, objects, vehicles, road.roadside)
+        add_cast_shadows(ground, view, objects, vehicles, road.roadside)
     draw_ground(image, view, buffers.ground, tables, horizon)
     solids = SolidLayer(buffers.solids, buffers.corners, buffers.uv, buffers.axes, buffers.greys)
     draw_solids(image, view, models, objects, order, n, solids)

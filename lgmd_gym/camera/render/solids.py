@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from lgmd_gym.camera.objects import MODEL_CAR, MODEL_POST
+from lgmd_gym.camera.objects import MODEL_CAR, is_picture
 from lgmd_gym.camera.render.car_model import BODY_TOP
 from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_project, sum_differences
 from lgmd_gym.camera.render.jit import kernel
@@ -43,18 +43,17 @@ def _to_axes(lens, x, y, z, out, i):
 
 @kernel
 def place_object(lens, look, obj, axes):
-    """Write an object in camera axes: ground centre, length, width and height [m], direction of the sun."""
+    """Write an object in camera axes: centre of the underside, length, width, height [m]; the sun."""
     c, s = obj.cos, obj.sin
     dx, dy = obj.x - lens.x, obj.y - lens.y
-    if obj.model >= MODEL_POST:
-        # Posts and trees are flat pictures that face the lens.
+    if is_picture(obj.model):
         away = max(math.sqrt(dx * dx + dy * dy), 1e-6)
         c, s = dx / away, dy / away
     # int64, because a kernel is compiled anew for each literal argument.
-    _to_axes(lens, dx, dy, -lens.z, axes, np.int64(0))
+    _to_axes(lens, dx, dy, obj.base - lens.z, axes, np.int64(0))
     _to_axes(lens, c * obj.length, s * obj.length, 0.0, axes, np.int64(1))
     _to_axes(lens, -s * obj.width, c * obj.width, 0.0, axes, np.int64(2))
-    _to_axes(lens, 0.0, 0.0, obj.height, axes, np.int64(3))
+    _to_axes(lens, 0.0, 0.0, obj.height - obj.base, axes, np.int64(3))
     _to_axes(lens, look.sun_x, look.sun_y, look.sun_z, axes, np.int64(4))
 
 
@@ -119,7 +118,7 @@ def draw_object(image, lens, look, obj, models, air, layer):
     if _outside(lens, layer.axes):
         return
     # Apparent height [px], at a distance of 1 m or more.
-    size = lens.focal * obj.height / max(distance(lens, obj) - 0.5 * obj.length, 1.0)
+    size = lens.focal * (obj.height - obj.base) / max(distance(lens, obj) - 0.5 * obj.length, 1.0)
     first, last = models.models[obj.model, 0], models.models[obj.model, 1]
     # From below the top of its body, a car's cabin is behind the body.
     reverse = obj.model == MODEL_CAR and lens.z < BODY_TOP * obj.height
