@@ -8,7 +8,7 @@ from lgmd_gym.camera.body_motion import HEAVE, PITCH, ROLL, YAW, body_motion, ro
 from lgmd_gym.camera.effects import NOISE_LOG2
 from lgmd_gym.camera.params import ROADS, CameraParams
 from lgmd_gym.camera.render.jit import exact_kernel
-from lgmd_gym.camera.worlds import draw_world
+from lgmd_gym.camera.worlds import World, draw_world
 
 MOUNT = np.dtype(
     [
@@ -34,13 +34,18 @@ def mount_of(p: CameraParams) -> np.ndarray:
     height, width = p.shape
     world = draw_world(p.world)
     values = (
-        *(p.mount_setback, p.mount_left, max(p.mount_height + world.mount_height_error, 0.05)),
+        *(p.mount_setback, p.mount_left, height_of(p, world)),
         *(p.yaw_deg + world.yaw_error_deg, p.pitch_deg + world.pitch_error_deg),
         *(ROADS[p.road], p.dive_deg, p.shutter_s),
         *(p.focal_px, 0.5 * width, 0.5 * height, 2.0 if world.drawn else 1.0),
         *(p.gaze == "path", p.shot_noise > 0.0 or p.read_noise > 0.0, p.vehicles == "box", seed_of(p)),
     )
     return np.array(values, dtype=MOUNT)
+
+
+def height_of(p: CameraParams, world: World) -> float:
+    """Return the height of the lens above the ground [m]; an error of the mount does not halve it."""
+    return max(p.mount_height + world.mount_height_error, 0.5 * p.mount_height)
 
 
 def seed_of(p: CameraParams) -> int:

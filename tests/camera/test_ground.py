@@ -56,19 +56,23 @@ def sample(data, level_start, lens, row, width):
 def reference_row(view, tables, coverage, row, behind, part):
     """Return a row of ground as grey levels, float64, shape (width,)."""
     look, width = view.look, len(behind)
-    road, paint, shadow = np.cumsum(coverage[:, row, :width].astype(float), axis=1) / part
-    road, paint, shadow = np.clip(road, 0, 1), np.clip(paint, 0, 1), np.clip(shadow, 0, 0.75)
+    road, paint, shadow, cast = np.cumsum(coverage[:, row, :width].astype(float), axis=1) / part
+    road, paint, cast = np.clip(road, 0, 1), np.clip(paint, 0, 1), np.clip(cast, 0, 1)
+    shadow = np.clip(shadow, 0, look["shadow_limit"])
     grain = look["asphalt_gain"] * sample(tables.asphalt, tables.level_start, view.lens, row, width)
     verge = look["verge_gain"] * sample(tables.verge, tables.level_start, view.lens, row, width)
     grey = road * (look["asphalt"] + grain) + (1 - road) * (look["verge"] + verge)
     grey += paint * (look["paint"] + 0.5 * grain - grey)
-    grey *= 1 - shadow
+    grey *= (1 - shadow) * (1 - look["cast"] * cast)
     v = row + 0.5 - view.lens["centre_v"]
     fall = v * view.lens["cos_pitch"] - view.lens["focal"] * view.lens["sin_pitch"]
     run = view.lens["focal"] * view.lens["cos_pitch"] + v * view.lens["sin_pitch"]
     ahead = view.lens["z"] / fall * run
     if look["night"]:
-        grey *= 0.04 + 1.25 * np.exp(-ahead / 26.0) * view.beam
+        grey *= look["night_light"] + look["beam_gain"] * np.exp(-ahead / 26.0) * view.beam
+    if look["wet"]:
+        grazing = 1.0 - view.lens["z"] / np.hypot(view.lens["z"], ahead)
+        grey += 0.5 * (0.02 + 0.98 * grazing**5) * (look["horizon"] - grey)
     if look["extinction"]:
         grey = look["haze"] + np.exp(-ahead * look["extinction"]) * (grey - look["haze"])
     return behind + part * (grey - behind)
@@ -77,12 +81,25 @@ def reference_row(view, tables, coverage, row, behind, part):
 @pytest.mark.parametrize("yaw", [0.0, 0.3, -2.0])
 @pytest.mark.parametrize(
     ("width", "fields"),
-    [(160, {}), (5, {}), (37, {"light": "night"}), (80, {"light": "night", "visibility_m": 60.0})],
+    [
+        (160, {}),
+        (5, {}),
+        (37, {"light": "night"}),
+        (80, {"light": "night", "visibility_m": 60.0}),
+        (50, {"world": 3}),
+        (80, {"world": 3, "wet": True}),
+    ],
 )
 def test_rows_equal_the_reference(width, fields, yaw):
     p = CameraParams(shape=(40, width), hfov_deg=30.0, **fields)
     view, tables, rng = view_of(p, yaw), tables_of(0), np.random.default_rng(width)
-    summed = rng.uniform([[[0.05]], [[-0.1]], [[-0.1]]], [[[1.2]], [[1.1]], [[0.9]]], (3, 40, width + 2))
+    assert (view.look["cast"] > 0.0) == (p.world is not None and not p.wet)
+    low, high = (
+        [[[value]] for value in values] for values in ((0.05, -0.1, -0.1, -0.1), (1.2, 1.1, 0.9, 1.3))
+    )
+    summed = rng.uniform(low, high, (4, 40, width + 2))
+    if not view.look["cast"]:
+        summed[3] = 0.0
     summed[:, 30] = 0.0  # only verge
     summed[0, 31:33] = 1.0  # only asphalt, and without any marking or shadow
     summed[1:, 32] = 0.0
@@ -100,7 +117,7 @@ def test_rows_equal_the_reference(width, fields, yaw):
 def test_rows_beside_the_row_do_not_change():
     p = CameraParams(shape=(12, 37))
     view, tables = view_of(p, 0.1), tables_of(0)
-    coverage = np.ones((3, 12, 39), np.float32)
+    coverage = np.ones((4, 12, 39), np.float32)
     image = np.full((12, 37), -1.0, np.float32)
     shade_row(image, 8, 1.0, coverage, view, tables)
     others = np.arange(12) != 8
