@@ -61,7 +61,7 @@ class CameraBatch:
             looks=np.zeros(size, LOOK),
             beams=np.zeros((*size, shape[1]), dtype=np.float32),
             skies=np.zeros((*size, *shape), dtype=np.float32),
-            sky_aims=np.full((*size, 2), np.nan),
+            sky_aims=np.full((*size, 3), np.nan),
             noise_starts=np.zeros(size, dtype=np.int64),
         )
         # Index of the tables, camera, mount and lenses of each camera, and the fields of its view.

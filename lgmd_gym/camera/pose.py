@@ -128,13 +128,21 @@ def pose_lens(mount, scene, ago_s, lens):
 
 
 @exact_kernel
+def half_frame(lens):
+    """Return half of the width and height of the upright rectangle around the rolled frame [px]."""
+    c, s = abs(lens.cos_roll), abs(lens.sin_roll)
+    return lens.centre_u * c + lens.centre_v * s, lens.centre_v * c + lens.centre_u * s
+
+
+@exact_kernel
 def side_tangent(lens):
     """Return the tangent of the largest horizontal angle between a point of the frame and the lens's yaw.
 
     It is -1.0 if the frame contains directions straight below or above the lens, or behind it.
     """
-    nearest = lens.focal * lens.cos_pitch - lens.centre_v * abs(lens.sin_pitch)
-    return lens.centre_u / nearest if nearest > 1e-3 * lens.focal else -1.0
+    half_width, half_height = half_frame(lens)
+    nearest = lens.focal * lens.cos_pitch - half_height * abs(lens.sin_pitch)
+    return half_width / nearest if nearest > 1e-3 * lens.focal else -1.0
 
 
 @exact_kernel

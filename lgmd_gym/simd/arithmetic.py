@@ -7,7 +7,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import overload
 
-from lgmd_gym.simd.vectors import FLOATS, LANES, ZEROS, call, integers, intrinsic, shuffle, vector
+from lgmd_gym.simd.vectors import FLOATS, INTS, LANES, ZEROS, call, integers, intrinsic, shuffle, vector
 
 
 def _elementwise(arity, emit, kind=vector, result_kind=None):
@@ -29,6 +29,7 @@ def _abs(builder, x):
 _add = _elementwise(2, lambda b, x, y: b.fadd(x, y))
 _sub = _elementwise(2, lambda b, x, y: b.fsub(x, y))
 _mul = _elementwise(2, lambda b, x, y: b.fmul(x, y))
+_div = _elementwise(2, lambda b, x, y: b.fdiv(x, y))
 # x * y + z, with a single rounding if the machine supports it.
 madd = _elementwise(3, lambda b, x, y, z: call(b, f"llvm.fmuladd.v{LANES}f32", x, y, z))
 # |x|.
@@ -46,6 +47,8 @@ minimum = _elementwise(2, lambda b, x, y: b.select(b.fcmp_ordered("<", x, y), x,
 # y where x > limit, else x.
 replace_above = _elementwise(3, lambda b, x, limit, y: b.select(b.fcmp_ordered(">", x, limit), y, x))
 as_floats = _elementwise(1, lambda b, x: b.sitofp(x, FLOATS), integers, vector)
+# Rounded towards 0; the lanes are within the range of int32.
+as_integers = _elementwise(1, lambda b, x: b.fptosi(x, INTS), vector, integers)
 
 
 @intrinsic
@@ -124,6 +127,7 @@ def _overload_operator(symbol, function, kind=vector) -> None:
 _overload_operator(operator.add, _add)
 _overload_operator(operator.sub, _sub)
 _overload_operator(operator.mul, _mul)
+_overload_operator(operator.truediv, _div)
 _overload_operator(operator.add, _elementwise(2, lambda b, x, y: b.add(x, y), integers), integers)
 _overload_operator(operator.mul, _elementwise(2, lambda b, x, y: b.mul(x, y), integers), integers)
 _overload_operator(operator.and_, _elementwise(2, lambda b, x, y: b.and_(x, y), integers), integers)

@@ -37,3 +37,16 @@ def test_frame_is_the_middle_of_a_larger_frame(hfov_deg, pitch_deg):
         crop, frame = _crop_and_frame(env, hfov_deg, pitch_deg=pitch_deg, roadside=2.0)
         assert np.abs(crop - frame).max() <= 1
         assert frame.std() > 1.0
+
+
+@pytest.mark.parametrize("hfov_deg", [20.0, 40.0])
+def test_frame_of_a_rolling_camera_is_the_middle_of_a_larger_frame(hfov_deg):
+    """The level of the texture, which is left out, follows the middle of the visible part of a row."""
+    rng = np.random.default_rng(5)
+    for env_steps in range(0, 240, 24):
+        env = straight_env(x=0.3, speed=60.0)
+        env.steps = env_steps
+        for k in range(5):
+            add_car(env, 9.0 + 6.0 * k, rng.uniform(-9.0, 13.0), 40 + 40 * k, heading=rng.uniform(-3.0, 3.0))
+        crop, frame = _crop_and_frame(env, hfov_deg, road="rough", seed=1, roadside=2.0, texture=0.0)
+        assert np.mean(np.abs(crop - frame) > 1) < 0.002

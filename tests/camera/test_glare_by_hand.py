@@ -7,6 +7,7 @@ import pytest
 from support.records import lens_of, record
 
 from lgmd_gym.camera.objects import MODEL_CAR, MODEL_TRUCK, OBJECT
+from lgmd_gym.camera.pinhole import project
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
 
 
@@ -43,6 +44,15 @@ def test_lamps_are_at_the_front_corners_of_the_car(heading, model, height, pitch
         row, column = int(v), int(u)
         distances = [hypot(column + 0.5 - a, row + 0.5 - b) for a, b in places]
         assert image[row, column] == pytest.approx(sum(light(d, 6.0, 200.0) for d in distances), rel=1e-4)
+
+
+def test_halos_roll_with_the_lens():
+    lens = lens_of(focal=200.0, pitch=0.05, roll=0.4)
+    image, _ = halos({"x": 32.0, "y": 1.0, "length": 0.0, "width": 0.0}, lens)
+    u, v = project(lens, np.array([32.0, 1.0, 0.9]))
+    rows, columns = np.indices(image.shape) + 0.5
+    assert (image * columns).sum() / image.sum() == pytest.approx(u, abs=0.05)
+    assert (image * rows).sum() / image.sum() == pytest.approx(v, abs=0.05)
 
 
 def single(away, turn=0.0, bearing=0.0, focal=200.0, **options):

@@ -9,6 +9,7 @@ from lgmd_gym.camera.effects import beam_profile, look_of
 from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.render.buffers import Tables, View
 from lgmd_gym.camera.render.ground import shade_row
+from lgmd_gym.camera.render.horizon import Horizon
 from lgmd_gym.camera.render.texture import TEXEL_M, ground_texture
 
 
@@ -16,10 +17,15 @@ def view_of(p, yaw, x=31.7, y=-4.2, pitch=-0.05):
     lens = np.zeros((), LENS)
     lens["x"], lens["y"], lens["z"], lens["yaw"], lens["pitch"] = x, y, 1.2, yaw, pitch
     lens["cos_yaw"], lens["sin_yaw"], lens["focal"] = np.cos(yaw), np.sin(yaw), p.focal_px
+    lens["cos_roll"] = 1.0
     lens["cos_pitch"], lens["sin_pitch"] = np.cos(pitch), np.sin(pitch)
     lens["centre_v"], lens["centre_u"] = 0.5 * np.array(p.shape)
     empty = np.zeros((0, 0), np.float32)
     return View(lens[()], look_of(p)[()], beam_profile(p), empty, np.zeros(2))
+
+
+def level_horizon(row):
+    return Horizon(row, 0.0, row, row)
 
 
 def tables_of(seed):
@@ -108,7 +114,7 @@ def test_rows_equal_the_reference(width, fields, yaw):
     for row in range(20, 40):
         part = 0.3 if row == 20 else 1.0
         expected = reference_row(view, tables, coverage, row, image[row].astype(float), part)
-        shade_row(image, row, part, coverage, view, tables)
+        shade_row(image, row, level_horizon(row + 1.0 - part), coverage, view, tables)
         # The line over the texture is in 16.16 fixed point: 0.5/65536 texel per pixel, at most 0.0012 here.
         assert image[row] == pytest.approx(expected, abs=0.05)
     assert not coverage[:, 20:].any()
@@ -119,7 +125,7 @@ def test_rows_beside_the_row_do_not_change():
     view, tables = view_of(p, 0.1), tables_of(0)
     coverage = np.ones((4, 12, 39), np.float32)
     image = np.full((12, 37), -1.0, np.float32)
-    shade_row(image, 8, 1.0, coverage, view, tables)
+    shade_row(image, 8, level_horizon(8.0), coverage, view, tables)
     others = np.arange(12) != 8
     assert (image[others] == -1.0).all()
     assert (image[8] > 0.0).all()

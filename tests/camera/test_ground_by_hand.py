@@ -1,6 +1,6 @@
 """Distance, texture and markings of the ground: every expected value is computed by hand."""
 
-from math import atan, cos, pi, sin, tan
+from math import atan, cos, hypot, pi, sin, tan
 
 import numpy as np
 import pytest
@@ -10,10 +10,12 @@ from lgmd_gym.camera import CameraParams
 from lgmd_gym.camera.effects import look_of
 from lgmd_gym.camera.render.buffers import GroundLayer
 from lgmd_gym.camera.render.ground import PAINT
+from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.markings import add_lines
 from lgmd_gym.camera.render.texture import TEXEL_M
-from lgmd_gym.camera.render.texture_sampling import distance_ahead, texture_line
+from lgmd_gym.camera.render.texture_sampling import bent_texels, distance_ahead, texture_line
 from lgmd_gym.camera.road_geometry import LINE
+from lgmd_gym.simd import as_floats, store
 
 
 @pytest.mark.parametrize("pitch", [0.0, -0.1, 0.05])
@@ -52,6 +54,41 @@ def test_texture_is_anchored_to_the_ground(yaw, pitch):
     assert line.start == LEVELS[i, j]
     assert 0 <= line.x < period_x
     assert 0 <= line.y < period_y
+
+
+@kernel
+def write_bends(line, bends, lanes):
+    """Write the shifts of 128 pixels of a row, x and y, in 1/65536 texels; `lanes` is scratch memory."""
+    for j in range(0, 128, 16):
+        x, y = bent_texels(line, j)
+        store(lanes, 0, as_floats(x))
+        store(lanes, 16, as_floats(y))
+        for lane in range(16):
+            bends[0, j + lane], bends[1, j + lane] = lanes[lane], lanes[16 + lane]
+
+
+@pytest.mark.parametrize(("roll", "row"), [(0.01, 70), (-0.2, 75), (0.2, 45), (-0.2, 37)])
+def test_texture_of_a_rolling_lens_is_anchored_to_the_ground(roll, row):
+    """Places are exact along the row, also where only a part of it is below the horizon."""
+    lens, checked = lens_of(0.5, 0.02, x=31.7, y=-4.2, roll=roll), 0
+    line, bends = texture_line(lens, row, LEVELS), np.zeros((2, 128), np.float32)
+    write_bends(line, bends, np.zeros(32, np.float32))
+    steps, sizes = (line.dx, line.dy), (line.log_x, line.log_y)
+    for column in range(120):
+        u, v = column + 0.5 - 60, row + 0.5 - 40
+        right, down = u * cos(roll) - v * sin(roll), v * cos(roll) + u * sin(roll)
+        fall = down * cos(0.02) - 100 * sin(0.02)
+        if fall < 1.0:
+            continue
+        ahead, across = (100 * cos(0.02) + down * sin(0.02)) / fall, right / fall
+        place = 31.7 + ahead * cos(0.5) - across * sin(0.5), -4.2 + ahead * sin(0.5) + across * cos(0.5)
+        for axis in range(2):
+            texel = TEXEL_M * (4096, 512)[axis] / 2 ** sizes[axis]
+            found = (line.x, line.y)[axis] + column * steps[axis] + bends[axis, column] / 65536
+            error = (found - place[axis] / texel + 0.5) % 2.0 ** sizes[axis]
+            assert min(error, 2.0 ** sizes[axis] - error) < 2e-3 * hypot(*steps) + 2e-3
+        checked += 1
+    assert checked > 20
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,13 @@
 """Motion blur."""
 
 import numpy as np
+import pytest
+from support.records import lens_of
 from support.roads import add_car, lens_x, straight_env
 
 from lgmd_gym.camera import EgoCamera
+from lgmd_gym.camera.objects import OBJECT
+from lgmd_gym.camera.render.blur import blur_steps, lens_before
 
 
 def test_still_scene_has_no_motion_blur():
@@ -38,3 +42,15 @@ def test_turning_blurs_the_horizon():
     sharp = EgoCamera("fovea").render(env).astype(float)
     blurred = EgoCamera("fovea", shutter_s=0.03).render(env).astype(float)
     assert np.abs(np.diff(blurred[:40], axis=1)).mean() < 0.8 * np.abs(np.diff(sharp[:40], axis=1)).mean()
+
+
+def test_roll_blurs_the_corners():
+    """A roll of 0.1 rad is 7.2 px at the corners of this frame: an image per two pixels."""
+    lens, rolled, none = lens_of(), lens_of(roll=0.1), np.zeros(0, OBJECT)
+    assert blur_steps(lens, lens, 0.01, none, 0) == 1
+    assert blur_steps(rolled, lens, 0.01, none, 0) == 4
+    middle = lens_of()
+    lens_before(rolled, lens, 0.75, middle)
+    assert (middle.roll, middle.cos_roll, middle.sin_roll) == pytest.approx(
+        (0.025, np.cos(0.025), np.sin(0.025))
+    )

@@ -6,10 +6,13 @@ import json
 import numpy as np
 import pytest
 from PIL import Image
+from support.records import lens_of
 from support.roads import straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
-from lgmd_gym.camera.render.panorama import natural_panorama
+from lgmd_gym.camera.pinhole import project
+from lgmd_gym.camera.render.horizon import horizon_of
+from lgmd_gym.camera.render.panorama import draw_panorama, natural_panorama
 
 
 @pytest.fixture
@@ -35,6 +38,23 @@ def test_image_spans_360_degrees_around_the_horizon(image_path, heading):
         u, v = camera.project([*far[:2], 1e6 * np.tan(np.radians(55.5 * 360 / 1024))])
         column = frame[: int(v) + 6, int(u)]
         assert abs(int(np.argmax(column)) + 0.5 - v) < 1.6
+
+
+def test_panorama_rolls_with_the_lens():
+    """The values of these panoramas are the azimuth and the elevation [degrees]."""
+    azimuth, elevation = np.meshgrid(
+        (np.arange(1024) + 0.5) * 360 / 1024, 90 - (np.arange(512) + 0.5) * 360 / 1024
+    )
+    lens = lens_of(0.1, 0.05, roll=0.3, focal=120.0, z=0.0)
+    for table in (azimuth, elevation):
+        image = np.zeros((80, 120), np.float32)
+        draw_panorama(image, lens, table.astype(np.float32), horizon_of(lens))
+        for right, up in ((8.0, 3.0), (15.0, 9.0), (25.0, 3.0)):
+            way, rise = np.radians(right), np.radians(up)
+            point = 1e6 * np.array([np.cos(way), np.sin(way), np.tan(rise)])
+            u, v = project(lens, point)
+            expected = right if table is azimuth else up
+            assert image[int(v), int(u)] == pytest.approx(expected, abs=0.5)
 
 
 def test_panorama_moves_with_the_heading_but_not_with_the_position():

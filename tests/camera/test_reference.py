@@ -5,7 +5,7 @@ import pytest
 from support.reference_camera import separate_boxes, worst_error
 from support.roads import add_car, add_mark, add_obstacle, box_record, lens_x, set_roadside, straight_env
 
-from lgmd_gym.camera import CameraParams
+from lgmd_gym.camera import CameraParams, EgoCamera
 
 SMALL = {"shape": (21, 34), "hfov_deg": 70.0}
 
@@ -38,6 +38,25 @@ def scene(**road):
 def test_light_is_that_of_many_rays(fields):
     params = CameraParams.make({**SMALL, "roadside": 0.0, **fields})
     assert worst_error(params, scene()) <= 1.0
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {},
+        {"pitch_deg": 0.4, "visibility_m": 30.0, "guard_rail": True},  # the horizon crosses rows
+        {"pitch_deg": 20.0, "yaw_deg": 30.0, "light": "night", "vehicles": "box"},
+        {"shape": (31, 140), "hfov_deg": 20.0},
+    ],
+)
+def test_light_of_a_rolling_camera_is_that_of_many_rays(fields):
+    params = CameraParams.make({**SMALL, "roadside": 0.0, "road": "rough", "seed": 1, **fields})
+    env = scene()
+    env.vehicle.speed, env.steps = 60.0, 24
+    camera = EgoCamera(params)
+    camera.render(env)
+    assert camera._lens["roll"] < np.radians(-0.85)
+    assert worst_error(params, env) <= 1.0
 
 
 def test_lens_that_points_down_shows_what_is_behind_it():

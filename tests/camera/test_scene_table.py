@@ -37,7 +37,7 @@ def test_no_object_that_is_left_out_would_be_in_the_frame():
             add_car(env, x, y, heading=rng.uniform(-3.0, 3.0))
         env.vehicle.action = {"steering": rng.uniform(-0.5, 0.5), "acceleration": 0.0}
         for yaw_deg, gaze in ((0.0, "path"), (75.0, "fixed"), (-140.0, "fixed")):
-            camera = EgoCamera(hfov_deg=150.0, yaw_deg=yaw_deg, gaze=gaze, shape=(40, 100))
+            camera = EgoCamera(hfov_deg=150.0, yaw_deg=yaw_deg, gaze=gaze, shape=(40, 100), road="rough")
             frame = camera.render(env)
             camera._stage._view = None  # read all objects
             np.testing.assert_array_equal(camera.render(env), frame)

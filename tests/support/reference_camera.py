@@ -74,22 +74,31 @@ class ReferenceCamera:
         """Return the light above the horizon in each pixel, and the contrast of sky, hills and trees."""
         lens, look = self.lens, self.look
         f, c, s = lens.focal, lens.cos_pitch, lens.sin_pitch
-        horizon = lens.centre_v + f * s / c
-        elevation = np.maximum((horizon - (row + 0.5)) / f, 0.0)
+        _, down = upright(lens, row + 0.5, column + 0.5)
+        elevation = np.maximum((f * s / c - down) / f, 0.0)
+        # The skyline of a lens that rolls is sheared: its azimuth is that of the horizon in the column.
+        tilt = (column + 0.5 - lens.centre_u) * lens.sin_roll
+        right, _ = upright(lens, lens.centre_v + (f * s / c - tilt) / lens.cos_roll, column + 0.5)
         light = look.horizon + (look.zenith - look.horizon) * (1.0 - np.exp(-3.0 * elevation))
         hills, trees, leaves = skyline(self.p.seed)
-        right = column + 0.5 - lens.centre_u
         turn, away = lens.yaw + np.arctan2(right, f * c), np.hypot(f, right)
         leaf = look.trees + look.leaf_gain * _at_angle(leaves, turn)
         above, contrast = rays.fall <= 0.0, 0.0
         for line, grey in ((hills, look.hills), (trees, leaf)):
             tan = _at_angle(line, turn)
-            top = lens.centre_v + f * (s * f - tan * c * away) / (c * f + tan * s * away)
-            depth = np.clip((row - top) / (horizon - top + 1.0), 0.0, 1.0)
-            cover = rays.mean((rays.v > top[:, None]) & above) / np.maximum(rays.mean(above), 1e-9)
+            top = f * (s * f - tan * c * away) / (c * f + tan * s * away)
+            depth = np.clip((down - 0.5 - top) / (f * s / c - top + 1.0), 0.0, 1.0)
+            cover = rays.mean((rays.direction[..., 2] > top[:, None]) & above)
+            cover /= np.maximum(rays.mean(above), 1e-9)
             light = light + cover * (grey * (1.0 - 0.02 * look.leaf_gain * depth) - light)
             contrast = np.where((cover > 0.0) & (cover < 1.0), look.horizon - look.trees, contrast)
         return light, contrast
+
+
+def upright(lens, v, u):
+    """Return image coordinates (right, down) from the centre, as for a lens without roll [px]."""
+    u, v = u - lens.centre_u, v - lens.centre_v
+    return u * lens.cos_roll - v * lens.sin_roll, v * lens.cos_roll + u * lens.sin_roll
 
 
 class Rays:
@@ -108,8 +117,8 @@ class Rays:
         # Steps of the plastic number cover a square evenly, and resolve edges of any direction.
         number = np.arange(side * side)
         self.v = row[:, None] + (0.5 + 0.5698402909980532 * number) % 1.0
-        right = column[:, None] + (0.5 + 0.7548776662466927 * number) % 1.0 - lens.centre_u
-        down = self.v - lens.centre_v
+        right = column[:, None] + (0.5 + 0.7548776662466927 * number) % 1.0
+        right, down = upright(lens, self.v, right)
         self.direction = np.stack((np.full_like(right, lens.focal), right, down), axis=-1)
         self.fall = down * lens.cos_pitch - lens.focal * lens.sin_pitch
         reach = lens.z / np.where(self.fall > 0.0, self.fall, np.inf)

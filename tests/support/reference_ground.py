@@ -95,16 +95,35 @@ def _footprint(x, y, item, centre, grow):
     return ((np.abs(along) <= reach[0]) & (np.abs(across) <= reach[1])).astype(float)
 
 
+def ground_points(lens, v, u):
+    """Return the ground at image points: distance ahead and across [m], slope, metres per direction."""
+    u, v = u - lens.centre_u, v - lens.centre_v
+    right, down = u * lens.cos_roll - v * lens.sin_roll, v * lens.cos_roll + u * lens.sin_roll
+    fall = np.maximum(down * lens.cos_pitch - lens.focal * lens.sin_pitch, 1e-6)
+    reach = lens.z / fall
+    return reach * (lens.focal * lens.cos_pitch + down * lens.sin_pitch), reach * right, fall, reach
+
+
+def middle_column(scene, row):
+    """Return the column coordinate of the middle of the part of each row below the horizon."""
+    columns = np.arange(0.0, scene.p.shape[1] + 0.01, 0.01)
+    lens = scene.lens
+    middles = {}
+    for number in set(row.tolist()):
+        below = columns[ground_points(lens, number + 0.5, columns)[2] > 1e-6]
+        middles[number] = 0.5 * (below[0] + below[-1]) if len(below) else lens.centre_u
+    return np.array([middles[number] for number in row.tolist()])
+
+
 def texture_at(scene, kind, row, column):
     """Return a texture at the middle of pixels, in stored units, at the level of their footprint."""
     lens, texture = scene.lens, ground_texture(kind, scene.p.seed)
-    v, u = row + 0.5 - lens.centre_v, column + 0.5 - lens.centre_u
-    fall = v * lens.cos_pitch - lens.focal * lens.sin_pitch
-    reach = lens.z / np.maximum(fall, 1e-6)
-    forward, long = reach * (lens.focal * lens.cos_pitch + v * lens.sin_pitch), reach * lens.focal
-    x = lens.x + forward * lens.cos_yaw - u * reach * lens.sin_yaw
-    y = lens.y + forward * lens.sin_yaw + u * reach * lens.cos_yaw
-    long = long / np.maximum(fall, 0.3)
+    forward, across, _, _ = ground_points(lens, row + 0.5, column + 0.5)
+    x = lens.x + forward * lens.cos_yaw - across * lens.sin_yaw
+    y = lens.y + forward * lens.sin_yaw + across * lens.cos_yaw
+    # The level is that of the middle of the row, or of its part below the horizon.
+    _, _, fall, reach = ground_points(lens, row + 0.5, middle_column(scene, row))
+    long = reach * lens.focal / np.maximum(fall, 0.3)
     levels = []
     for parts, top in zip(((long, reach), (reach, long)), texture.level_start.shape, strict=True):
         square = (parts[0] * lens.cos_yaw) ** 2 + (parts[1] * lens.sin_yaw) ** 2
@@ -137,9 +156,8 @@ def _bilinear(texture, i, j, x, y):
 def _through_air(scene, grey, row, column):
     """Return greys of the ground under headlights and fog, at the distance of each pixel's row."""
     lens, look = scene.lens, scene.look
-    v, u = row + 0.5 - lens.centre_v, column + 0.5 - lens.centre_u
-    fall = np.maximum(v * lens.cos_pitch - lens.focal * lens.sin_pitch, 1e-6)
-    forward = np.minimum(lens.z / fall * (lens.focal * lens.cos_pitch + v * lens.sin_pitch), 1e5)
+    u = column + 0.5 - lens.centre_u
+    forward = np.minimum(ground_points(lens, row + 0.5, middle_column(scene, row))[0], 1e5)
     if look.night:
         beam = np.exp(-((u / lens.focal / BEAM_WIDTH) ** 2))
         grey = grey * (0.04 + 1.25 * np.exp(-np.maximum(forward, 0.0) / 26.0) * beam)

@@ -28,6 +28,8 @@ def blur_steps(lens, before, shutter_s, objects, count):
     f, reach = lens.focal, 1.3 * lens.centre_u / lens.focal
     way = math.sqrt((lens.x - before.x) ** 2 + (lens.y - before.y) ** 2)
     turn = abs(lens.yaw - before.yaw) + abs(lens.pitch - before.pitch)
+    # Roll moves the corners of the frame most.
+    turn += abs(lens.roll - before.roll) * math.sqrt(lens.centre_u**2 + lens.centre_v**2) / f
     # The ground in the lowest row: a point at the distance Z moves down by f·h·way/Z².
     fall = lens.centre_v * lens.cos_pitch - f * lens.sin_pitch
     lowest = max(lens.z * f / fall, 1.0) if fall > 1e-6 else 1e6
@@ -60,9 +62,11 @@ def lens_before(end, start, ago, out):
     out.z = end.z + ago * (start.z - end.z)
     out.yaw = end.yaw + ago * (start.yaw - end.yaw)
     out.pitch = end.pitch + ago * (start.pitch - end.pitch)
+    out.roll = end.roll + ago * (start.roll - end.roll)
     out.focal, out.centre_u, out.centre_v = end.focal, end.centre_u, end.centre_v
     out.cos_yaw, out.sin_yaw = math.cos(out.yaw), math.sin(out.yaw)
     out.cos_pitch, out.sin_pitch = math.cos(out.pitch), math.sin(out.pitch)
+    out.cos_roll, out.sin_roll = math.cos(out.roll), math.sin(out.roll)
 
 
 @kernel

@@ -15,7 +15,7 @@ class Views(NamedTuple):
         looks: `LOOK` records, shape (cameras,).
         beams: Fall-off of the low beam over the columns, float32, shape (cameras, width).
         skies: The last sky, float32, shape (cameras, height, width).
-        sky_aims: Yaw and pitch of the last sky, float64, shape (cameras, 2).
+        sky_aims: Yaw, pitch and roll of the last sky, float64, shape (cameras, 3).
         noise_starts: Index of the frame's first number in the noise table, int64, shape (cameras,).
     """
 
@@ -75,6 +75,8 @@ class Buffers(NamedTuple):
         distances: Distances of the objects from the lens, float64, shape (512,) [m].
         extents: Middle and half of an object's azimuths [quarter turns] and its least and greatest distance
             [m] as seen from the lens, float64, shape (512, 4).
+        azimuths: Azimuth of the horizon in each column relative to the lens, float64, shape (width,) [rad].
+        outlines: Skyline in each column, see `sky`, float32, shape (5, width).
     """
 
     image: np.ndarray
@@ -90,6 +92,8 @@ class Buffers(NamedTuple):
     order: np.ndarray
     distances: np.ndarray
     extents: np.ndarray
+    azimuths: np.ndarray
+    outlines: np.ndarray
 
 
 class GroundLayer(NamedTuple):
@@ -128,4 +132,6 @@ def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
         order=np.zeros(MAX_DRAWN, dtype=np.int64),
         distances=np.zeros(MAX_DRAWN),
         extents=np.zeros((MAX_DRAWN, 4)),
+        azimuths=np.zeros(width),
+        outlines=np.zeros((5, width), dtype=np.float32),
     )

@@ -11,7 +11,7 @@ import math
 import numba as nb
 
 from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.simd import any_different, load_part, running_sum, splat, splat_last, store_part
+from lgmd_gym.simd import LANES, any_different, load_part, running_sum, splat, splat_last, store_part
 
 NEAR = 0.1
 """Depth of the near plane [m]."""
@@ -56,6 +56,35 @@ def _add_upright(acc, k, x0, y0, x1, y1, w, w2):
 
 
 @kernel
+def _add_run(plane, at, count, step):
+    """Add `step` to `count` differences of a channel from index `at` on."""
+    step = splat(nb.float32(step))
+    for j in range(0, count, LANES):
+        store_part(plane, at + j, count - j, load_part(plane, at + j, count - j) + step)
+
+
+@kernel
+def _add_shallow(acc, k, row, low, high, dy, w, w2):
+    """Add the part of an edge in one row, from column coordinate `low` to `high`, over several columns."""
+    rise = dy / (high - low)
+    first, last = int(low), math.ceil(high) - 1
+    area = 0.5 * rise * (first + 1.0 - low) ** 2
+    _add_cell(acc, k, row, first, w * area, w2 * area)
+    if last > first + 1:
+        step = rise * (first + 1.5 - low) - area
+        _add_cell(acc, k, row, first + 1, w * step, w2 * step)
+        # Further columns to the last one are covered by `rise` more each.
+        at, count = row * acc.shape[2] + first + 2, last - first - 2
+        _add_run(acc[k], at, count, w * rise)
+        if w2 != 0.0:
+            _add_run(acc[k + 1], at, count, w2 * rise)
+        area = rise * (last - 0.5 - low)
+    end = rise * (high - last) * (0.5 * (last + high) - low) + dy * (last + 1.0 - high)
+    _add_cell(acc, k, row, last, w * (end - area), w2 * (end - area))
+    _add_cell(acc, k, row, last + 1, w * (dy - end), w2 * (dy - end))
+
+
+@kernel
 def _add_inside(acc, k, x0, y0, x1, y1, w, w2):
     """Add an edge inside the frame that runs down (y0 < y1)."""
     width = float(acc.shape[2] - 2)
@@ -75,17 +104,7 @@ def _add_inside(acc, k, x0, y0, x1, y1, w, w2):
             _add_cell(acc, k, row, col, w * area, w2 * area)
             _add_cell(acc, k, row, col + 1, w * (dy - area), w2 * (dy - area))
         else:
-            # A shallow edge: coverage rises over several columns.
-            rise = dy / (high - low)
-            before = 0.0
-            while col < high:
-                left = low if low > col else float(col)
-                right = high if high < col + 1.0 else col + 1.0
-                area = rise * (right - left) * (0.5 * (left + right) - low) + dy * (col + 1.0 - right)
-                _add_cell(acc, k, row, col, w * (area - before), w2 * (area - before))
-                before = area
-                col += 1
-            _add_cell(acc, k, row, col, w * (dy - before), w2 * (dy - before))
+            _add_shallow(acc, k, row, low, high, dy, w, w2)
         x, y = x_next, y_next
         row += 1
 

@@ -38,8 +38,9 @@ def add_glare(image, lens, obj, clear, budget):
         if not (facing > 0.0 and depth > 1.0):
             continue
         f = lens.focal
-        u = lens.centre_u + f * (y * lens.cos_yaw - x * lens.sin_yaw) / depth
-        v = lens.centre_v + f * (ahead * lens.sin_pitch - z * lens.cos_pitch) / depth
+        right, down = y * lens.cos_yaw - x * lens.sin_yaw, ahead * lens.sin_pitch - z * lens.cos_pitch
+        u = lens.centre_u + f * (right * lens.cos_roll + down * lens.sin_roll) / depth
+        v = lens.centre_v + f * (down * lens.cos_roll - right * lens.sin_roll) / depth
         near = min(_FULL / away, 1.0)
         radius = max(f * _RADIUS * math.sqrt(near), 1.5)
         radius = min(radius, math.sqrt(max(budget, 0.0) / math.pi), 24.0)

@@ -1,7 +1,9 @@
 """Kernels of the ground: asphalt, verge and everything flat on them.
 
-Without roll, each image row is at one distance ahead: a row of ground is a straight line over the texture
-with one footprint, and the level of the rip-map is chosen once per row.
+A row of the image is a straight line over the texture, also if the lens rolls. Without roll, it is at one
+distance ahead, and its pixels are evenly spaced. The level of the rip-map, the fog and the headlights are
+those of the middle of the part of the row below the horizon; with a roll of 0.5°, they are 0.7 rows off at
+the sides of a frame of 160 columns.
 """
 
 import numba as nb
@@ -9,12 +11,20 @@ import numpy as np
 
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, sum_differences, winding
 from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.camera.render.texture_sampling import distance_ahead, fixed_line, sample, texture_line
+from lgmd_gym.camera.render.texture_sampling import (
+    bent_texels,
+    distance_ahead,
+    fixed_line,
+    sample,
+    texture_line,
+)
 from lgmd_gym.camera.render.weather import row_air, through_air
 from lgmd_gym.simd import (
     LANES,
     any_above,
+    as_floats,
     at_least,
+    lane_numbers,
     load_part,
     madd,
     maximum,
@@ -43,8 +53,12 @@ def add_ground_quad(layer, k, lens, quad, weight):
 
 @kernel
 def add_quad(layer, k, lens, weight):
-    """Add the quad in `layer.corners`, of either winding, to channel k."""
+    """Add the quad in `layer.corners`, given for a lens without roll, of either winding, to channel k."""
     corners, uv = layer.corners, layer.uv
+    c, s = lens.cos_roll, lens.sin_roll
+    for i in range(4):
+        right, down = corners[i, 1], corners[i, 2]
+        corners[i, 1], corners[i, 2] = right * c + down * s, down * c - right * s
     if max(max(corners[0, 0], corners[1, 0]), max(corners[2, 0], corners[3, 0])) < NEAR:
         return
     n = clip_and_project(lens, corners, 4, uv)
@@ -86,13 +100,13 @@ def _ground_light(look, tables, line, x, y, coverages):
 
 
 @kernel
-def shade_row(image, row, part, coverage, view, tables):
+def shade_row(image, row, horizon, coverage, view, tables):
     """Draw one row of the ground layer over a row of the image, and clear its coverage.
 
     Args:
         image: Light, float32, shape (height, width) [grey levels].
-        row: Row of the image, at or below the horizon.
-        part: Share of the row below the horizon.
+        row: Row of the image, at least partly below the horizon.
+        horizon: `Horizon`.
         coverage: Coverage differences, see `Buffers.ground`.
         view: `View`.
         tables: `Tables`.
@@ -102,9 +116,14 @@ def shade_row(image, row, part, coverage, view, tables):
     sunny = view.look.cast > 0.0
     line = texture_line(view.lens, row, tables.level_start)
     x, y, step_x, step_y = fixed_line(line)
+    whole, bent = row >= horizon.bottom, line.bend != 0.0
+    # Share of each pixel below the horizon.
+    below = splat(nb.float32(row + 1.0 - horizon.left - 0.5 * horizon.slope))
+    fall, lanes = splat(nb.float32(-horizon.slope)), as_floats(lane_numbers())
+    zero, one, least = splat(nb.float32(0.0)), splat(nb.float32(1.0)), splat(nb.float32(1e-3))
+    share = inverse = one
     air = row_air(view.look, distance_ahead(view.lens, row), view.lens.z)
-    share, inverse, whole = splat(nb.float32(part)), splat(nb.float32(1.0 / max(part, 1e-3))), part == 1.0
-    sum_road = sum_paint = sum_shadow = sum_cast = cover_cast = splat(nb.float32(0.0))
+    sum_road = sum_paint = sum_shadow = sum_cast = cover_cast = zero
     for j in range(0, width, LANES):
         at, pixel, count = row * stride + j, row * width + j, width - j
         cover_road, sum_road = sum_differences(road, at, count, sum_road)
@@ -114,11 +133,18 @@ def shade_row(image, row, part, coverage, view, tables):
             cover_cast, sum_cast = sum_differences(cast, at, count, sum_cast)
         coverages = (cover_road, cover_paint, cover_shadow, cover_cast)
         if not whole:
-            # As shares of the ground in this row.
+            share = madd(fall, lanes + splat(nb.float32(j)), below)
+            share = minimum(maximum(share, zero), one)
+            # As shares of the ground in these pixels.
+            inverse = one / maximum(share, least)
             coverages = (
                 cover_road * inverse, cover_paint * inverse, cover_shadow * inverse, cover_cast * inverse,
             )  # fmt: skip
-        grey = _ground_light(view.look, tables, line, x, y, coverages)
+        at_x, at_y = x, y
+        if bent:
+            away_x, away_y = bent_texels(line, j)
+            at_x, at_y = x + away_x, y + away_y
+        grey = _ground_light(view.look, tables, line, at_x, at_y, coverages)
         grey = through_air(grey, air, view.beam, j)
         if not whole:
             behind = load_part(image, pixel, count)

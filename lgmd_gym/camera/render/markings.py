@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from lgmd_gym.camera.pose import side_tangent
+from lgmd_gym.camera.pose import half_frame, side_tangent
 from lgmd_gym.camera.render.ground import PAINT, add_quad
 from lgmd_gym.camera.render.jit import kernel
 
@@ -43,7 +43,7 @@ def _visible_part(lens, line, length):
     """
     ahead, across, d_ahead, d_across, width = line
     tan = side_tangent(lens)
-    low = lens.centre_v / lens.focal
+    low = half_frame(lens)[1] / lens.focal
     rise, drop = low * lens.cos_pitch - lens.sin_pitch, lens.z * (lens.cos_pitch + low * lens.sin_pitch)
     a, b = 0.0, length
     for side in range(5 if tan >= 0.0 else 0):

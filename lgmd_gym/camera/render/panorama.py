@@ -95,16 +95,19 @@ def draw_panorama(image, lens, table, horizon):
     """Fill the rows above the horizon from a `panorama_table`."""
     height, width = image.shape
     f, c, s = lens.focal, lens.cos_pitch, lens.sin_pitch
-    rows = int(min(max(math.ceil(horizon), 0.0), height))
+    cr, sr = lens.cos_roll, lens.sin_roll
+    rows = int(min(max(math.ceil(horizon.bottom), 0.0), height))
     high, wide = table.shape
     texels = wide / (2.0 * math.pi)
     for j in range(width):
-        u = j + 0.5 - lens.centre_u
-        turn = math.atan2(u, f * c)
+        right = j + 0.5 - lens.centre_u
+        u, turn = right, math.atan2(right, f * c)
         for i in range(rows):
             v = i + 0.5 - lens.centre_v
+            if sr != 0.0:
+                u, v = right * cr - v * sr, v * cr + right * sr
             ahead = f * c + v * s
-            if s != 0.0:
+            if s != 0.0 or sr != 0.0:
                 turn = math.atan2(u, ahead)
             rise = math.atan2(f * s - v * c, math.sqrt(ahead * ahead + u * u))
             x = (lens.yaw + turn) * texels - 0.5

@@ -10,6 +10,7 @@ from lgmd_gym.camera.render.buffers import Buffers, GroundLayer, SolidLayer, Tab
 from lgmd_gym.camera.render.cast_shadows import add_cast_shadows
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
 from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
+from lgmd_gym.camera.render.horizon import horizon_of
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.markings import add_lines
 from lgmd_gym.camera.render.models import Models
@@ -47,16 +48,16 @@ def append_roadside(lens, roadside, look, objects, count):
 
 
 @kernel
-def draw_distance(image, view, tables, horizon):
+def draw_distance(image, view, tables, horizon, buffers):
     """Draw the sky and skyline, or the panorama; reuse them while the lens does not turn."""
     lens, sky, aim = view.lens, view.sky, view.sky_aim
-    if aim[0] != lens.yaw or aim[1] != lens.pitch:
-        aim[0], aim[1] = lens.yaw, lens.pitch
+    if aim[0] != lens.yaw or aim[1] != lens.pitch or aim[2] != lens.roll:
+        aim[0], aim[1], aim[2] = lens.yaw, lens.pitch, lens.roll
         if tables.panorama.shape[0] > 0:
             draw_panorama(sky, lens, tables.panorama, horizon)
         else:
-            draw_sky(sky, lens, tables.skyline, view.look, horizon)
-    for i in range(int(min(max(math.ceil(horizon), 0.0), image.shape[0]))):
+            draw_sky(sky, lens, tables.skyline, view.look, horizon, buffers)
+    for i in range(int(min(max(math.ceil(horizon.bottom), 0.0), image.shape[0]))):
         for j in range(image.shape[1]):
             image[i, j] = sky[i, j]
 
@@ -76,15 +77,18 @@ def add_flats(layer, view, road, objects, order, n):
 def draw_ground(image, view, coverage, tables, horizon):
     """Draw the ground layer over asphalt and verge, below the horizon."""
     height = image.shape[0]
-    start = int(min(max(math.floor(horizon), 0.0), float(height)))
+    start = int(min(max(math.floor(horizon.top), 0.0), float(height)))
     if view.look.paved > 0.0:
         for i in range(start, height):
             coverage[ROAD, i, 0] = 1.0
     if start > 0:
         # Rounding may put the far end of a road into the row above the horizon.
         coverage[:, start - 1] = 0.0
+    if horizon.slope != 0.0:
+        # Edges left of the frame may be higher than its horizon; they cancel up to rounding.
+        coverage[:, :start, 0] = 0.0
     for i in range(start, height):
-        shade_row(image, i, min(1.0, i + 1.0 - horizon), coverage, view, tables)
+        shade_row(image, i, horizon, coverage, view, tables)
 
 
 @kernel
@@ -115,8 +119,8 @@ def draw_light(view, road, tables, models, objects, count, buffers):
     vehicles = count
     count = append_roadside(lens, road.roadside, view.look, objects, count)
     n = order_objects(lens, objects, count, order, buffers.distances, buffers.extents)
-    horizon = lens.centre_v + lens.focal * lens.sin_pitch / lens.cos_pitch
-    draw_distance(image, view, tables, horizon)
+    horizon = horizon_of(lens)
+    draw_distance(image, view, tables, horizon, buffers)
     ground = GroundLayer(buffers.ground, buffers.corners, buffers.uv, buffers.quad)
     add_flats(ground, view, road, objects, order, n)
     if cast_shadows:

@@ -35,10 +35,11 @@ class Air(NamedTuple):
 @kernel
 def _to_axes(lens, x, y, z, out, i):
     """Write a world vector as (depth, right, down) to row i of `out`."""
-    ahead = x * lens.cos_yaw + y * lens.sin_yaw
+    ahead, right = x * lens.cos_yaw + y * lens.sin_yaw, y * lens.cos_yaw - x * lens.sin_yaw
+    down = ahead * lens.sin_pitch - z * lens.cos_pitch
     out[i, 0] = ahead * lens.cos_pitch + z * lens.sin_pitch
-    out[i, 1] = y * lens.cos_yaw - x * lens.sin_yaw
-    out[i, 2] = ahead * lens.sin_pitch - z * lens.cos_pitch
+    out[i, 1] = right * lens.cos_roll + down * lens.sin_roll
+    out[i, 2] = down * lens.cos_roll - right * lens.sin_roll
 
 
 @kernel

@@ -7,7 +7,7 @@ import numba as nb
 
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.texture import TEXEL_M
-from lgmd_gym.simd import as_floats, gather_words, lane_numbers, madd, splat
+from lgmd_gym.simd import as_floats, as_integers, gather_words, lane_numbers, madd, maximum, minimum, splat
 
 
 class TextureLine(NamedTuple):
@@ -21,6 +21,8 @@ class TextureLine(NamedTuple):
         dy: Texels per pixel along y.
         log_x: log2 of the level's size along x.
         log_y: log2 of the level's size along y.
+        bend: Change of the scale along the line due to roll, as a share per pixel; 0 for even spacing.
+        middle: Column coordinate where `dx` and `dy` hold [px].
     """
 
     start: int
@@ -30,14 +32,40 @@ class TextureLine(NamedTuple):
     dy: float
     log_x: int
     log_y: int
+    bend: float
+    middle: float
+
+
+@kernel
+def _ground_point(lens, row):
+    """Return the middle of the part of an image row that is below the horizon.
+
+    Returns:
+        Its column relative to the middle of the frame [px]; its fall, the slope towards the ground, scaled,
+            at least 1e-6; its distance ahead and across [m]; the metres per unit of its direction.
+    """
+    f, c, s = lens.focal, lens.cos_pitch, lens.sin_pitch
+    v = row + 0.5 - lens.centre_v
+    u, down, right = 0.0, v, 0.0
+    if lens.sin_roll != 0.0:
+        tilt = lens.sin_roll * c
+        level = v * lens.cos_roll * c - f * s  # fall in the middle
+        if level < abs(tilt) * lens.centre_u:
+            side = math.copysign(lens.centre_u, tilt)
+            u = min(max(0.5 * (side - level / tilt), -lens.centre_u), lens.centre_u)
+        down, right = v * lens.cos_roll + u * lens.sin_roll, u * lens.cos_roll - v * lens.sin_roll
+    fall = max(down * c - f * s, 1e-6)
+    reach = lens.z / fall
+    return u, fall, reach * (f * c + down * s), reach * right, reach
 
 
 @kernel
 def distance_ahead(lens, row):
-    """Return the distance of the ground at the middle of an image row, at most 100 km [m]."""
-    v = row + 0.5 - lens.centre_v
-    fall = max(v * lens.cos_pitch - lens.focal * lens.sin_pitch, 1e-6)
-    return min(lens.z / fall * (lens.focal * lens.cos_pitch + v * lens.sin_pitch), 1e5)
+    """Return the distance of the ground at the middle of an image row, at most 100 km [m].
+
+    If the lens rolls, it is the middle of the part of the row that is below the horizon.
+    """
+    return min(_ground_point(lens, row)[2], 1e5)
 
 
 @kernel
@@ -54,11 +82,12 @@ def _level(square, top):
 @kernel
 def texture_line(lens, row, level_start):
     """Return the `TextureLine` of an image row below the horizon; see `Texture.level_start`."""
-    v = row + 0.5 - lens.centre_v
-    fall = v * lens.cos_pitch - lens.focal * lens.sin_pitch
-    reach = lens.z / max(fall, 1e-6)
-    ahead = reach * (lens.focal * lens.cos_pitch + v * lens.sin_pitch)
+    u, fall, ahead, across, reach = _ground_point(lens, row)
     c, s = lens.cos_yaw, lens.sin_yaw
+    # Metres ahead and across per pixel; the perspective changes them along the row if the lens rolls.
+    bend = lens.sin_roll * lens.cos_pitch / fall
+    d_ahead = lens.sin_roll * lens.sin_pitch * reach - bend * ahead
+    d_across = lens.cos_roll * reach - bend * across
     along = lens.focal * reach / max(fall, 0.3)
     # The pixel's footprint along the axes of the texture.
     wide_x = ((along * c) ** 2 + (reach * s) ** 2) * (1.0 / TEXEL_M**2)
@@ -67,12 +96,14 @@ def texture_line(lens, row, level_start):
     i, j = _level(wide_x, top_x), _level(wide_y, top_y)
     log_x, log_y = top_x - i, top_y - j
     scale_x, scale_y = 1.0 / (TEXEL_M * (1 << i)), 1.0 / (TEXEL_M * (1 << j))
-    left = (0.5 - lens.centre_u) * reach
-    x = (lens.x + ahead * c - left * s) * scale_x - 0.5
-    y = (lens.y + ahead * s + left * c) * scale_y - 0.5
+    first = 0.5 - lens.centre_u - u
+    ahead, across = ahead + first * d_ahead, across + first * d_across
+    x = (lens.x + ahead * c - across * s) * scale_x - 0.5
+    y = (lens.y + ahead * s + across * c) * scale_y - 0.5
     x -= math.floor(x / (1 << log_x)) * (1 << log_x)
     y -= math.floor(y / (1 << log_y)) * (1 << log_y)
-    return TextureLine(level_start[i, j], x, y, -s * reach * scale_x, c * reach * scale_y, log_x, log_y)
+    dx, dy = (d_ahead * c - d_across * s) * scale_x, (d_ahead * s + d_across * c) * scale_y
+    return TextureLine(level_start[i, j], x, y, dx, dy, log_x, log_y, bend, lens.centre_u + u)
 
 
 @kernel
@@ -89,6 +120,26 @@ def fixed_line(line):
     x = splat(_fixed(line.x, 0.0)) + lanes * splat(step_x)
     y = splat(_fixed(line.y, 0.0)) + lanes * splat(step_y)
     return x, y, splat(nb.int32(16) * step_x), splat(nb.int32(16) * step_y)
+
+
+@kernel
+def bent_texels(line, column):
+    """Return the texels (x, y) from even spacing to the places of sixteen pixels, from a column, 16.16.
+
+    The pixel at t columns from `line.middle` is at t / (1 + bend·t) times the steps there.
+    """
+    t = as_floats(lane_numbers()) + splat(nb.float32(column + 0.5 - line.middle))
+    bend, least = splat(nb.float32(line.bend)), splat(nb.float32(1e-3))  # 0 is the horizon
+    late = splat(nb.float32(-line.bend)) * t * t / maximum(madd(bend, t, splat(nb.float32(1.0))), least)
+    return _to_fixed(late, line.dx), _to_fixed(late, line.dy)
+
+
+@kernel
+def _to_fixed(columns, step):
+    """Return `step` [texels per column] times columns, in 16.16 fixed point and within the range of int32."""
+    limit = nb.float32(2.0e9)
+    texels = columns * splat(nb.float32(65536.0 * step))
+    return as_integers(minimum(maximum(texels, splat(-limit)), splat(limit)))
 
 
 @kernel
