@@ -20,6 +20,7 @@ MAX_DRAWN = 512
 
 MODEL_CAR, MODEL_TRUCK, MODEL_BOX, MODEL_MARK, MODEL_BARRIER, MODEL_RAIL = 0, 1, 2, 3, 4, 5
 MODEL_POST, MODEL_TREE, MODEL_CROWN = 6, 7, 8  # flat pictures that face the lens
+MODEL_SMALL, MODEL_SUV, MODEL_VAN, MODEL_TRAILER, MODEL_BUS = 9, 10, 11, 12, 13
 OUTLINE = -1.0
 """Shade of a ground mark that is painted as an outline; other shades fill it."""
 FIRST_INDEXED = -2.0
@@ -44,6 +45,38 @@ BRAKE_LIGHT_MPS2 = -0.5
 _MOUNT_REACH = 100.0  # upper bound of the distance between a lens and the ego's centre [m]
 _TALL_M, _LONG_M, _TRUCK_HEIGHT_M = 2.2, 7.5, 2.8  # a taller or longer car is drawn as a truck
 _MODELS: dict[type, tuple[int, float]] = {}
+
+
+class Body(NamedTuple):
+    """A body that a vehicle may have.
+
+    Attributes:
+        model: Its model.
+        lowest: Lower end of its usual heights [m].
+        highest: Upper end [m].
+    """
+
+    model: int
+    lowest: float
+    highest: float
+
+
+BODY_MODELS = {
+    "small": Body(MODEL_SMALL, 1.44, 1.56),
+    "saloon": Body(MODEL_CAR, 1.40, 1.50),
+    "suv": Body(MODEL_SUV, 1.62, 1.82),
+    "van": Body(MODEL_VAN, 2.20, 2.80),
+    "truck": Body(MODEL_TRUCK, 2.80, 3.80),
+    "trailer": Body(MODEL_TRAILER, 3.85, 4.00),
+    "bus": Body(MODEL_BUS, 2.95, 3.40),
+}
+"""Bodies of vehicles by name, see `body_of`."""
+_HEIGHTS = np.zeros((MODEL_BUS + 1, 2))
+for _body in BODY_MODELS.values():
+    _HEIGHTS[_body.model] = _body.lowest, _body.highest
+_DEFAULT_HEIGHTS = (1.5, 1.427)  # of highway-env's vehicles, and of the target car of the scenarios [m]
+_BODY_LONG_M, _BODY_WIDE_M, _TRAILER_LONG_M = 5.0, 2.3, 10.0
+_HASH_MASK, _HASH_FACTOR = 0xFFFFFFFF, 0x045D9F3B
 
 
 class View(NamedTuple):
@@ -185,3 +218,45 @@ def index_shade(seed, index):
     """Return the grey of the index-th vehicle: 30 to 225, evenly spread, the same in every process."""
     # Golden-ratio steps: neighbours in the list differ, and any few cover dark to light.
     return 30.0 + 195.0 * ((0.29 + 0.6180339887498949 * index + 0.7548776662466927 * seed) % 1.0)
+
+
+@exact_kernel
+def _share(world, index, draw):
+    """Return a number from 0 to 1 that is drawn by hashing three integers, the same in every process."""
+    mixed = 0
+    for number in (world, index, draw):
+        mixed = ((mixed ^ (number & _HASH_MASK)) * _HASH_FACTOR + 1) & _HASH_MASK
+        mixed = ((mixed ^ (mixed >> 16)) * _HASH_FACTOR) & _HASH_MASK
+        mixed ^= mixed >> 16
+    return mixed / 4294967296.0
+
+
+@exact_kernel
+def body_of(world, index, length, width, height):
+    """Return the model and the height [m] of the index-th vehicle of a world.
+
+    Cars are small cars, saloons or SUVs. From 5 m they are vans; from 7.5 m, or wider than 2.3 m, they are
+    trucks, buses and, from 10 m, articulated trucks. A vehicle of the default height (1.5 m, 1.427 m) gets a
+    usual one of its body.
+
+    Args:
+        world: Integer that draws the appearance of an episode.
+        index: Place of the vehicle in the road's list.
+        length: Length of the vehicle [m].
+        width: Width of the vehicle [m].
+        height: Height of the vehicle [m].
+    """
+    kind = _share(world, index, 0)
+    if length >= _LONG_M or (length >= _BODY_LONG_M and width > _BODY_WIDE_M):
+        if length >= _TRAILER_LONG_M and kind < 0.5:
+            model = MODEL_TRAILER
+        else:
+            model = MODEL_BUS if kind > 0.75 else MODEL_TRUCK
+    elif length >= _BODY_LONG_M:
+        model = MODEL_VAN
+    else:
+        model = MODEL_SMALL if kind < 0.3 else MODEL_SUV if kind > 0.7 else MODEL_CAR
+    if height in _DEFAULT_HEIGHTS:
+        low, high = _HEIGHTS[model, 0], _HEIGHTS[model, 1]
+        height = low + (high - low) * _share(world, index, 1)
+    return model, height

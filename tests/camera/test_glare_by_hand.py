@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from support.records import lens_of, record
 
-from lgmd_gym.camera.objects import MODEL_CAR, MODEL_TRUCK, OBJECT
+from lgmd_gym.camera.objects import BODY_MODELS, MODEL_CAR, MODEL_TRUCK, OBJECT
 from lgmd_gym.camera.pinhole import project
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
+from lgmd_gym.camera.render.models import all_models
 
 
 def halos(obj, lens=None, clear=1.0, budget=1e9, shape=(80, 120)):
@@ -18,7 +19,8 @@ def halos(obj, lens=None, clear=1.0, budget=1e9, shape=(80, 120)):
     heading = obj.get("heading", pi)
     obj = {name: value for name, value in obj.items() if name != "heading"}
     obj = record(OBJECT, **(size | {"cos": cos(heading), "sin": sin(heading)} | obj))
-    return image, float(add_glare(image, lens or lens_of(focal=200.0), obj, clear, budget))
+    lamps = all_models(linear=False).lamps[obj.model]
+    return image, float(add_glare(image, lens or lens_of(focal=200.0), obj, lamps, clear, budget))
 
 
 def light(distance, radius, peak):
@@ -100,9 +102,10 @@ def test_lamps_shine_forwards(turn, share, side, bearing):
 
 
 def test_which_objects_have_glare():
-    for model in range(12):
+    vehicles = {body.model for body in BODY_MODELS.values()}
+    for model in range(len(all_models(linear=False).models)):
         image, _ = halos({"x": 20.0, "model": model})
-        assert image.any() == (model in (MODEL_CAR, MODEL_TRUCK))
+        assert image.any() == (model in vehicles)
     assert not halos({"x": 20.0, "heading": 0.0})[0].any()
     assert not halos({"x": -20.0, "heading": 0.0})[0].any()  # behind
     assert not halos({"x": 20.0}, budget=0.0)[0].any()

@@ -99,7 +99,7 @@ def _car_cabin(b: ModelBuilder, faces: list[int]) -> None:
 
 def add_car(b: ModelBuilder) -> None:
     """Add a passenger car."""
-    b.model()
+    b.model(split=BODY_TOP, lamps=(0.375, 0.45))
     b.solid()
     rear, front, left, right, top = b.box(0.0, BODY_TOP, (-0.5, 0.5, 0.5), (-0.5, 0.5, 0.5))
     _car_rear(b, rear)

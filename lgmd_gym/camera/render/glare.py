@@ -4,7 +4,6 @@ import math
 
 import numba as nb
 
-from lgmd_gym.camera.objects import MODEL_CAR, MODEL_TRUCK
 from lgmd_gym.camera.render.jit import kernel
 
 BUDGET_PX = 3000.0
@@ -12,21 +11,21 @@ BUDGET_PX = 3000.0
 _RADIUS = 0.03  # radius of a halo, 1.7°, from scatter in the lens [rad]
 _PEAK = 200.0  # grey added at the centre by a lamp nearer than _FULL
 _FULL = 50.0  # [m]
-_LAMP_AT = 0.375  # distance of a lamp from the middle, as a share of the width
 
 
 @kernel
-def add_glare(image, lens, obj, clear, budget):
+def add_glare(image, lens, obj, lamps, clear, budget):
     """Add the halos of an object's headlights that face the lens.
 
-    `clear` is the transmission of the air times the opacity of the object, and `budget` the remaining area
-    for halos [px]. Returns the budget after these halos.
+    `lamps` is the row of `Models.lamps` of the object's model, `clear` the transmission of the air times the
+    opacity of the object, and `budget` the remaining area for halos [px]. Returns the budget after these
+    halos.
     """
-    if not (obj.model == MODEL_CAR or obj.model == MODEL_TRUCK) or budget <= 0.0:
+    if lamps[1] == 0.0 or budget <= 0.0:
         return budget
     c, s = obj.cos, obj.sin
-    up = (0.45 if obj.model == MODEL_CAR else 0.22) * obj.height
-    for side in (-_LAMP_AT, _LAMP_AT):
+    up = lamps[1] * obj.height
+    for side in (-lamps[0], lamps[0]):
         x = obj.x + 0.5 * obj.length * c - side * obj.width * s - lens.x
         y = obj.y + 0.5 * obj.length * s + side * obj.width * c - lens.y
         away = math.sqrt(x * x + y * y)

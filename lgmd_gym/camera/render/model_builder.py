@@ -26,10 +26,19 @@ class ModelBuilder:
         self.fine: list[float] = []
         self.solids: list[list[int]] = []
         self.models: list[list[int]] = []
+        self.splits: list[float] = []
+        self.lamps: list[tuple[float, float]] = []
 
-    def model(self) -> None:
-        """Start a model."""
+    def model(self, split: float = 0.0, lamps: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Start a model.
+
+        Args:
+            split: Height at which the second solid begins; from below it, the solids are drawn in reverse.
+            lamps: Distance of the headlights from the middle and their height; (0, 0) for none.
+        """
         self.models.append([len(self.solids), len(self.solids)])
+        self.splits.append(split)
+        self.lamps.append(lamps)
 
     def solid(self) -> None:
         """Start a solid of the current model."""

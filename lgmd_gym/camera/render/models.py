@@ -6,7 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from lgmd_gym.camera.effects import WHITE
+from lgmd_gym.camera.render.body_models import SMALL, SUV, VAN, add_body
 from lgmd_gym.camera.render.car_model import add_car
+from lgmd_gym.camera.render.long_models import add_bus, add_trailer
 from lgmd_gym.camera.render.model_builder import BODY, ModelBuilder
 from lgmd_gym.camera.render.plain_models import (
     add_barrier,
@@ -34,6 +36,10 @@ class Models(NamedTuple):
             that height, float64, shape (polygons,) [px].
         solids: First and last + 1 polygon of each solid, int64, shape (solids, 2).
         models: First and last + 1 solid of each model, int64, shape (models, 2).
+        splits: Height from below which the solids of a model are drawn in reverse, as a share of its height,
+            float64, shape (models,).
+        lamps: Distance of a model's headlights from its middle as a share of its width, and their height as
+            a share of its height, 0 for none, float64, shape (models, 2).
     """
 
     corners: np.ndarray
@@ -44,6 +50,8 @@ class Models(NamedTuple):
     fine: np.ndarray
     solids: np.ndarray
     models: np.ndarray
+    splits: np.ndarray
+    lamps: np.ndarray
 
 
 @lru_cache(maxsize=2)
@@ -63,6 +71,10 @@ def all_models(linear: bool) -> Models:
     add_post(b)
     add_tree(b)
     add_crown(b)
+    for shape in (SMALL, SUV, VAN):
+        add_body(b, shape)
+    add_trailer(b)
+    add_bus(b)
     corners = np.zeros((len(b.corners), _MAX_CORNERS, 3))
     for index, points in enumerate(b.corners):
         corners[index, : len(points)] = points
@@ -75,6 +87,8 @@ def all_models(linear: bool) -> Models:
         fine=np.array(b.fine, dtype=np.float64),
         solids=np.array(b.solids),
         models=np.array(b.models),
+        splits=np.array(b.splits),
+        lamps=np.array(b.lamps),
     )
 
 

@@ -7,7 +7,7 @@ from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, ModelBuilder,
 
 def add_truck(b: ModelBuilder) -> None:
     """Add a truck."""
-    b.model()
+    b.model(lamps=(0.375, 0.22))
     b.solid()
     rear, front, left, right, _ = b.box(0.0, 1.0, (-0.5, 0.5, 0.5), (-0.5, 0.5, 0.5))
     gap = b.rect(rear, (0.0, 1.0), (0.0, 0.20), 14.0)

@@ -108,7 +108,7 @@ def draw_solids(image, view, models, objects, order, n, layer):
         clear = math.exp(-away * look.extinction) if look.extinction > 0.0 else 1.0
         draw_object(image, lens, look, obj, models, Air(light, clear, opacity), layer)
         if look.night > 0.0:
-            budget = add_glare(image, lens, obj, clear * opacity, budget)
+            budget = add_glare(image, lens, obj, models.lamps[obj.model], clear * opacity, budget)
 
 
 @kernel

@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from lgmd_gym.camera.objects import MODEL_CAR, is_picture
-from lgmd_gym.camera.render.car_model import BODY_TOP
+from lgmd_gym.camera.objects import is_picture
 from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_project, sum_differences
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
@@ -44,7 +43,7 @@ def _to_axes(lens, x, y, z, out, i):
 
 @kernel
 def place_object(lens, look, obj, axes):
-    """Write an object in camera axes: centre of the underside, length, width, height [m]; the sun."""
+    """Write an object in camera axes: centre of its underside, its size [m], direction of the sun."""
     c, s = obj.cos, obj.sin
     dx, dy = obj.x - lens.x, obj.y - lens.y
     if is_picture(obj.model):
@@ -122,7 +121,7 @@ def draw_object(image, lens, look, obj, models, air, layer):
     size = lens.focal * (obj.height - obj.base) / max(distance(lens, obj) - 0.5 * obj.length, 1.0)
     first, last = models.models[obj.model, 0], models.models[obj.model, 1]
     # From below the top of its body, a car's cabin is behind the body.
-    reverse = obj.model == MODEL_CAR and lens.z < BODY_TOP * obj.height
+    reverse = lens.z < models.splits[obj.model] * obj.height
     for k in range(last - first):
         solid = last - 1 - k if reverse else first + k
         u0, v0, u1, v1 = _add_solid(layer, lens, look, obj, models, solid, size, air)
