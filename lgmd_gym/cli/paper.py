@@ -20,6 +20,13 @@ from lgmd_gym.video.clips.playback import PLAYBACK_CONFIGS
 
 def run(options: Paper) -> int:
     """Run the paper's experiments and print its claims; return 2 if a clip is truncated, else 0."""
+    if options.realism:
+        from lgmd_gym.cli import realism
+
+        return realism.run(options)
+    for name in ("clip_hfov_deg", "ignore_bottom", "night", "seeds"):
+        if getattr(options, name) != getattr(Paper, name):
+            raise ValueError(f"--{name.replace('_', '-')} requires --realism")
     if (options.clips is None) != (options.crashes is None):
         raise ValueError(
             "--clips and --crashes must be used together: a folder, and a CSV with clip,crash_frame"
