@@ -75,7 +75,7 @@ _HEIGHTS = np.zeros((MODEL_BUS + 1, 2))
 for _body in BODY_MODELS.values():
     _HEIGHTS[_body.model] = _body.lowest, _body.highest
 _DEFAULT_HEIGHTS = (1.5, 1.427)  # of highway-env's vehicles, and of the target car of the scenarios [m]
-_BODY_LONG_M, _BODY_WIDE_M, _TRAILER_LONG_M = 5.0, 2.3, 10.0
+_BODY_LONG_M, _BODY_WIDE_M, _TRAILER_LONG_M = 5.2, 2.3, 10.0
 _HASH_MASK, _HASH_FACTOR = 0xFFFFFFFF, 0x045D9F3B
 
 
@@ -185,6 +185,10 @@ def choose_objects(lens, mount, objects, count, chosen):
         if obj.model == MODEL_CAR:
             if mount.box != 0:
                 obj.model = MODEL_BOX
+            elif mount.code_power == 2.0:
+                # The shade tells vehicles apart in every list of the visible ones.
+                index = int(16.0 * obj.shade)
+                obj.model, obj.height = body_of(mount.seed, index, obj.length, obj.width, obj.height)
             elif obj.height > _TALL_M or obj.length > _LONG_M:
                 obj.model, obj.height = MODEL_TRUCK, max(obj.height, _TRUCK_HEIGHT_M)
         if obj.shade <= FIRST_INDEXED:
@@ -235,7 +239,7 @@ def _share(world, index, draw):
 def body_of(world, index, length, width, height):
     """Return the model and the height [m] of the index-th vehicle of a world.
 
-    Cars are small cars, saloons or SUVs. From 5 m they are vans; from 7.5 m, or wider than 2.3 m, they are
+    Cars are small cars, saloons or SUVs. From 5.2 m they are vans; from 7.5 m, or wider than 2.3 m, they are
     trucks, buses and, from 10 m, articulated trucks. A vehicle of the default height (1.5 m, 1.427 m) gets a
     usual one of its body.
 

@@ -19,9 +19,9 @@ SHOWN = [name for name, body in BODY_MODELS.items() if body.model not in (MODEL_
 @pytest.mark.parametrize(
     ("length", "width", "names"),
     [
-        (4.99, 1.8, CARS),
-        (4.99, 2.4, CARS),
-        (5.0, 2.3, {"van"}),
+        (5.19, 1.8, CARS),
+        (5.19, 2.4, CARS),
+        (5.2, 2.3, {"van"}),
         (7.49, 2.0, {"van"}),
         (7.49, 2.31, {"truck", "bus"}),
         (7.5, 2.0, {"truck", "bus"}),
