@@ -22,6 +22,7 @@ LINE = np.dtype([(name, np.float64) for name in ("x0", "y0", "x1", "y1", "start"
 
 _LANE_STEP = 2.0
 _MAX_PIECES = 2000
+_MAX_KNOWN = 16  # geometries of a network that are remembered
 _BAY_LENGTH = 20.0  # a network whose longest lane is no longer than this is a car park [m]
 
 
@@ -64,6 +65,8 @@ def road_geometry(road: Any, roadside: float = 0.0, seed: int = 0, rail: bool = 
     except TypeError:  # not hashable or without weak references: no cache
         return _extract(_lanes(network), *key)
     if key not in known:
+        if len(known) >= _MAX_KNOWN:  # each world has a roadside of its own
+            known.clear()
         known[key] = _extract(_lanes(network), *key)
     return known[key]
 
