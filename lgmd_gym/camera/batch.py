@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.camera.effects import LOOK, beam_profile, look_of, texture_gains
+from lgmd_gym.camera.effects import LOOK, beam_profile, in_world, look_of, texture_gains
 from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.pose import MOUNT, mount_of
@@ -22,11 +22,13 @@ class _Prepared(NamedTuple):
     look: np.ndarray
     beam: np.ndarray
     tables_key: tuple[Any, ...]
+    params: CameraParams
 
 
 @lru_cache(maxsize=512)
 def _prepare(p: CameraParams) -> _Prepared:
-    return _Prepared(mount_of(p), look_of(p), beam_profile(p), tables_key(p))
+    p = in_world(p)
+    return _Prepared(mount_of(p), look_of(p), beam_profile(p), tables_key(p), p)
 
 
 class CameraBatch:
@@ -63,6 +65,7 @@ class CameraBatch:
             skies=np.zeros((*size, *shape), dtype=np.float32),
             sky_aims=np.full((*size, 3), np.nan),
             noise_starts=np.zeros(size, dtype=np.int64),
+            exposures=np.full((*size, 3), np.nan),
         )
         # Index of the tables, camera, mount and lenses of each camera, and the fields of its view.
         self._bundle = Bundle(
@@ -90,11 +93,12 @@ class CameraBatch:
         self._views.looks[index, member] = prepared.look
         self._views.beams[index, member] = prepared.beam
         self._views.sky_aims[index, member] = np.nan  # redraw the sky
+        self._views.exposures[index, member] = np.nan  # adapt to the next frame
         if texture is not None:
-            for name, gain in texture_gains(p, texture).items():
+            for name, gain in texture_gains(prepared.params, texture).items():
                 self._views.looks[name][index, member] = gain
         if prepared.tables_key not in self._tables:
-            self._tables[prepared.tables_key] = self._next_index, SharedTables(p)
+            self._tables[prepared.tables_key] = self._next_index, SharedTables(prepared.params)
             self._next_index += 1
         used = self._tables[prepared.tables_key][0]
         if not np.all(self._tables_indices[index, member] == used):

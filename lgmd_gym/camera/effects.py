@@ -1,6 +1,7 @@
 """Numeric parameters of light, weather and sensor noise for the kernels."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -14,18 +15,12 @@ LOOK = np.dtype(
         for name in (
             *("asphalt", "asphalt_gain", "verge", "verge_gain", "paint", "line_width", "dash", "dash_period"),
             *("zenith", "horizon", "hills", "trees", "leaf_gain", "hill_scale", "tree_scale"),
-            *("sun_x", "sun_y", "sun_z", "ambient", "direct", "cast", "code_power"),
-            *(
-                "under_body",
-                "under_lean",
-                "under_first",
-                "under_step",
-                "under_rings",
-                "under_box",
-                "shadow_limit",
-            ),
+            *("sun_x", "sun_y", "sun_z", "ambient", "direct", "cast"),
+            *("under_body", "under_lean", "under_first", "under_step", "under_rings", "under_box"),
+            "shadow_limit",
             *("haze", "extinction", "night", "night_light", "beam_gain", "wet", "paved"),
             *("shot_noise", "read_noise", "shutter_s"),
+            *("linear", "auto_exposure_s", "target_grey", "least_gain", "most_gain"),
         )
     ]
 )
@@ -33,36 +28,52 @@ LOOK = np.dtype(
 
 Light (`…_gain`: per stored unit of a texture or skyline); width of markings, length and period of dashes [m];
 scale of the skyline's elevations; direction of the sun; light on a face from the sky, and from the sun where
-it is at right angles, as shares of the light on the road; share of light that a cast shadow removes; power of
-the display code that is proportional to light; the soft shadow below an object, see `shadows.add_shadow`;
-extinction of the air [1/m]; 1.0 for night, for a wet and for an all-paved ground; light at night apart from
-the low beam, and its peak; sensor noise [grey levels]; exposure time [s].
+it is at right angles, as shares of the light on the road; share of light that a cast shadow removes; the soft
+shadow below an object, see `shadows.add_shadow`; light of the fog and extinction of the air [1/m]; 1.0 for
+night; light at night apart from the low beam, and its peak; 1.0 for a wet and for an all-paved ground; sensor
+noise [grey levels]; exposure time [s]; 1.0 for linear light; time constant [s], target [grey levels] and
+bounds of the gain of the automatic exposure.
 """
 ASPHALT_GREY, PAINT_GREY = 104.0, 208.0  # of the laboratory by day
 BEAM_WIDTH = 0.26  # the low beam falls to 1/e at this tangent of the angle from straight ahead
 WHITE = 255.0
+SHOT_NOISE, READ_NOISE = 1.2, 0.8
+"""Usual noise of the sensor in numbered worlds, see `CameraParams`."""
+_WET_ASPHALT, _WET_VERGE, _WET_PAINT = 0.78, 0.85, 0.9  # grey of a wet surface over that of a dry one
 _LABORATORY_SUN = (-0.48, 0.36, 0.80)
 _TEXTURE_GAIN = 1.0 / 36.0  # textures store 36 per standard deviation
 NOISE_LOG2 = 17
 """Binary logarithm of the length of the noise table."""
 
 
+def in_world(p: CameraParams) -> CameraParams:
+    """Return a camera with the sensor of its world: linear light, noise and automatic exposure."""
+    world = draw_world(p.world)
+    if not world.drawn:
+        return p
+    return replace(
+        p,
+        linear_light=True,
+        auto_exposure_s=p.auto_exposure_s or world.exposure_s,
+        shot_noise=max(p.shot_noise, SHOT_NOISE * world.noise),
+        read_noise=max(p.read_noise, READ_NOISE * world.noise),
+    )
+
+
 def look_of(p: CameraParams) -> np.ndarray:
     """Return the appearance of the world for a camera, a `LOOK` record of shape ()."""
     look, world = np.zeros((), LOOK), draw_world(p.world)
-    look["code_power"] = 2.0 if world.drawn else 1.0
-    look["asphalt"], look["verge"] = (
-        to_light(world, _wet(p, world.asphalt_grey, 0.78)),
-        to_light(world, _wet(p, world.verge_grey, 0.85)),
-    )
-    look["paint"] = to_light(world, _wet(p, world.paint_grey, 0.9))
+    look["asphalt"] = to_light(p, _wet(p, world.asphalt_grey, _WET_ASPHALT))
+    look["verge"] = to_light(p, _wet(p, world.verge_grey, _WET_VERGE))
+    look["paint"] = to_light(p, _wet(p, world.paint_grey, _WET_PAINT))
     for name, gain in texture_gains(p, p.texture).items():
         look[name] = gain
     look["line_width"], (look["dash"], look["dash_period"]) = world.line_width, world.dash
     _set_sky(look, p, world)
     _set_sun(look, p, world)
+    _set_sensor(look, p)
     look["night"], look["wet"] = float(p.light == "night"), float(p.wet)
-    look["night_light"], look["beam_gain"] = (world.street_light, 0.6) if world.drawn else (0.04, 1.25)
+    look["night_light"], look["beam_gain"] = world.street_light, world.beam
     if p.visibility_m > 0.0:
         # Koschmieder: 5 % of the contrast remains at the visibility.
         look["extinction"] = math.log(20.0) / p.visibility_m
@@ -70,17 +81,17 @@ def look_of(p: CameraParams) -> np.ndarray:
         for name in ("zenith", "horizon", "hills", "trees"):
             look[name] = haze + remaining * (look[name] - haze)
         look["leaf_gain"] *= remaining
-    look["shot_noise"], look["read_noise"] = p.shot_noise, p.read_noise
-    look["shutter_s"] = p.shutter_s
     return look
 
 
-def to_light(world: World, grey: float) -> float:
-    """Return the light of a display-coded grey level; both are 255 for white.
+def to_light(p: CameraParams, grey: float) -> float:
+    """Return the light of a display-coded grey level; both are 255 for white."""
+    return grey * grey / WHITE if p.linear_light else grey
 
-    In drawn worlds the display code is the square root of light. In the laboratory it is light itself.
-    """
-    return grey * grey / WHITE if world.drawn else grey
+
+def _slope(p: CameraParams, grey: float) -> float:
+    """Return the change of light per grey level at a display-coded grey level."""
+    return 2.0 * grey / WHITE if p.linear_light else 1.0
 
 
 def texture_gains(p: CameraParams, texture: float) -> dict[str, float]:
@@ -91,18 +102,25 @@ def texture_gains(p: CameraParams, texture: float) -> dict[str, float]:
         texture: Contrast, in place of that of `p`.
     """
     world = draw_world(p.world)
-    gains = {}
-    for name, std, grey, contrast in (
-        ("asphalt_gain", 9.0, _wet(p, world.asphalt_grey, 0.78), world.asphalt_contrast),
-        ("verge_gain", 16.0, _wet(p, world.verge_grey, 0.85), world.verge_contrast),
-    ):
-        slope = 2.0 * grey / WHITE if world.drawn else 1.0  # of light over the display code
-        gains[name] = std * contrast * texture * _TEXTURE_GAIN * slope
-    return gains
+    asphalt, verge = _wet(p, world.asphalt_grey, _WET_ASPHALT), _wet(p, world.verge_grey, _WET_VERGE)
+    return {
+        "asphalt_gain": 9.0 * texture * world.asphalt_contrast * _TEXTURE_GAIN * _slope(p, asphalt),
+        "verge_gain": 16.0 * texture * world.verge_contrast * _TEXTURE_GAIN * _slope(p, verge),
+    }
+
+
+def _set_sensor(look: np.ndarray, p: CameraParams) -> None:
+    """Set noise and exposure."""
+    night = p.light == "night"
+    look["shot_noise"], look["read_noise"] = p.shot_noise, p.read_noise
+    look["shutter_s"] = p.shutter_s
+    look["linear"], look["auto_exposure_s"] = float(p.linear_light), p.auto_exposure_s
+    look["target_grey"] = 64.0 if night else 110.0
+    look["least_gain"], look["most_gain"] = (1.0, 24.0) if night else (0.25, 8.0)
 
 
 def _wet(p: CameraParams, grey: float, darkening: float) -> float:
-    """Return the grey of a surface, darker if it is wet."""
+    """Return the grey of a surface, multiplied by `darkening` if it is wet."""
     return grey * darkening if p.wet else grey
 
 
@@ -113,10 +131,10 @@ def _set_sky(look: np.ndarray, p: CameraParams, world: World) -> None:
         greys = (6.0, 14.0, 7.0, 4.0, 1.0)
     names = ("zenith", "horizon", "hills", "trees")
     for name, grey in zip(names, greys, strict=False):
-        look[name] = to_light(world, grey)
-    look["leaf_gain"] = greys[4] * (2.0 * greys[3] / WHITE if world.drawn else 1.0)
+        look[name] = to_light(p, grey)
+    look["leaf_gain"] = greys[4] * _slope(p, greys[3])
     look["hill_scale"], look["tree_scale"] = world.hill_scale, world.tree_scale
-    look["haze"] = to_light(world, haze_grey(p))
+    look["haze"] = to_light(p, haze_grey(p))
 
 
 def _set_sun(look: np.ndarray, p: CameraParams, world: World) -> None:

@@ -167,7 +167,7 @@ def choose_objects(lens, mount, objects, count, chosen):
 
     Args:
         lens: `LENS` record.
-        mount: `MOUNT` record, for `box`, `seed` and `code_power`.
+        mount: `MOUNT` record, for `box`, `seed`, `drawn` and `linear`.
         objects: `OBJECT` records.
         count: Number of objects.
         chosen: `OBJECT` records to write, with the model and the grey that are drawn.
@@ -185,7 +185,7 @@ def choose_objects(lens, mount, objects, count, chosen):
         if obj.model == MODEL_CAR:
             if mount.box != 0:
                 obj.model = MODEL_BOX
-            elif mount.code_power == 2.0:
+            elif mount.drawn != 0:
                 # The shade tells vehicles apart in every list of the visible ones.
                 index = int(16.0 * obj.shade)
                 obj.model, obj.height = body_of(mount.seed, index, obj.length, obj.width, obj.height)
@@ -194,14 +194,14 @@ def choose_objects(lens, mount, objects, count, chosen):
         if obj.shade <= FIRST_INDEXED:
             obj.shade = index_shade(mount.seed, FIRST_INDEXED - obj.shade)
         if obj.model != MODEL_MARK:
-            obj.shade = light_of_code(obj.shade, mount.code_power)
+            obj.shade = light_of_code(obj.shade, mount.linear)
     return n
 
 
 @exact_kernel
-def light_of_code(grey, code_power):
+def light_of_code(grey, linear):
     """Return the light of a display-coded grey level, 255 for white; see `effects.to_light`."""
-    return grey * grey * (1.0 / 255.0) if code_power == 2.0 else grey
+    return grey * grey * (1.0 / 255.0) if linear > 0.0 else grey
 
 
 def _default_appearance(cls: type) -> tuple[int, float]:

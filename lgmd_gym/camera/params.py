@@ -43,6 +43,7 @@ _BOUNDS = {
     "visibility_m": _Interval(0.0, 1e6, True, True, "m (0 is clear air)"),
     "shot_noise": _Interval(0.0, 10.0, True, True, "grey levels at mid-grey"),
     "read_noise": _Interval(0.0, 50.0, True, True, "grey levels"),
+    "auto_exposure_s": _Interval(0.0, 60.0, True, True, "s (0 is a fixed exposure)"),
     "dive_deg": _Interval(0.0, 2.0, True, True, "degrees per m/s²"),
     "shutter_s": _Interval(0.0, 0.1, True, True, "s"),
 }
@@ -87,8 +88,8 @@ class CameraParams:
             converted to grey and wrapped around 360°, with its middle row at the horizon and its left
             edge in the direction +x.
         guard_rail: Whether steel rails, 0.75 m high on posts, run along the outer edges of the road.
-        world: Number of the world that determines the appearance of road, surroundings and light, see
-            `World`; None for the laboratory.
+        world: Number of the world that determines the appearance of road, surroundings and light, and the
+            sensor, see `World` and `in_world`; None for the laboratory.
         seed: Seed of textures and skyline of the laboratory, and of the grey of vehicles without a `shade`.
         light: `"day"`, `"night"` or `"low_sun"`. At night, the ego's headlights and the lights of other cars
             are on. A low sun is 4° to 12° above the horizon, near the direction +x; in the laboratory it
@@ -103,6 +104,12 @@ class CameraParams:
         dive_deg: Nose-down pitch per braking deceleration [degrees per m/s²]; 0.05 to 0.15 for sprung cars.
         shutter_s: Exposure time, which ends at the time of the frame; 0 disables motion blur [s].
             Automotive cameras that must capture 90 Hz pulsed lights expose for 0.011 s or more by day.
+        linear_light: Whether the scene is in linear light (255 is white), which the sensor encodes with a
+            square-root curve: grey = 255·√(light / 255). Noise is added to the light; its stated standard
+            deviation is that at grey 128, and photon noise then has it at every grey.
+        auto_exposure_s: Time constant of the gain that brings the mean of the frames before to grey 110
+            [s]; the first frame of an episode has its own gain. 0 disables it. The gain is 1/4 to 8 by day
+            and 1 to 24 at night.
     """
 
     name: str = "custom"
@@ -129,6 +136,8 @@ class CameraParams:
     road: str = "still"
     dive_deg: float = 0.0
     shutter_s: float = 0.0
+    linear_light: bool = False
+    auto_exposure_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -212,7 +221,7 @@ def _check_surroundings(p: CameraParams) -> None:
         raise ValueError(
             f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
         )
-    for name in ("guard_rail", "wet"):
+    for name in ("guard_rail", "wet", "linear_light"):
         object.__setattr__(p, name, check_flag(f"camera {name}", getattr(p, name)))
 
 

@@ -14,15 +14,14 @@ MOUNT = np.dtype(
     [
         *((name, np.float64) for name in ("setback", "left", "height", "yaw_deg", "pitch_deg")),
         *((name, np.float64) for name in ("road", "dive_deg", "shutter_s")),
-        *((name, np.float64) for name in ("focal", "centre_u", "centre_v", "code_power")),
-        *((name, np.int64) for name in ("path", "noisy", "box", "seed")),
+        *((name, np.float64) for name in ("focal", "centre_u", "centre_v", "linear")),
+        *((name, np.int64) for name in ("path", "noisy", "box", "drawn", "seed")),
     ]
 )
 """How a camera sits on the car and moves with it, as the kernels read it.
 
-The fields of `CameraParams`; amplitude of the road in `ROADS`; focal length and image centre [px]; power of
-the display code that is proportional to light; 1 for the gaze `"path"`, for sensor noise and for
-`vehicles="box"`.
+The fields of `CameraParams`; amplitude of the road in `ROADS`; focal length and image centre [px]; 1 for
+linear light, the gaze `"path"`, sensor noise, `vehicles="box"` and a numbered world.
 """
 
 _PATH_S = 1.0  # look-ahead time of the gaze "path" [s]
@@ -37,8 +36,9 @@ def mount_of(p: CameraParams) -> np.ndarray:
         *(p.mount_setback, p.mount_left, height_of(p, world)),
         *(p.yaw_deg + world.yaw_error_deg, p.pitch_deg + world.pitch_error_deg),
         *(ROADS[p.road], p.dive_deg, p.shutter_s),
-        *(p.focal_px, 0.5 * width, 0.5 * height, 2.0 if world.drawn else 1.0),
-        *(p.gaze == "path", p.shot_noise > 0.0 or p.read_noise > 0.0, p.vehicles == "box", seed_of(p)),
+        *(p.focal_px, 0.5 * width, 0.5 * height, p.linear_light),
+        *(p.gaze == "path", p.shot_noise > 0.0 or p.read_noise > 0.0, p.vehicles == "box"),
+        *(world.drawn, seed_of(p)),
     )
     return np.array(values, dtype=MOUNT)
 

@@ -88,6 +88,7 @@ class World:
         sun_share: Share of the light on a horizontal surface that comes directly from the sun; 0 under an
             overcast sky.
         street_light: Light at night apart from headlights, as a share of daylight.
+        beam: Peak of the light of the ego's low beam, as a share of daylight.
         under_body: Share of the light that is missing below the middle of a vehicle.
         mount_height_error: Height of the lens above that of its mount [m].
         pitch_error_deg: Upward tilt of the optical axis relative to its mount [degrees].
@@ -118,6 +119,7 @@ class World:
     sun_elevation_deg: float = 53.13
     sun_share: float = 0.0
     street_light: float = 0.04
+    beam: float = 1.25
     under_body: float = 0.66
     mount_height_error: float = 0.0
     pitch_error_deg: float = 0.0
@@ -211,6 +213,7 @@ def _draw_sun(rng: np.random.Generator) -> dict[str, object]:
         "sun_azimuth_deg": float(rng.uniform(0.0, 360.0)),
         "sun_elevation_deg": float(rng.uniform(18.0, 62.0)),
         "sun_share": share,
+        "beam": float(rng.uniform(0.3, 0.9)),
         "street_light": float(np.exp(rng.uniform(np.log(0.001), np.log(0.02)))),
         # Display-coded, 0.49 to 0.58 of the road's grey was measured on a real overcast road, and 0.41 to
         # 0.85 in a tunnel; light is the square of the display code.

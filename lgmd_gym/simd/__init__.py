@@ -27,6 +27,7 @@ from lgmd_gym.simd.arithmetic import (
     running_sum,
     select_by_sign,
     splat_last,
+    square_root,
     total,
 )
 from lgmd_gym.simd.partial import load_part, store_part
@@ -55,6 +56,7 @@ __all__ = [
     "select_by_sign",
     "splat",
     "splat_last",
+    "square_root",
     "store",
     "store_bytes",
     "store_part",

@@ -34,6 +34,8 @@ _div = _elementwise(2, lambda b, x, y: b.fdiv(x, y))
 madd = _elementwise(3, lambda b, x, y, z: call(b, f"llvm.fmuladd.v{LANES}f32", x, y, z))
 # |x|.
 magnitude = _elementwise(1, _abs)
+# √x; no lane may be negative.
+square_root = _elementwise(1, lambda b, x: call(b, f"llvm.sqrt.v{LANES}f32", x))
 # Larger of both lanes; neither may be NaN.
 maximum = _elementwise(2, lambda b, x, y: b.select(b.fcmp_ordered(">", x, y), x, y))
 # x where x >= limit, else 0.

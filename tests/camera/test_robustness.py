@@ -21,6 +21,8 @@ OPTIONS = st.fixed_dictionaries(
         "light": st.sampled_from(["day", "night"]),
         "visibility_m": st.sampled_from([0.0, 0.01, 1.0, 30.0]),
         "shutter_s": st.sampled_from([0.0, 0.03]),
+        "linear_light": st.booleans(),
+        "auto_exposure_s": st.sampled_from([0.0, 0.2]),
         "road": st.sampled_from(["still", "rough"]),
         "panorama": st.sampled_from(["skyline", "natural"]),
         "guard_rail": st.booleans(),

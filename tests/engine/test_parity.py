@@ -26,6 +26,7 @@ ARGUMENTS = {
     "brake": {"config": {"max_deceleration": 5.0, "dead_time": 0.3}},
     "condition": {"condition": "night", "include_frame": True},
     "neuron": {"params": {"t_sf": 10.0}},
+    "automatic exposure": {"camera": {"name": "wide", "auto_exposure_s": 0.3}, "include_frame": True},
 }
 
 

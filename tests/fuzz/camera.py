@@ -53,6 +53,8 @@ def draw_camera(rng, name, shape):
         road=str(choice(["still", "rough"])),
         dive_deg=float(choice([0.0, 0.1])),
         shutter_s=float(choice([0.0, 0.0, 0.03])),
+        linear_light=bool(rng.integers(2)),
+        auto_exposure_s=float(choice([0.0, 0.2])),
     )
 
 

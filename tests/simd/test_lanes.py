@@ -12,7 +12,7 @@ A, B = RNG.normal(size=16).astype(np.float32), RNG.normal(size=16).astype(np.flo
 
 @nb.njit
 def apply(a, b, out):
-    """Write running sum, last lane, minimum, replacement above a limit, quotient and whole part to `out`."""
+    """Write running sum, last lane, minimum, replacement quotient, whole part and root to `out`."""
     x, y = simd.load(a, 0), simd.load(b, 0)
     simd.store(out, 0, simd.running_sum(x))
     simd.store(out, 16, simd.splat_last(x))
@@ -20,6 +20,7 @@ def apply(a, b, out):
     simd.store(out, 48, simd.replace_above(x, y, simd.splat(nb.float32(7.0))))
     simd.store(out, 64, x / y)
     simd.store(out, 80, simd.as_floats(simd.as_integers(x * simd.splat(nb.float32(9.0)))))
+    simd.store(out, 96, simd.square_root(simd.magnitude(x)))
     return simd.any_above(x, y), simd.any_different(x, y)
 
 
@@ -46,7 +47,7 @@ def gather(data, indices, out):
 
 
 def test_operations_on_lanes():
-    out = np.zeros((6, 16), np.float32)
+    out = np.zeros((7, 16), np.float32)
     assert apply(A, B, out) == (True, True)
     assert out[0] == pytest.approx(np.cumsum(A), abs=1e-5)
     assert np.array_equal(out[1], np.full(16, A[-1]))
@@ -54,6 +55,7 @@ def test_operations_on_lanes():
     assert np.array_equal(out[3], np.where(A > B, np.float32(7.0), A))
     assert np.array_equal(out[4], A / B)
     assert np.array_equal(out[5], np.trunc(A * np.float32(9.0)))
+    assert np.array_equal(out[6], np.sqrt(np.abs(A)))
     assert apply(A, A, out) == (False, False)
     assert apply(A, np.where(np.arange(16) == 11, A + 1, A).astype(np.float32), out) == (False, True)
 

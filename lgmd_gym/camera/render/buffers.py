@@ -17,6 +17,7 @@ class Views(NamedTuple):
         skies: The last sky, float32, shape (cameras, height, width).
         sky_aims: Yaw, pitch and roll of the last sky, float64, shape (cameras, 3).
         noise_starts: Index of the frame's first number in the noise table, int64, shape (cameras,).
+        exposures: State of the automatic exposure, see `exposure`, float64, shape (cameras, 3).
     """
 
     looks: np.ndarray
@@ -24,6 +25,7 @@ class Views(NamedTuple):
     skies: np.ndarray
     sky_aims: np.ndarray
     noise_starts: np.ndarray
+    exposures: np.ndarray
 
 
 class View(NamedTuple):

@@ -10,6 +10,7 @@ from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pose import noise_start, pose_lens
 from lgmd_gym.camera.render.buffers import Buffers, Tables, Views, make_buffers
 from lgmd_gym.camera.render.bundle import Bundle
+from lgmd_gym.camera.render.exposure import follow_exposure
 from lgmd_gym.camera.render.jit import outer_kernel
 from lgmd_gym.camera.render.models import all_models
 from lgmd_gym.camera.render.panorama import panorama_table
@@ -25,7 +26,7 @@ _MAX_JOINED = 8  # tables that a workspace remembers
 def tables_key(p: CameraParams) -> tuple[Any, ...]:
     """Return the parameters that cameras of one frame size must have in common to share `SharedTables`."""
     world = draw_world(p.world)
-    ground = (world.asphalt, world.verge, world.skyline) if world.drawn else (p.seed,)
+    ground = (world.asphalt, world.verge, world.skyline) if world.drawn else (p.seed, p.linear_light)
     if p.panorama == "skyline":
         return ground
     # The table of a panorama includes light and fog, at the resolution of the lens.
@@ -52,7 +53,7 @@ class SharedTables:
             noise=noise_table(0 if world.drawn else p.seed),
             panorama=panorama_table(p),
         )
-        self.bundle = Bundle(tuple(tables), tuple(all_models(linear=world.drawn)))
+        self.bundle = Bundle(tuple(tables), tuple(all_models(linear=p.linear_light)))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "SharedTables":
         return self
@@ -125,6 +126,8 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
             if mount.noisy != 0:
                 views.noise_starts[env, k] = noise_start(mount, scene, lens)
             views.looks[env, k].paved = float(span[6])
+            if views.looks[env, k].auto_exposure_s > 0.0:
+                follow_exposure(views.exposures[env, k], scene, views.looks[env, k].auto_exposure_s)
             count = choose_objects(lens, mount, objects[env], counts[env], chosen)
             road = RoadGeometry(
                 surface[span[0] : span[1]],
@@ -135,6 +138,7 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
             rows = (
                 views.looks[env, k : k + 1], views.beams[env, k : k + 1], views.skies[env, k : k + 1],
                 views.sky_aims[env, k : k + 1], views.noise_starts[env, k : k + 1],
+                views.exposures[env, k : k + 1],
             )  # fmt: skip
             draw_frames(
                 frames[env, k : k + 1], lenses[env, k : k + 1], rows, road, lookup_tables, models, chosen,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lgmd_gym.camera.effects import far_transmission, haze_grey
+from lgmd_gym.camera.effects import WHITE, far_transmission, haze_grey, to_light
 from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.render.jit import kernel
 
@@ -30,6 +30,8 @@ def panorama_table(p: CameraParams) -> np.ndarray:
         return np.zeros((0, 0), dtype=np.float32)
     grey = natural_panorama(p.seed) if p.panorama == "natural" else _image(p.panorama)
     grey = grey.astype(np.float32)
+    if p.linear_light:
+        grey *= grey / np.float32(WHITE)
     # Halve the resolution while a pixel at the centre of the frame covers more than about 1.4 texels.
     while grey.shape[1] > 16 and 1.0 / p.focal_px > 1.4 * 2.0 * math.pi / grey.shape[1]:
         grey = 0.25 * (grey[0::2, 0::2] + grey[1::2, 0::2] + grey[0::2, 1::2] + grey[1::2, 1::2])
@@ -38,7 +40,7 @@ def panorama_table(p: CameraParams) -> np.ndarray:
     if p.light == "night":
         grey *= _NIGHT
     if p.visibility_m > 0.0:
-        haze = haze_grey(p)
+        haze = to_light(p, haze_grey(p))
         grey = haze + far_transmission(p) * (grey - haze)
     return np.ascontiguousarray(grey, dtype=np.float32)
 

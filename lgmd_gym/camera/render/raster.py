@@ -8,6 +8,7 @@ from lgmd_gym.camera.objects import MODEL_MARK, light_of_code
 from lgmd_gym.camera.render.blur import add_weighted, blur_steps, lens_before, move_objects, overwrite
 from lgmd_gym.camera.render.buffers import Buffers, GroundLayer, SolidLayer, Tables, View, Views
 from lgmd_gym.camera.render.cast_shadows import add_cast_shadows
+from lgmd_gym.camera.render.exposure import adapt_exposure
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
 from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
 from lgmd_gym.camera.render.horizon import horizon_of
@@ -41,7 +42,7 @@ def append_roadside(lens, roadside, look, objects, count):
         if dx * dx + dy * dy < PLANT_RANGE * PLANT_RANGE and visible(lens, roadside[low]):
             objects[count] = roadside[low]
             if objects[count].model != MODEL_MARK:
-                objects[count].shade = light_of_code(objects[count].shade, look.code_power)
+                objects[count].shade = light_of_code(objects[count].shade, look.linear)
             count += 1
         low += 1
     return count
@@ -165,4 +166,5 @@ def draw_frames(out, lenses, views, road, tables, models, objects, count, buffer
                 move_objects(objects, count, ago * look.shutter_s)
                 add_weighted(total, image, nb.float32(1.0 / steps))
             overwrite(image, total)
-        expose(out[k], image, look, tables.noise, views.noise_starts[k])
+        gain = adapt_exposure(views.exposures[k], image, look) if look.auto_exposure_s > 0.0 else 1.0
+        expose(out[k], image, look, gain, tables.noise, views.noise_starts[k])

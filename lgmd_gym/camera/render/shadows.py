@@ -39,7 +39,7 @@ def _add_mark(layer, lens, obj, look):
         if paint > 0.0:
             _add_footprint(layer, PAINT, lens, obj, centre, 0.0, min(paint, 1.0))
         else:
-            left = light_of_code(obj.shade, look.code_power) / light_of_code(ASPHALT_GREY, look.code_power)
+            left = light_of_code(obj.shade, look.linear) / light_of_code(ASPHALT_GREY, look.linear)
             _add_footprint(layer, SHADOW, lens, obj, centre, 0.0, 1.0 - left)
         return
     _add_footprint(layer, PAINT, lens, obj, centre, 0.0, 0.8)

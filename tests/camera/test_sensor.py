@@ -1,0 +1,135 @@
+"""The sensor: linear light, its noise, and automatic exposure."""
+
+import copy
+import pickle
+from math import exp, sqrt
+
+import numpy as np
+import pytest
+from support.records import records
+from support.roads import add_mark, straight_env
+
+from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera.effects import look_of, noise_table
+from lgmd_gym.camera.render.exposure import adapt_exposure, follow_exposure
+from lgmd_gym.camera.render.sensor import expose
+from lgmd_gym.camera.scene import SCENE
+
+BRIDGE = {"size": (200.0, 60.0), "shade": 10.0}
+
+
+def exposed(light, gain=1.0, start=0, **fields):
+    """Return the frame of an even light, shape (200, 201)."""
+    image, out = np.full((200, 201), light, np.float32), np.zeros((200, 201), np.uint8)
+    expose(out, image, look_of(CameraParams(**fields))[()], gain, noise_table(0), start)
+    return out
+
+
+@pytest.mark.parametrize("light", [-3.0, 0.0, 0.3, 1.0, 40.0, 200.0, 255.0, 400.0])
+@pytest.mark.parametrize("gain", [0.25, 1.0, 8.0])
+def test_linear_light_is_encoded_with_a_square_root(light, gain):
+    assert np.all(exposed(light, gain) == int(min(max(gain * light, 0.0), 255.0) + 0.5))
+    grey = 255.0 * sqrt(min(max(gain * light, 0.0) / 255.0, 1.0))
+    assert np.all(exposed(light, gain, linear_light=True) == int(grey + 0.5))
+
+
+@pytest.mark.parametrize("grey", [64.0, 128.0, 200.0])
+def test_noise_of_linear_light_has_its_deviation_at_mid_grey(grey):
+    """Photon noise grows with the root of the light, as the curve's slope falls; read noise does not grow."""
+    light = grey**2 / 255.0
+    assert exposed(light, shot_noise=4.0, linear_light=True).std() == pytest.approx(4.0, rel=0.03)
+    read = exposed(light, read_noise=4.0, linear_light=True).std()
+    assert read == pytest.approx(4.0 * 128.0 / grey, rel=0.04)
+
+
+def test_gain_amplifies_noise():
+    """The same grey from a quarter of the light has twice the photon noise and four times the read noise."""
+    light = 128.0**2 / 255.0
+    shot = exposed(light / 4.0, 4.0, shot_noise=2.0, linear_light=True).std()
+    read = exposed(light / 4.0, 4.0, read_noise=2.0, linear_light=True).std()
+    assert (shot, read) == pytest.approx((4.0, 8.0), rel=0.05)
+
+
+@pytest.mark.parametrize("linear", [False, True])
+def test_gain_brings_the_mean_light_to_mid_grey(linear):
+    look = look_of(CameraParams(auto_exposure_s=1.0, linear_light=linear))[()]
+    target = 110.0**2 / 255.0 if linear else 110.0
+    exposure = np.full(3, np.nan)
+    assert adapt_exposure(exposure, np.full((9, 21), 40.0, np.float32), look) == pytest.approx(target / 40.0)
+    # The next frame has the same gain, and calls for another one.
+    assert adapt_exposure(exposure, np.full((9, 21), 20.0, np.float32), look) == pytest.approx(target / 40.0)
+    assert exposure[1] == pytest.approx(target / 20.0)
+
+
+@pytest.mark.parametrize(
+    ("light", "night", "gain"), [(4.0, 0, 8.0), (1e4, 0, 110 / 255), (0.0, 1, 24.0), (250.0, 1, 1.0)]
+)
+def test_gain_is_bounded(light, night, gain):
+    look = look_of(CameraParams(auto_exposure_s=1.0, light=("day", "night")[night]))[()]
+    assert adapt_exposure(np.full(3, np.nan), np.full((8, 8), light, np.float32), look) == pytest.approx(gain)
+
+
+def test_gain_approaches_with_the_time_constant():
+    scenes = records(
+        SCENE, *({"time_s": time, "steps": step} for time, step in ((2.0, 20), (2.3, 23), (0.1, 1)))
+    )
+    exposure = np.array([1.0, 4.0, 1.5])
+    follow_exposure(exposure, scenes[0], 0.5)
+    # One time constant: the logarithm has gone 63 % of its way.
+    assert exposure == pytest.approx([4.0 ** (1.0 - exp(-1.0)), 4.0, 2.0])
+    follow_exposure(exposure, scenes[0], 0.5)
+    assert exposure[0] == pytest.approx(4.0 ** (1.0 - exp(-1.0)))  # no time has passed
+    follow_exposure(exposure, scenes[1], 0.5)
+    assert exposure[0] == pytest.approx(4.0 ** (1.0 - exp(-1.6)))
+    follow_exposure(exposure, scenes[2], 0.5)
+    assert np.isnan(exposure[0])  # the clock has gone back
+
+
+def drive_under_a_bridge(camera):
+    """Return the grey of the sky in eight frames 0.5 s apart, with a shadow from the third one on."""
+    env, greys = straight_env(), []
+    for frame in range(8):
+        env.steps = 15 * frame
+        if frame == 2:
+            add_mark(env, 50.0, 3.5, **BRIDGE)
+        greys.append(float(camera.render(env)[:30].mean()))
+    return greys
+
+
+def test_picture_becomes_brighter_under_a_bridge_after_a_delay():
+    greys = drive_under_a_bridge(EgoCamera("wide", auto_exposure_s=0.5, roadside=0.0))
+    assert greys[1] == pytest.approx(greys[0], abs=0.5)
+    assert greys[2] == pytest.approx(greys[1], abs=0.5)  # the gain of the frames before
+    assert greys[3] > greys[2] + 5.0
+    assert np.all(np.diff(greys[3:]) > 0.0)
+    assert greys[7] - greys[6] < 0.1 * (greys[3] - greys[2])
+    fixed = drive_under_a_bridge(EgoCamera("wide", roadside=0.0))
+    assert fixed == [fixed[0]] * 8
+
+
+def test_first_frame_of_an_episode_has_its_own_gain():
+    env, camera = straight_env(), EgoCamera("wide", auto_exposure_s=5.0, roadside=0.0)
+    drive_under_a_bridge(camera)
+    env.steps = 3
+    assert np.array_equal(camera.render(env), EgoCamera(camera.params).render(env))
+    env.steps = 9
+    camera.render(env)
+    add_mark(env, 50.0, 3.5, **BRIDGE)
+    env.steps = 0
+    assert np.array_equal(camera.render(env), EgoCamera(camera.params).render(env))
+
+
+@pytest.mark.parametrize(
+    "copied", [copy.deepcopy, lambda camera: pickle.loads(pickle.dumps(camera))], ids=["deepcopy", "pickle"]
+)
+def test_copy_continues_with_the_same_gain(copied):
+    env, camera = straight_env(), EgoCamera("wide", auto_exposure_s=0.5, roadside=0.0)
+    camera.render(env)
+    add_mark(env, 50.0, 3.5, **BRIDGE)
+    env.steps = 15
+    camera.render(env)
+    clone = copied(camera)
+    for env.steps in (20, 30):
+        frame = camera.render(env)
+        assert np.array_equal(clone.render(env), frame)
+    assert not np.array_equal(EgoCamera(camera.params).render(env), frame)
