@@ -40,8 +40,8 @@ def posts_and_plants(segments: np.ndarray, density: float, seed: int) -> np.ndar
     width = height * np.where(bush, rng.uniform(1.2, 1.7, len(plants)), rng.uniform(0.55, 0.8, len(plants)))
     plants["length"], plants["width"], plants["height"] = width, width, height
     plants["shade"] = rng.uniform(38.0, 82.0, len(plants))
-    plants = plants[_clear_of(_positions(plants), segments, _PLANT_CLEARANCE + 0.5 * width)]
-    posts = posts[_clear_of(_positions(posts), segments, np.full(len(posts), 0.6))]
+    plants = plants[clear_of(_positions(plants), segments, _PLANT_CLEARANCE + 0.5 * width)]
+    posts = posts[clear_of(_positions(posts), segments, np.full(len(posts), 0.6))]
     both = np.concatenate((posts, plants))
     return both[np.argsort(both["x"], kind="stable")]
 
@@ -55,12 +55,12 @@ def guard_rails(segments: np.ndarray) -> np.ndarray:
         for side in (-1.0, 1.0):
             line = nodes[:, 0:2] + side * (0.5 * nodes[:, 4:5] + _RAIL_OFFSET) * nodes[:, 2:4]
             middle = 0.5 * (line[:-1] + line[1:])
-            free = _clear_of(line, segments, np.full(len(line), 0.4 * _RAIL_OFFSET))
-            free_middle = _clear_of(middle, segments, np.full(len(middle), 0.4 * _RAIL_OFFSET))
+            free = clear_of(line, segments, np.full(len(line), 0.4 * _RAIL_OFFSET))
+            free_middle = clear_of(middle, segments, np.full(len(middle), 0.4 * _RAIL_OFFSET))
             free = free[:-1] & free[1:] & free_middle
             pieces.append(np.concatenate((line[:-1], line[1:]), axis=1)[free])
     ends = np.concatenate(pieces)
-    unit, length = _directions(ends)
+    unit, length = directions(ends)
     rails = _records(0.5 * (ends[:, 0:2] + ends[:, 2:4]), MODEL_RAIL)
     rails["cos"], rails["sin"], rails["length"] = unit[:, 0], unit[:, 1], length
     # EN 1317 systems are 0.7 to 0.8 m high; the grey is that of galvanised steel.
@@ -68,7 +68,7 @@ def guard_rails(segments: np.ndarray) -> np.ndarray:
     return rails
 
 
-def _directions(segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def directions(segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the unit vectors, shape (n, 2), and lengths, shape (n,), of pieces x0, y0, x1, y1, … [m]."""
     delta = segments[:, 2:4] - segments[:, 0:2]
     length = np.maximum(np.hypot(delta[:, 0], delta[:, 1]), 1e-9)
@@ -77,7 +77,7 @@ def _directions(segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _nodes(lane: np.ndarray) -> np.ndarray:
     """Return points every 8 m along a lane: x, y, unit normal to the right, width; shape (n, 5)."""
-    unit, length = _directions(lane)
+    unit, length = directions(lane)
     total = lane[-1, 4] + length[-1]
     along = np.linspace(0.0, total, int(np.ceil(total / _RAIL_STEP)) + 1)
     owner = np.clip(np.searchsorted(lane[:, 4], along, side="right") - 1, 0, len(lane) - 1)
@@ -100,7 +100,7 @@ def _along_edges(
     segments: np.ndarray, step: float, offset: float, spread: float, rng: np.random.Generator
 ) -> np.ndarray:
     """Return points every `step` metres along the outer edges, `offset` to `offset + spread` beyond them."""
-    unit, length = _directions(segments)
+    unit, length = directions(segments)
     start, width = segments[:, 4], segments[:, 5]
     first = np.ceil(start / step)
     count = np.maximum(np.ceil((start + length) / step) - first, 0.0).astype(np.int64)
@@ -115,22 +115,28 @@ def _along_edges(
         base = segments[owner, 0:2] + unit[owner] * (along + jitter)[:, None]
         # Only the outer side of the outer lane: a metre beyond any other edge is another lane.
         kerb = base + side * (0.5 * width[owner] + 1.0)[:, None] * across
-        outer = _clear_of(kerb, segments, np.zeros(len(kerb)))
+        outer = clear_of(kerb, segments, np.zeros(len(kerb)))
         points.append((base + lateral[:, None] * across)[outer])
     return np.concatenate(points)
 
 
 @exact_kernel
-def _clear_of(points, segments, margin):
+def clear_of(points, segments, margin):
     """Return whether each point is at least `margin` beyond the edges of all lanes; bool, shape (n,)."""
     clear = np.ones(len(points), dtype=np.bool_)
     for i in range(len(points)):
-        for j in range(len(segments)):
-            x0, y0, width = segments[j, 0], segments[j, 1], segments[j, 5]
-            dx, dy = segments[j, 2] - x0, segments[j, 3] - y0
-            rx, ry = points[i, 0] - x0, points[i, 1] - y0
-            t = min(max((rx * dx + ry * dy) / max(dx * dx + dy * dy, 1e-9), 0.0), 1.0)
-            if not math.hypot(rx - t * dx, ry - t * dy) > 0.5 * width + margin[i]:
-                clear[i] = False
-                break
+        clear[i] = is_clear(points[i, 0], points[i, 1], segments, margin[i])
     return clear
+
+
+@exact_kernel
+def is_clear(x, y, segments, margin):
+    """Return whether a point is at least `margin` beyond the edges of all lanes."""
+    for j in range(len(segments)):
+        x0, y0, width = segments[j, 0], segments[j, 1], segments[j, 5]
+        dx, dy = segments[j, 2] - x0, segments[j, 3] - y0
+        rx, ry = x - x0, y - y0
+        t = min(max((rx * dx + ry * dy) / max(dx * dx + dy * dy, 1e-9), 0.0), 1.0)
+        if not math.hypot(rx - t * dx, ry - t * dy) > 0.5 * width + margin:
+            return False
+    return True

@@ -100,3 +100,19 @@ class ModelBuilder:
             self.face([(b0, bw, z1), (a0, aw, z0), (a1, aw, z0), (b1, bw, z1)]),
             self.face([(b1, -bw, z1), (b0, -bw, z1), (b0, bw, z1), (b1, bw, z1)]),
         ]
+
+    def underside(self, value: float = 0.5) -> int:
+        """Add the lower face of a box of full length and width at its base."""
+        corners = [(0.5, 0.5, 0.0), (-0.5, 0.5, 0.0), (-0.5, -0.5, 0.0), (0.5, -0.5, 0.0)]
+        return self.face(corners, value)
+
+    def sheet(self, outline: list[tuple[float, float]], back: float, value: float = 1.0) -> int:
+        """Add an upright sheet across the length, with a plain back, and return the face to the rear.
+
+        Args:
+            outline: Corners (y, z), anticlockwise as seen from the rear, top left first.
+            back: Value of the side that faces forwards.
+            value: Value of the side that faces to the rear.
+        """
+        self.face([(0.5, y, z) for y, z in reversed(outline)], back)
+        return self.face([(-0.5, y, z) for y, z in outline], value)

@@ -8,8 +8,10 @@ import numpy as np
 from lgmd_gym.camera.effects import WHITE
 from lgmd_gym.camera.render.body_models import SMALL, SUV, VAN, add_body
 from lgmd_gym.camera.render.car_model import add_car
+from lgmd_gym.camera.render.clutter_models import add_hedge, add_house, add_power_pole, add_sign, add_wall
 from lgmd_gym.camera.render.long_models import add_bus, add_trailer
 from lgmd_gym.camera.render.model_builder import BODY, ModelBuilder
+from lgmd_gym.camera.render.overhead_models import add_beam, add_board, add_deck, add_panel, add_signal
 from lgmd_gym.camera.render.plain_models import (
     add_barrier,
     add_crown,
@@ -75,6 +77,12 @@ def all_models(linear: bool) -> Models:
         add_body(b, shape)
     add_trailer(b)
     add_bus(b)
+    for add in (add_beam, add_deck, add_panel, add_board, add_signal):
+        add(b)
+    for corners in (8, 3, 4):
+        add_sign(b, corners)
+    for add in (add_power_pole, add_wall, add_hedge, add_house):
+        add(b)
     corners = np.zeros((len(b.corners), _MAX_CORNERS, 3))
     for index, points in enumerate(b.corners):
         corners[index, : len(points)] = points

@@ -1,0 +1,107 @@
+"""Clutter: densities of what stands along a road."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from lgmd_gym.errors import check_within
+
+MAX_DENSITY = 200.0
+"""Maximum density of one kind [1/km]."""
+
+
+@dataclass(frozen=True)
+class Clutter:
+    """Densities of the pieces of clutter along a road, 0 to 200 [1/km].
+
+    Attributes:
+        sign: Traffic signs, per outer edge.
+        board: Direction signs on two posts, per outer edge.
+        lamp_post: Lamp posts with an arm towards the road, per outer edge.
+        power_pole: Power poles, per outer edge.
+        overhanging_tree: Trees with a crown that reaches over the road, per outer edge.
+        wall: Walls of 30 m, per outer edge.
+        hedge: Hedges of 10 m, per outer edge.
+        house: Houses, per outer edge.
+        parked_car: Parked vehicles, per outer edge.
+        bollard: Bollards, per outer edge.
+        drain: Drains at the edge of the asphalt, per outer edge.
+        gantry: Gantries with one to three panels, per road.
+        bridge: Bridges over the road, per road.
+        tunnel: Underpasses of 30 to 60 m, per road.
+        signal: Traffic signals with an arm over the road, per road.
+        zebra: Zebra crossings, per road.
+        arrow: Arrows on the asphalt, per lane.
+        patch: Dark and light patches of tar, per lane.
+        manhole: Manholes, per lane.
+        joint: Joints across the lane, per lane.
+        skid: Pairs of skid marks, per lane.
+        queue: Queues of standing cars, per km of the lane that `place_clutter` is given.
+
+    Raises:
+        ValueError: For a density out of range.
+    """
+
+    sign: float = 0.0
+    board: float = 0.0
+    lamp_post: float = 0.0
+    power_pole: float = 0.0
+    overhanging_tree: float = 0.0
+    wall: float = 0.0
+    hedge: float = 0.0
+    house: float = 0.0
+    parked_car: float = 0.0
+    bollard: float = 0.0
+    drain: float = 0.0
+    gantry: float = 0.0
+    bridge: float = 0.0
+    tunnel: float = 0.0
+    signal: float = 0.0
+    zebra: float = 0.0
+    arrow: float = 0.0
+    patch: float = 0.0
+    manhole: float = 0.0
+    joint: float = 0.0
+    skid: float = 0.0
+    queue: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = check_within(f"clutter {field.name}", getattr(self, field.name), 0.0, MAX_DENSITY, "1/km")
+            object.__setattr__(self, field.name, value)
+
+
+ROAD_TYPES = {
+    "motorway": Clutter(
+        sign=3.0, board=1.5, wall=5.0, gantry=0.8, bridge=0.7, tunnel=0.1, patch=3.0, joint=4.0, skid=1.5,
+        queue=1.5,
+    ),
+    "rural": Clutter(
+        sign=4.0, board=0.7, power_pole=10.0, overhanging_tree=7.0, hedge=6.0, house=1.5, bollard=3.0,
+        bridge=0.3, patch=5.0, skid=1.0, queue=0.5,
+    ),
+    "urban": Clutter(
+        sign=8.0, lamp_post=16.0, overhanging_tree=4.0, wall=2.0, hedge=3.0, house=14.0, parked_car=16.0,
+        bollard=4.0, drain=8.0, bridge=0.3, tunnel=0.2, signal=2.0, zebra=1.5, arrow=2.0, patch=5.0,
+        manhole=5.0, joint=1.0, queue=3.0,
+    ),
+    "industrial": Clutter(
+        sign=4.0, board=1.0, lamp_post=12.0, power_pole=6.0, wall=8.0, hedge=2.0, house=8.0, parked_car=8.0,
+        gantry=0.5, bridge=0.6, tunnel=0.2, signal=0.8, patch=7.0, manhole=3.0, joint=3.0, skid=2.0,
+        queue=1.5,
+    ),
+}  # fmt: skip
+"""Typical densities by type of road."""
+
+_PRESENT = 0.75  # probability that a kind of a road type occurs in a world
+
+
+def draw_clutter(rng: np.random.Generator) -> Clutter:
+    """Draw a type of road and the densities of its clutter.
+
+    Each kind of the type is absent with a probability of 1/4, or has 0.4 to 1.6 times its typical density.
+    """
+    typical = ROAD_TYPES[list(ROAD_TYPES)[rng.integers(len(ROAD_TYPES))]]
+    names = [field.name for field in fields(Clutter)]
+    factors = rng.uniform(0.4, 1.6, len(names)) * (rng.random(len(names)) < _PRESENT)
+    return Clutter(**{n: getattr(typical, n) * float(f) for n, f in zip(names, factors, strict=True)})
