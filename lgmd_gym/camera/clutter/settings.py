@@ -77,17 +77,17 @@ ROAD_TYPES = {
         queue=1.5,
     ),
     "rural": Clutter(
-        sign=4.0, board=0.7, power_pole=10.0, overhanging_tree=7.0, hedge=6.0, house=1.5, bollard=3.0,
-        bridge=0.3, patch=5.0, skid=1.0, queue=0.5,
+        sign=3.0, board=0.7, power_pole=8.0, overhanging_tree=5.0, hedge=5.0, house=1.5, bollard=2.0,
+        bridge=0.3, patch=4.0, skid=1.0, queue=0.5,
     ),
     "urban": Clutter(
-        sign=8.0, lamp_post=16.0, overhanging_tree=4.0, wall=2.0, hedge=3.0, house=14.0, parked_car=16.0,
-        bollard=4.0, drain=8.0, bridge=0.3, tunnel=0.2, signal=2.0, zebra=1.5, arrow=2.0, patch=5.0,
-        manhole=5.0, joint=1.0, queue=3.0,
+        sign=4.0, lamp_post=9.0, overhanging_tree=2.0, wall=1.5, hedge=2.0, house=7.0, parked_car=8.0,
+        bollard=1.5, drain=4.0, bridge=0.3, tunnel=0.2, signal=1.5, zebra=1.0, arrow=1.0, patch=3.0,
+        manhole=3.0, joint=1.0, queue=3.0,
     ),
     "industrial": Clutter(
-        sign=4.0, board=1.0, lamp_post=12.0, power_pole=6.0, wall=8.0, hedge=2.0, house=8.0, parked_car=8.0,
-        gantry=0.5, bridge=0.6, tunnel=0.2, signal=0.8, patch=7.0, manhole=3.0, joint=3.0, skid=2.0,
+        sign=3.0, board=1.0, lamp_post=7.0, power_pole=3.0, wall=5.0, hedge=1.5, house=4.0, parked_car=5.0,
+        gantry=0.5, bridge=0.6, tunnel=0.2, signal=0.8, patch=4.0, manhole=2.0, joint=2.0, skid=1.5,
         queue=1.5,
     ),
 }  # fmt: skip

@@ -5,6 +5,8 @@ import math
 from lgmd_gym.camera.render.model_builder import BODY, ModelBuilder
 
 _FULL = (-0.5, 0.5, 0.5)
+_WINDOW_FINE = 20.0  # windows appear from this height of the house on: dozens of polygons [px]
+_JOINT_FINE = 8.0  # the same for the joints of a wall [px]
 _RIM = 0.72  # values of a traffic sign, as multiples of its shade
 
 
@@ -46,7 +48,10 @@ def add_wall(b: ModelBuilder) -> None:
     b.solid()
     for face in b.box(0.0, 1.0, _FULL, _FULL)[2:4]:
         for k in range(9):
-            b.rect(face, (max(k / 8.0 - 0.006, 0.0), min(k / 8.0 + 0.006, 1.0)), (0.0, 0.94), 0.62, BODY)
+            joint = b.rect(
+                face, (max(k / 8.0 - 0.006, 0.0), min(k / 8.0 + 0.006, 1.0)), (0.0, 0.94), 0.62, BODY
+            )
+            b.fine[joint] = _JOINT_FINE
         b.rect(face, (0.0, 1.0), (0.94, 1.0), 1.3, BODY)
         b.rect(face, (0.0, 1.0), (0.0, 0.10), 0.75, BODY)
         b.rect(face, (0.0, 1.0), (0.46, 0.50), 0.85, BODY)
@@ -68,13 +73,16 @@ def add_house(b: ModelBuilder) -> None:
     b.model(split=0.72)
     b.solid()
     faces = b.box(0.0, 0.72, (-0.47, 0.47, 0.47), (-0.47, 0.47, 0.47))
-    for face, columns in zip(faces[:4], (3, 3, 5, 5), strict=True):
+    for face, columns in zip(faces[:4], (2, 2, 4, 4), strict=True):
         b.rect(face, (0.0, 1.0), (0.0, 0.08), 0.7, BODY)
         for row in (0.14, 0.58):
             for column in range(columns):
                 left = (column + 0.28) / columns
                 window = b.rect(face, (left, left + 0.44 / columns), (row, row + 0.28), 45.0)
-                b.rect(face, (left, left + 0.44 / columns), (row + 0.17, row + 0.28), 95.0, parent=window)
+                sky = b.rect(
+                    face, (left, left + 0.44 / columns), (row + 0.17, row + 0.28), 95.0, parent=window
+                )
+                b.fine[window], b.fine[sky] = _WINDOW_FINE, 2.0 * _WINDOW_FINE
     b.solid()
     for face in b.box(0.72, 1.0, _FULL, (-0.32, 0.32, 0.02)):
         b.value[face] = 0.55

@@ -1,6 +1,6 @@
 """Models of what hangs over a road: beams, bridge decks, panels and signal heads."""
 
-from lgmd_gym.camera.render.model_builder import BODY, ModelBuilder
+from lgmd_gym.camera.render.model_builder import BODY, LAMP, ModelBuilder
 
 _FULL = (-0.5, 0.5, 0.5)
 
@@ -61,5 +61,7 @@ def add_signal(b: ModelBuilder) -> None:
     b.solid()
     rear = b.box(0.0, 1.0, _FULL, _FULL)[0]
     b.underside()
-    for v, grey in ((0.82, 240.0), (0.5, 60.0), (0.18, 60.0)):
-        b.disc(rear, 0.5, v, 0.36, 0.13, grey, rear)
+    red = b.disc(rear, 0.5, 0.82, 0.36, 0.13, 240.0, rear)
+    b.role[red] = LAMP
+    for v in (0.5, 0.18):
+        b.disc(rear, 0.5, v, 0.36, 0.13, 60.0, rear)
