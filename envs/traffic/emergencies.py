@@ -1,33 +1,45 @@
-"""Emergencies in traffic: contacts of the ego and hard braking of its driver."""
+"""Emergencies in traffic: when the ego needs a braking that its driver alone does not provide in time.
 
+An emergency is a contact of the ego, on any side, or a moment in which the required deceleration reaches
+`EMERGENCY`, the least emergency braking of UN R152 (5.2.1.2). The required deceleration is a generalised DRAC
+(Cooper and Ferguson 1976), see `required_deceleration`. It depends on speeds, distances and steering only: a
+driver of IDM also brakes by more than 5 m/s² to give way, without a conflict.
+
+A brake of the agent is needed if, without it, an emergency follows within `HORIZON`: 3 s is the limit of the
+time to collision below which driving is critical (Minderhoud and Bovy 2001). The episode is therefore
+continued from that moment with the driver alone.
+"""
+
+from bisect import bisect_left
 from dataclasses import dataclass
+from math import inf
 
 from lgmd_gym.envs.traffic.env import TrafficEnv
 
-HORIZON = 10.0  # [s], an emergency within this time after a brake makes it necessary; horizon of `ttc`
-HARD_BRAKING = 5.0  # [m/s²], UN R152 2.1: minimum deceleration of an emergency braking demand
+HORIZON = 3.0  # [s], a brake is needed if an emergency follows within this time
+EMERGENCY = 5.0  # [m/s²], required deceleration of an emergency
 
 
 @dataclass(frozen=True, slots=True)
 class Emergencies:
     """The emergencies of an episode without braking by the agent.
 
-    An emergency is a contact of the ego, on any side, or braking of the driver by `HARD_BRAKING` or more. A
-    brake of the agent before an emergency is necessary even if the driver alone would have avoided contact.
-
     Attributes:
         contact: Time of the ego's contact [s]; None without contact.
-        hard: Times of the decisions after which the driver braked hard, ascending [s].
+        demanding: Times of decisions with a required deceleration of `EMERGENCY` or more, ascending [s].
     """
 
     contact: float | None
-    hard: tuple[float, ...]
+    demanding: tuple[float, ...]
 
     def time_until(self, time: float, horizon: float = HORIZON) -> float | None:
         """Return the time from `time` to the next emergency, 0 during one [s]; None beyond `horizon`."""
-        times = [*self.hard, *([] if self.contact is None else [self.contact])]
-        after = [moment - time for moment in times if -1e-9 <= moment - time <= horizon + 1e-9]
-        return max(min(after), 0.0) if after else None
+        tolerance = 1e-9
+        number = bisect_left(self.demanding, time - tolerance)
+        following = self.demanding[number] if number < len(self.demanding) else inf
+        if self.contact is not None and self.contact >= time - tolerance:
+            following = min(following, self.contact)
+        return max(following - time, 0.0) if following - time <= horizon + tolerance else None
 
 
 def simulate_driver(env: TrafficEnv, time: float, horizon: float = HORIZON) -> Emergencies:
@@ -40,11 +52,11 @@ def simulate_driver(env: TrafficEnv, time: float, horizon: float = HORIZON) -> E
     """
     vars(env.road).pop("step", None)  # the callback of `on_road_step` would render camera frames
     policy_hz = env.config["policy_frequency"]
-    hard = [time] if env.ego.driver_acceleration <= -HARD_BRAKING else []
+    demanding = [time] if env.required_deceleration >= EMERGENCY else []
     for step in range(1, round(horizon * policy_hz) + 1):
         if env.road.contact is not None:
-            return Emergencies(time + (step - 1) / policy_hz, tuple(hard))
+            return Emergencies(time + (step - 1) / policy_hz, tuple(demanding))
         env.step_unobserved()
-        if env.ego.driver_acceleration <= -HARD_BRAKING:
-            hard.append(time + step / policy_hz)
-    return Emergencies(time + horizon if env.road.contact is not None else None, tuple(hard))
+        if env.required_deceleration >= EMERGENCY:
+            demanding.append(time + step / policy_hz)
+    return Emergencies(time + horizon if env.road.contact is not None else None, tuple(demanding))

@@ -15,6 +15,7 @@ from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.envs.spaces import ContinuousDemand, EgoState
 from lgmd_gym.envs.traffic.ego import TrafficEgo
+from lgmd_gym.envs.traffic.need import required_deceleration
 from lgmd_gym.envs.traffic.road import TrafficRoad
 
 JAM_TIME, JAM_SPEED = 10.0, 0.5  # [s], [m/s]: the episode ends after this time below this speed
@@ -58,8 +59,8 @@ class TrafficEnv(EgoBrakeEnv):
     ## Description
 
     Roads and cars are highway-env's: subclasses also inherit from one of its environments. The seed draws the
-    traffic. The ego keeps its lane or route, driven by IDM. The demand passes through the brake model of
-    `BrakingEnv`.
+    traffic, and the time headway of each driver, in [0.4, 1.5] s. The ego keeps its lane or route, driven by
+    IDM. The demand passes through the brake model of `BrakingEnv`.
 
     ## Action Space
 
@@ -82,13 +83,13 @@ class TrafficEnv(EgoBrakeEnv):
 
     ## Info
 
-    The keys of `BrakingEnv` except `thw`, `drac` and `required_deceleration`, with these differences;
-    undefined values are `inf`.
+    The keys of `BrakingEnv` except `thw` and `drac`, with these differences; undefined values are `inf`.
 
     | key | meaning | undefined |
     |---|---|---|
     | `deceleration` | ego deceleration beyond the driver's, >= 0 [m/s²] | |
     | `driver_acceleration` | acceleration demanded by the driver [m/s²] | |
+    | `required_deceleration` | Δv / (2·t) of contacts predicted with the steering, >= 0 [m/s²] | contact |
     | `target_speed` | speed along the ego's heading of the first car ahead [m/s] | nothing within 300 m |
     | `side` | part of the ego in contact: "front", "rear", "side"; "" without contact | |
     | `distance` | distance travelled since the reset [m] | |
@@ -141,6 +142,11 @@ class TrafficEnv(EgoBrakeEnv):
     def ego(self) -> TrafficEgo:
         """The car under test."""
         return cast(TrafficEgo, self.vehicle)
+
+    @property
+    def required_deceleration(self) -> float:
+        """Deceleration that avoids the predicted contacts [m/s²]; see `need.required_deceleration`."""
+        return required_deceleration(self.road.bodies())
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Advance by one decision; see `AbstractEnv.step`."""
@@ -235,6 +241,7 @@ class TrafficEnv(EgoBrakeEnv):
             "relative_impact_speed": contact.relative_impact_speed if contact else inf,
             "deceleration": ego.braking,
             "driver_acceleration": ego.driver_acceleration,
+            "required_deceleration": required_deceleration(bodies),
             "target_speed": float(lead["speed"] * cos(lead["heading"] - ego.heading)) if index else inf,
             "distance": ego.travelled,
         }

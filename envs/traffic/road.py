@@ -187,7 +187,7 @@ class TrafficRoad(RegulatedRoad):
         cars = cars[[ego, *range(ego), *range(ego + 1, len(cars))]]
         bodies = np.zeros(len(cars), BODY)
         bodies["kind"], bodies["path_end"] = BOX, 1
-        for name in ("x", "y", "heading", "speed", "length", "width"):
+        for name in ("x", "y", "heading", "speed", "steering", "length", "width"):
             bodies[name] = cars[name]
         return bodies
 

@@ -218,8 +218,9 @@ def test_braking_for_a_stationary_car_is_necessary_and_avoids_contact(wall_kinds
     assert row["threat"]
     assert row["avoided"] is True
     assert not row["collision"]
-    assert (row["brakes"], row["false_activations"], row["premature_brakes"], row["stops"]) == (1, 0, 0, 1)
-    assert log.events[0].time_to_emergency < 1.0  # hard braking of the driver
+    assert (row["brakes"], row["false_activations"], row["stops"]) == (1, 0, 1)
+    # At 25 m/s, 50 - 2.15 - 2.5 m behind the stationary car, 6.9 m/s² are required.
+    assert log.events[0].time_to_emergency == 0.0
     assert 2.0 < row["peak_deceleration"] <= 9.0
 
 
@@ -267,15 +268,41 @@ def test_always_brake_makes_progress():
 
 
 def test_time_to_the_next_emergency_within_the_horizon():
-    emergencies = Emergencies(contact=20.0, hard=(5.0, 5.1))
-    assert emergencies.time_until(0.0) == 5.0
+    emergencies = Emergencies(contact=20.0, demanding=(5.0, 5.5))
+    assert emergencies.time_until(2.0) == 3.0
+    assert emergencies.time_until(1.9) is None
+    assert emergencies.time_until(1.9, 10.0) == pytest.approx(3.1)
     assert emergencies.time_until(5.0) == 0.0
-    assert emergencies.time_until(5.2) is None
-    assert emergencies.time_until(10.0) == 10.0
-    assert emergencies.time_until(9.9) is None
+    assert emergencies.time_until(5.2) == pytest.approx(0.3)
+    assert emergencies.time_until(5.6) is None
+    assert emergencies.time_until(17.0) == 3.0
+    assert emergencies.time_until(16.9) is None
+    assert emergencies.time_until(20.1) is None
     assert Emergencies(None, ()).time_until(0.0) is None
 
 
-def test_braking_4_5_s_before_an_emergency_is_premature_not_false():
-    event = BrakingEvent(start=0.0, time_to_emergency=4.5, last=0.0, peak=9.0)
-    assert (event.false, event.premature) == (False, True)
+@pytest.mark.parametrize(
+    ("time", "peak", "false"), [(None, 9.0, True), (None, 2.0, False), (2.9, 9.0, False)]
+)
+def test_braking_is_false_if_it_counts_and_is_not_needed(time, peak, false):
+    assert BrakingEvent(start=0.0, time_to_emergency=time, last=0.0, peak=peak).false is false
+
+
+def test_time_in_which_a_brake_is_needed(wall_kinds):
+    """The ego of "wall" has contact after less than 3 s; that of "empty" is never in need."""
+    recording = Recorded("wall", config={"duration": 12}).recording
+    moving, needed = recording.moving_and_needed
+    assert moving == needed == len(recording.moments) / 30
+    moving, needed = Recorded("empty", config={"duration": 12}).recording.moving_and_needed
+    assert (moving, needed) == (pytest.approx(12.0, abs=0.1), 0.0)
+
+
+def test_hard_braking_of_the_driver_without_a_conflict_is_no_emergency():
+    """At intersections, IDM brakes by more than 5 m/s² to give way to cars that will have passed."""
+    recording = Recorded("intersection", 2).recording
+    driver = np.array([moment.info["driver_acceleration"] for moment in recording.moments])
+    required = np.array([moment.info["required_deceleration"] for moment in recording.moments])
+    assert (driver <= -5.0).sum() > 10
+    assert (required[driver <= -5.0] < 5.0).any()
+    moving, needed = recording.moving_and_needed
+    assert needed < 0.3 * moving

@@ -20,8 +20,8 @@ SHORT = {"duration": 12}
 def row(agent="a", kind="merge", **values):
     """Return a row with zeros for all counts and lengths."""
     identity = {"agent": agent, "case": f"traffic/{kind}/s0", "condition": "clear"}
-    counts = ("alerts", "brakes", "false_activations", "premature_brakes", "stops")
-    zeros = dict.fromkeys((*counts, "peak_deceleration", "distance"), 0)
+    counts = ("alerts", "brakes", "false_activations", "stops")
+    zeros = dict.fromkeys((*counts, "peak_deceleration", "distance", "moving_time", "needed_time"), 0)
     return dict.fromkeys(KEYS) | identity | zeros | {"collision": False, "threat": False} | values
 
 

@@ -6,8 +6,8 @@ from functools import cached_property
 from typing import Any
 
 from lgmd_gym.benchmark.traffic.reader import Moment, SceneReader
-from lgmd_gym.envs.traffic.emergencies import HARD_BRAKING, HORIZON, Emergencies, simulate_driver
-from lgmd_gym.envs.traffic.env import TrafficEnv
+from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON, Emergencies, simulate_driver
+from lgmd_gym.envs.traffic.env import JAM_SPEED, TrafficEnv
 from lgmd_gym.envs.traffic.registration import make_traffic
 from lgmd_gym.sensing.sensor_array import SensorArray
 
@@ -37,11 +37,20 @@ class TrafficRecording:
     @cached_property
     def emergencies(self) -> Emergencies:
         """Emergencies up to `HORIZON` beyond the end."""
-        driver = [moment.info["driver_acceleration"] for moment in self.moments]
-        hard = [index / self.policy_hz for index, value in enumerate(driver) if value <= -HARD_BRAKING]
+        required = [moment.info["required_deceleration"] for moment in self.moments]
+        demanding = [index / self.policy_hz for index, value in enumerate(required) if value >= EMERGENCY]
         end = len(self.moments) - 1
         beyond = simulate_driver(self.fork(end), end / self.policy_hz)
-        return Emergencies(beyond.contact, (*hard, *beyond.hard))
+        return Emergencies(beyond.contact, tuple(sorted({*demanding, *beyond.demanding})))
+
+    @cached_property
+    def moving_and_needed(self) -> tuple[float, float]:
+        """Time in motion, above 0.5 m/s, and the part of it in which a brake is needed [s]."""
+        moving = [
+            index / self.policy_hz for index, moment in enumerate(self.moments) if moment.speed > JAM_SPEED
+        ]
+        needed = sum(self.emergencies.time_until(time) is not None for time in moving)
+        return len(moving) / self.policy_hz, needed / self.policy_hz
 
     def fork(self, decision: int) -> TrafficEnv:
         """Return an environment in the exact state of a decision.

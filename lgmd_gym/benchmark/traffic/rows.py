@@ -6,7 +6,7 @@ from typing import Any
 
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import Step
-from lgmd_gym.benchmark.metrics import NUISANCE, PREMATURE
+from lgmd_gym.benchmark.metrics import NUISANCE
 from lgmd_gym.benchmark.rows import ID_KEYS, WORLD
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.traffic.recording import TrafficRecording
@@ -26,11 +26,12 @@ KEYS = (
     "alerts",
     "brakes",
     "false_activations",
-    "premature_brakes",
     "stops",
     "peak_deceleration",
     "distance",
     "duration",
+    "moving_time",
+    "needed_time",
     "fps",
     "error",
 )
@@ -42,7 +43,7 @@ class BrakingEvent:
 
     Attributes:
         start: Time of the first demand [s].
-        time_to_emergency: Time from the start to the emergency without it [s]; None for no emergency.
+        time_to_emergency: Time from the start to the emergency without it [s]; None if it is not needed.
         last: Time of the last demand [s].
         peak: Highest deceleration beyond the driver's [m/s²].
     """
@@ -59,13 +60,8 @@ class BrakingEvent:
 
     @property
     def false(self) -> bool:
-        """Whether the event counts and no emergency would follow without it."""
+        """Whether the event counts and is not needed, see `lgmd_gym.envs.traffic.emergencies`."""
         return self.counts and self.time_to_emergency is None
-
-    @property
-    def premature(self) -> bool:
-        """Whether the event counts and the emergency is more than 4 s away."""
-        return self.counts and self.time_to_emergency is not None and self.time_to_emergency > PREMATURE
 
 
 @dataclass(slots=True)
@@ -103,6 +99,7 @@ def measure(recording: TrafficRecording, log: EpisodeLog) -> dict[str, Any]:
     """
     assert log.end is not None
     info = log.end.info
+    moving, needed = recording.moving_and_needed
     threat, collision = bool(recording.moments[-1].info["collision"]), bool(info["collision"])
     return {
         "threat": threat,
@@ -114,11 +111,12 @@ def measure(recording: TrafficRecording, log: EpisodeLog) -> dict[str, Any]:
         "alerts": int(log.alerts),
         "brakes": sum(event.counts for event in log.events),
         "false_activations": sum(event.false for event in log.events),
-        "premature_brakes": sum(event.premature for event in log.events),
         "stops": log.stops,
         "peak_deceleration": float(log.peak),
         "distance": float(info["distance"]),
         "duration": log.duration,
+        "moving_time": moving,
+        "needed_time": needed,
         "fps": recording.fps,
     }
 

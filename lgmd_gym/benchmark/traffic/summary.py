@@ -20,7 +20,8 @@ COLUMNS = (
     "false_per_100km",
     "false_low",
     "false_high",
-    "premature_brakes",
+    "moving_s",
+    "needed_share",
     "alerts_per_100km",
     "threats",
     "avoided",
@@ -41,8 +42,9 @@ class TrafficSummary(NamedTuple):
         distance: Total distance [m].
         alerts: Number of alerts.
         brakes: Number of braking events beyond 0.25 g.
-        false_activations: Number of these without an emergency.
-        premature: Number of these with an emergency more than 4 s away.
+        false_activations: Number of these that were not needed.
+        moving: Time in motion without braking by the agent [s].
+        needed: Part of it in which a brake is needed, and therefore never false [s].
         avoided: Episodes without contact among those with contact without braking.
         contacts: Number of episodes with contact.
         rear_ended: Number of episodes in which another car hit the ego's rear.
@@ -57,7 +59,8 @@ class TrafficSummary(NamedTuple):
     alerts: int
     brakes: int
     false_activations: int
-    premature: int
+    moving: float
+    needed: float
     avoided: Rate
     contacts: int
     rear_ended: int
@@ -67,6 +70,11 @@ class TrafficSummary(NamedTuple):
     def per_100km(self, count: float) -> float:
         """Return a count as a rate [1/100 km]; infinite without distance."""
         return count * PER / self.distance if self.distance > 0.0 else inf
+
+    @property
+    def needed_share(self) -> float | None:
+        """Share of the time in motion in which a brake is needed; None without motion."""
+        return self.needed / self.moving if self.moving > 0.0 else None
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -86,7 +94,8 @@ def summarise_traffic(agent: str, kind: str, rows: list[Row]) -> TrafficSummary:
         alerts=sum(row["alerts"] for row in played),
         brakes=sum(row["brakes"] for row in played),
         false_activations=sum(row["false_activations"] for row in played),
-        premature=sum(row["premature_brakes"] for row in played),
+        moving=sum(row["moving_time"] for row in played),
+        needed=sum(row["needed_time"] for row in played),
         avoided=rate_of([row for row in played if row["threat"]], "avoided"),
         contacts=sum(row["collision"] for row in played),
         rear_ended=sum(row["side"] == "rear" for row in played),
@@ -126,7 +135,8 @@ def _line(item: TrafficSummary, condition: str) -> list[Any]:
         item.brakes,
         item.false_activations,
         *(f"{item.per_100km(count):.4f}" if driven else "" for count in counts),
-        item.premature,
+        f"{item.moving:.2f}",
+        "" if item.needed_share is None else f"{item.needed_share:.4f}",
         f"{item.per_100km(item.alerts):.4f}" if driven else "",
         item.avoided.n,
         item.avoided.k,

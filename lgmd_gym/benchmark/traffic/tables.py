@@ -6,16 +6,18 @@ from rich.table import Table
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.summary import Sample
 from lgmd_gym.benchmark.traffic.summary import TrafficSummary, traffic_summaries
+from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON
 
 CAPTION = (
-    "false: without it, no contact and no hard braking by the driver within 10 s; [exact Poisson 95 % "
-    "interval]; premature: emergency more than 4 s away; contacts (of these rear-ended)"
+    f"false: without it, no contact and no required deceleration of {EMERGENCY:g} m/s² within {HORIZON:g} s; "
+    "[exact Poisson 95 % interval]; needed: share of the time in motion in which a brake is not false; "
+    "contacts (of these rear-ended)"
 )
 HEADINGS = (
     "km",
     "false activations\nper 100 km",
     "false/\nbrakes",
-    "pre-\nmature",
+    "needed,\n% of time",
     "avoided",
     "contacts",
 )
@@ -54,7 +56,7 @@ def _cells(item: TrafficSummary, by_kind: bool) -> list[str]:
         f"{item.distance / 1000:.1f}",
         rate,
         f"{item.false_activations}/{item.brakes}",
-        str(item.premature),
+        "–" if item.needed_share is None else f"{100.0 * item.needed_share:.1f}",
         f"{item.avoided.k}/{item.avoided.n}",
         f"{item.contacts} ({item.rear_ended})",
     ]

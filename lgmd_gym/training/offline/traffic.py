@@ -20,10 +20,11 @@ from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.scenarios.distribution import draw_camera_fields
-from lgmd_gym.envs.traffic.emergencies import HARD_BRAKING, Emergencies, simulate_driver
+from lgmd_gym.envs.traffic.emergencies import EMERGENCY, Emergencies, simulate_driver
 from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
 from lgmd_gym.training.offline.episodes import Observation, RecordedEpisode, select_signals, stack
 
+MARGIN = 10.0  # segments end this time before an emergency [s]
 MAX_LENGTH = 10.0  # longest segment [s]; levels last 7 s in the median and 22 s at most
 MIN_LENGTH = 1.0  # shortest stretch without an emergency that is kept [s]
 
@@ -58,7 +59,7 @@ class TrafficRecorder:
             env.close()
         policy_hz = base.config["policy_frequency"]
         times = np.arange(len(observations)) / policy_hz
-        non_threat = [emergencies.time_until(time) is None for time in times.tolist()]
+        non_threat = [emergencies.time_until(time, MARGIN) is None for time in times.tolist()]
         return [
             non_threat_episode(stack(observations[first:last]), policy_hz)
             for first, last in segment_bounds(non_threat, policy_hz)
@@ -74,23 +75,23 @@ def run_episode(env: gym.Env, seed: int, shrink: int | None = None) -> tuple[lis
         shrink: See `select_signals`.
     """
     base: Any = env.unwrapped
-    observations, hard_brakings = [], []
+    observations, demanding = [], []
     policy_hz = base.config["policy_frequency"]
     for step, _ in rollout(env, make_agent(NO_BRAKE), seed):
         if step.done:
             break
-        if step.info["driver_acceleration"] <= -HARD_BRAKING:
-            hard_brakings.append(len(observations) / policy_hz)
+        if step.info["required_deceleration"] >= EMERGENCY:
+            demanding.append(len(observations) / policy_hz)
         observations.append(select_signals(step.observation, shrink))
-    later = simulate_driver(base, len(observations) / policy_hz)
-    return observations, Emergencies(later.contact, (*hard_brakings, *later.hard))
+    later = simulate_driver(base, len(observations) / policy_hz, MARGIN)
+    return observations, Emergencies(later.contact, (*demanding, *later.demanding))
 
 
 def segment_bounds(non_threat: list[bool], policy_hz: float) -> list[tuple[int, int]]:
     """Return first and last (exclusive) decision of each segment; a long stretch is divided evenly.
 
     Args:
-        non_threat: Whether no emergency is near, for each decision.
+        non_threat: Whether no emergency follows within `MARGIN`, for each decision.
         policy_hz: Decision rate [Hz].
     """
     edges = np.flatnonzero(np.diff([0, *map(int, non_threat), 0])).reshape(-1, 2)
