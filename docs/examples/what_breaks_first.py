@@ -96,7 +96,7 @@ def first_table(
     """Print the table of changed cameras, weather and targets."""
     threats = [*find_suite("r152").cases, *find_suite("fmvss127").cases][::every]
     non_threats = find_suite("false-reaction").cases[::every]
-    print("| change | sample | avoided | premature | false activations |\n|---|---|---|---|---|")
+    print("| change | avoided | premature | false activations | sample |\n|---|---|---|---|---|")
     for name in names:
         change, arguments = CHANGES[name]
         rows = play(agent, with_arguments(threats, **arguments), seeds, change, jobs)
@@ -108,7 +108,7 @@ def first_table(
             rate(false_reaction, "false_activation"),
         )
         sample = f"{Sample.of(rows)}, {Sample.of(false_reaction)}" if false_reaction else str(Sample.of(rows))
-        print(f"| {name} | {sample} | {' | '.join(cells)} |", flush=True)
+        print(f"| {name} | {' | '.join(cells)} | {sample} |", flush=True)
 
 
 def second_table(agent: str, seeds: int, jobs: int, every: int = 1) -> None:
