@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lgmd_gym.camera.clutter import draw_clutter, place_clutter
 from lgmd_gym.camera.objects import OBJECT
 from lgmd_gym.camera.roadside import guard_rails, posts_and_plants
 
@@ -42,12 +43,14 @@ class RoadGeometry(NamedTuple):
     paved: bool
 
 
-_CACHE: weakref.WeakKeyDictionary[Any, dict[tuple[float, int, bool], RoadGeometry]] = (
+_CACHE: weakref.WeakKeyDictionary[Any, dict[tuple[float, int, bool, bool], RoadGeometry]] = (
     weakref.WeakKeyDictionary()
 )
 
 
-def road_geometry(road: Any, roadside: float = 0.0, seed: int = 0, rail: bool = False) -> RoadGeometry:
+def road_geometry(
+    road: Any, roadside: float = 0.0, seed: int = 0, rail: bool = False, cluttered: bool = False
+) -> RoadGeometry:
     """Return the geometry of a road's network, cached for the lifetime of the network.
 
     Args:
@@ -55,9 +58,10 @@ def road_geometry(road: Any, roadside: float = 0.0, seed: int = 0, rail: bool = 
         roadside: Density of posts and trees, as a multiple of the natural density.
         seed: Seed of their positions.
         rail: Whether guard rails run along the outer edges.
+        cluttered: Whether clutter stands along the road, see `draw_clutter`.
     """
     network = network_of(road)
-    key = (roadside, seed, rail)
+    key = (roadside, seed, rail, cluttered)
     if network is None:
         return _extract([], *key)
     try:
@@ -81,7 +85,7 @@ def _lanes(network: Any) -> list[Any]:
     return [lane for lane in lanes if math.isfinite(lane.length) and lane.length > 0.0]
 
 
-def _extract(lanes: list[Any], roadside: float, seed: int, rail: bool) -> RoadGeometry:
+def _extract(lanes: list[Any], roadside: float, seed: int, rail: bool, cluttered: bool) -> RoadGeometry:
     if not lanes:
         return RoadGeometry(np.zeros((0, 8)), np.zeros(0, LINE), np.zeros(0, OBJECT), True)
     surface: list[np.ndarray] = []
@@ -98,20 +102,23 @@ def _extract(lanes: list[Any], roadside: float, seed: int, rail: bool) -> RoadGe
         surface.append(_car_park(np.concatenate(surface)))
         records = np.zeros(0, OBJECT)
     else:
-        records = _roadside_of(np.concatenate(segments).tobytes(), roadside, seed, rail)
+        records = _roadside_of(np.concatenate(segments).tobytes(), roadside, seed, rail, cluttered)
     lines_once = _without_duplicates(np.concatenate(lines))
     return RoadGeometry(np.concatenate(surface), lines_once.view(LINE)[:, 0], records, False)
 
 
 @lru_cache(maxsize=16)
-def _roadside_of(segments: bytes, roadside: float, seed: int, rail: bool) -> np.ndarray:
+def _roadside_of(segments: bytes, roadside: float, seed: int, rail: bool, cluttered: bool) -> np.ndarray:
     """Return the roadside, cached by the shape of the lanes, because each reset builds a new network."""
     pieces = np.frombuffer(segments).reshape(-1, 6)
     out = posts_and_plants(pieces, roadside, seed)
+    parts = [out]
     if rail:
-        out = np.concatenate((out, guard_rails(pieces)))
-        out = out[np.argsort(out["x"], kind="stable")]
-    return out
+        parts.append(guard_rails(pieces))
+    if cluttered:
+        parts.append(place_clutter(pieces, draw_clutter(np.random.default_rng([seed, 11])), seed))
+    out = np.concatenate(parts)
+    return out[np.argsort(out["x"], kind="stable")]
 
 
 def _stations(lane: Any) -> np.ndarray:

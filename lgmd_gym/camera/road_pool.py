@@ -14,8 +14,8 @@ from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.road_geometry import LINE, RoadGeometry, network_of, road_geometry
 from lgmd_gym.camera.worlds import draw_world
 
-RoadKey: TypeAlias = tuple[float, int, bool]
-"""What the geometry depends on besides the lanes: `roadside`, `seed` and `guard_rail` of `CameraParams`."""
+RoadKey: TypeAlias = tuple[float, int, bool, bool]
+"""What the geometry depends on besides the lanes: the arguments of `road_geometry`."""
 Span: TypeAlias = tuple[int, ...]
 """A row of `RoadArrays.spans`."""
 
@@ -23,7 +23,7 @@ Span: TypeAlias = tuple[int, ...]
 def road_key(p: CameraParams) -> RoadKey:
     """Return the parameters of a camera that its road depends on."""
     world = draw_world(p.world)
-    return p.roadside * world.roadside, seed_of(p), p.guard_rail or world.guard_rail
+    return p.roadside * world.roadside, seed_of(p), p.guard_rail or world.guard_rail, world.drawn
 
 
 class RoadArrays(NamedTuple):
