@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.params import MAX_WIDTH, CameraParams
 from lgmd_gym.camera.worlds import World, draw_world
 
 LOOK = np.dtype(
@@ -15,7 +15,7 @@ LOOK = np.dtype(
         for name in (
             *("asphalt", "asphalt_gain", "verge", "verge_gain", "paint", "line_width", "dash", "dash_period"),
             *("zenith", "horizon", "hills", "trees", "leaf_gain", "hill_scale", "tree_scale"),
-            *("sun_x", "sun_y", "sun_z", "ambient", "direct", "cast"),
+            *("sun_x", "sun_y", "sun_z", "ambient", "direct", "cast", "glare"),
             *("under_body", "under_lean", "under_first", "under_step", "under_rings", "under_box"),
             "shadow_limit",
             *("haze", "extinction", "night", "night_light", "beam_gain", "wet", "paved"),
@@ -28,7 +28,8 @@ LOOK = np.dtype(
 
 Light (`…_gain`: per stored unit of a texture or skyline); width of markings, length and period of dashes [m];
 scale of the skyline's elevations; direction of the sun; light on a face from the sky, and from the sun where
-it is at right angles, as shares of the light on the road; share of light that a cast shadow removes; the soft
+it is at right angles, as shares of the light on the road; share of light that a cast shadow removes; glare in the
+direction of the sun; the soft
 shadow below an object, see `shadows.add_shadow`; light of the fog and extinction of the air [1/m]; 1.0 for
 night; light at night apart from the low beam, and its peak; 1.0 for a wet and for an all-paved ground; sensor
 noise [grey levels]; exposure time [s]; 1.0 for linear light; time constant [s], target [grey levels] and
@@ -39,15 +40,19 @@ BEAM_WIDTH = 0.26  # the low beam falls to 1/e at this tangent of the angle from
 WHITE = 255.0
 SHOT_NOISE, READ_NOISE = 1.2, 0.8
 """Usual noise of the sensor in numbered worlds, see `CameraParams`."""
+_GLARE = 700.0  # light that is scattered in the direction of a low sun
 _WET_ASPHALT, _WET_VERGE, _WET_PAINT = 0.78, 0.85, 0.9  # grey of a wet surface over that of a dry one
 _LABORATORY_SUN = (-0.48, 0.36, 0.80)
 _TEXTURE_GAIN = 1.0 / 36.0  # textures store 36 per standard deviation
 NOISE_LOG2 = 17
-"""Binary logarithm of the length of the noise table."""
+"""Binary logarithm of the number of different numbers in the noise table."""
 
 
 def in_world(p: CameraParams) -> CameraParams:
-    """Return a camera with the sensor of its world: linear light, noise and automatic exposure."""
+    """Return a camera with the sensor of its world: linear light, noise and automatic exposure.
+
+    The noise replaces that of `p`, also that of a condition: at night it grows with the gain of the exposure.
+    """
     world = draw_world(p.world)
     if not world.drawn:
         return p
@@ -55,8 +60,8 @@ def in_world(p: CameraParams) -> CameraParams:
         p,
         linear_light=True,
         auto_exposure_s=p.auto_exposure_s or world.exposure_s,
-        shot_noise=max(p.shot_noise, SHOT_NOISE * world.noise),
-        read_noise=max(p.read_noise, READ_NOISE * world.noise),
+        shot_noise=SHOT_NOISE * world.noise,
+        read_noise=READ_NOISE * world.noise,
     )
 
 
@@ -115,8 +120,8 @@ def _set_sensor(look: np.ndarray, p: CameraParams) -> None:
     look["shot_noise"], look["read_noise"] = p.shot_noise, p.read_noise
     look["shutter_s"] = p.shutter_s
     look["linear"], look["auto_exposure_s"] = float(p.linear_light), p.auto_exposure_s
-    look["target_grey"] = 64.0 if night else 110.0
-    look["least_gain"], look["most_gain"] = (1.0, 24.0) if night else (0.25, 8.0)
+    look["target_grey"] = (0.5 if night else 1.0) * draw_world(p.world).exposure_grey
+    look["least_gain"], look["most_gain"] = (0.5, 6.0) if night else (0.25, 8.0)
 
 
 def _wet(p: CameraParams, grey: float, darkening: float) -> float:
@@ -128,7 +133,9 @@ def _set_sky(look: np.ndarray, p: CameraParams, world: World) -> None:
     """Set the light of sky, skyline and fog."""
     greys = (*world.greys, world.leaf_contrast)
     if p.light == "night":
-        greys = (6.0, 14.0, 7.0, 4.0, 1.0)
+        # In numbered worlds street lamps light the sky.
+        glow = math.sqrt(world.street_light / 0.04) if world.drawn else 1.0
+        greys = tuple(glow * grey for grey in (6.0, 14.0, 7.0, 4.0, 1.0))
     names = ("zenith", "horizon", "hills", "trees")
     for name, grey in zip(names, greys, strict=False):
         look[name] = to_light(p, grey)
@@ -151,7 +158,7 @@ def _set_sun(look: np.ndarray, p: CameraParams, world: World) -> None:
         look["sun_z"] = math.sin(elevation)
         # A vertical face receives light from half of the sky and from the ground.
         look["ambient"], look["direct"] = 0.12 + 0.55 * (1.0 - share), share / math.sin(elevation)
-        look["cast"] = share
+        look["cast"], look["glare"] = share, _GLARE if p.light == "low_sun" and share > 0.0 else 0.0
         # From 0.5 m inside the outline of a car to 0.28 m outside it; a box has a shadow at its edges only.
         rings, missing = 7, world.under_body * (0.6 if p.light == "night" else 1.0)
         values = (missing / rings, 0.0, -0.5, 0.13, rings, 0.2, 0.95)
@@ -195,5 +202,9 @@ def beam_profile(p: CameraParams) -> np.ndarray:
 
 @lru_cache(maxsize=4)
 def noise_table(seed: int) -> np.ndarray:
-    """Return standard normal numbers, float32, shape (131072,)."""
-    return np.random.default_rng([seed, 5]).standard_normal(1 << NOISE_LOG2, dtype=np.float32)
+    """Return 2^`NOISE_LOG2` standard normal numbers and the first ones again, float32.
+
+    The repeated ones let a row of a frame begin at any of the numbers.
+    """
+    numbers = np.random.default_rng([seed, 5]).standard_normal(1 << NOISE_LOG2, dtype=np.float32)
+    return np.concatenate((numbers, numbers[: MAX_WIDTH + 16]))

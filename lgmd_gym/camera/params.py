@@ -20,6 +20,8 @@ from lgmd_gym.errors import (
 )
 
 MAX_PATH = 4096  # characters
+MAX_WIDTH = 4096
+"""Maximum width and height of a frame [px]."""
 
 
 class _Interval(NamedTuple):
@@ -143,7 +145,7 @@ class CameraParams:
         """Check every field."""
         if not isinstance(self.name, str) or not self.name:
             raise ValueError(f"camera name must be a non-empty string, got {shown(self.name)}")
-        object.__setattr__(self, "shape", check_size("camera shape", self.shape, 4, 4096))
+        object.__setattr__(self, "shape", check_size("camera shape", self.shape, 4, MAX_WIDTH))
         for name, bound in _BOUNDS.items():
             object.__setattr__(self, name, _checked_number(name, getattr(self, name), bound))
         _check_surroundings(self)

@@ -45,7 +45,7 @@ _ASPHALT_CONTRASTS = {
     "concrete": (0.5, 1.2),
 }
 _VERGE_GREYS = {
-    "grass": (52.0, 104.0),
+    "grass": (60.0, 110.0),
     "gravel": (92.0, 150.0),
     "soil": (70.0, 128.0),
     "paving": (92.0, 146.0),
@@ -62,7 +62,7 @@ _OVERCAST_SHARE = 0.4  # of all daylight worlds
 class World:
     """The appearance of an episode.
 
-    Grey levels are display-coded, 0 to 255, in the light of a clear or overcast day.
+    Grey levels are display-coded, 255 for white, in the light of a clear or overcast day.
 
     Attributes:
         number: Number of the world; -1 for the laboratory.
@@ -94,6 +94,7 @@ class World:
         pitch_error_deg: Upward tilt of the optical axis relative to its mount [degrees].
         yaw_error_deg: Turn of the optical axis to the right relative to its mount [degrees].
         noise: Sensor noise as a multiple of the usual noise.
+        exposure_grey: Mean grey to which the automatic exposure brings the road and its surroundings by day.
         exposure_s: Time constant of the automatic exposure [s]; 0 for a fixed exposure.
     """
 
@@ -125,6 +126,7 @@ class World:
     pitch_error_deg: float = 0.0
     yaw_error_deg: float = 0.0
     noise: float = 0.0
+    exposure_grey: float = 110.0
     exposure_s: float = 0.0
 
     @property
@@ -191,13 +193,13 @@ def _draw_markings(rng: np.random.Generator) -> dict[str, object]:
 
 
 def _draw_surroundings(rng: np.random.Generator) -> dict[str, object]:
-    horizon = float(rng.uniform(190.0, 250.0))
+    horizon = float(rng.uniform(205.0, 330.0))  # a bright sky is beyond white
     return {
         "skyline": int(rng.integers(SKYLINES)),
         "hill_scale": float(rng.uniform(0.0, 2.0)),
         "tree_scale": float(np.exp(rng.uniform(np.log(0.5), np.log(4.0)))),
         "greys": (
-            float(rng.uniform(120.0, 205.0)), horizon, float(rng.uniform(90.0, 150.0)),
+            horizon * float(rng.uniform(0.55, 0.95)), horizon, float(rng.uniform(90.0, 150.0)),
             float(rng.uniform(34.0, 92.0)),
         ),
         "leaf_contrast": float(rng.uniform(3.0, 10.0)),
@@ -214,7 +216,7 @@ def _draw_sun(rng: np.random.Generator) -> dict[str, object]:
         "sun_elevation_deg": float(rng.uniform(18.0, 62.0)),
         "sun_share": share,
         "beam": float(rng.uniform(0.3, 0.9)),
-        "street_light": float(np.exp(rng.uniform(np.log(0.001), np.log(0.02)))),
+        "street_light": float(np.exp(rng.uniform(np.log(0.002), np.log(0.08)))),
         # Display-coded, 0.49 to 0.58 of the road's grey was measured on a real overcast road, and 0.41 to
         # 0.85 in a tunnel; light is the square of the display code.
         "under_body": float(rng.uniform(0.62, 0.80)),
@@ -227,5 +229,6 @@ def _draw_camera(rng: np.random.Generator) -> dict[str, object]:
         "pitch_error_deg": float(rng.uniform(-0.5, 0.5)),
         "yaw_error_deg": float(rng.uniform(-0.5, 0.5)),
         "noise": float(rng.uniform(0.5, 1.5)),
+        "exposure_grey": float(rng.uniform(84.0, 122.0)),
         "exposure_s": float(rng.uniform(0.2, 1.0)),
     }

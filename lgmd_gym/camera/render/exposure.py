@@ -9,7 +9,7 @@ import math
 import numba as nb
 
 from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.simd import LANES, load_part, minimum, splat, total
+from lgmd_gym.simd import LANES, load_part, maximum, minimum, splat, square_root, total
 
 _EVERY = 4  # rows between those that are measured
 _GAIN, _CALLED, _TIME = 0, 1, 2
@@ -40,8 +40,9 @@ def adapt_exposure(exposure, image, look):
         image: Light, float32, shape (height, width).
         look: Target and bounds of the gain.
     """
-    target = look.target_grey**2 / 255.0 if look.linear > 0.0 else look.target_grey
-    wanted = target / max(_mean_light(image), 1e-3)
+    wanted = look.target_grey / max(_mean_grey(image, look.linear > 0.0), 1e-2)
+    if look.linear > 0.0:
+        wanted = wanted * wanted
     exposure[_CALLED] = min(max(wanted, look.least_gain), look.most_gain)
     if math.isnan(exposure[_GAIN]):
         exposure[_GAIN] = exposure[_CALLED]
@@ -49,12 +50,17 @@ def adapt_exposure(exposure, image, look):
 
 
 @kernel
-def _mean_light(image):
-    """Return the mean light of every fourth row, at most white in each pixel."""
+def _mean_grey(image, linear):
+    """Return the mean grey of every fourth row of the lower two thirds, at most white in each pixel.
+
+    The weight of the road keeps a bright sky from darkening it, as in cameras of cars.
+    """
     height, width = image.shape
     white, sums, count = splat(nb.float32(255.0)), splat(nb.float32(0.0)), 0
-    for i in range(_EVERY // 2, height, _EVERY):
+    zero = splat(nb.float32(0.0))
+    for i in range(height // 3, height, _EVERY):
         for j in range(0, width, LANES):
-            sums = sums + minimum(load_part(image, i * width + j, width - j), white)
+            light = minimum(maximum(load_part(image, i * width + j, width - j), zero), white)
+            sums = sums + (square_root(light * white) if linear else light)
         count += width
     return total(sums) / count

@@ -11,6 +11,7 @@ BUDGET_PX = 3000.0
 _RADIUS = 0.03  # radius of a halo, 1.7°, from scatter in the lens [rad]
 _PEAK = 200.0  # grey added at the centre by a lamp nearer than _FULL
 _FULL = 50.0  # [m]
+_SUN_RADIUS = 0.05  # the glare of the sun halves at this angle from it [rad]
 
 
 @kernel
@@ -45,6 +46,26 @@ def add_glare(image, lens, obj, lamps, clear, budget):
         radius = min(radius, math.sqrt(max(budget, 0.0) / math.pi), 24.0)
         budget -= _add_halo(image, u, v, radius, _PEAK * facing * near * clear)
     return budget
+
+
+@kernel
+def add_sun_glare(image, lens, look):
+    """Add the light of a low sun that scatters in lens and windscreen: a wide halo around its direction."""
+    level = look.sun_x * lens.cos_yaw + look.sun_y * lens.sin_yaw
+    depth = level * lens.cos_pitch + look.sun_z * lens.sin_pitch
+    if not depth > 0.1:
+        return
+    f, height, width = lens.focal, image.shape[0], image.shape[1]
+    right = (look.sun_y * lens.cos_yaw - look.sun_x * lens.sin_yaw) / depth
+    down = (level * lens.sin_pitch - look.sun_z * lens.cos_pitch) / depth
+    u = lens.centre_u + f * (right * lens.cos_roll - down * lens.sin_roll)
+    v = lens.centre_v + f * (right * lens.sin_roll + down * lens.cos_roll)
+    scale, peak = nb.float32(1.0 / (f * _SUN_RADIUS) ** 2), nb.float32(look.glare)
+    for i in range(height):
+        dy = nb.float32(i + 0.5 - v)
+        for j in range(width):
+            dx = nb.float32(j + 0.5 - u)
+            image[i, j] += peak / (nb.float32(1.0) + scale * (dx * dx + dy * dy))
 
 
 @kernel

@@ -9,7 +9,7 @@ from lgmd_gym.camera.render.blur import add_weighted, blur_steps, lens_before, m
 from lgmd_gym.camera.render.buffers import Buffers, GroundLayer, SolidLayer, Tables, View, Views
 from lgmd_gym.camera.render.cast_shadows import add_cast_shadows
 from lgmd_gym.camera.render.exposure import adapt_exposure
-from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
+from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare, add_sun_glare
 from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
 from lgmd_gym.camera.render.horizon import horizon_of
 from lgmd_gym.camera.render.jit import kernel
@@ -129,6 +129,8 @@ def draw_light(view, road, tables, models, objects, count, buffers):
     draw_ground(image, view, buffers.ground, tables, horizon)
     solids = SolidLayer(buffers.solids, buffers.corners, buffers.uv, buffers.axes, buffers.greys)
     draw_solids(image, view, models, objects, order, n, solids)
+    if view.look.glare > 0.0:
+        add_sun_glare(image, lens, view.look)
 
 
 @kernel

@@ -4,46 +4,34 @@ import math
 
 import numba as nb
 
+from lgmd_gym.camera.effects import NOISE_LOG2
 from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.simd import LANES, load_part, maximum, minimum, splat, square_root, store_bytes
+from lgmd_gym.simd import LANES, load_part, madd, maximum, minimum, splat, square_root, store_bytes
 
-_MID_GREY = 128.0  # where the noise levels hold
-_MID_LIGHT = _MID_GREY**2 / 255.0  # its linear light
-_MID_SLOPE = 2.0 * _MID_GREY / 255.0  # light per grey level there
-
-
-@kernel
-def _noise_levels(look):
-    """Return the variance of photon noise per unit of light, and that of read noise."""
-    if look.linear > 0.0:
-        square = _MID_SLOPE**2
-        return square * look.shot_noise**2 / _MID_LIGHT, square * look.read_noise**2
-    return look.shot_noise**2 / _MID_GREY, look.read_noise**2
+_MID_GREY = 128.0  # where the noise levels of a sensor without a display curve hold
 
 
 @kernel
 def expose(out, image, look, gain, noise, start):
-    """Add the sensor's noise to the light, amplify, encode and round it to grey values.
-
-    The noise is that of the light before the gain: a gain of 4 doubles the photon noise of a grey.
+    """Amplify and encode the light, add the sensor's noise and round to grey values.
 
     Args:
         out: Frame, uint8, shape (height, width).
-        image: Light; the noise is added in place.
+        image: Light; the noise is added in place unless the light is linear.
         look: Noise levels, and whether the light is linear.
         gain: Amplification of light and noise.
-        noise: Standard normal numbers, float32, a power of two of them.
+        noise: Standard normal numbers, see `noise_table`.
         start: Index of this frame's first number in `noise`.
     """
     height, width = out.shape
+    mask = (1 << NOISE_LOG2) - 1
+    if look.linear > 0.0:
+        _encode(out, image, look, gain, noise, start, mask)
+        return
     zero = nb.float32(0.0)
     black, half, white = splat(zero), splat(nb.float32(0.5)), splat(nb.float32(255.0))
-    noisy, linear = look.shot_noise > 0.0 or look.read_noise > 0.0, look.linear > 0.0
-    shot, read = _noise_levels(look)
-    shot, read = nb.float32(shot), nb.float32(read)
-    scale = splat(nb.float32(gain * 255.0 if linear else gain))
-    plain = gain == 1.0 and not linear
-    mask = noise.shape[0] - 1
+    noisy, scale = look.shot_noise > 0.0 or look.read_noise > 0.0, splat(nb.float32(gain))
+    shot, read = nb.float32(look.shot_noise**2 / _MID_GREY), nb.float32(look.read_noise**2)
     for i in range(height):
         if noisy:
             for j in range(width):
@@ -52,8 +40,28 @@ def expose(out, image, look, gain, noise, start):
         for j in range(0, width, LANES):
             at, count = i * width + j, width - j
             light = maximum(load_part(image, at, count), black)
-            if not plain:
+            if gain != 1.0:
                 light = light * scale
-                if linear:
-                    light = square_root(light)
             store_bytes(out, at, count, minimum(light, white) + half)
+
+
+@kernel
+def _encode(out, image, look, gain, noise, start, mask):
+    """Encode linear light as its square root, with noise.
+
+    The square root of a number of photons has the same deviation for any number, so the photon noise of the
+    code depends on the gain only: a gain of 4 means a quarter of the photons and twice the noise.
+    """
+    height, width = out.shape
+    black, half, white = splat(nb.float32(0.0)), splat(nb.float32(0.5)), splat(nb.float32(255.0))
+    scale = splat(nb.float32(gain * 255.0))
+    level = math.sqrt(gain) * math.sqrt(look.shot_noise**2 + look.read_noise**2)
+    noisy, level16 = level > 0.0, splat(nb.float32(level))
+    for i in range(height):
+        first = (start + i * width) & mask
+        for j in range(0, width, LANES):
+            at, count = i * width + j, width - j
+            code = square_root(maximum(load_part(image, at, count), black) * scale)
+            if noisy:
+                code = madd(level16, load_part(noise, first + j, count), code)
+            store_bytes(out, at, count, minimum(maximum(code, black), white) + half)
