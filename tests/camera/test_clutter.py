@@ -1,6 +1,6 @@
 """Clutter: where it stands, and how it is drawn."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -194,4 +194,17 @@ def test_model_is_drawn_as_along_the_rays(name, heading):
     base = 3.0 if MODELS[name] <= 16 else 0.0
     record = box_record(lens_x(env) + 14.0, 1.0, size, heading=heading, model=MODELS[name], base=base)
     set_roadside(env, params, record)
+    assert worst_error(params, env) <= 1.0
+
+
+@pytest.mark.parametrize(("seed", "kind"), list(enumerate(ROAD_TYPES)))
+def test_clutter_is_drawn_as_along_the_rays(seed, kind):
+    """Also the order of what hides each other, next to a queue and under bridges."""
+    env = straight_env(lanes=2, x=300.0)
+    params = CameraParams(shape=(21, 34), hfov_deg=60.0, texture=0.0)
+    lanes = np.array([[-200.0, y, 5000.0, y, 0.0, 3.5] for y in (0.0, 3.5)])
+    clutter = replace(ROAD_TYPES[kind], bridge=6.0, gantry=6.0, signal=6.0)
+    records = place_clutter(lanes, clutter, seed, (250.0, 500.0), queue_lane=0)
+    assert len(records) > 10
+    set_roadside(env, params, records)
     assert worst_error(params, env) <= 1.0

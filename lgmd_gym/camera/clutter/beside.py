@@ -66,7 +66,8 @@ def overhanging_trees(s: Sites, rng: np.random.Generator) -> Parts:
     shade, out = rng.uniform(40.0, 75.0, n), rng.uniform(2.6, 3.4, n)
     crown = (2.0, width, bottom + width * rng.uniform(0.6, 0.9, n))
     return [
-        part(s, MODEL_BOX, (0.4, 0.4, bottom + 0.8), 0.6 * shade, out=out),
+        # Behind the crown, which is a flat picture.
+        part(s, MODEL_BOX, (0.4, 0.4, bottom + 0.8), 0.6 * shade, out=out, along=0.35),
         part(s, MODEL_CROWN, crown, shade, out=out, base=bottom),
     ]
 

@@ -81,9 +81,9 @@ ROAD_TYPES = {
         bridge=0.3, patch=4.0, skid=1.0, queue=0.5,
     ),
     "urban": Clutter(
-        sign=4.0, lamp_post=9.0, overhanging_tree=2.0, wall=1.5, hedge=2.0, house=7.0, parked_car=8.0,
-        bollard=1.5, drain=4.0, bridge=0.3, tunnel=0.2, signal=1.5, zebra=1.0, arrow=1.0, patch=3.0,
-        manhole=3.0, joint=1.0, queue=3.0,
+        sign=3.5, lamp_post=7.0, overhanging_tree=2.0, wall=1.0, hedge=1.5, house=6.0, parked_car=7.0,
+        bollard=1.0, drain=3.0, bridge=0.3, tunnel=0.2, signal=1.5, zebra=1.0, arrow=1.0, patch=3.0,
+        manhole=2.5, joint=1.0, queue=3.0,
     ),
     "industrial": Clutter(
         sign=3.0, board=1.0, lamp_post=7.0, power_pole=3.0, wall=5.0, hedge=1.5, house=4.0, parked_car=5.0,

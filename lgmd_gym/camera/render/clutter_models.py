@@ -70,7 +70,7 @@ def add_hedge(b: ModelBuilder) -> None:
 
 def add_house(b: ModelBuilder) -> None:
     """Add a house with windows and a hipped roof."""
-    b.model(split=0.72)
+    b.model()
     b.solid()
     faces = b.box(0.0, 0.72, (-0.47, 0.47, 0.47), (-0.47, 0.47, 0.47))
     for face, columns in zip(faces[:4], (2, 2, 4, 4), strict=True):
