@@ -28,8 +28,8 @@ LOOK = np.dtype(
 
 Light (`…_gain`: per stored unit of a texture or skyline); width of markings, length and period of dashes [m];
 scale of the skyline's elevations; direction of the sun; light on a face from the sky, and from the sun where
-it is at right angles, as shares of the light on the road; share of light that a cast shadow removes; glare in the
-direction of the sun; the soft
+it is at right angles, as shares of the light on the road; share of light that a cast shadow removes; glare
+in the direction of the sun; the soft
 shadow below an object, see `shadows.add_shadow`; light of the fog and extinction of the air [1/m]; 1.0 for
 night; light at night apart from the low beam, and its peak; 1.0 for a wet and for an all-paved ground; sensor
 noise [grey levels]; exposure time [s]; 1.0 for linear light; time constant [s], target [grey levels] and
