@@ -17,6 +17,7 @@ OPTIONS = {
     "night": ({"light": "night"}, 1.4),
     "fog": (CONDITIONS["fog"], 1.4),
     "guard_rail": ({"guard_rail": True}, 2.6),
+    "road": ({"road": "normal"}, 1.6),  # redraws the sky, and no edge is level
     "shutter": ({"shutter_s": 0.011}, 3.4),  # two sharp images
     "panorama": ({"panorama": "natural"}, 1.4),  # redrawn only when the lens turns
 }

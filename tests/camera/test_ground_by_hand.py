@@ -2,6 +2,7 @@
 
 from math import atan, cos, hypot, pi, sin, tan
 
+import numba as nb
 import numpy as np
 import pytest
 from support.records import lens_of, records
@@ -13,9 +14,9 @@ from lgmd_gym.camera.render.ground import PAINT
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.markings import add_lines
 from lgmd_gym.camera.render.texture import TEXEL_M
-from lgmd_gym.camera.render.texture_sampling import bent_texels, distance_ahead, texture_line
+from lgmd_gym.camera.render.texture_sampling import bend_of, bent_texels, distance_ahead, texture_line
 from lgmd_gym.camera.road_geometry import LINE
-from lgmd_gym.simd import as_floats, store
+from lgmd_gym.simd import as_floats, lane_numbers, splat, store
 
 
 @pytest.mark.parametrize("pitch", [0.0, -0.1, 0.05])
@@ -59,8 +60,9 @@ def test_texture_is_anchored_to_the_ground(yaw, pitch):
 @kernel
 def write_bends(line, bends, lanes):
     """Write the shifts of 128 pixels of a row, x and y, in 1/65536 texels; `lanes` is scratch memory."""
+    bend = bend_of(line, 120)
     for j in range(0, 128, 16):
-        x, y = bent_texels(line, j)
+        x, y = bent_texels(bend, as_floats(lane_numbers()) + splat(nb.float32(j + bend.first)))
         store(lanes, 0, as_floats(x))
         store(lanes, 16, as_floats(y))
         for lane in range(16):

@@ -77,7 +77,8 @@ class Buffers(NamedTuple):
         distances: Distances of the objects from the lens, float64, shape (512,) [m].
         extents: Middle and half of an object's azimuths [quarter turns] and its least and greatest distance
             [m] as seen from the lens, float64, shape (512, 4).
-        azimuths: Azimuth of the horizon in each column relative to the lens, float64, shape (width,) [rad].
+        directions: Azimuth of the horizon in each column relative to the lens [rad] and length of its
+            direction [px], float64, shape (2, width).
         outlines: Skyline in each column, see `sky`, float32, shape (5, width).
     """
 
@@ -94,7 +95,7 @@ class Buffers(NamedTuple):
     order: np.ndarray
     distances: np.ndarray
     extents: np.ndarray
-    azimuths: np.ndarray
+    directions: np.ndarray
     outlines: np.ndarray
 
 
@@ -134,6 +135,6 @@ def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
         order=np.zeros(MAX_DRAWN, dtype=np.int64),
         distances=np.zeros(MAX_DRAWN),
         extents=np.zeros((MAX_DRAWN, 4)),
-        azimuths=np.zeros(width),
+        directions=np.zeros((2, width)),
         outlines=np.zeros((5, width), dtype=np.float32),
     )

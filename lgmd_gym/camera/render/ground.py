@@ -12,6 +12,7 @@ import numpy as np
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, sum_differences, winding
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.texture_sampling import (
+    bend_of,
     bent_texels,
     distance_ahead,
     fixed_line,
@@ -120,6 +121,8 @@ def shade_row(image, row, horizon, coverage, view, tables):
     # Share of each pixel below the horizon.
     below = splat(nb.float32(row + 1.0 - horizon.left - 0.5 * horizon.slope))
     fall, lanes = splat(nb.float32(-horizon.slope)), as_floats(lane_numbers())
+    bend = bend_of(line, width)
+    t, next_t = lanes + splat(nb.float32(bend.first)), splat(nb.float32(LANES))
     zero, one, least = splat(nb.float32(0.0)), splat(nb.float32(1.0)), splat(nb.float32(1e-3))
     share = inverse = one
     air = row_air(view.look, distance_ahead(view.lens, row), view.lens.z)
@@ -142,7 +145,7 @@ def shade_row(image, row, horizon, coverage, view, tables):
             )  # fmt: skip
         at_x, at_y = x, y
         if bent:
-            away_x, away_y = bent_texels(line, j)
+            away_x, away_y = bent_texels(bend, t)
             at_x, at_y = x + away_x, y + away_y
         grey = _ground_light(view.look, tables, line, at_x, at_y, coverages)
         grey = through_air(grey, air, view.beam, j)
@@ -150,7 +153,7 @@ def shade_row(image, row, horizon, coverage, view, tables):
             behind = load_part(image, pixel, count)
             grey = madd(share, grey - behind, behind)
         store_part(image, pixel, count, grey)
-        x, y = x + step_x, y + step_y
+        x, y, t = x + step_x, y + step_y, t + next_t
     # Edges at the right side of the frame.
     for j in range(width, width + 2):
         road[row, j] = paint[row, j] = shadow[row, j] = cast[row, j] = nb.float32(0.0)

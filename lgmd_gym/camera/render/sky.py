@@ -82,30 +82,41 @@ def _trace_outlines(lens, line, look, horizon, buffers):
     The skyline of a lens that rolls is sheared instead of turned: it is shifted by up to the sine of the roll
     times its height, 0.06 px in `wide` and 0.4 px in `fovea` at 0.5°.
     """
-    azimuths, out = buffers.azimuths, buffers.outlines
-    width, n = out.shape[1], line.shape[1]
-    f, c, s = lens.focal, lens.cos_pitch, lens.sin_pitch
-    cr, sr = lens.cos_roll, lens.sin_roll
-    left = horizon.left - lens.centre_v
+    azimuths, distances = buffers.directions[0], buffers.directions[1]
+    out, n = buffers.outlines, line.shape[1]
+    width, f, c, s = out.shape[1], lens.focal, lens.cos_pitch, lens.sin_pitch
+    # Loops become vectors only if they read no record.
+    roll, yaw = lens.cos_roll, lens.yaw
+    # The horizon in column j, as for a lens without roll, is at start + step·j.
+    step = lens.cos_roll - horizon.slope * lens.sin_roll
+    start = 0.5 * step - lens.centre_u * lens.cos_roll - (horizon.left - lens.centre_v) * lens.sin_roll
+    narrow = 1.0 / (f * c)
     for j in range(width):
-        u = (j + 0.5 - lens.centre_u) * cr - (left + horizon.slope * (j + 0.5)) * sr
-        azimuths[j] = _arctan(u / (f * c))
+        u = start + step * j
+        azimuths[j] = _arctan(u * narrow)
+        distances[j] = math.sqrt(f * f + u * u)
+    trees, leaf_gain = look.trees, look.leaf_gain
+    turn = n / (2.0 * math.pi)
     for j in range(width):
-        u = (j + 0.5 - lens.centre_u) * cr - (left + horizon.slope * (j + 0.5)) * sr
-        away = math.sqrt(f * f + u * u)
-        at = (lens.yaw + azimuths[j]) * n / (2.0 * math.pi)
+        at = (yaw + azimuths[j]) * turn
         cell = math.floor(at)
         w = at - cell
         a, b = int(cell) & (n - 1), (int(cell) + 1) & (n - 1)
         for layer in range(2):
             scale = look.hill_scale if layer == _HILLS else look.tree_scale
-            tan = scale * (line[layer, a] + w * (line[layer, b] - line[layer, a]))
-            # Rows between the horizon and the direction with elevation atan(tan) in this column.
-            height = f * tan * away / (c * (f * c + tan * s * away)) * cr
-            out[layer, j] = nb.float32(height)
-            out[layer + _DEPTH, j] = nb.float32(1.0 / (height + 1.0))
+            rise = scale * distances[j] * (line[layer, a] + w * (line[layer, b] - line[layer, a]))
+            # Rows between the horizon and this elevation: the quotient of these.
+            out[layer, j] = nb.float32(f * rise * roll)
+            out[layer + _DEPTH, j] = nb.float32(c * (f * c + rise * s))
         leaf = line[_LEAVES, a] + w * (line[_LEAVES, b] - line[_LEAVES, a])
-        out[_LEAVES, j] = nb.float32(look.trees + look.leaf_gain * leaf)
+        out[_LEAVES, j] = nb.float32(trees + leaf_gain * leaf)
+    one = splat(nb.float32(1.0))
+    for layer in range(2):
+        for j in range(0, width, LANES):
+            at, below, count = layer * width + j, (layer + _DEPTH) * width + j, width - j
+            height = load_part(out, at, count) / load_part(out, below, count)
+            store_part(out, at, count, height)
+            store_part(out, below, count, one / (height + one))
 
 
 @kernel
@@ -140,18 +151,18 @@ def draw_sky(image, lens, line, look, horizon, buffers):
     for j in range(width):
         highest = max(highest, outlines[_HILLS, j], outlines[_TREES, j])
     low, high = min(look.zenith, look.horizon), max(look.zenith, look.horizon)
+    least, most = splat(nb.float32(low)), splat(nb.float32(high))
+    columns = as_floats(lane_numbers()) + splat(nb.float32(0.5 - 0.5 * width))
     for i in range(rows):
         grey, change = _gradient(look, horizon, i, width, lens.focal)
+        sky = madd(columns, splat(nb.float32(change)), splat(nb.float32(grey)))
+        step, outlined = splat(nb.float32(LANES * change)), i + 1.0 + highest >= horizon.top
         for j in range(0, width, LANES):
-            sky = madd(
-                as_floats(lane_numbers()) + splat(nb.float32(j + 0.5 - 0.5 * width)),
-                splat(nb.float32(change)),
-                splat(nb.float32(grey)),
-            )
-            sky = minimum(maximum(sky, splat(nb.float32(low))), splat(nb.float32(high)))
-            if i + 1.0 + highest >= horizon.top:
-                sky = _with_outlines(sky, outlines, look, horizon, i, j)
-            store_part(image, i * width + j, width - j, sky)
+            light = minimum(maximum(sky, least), most)
+            if outlined:
+                light = _with_outlines(light, outlines, look, horizon, i, j)
+            store_part(image, i * width + j, width - j, light)
+            sky = sky + step
 
 
 @kernel

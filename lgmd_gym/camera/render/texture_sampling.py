@@ -7,7 +7,7 @@ import numba as nb
 
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.texture import TEXEL_M
-from lgmd_gym.simd import as_floats, as_integers, gather_words, lane_numbers, madd, maximum, minimum, splat
+from lgmd_gym.simd import as_floats, as_integers, gather_words, lane_numbers, madd, maximum, splat
 
 
 class TextureLine(NamedTuple):
@@ -122,24 +122,40 @@ def fixed_line(line):
     return x, y, splat(nb.int32(16) * step_x), splat(nb.int32(16) * step_y)
 
 
-@kernel
-def bent_texels(line, column):
-    """Return the texels (x, y) from even spacing to the places of sixteen pixels, from a column, 16.16.
+class Bend(NamedTuple):
+    """Places of the pixels of a row that is not evenly spaced: t / (1 + rate·t) steps from a column.
 
-    The pixel at t columns from `line.middle` is at t / (1 + bend·t) times the steps there.
+    Attributes:
+        rate: Change of the scale per pixel.
+        least: Lower bound of 1 + rate·t, which keeps texels within the range of int32; 0 is the horizon.
+        x: Texels along x per t² / (1 + rate·t), in 16.16 fixed point.
+        y: Texels along y, likewise.
+        first: t of pixel 0 [px].
     """
-    t = as_floats(lane_numbers()) + splat(nb.float32(column + 0.5 - line.middle))
-    bend, least = splat(nb.float32(line.bend)), splat(nb.float32(1e-3))  # 0 is the horizon
-    late = splat(nb.float32(-line.bend)) * t * t / maximum(madd(bend, t, splat(nb.float32(1.0))), least)
-    return _to_fixed(late, line.dx), _to_fixed(late, line.dy)
+
+    rate: float
+    least: float
+    x: float
+    y: float
+    first: float
 
 
 @kernel
-def _to_fixed(columns, step):
-    """Return `step` [texels per column] times columns, in 16.16 fixed point and within the range of int32."""
-    limit = nb.float32(2.0e9)
-    texels = columns * splat(nb.float32(65536.0 * step))
-    return as_integers(minimum(maximum(texels, splat(-limit)), splat(limit)))
+def bend_of(line, width):
+    """Return the `Bend` of a line over a row of `width` pixels."""
+    x, y = -65536.0 * line.bend * line.dx, -65536.0 * line.bend * line.dy
+    least = max(1e-3, max(abs(x), abs(y)) * width * width / 2e9)
+    return Bend(line.bend, least, x, y, 0.5 - line.middle)
+
+
+@kernel
+def bent_texels(bend, t):
+    """Return the texels (x, y) from even spacing to the places of sixteen pixels, in 16.16 fixed point."""
+    scale = maximum(
+        madd(splat(nb.float32(bend.rate)), t, splat(nb.float32(1.0))), splat(nb.float32(bend.least))
+    )
+    late = t * t / scale
+    return as_integers(late * splat(nb.float32(bend.x))), as_integers(late * splat(nb.float32(bend.y)))
 
 
 @kernel
