@@ -7,7 +7,7 @@ import numpy as np
 from highway_env.road.road import RoadNetwork
 
 from lgmd_gym.camera import CONDITIONS
-from lgmd_gym.camera.worlds import draw_world
+from lgmd_gym.camera.worlds import LABORATORY, draw_world
 from lgmd_gym.envs.appearance import Appearance, brake_of
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.scenarios.distribution import (
@@ -58,18 +58,18 @@ class EpisodeSource(Protocol):
 
 
 class FixedScenario:
-    """The same scenario in every episode, with a random start, random grey levels and a random world.
+    """The same scenario in every episode, with a random start and random grey levels.
 
     `info` adds `world`, the number of the world, or -1 in the laboratory.
 
     Args:
         scenario: The scenario.
-        appearance: World and camera condition.
+        appearance: World and camera condition; None for the laboratory.
     """
 
     def __init__(self, scenario: Scenario, appearance: Appearance | None = None) -> None:
         self.first = scenario
-        self.appearance = appearance or Appearance()
+        self.appearance = appearance or Appearance(world=LABORATORY)
 
     def draw(self, rng: np.random.Generator) -> Draw:
         """Return the next episode."""
@@ -121,7 +121,8 @@ class RandomLevels:
         level = self.start_level + int(rng.integers(self.num_levels))
         generator = level_generator(self.split, level)
         placement = place(draw_scenario(generator), generator)
-        fields = draw_camera_fields(self.split, level, self.conditions, self.appearance)
+        world = self.appearance.draw(level_generator(self.split, level, part=2))
+        fields = world | draw_camera_fields(self.split, level, self.conditions)
         info = {"level": level, "condition": fields["condition"], "world": world_number(fields)}
         return Draw(placement, fields, info, brake_of(fields))
 

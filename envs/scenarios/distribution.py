@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.camera import CONDITIONS
-from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.scenarios.registry import make_scenario
 from lgmd_gym.envs.scenarios.scenario import Scenario
@@ -44,17 +43,14 @@ def level_generator(split: str, level: int, part: int = 0) -> np.random.Generato
     return np.random.default_rng([SPLITS.index(split), level, *([part] if part else [])])
 
 
-def draw_camera_fields(
-    split: str, level: int, conditions: Sequence[str], appearance: Appearance
-) -> dict[str, Any]:
-    """Return the camera fields of a level: world, condition and, in [0.5, 1.5], contrast of the ground.
+def draw_camera_fields(split: str, level: int, conditions: Sequence[str]) -> dict[str, Any]:
+    """Return the camera fields of a level: a condition, and the contrast of the ground texture in [0.5, 1.5].
 
     They are drawn from a separate random stream, so that the scenario does not depend on `conditions`.
     """
     rng = level_generator(split, level, part=1)
     texture = float(rng.uniform(0.5, 1.5))
-    condition = conditions[int(rng.integers(len(conditions)))]
-    return {**appearance.draw(rng), "condition": condition, "texture": texture}
+    return {"condition": conditions[int(rng.integers(len(conditions)))], "texture": texture}
 
 
 def draw_scenario(rng: np.random.Generator) -> Scenario:

@@ -189,7 +189,7 @@ def choose_objects(lens, mount, objects, count, chosen):
             if mount.box != 0:
                 obj.model = MODEL_BOX
             elif mount.drawn != 0:
-                # The shade tells vehicles apart in every list of the visible ones.
+                # The index of a vehicle depends on which ones are visible, but its shade does not.
                 index = int(16.0 * obj.shade)
                 obj.model, obj.height = body_of(mount.seed, index, obj.length, obj.width, obj.height)
             elif obj.height > _TALL_M or obj.length > _LONG_M:

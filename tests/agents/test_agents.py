@@ -60,7 +60,7 @@ def test_ground_truth_does_not_change_the_actions(name):
     for shuffled in (False, True):
         agent = make_agent(name)
         sensors = SensorConfig().for_agent(agent)
-        env = gym.make("LGMD/CCRs-v0", ego_speed=8.0, trace=True, **sensors.arguments)
+        env = gym.make("LGMD/CCRs-v0", ego_speed=8.0, trace=True, world="laboratory", **sensors.arguments)
         observation, info = env.reset(seed=1)
         agent.reset(1)
         actions.append([])

@@ -121,7 +121,7 @@ def test_fork_that_differs_from_the_recording_is_rejected(merge):
 def test_recorded_steps_equal_those_of_the_wrapper(camera):
     config = {"duration": 3}
     recorded = Recorded("two-way", 1, SensorConfig(camera), config)
-    env = gym.make(traffic_id("two-way"), camera=camera, trace=True, config=config)
+    env = gym.make(traffic_id("two-way"), camera=camera, trace=True, config=config, world="laboratory")
     steps = [step for step, _ in rollout(env, make_agent("no-brake"), 1)]
     assert len(steps) == len(recorded.steps) == 3 * 30 + 1
     assert all(same_inputs(step, other) for step, other in zip(recorded.steps, steps, strict=True))
@@ -137,7 +137,7 @@ def test_live_episode_continues_a_recording(merge, decision):
 
 def test_live_episode_observes_the_same_as_the_wrapper_while_braking(merge):
     live = LiveEpisode(merge.recording, 0, merge.sensor_config)
-    env = gym.make(traffic_id("merge"), camera="fovea", trace=True, config=SHORT)
+    env = gym.make(traffic_id("merge"), camera="fovea", trace=True, config=SHORT, world="laboratory")
     env.reset(seed=0)
     for _ in range(40):
         observation, _, terminated, truncated, info = env.step(to_action(BRAKE))

@@ -100,7 +100,7 @@ def test_discrete_actions(actions):
 
 
 def test_step_of_an_ended_environment_without_autoreset():
-    envs = gym.make_vec("LGMD/CCRs-v0", num_envs=2, autoreset_mode="Disabled", ego_speed=3.0)
+    envs = gym.make_vec("LGMD/CCRs-v0", num_envs=2, autoreset_mode="Disabled", ego_speed=3.0, world=7)
     envs.reset(seed=0)
     ended = np.zeros(2, bool)
     while not ended.any():

@@ -137,7 +137,7 @@ def test_wrong_arguments():
 
 
 def test_a_vector_of_single_environments_is_accepted():
-    arguments = {"num_envs": 2, "camera": None, **FAST}
+    arguments = {"num_envs": 2, "camera": None, "world": "laboratory", **FAST}
     vector = {"autoreset_mode": "SameStep"}
     sync = gym.make_vec("LGMD/CCRs-v0", vectorization_mode="sync", vector_kwargs=vector, **arguments)
     engine = gym.make_vec("LGMD/CCRs-v0", autoreset_mode="SameStep", **arguments)

@@ -9,6 +9,7 @@ import pytest
 from lgmd_gym import CameraParams, EgoCamera
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.camera import CONDITIONS
+from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs import FAMILIES
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.episode_source import RandomLevels
@@ -102,7 +103,10 @@ def test_levels_set_condition_and_texture_of_the_camera():
         _, info = env.reset(seed=seed)
         used = env.get_wrapper_attr("sensors").cameras[0]["fovea"]
         bare = CameraParams.preset("fovea").with_condition(info["condition"])
-        assert used.params == replace(bare, texture=used.params.texture)
+        assert used.params == replace(
+            bare, texture=used.params.texture, world=info["world"], road="normal"
+        )
+        assert info["world"] in SPLIT_WORLDS["validation"]
         assert np.array_equal(env.get_wrapper_attr("frames")["fovea"], EgoCamera(used.params).render(env))
         textures.setdefault(info["condition"], []).append(used.params.texture)
     assert set(textures) == set(CONDITIONS)

@@ -1,5 +1,7 @@
 """Brakes that an episode brings with it."""
 
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -120,7 +122,20 @@ def test_agents_cannot_read_the_brake():
         assert one[-1] == other[-1]
 
 
-def test_registered_ids_take_the_configured_brake():
-    env = gym.make("LGMD/CCRs-v0", camera=None, config={"max_deceleration": 6.0})
+@pytest.mark.parametrize(("condition", "wet"), [("clear", False), ("rain", True), ("fog", False)])
+def test_registered_ids_draw_the_brake_of_the_world(condition, wet):
+    env = gym.make("LGMD/CCRs-v0", camera=None, world=12, condition=condition)
     env.reset(seed=0)
-    assert env.unwrapped.brake == BrakeParams(max_deceleration=6.0)
+    assert env.unwrapped.brake == draw_brake(12, wet)
+
+
+def test_the_laboratory_has_the_configured_brake():
+    env = gym.make("LGMD/CCRs-v0", camera=None, world="laboratory")
+    env.reset(seed=0)
+    assert env.unwrapped.brake == BrakeParams()
+
+
+def test_configured_keys_replace_those_of_the_world():
+    env = gym.make("LGMD/CCRs-v0", camera=None, world=12, config={"max_deceleration": 6.0})
+    env.reset(seed=0)
+    assert env.unwrapped.brake == replace(draw_brake(12, False), max_deceleration=6.0)

@@ -119,7 +119,7 @@ def test_fields_equal_frames_of_their_cameras():
     """A field resampled from a fine wide frame shows what a camera of that field shows."""
     cameras = [item for item in StoppingZone().camera if item["name"] in ("upright20", "ground20")]
     wide = {"name": "clip", "shape": [480, 864], "hfov_deg": 90.0}
-    env = gym.make("LGMD/CCRs-v0", camera=[wide, *cameras], ego_speed=8.0)
+    env = gym.make("LGMD/CCRs-v0", camera=[wide, *cameras], ego_speed=8.0, world="laboratory")
     env.reset(seed=0)
     for _ in range(75):
         env.step(np.zeros(1, np.float32))

@@ -23,8 +23,7 @@ def draw_all_brakes(monkeypatch):
     make_source = registration.make_source
 
     def drawing(*arguments):
-        source, fields = make_source(*arguments)
-        return DrawnBrakes(source), fields
+        return DrawnBrakes(make_source(*arguments))
 
     for module in (registration, vector_env, batch):
         monkeypatch.setattr(module, "make_source", drawing)

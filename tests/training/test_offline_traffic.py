@@ -24,7 +24,7 @@ HIGHWAY, INTERSECTION = 0, 3  # seeds of these kinds of traffic
 
 @pytest.mark.parametrize(("env_id", "speed"), [("LGMD/EmptyRoad-v0", 12.0), ("LGMD/Following-v0", 20.0)])
 def test_computed_returns_equal_replays_in_braking_env(tmp_path, env_id, speed):
-    config = offline_config(tmp_path, env_id, env_kwargs={"ego_speed": speed})
+    config = offline_config(tmp_path, env_id, env_kwargs={"ego_speed": speed, "world": "laboratory"})
     ((replayed,),) = EpisodeRecorder(partial(config.make_env, "train"), hold=0, brake=1).record(range(1))
     computed = non_threat_episode(replayed.observations, 30.0)
     assert not replayed.threat
@@ -79,7 +79,8 @@ def test_segments_exclude_the_ten_seconds_before_an_emergency(monkeypatch, emerg
 def test_observations_equal_those_of_the_benchmark(monkeypatch, seed):
     config = {"duration": 12}
     monkeypatch.setattr(traffic, "make_traffic", partial(traffic.make_traffic, config=config))
-    monkeypatch.setattr(traffic, "draw_camera_fields", lambda *_: {"condition": "fog"})
+    fields = {"world": None, "condition": "fog", "road": "still"}
+    monkeypatch.setattr(traffic, "draw_camera_fields", lambda *_: fields)
     monkeypatch.setattr(traffic, "segment_bounds", lambda non_threat, policy_hz: [(0, len(non_threat))])
     ((whole,),) = TrafficRecorder("train", "fovea").record(range(seed, seed + 1))
     sensor_config = SensorConfig(camera="fovea").with_condition("fog")

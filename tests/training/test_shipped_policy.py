@@ -44,7 +44,7 @@ def test_card_matches_the_packaged_hyperparameters_and_cameras():
 @pytest.mark.parametrize("scenario", ["CCRs", "EmptyRoad"])
 def test_policy_brakes_for_a_car_and_not_on_an_empty_road(scenario):
     agent = make_agent("policy:zones")
-    env = gym.make(f"LGMD/{scenario}-v0", ego_speed=11.0, camera=agent.camera)
+    env = gym.make(f"LGMD/{scenario}-v0", ego_speed=11.0, camera=agent.camera, world="laboratory")
     observation, info = env.reset(seed=1)
     agent.reset(1)
     braked = done = False

@@ -15,7 +15,7 @@ SMALL = {"vehicles_count": 3, "simulation_frequency": 30}
 
 
 def test_outputs_equal_those_of_camera_and_neuron_alone():
-    env = gym.make("LGMD/CCRs-v0", camera="standard", ego_speed=12.0, trace=True)
+    env = gym.make("LGMD/CCRs-v0", camera="standard", ego_speed=12.0, trace=True, world="laboratory")
     bare = env.unwrapped.__class__(env.unwrapped.scenario)
     camera = EgoCamera("standard")
     neuron = LGMD(camera.shape, fps=30.0)
@@ -67,7 +67,7 @@ def test_birdseye_is_a_camera():
 
 
 def test_camera_params_are_a_camera():
-    env = gym.make("LGMD/CCRs-v0", camera=CameraParams(name="custom-20", hfov_deg=20.0), include_frame=True)
+    env = gym.make("LGMD/CCRs-v0", camera=CameraParams(name="custom-20", hfov_deg=20.0), include_frame=True, world="laboratory")
     observation, info = env.reset(seed=0)
     assert "lgmd/custom-20/ffi" in info
     np.testing.assert_array_equal(observation["frame"][:, :, 0], EgoCamera(hfov_deg=20.0).render(env))

@@ -90,7 +90,8 @@ def test_frames_of_stock_environments():
 
 
 def test_other_vector_wrappers_can_be_applied():
-    envs = gym.make_vec("LGMD/CCRs-v0", num_envs=2, vectorization_mode="sync", camera=None)
+    arguments = {"camera": None, "world": "laboratory"}
+    envs = gym.make_vec("LGMD/CCRs-v0", num_envs=2, vectorization_mode="sync", **arguments)
     envs = RecordEpisodeStatistics(LGMDObservation(envs))
     envs.reset(seed=0)
     for _ in range(60):

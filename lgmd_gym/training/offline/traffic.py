@@ -51,8 +51,8 @@ class TrafficRecorder:
         kind = list(KINDS)[seed % len(KINDS)]
         env = make_traffic(kind, camera=self.camera, include_frame=self.shrink is not None)
         base: Any = env.unwrapped
-        appearance = Appearance(split=self.split)
-        base.camera_overrides = draw_camera_fields(self.split, seed, tuple(CONDITIONS), appearance)
+        base.appearance = Appearance(split=self.split)
+        base.camera_overrides = draw_camera_fields(self.split, seed, tuple(CONDITIONS))
         try:
             observations, emergencies = run_episode(env, seed, self.shrink)
         finally:
