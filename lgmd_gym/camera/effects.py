@@ -17,7 +17,7 @@ LOOK = np.dtype(
             *("zenith", "horizon", "hills", "trees", "leaf_gain", "hill_scale", "tree_scale"),
             *("sun_x", "sun_y", "sun_z", "ambient", "direct", "cast", "glare"),
             *("under_body", "under_lean", "under_first", "under_step", "under_rings", "under_box"),
-            "shadow_limit",
+            *("under_road", "shadow_limit"),
             *("haze", "extinction", "night", "night_light", "beam_gain", "wet", "paved"),
             *("shot_noise", "read_noise", "shutter_s"),
             *("linear", "auto_exposure_s", "target_grey", "least_gain", "most_gain"),
@@ -29,11 +29,11 @@ LOOK = np.dtype(
 Light (`…_gain`: per stored unit of a texture or skyline); width of markings, length and period of dashes [m];
 scale of the skyline's elevations; direction of the sun; light on a face from the sky, and from the sun where
 it is at right angles, as shares of the light on the road; share of light that a cast shadow removes; glare
-in the direction of the sun; the soft
-shadow below an object, see `shadows.add_shadow`; light of the fog and extinction of the air [1/m]; 1.0 for
-night; light at night apart from the low beam, and its peak; 1.0 for a wet and for an all-paved ground; sensor
-noise [grey levels]; exposure time [s]; 1.0 for linear light; time constant [s], target [grey levels] and
-bounds of the gain of the automatic exposure.
+in the direction of the sun; the soft shadow below an object, see `shadows.add_shadow`; light of the road
+below a vehicle, 0 in the laboratory; light of the fog and extinction of the air [1/m]; 1.0 for night; light
+at night apart from the low beam, and its peak; 1.0 for a wet and for an all-paved ground; sensor noise [grey
+levels]; exposure time [s]; 1.0 for linear light; time constant [s], target [grey levels] and bounds of the
+gain of the automatic exposure.
 """
 ASPHALT_GREY, PAINT_GREY = 104.0, 208.0  # of the laboratory by day
 BEAM_WIDTH = 0.26  # the low beam falls to 1/e at this tangent of the angle from straight ahead
@@ -159,9 +159,10 @@ def _set_sun(look: np.ndarray, p: CameraParams, world: World) -> None:
         # A vertical face receives light from half of the sky and from the ground.
         look["ambient"], look["direct"] = 0.12 + 0.55 * (1.0 - share), share / math.sin(elevation)
         look["cast"], look["glare"] = share, _GLARE if p.light == "low_sun" and share > 0.0 else 0.0
-        # From 0.5 m inside the outline of a car to 0.28 m outside it; a box has a shadow at its edges only.
+        # From 0.1 m inside the outline of a car to 0.5 m outside it; a box has a shadow at its edges only.
         rings, missing = 7, world.under_body * (0.6 if p.light == "night" else 1.0)
-        values = (missing / rings, 0.0, -0.5, 0.13, rings, 0.2, 0.95)
+        values = (missing / rings, 0.0, -0.1, 0.1, rings, 0.2, 0.95)
+        look["under_road"] = look["asphalt"] * (1.0 - missing)
     names = (
         *("under_body", "under_lean", "under_first", "under_step", "under_rings", "under_box"),
         "shadow_limit",

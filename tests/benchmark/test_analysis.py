@@ -258,7 +258,7 @@ def run_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     (folder / "three-cases.toml").write_text(SUITE)
     config = benchmark.RunConfig(
-        suite=str(folder / "three-cases.toml"), agents=AGENTS, seeds=2, conditions=("clear", "rain")
+        suite=str(folder / "three-cases.toml"), agents=AGENTS, seeds=2, conditions=("clear", "rain"), worlds=0
     )
     benchmark.run(config, folder / "run", plots=False)
     return folder / "run"

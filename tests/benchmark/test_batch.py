@@ -2,6 +2,7 @@
 
 import dataclasses
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -295,13 +296,15 @@ def test_an_agent_that_needs_memory_does_not_replace_the_worker_processes(tmp_pa
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_run_gives_the_rows_and_series_of_single_tasks(tmp_path, jobs):
     agents = ("spike-threshold", "ttc-oracle")
-    run = new_run(tmp_path / "run", jobs=jobs, suite="r152", agents=agents, seeds=1)
+    run = new_run(tmp_path / "run", jobs=jobs, suite="r152", agents=agents, seeds=1, worlds=4)
     assert run.play()
     expected = []
-    for case in run.plan.cases:
-        first = run_task(Task("no-brake", case, 0, SensorConfig()))
+    for index, case in enumerate(run.plan.cases):
+        task = Task("no-brake", case, 0, SensorConfig(), world=run.config.world(0, index))
+        first = run_task(task)
         expected.append(first)
-        expected += [run_task(Task(name, case, 0, SensorConfig(), first.counterfactual)) for name in agents]
+        others = (replace(task, agent=name, counterfactual=first.counterfactual) for name in agents)
+        expected += [run_task(other) for other in others]
     assert sorted_rows(read_rows(tmp_path / "run")) == sorted_rows([result.row for result in expected])
     for result in expected:
         series = read_series(tmp_path / "run", series_name(key_of(result.row)))

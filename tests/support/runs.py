@@ -19,8 +19,8 @@ speeds_kmh = [30]
 
 
 def new_run(folder, jobs=1, **values):
-    """Return a new run of a `RunConfig`."""
-    return Run.new(RunConfig(**values), folder, Executor(jobs))
+    """Return a new run of a `RunConfig`, in the laboratory unless it states a number of worlds."""
+    return Run.new(RunConfig(**{"worlds": 0} | values), folder, Executor(jobs))
 
 
 def read_rows(folder):

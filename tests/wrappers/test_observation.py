@@ -67,7 +67,12 @@ def test_birdseye_is_a_camera():
 
 
 def test_camera_params_are_a_camera():
-    env = gym.make("LGMD/CCRs-v0", camera=CameraParams(name="custom-20", hfov_deg=20.0), include_frame=True, world="laboratory")
+    env = gym.make(
+        "LGMD/CCRs-v0",
+        camera=CameraParams(name="custom-20", hfov_deg=20.0),
+        include_frame=True,
+        world="laboratory",
+    )
     observation, info = env.reset(seed=0)
     assert "lgmd/custom-20/ffi" in info
     np.testing.assert_array_equal(observation["frame"][:, :, 0], EgoCamera(hfov_deg=20.0).render(env))

@@ -16,7 +16,6 @@ KEYS = (
     *ID_KEYS,
     WORLD,
     "camera",
-    "world",
     "threat",
     "collision",
     "avoided",

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, ModelBuilder
+from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, UNDER, ModelBuilder
 
 Range = tuple[float, float]
 
@@ -58,7 +58,7 @@ VAN = BodyShape(
 
 def _wheels(b: ModelBuilder, face: int, top: float) -> None:
     """Add the gap below a bumper with two tyres."""
-    gap = b.rect(face, (0.0, 1.0), (0.0, top), 14.0)
+    gap = b.rect(face, (0.0, 1.0), (0.0, top), 14.0, UNDER)
     b.rect(face, (0.04, 0.17), (0.0, top), 4.0, parent=gap)
     b.rect(face, (0.83, 0.96), (0.0, top), 4.0, parent=gap)
 
@@ -89,7 +89,7 @@ def _front(b: ModelBuilder, face: int, s: BodyShape) -> None:
 
 def _side(b: ModelBuilder, face: int, s: BodyShape, *, mirrored: bool) -> None:
     low = s.clearance
-    sill = b.rect(face, (0.0, 1.0), (0.0, low), 14.0)
+    sill = b.rect(face, (0.0, 1.0), (0.0, low), 14.0, UNDER)
     b.rect(face, (0.02, 0.98), (0.80, 0.85), 1.2, BODY)
     for axle in s.axles:
         u = 1.0 - axle if mirrored else axle

@@ -1,13 +1,13 @@
 """The model of a passenger car."""
 
-from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, ModelBuilder
+from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, UNDER, ModelBuilder
 
 BODY_TOP = 0.62
 """Height at which the cabin begins, as a share of a car's height."""
 
 
 def _car_rear(b: ModelBuilder, rear: int) -> None:
-    gap = b.rect(rear, (0.0, 1.0), (0.0, 0.24), 14.0)  # gap below the bumper
+    gap = b.rect(rear, (0.0, 1.0), (0.0, 0.24), 14.0, UNDER)  # gap below the bumper
     b.rect(rear, (0.03, 0.15), (0.0, 0.24), 4.0, parent=gap)  # tyres
     b.rect(rear, (0.85, 0.97), (0.0, 0.24), 4.0, parent=gap)
     b.rect(rear, (0.0, 1.0), (0.24, 0.33), 38.0)  # plastic lip
@@ -56,7 +56,7 @@ def _close_up_glass(b: ModelBuilder, window: int, sky: int) -> None:
 
 
 def _car_front(b: ModelBuilder, front: int) -> None:
-    gap = b.rect(front, (0.0, 1.0), (0.0, 0.22), 14.0)
+    gap = b.rect(front, (0.0, 1.0), (0.0, 0.22), 14.0, UNDER)
     b.rect(front, (0.03, 0.15), (0.0, 0.22), 4.0, parent=gap)
     b.rect(front, (0.85, 0.97), (0.0, 0.22), 4.0, parent=gap)
     grille = b.rect(front, (0.22, 0.78), (0.28, 0.58), 30.0)
@@ -68,7 +68,7 @@ def _car_front(b: ModelBuilder, front: int) -> None:
 
 
 def _car_side(b: ModelBuilder, side: int, rear_u: float, front_u: float) -> None:
-    sill = b.rect(side, (0.0, 1.0), (0.0, 0.24), 14.0)
+    sill = b.rect(side, (0.0, 1.0), (0.0, 0.24), 14.0, UNDER)
     strip = b.rect(side, (0.0, 1.0), (0.24, 0.36), 0.75, BODY)
     b.rect(side, (0.02, 0.98), (0.76, 0.80), 1.15, BODY)
     for u in (rear_u, front_u):

@@ -1,11 +1,11 @@
 """Models of articulated trucks and buses: one box with details."""
 
-from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, ModelBuilder
+from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, UNDER, ModelBuilder
 
 
 def _gap(b: ModelBuilder, face: int, top: float, tyre: float) -> int:
     """Add the space below a body with two tyres, and return the space."""
-    gap = b.rect(face, (0.0, 1.0), (0.0, top), 14.0)
+    gap = b.rect(face, (0.0, 1.0), (0.0, top), 14.0, UNDER)
     for u in (0.04, 0.96 - tyre):
         b.rect(face, (u, u + tyre), (0.0, 0.9 * top), 4.0, parent=gap)
     return gap
@@ -13,7 +13,7 @@ def _gap(b: ModelBuilder, face: int, top: float, tyre: float) -> int:
 
 def _axles(b: ModelBuilder, face: int, centres: tuple[float, ...], top: float, *, mirrored: bool) -> None:
     """Add the space below a long side with its wheels, given from the rear."""
-    gap = b.rect(face, (0.0, 1.0), (0.0, top), 20.0)
+    gap = b.rect(face, (0.0, 1.0), (0.0, top), 20.0, UNDER)
     for centre in centres:
         u = 1.0 - centre if mirrored else centre
         b.rect(face, (u - 0.033, u + 0.033), (0.0, top), 6.0, parent=gap)

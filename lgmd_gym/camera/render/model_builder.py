@@ -6,6 +6,7 @@ BODY = 0  # value: multiple of the object's shade, in the light of the face
 FIXED = 1  # value: grey level, in the light of the face
 TAIL = 2  # value: grey level of a tail light when off; 255 when braking
 LAMP = 3  # value: grey level of a headlight by day; 255 at night
+UNDER = 4  # gap below a vehicle; value: grey level in the laboratory, in numbered worlds that of shaded road
 
 Point = tuple[float, float, float]
 

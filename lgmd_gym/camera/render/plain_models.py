@@ -2,7 +2,7 @@
 
 import math
 
-from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, ModelBuilder, Point
+from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, UNDER, ModelBuilder, Point
 
 
 def add_truck(b: ModelBuilder) -> None:
@@ -10,7 +10,7 @@ def add_truck(b: ModelBuilder) -> None:
     b.model(lamps=(0.375, 0.22))
     b.solid()
     rear, front, left, right, _ = b.box(0.0, 1.0, (-0.5, 0.5, 0.5), (-0.5, 0.5, 0.5))
-    gap = b.rect(rear, (0.0, 1.0), (0.0, 0.20), 14.0)
+    gap = b.rect(rear, (0.0, 1.0), (0.0, 0.20), 14.0, UNDER)
     b.rect(rear, (0.04, 0.2), (0.0, 0.20), 4.0, parent=gap)
     b.rect(rear, (0.8, 0.96), (0.0, 0.20), 4.0, parent=gap)
     b.rect(rear, (0.0, 1.0), (0.20, 0.27), 45.0)

@@ -9,7 +9,7 @@ import numpy as np
 from lgmd_gym.camera.objects import is_picture
 from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_project, sum_differences
 from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
+from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, UNDER
 from lgmd_gym.camera.render.order import distance
 from lgmd_gym.simd import LANES, any_above, load_part, madd, magnitude, maximum, minimum, splat, store_part
 
@@ -99,8 +99,14 @@ def _face_light(corners, axes, look):
 
 
 @kernel
-def _grey(role, value, light, obj, night):
-    """Return the grey of a polygon; lamps emit light, all else reflects it."""
+def _grey(role, value, light, obj, look, air):
+    """Return the grey of a polygon; lamps emit light, all else reflects it.
+
+    The gap below a vehicle has the light of the shaded road behind it, whatever the light on the face.
+    """
+    night = look.night > 0.0
+    if role == UNDER and look.under_road > 0.0:
+        return look.under_road * air.light
     if role == TAIL:
         if obj.braking > 0:
             return 255.0
@@ -139,7 +145,6 @@ def _add_solid(layer, lens, look, obj, models, solid, size, air):
     Returns the bounds (u0, v0, u1, v1) of these faces [px]; u1 < u0 if there is none.
     """
     corners, uv, greys = layer.corners, layer.uv, layer.greys
-    night = look.night > 0.0
     height, width = layer.coverage.shape[1], layer.coverage.shape[2] - 2
     u0, v0, u1, v1 = 1e9, 1e9, -1e9, -1e9
     for p in range(models.solids[solid, 0], models.solids[solid, 1]):
@@ -162,7 +167,7 @@ def _add_solid(layer, lens, look, obj, models, solid, size, air):
         # The edges of a polygon left of the frame would cancel.
         if right <= 0.0 or bottom <= 0.0 or left >= width or top >= height:
             continue
-        grey = _grey(models.role[p], models.value[p], light, obj, night)
+        grey = _grey(models.role[p], models.value[p], light, obj, look, air)
         greys[p, 0], greys[p, 1] = grey, light
         if parent >= 0:
             add_polygon(layer.coverage, np.int64(1), uv, m, weight * (grey - greys[parent, 0]), 0.0)
