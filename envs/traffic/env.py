@@ -188,7 +188,7 @@ class TrafficEnv(EgoBrakeEnv):
         self.ego.travelled = 0.0
         self.steps = self._jam_steps = 0
         # A generator of its own: the traffic of a seed is the same in every world.
-        self.camera_fields = self.appearance.draw(self.np_random.spawn(1)[0]) | self.camera_overrides
+        self.camera_fields = {**self.appearance.draw(self.np_random.spawn(1)[0]), **self.camera_overrides}
 
     def _build(self) -> None:
         super()._reset()

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ SPLIT_WORLDS = {
 }
 """Disjoint ranges of worlds; those held out are for final evaluations only."""
 
-ASPHALTS = ("fresh", "worn", "patched", "cracked", "coarse", "concrete")
+ASPHALTS = ("fresh", "aged", "patched", "cracked", "coarse", "concrete")
 VERGES = ("grass", "gravel", "soil", "paving")
 TILES = 2
 """Number of different textures per kind of ground."""
@@ -30,7 +31,7 @@ SKYLINES = 64
 # concrete 20 % to 35 % of the light (Levinson and Akbari 2002, Cement and Concrete Research 32).
 _ASPHALT_GREYS = {
     "fresh": (66.0, 92.0),
-    "worn": (92.0, 132.0),
+    "aged": (92.0, 132.0),
     "patched": (84.0, 122.0),
     "cracked": (96.0, 138.0),
     "coarse": (84.0, 124.0),
@@ -38,7 +39,7 @@ _ASPHALT_GREYS = {
 }
 _ASPHALT_CONTRASTS = {
     "fresh": (0.4, 0.9),
-    "worn": (0.6, 1.3),
+    "aged": (0.6, 1.3),
     "patched": (0.8, 1.6),
     "cracked": (0.8, 1.6),
     "coarse": (0.8, 1.7),
@@ -171,7 +172,7 @@ def check_world(value: object) -> int | None:
     return check_whole("world", value, 0, WORLDS - 1)
 
 
-def _draw_ground(rng: np.random.Generator) -> dict[str, object]:
+def _draw_ground(rng: np.random.Generator) -> dict[str, Any]:
     road, verge = str(rng.choice(ASPHALTS, p=_ASPHALT_SHARES)), str(rng.choice(VERGES, p=_VERGE_SHARES))
     return {
         "asphalt": (road, int(rng.integers(TILES))),
@@ -183,7 +184,7 @@ def _draw_ground(rng: np.random.Generator) -> dict[str, object]:
     }
 
 
-def _draw_markings(rng: np.random.Generator) -> dict[str, object]:
+def _draw_markings(rng: np.random.Generator) -> dict[str, Any]:
     return {
         "paint_grey": float(rng.uniform(150.0, 232.0)),
         "line_width": float(rng.uniform(0.10, 0.20)),
@@ -192,7 +193,7 @@ def _draw_markings(rng: np.random.Generator) -> dict[str, object]:
     }
 
 
-def _draw_surroundings(rng: np.random.Generator) -> dict[str, object]:
+def _draw_surroundings(rng: np.random.Generator) -> dict[str, Any]:
     horizon = float(rng.uniform(205.0, 330.0))  # a bright sky is beyond white
     return {
         "skyline": int(rng.integers(SKYLINES)),
@@ -208,7 +209,7 @@ def _draw_surroundings(rng: np.random.Generator) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _draw_sun(rng: np.random.Generator) -> dict[str, object]:
+def _draw_sun(rng: np.random.Generator) -> dict[str, Any]:
     overcast = rng.random() < _OVERCAST_SHARE
     share = 0.0 if overcast else float(rng.uniform(0.45, 0.85))
     return {
@@ -223,7 +224,7 @@ def _draw_sun(rng: np.random.Generator) -> dict[str, object]:
     }
 
 
-def _draw_camera(rng: np.random.Generator) -> dict[str, object]:
+def _draw_camera(rng: np.random.Generator) -> dict[str, Any]:
     return {
         "mount_height_error": float(rng.uniform(-0.1, 0.1)),
         "pitch_error_deg": float(rng.uniform(-0.5, 0.5)),

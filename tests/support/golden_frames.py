@@ -25,6 +25,11 @@ OPTIONS = {
     "mount": {"gaze": "path", "mount_height": 1.6, "mount_left": 0.4, "pitch_deg": -8.0, "yaw_deg": 12.0},
     "motion": {"road": "rough", "dive_deg": 0.3, "shutter_s": 0.03},
     "night-rail": {"light": "night", "guard_rail": True},
+    "world-sunny": {"world": 11, "road": "normal"},
+    "world-overcast": {"world": 1, "road": "rough"},
+    "world-night": {"world": 4, "condition": "night"},
+    "world-rain": {"world": 6, "condition": "rain"},
+    "world-low-sun": {"world": 10, "condition": "low_sun"},
 }
 """Camera fields that the golden frames cover in addition to the named conditions."""
 

@@ -8,7 +8,7 @@ import numpy as np
 
 EXPONENTS = {
     "asphalt": 0.85, "verge": 1.1,
-    "fresh": 0.5, "worn": 0.85, "patched": 0.85, "cracked": 0.8, "coarse": 0.35, "concrete": 0.7,
+    "fresh": 0.5, "aged": 0.85, "patched": 0.85, "cracked": 0.8, "coarse": 0.35, "concrete": 0.7,
     "grass": 0.9, "gravel": 0.3, "soil": 1.2, "paving": 0.6,
 }  # fmt: skip
 """Exponent of the amplitude spectrum, 1/frequency^exponent, by kind of ground."""
@@ -24,7 +24,7 @@ def add_features(kind: str, tile: np.ndarray, rng: np.random.Generator) -> None:
     """Add the features of a kind of ground to noise of unit variance, in place."""
     if kind == "asphalt":
         _add_seams(tile, rng, seams=14, patches=8)
-    elif kind == "worn":
+    elif kind == "aged":
         _add_seams(tile, rng, seams=8, patches=3)
     elif kind == "patched":
         _add_seams(tile, rng, seams=22, patches=34)
