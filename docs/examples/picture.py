@@ -30,7 +30,7 @@ def main(path: Path, film: Path | None = None, ego_speed: float = 11.1, after: i
     """
     agent = make_agent("spike-threshold")
     title = f"LGMD/CCRs-v0 at {3.6 * ego_speed:.0f} km/h   {agent.name}"
-    env = LGMDView(gym.make("LGMD/CCRs-v0", ego_speed=ego_speed, shade=60), title=title)
+    env = LGMDView(gym.make("LGMD/CCRs-v0", ego_speed=ego_speed, shade=60, world="laboratory"), title=title)
     observation, info = env.reset(seed=0)
     decisions = since_alert = 0
     done, pictures = False, []

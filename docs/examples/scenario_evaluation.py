@@ -22,7 +22,7 @@ DELAY, DECELERATION = 1 / 30 + 0.1 + 0.2 / 2, 9.0  # [s], [m/s²]
 
 def ttc_at_alert(camera: str, kmh: float, seed: int) -> float:
     """Return the time to contact [s] at the first alert without braking; NaN without an alert."""
-    env = gym.make("LGMD/CCRs-v0", ego_speed=kmh / 3.6, camera=camera)
+    env = gym.make("LGMD/CCRs-v0", ego_speed=kmh / 3.6, camera=camera, world="laboratory")
     _, info = env.reset(seed=seed)
     hold = np.zeros(1, np.float32)
     while not info["collision"]:
@@ -34,7 +34,7 @@ def ttc_at_alert(camera: str, kmh: float, seed: int) -> float:
 
 def alerts_on_empty_road(camera: str, kmh: float, seeds: int) -> int:
     """Return the number of seeds with an alert on an empty road."""
-    env = gym.make("LGMD/EmptyRoad-v0", ego_speed=kmh / 3.6, camera=camera)
+    env = gym.make("LGMD/EmptyRoad-v0", ego_speed=kmh / 3.6, camera=camera, world="laboratory")
     count = 0
     for seed in range(seeds):
         _, info = env.reset(seed=seed)
