@@ -190,6 +190,8 @@ class Paper:
     """With --realism: clips at night. Default: those with a median grey below 75."""
     seeds: int = 3
     """With --realism: seeds of every simulated drive."""
+    worlds: int = 20
+    """With --realism: number of training worlds of the simulated drives; 0 for the plain laboratory."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,7 +24,7 @@ def run(options: Paper) -> int:
         from lgmd_gym.cli import realism
 
         return realism.run(options)
-    for name in ("clip_hfov_deg", "ignore_bottom", "night", "seeds"):
+    for name in ("clip_hfov_deg", "ignore_bottom", "night", "seeds", "worlds"):
         if getattr(options, name) != getattr(Paper, name):
             raise ValueError(f"--{name.replace('_', '-')} requires --realism")
     if (options.clips is None) != (options.crashes is None):

@@ -44,6 +44,7 @@ class Comparison(NamedTuple):
         low: 5th percentile of the simulated values.
         high: 95th percentile of the simulated values.
         inside: Number of real values in [low, high].
+        median_inside: Whether the median of the real values is in [low, high].
         distance: See `normalized_distance`.
     """
 
@@ -54,6 +55,7 @@ class Comparison(NamedTuple):
     low: float
     high: float
     inside: int
+    median_inside: bool
     distance: float
 
 
@@ -151,10 +153,12 @@ def compare(drives: Sequence[DriveValues]) -> list[Comparison]:
             if len(real) and len(simulated):
                 low, high = np.percentile(simulated, RANGE)
                 inside = int(((real >= low) & (real <= high)).sum())
-                distance = normalized_distance(real, simulated)
                 comparisons.append(
-                    Comparison(group, name, real, simulated, float(low), float(high), inside, distance)
-                )
+                    Comparison(
+                        group, name, real, simulated, float(low), float(high), inside,
+                        bool(low <= np.median(real) <= high), normalized_distance(real, simulated),
+                    )
+                )  # fmt: skip
     return comparisons
 
 

@@ -2,14 +2,24 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 
 from lgmd_gym.camera import CameraParams
+from lgmd_gym.camera.worlds import LABORATORY
 
-GROUPS = {"day": "clear", "night": "night"}  # camera condition of each group
+GROUPS = {
+    "day": ("clear", "clear", "clear", "rain", "clear", "clear", "low_sun"),
+    "night": ("night",),
+}
+"""Camera conditions of the drives of each group, in turn; the laboratory has the first one only.
+
+Of four real clips by day, three have clear weather and one a grey sky; none has fog. Seven has no common factor
+with the number of environments or with twenty worlds: given enough seeds, each occurs with each condition.
+"""
 MAX_SECONDS = 5.0  # of a drive; real clips have 2 to 10 s before the crash
 
 
@@ -36,8 +46,8 @@ class Drives:
 
     Attributes:
         env: Environment id.
-        arguments: Arguments of `gym.make`, for example of the scenario family.
-        camera: Fields of `CameraParams`, and optionally `condition`.
+        arguments: Arguments of `gym.make`: of the scenario family, `world`, `condition` and `road`.
+        camera: Fields of `CameraParams`.
         seeds: Seeds, one drive each.
         group: Group of real clips with which the drives are compared.
     """
@@ -66,29 +76,37 @@ ROADS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("LGMD/Traffic-TwoWay-v0", {}),
     ("LGMD/Traffic-Intersection-v0", {}),
 )
-"""Environments and arguments of `laboratory_drives`: an ego among other vehicles."""
+"""Environments and arguments of `simulated_drives`: an ego among other vehicles."""
 
 
-def laboratory_drives(
+def simulated_drives(
+    worlds: Sequence[int],
     seeds: Sequence[int],
     arguments: Mapping[str, Any] | None = None,
     camera: Mapping[str, Any] | None = None,
 ) -> list[Drives]:
-    """Return drives on `ROADS`, each by day and at night.
+    """Return drives on `ROADS` by day and at night, each with one world and one condition of its group.
+
+    Worlds and conditions follow each other in turn: the drives of a group have as many worlds as possible.
 
     Args:
-        seeds: Seeds of every environment and condition.
+        worlds: Numbers of the worlds; empty for the laboratory.
+        seeds: Seeds of every environment and group.
         arguments: Further arguments of every environment.
-        camera: Further camera fields of every drive; they override those of the condition.
+        camera: Further camera fields of every drive.
     """
-    return [
-        Drives(
-            env=env, arguments={**own, **(arguments or {})},
-            camera={"condition": condition, **(camera or {})}, seeds=seeds, group=group,
-        )
-        for group, condition in GROUPS.items()
-        for env, own in ROADS
-    ]  # fmt: skip
+    drives = []
+    for group, conditions in GROUPS.items():
+        for index, (seed, (env, own)) in enumerate(product(seeds, ROADS)):
+            appearance = {
+                "world": worlds[index % len(worlds)] if worlds else LABORATORY,
+                "condition": conditions[index % len(conditions)] if worlds else conditions[0],
+            }
+            drives.append(
+                Drives(env=env, arguments={**own, **appearance, **(arguments or {})}, camera=camera or {},
+                       seeds=(seed,), group=group)
+            )  # fmt: skip
+    return drives
 
 
 def drive_frames(drives: Drives, seed: int, optics: Optics) -> Iterator[np.ndarray]:

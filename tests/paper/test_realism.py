@@ -11,8 +11,9 @@ from lgmd_gym.cli import main as cli
 from lgmd_gym.cli import realism as command
 from lgmd_gym.paper import realism_drives
 from lgmd_gym.paper.realism import DriveValues, compare, normalized_distance
-from lgmd_gym.paper.realism_drives import ROADS, Drives, Optics, drive_frames, laboratory_drives
+from lgmd_gym.paper.realism_drives import GROUPS, ROADS, Drives, Optics, drive_frames, simulated_drives
 from lgmd_gym.paper.realism_statistics import STATISTICS
+from lgmd_gym.paper.realism_tables import summary_line
 
 OPTICS = Optics((60, 100), 30, 90.0)
 
@@ -77,8 +78,19 @@ def test_comparison_by_hand():
     rows = compare([*real, *simulated, drive("night", True, 1.0)])
     assert [(row.group, row.statistic) for row in rows] == [("day", name) for name in STATISTICS]
     for row in rows:
-        assert (row.low, row.high, row.inside) == (5.0, 95.0, 2)
+        assert (row.low, row.high, row.inside, row.median_inside) == (5.0, 95.0, 2, True)
         np.testing.assert_array_equal(row.real, (4.9, 5.0, 95.0, 95.1))
+
+
+@pytest.mark.parametrize(("values", "expected"), [((0.0, 3.0, 50.0), False), ((0.0, 5.0, 99.0), True)])
+def test_the_real_median_is_inside_or_not(values, expected):
+    simulated = [drive("day", False, float(value)) for value in range(101)]
+    rows = compare([*simulated, *(drive("day", True, value) for value in values)])
+    assert {row.median_inside for row in rows} == {expected}
+    assert summary_line(rows) == (
+        "Statistics with the real median inside the simulated 5–95 % range: "
+        f"day {12 if expected else 0} of 12"
+    )
 
 
 def test_day_is_first():
@@ -86,19 +98,41 @@ def test_day_is_first():
     assert list(dict.fromkeys(row.group for row in rows)) == ["day", "night"]
 
 
-def test_laboratory_drives_take_further_arguments():
-    drives = laboratory_drives(range(2), arguments={"ego_speed": 9.0}, camera={"texture": 2.0})
-    assert len(drives) == 2 * len(ROADS)
-    assert {item.group for item in drives} == {"day", "night"}
+def test_drives_of_the_laboratory():
+    drives = simulated_drives((), range(2), arguments={"ego_speed": 9.0}, camera={"texture": 2.0})
+    assert len(drives) == 2 * 2 * len(ROADS)
+    assert {(item.group, item.arguments["condition"]) for item in drives} == {
+        ("day", "clear"), ("night", "night")
+    }  # fmt: skip
     assert all(item.arguments["ego_speed"] == 9.0 for item in drives)
-    assert drives[0].camera == {"condition": "clear", "texture": 2.0}
-    assert drives[-1].label == "Traffic-Intersection ego_speed=9.0 condition=night texture=2.0"
-    assert list(drives[0].seeds) == [0, 1]
+    assert {item.arguments["world"] for item in drives} == {"laboratory"}
+    assert drives[-1].label == (
+        "Traffic-Intersection world=laboratory condition=night ego_speed=9.0 texture=2.0"
+    )
+    assert [list(item.seeds) for item in drives[:: len(ROADS)]] == [[0], [1], [0], [1]]
+
+
+def test_drives_have_worlds_and_conditions_in_turn():
+    drives = simulated_drives(range(20), range(3))
+    day = [item for item in drives if item.group == "day"]
+    assert len(drives) == 2 * len(day) == 2 * 3 * len(ROADS)
+    assert [item.arguments["world"] for item in day] == [*range(20), *range(7)]
+    assert [item.arguments["condition"] for item in day[:7]] == list(GROUPS["day"])
+    assert len({item.env for item in day if item.arguments["condition"] == "rain"}) == 4
+
+
+def test_a_drive_has_the_light_of_its_world():
+    frames = {world: next(drive_frames(simulated_drives((world,), (0,))[0], 0, OPTICS)) for world in (0, 1)}
+    again = next(drive_frames(simulated_drives((1,), (0,))[0], 0, OPTICS))
+    np.testing.assert_array_equal(frames[1], again)
+    assert (frames[0] != frames[1]).mean() > 0.9
 
 
 @pytest.mark.parametrize("env", ["LGMD/Following-v0", "LGMD/Traffic-TwoWay-v0"])
 def test_frames_of_a_drive(env, short_drives):
-    day, night = (Drives(env=env, camera={"condition": name}) for name in ("clear", "night"))
+    day, night = (
+        Drives(env=env, arguments={"world": "laboratory", "condition": name}) for name in ("clear", "night")
+    )
     frames = list(drive_frames(day, 0, OPTICS))
     assert len(frames) == 15
     assert {(frame.shape, frame.dtype) for frame in frames} == {((60, 100), np.dtype(np.uint8))}
@@ -110,7 +144,8 @@ def test_frames_of_a_drive(env, short_drives):
 
 def test_rate_of_a_drive():
     """At 25 Hz, one second of a drive has 25 frames; the ego has moved as far as in 30 frames at 30 Hz."""
-    item = Drives(env="LGMD/Following-v0", arguments={"ego_speed": 10.0}, camera={"texture": 0.0})
+    item = Drives(env="LGMD/Following-v0", arguments={"ego_speed": 10.0, "world": "laboratory"},
+                  camera={"texture": 0.0})  # fmt: skip
     one, other = (list(drive_frames(item, 0, OPTICS._replace(fps=fps))) for fps in (25, 30))
     assert (len(one), len(other)) == (125, 150)
     np.testing.assert_array_equal(one[25], other[30])
@@ -133,8 +168,9 @@ def test_command(clips, tmp_path, capsys):
         "noon.mkv": "day", "dusk.mkv": "day", "dark.mkv": "night"
     }  # fmt: skip
     assert [row["name"] for row in drives if row["kind"] == "simulated"][1] == (
-        "Following ego_speed=13.9 condition=clear seed=1"
+        "Following ego_speed=25.0 world=1 condition=clear seed=0"
     )
+    assert "5–95 % range: day " in printed
     rows = rows_of(out / "realism.csv")
     covered = [name for name in STATISTICS if name != "ground"]  # frames of 60 rows have no ground field
     assert [row["statistic"] for row in rows] == covered * 2
@@ -145,7 +181,17 @@ def test_command(clips, tmp_path, capsys):
     text = (out / "realism.md").read_text(encoding="utf-8")
     assert text.count("## ") == 2
     assert text.count("\n|") == 2 * (len(covered) + 3)
+    assert text.count("5–95 % range: day ") == 1
     assert Image.open(out / "realism.png").size[0] > 1000
+
+
+@pytest.mark.usefixtures("short_drives")
+def test_command_in_the_laboratory(clips, tmp_path):
+    out = tmp_path / "run"
+    assert run("--clips", clips, "--seeds", 1, "--worlds", 0, "--out", out) == 0
+    names = [row["name"] for row in rows_of(out / "drives.csv") if row["kind"] == "simulated"]
+    assert len(names) == 4
+    assert all(" world=laboratory " in name for name in names)
 
 
 @pytest.mark.usefixtures("short_drives")
@@ -183,6 +229,11 @@ def test_crashes_and_named_nights(clips, tmp_path, monkeypatch):
     [
         (["--realism"], "--realism requires --clips"),
         (["--realism", "--clips", "{clips}", "--seeds", "0"], "seeds must be a whole number >= 1"),
+        (
+            ["--realism", "--clips", "{clips}", "--worlds", "6001"],
+            "worlds must be a whole number in [0, 6000]",
+        ),
+        (["--worlds", "0"], "--worlds requires --realism"),
         (["--realism", "--clips", "{clips}", "--clip-hfov-deg", "180"], "clip_hfov_deg must be in [10, 160]"),
         (["--realism", "--clips", "{clips}", "--ignore-bottom", "0.6"], "ignore_bottom must be in [0, 0.5]"),
         (["--realism", "--clips", "{clips}", "--night", "duck"], "did you mean 'dusk'?"),
