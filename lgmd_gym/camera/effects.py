@@ -21,6 +21,7 @@ LOOK = np.dtype(
             *("haze", "extinction", "night", "night_light", "beam_gain", "wet", "paved"),
             *("shot_noise", "read_noise", "shutter_s"),
             *("linear", "auto_exposure_s", "target_grey", "least_gain", "most_gain"),
+            "contrast",
         )
     ]
 )
@@ -33,7 +34,7 @@ in the direction of the sun; the soft shadow below an object, see `shadows.add_s
 below a vehicle, 0 in the laboratory; light of the fog and extinction of the air [1/m]; 1.0 for night; light
 at night apart from the low beam, and its peak; 1.0 for a wet and for an all-paved ground; sensor noise [grey
 levels]; exposure time [s]; 1.0 for linear light; time constant [s], target [grey levels] and bounds of the
-gain of the automatic exposure.
+gain of the automatic exposure; slope of the tone curve at the target grey.
 """
 ASPHALT_GREY, PAINT_GREY = 104.0, 208.0  # of the laboratory by day
 BEAM_WIDTH = 0.26  # the low beam falls to 1/e at this tangent of the angle from straight ahead
@@ -42,6 +43,9 @@ SHOT_NOISE, READ_NOISE = 1.2, 0.8
 """Usual noise of the sensor in numbered worlds, see `CameraParams`."""
 _GLARE = 700.0  # light that is scattered in the direction of a low sun
 _WET_ASPHALT, _WET_VERGE, _WET_PAINT = 0.78, 0.85, 0.9  # grey of a wet surface over that of a dry one
+# Glass beads return headlights: a marking has at least 100 mcd/(m² lx) (EN 1436), asphalt 10 to 20. By day
+# the marking has two to four times the light of the asphalt.
+_RETRO_REFLECTION = 1.8
 _LABORATORY_SUN = (-0.48, 0.36, 0.80)
 _TEXTURE_GAIN = 1.0 / 36.0  # textures store 36 per standard deviation
 NOISE_LOG2 = 17
@@ -71,6 +75,8 @@ def look_of(p: CameraParams) -> np.ndarray:
     look["asphalt"] = to_light(p, _wet(p, world.asphalt_grey, _WET_ASPHALT))
     look["verge"] = to_light(p, _wet(p, world.verge_grey, _WET_VERGE))
     look["paint"] = to_light(p, _wet(p, world.paint_grey, _WET_PAINT))
+    if world.drawn and p.light == "night" and not p.wet:
+        look["paint"] *= _RETRO_REFLECTION
     for name, gain in texture_gains(p, p.texture).items():
         look[name] = gain
     look["line_width"], (look["dash"], look["dash_period"]) = world.line_width, world.dash
@@ -120,7 +126,9 @@ def _set_sensor(look: np.ndarray, p: CameraParams) -> None:
     look["shot_noise"], look["read_noise"] = p.shot_noise, p.read_noise
     look["shutter_s"] = p.shutter_s
     look["linear"], look["auto_exposure_s"] = float(p.linear_light), p.auto_exposure_s
-    look["target_grey"] = (0.5 if night else 1.0) * draw_world(p.world).exposure_grey
+    world = draw_world(p.world)
+    look["target_grey"] = (world.night_exposure if night else 1.0) * world.exposure_grey
+    look["contrast"] = world.contrast
     look["least_gain"], look["most_gain"] = (0.5, 6.0) if night else (0.25, 8.0)
 
 

@@ -38,12 +38,12 @@ _ASPHALT_GREYS = {
     "concrete": (124.0, 162.0),
 }
 _ASPHALT_CONTRASTS = {
-    "fresh": (0.4, 0.9),
-    "aged": (0.6, 1.3),
-    "patched": (0.8, 1.6),
-    "cracked": (0.8, 1.6),
-    "coarse": (0.8, 1.7),
-    "concrete": (0.5, 1.2),
+    "fresh": (0.2, 0.6),
+    "aged": (0.3, 1.0),
+    "patched": (0.4, 1.2),
+    "cracked": (0.4, 1.3),
+    "coarse": (0.4, 1.1),
+    "concrete": (0.25, 0.9),
 }
 _VERGE_GREYS = {
     "grass": (60.0, 110.0),
@@ -96,7 +96,9 @@ class World:
         yaw_error_deg: Turn of the optical axis to the right relative to its mount [degrees].
         noise: Sensor noise as a multiple of the usual noise.
         exposure_grey: Mean grey to which the automatic exposure brings the road and its surroundings by day.
+        night_exposure: The same at night, as a share of that by day.
         exposure_s: Time constant of the automatic exposure [s]; 0 for a fixed exposure.
+        contrast: Slope of the camera's tone curve at that grey; 1 for the square root of the light alone.
     """
 
     number: int = -1
@@ -128,7 +130,9 @@ class World:
     yaw_error_deg: float = 0.0
     noise: float = 0.0
     exposure_grey: float = 110.0
+    night_exposure: float = 0.5
     exposure_s: float = 0.0
+    contrast: float = 1.0
 
     @property
     def drawn(self) -> bool:
@@ -180,7 +184,7 @@ def _draw_ground(rng: np.random.Generator) -> dict[str, Any]:
         "asphalt_grey": float(rng.uniform(*_ASPHALT_GREYS[road])),
         "asphalt_contrast": float(rng.uniform(*_ASPHALT_CONTRASTS[road])),
         "verge_grey": float(rng.uniform(*_VERGE_GREYS[verge])),
-        "verge_contrast": float(rng.uniform(0.6, 1.4)),
+        "verge_contrast": float(rng.uniform(0.5, 1.5)),
     }
 
 
@@ -194,16 +198,16 @@ def _draw_markings(rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _draw_surroundings(rng: np.random.Generator) -> dict[str, Any]:
-    horizon = float(rng.uniform(205.0, 330.0))  # a bright sky is beyond white
+    horizon = float(rng.uniform(155.0, 285.0))  # a bright sky is beyond white
     return {
         "skyline": int(rng.integers(SKYLINES)),
         "hill_scale": float(rng.uniform(0.0, 2.0)),
         "tree_scale": float(np.exp(rng.uniform(np.log(0.5), np.log(4.0)))),
         "greys": (
             horizon * float(rng.uniform(0.55, 0.95)), horizon, float(rng.uniform(90.0, 150.0)),
-            float(rng.uniform(34.0, 92.0)),
+            float(rng.uniform(24.0, 84.0)),
         ),
-        "leaf_contrast": float(rng.uniform(3.0, 10.0)),
+        "leaf_contrast": float(rng.uniform(4.0, 16.0)),
         "roadside": float(rng.uniform(0.0, 2.0)),
         "guard_rail": bool(rng.random() < 0.25),
     }  # fmt: skip
@@ -216,7 +220,7 @@ def _draw_sun(rng: np.random.Generator) -> dict[str, Any]:
         "sun_azimuth_deg": float(rng.uniform(0.0, 360.0)),
         "sun_elevation_deg": float(rng.uniform(18.0, 62.0)),
         "sun_share": share,
-        "beam": float(rng.uniform(0.3, 0.9)),
+        "beam": float(rng.uniform(0.5, 1.4)),
         "street_light": float(np.exp(rng.uniform(np.log(0.002), np.log(0.08)))),
         # Display-coded, 0.49 to 0.58 of the road's grey was measured on a real overcast road, and 0.41 to
         # 0.85 in a tunnel; light is the square of the display code.
@@ -229,7 +233,12 @@ def _draw_camera(rng: np.random.Generator) -> dict[str, Any]:
         "mount_height_error": float(rng.uniform(-0.1, 0.1)),
         "pitch_error_deg": float(rng.uniform(-0.5, 0.5)),
         "yaw_error_deg": float(rng.uniform(-0.5, 0.5)),
-        "noise": float(rng.uniform(0.5, 1.5)),
+        # Dash cameras filter noise in time, and their compression removes most of the rest.
+        "noise": float(np.exp(rng.uniform(np.log(0.12), np.log(1.2)))),
         "exposure_grey": float(rng.uniform(84.0, 122.0)),
         "exposure_s": float(rng.uniform(0.2, 1.0)),
+        "night_exposure": float(rng.uniform(0.25, 0.75)),
+        # Cameras render pictures with more contrast than the scene, with clipped shadows (ISO 22028-1 calls
+        # such pictures output-referred).
+        "contrast": float(rng.uniform(1.0, 1.55)),
     }

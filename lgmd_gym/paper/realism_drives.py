@@ -17,8 +17,9 @@ GROUPS = {
 }
 """Camera conditions of the drives of each group, in turn; the laboratory has the first one only.
 
-Of four real clips by day, three have clear weather and one a grey sky; none has fog. Seven has no common factor
-with the number of environments or with twenty worlds: given enough seeds, each occurs with each condition.
+Of four real clips by day, three have clear weather and one a grey sky; none has fog. Seven has no common
+factor with the number of environments or with twenty worlds: given enough seeds, each occurs with each
+condition.
 """
 MAX_SECONDS = 5.0  # of a drive; real clips have 2 to 10 s before the crash
 

@@ -13,10 +13,13 @@ from lgmd_gym.camera.objects import (
     MODEL_CROWN,
     MODEL_HEDGE,
     MODEL_HOUSE,
+    MODEL_LAMP,
     MODEL_PLATE_SIGN,
     MODEL_POST,
     MODEL_POWER_POLE,
     MODEL_ROUND_SIGN,
+    MODEL_THICKET,
+    MODEL_TREE,
     MODEL_TRIANGLE_SIGN,
     MODEL_WALL,
     body_of,
@@ -50,6 +53,7 @@ def lamp_posts(s: Sites, rng: np.random.Generator) -> Parts:
     return [
         part(s, MODEL_BOX, (0.16, 0.16, height), shade, out=1.5),
         part(s, MODEL_BEAM, (0.2, 1.9, height), shade, out=0.5, base=height - 0.14),
+        part(s, MODEL_LAMP, (0.3, 0.7, height - 0.14), shade, out=-0.1, base=height - 0.3),
     ]
 
 
@@ -70,6 +74,26 @@ def overhanging_trees(s: Sites, rng: np.random.Generator) -> Parts:
         part(s, MODEL_BOX, (0.4, 0.4, bottom + 0.8), 0.6 * shade, out=out, along=0.35),
         part(s, MODEL_CROWN, crown, shade, out=out, base=bottom),
     ]
+
+
+def avenues(s: Sites, rng: np.random.Generator) -> Parts:
+    """Return rows of four trees, 7 m apart."""
+    n = len(s.place)
+    shade, out = rng.uniform(30.0, 70.0, n), rng.uniform(2.9, 3.6, n)
+    trees = []
+    for k in range(4):
+        height = rng.uniform(5.5, 8.0, n)
+        width = np.minimum(rng.uniform(0.55, 0.75, n) * height, 5.0)
+        trees.append(part(s, MODEL_TREE, (width, width, height), shade, out=out, along=7.0 * k - 10.5))
+    return trees
+
+
+def thickets(s: Sites, rng: np.random.Generator) -> Parts:
+    """Return pieces of 24 m of dense trees and bushes, 4 to 9 m high."""
+    n = len(s.place)
+    width, shade = rng.uniform(1.5, 3.0, n), rng.uniform(34.0, 80.0, n)
+    out = rng.uniform(1.2, 4.0, n) + 0.5 * width
+    return [part(s, MODEL_THICKET, (24.0, width, rng.uniform(4.0, 9.0, n)), shade, out=out)]
 
 
 def walls(s: Sites, rng: np.random.Generator) -> Parts:
@@ -134,6 +158,8 @@ BESIDE: dict[str, Callable[[Sites, np.random.Generator], Parts]] = {
     "wall": walls,
     "lamp_post": lamp_posts,
     "overhanging_tree": overhanging_trees,
+    "thicket": thickets,
+    "avenue": avenues,
     "power_pole": power_poles,
     "board": boards,
     "sign": signs,

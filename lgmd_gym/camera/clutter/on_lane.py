@@ -22,7 +22,7 @@ def patches(s: Sites, rng: np.random.Generator) -> Parts:
     """Return patches of tar, most of them darker than the asphalt."""
     n = len(s.place)
     size = (rng.uniform(0.8, 6.0, n), rng.uniform(0.5, 2.2, n))
-    shade = np.where(rng.random(n) < 0.7, rng.uniform(60.0, 90.0, n), rng.uniform(115.0, 135.0, n))
+    shade = np.where(rng.random(n) < 0.7, rng.uniform(60.0, 90.0, n), rng.uniform(107.0, 116.0, n))
     out = rng.uniform(-0.5, 0.5, n) * np.maximum(s.width - size[1], 0.0)
     return [mark(s, size, shade, out=out)]
 

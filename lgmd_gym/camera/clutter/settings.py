@@ -20,6 +20,8 @@ class Clutter:
         lamp_post: Lamp posts with an arm towards the road, per outer edge.
         power_pole: Power poles, per outer edge.
         overhanging_tree: Trees with a crown that reaches over the road, per outer edge.
+        thicket: Dense trees and bushes of 24 m, per outer edge.
+        avenue: Rows of four trees, per outer edge.
         wall: Walls of 30 m, per outer edge.
         hedge: Hedges of 10 m, per outer edge.
         house: Houses, per outer edge.
@@ -47,6 +49,8 @@ class Clutter:
     lamp_post: float = 0.0
     power_pole: float = 0.0
     overhanging_tree: float = 0.0
+    thicket: float = 0.0
+    avenue: float = 0.0
     wall: float = 0.0
     hedge: float = 0.0
     house: float = 0.0
@@ -73,22 +77,22 @@ class Clutter:
 
 ROAD_TYPES = {
     "motorway": Clutter(
-        sign=3.0, board=1.5, wall=5.0, gantry=0.8, bridge=0.7, tunnel=0.1, patch=3.0, joint=4.0, skid=1.5,
-        queue=1.5,
+        sign=3.0, board=1.5, lamp_post=8.0, thicket=12.0, wall=5.0, gantry=0.8, bridge=0.7, tunnel=0.1,
+        patch=6.0, joint=8.0, skid=3.0, queue=1.5,
     ),
     "rural": Clutter(
-        sign=3.0, board=0.7, power_pole=8.0, overhanging_tree=5.0, hedge=5.0, house=1.5, bollard=2.0,
-        bridge=0.3, patch=4.0, skid=1.0, queue=0.5,
+        sign=3.0, board=0.7, power_pole=8.0, overhanging_tree=5.0, thicket=20.0, avenue=8.0, hedge=5.0,
+        house=1.5, bollard=2.0, bridge=0.3, patch=10.0, joint=2.0, skid=2.0, queue=0.5,
     ),
     "urban": Clutter(
-        sign=3.5, lamp_post=7.0, overhanging_tree=2.0, wall=1.0, hedge=1.5, house=6.0, parked_car=7.0,
-        bollard=1.0, drain=3.0, bridge=0.3, tunnel=0.2, signal=1.5, zebra=1.0, arrow=1.0, patch=3.0,
-        manhole=2.5, joint=1.0, queue=3.0,
+        sign=3.5, lamp_post=20.0, overhanging_tree=2.0, thicket=4.0, avenue=6.0, wall=1.0, hedge=1.5,
+        house=8.0, parked_car=9.0, bollard=1.0, drain=8.0, bridge=0.3, tunnel=0.2, signal=1.5, zebra=1.0,
+        arrow=1.5, patch=8.0, manhole=8.0, joint=3.0, skid=1.0, queue=3.0,
     ),
     "industrial": Clutter(
-        sign=3.0, board=1.0, lamp_post=7.0, power_pole=3.0, wall=5.0, hedge=1.5, house=4.0, parked_car=5.0,
-        gantry=0.5, bridge=0.6, tunnel=0.2, signal=0.8, patch=4.0, manhole=2.0, joint=2.0, skid=1.5,
-        queue=1.5,
+        sign=3.0, board=1.0, lamp_post=16.0, power_pole=3.0, thicket=6.0, avenue=3.0, wall=5.0, hedge=1.5,
+        house=4.0, parked_car=5.0, gantry=0.5, bridge=0.6, tunnel=0.2, signal=0.8, drain=4.0, patch=10.0,
+        manhole=5.0, joint=6.0, skid=3.0, queue=1.5,
     ),
 }  # fmt: skip
 """Typical densities by type of road."""

@@ -7,6 +7,7 @@ from lgmd_gym.camera.render.model_builder import BODY, ModelBuilder
 _FULL = (-0.5, 0.5, 0.5)
 _WINDOW_FINE = 20.0  # windows appear from this height of the house on: dozens of polygons [px]
 _JOINT_FINE = 8.0  # the same for the joints of a wall [px]
+_LEAVES_FINE = 10.0  # the same for leaves [px]
 _RIM = 0.72  # values of a traffic sign, as multiples of its shade
 
 
@@ -66,6 +67,31 @@ def add_hedge(b: ModelBuilder) -> None:
         for k, value in enumerate((0.8, 1.25, 0.7, 1.15, 0.85)):
             low = 0.25 + 0.09 * ((3 * k) % 5)
             b.rect(face, (0.02 + 0.19 * k, 0.16 + 0.19 * k), (low, low + 0.3), value, BODY)
+
+
+def add_thicket(b: ModelBuilder) -> None:
+    """Add a piece of dense trees and bushes: four crowns above a thicket with light and dark leaves."""
+    b.model()
+    for k, (top, value) in enumerate(((0.94, 0.8), (1.0, 1.1), (0.9, 0.65), (0.97, 0.95))):
+        b.solid()
+        for way in (-1.0, 1.0):  # the side at the left, that at the right
+            crown = b.face(_oval(0.24 * k - 0.36, way, (0.15, top - 0.62), 0.62), value)
+            b.face(_oval(0.24 * k - 0.36 + 0.04 * way, way, (0.06, 0.10), 0.8), 1.5 * value, BODY, crown)
+            b.fine[-1] = _LEAVES_FINE
+    b.solid()
+    faces = b.box(0.0, 0.78, _FULL, (-0.49, 0.49, 0.3))
+    for face, count in zip(faces[:4], (4, 4, 10, 10), strict=True):
+        for k in range(count):
+            u, v = (0.31 + 0.618 * k) % 1.0, (0.2 + 0.414 * k) % 1.0
+            value = (0.45, 1.6, 0.65, 1.35, 0.3)[k % 5]
+            leaves = b.disc(face, 0.1 + 0.8 * u, 0.14 + 0.7 * v, 0.6 / count, 0.12, value, face)
+            b.role[leaves], b.fine[leaves] = BODY, _LEAVES_FINE
+
+
+def _oval(x: float, way: float, radii: tuple[float, float], z: float) -> list[tuple[float, float, float]]:
+    """Return an octagon along the length; `way` is -1 for the side at the left, 1 for that at the right."""
+    angles = [(k + 0.5) * math.pi / 4.0 for k in range(8)]
+    return [(x + way * radii[0] * math.cos(a), 0.0, z + radii[1] * math.sin(a)) for a in angles]
 
 
 def add_house(b: ModelBuilder) -> None:

@@ -1,4 +1,4 @@
-"""Kernel of glare: halos around the headlights of oncoming cars at night."""
+"""Kernels of glare: halos around the headlights of oncoming cars and street lamps at night."""
 
 import math
 
@@ -10,13 +10,14 @@ BUDGET_PX = 3000.0
 """Approximate maximum area of all halos of a frame [px]."""
 _RADIUS = 0.03  # radius of a halo, 1.7°, from scatter in the lens [rad]
 _PEAK = 200.0  # grey added at the centre by a lamp nearer than _FULL
+_LAMP_PEAK = 60.0  # the same of a street lamp, which shines downwards for the most part
 _FULL = 50.0  # [m]
 _SUN_RADIUS = 0.05  # the glare of the sun halves at this angle from it [rad]
 
 
 @kernel
 def add_glare(image, lens, obj, lamps, clear, budget):
-    """Add the halos of an object's headlights that face the lens.
+    """Add the halos of an object's headlights that face the lens, or of a street lamp.
 
     `lamps` is the row of `Models.lamps` of the object's model, `clear` the transmission of the air times the
     opacity of the object, and `budget` the remaining area for halos [px]. Returns the budget after these
@@ -26,12 +27,14 @@ def add_glare(image, lens, obj, lamps, clear, budget):
         return budget
     c, s = obj.cos, obj.sin
     up = lamps[1] * obj.height
-    for side in (-lamps[0], lamps[0]):
+    around = lamps[0] == 0.0
+    for k in range(1 if around else 2):
+        side = lamps[0] if k == 1 else -lamps[0]
         x = obj.x + 0.5 * obj.length * c - side * obj.width * s - lens.x
         y = obj.y + 0.5 * obj.length * s + side * obj.width * c - lens.y
         away = math.sqrt(x * x + y * y)
         # Full within 30° of the direction to the lens, zero beyond 60°.
-        facing = min((-(x * c + y * s) / max(away, 0.1) - 0.5) / 0.366, 1.0)
+        facing = 1.0 if around else min((-(x * c + y * s) / max(away, 0.1) - 0.5) / 0.366, 1.0)
         ahead = x * lens.cos_yaw + y * lens.sin_yaw
         z = up - lens.z
         depth = ahead * lens.cos_pitch + z * lens.sin_pitch
@@ -44,7 +47,8 @@ def add_glare(image, lens, obj, lamps, clear, budget):
         near = min(_FULL / away, 1.0)
         radius = max(f * _RADIUS * math.sqrt(near), 1.5)
         radius = min(radius, math.sqrt(max(budget, 0.0) / math.pi), 24.0)
-        budget -= _add_halo(image, u, v, radius, _PEAK * facing * near * clear)
+        peak = _LAMP_PEAK if around else _PEAK
+        budget -= _add_halo(image, u, v, radius, peak * facing * near * clear)
     return budget
 
 

@@ -35,7 +35,8 @@ class ModelBuilder:
 
         Args:
             split: Height at which the second solid begins; from below it, the solids are drawn in reverse.
-            lamps: Distance of the headlights from the middle and their height; (0, 0) for none.
+            lamps: Distance of the headlights from the middle and their height; (0, 0) for none, and (0, 1)
+                for one lamp that shines in all directions.
         """
         self.models.append([len(self.solids), len(self.solids)])
         self.splits.append(split)

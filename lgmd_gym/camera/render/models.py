@@ -8,10 +8,24 @@ import numpy as np
 from lgmd_gym.camera.effects import WHITE
 from lgmd_gym.camera.render.body_models import SMALL, SUV, VAN, add_body
 from lgmd_gym.camera.render.car_model import add_car
-from lgmd_gym.camera.render.clutter_models import add_hedge, add_house, add_power_pole, add_sign, add_wall
+from lgmd_gym.camera.render.clutter_models import (
+    add_hedge,
+    add_house,
+    add_power_pole,
+    add_sign,
+    add_thicket,
+    add_wall,
+)
 from lgmd_gym.camera.render.long_models import add_bus, add_trailer
 from lgmd_gym.camera.render.model_builder import BODY, ModelBuilder
-from lgmd_gym.camera.render.overhead_models import add_beam, add_board, add_deck, add_panel, add_signal
+from lgmd_gym.camera.render.overhead_models import (
+    add_beam,
+    add_board,
+    add_deck,
+    add_lamp,
+    add_panel,
+    add_signal,
+)
 from lgmd_gym.camera.render.plain_models import (
     add_barrier,
     add_crown,
@@ -40,8 +54,9 @@ class Models(NamedTuple):
         models: First and last + 1 solid of each model, int64, shape (models, 2).
         splits: Height from below which the solids of a model are drawn in reverse, as a share of its height,
             float64, shape (models,).
-        lamps: Distance of a model's headlights from its middle as a share of its width, and their height as
-            a share of its height, 0 for none, float64, shape (models, 2).
+        lamps: Distance of a model's headlights from its middle as a share of its width, 0 for one lamp that
+            shines in all directions, and their height as a share of its height, 0 for none, float64, shape
+            (models, 2).
     """
 
     corners: np.ndarray
@@ -81,7 +96,7 @@ def all_models(linear: bool) -> Models:
         add(b)
     for corners in (8, 3, 4):
         add_sign(b, corners)
-    for add in (add_power_pole, add_wall, add_hedge, add_house):
+    for add in (add_power_pole, add_wall, add_hedge, add_house, add_lamp, add_thicket):
         add(b)
     corners = np.zeros((len(b.corners), _MAX_CORNERS, 3))
     for index, points in enumerate(b.corners):

@@ -65,3 +65,12 @@ def add_signal(b: ModelBuilder) -> None:
     b.role[red] = LAMP
     for v in (0.5, 0.18):
         b.disc(rear, 0.5, v, 0.36, 0.13, 60.0, rear)
+
+
+def add_lamp(b: ModelBuilder) -> None:
+    """Add the head of a street lamp, which shines downwards and to all sides at night."""
+    b.model(lamps=(0.0, 1.0))
+    b.solid()
+    sides = b.box(0.0, 1.0, _FULL, _FULL)[:4]
+    for face in (*sides, b.underside()):
+        b.role[face], b.value[face] = LAMP, 150.0

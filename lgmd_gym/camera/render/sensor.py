@@ -50,12 +50,15 @@ def _encode(out, image, look, gain, noise, start, mask):
     """Encode linear light as its square root, with noise.
 
     The square root of a number of photons has the same deviation for any number, so the photon noise of the
-    code depends on the gain only: a gain of 4 means a quarter of the photons and twice the noise.
+    code depends on the gain only: a gain of 4 means a quarter of the photons and twice the noise. Then the
+    tone curve raises the contrast around the target of the exposure.
     """
     height, width = out.shape
     black, half, white = splat(nb.float32(0.0)), splat(nb.float32(0.5)), splat(nb.float32(255.0))
     scale = splat(nb.float32(gain * 255.0))
     level = math.sqrt(gain) * math.sqrt(look.shot_noise**2 + look.read_noise**2)
+    contrast = splat(nb.float32(look.contrast))
+    offset = splat(nb.float32(look.target_grey * (1.0 - look.contrast)))
     noisy, level16 = level > 0.0, splat(nb.float32(level))
     for i in range(height):
         first = (start + i * width) & mask
@@ -64,4 +67,5 @@ def _encode(out, image, look, gain, noise, start, mask):
             code = square_root(maximum(load_part(image, at, count), black) * scale)
             if noisy:
                 code = madd(level16, load_part(noise, first + j, count), code)
+            code = madd(contrast, code, offset)
             store_bytes(out, at, count, minimum(maximum(code, black), white) + half)
