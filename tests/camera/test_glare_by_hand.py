@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.records import lens_of, record
 
-from lgmd_gym.camera.objects import BODY_MODELS, MODEL_CAR, MODEL_TRUCK, OBJECT
+from lgmd_gym.camera.objects import BODY_MODELS, MODEL_CAR, MODEL_LAMP, MODEL_TRUCK, OBJECT
 from lgmd_gym.camera.pinhole import project
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
 from lgmd_gym.camera.render.models import all_models
@@ -102,10 +102,10 @@ def test_lamps_shine_forwards(turn, share, side, bearing):
 
 
 def test_which_objects_have_glare():
-    vehicles = {body.model for body in BODY_MODELS.values()}
+    shining = {MODEL_LAMP, *(body.model for body in BODY_MODELS.values())}
     for model in range(len(all_models(linear=False).models)):
         image, _ = halos({"x": 20.0, "model": model})
-        assert image.any() == (model in vehicles)
+        assert image.any() == (model in shining)
     assert not halos({"x": 20.0, "heading": 0.0})[0].any()
     assert not halos({"x": -20.0, "heading": 0.0})[0].any()  # behind
     assert not halos({"x": 20.0}, budget=0.0)[0].any()
