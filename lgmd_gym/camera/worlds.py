@@ -237,7 +237,7 @@ def _draw_camera(rng: np.random.Generator) -> dict[str, Any]:
         "noise": float(np.exp(rng.uniform(np.log(0.12), np.log(1.2)))),
         "exposure_grey": float(rng.uniform(84.0, 122.0)),
         "exposure_s": float(rng.uniform(0.2, 1.0)),
-        "night_exposure": float(rng.uniform(0.25, 0.75)),
+        "night_exposure": float(rng.uniform(0.22, 0.9)),
         # Cameras render pictures with more contrast than the scene, with clipped shadows (ISO 22028-1 calls
         # such pictures output-referred).
         "contrast": float(rng.uniform(1.0, 1.55)),

@@ -27,7 +27,7 @@ def test_tone_curve_is_steeper_around_the_target_of_the_exposure(grey, expected)
 
 
 @pytest.mark.parametrize(
-    ("name", "low", "high"), [("contrast", 1.0, 1.55), ("night_exposure", 0.25, 0.75), ("noise", 0.12, 1.2)]
+    ("name", "low", "high"), [("contrast", 1.0, 1.55), ("night_exposure", 0.22, 0.9), ("noise", 0.12, 1.2)]
 )
 def test_worlds_differ_in_their_sensor(name, low, high):
     values = np.array([getattr(world, name) for world in TRAINING])
