@@ -79,7 +79,7 @@ def closed_loop(env_id, **arguments):
 
 def engine(count, threads=1):
     """Return a function that steps `count` environments of the engine by one camera frame."""
-    envs = gym.make_vec("LGMD/CCRs-v0", num_envs=count, threads=threads)
+    envs = gym.make_vec("LGMD/CCRs-v0", num_envs=count, threads=threads, world="laboratory")
     envs.reset(seed=0)
     return lambda: envs.step(np.zeros((count, 1)))
 
@@ -257,7 +257,7 @@ def rows(path=None):
         (seconds,) = interleaved(camera(name, vehicles))
         height, width = EgoCamera(name).shape
         yield f"camera `{name}`, {width}×{height}, {vehicles} vehicles", f"{seconds * 1e6:.0f} µs", ""
-    ours, theirs = interleaved(closed_loop("LGMD/CCRs-v0"), top_view(), repeats=60)
+    ours, theirs = interleaved(closed_loop("LGMD/CCRs-v0", world="laboratory"), top_view(), repeats=60)
     what = "closed loop, 2 vehicles, 160×90, physics 60 Hz"
     yield what, f"{1 / ours:,.0f} frames/s", f"{theirs / ours:.1f}× highway-env with its grey top view"
     yield from engine_rows(path)

@@ -40,7 +40,7 @@ def test_memory_does_not_grow():
     """Run 100,000 steps with resets in one environment."""
     import resource
 
-    env = gym.make("LGMD/CCRs-v0", ego_speed=15.0)
+    env = gym.make("LGMD/CCRs-v0", ego_speed=15.0, world="laboratory")
     hold, seed = np.zeros(1, np.float32), 0
     peaks = []
     for _ in range(4):

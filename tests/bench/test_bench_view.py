@@ -14,7 +14,7 @@ pytestmark = pytest.mark.bench
 
 @pytest.fixture
 def view():
-    env = LGMDView(gym.make("LGMD/CCRm-v0"))
+    env = LGMDView(gym.make("LGMD/CCRm-v0", world="laboratory"))
     env.reset(seed=0)
     env.step([0.0])
     env.render()
