@@ -23,7 +23,7 @@ LINE = np.dtype([(name, np.float64) for name in ("x0", "y0", "x1", "y1", "start"
 
 _LANE_STEP = 2.0
 _MAX_PIECES = 2000
-_MAX_KNOWN = 16  # geometries of a network that are remembered
+_MAX_KNOWN = 2  # geometries of a network that are remembered
 _BAY_LENGTH = 20.0  # a network whose longest lane is no longer than this is a car park [m]
 
 

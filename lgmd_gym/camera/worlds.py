@@ -24,7 +24,7 @@ ASPHALTS = ("fresh", "aged", "patched", "cracked", "coarse", "concrete")
 VERGES = ("grass", "gravel", "soil", "paving")
 TILES = 2
 """Number of different textures per kind of ground."""
-SKYLINES = 64
+SKYLINES = 32
 """Number of different skylines."""
 
 # Mean grey of a new to a weathered surface, display-coded. Asphalt reflects 5 % (new) to 15 % (aged) and

@@ -27,7 +27,7 @@ _DEPTH = 3
 `_DEPTH` on, 1 / (height + 1) of hills and trees."""
 
 
-@lru_cache(maxsize=80)
+@lru_cache(maxsize=40)
 def skyline(seed: int) -> np.ndarray:
     """Return the skyline over 360°, natural 1/f^k profiles periodic in azimuth; float32, shape (3, 32768).
 

@@ -15,6 +15,7 @@ from lgmd_gym.camera.render.ground_features import EXPONENTS, STREAMS, add_featu
 TEXEL_M = 0.04
 """Size of a texel [m]. The near ground of a 60° lens at 160 px has 3 to 8 cm per pixel."""
 _LONG_LOG2, _WIDE_LOG2 = 12, 9  # 164 m along x, 20 m along y
+_LABORATORY = ("asphalt", "verge")  # kinds of ground of the laboratory
 _STD_CODE = 36.0  # standard deviation of the stored bytes around 128
 
 
@@ -41,7 +42,8 @@ def ground_texture(kind: str, tile: int) -> Texture:
         tile: Number of the texture.
     """
     rng = np.random.default_rng([tile, STREAMS[kind]])
-    deviations = _noise(rng, EXPONENTS[kind])
+    # The many textures of numbered worlds are half as long, so that all of them fit into 85 MB.
+    deviations = _noise(rng, EXPONENTS[kind], _LONG_LOG2 - (kind not in _LABORATORY))
     add_features(kind, deviations, rng)
     deviations -= deviations.mean()
     deviations /= deviations.std()
@@ -51,9 +53,9 @@ def ground_texture(kind: str, tile: int) -> Texture:
     return _ripmap(deviations)
 
 
-def _noise(rng: np.random.Generator, exponent: float) -> np.ndarray:
+def _noise(rng: np.random.Generator, exponent: float, long_log2: int) -> np.ndarray:
     """Return periodic noise with amplitude 1/frequency^exponent; float32, unit variance."""
-    shape = (1 << _LONG_LOG2, 1 << _WIDE_LOG2)
+    shape = (1 << long_log2, 1 << _WIDE_LOG2)
     white = rng.standard_normal(shape, dtype=np.float32)
     spectrum = np.fft.rfft2(white)
     fx = np.fft.fftfreq(shape[0]).astype(np.float32)[:, None]
@@ -71,12 +73,13 @@ def _noise(rng: np.random.Generator, exponent: float) -> np.ndarray:
 
 
 def _ripmap(tile: np.ndarray) -> Texture:
-    level_start = np.zeros((_LONG_LOG2 + 1, _WIDE_LOG2 + 1), dtype=np.int64)
+    long_log2 = tile.shape[0].bit_length() - 1
+    level_start = np.zeros((long_log2 + 1, _WIDE_LOG2 + 1), dtype=np.int64)
     widths = sum((1 << j) + 1 for j in range(_WIDE_LOG2 + 1))
     # Pairs of texels are read as words of four bytes.
-    data = np.zeros(((2 << _LONG_LOG2) - 1) * widths + 2, dtype=np.uint8)
+    data = np.zeros(((2 << long_log2) - 1) * widths + 2, dtype=np.uint8)
     at = 0
-    for i in range(_LONG_LOG2 + 1):
+    for i in range(long_log2 + 1):
         level = tile
         for j in range(_WIDE_LOG2 + 1):
             level_start[i, j] = at
@@ -88,6 +91,6 @@ def _ripmap(tile: np.ndarray) -> Texture:
             at += texels.size
             if j < _WIDE_LOG2:
                 level = np.float32(0.5) * (level[:, 0::2] + level[:, 1::2])
-        if i < _LONG_LOG2:
+        if i < long_log2:
             tile = np.float32(0.5) * (tile[0::2] + tile[1::2])
     return Texture(data, level_start)
