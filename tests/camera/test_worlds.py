@@ -149,3 +149,15 @@ def test_the_mount_has_the_errors_of_the_world():
     assert np.degrees(lens["pitch"] - plain["pitch"]) == pytest.approx(world.pitch_error_deg)
     camera.render(env, gaze=(2.0, 0.0))
     assert np.degrees(camera._lens["yaw"]) == pytest.approx(world.yaw_error_deg + 2.0)
+
+
+@pytest.mark.parametrize("number", [1618, 1790, 5702])
+def test_frames_do_not_depend_on_frames_drawn_before(number):
+    """The scratch memory is clear after each frame, also where details of trees protrude from them."""
+    env, camera = straight_env(lanes=2), EgoCamera("fovea", world=number, road="rough")
+    for step in range(60):
+        env.steps = step
+        env.vehicle.position[0] = 1.5 * step
+        camera.render(env)
+        assert not camera.buffers.solids.any()
+        assert not camera.buffers.ground.any()

@@ -142,7 +142,7 @@ def draw_object(image, lens, look, obj, models, air, layer):
 def _add_solid(layer, lens, look, obj, models, solid, size, air):
     """Add the faces and details of one solid that are in the frame.
 
-    Returns the bounds (u0, v0, u1, v1) of these faces [px]; u1 < u0 if there is none.
+    Returns the bounds (u0, v0, u1, v1) of all of them [px]; u1 < u0 if there is none.
     """
     corners, uv, greys = layer.corners, layer.uv, layer.greys
     height, width = layer.coverage.shape[1], layer.coverage.shape[2] - 2
@@ -169,11 +169,12 @@ def _add_solid(layer, lens, look, obj, models, solid, size, air):
             continue
         grey = _grey(models.role[p], models.value[p], light, obj, look, air)
         greys[p, 0], greys[p, 1] = grey, light
+        # Also a detail, which may protrude from its face: the layer is cleared within the bounds.
+        u0, v0, u1, v1 = min(u0, left), min(v0, top), max(u1, right), max(v1, bottom)
         if parent >= 0:
             add_polygon(layer.coverage, np.int64(1), uv, m, weight * (grey - greys[parent, 0]), 0.0)
             continue
         add_polygon(layer.coverage, np.int64(0), uv, m, weight, weight * grey)
-        u0, v0, u1, v1 = min(u0, left), min(v0, top), max(u1, right), max(v1, bottom)
     return u0, v0, u1, v1
 
 
