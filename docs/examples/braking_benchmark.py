@@ -22,7 +22,7 @@ AGENTS = ("spike-threshold:threshold=30", "spike-threshold:threshold=90,frames=2
 
 def main(folder: Path, picture: Path | None = None, seeds: int = 1) -> list[AgentSummary]:
     """Run the quick suite, print one line per agent and plot the rates."""
-    run = Run.new(RunConfig(suite="quick", agents=AGENTS, seeds=seeds), folder)
+    run = Run.new(RunConfig(suite="quick", agents=AGENTS, seeds=seeds, worlds=0), folder)
     run.play()
     found = summaries(run.rows, lambda row: "")
     for item in found:
