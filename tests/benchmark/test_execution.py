@@ -106,7 +106,7 @@ def test_first_seed_selects_the_later_seeds_of_a_longer_run(short_suite, tmp_pat
     assert whole.play()
     out = tmp_path / "late"
     flags = ["--suite", str(short_suite), "--agents", "spike-threshold", "--jobs", "1", "--out", str(out)]
-    assert cli.run(["bench", *flags, "--seeds", "2", "--first-seed", "1"]) == 0
+    assert cli.run(["bench", *flags, "--seeds", "2", "--first-seed", "1", "--worlds", "0"]) == 0
     assert "2 seeds from 1 on" in " ".join(capsys.readouterr().out.split())
     late = Run.resume(out)
     assert late.play()  # no episode is missing

@@ -42,13 +42,14 @@ def test_bench_writes_a_run_folder(tmp_path):
 def test_drive_writes_a_video(tmp_path):
     video = tmp_path / "out.mp4"
     done = run(
-        "drive", "LGMD/CCRs-v0", "--agent", "spike-threshold", "--set", "ego_speed=4", "--video", str(video)
+        *("drive", "LGMD/CCRs-v0", "--agent", "spike-threshold", "--video", str(video)),
+        *("--set", "ego_speed=4"),
     )
     assert done.returncode == 0, done.stderr
     assert "no contact" in done.stdout
     pictures = list(VideoReader(video))
     assert pictures[0].shape == (720, 1280, 3)
-    assert len(pictures) > 100
+    assert len(pictures) > 40
     assert pictures[-1].std() > 20
     assert (pictures[0] != pictures[-1]).any()
 

@@ -92,7 +92,7 @@ def test_cars_move_as_on_a_road_of_highway_env(kind):
             assert (car.heading, car.speed) == pytest.approx((other.heading, other.speed), abs=1e-6)
             assert (car.lane_index, car.target_lane_index) == (other.lane_index, other.target_lane_index)
             assert (car.lane, car.target_speed) == (other.lane, other.target_speed)
-    assert changes > 0 or kind in ("two-way", "intersection"), "no lane change"
+    assert changes > 0 or kind in ("two-way", "intersection", "roundabout"), "no lane change"
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -28,6 +28,8 @@ HIGHWAY = {
     "observation": {"type": "LidarObservation", "cells": 4},
 }
 
+LABORATORY = "laboratory"  # each new world fills caches, up to 110 MB of textures and skylines
+
 
 class Usage(NamedTuple):
     """Resources of this process."""
@@ -67,7 +69,7 @@ class Vector:
     """Steps of the vector engine, which resets by itself."""
 
     def __init__(self):
-        self.env, self.episodes = gym.make_vec("LGMD/RandomBraking-v0", num_envs=8), 8
+        self.env, self.episodes = gym.make_vec("LGMD/RandomBraking-v0", num_envs=8, world=LABORATORY), 8
         self.env.reset(seed=0)
 
     def step(self):
@@ -78,7 +80,7 @@ class Vector:
 
 
 KINDS = {
-    "braking": lambda: Single(lambda: gym.make("LGMD/RandomBraking-v0")),
+    "braking": lambda: Single(lambda: gym.make("LGMD/RandomBraking-v0", world=LABORATORY)),
     "highway": lambda: Single(lambda: LGMDObservation(gym.make("highway-v0", config=HIGHWAY), fps=15)),
     "vector": Vector,
 }
