@@ -11,6 +11,7 @@ from lgmd_gym.camera.pose import side_tangent
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
 from lgmd_gym.camera.render.ground import CAST
 from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.camera.render.order import first_from
 
 _FADE_START, _FADE_END = 100.0, 150.0  # shadows fade out between these distances from the lens [m]
 _CROWN_CORNERS = 8
@@ -29,15 +30,7 @@ def add_cast_shadows(layer, view, objects, count, roadside):
     for i in range(count):
         if objects[i].model != MODEL_MARK:
             _add_shadow_of(layer, lens, objects[i], away)
-    n = roadside.shape[0]
-    low, high = 0, n
-    start = lens.x - _FADE_END
-    while low < high:
-        middle = (low + high) // 2
-        if roadside[middle].x < start:
-            low = middle + 1
-        else:
-            high = middle
+    n, low = roadside.shape[0], first_from(roadside, lens.x - _FADE_END)
     while low < n and roadside[low].x < lens.x + _FADE_END:
         if roadside[low].model != MODEL_MARK:
             _add_shadow_of(layer, lens, roadside[low], away)

@@ -16,6 +16,19 @@ def distance(lens, obj):
 
 
 @kernel
+def first_from(roadside, x):
+    """Return the index of the first object of a roadside, which is sorted by x, at or beyond x."""
+    low, high = 0, roadside.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if roadside[middle].x < x:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@kernel
 def visible(lens, obj):
     """Return whether an object may be in the frame and the lens is outside it."""
     dx, dy = obj.x - lens.x, obj.y - lens.y

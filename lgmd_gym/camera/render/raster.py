@@ -15,7 +15,7 @@ from lgmd_gym.camera.render.horizon import horizon_of
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.markings import add_lines
 from lgmd_gym.camera.render.models import Models
-from lgmd_gym.camera.render.order import distance, order_objects, visible
+from lgmd_gym.camera.render.order import distance, first_from, order_objects, visible
 from lgmd_gym.camera.render.panorama import draw_panorama
 from lgmd_gym.camera.render.sensor import expose
 from lgmd_gym.camera.render.shadows import add_shadow
@@ -28,15 +28,7 @@ from lgmd_gym.camera.roadside import PLANT_RANGE
 @kernel
 def append_roadside(lens, roadside, look, objects, count):
     """Append the roadside within range to the objects; returns the new count."""
-    n = roadside.shape[0]
-    low, high = 0, n
-    start = lens.x - PLANT_RANGE
-    while low < high:
-        middle = (low + high) // 2
-        if roadside[middle].x < start:
-            low = middle + 1
-        else:
-            high = middle
+    n, low = roadside.shape[0], first_from(roadside, lens.x - PLANT_RANGE)
     while low < n and roadside[low].x < lens.x + PLANT_RANGE and count < objects.shape[0]:
         dx, dy = roadside[low].x - lens.x, roadside[low].y - lens.y
         if dx * dx + dy * dy < PLANT_RANGE * PLANT_RANGE and visible(lens, roadside[low]):
