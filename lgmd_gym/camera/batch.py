@@ -13,6 +13,7 @@ from lgmd_gym.camera.pose import MOUNT, mount_of
 from lgmd_gym.camera.render.buffers import Views
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.context import SharedTables, Workspace, draw_cameras, tables_key
+from lgmd_gym.camera.render.own_car import OWN_CAR, own_car_of
 
 
 class _Prepared(NamedTuple):
@@ -21,6 +22,7 @@ class _Prepared(NamedTuple):
     mount: np.ndarray
     look: np.ndarray
     beam: np.ndarray
+    own_car: np.ndarray
     tables_key: tuple[Any, ...]
     params: CameraParams
 
@@ -28,7 +30,8 @@ class _Prepared(NamedTuple):
 @lru_cache(maxsize=512)
 def _prepare(p: CameraParams) -> _Prepared:
     p = in_world(p)
-    return _Prepared(mount_of(p), look_of(p), beam_profile(p), tables_key(p), p)
+    look = look_of(p)
+    return _Prepared(mount_of(p), look, beam_profile(p), own_car_of(p, look), tables_key(p), p)
 
 
 class CameraBatch:
@@ -66,6 +69,7 @@ class CameraBatch:
             sky_aims=np.full((*size, 3), np.nan),
             noise_starts=np.zeros(size, dtype=np.int64),
             exposures=np.full((*size, 3), np.nan),
+            own_cars=np.zeros(size, OWN_CAR),
         )
         # Index of the tables, camera, mount and lenses of each camera, and the fields of its view.
         self._bundle = Bundle(
@@ -92,6 +96,7 @@ class CameraBatch:
         self._mounts[index, member] = prepared.mount
         self._views.looks[index, member] = prepared.look
         self._views.beams[index, member] = prepared.beam
+        self._views.own_cars[index, member] = prepared.own_car
         self._views.sky_aims[index, member] = np.nan  # redraw the sky
         self._views.exposures[index, member] = np.nan  # adapt to the next frame
         if texture is not None:
@@ -124,7 +129,7 @@ class CameraBatch:
         self,
         first: int,
         last: int,
-        world: Bundle,
+        scene_table: Bundle,
         roads: Bundle,
         frames: np.ndarray,
         selected: np.ndarray,
@@ -135,5 +140,5 @@ class CameraBatch:
         Threads may draw disjoint ranges at once, each with a workspace of its own.
         """
         for used, tables in self._tables.values():
-            inputs = workspace.join(self._bundle, world, roads, tables.bundle)
+            inputs = workspace.join(self._bundle, scene_table, roads, tables.bundle)
             draw_cameras(first, last, used, frames, selected, inputs.native)

@@ -21,6 +21,7 @@ LOOK = np.dtype(
             *("haze", "extinction", "night", "night_light", "beam_gain", "wet", "paved"),
             *("shot_noise", "read_noise", "shutter_s"),
             *("linear", "auto_exposure_s", "target_grey", "least_gain", "most_gain"),
+            *("veil", "lamps_ahead"),
             "contrast",
         )
     ]
@@ -34,11 +35,13 @@ in the direction of the sun; the soft shadow below an object, see `shadows.add_s
 below a vehicle, 0 in the laboratory; light of the fog and extinction of the air [1/m]; 1.0 for night; light
 at night apart from the low beam, and its peak; 1.0 for a wet and for an all-paved ground; sensor noise [grey
 levels]; exposure time [s]; 1.0 for linear light; time constant [s], target [grey levels] and bounds of the
-gain of the automatic exposure; slope of the tone curve at the target grey.
+gain of the automatic exposure; light of fog in the low beam, see `veil_at`, 0 by day and in clear air;
+distance of the own headlights ahead of the lens [m]; slope of the tone curve at the target grey.
 """
 ASPHALT_GREY, PAINT_GREY = 104.0, 208.0  # of the laboratory by day
 BEAM_WIDTH = 0.26  # the low beam falls to 1/e at this tangent of the angle from straight ahead
-WHITE = 255.0
+BEAM_REACH = 26.0  # the low beam falls to 1/e over this distance [m]
+WHITE = 255.0  # grey level and light
 SHOT_NOISE, READ_NOISE = 1.2, 0.8
 """Usual noise of the sensor in numbered worlds, see `CameraParams`."""
 _GLARE = 700.0  # light that is scattered in the direction of a low sun
@@ -46,6 +49,10 @@ _WET_ASPHALT, _WET_VERGE, _WET_PAINT = 0.78, 0.85, 0.9  # grey of a wet surface 
 # Glass beads return headlights: a marking has at least 100 mcd/(m² lx) (EN 1436), asphalt 10 to 20. By day
 # the marking has two to four times the light of the asphalt.
 _RETRO_REFLECTION = 1.8
+# Droplets of fog scatter 1/18.5 of the light that they remove per steradian backwards (the extinction-to-
+# backscatter ratio of water clouds, 18 to 19 sr), a white surface 1/π: fog is as light as a surface that
+# reflects π/18.5 = 17 %, which has this grey.
+_FOG_GREY = 105.0
 _LABORATORY_SUN = (-0.48, 0.36, 0.80)
 _TEXTURE_GAIN = 1.0 / 36.0  # textures store 36 per standard deviation
 NOISE_LOG2 = 17
@@ -92,6 +99,9 @@ def look_of(p: CameraParams) -> np.ndarray:
         for name in ("zenith", "horizon", "hills", "trees"):
             look[name] = haze + remaining * (look[name] - haze)
         look["leaf_gain"] *= remaining
+        if p.light == "night":
+            look["veil"] = to_light(p, _FOG_GREY) * world.beam
+            look["lamps_ahead"] = max(p.mount_setback, 0.0)
     return look
 
 

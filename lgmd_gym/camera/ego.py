@@ -20,7 +20,7 @@ class EgoCamera:
     """A camera on the ego car of any highway-env environment.
 
     Frames are grey, uint8, shape (height, width), with row 0 at the top. The same seed and the same road
-    state give the same frame, in any process. The ego's own body is not drawn.
+    state give the same frame, in any process. Of the ego's own body, at most the bonnet is drawn.
 
     Args:
         params: A preset's name, `CameraParams`, a dict of its fields, or None for `wide`.
@@ -118,7 +118,7 @@ class _Stage:
         self.batch = CameraBatch([p], p.shape)
         self.workspace = Workspace(p.shape)
         self._params, self._keys = p, (road_key(p),)
-        self._world, self._roads = SceneTable(), RoadPool(1, 1)
+        self._scene_table, self._roads = SceneTable(), RoadPool(1, 1)
         self._view = view_of([p])
         self._selected = np.ones((1, 1), np.bool_)
         self._turned = False  # whether the last gaze replaced that of the parameters
@@ -128,10 +128,16 @@ class _Stage:
         if gaze is not None or self._turned:
             self.batch.turn(0, 0, self._params, gaze)
             self._turned = gaze is not None
-        ego = self._world.read(env, None if self._turned else self._view)
+        ego = self._scene_table.read(env, None if self._turned else self._view)
         self._roads.assign(0, ego.road, self._keys)
         self.batch.draw(
-            0, 1, self._world.bundle, self._roads.bundle, out[None, None], self._selected, self.workspace
+            0,
+            1,
+            self._scene_table.bundle,
+            self._roads.bundle,
+            out[None, None],
+            self._selected,
+            self.workspace,
         )
 
 

@@ -15,6 +15,7 @@ from lgmd_gym.errors import (
     check_keys,
     check_known,
     check_size,
+    check_whole,
     is_integer,
     shown,
 )
@@ -48,6 +49,7 @@ _BOUNDS = {
     "auto_exposure_s": _Interval(0.0, 60.0, True, True, "s (0 is a fixed exposure)"),
     "dive_deg": _Interval(0.0, 2.0, True, True, "degrees per m/s²"),
     "shutter_s": _Interval(0.0, 0.1, True, True, "s"),
+    "windscreen": _Interval(0.0, 0.2, True, True, "of the light of the sky"),
 }
 ROADS = {"still": 0.0, "smooth": 0.5, "normal": 1.0, "rough": 2.0}
 """Motion of the car's body on each road, as a multiple of the measured motion in `body_motion`.
@@ -92,12 +94,15 @@ class CameraParams:
         guard_rail: Whether steel rails, 0.75 m high on posts, run along the outer edges of the road.
         world: Number of the world that determines the appearance of road, surroundings and light, and the
             sensor, see `World` and `in_world`; None for the laboratory.
+        queue_lane: Index of the lane on which the queues of the world's clutter stand, in the order of the
+            road network; None for none. Braking environments set it to a free lane next to the ego's.
         seed: Seed of textures and skyline of the laboratory, and of the grey of vehicles without a `shade`.
         light: `"day"`, `"night"` or `"low_sun"`. At night, the ego's headlights and the lights of other cars
             are on. A low sun is 4° to 12° above the horizon, near the direction +x; in the laboratory it
             equals day.
         wet: Whether the road is wet: darker, and lighter towards the horizon, where it reflects the sky.
-        visibility_m: Meteorological visibility in fog (5 % contrast, Koschmieder); 0 is clear air [m].
+        visibility_m: Meteorological visibility in fog (5 % contrast, Koschmieder); 0 is clear air [m]. At
+            night, the fog scatters light of the own headlights back, see `render.veil`.
         shot_noise: Standard deviation of photon noise at grey 128, growing with √grey [grey levels].
         read_noise: Standard deviation of the sensor's read noise [grey levels].
         road: Motion of the body (pitch, roll, yaw and heave): `"still"` for none, or that of a car on a
@@ -112,6 +117,16 @@ class CameraParams:
         auto_exposure_s: Time constant of the gain that brings the mean of the frames before to grey 110
             [s]; the first frame of an episode has its own gain. 0 disables it. The gain is 1/4 to 8 by day
             and 1 to 24 at night.
+        bonnet: Whether the own car's bonnet is visible at the bottom of the frame, see `render.own_car`. It
+            is fixed to the car: neither the road nor the motion of the body moves it in the frame. With the
+            mount of `wide`, it covers the lowest 11 rows; in `standard`, `tele` and `fovea` it is below the
+            frame. A lens that is 0.1 m lower (an error of the mount in a world) shows 12 rows more. Needs a
+            lens behind the windscreen: at least 1.1 m high, at least 1.2 m behind the front bumper and at
+            most 0.7 m from the centreline.
+        windscreen: Reflections of the dashboard in the windscreen: their mean light as a share of that of the
+            sky, in [0, 0.2]; 0 for none. They are fixed in the frame and stronger in its lower part. Glass
+            reflects 17 % at 60° (both surfaces, by Fresnel), so that 0.01 to 0.03 stands for a dark dashboard
+            and 0.14 for a sheet of white paper; the pattern is an assumption.
     """
 
     name: str = "custom"
@@ -129,6 +144,7 @@ class CameraParams:
     panorama: str = "skyline"
     guard_rail: bool = False
     world: int | None = None
+    queue_lane: int | None = None
     seed: int = 0
     light: str = "day"
     wet: bool = False
@@ -140,6 +156,8 @@ class CameraParams:
     shutter_s: float = 0.0
     linear_light: bool = False
     auto_exposure_s: float = 0.0
+    bonnet: bool = False
+    windscreen: float = 0.0
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -150,8 +168,12 @@ class CameraParams:
             object.__setattr__(self, name, _checked_number(name, getattr(self, name), bound))
         _check_surroundings(self)
         object.__setattr__(self, "world", None if self.world is None else check_world(self.world))
+        if self.queue_lane is not None:
+            object.__setattr__(self, "queue_lane", check_whole("camera queue_lane", self.queue_lane, 0))
         for name, known in _CHOICES.items():
             check_known(f"camera {name}", getattr(self, name), known)
+        if self.bonnet:
+            _check_behind_windscreen(self)
 
     @property
     def focal_px(self) -> float:
@@ -223,8 +245,20 @@ def _check_surroundings(p: CameraParams) -> None:
         raise ValueError(
             f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
         )
-    for name in ("guard_rail", "wet", "linear_light"):
+    for name in ("guard_rail", "wet", "linear_light", "bonnet"):
         object.__setattr__(p, name, check_flag(f"camera {name}", getattr(p, name)))
+
+
+def _check_behind_windscreen(p: CameraParams) -> None:
+    """Check that a lens with a bonnet is behind the windscreen, also with the mounting errors of a world."""
+    limits = (
+        ("mount_height", p.mount_height >= 1.1, "at least 1.1 m"),
+        ("mount_setback", p.mount_setback >= 1.2, "at least 1.2 m"),
+        ("mount_left", abs(p.mount_left) <= 0.7, "at most 0.7 m to either side"),
+    )
+    for name, allowed, limit in limits:
+        if not allowed:
+            raise ValueError(f"camera {name} must be {limit} with bonnet=True, got {shown(getattr(p, name))}")
 
 
 def _field_names() -> list[str]:

@@ -90,6 +90,26 @@ def _tilt(mount, scene, time_s, turn, gain):
 
 
 @exact_kernel
+def _yaw_on_car(mount, scene):
+    """Return the yaw of a lens relative to the car [degrees]."""
+    if mount.path != 0:
+        return mount.yaw_deg + math.degrees(_path_yaw(scene))
+    return mount.yaw_deg
+
+
+@exact_kernel
+def pose_on_car(mount, scene, own_car):
+    """Write the pose of a lens relative to the car, which the motion of the body does not change.
+
+    Args:
+        mount: `MOUNT` record.
+        scene: `SCENE` record.
+        own_car: `OWN_CAR` record to write.
+    """
+    own_car.yaw, own_car.pitch = math.radians(_yaw_on_car(mount, scene)), math.radians(mount.pitch_deg)
+
+
+@exact_kernel
 def pose_lens(mount, scene, ago_s, lens):
     """Write the pose of a camera's lens to a `LENS` record.
 
@@ -108,9 +128,7 @@ def pose_lens(mount, scene, ago_s, lens):
     forward = 0.5 * scene.length - mount.setback
     c, s = math.cos(heading), math.sin(heading)
     z = mount.height
-    yaw_deg = mount.yaw_deg
-    if mount.path != 0:
-        yaw_deg += math.degrees(_path_yaw(scene))
+    yaw_deg = _yaw_on_car(mount, scene)
     gain = road_gain(mount.road, scene.speed)
     tilt, roll = _tilt(mount, scene, time_s, math.radians(yaw_deg), gain)
     if gain > 0.0:

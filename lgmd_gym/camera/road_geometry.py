@@ -22,6 +22,7 @@ LINE = np.dtype([(name, np.float64) for name in ("x0", "y0", "x1", "y1", "start"
 """A straight piece of a marking: its ends and its start along the lane [m], 1.0 if striped."""
 
 _LANE_STEP = 2.0
+_IN_LINE = 1e-6  # ends of lanes in line with each other [m]
 _MAX_PIECES = 2000
 _MAX_KNOWN = 2  # geometries of a network that are remembered
 _BAY_LENGTH = 20.0  # a network whose longest lane is no longer than this is a car park [m]
@@ -43,13 +44,16 @@ class RoadGeometry(NamedTuple):
     paved: bool
 
 
-_CACHE: weakref.WeakKeyDictionary[Any, dict[tuple[float, int, bool, bool], RoadGeometry]] = (
-    weakref.WeakKeyDictionary()
-)
+_CACHE: weakref.WeakKeyDictionary[Any, dict[tuple[Any, ...], RoadGeometry]] = weakref.WeakKeyDictionary()
 
 
 def road_geometry(
-    road: Any, roadside: float = 0.0, seed: int = 0, rail: bool = False, cluttered: bool = False
+    road: Any,
+    roadside: float = 0.0,
+    seed: int = 0,
+    rail: bool = False,
+    cluttered: bool = False,
+    queue_lane: int | None = None,
 ) -> RoadGeometry:
     """Return the geometry of a road's network, cached for the lifetime of the network.
 
@@ -59,9 +63,10 @@ def road_geometry(
         seed: Seed of their positions.
         rail: Whether guard rails run along the outer edges.
         cluttered: Whether clutter stands along the road, see `draw_clutter`.
+        queue_lane: See `place_clutter`.
     """
     network = network_of(road)
-    key = (roadside, seed, rail, cluttered)
+    key = (roadside, seed, rail, cluttered, queue_lane)
     if network is None:
         return _extract([], *key)
     try:
@@ -85,7 +90,8 @@ def _lanes(network: Any) -> list[Any]:
     return [lane for lane in lanes if math.isfinite(lane.length) and lane.length > 0.0]
 
 
-def _extract(lanes: list[Any], roadside: float, seed: int, rail: bool, cluttered: bool) -> RoadGeometry:
+def _extract(lanes: list[Any], *key: Any) -> RoadGeometry:
+    """Return the geometry of lanes; `key` is the other arguments of `road_geometry`."""
     if not lanes:
         return RoadGeometry(np.zeros((0, 8)), np.zeros(0, LINE), np.zeros(0, OBJECT), True)
     surface: list[np.ndarray] = []
@@ -102,13 +108,15 @@ def _extract(lanes: list[Any], roadside: float, seed: int, rail: bool, cluttered
         surface.append(_car_park(np.concatenate(surface)))
         records = np.zeros(0, OBJECT)
     else:
-        records = _roadside_of(np.concatenate(segments).tobytes(), roadside, seed, rail, cluttered)
+        records = _roadside_of(np.concatenate(segments).tobytes(), *key)
     lines_once = _without_duplicates(np.concatenate(lines))
-    return RoadGeometry(np.concatenate(surface), lines_once.view(LINE)[:, 0], records, False)
+    return RoadGeometry(_joined(np.concatenate(surface)), lines_once.view(LINE)[:, 0], records, False)
 
 
 @lru_cache(maxsize=16)
-def _roadside_of(segments: bytes, roadside: float, seed: int, rail: bool, cluttered: bool) -> np.ndarray:
+def _roadside_of(
+    segments: bytes, roadside: float, seed: int, rail: bool, cluttered: bool, queue_lane: int | None
+) -> np.ndarray:
     """Return the roadside, cached by the shape of the lanes, because each reset builds a new network."""
     pieces = np.frombuffer(segments).reshape(-1, 6)
     out = posts_and_plants(pieces, roadside, seed)
@@ -116,7 +124,8 @@ def _roadside_of(segments: bytes, roadside: float, seed: int, rail: bool, clutte
     if rail:
         parts.append(guard_rails(pieces))
     if cluttered:
-        parts.append(place_clutter(pieces, draw_clutter(np.random.default_rng([seed, 11])), seed))
+        clutter = draw_clutter(np.random.default_rng([seed, 11]))
+        parts.append(place_clutter(pieces, clutter, seed, queue_lane=queue_lane))
     out = np.concatenate(parts)
     return out[np.argsort(out["x"], kind="stable")]
 
@@ -153,6 +162,31 @@ def _edge(lane: Any, stations: np.ndarray, side: int, extra: float) -> np.ndarra
 def _ribbon(lane: Any, stations: np.ndarray) -> np.ndarray:
     left, right = _edge(lane, stations, 0, SHOULDER), _edge(lane, stations, 1, SHOULDER)
     return np.concatenate((left[:-1], right[:-1], right[1:], left[1:]), axis=1)
+
+
+def _joined(surface: np.ndarray) -> np.ndarray:
+    """Join quads of neighbouring straight lanes that begin and end in line, into fewer edges to draw."""
+    joined: list[np.ndarray] = []
+    for quad in surface:
+        if joined and _continues(joined[-1], quad):
+            joined[-1] = np.concatenate((joined[-1][:2], quad[2:6], joined[-1][6:]))
+        else:
+            joined.append(quad)
+    return np.array(joined)
+
+
+def _continues(quad: np.ndarray, other: np.ndarray) -> bool:
+    """Return whether another quad overlaps with or touches the right side of a quad, along all of it."""
+    for left, right in ((slice(0, 2), slice(2, 4)), (slice(6, 8), slice(4, 6))):
+        across = quad[right] - quad[left]
+        width = max(float(np.hypot(*across)), 1e-9)
+        for side, first, last in ((left, 0.0, width), (right, width, math.inf)):
+            offset = other[side] - quad[left]
+            along = float(offset @ across) / width
+            aside = float(offset[0] * across[1] - offset[1] * across[0]) / width
+            if not (abs(aside) < _IN_LINE and first - _IN_LINE <= along <= last + _IN_LINE):
+                return False
+    return True
 
 
 def _line(lane: Any, stations: np.ndarray, side: int, *, striped: bool) -> np.ndarray:

@@ -14,7 +14,7 @@ from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.road_geometry import LINE, RoadGeometry, network_of, road_geometry
 from lgmd_gym.camera.worlds import draw_world
 
-RoadKey: TypeAlias = tuple[float, int, bool, bool]
+RoadKey: TypeAlias = tuple[float, int, bool, bool, int | None]
 """What the geometry depends on besides the lanes: the arguments of `road_geometry`."""
 Span: TypeAlias = tuple[int, ...]
 """A row of `RoadArrays.spans`."""
@@ -23,7 +23,8 @@ Span: TypeAlias = tuple[int, ...]
 def road_key(p: CameraParams) -> RoadKey:
     """Return the parameters of a camera that its road depends on."""
     world = draw_world(p.world)
-    return p.roadside * world.roadside, seed_of(p), p.guard_rail or world.guard_rail, world.drawn
+    rail = p.guard_rail or world.guard_rail
+    return p.roadside * world.roadside, seed_of(p), rail, world.drawn, p.queue_lane if world.drawn else None
 
 
 class RoadArrays(NamedTuple):
@@ -89,12 +90,6 @@ class RoadPool:
                 self._stored[digest] = _append(self.arrays, self._used, geometry)
         self.arrays.spans[index] = [self._stored[digests[key]] for key in keys]
         self._roads[index] = network, keys
-
-    def reassign(self, index: int, keys: Sequence[RoadKey]) -> None:
-        """Set the keys of an environment's cameras, and keep its road."""
-        known = self._roads[index]
-        if known is not None:
-            self.assign(index, known[0], keys)
 
     def _reserve(self, roads: Sequence[RoadGeometry], keep: set[bytes]) -> None:
         """Make space for more roads, if necessary in new arrays without the roads that no camera uses."""

@@ -125,7 +125,8 @@ def _print_tables(benchmark: "Run", console: Console) -> None:
         agents = list(dict.fromkeys([NO_BRAKE, *config.agents]))
         for table in tables.score_tables(rows, agents, title):
             console.print(table)
-        console.print(tables.limit_table(rows, agents, suite) or tables.case_table(rows, agents))
+        for table in tables.tables_by_case(rows, agents, suite):
+            console.print(table)
 
 
 def _title(benchmark: "Run") -> str:

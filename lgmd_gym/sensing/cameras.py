@@ -111,6 +111,6 @@ class Variants:
                     f"{changed.shape}; set the shape in the camera argument"
                 )
         known = [p for p in params if p is not None]
-        placeholder = road_key(known[0]) if known else (0.0, 0, False, False)
+        placeholder = road_key(known[0]) if known else (0.0, 0, False, False, None)
         keys = tuple(placeholder if p is None else road_key(p) for p in params)
         return Variant(params, keys, view_of(known))

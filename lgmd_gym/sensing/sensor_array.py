@@ -74,7 +74,7 @@ class SensorArray:
         self._textures: list[float | None] = [None] * num_envs
         self._fields: list[dict[str, Any]] = [{}] * num_envs
         size = num_envs, len(self.names)
-        self._world, self._roads = SceneTable(num_envs), RoadPool(*size)
+        self._scene_table, self._roads = SceneTable(num_envs), RoadPool(*size)
         self.enabled = np.ones(size, np.bool_)
         self._stale = np.zeros(size, np.bool_)
         self._all = np.ones(num_envs, np.bool_)
@@ -123,9 +123,9 @@ class SensorArray:
         base: Any = env.unwrapped
         write_scene = getattr(base, "write_scene", None)
         if write_scene is None or base.road is None:
-            self._world.read(base, variant.view, index)
+            self._scene_table.read(base, variant.view, index)
         else:
-            write_scene(self._world.at(index))
+            write_scene(self._scene_table.at(index))
         self._roads.assign(index, base.road, variant.road_keys)
         for camera, top_view in self._top_views[index].items():
             if self.enabled[index, camera]:
@@ -141,6 +141,9 @@ class SensorArray:
 
     def set_camera_fields(self, index: int, fields: Mapping[str, Any] | None) -> None:
         """Change the cameras of environment `index` relative to the `camera` argument.
+
+        Fields that change the road, such as `world`, apply with the next `set_road` or `read`: they may not
+        fit the road of the last episode.
 
         Args:
             index: Index of the environment.
@@ -158,7 +161,6 @@ class SensorArray:
                 self._groups[group].batch.set_params(index, member, p, texture)
         self._used_variants[index], self._textures[index] = variant, texture
         self._fields[index] = dict(fields)
-        self._roads.reassign(index, variant.road_keys)
 
     def process(self, first: int, last: int, active: np.ndarray | None = None) -> None:
         """Draw and process one frame of every enabled camera of the environments first..last-1.
@@ -173,7 +175,7 @@ class SensorArray:
         """
         active = self._all if active is None else active
         for group in self._groups:
-            group.process(first, last, active, self._world.bundle, self._roads.bundle)
+            group.process(first, last, active, self._scene_table.bundle, self._roads.bundle)
 
     def step(self, active: np.ndarray | None = None) -> None:
         """Process all environments like `process`, on `threads` threads."""
@@ -222,8 +224,12 @@ class SensorArray:
 
     def _link(self) -> None:
         """Name the arrays that belong to others."""
-        world = self._world
-        self.scenes, self.objects, self.object_counts = world.scenes, world.objects, world.object_counts
+        scene_table = self._scene_table
+        self.scenes, self.objects, self.object_counts = (
+            scene_table.scenes,
+            scene_table.objects,
+            scene_table.object_counts,
+        )
         self.frames = [group.frames for group in self._groups]
         numbers, spikes, alerts = self._outputs
         self.signals = numbers[:, : len(SIGNALS)]

@@ -55,14 +55,14 @@ class SensorGroup:
         self._neurons = Bundle(cameras, self.neuron.outputs, *outputs)
         self._workspaces: list[Workspace] = []
 
-    def process(self, first: int, last: int, active: np.ndarray, world: Bundle, roads: Bundle) -> None:
+    def process(self, first: int, last: int, active: np.ndarray, scene_table: Bundle, roads: Bundle) -> None:
         """Draw and process a frame of every enabled camera of active environments among first..last-1.
 
         Args:
             first: First environment.
             last: Last environment + 1.
             active: Environments with a new frame, bool, shape (num_envs,).
-            world: `SceneTable.bundle`.
+            scene_table: `SceneTable.bundle`.
             roads: `RoadPool.bundle`.
         """
         num_selected, num_fresh = select_cameras(first, last, active, self._selection.native)
@@ -76,7 +76,7 @@ class SensorGroup:
             workspace = self._workspaces.pop()
         except IndexError:
             workspace = Workspace(self.batch.shape)
-        self.batch.draw(first, last, world, roads, self.frames, self._selected, workspace)
+        self.batch.draw(first, last, scene_table, roads, self.frames, self._selected, workspace)
         self._workspaces.append(workspace)
         count = len(self.members)
         frames = self.frames.reshape(-1, *self.batch.shape)

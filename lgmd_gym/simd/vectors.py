@@ -181,21 +181,34 @@ def lane_numbers(typingctx):
     return integers(), lambda *_: ir.Constant(INTS, list(range(LANES)))
 
 
+class _Places(ir.Instruction):
+    """The addresses of bytes behind a common one; llvmlite's own instruction has no vectors.
+
+    From a common address and indices of 32 bits, machines gather in one instruction.
+    """
+
+    def __init__(self, parent, base, indices) -> None:
+        kind = ir.VectorType(ir.PointerType(), LANES)
+        super().__init__(parent, kind, "getelementptr", [base, indices])
+
+    def descr(self, buf) -> None:
+        base, indices = self.operands
+        text = f"{base.type} {base.get_reference()}, {indices.type} {indices.get_reference()}"
+        buf.append(f"getelementptr i8, {text}\n")
+
+
 @intrinsic
 def gather_words(typingctx, array, indices):
     """Return the four bytes at array[index] to array[index + 3] for each lane, the first as lowest byte.
 
-    `array` is a contiguous uint8 array with three bytes behind the last index.
+    `array` is a contiguous uint8 array of less than 2^31 bytes with three bytes behind the last index.
     """
 
     def codegen(context, builder, signature, args):
         data = cgutils.create_struct_proxy(signature.args[0])(context, builder, args[0]).data
-        address, wide = ir.IntType(64), ir.VectorType(ir.IntType(64), LANES)
-        empty = ir.Constant(wide, ir.Undefined)
-        first = builder.insert_element(empty, builder.ptrtoint(data, address), ir.Constant(ir.IntType(32), 0))
-        start = shuffle(builder, first, empty, [0] * LANES)
-        places = builder.add(start, builder.zext(args[1], wide))
-        pointers = builder.inttoptr(places, ir.VectorType(ir.PointerType(), LANES))
+        places = builder.sext(args[1], ir.VectorType(ir.IntType(64), LANES))
+        pointers = _Places(builder.block, data, places)
+        builder._insert(pointers)
         flag, all_lanes = ir.IntType(1), ir.VectorType(ir.IntType(1), LANES)
         return call(
             builder,

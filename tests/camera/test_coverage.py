@@ -46,6 +46,41 @@ def test_coverage_against_supersampling():
         assert coverage(corners).sum() == pytest.approx(sampled.sum(), abs=0.3)
 
 
+def area_in_pixel(corners, row, col):
+    """Return the exact area of a polygon in a pixel, clipped side by side."""
+    for axis, limit, sign in ((0, col, 1.0), (0, col + 1, -1.0), (1, row, 1.0), (1, row + 1, -1.0)):
+        inside = sign * (corners[:, axis] - limit)
+        kept = []
+        for i, j in zip(range(len(corners)), np.roll(range(len(corners)), -1), strict=True):
+            if inside[i] >= 0.0:
+                kept.append(corners[i])
+            if (inside[i] >= 0.0) != (inside[j] >= 0.0):
+                kept.append(corners[i] + inside[i] / (inside[i] - inside[j]) * (corners[j] - corners[i]))
+        if len(kept) < 3:
+            return 0.0
+        corners = np.array(kept)
+    after = np.roll(corners, -1, axis=0)
+    return 0.5 * abs(np.sum(corners[:, 0] * after[:, 1] - after[:, 0] * corners[:, 1]))
+
+
+@pytest.mark.parametrize(
+    "corners",
+    [
+        [[3.3, 2.2], [3.1, 5.4], [27.6, 5.7], [27.9, 2.9]],  # a rolled rectangle, wider than a vector
+        [[3.3, 2.2], [3.3, 5.4], [12.5, 5.41], [12.5, 2.21]],  # the same within a vector
+        [[3.3, 2.2], [3.3, 5.4], [20.5, 5.45], [20.5, 2.25]],  # a little wider than a vector
+        [[-5.0, 1.5], [-4.0, 20.0], [39.0, 3.0], [38.0, 1.6]],  # from side to side, seven columns a row
+        [[8.0, -3.0], [2.0, 30.0], [31.5, 26.0], [16.01, -2.0]],  # at most one column a row
+        [[30.2, 4.0], [24.0, 7.0], [31.99, 9.0], [32.0, 4.1]],  # ends at the last column
+        [[0.0, 0.0], [0.0, 24.0], [32.0, 24.0], [32.0, 0.0]],
+    ],
+)
+def test_coverage_is_the_exact_area_in_each_pixel(corners):
+    corners = np.array(corners)
+    exact = [[area_in_pixel(corners, row, col) for col in range(32)] for row in range(24)]
+    assert coverage(corners) == pytest.approx(np.array(exact), abs=2e-6)
+
+
 def test_polygons_far_outside_the_frame_are_clipped():
     huge = np.array([[-1e7, -1e6], [-1e7, 1e6], [1e7, 1e6], [1e7, -1e6]])
     assert coverage(huge) == pytest.approx(np.ones((24, 32)), abs=1e-5)

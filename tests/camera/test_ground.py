@@ -10,7 +10,9 @@ from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.render.buffers import Tables, View
 from lgmd_gym.camera.render.ground import shade_row
 from lgmd_gym.camera.render.horizon import Horizon
+from lgmd_gym.camera.render.own_car import OWN_CAR
 from lgmd_gym.camera.render.texture import TEXEL_M, ground_texture
+from lgmd_gym.camera.render.veil import veil_at
 
 
 def view_of(p, yaw, x=31.7, y=-4.2, pitch=-0.05):
@@ -21,7 +23,7 @@ def view_of(p, yaw, x=31.7, y=-4.2, pitch=-0.05):
     lens["cos_pitch"], lens["sin_pitch"] = np.cos(pitch), np.sin(pitch)
     lens["centre_v"], lens["centre_u"] = 0.5 * np.array(p.shape)
     empty = np.zeros((0, 0), np.float32)
-    return View(lens[()], look_of(p)[()], beam_profile(p), empty, np.zeros(2))
+    return View(lens[()], look_of(p)[()], beam_profile(p), empty, np.zeros(2), np.zeros((), OWN_CAR)[()])
 
 
 def level_horizon(row):
@@ -31,7 +33,7 @@ def level_horizon(row):
 def tables_of(seed):
     asphalt, verge = ground_texture("asphalt", seed), ground_texture("verge", seed)
     empty = np.zeros((0, 0), np.float32)
-    return Tables(asphalt.data, verge.data, asphalt.level_start, empty, np.zeros(0, np.float32), empty)
+    return Tables(asphalt.data, verge.data, asphalt.level_start, empty, np.zeros(0, np.float32), empty, empty)
 
 
 def sample(data, level_start, lens, row, width):
@@ -75,12 +77,15 @@ def reference_row(view, tables, coverage, row, behind, part):
     run = view.lens["focal"] * view.lens["cos_pitch"] + v * view.lens["sin_pitch"]
     ahead = view.lens["z"] / fall * run
     if look["night"]:
-        grey *= look["night_light"] + look["beam_gain"] * np.exp(-ahead / 26.0) * view.beam
+        way = (1.0 / 26.0 + look["extinction"]) * ahead
+        grey *= look["night_light"] + look["beam_gain"] * np.exp(-way) * view.beam
     if look["wet"]:
         grazing = 1.0 - view.lens["z"] / np.hypot(view.lens["z"], ahead)
         grey += 0.5 * (0.02 + 0.98 * grazing**5) * (look["horizon"] - grey)
     if look["extinction"]:
         grey = look["haze"] + np.exp(-ahead * look["extinction"]) * (grey - look["haze"])
+        if look["night"]:
+            grey += veil_at(look, view.lens["z"], view.lens["z"] / ahead, ahead) * view.beam
     return behind + part * (grey - behind)
 
 

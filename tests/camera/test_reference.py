@@ -29,6 +29,14 @@ def scene(**road):
         {},
         {"light": "night", "vehicles": "box"},
         {"visibility_m": 30.0, "guard_rail": True},
+        {"visibility_m": 20.0, "light": "night", "vehicles": "box"},
+        {
+            "visibility_m": 20.0,
+            "light": "night",
+            "vehicles": "box",
+            "mount_height": 0.4,
+            "mount_setback": 0.0,
+        },
         {"pitch_deg": 0.4},  # the horizon is within a row
         {"pitch_deg": 20.0, "yaw_deg": 30.0},
         {"mount_height": 0.4},  # below the cabins
@@ -46,6 +54,7 @@ def test_light_is_that_of_many_rays(fields):
         {},
         {"pitch_deg": 0.4, "visibility_m": 30.0, "guard_rail": True},  # the horizon crosses rows
         {"pitch_deg": 20.0, "yaw_deg": 30.0, "light": "night", "vehicles": "box"},
+        {"visibility_m": 20.0, "light": "night", "vehicles": "box"},
         {"shape": (31, 140), "hfov_deg": 20.0},
     ],
 )

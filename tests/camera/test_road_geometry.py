@@ -115,7 +115,7 @@ def test_geometry_is_cached_for_the_lifetime_of_the_network(monkeypatch):
 
 def test_straight_lane_is_one_piece_and_duplicate_lines_are_dropped():
     geometry = road_geometry(straight_env(lanes=4).road)
-    assert geometry.surface.shape == (4, 8)
+    assert geometry.surface.shape == (1, 8)  # joined
     assert geometry.lines.shape[0] == 5
     assert geometry.lines["striped"].sum() == 3
     net = RoadNetwork()
@@ -125,6 +125,16 @@ def test_straight_lane_is_one_piece_and_duplicate_lines_are_dropped():
     assert road_geometry(Road(net)).lines.shape[0] == 3
     net.add_lane("c", "d", SineLane([0, 50], [100, 50], amplitude=3, pulsation=0.1, phase=0.0))
     assert road_geometry(Road(net)).lines.shape[0] == 3  # cached at the first call
+
+
+def test_lanes_side_by_side_are_joined_but_not_those_of_other_lengths_or_apart():
+    net = RoadNetwork()
+    for y, end in ((0.0, 100.0), (4.0, 100.0), (8.0, 90.0), (20.0, 90.0)):
+        net.add_lane("a", "b", StraightLane([0, y], [end, y], width=4.0))
+    surface = road_geometry(Road(net)).surface
+    assert surface.shape == (3, 8)
+    assert surface[0] == pytest.approx([0.0, -2.5, 0.0, 6.5, 100.0, 6.5, 100.0, -2.5])
+    assert surface[1] == pytest.approx([0.0, 5.5, 0.0, 10.5, 90.0, 10.5, 90.0, 5.5])
 
 
 def test_network_without_lanes_is_all_asphalt():

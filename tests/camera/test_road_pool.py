@@ -38,7 +38,7 @@ def test_every_environment_and_camera_has_its_road():
         pool.assign(index, road, keys)
     for index, road in enumerate(used):
         assert_holds(pool, index, road, keys)
-    pool.reassign(2, (SEEDED, PLAIN))
+    pool.assign(2, used[2], (SEEDED, PLAIN))
     for index, road in enumerate(used):
         assert_holds(pool, index, road, (SEEDED, PLAIN) if index == 2 else keys)
 

@@ -6,11 +6,15 @@ from dataclasses import astuple, fields
 
 import numpy as np
 import pytest
-from support.roads import add_car, straight_env
+from support.records import lens_of, record
+from support.roads import add_car, box_record, set_roadside, straight_env
 
 from lgmd_gym import CameraParams, EgoCamera
 from lgmd_gym.camera import CONDITIONS
-from lgmd_gym.camera.effects import in_world, look_of, sun_of
+from lgmd_gym.camera.effects import LOOK, in_world, look_of, sun_of
+from lgmd_gym.camera.objects import MODEL_BEAM, MODEL_CROWN, MODEL_DECK, OBJECT
+from lgmd_gym.camera.pinhole import project
+from lgmd_gym.camera.render.glare import add_sun_glare
 from lgmd_gym.camera.worlds import ASPHALTS, SPLIT_WORLDS, VERGES, WORLDS, World, draw_world
 
 MANY = [draw_world(number) for number in range(400)]
@@ -161,3 +165,33 @@ def test_frames_do_not_depend_on_frames_drawn_before(number):
         camera.render(env)
         assert not camera.buffers.solids.any()
         assert not camera.buffers.ground.any()
+
+
+@pytest.mark.parametrize("roll", [0.0, 0.3, -0.3])
+def test_the_glare_is_brightest_in_the_direction_of_the_sun(roll):
+    lens = lens_of(0.1, 0.05, roll=roll, shape=(81, 121))
+    azimuth, elevation = 0.25, 0.15
+    level = np.cos(elevation)
+    sun = level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)
+    look = record(LOOK, glare=500.0, **dict(zip(("sun_x", "sun_y", "sun_z"), sun, strict=True)))
+    image = np.zeros((81, 121), np.float32)
+    add_sun_glare(image, lens, look)
+    u, v = project(lens, 1e6 * np.array(sun))
+    row, column = np.unravel_index(image.argmax(), image.shape)
+    assert (column + 0.5, row + 0.5) == pytest.approx((u, v), abs=0.71)
+
+
+@pytest.mark.parametrize(("model", "shaded"), [(MODEL_BEAM, False), (MODEL_CROWN, False), (MODEL_DECK, True)])
+def test_only_bridges_overhead_have_a_soft_shadow(model, shaded):
+    params = CameraParams(shape=(90, 160), world=1)  # overcast
+    env = straight_env(lanes=1)
+    set_roadside(env, params, np.zeros(0, OBJECT))
+    camera = EgoCamera(params)
+    camera.render(env)
+    bare = camera.light[70:].copy()
+    x, y = env.vehicle.position
+    record_above = box_record(x + 9.0, y, (8.0, 4.0, 6.0), model=model, base=5.0)
+    set_roadside(env, params, record_above)
+    camera = EgoCamera(params)
+    camera.render(env)
+    assert bool((camera.light[70:] < 0.9 * bare).any()) is shaded

@@ -21,10 +21,11 @@ CAMERAS = [
     CameraParams.preset("fovea", **SMALL, guard_rail=True),
     {"name": "back", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box"},
     {"name": "path", "shape": (45, 80), "gaze": "path", "panorama": "natural", "mount_left": 0.4},
+    {"name": "driver", "shape": (45, 80), "gaze": "path", "bonnet": True, "windscreen": 0.1},
 ]
 FIELDS = [
     {},
-    {"condition": "night", "texture": 0.7},
+    {"condition": "night", "texture": 0.7, "visibility_m": 40.0},
     {"condition": "rain", "texture": 1.4, "auto_exposure_s": 0.2},
     {"condition": "fog", "seed": 5, "roadside": 2.0, "linear_light": True},
     {"condition": "low_sun", "world": 11, "road": "rough"},
@@ -78,6 +79,19 @@ def test_frames_and_outputs_equal_those_of_single_cameras_and_neurons(threads):
                 assert [field[index, k].item() for field in sensors.responses] == list(expected)
     assert sensors.responses.spikes.dtype == np.int64
     assert sensors.responses.alert.dtype == np.bool_
+
+
+def test_fields_of_the_next_road_need_not_fit_the_last_one():
+    """A level on two lanes, and then one with a queue on the third lane."""
+    sensors = SensorArray("wide", 30.0, LGMDParams(), 1)
+    narrow, broad = straight_env(lanes=2), straight_env(lanes=3)
+    for env, lane in ((broad, 2), (narrow, 1), (broad, 2)):
+        fields = {"world": 8002, "queue_lane": lane}
+        sensors.set_camera_fields(0, fields)
+        sensors.set_road(0, env.road)
+        sensors.read(env, 0)
+        sensors.process(0, 1)
+        np.testing.assert_array_equal(sensors.frame_of(0, 0), EgoCamera("wide", **fields).render(env))
 
 
 def test_camera_fields_change_at_any_time():

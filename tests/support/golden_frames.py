@@ -30,6 +30,12 @@ OPTIONS = {
     "world-night": {"world": 4, "condition": "night"},
     "world-rain": {"world": 6, "condition": "rain"},
     "world-low-sun": {"world": 10, "condition": "low_sun"},
+    "night-fog": {"light": "night", "visibility_m": 30.0},
+    "world-night-fog": {"world": 4, "light": "night", "visibility_m": 60.0, "road": "rough"},
+    "bonnet": {"bonnet": True, "road": "rough"},
+    "bonnet-mount": {"bonnet": True, "gaze": "path", "pitch_deg": -8.0, "yaw_deg": 12.0, "mount_left": 0.4},
+    "world-windscreen": {"world": 11, "bonnet": True, "windscreen": 0.1},
+    "night-windscreen": {"light": "night", "bonnet": True, "windscreen": 0.2},
 }
 """Camera fields that the golden frames cover in addition to the named conditions."""
 

@@ -1,12 +1,13 @@
 """A slow reference of the camera: many rays per pixel, without culling, polygons' edges or kernels.
 
-It leaves out motion blur, sensor noise, panoramas and the halos of headlights.
+It leaves out motion blur, sensor noise, panoramas, the halos of headlights, the own car and its windscreen.
 """
 
 import math
 from types import SimpleNamespace
 
 import numpy as np
+from support.reference_air import row_slope, veil
 from support.reference_ground import ground_light
 from support.reference_solids import ordered_solids
 
@@ -53,7 +54,7 @@ class ReferenceCamera:
         shares = [(1.0 - below, grey) for grey in (light, light + gap)]
         shares += [(below, grey) for grey in (ground, ground + contrast)]
         light = light + below * (ground - light)
-        for share, grey, gap in ordered_solids(self, rays):
+        for share, grey, gap in ordered_solids(self, rays, row, column):
             light = light * (1.0 - share) + share * grey
             shares += [(share, grey), (share, grey + gap)]
         lows = [np.where(share > 0.0, grey, np.inf) for share, grey in shares]
@@ -92,7 +93,7 @@ class ReferenceCamera:
             cover /= np.maximum(rays.mean(above), 1e-9)
             light = light + cover * (grey * (1.0 - 0.02 * look.leaf_gain * depth) - light)
             contrast = np.where((cover > 0.0) & (cover < 1.0), look.horizon - look.trees, contrast)
-        return light, contrast
+        return light + veil(self, column, row_slope(lens, row), 1e9), contrast
 
 
 def upright(lens, v, u):

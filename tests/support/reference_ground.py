@@ -3,9 +3,10 @@
 import math
 
 import numpy as np
+from support.reference_air import beam, veil
 
 from lgmd_gym.camera import objects as kinds
-from lgmd_gym.camera.effects import ASPHALT_GREY, BEAM_WIDTH, PAINT_GREY
+from lgmd_gym.camera.effects import ASPHALT_GREY, PAINT_GREY
 from lgmd_gym.camera.render.texture import TEXEL_M, ground_texture
 
 
@@ -80,7 +81,9 @@ def _marks_and_shadows(scene, x, y):
             away = math.hypot(item.x - scene.lens.x, item.y - scene.lens.y)
             dark = max(min(0.4, 0.8 - away / 60.0), 0.0)
             shadow += dark * _footprint(x, y, item, at, -0.2 * item.width)
-        elif model not in (kinds.MODEL_POST, kinds.MODEL_RAIL):
+        elif model not in (kinds.MODEL_POST, kinds.MODEL_RAIL) and (
+            item.base == 0.0 or model == kinds.MODEL_DECK
+        ):
             for ring in range(int(look.under_rings)):
                 grow = max(look.under_first + look.under_step * ring, -0.5 * min(item.length, item.width))
                 shadow += look.under_body * _footprint(x, y, item, at, grow)
@@ -156,12 +159,12 @@ def _bilinear(texture, i, j, x, y):
 def _through_air(scene, grey, row, column):
     """Return greys of the ground under headlights and fog, at the distance of each pixel's row."""
     lens, look = scene.lens, scene.look
-    u = column + 0.5 - lens.centre_u
     forward = np.minimum(ground_points(lens, row + 0.5, middle_column(scene, row))[0], 1e5)
     if look.night:
-        beam = np.exp(-((u / lens.focal / BEAM_WIDTH) ** 2))
-        grey = grey * (0.04 + 1.25 * np.exp(-np.maximum(forward, 0.0) / 26.0) * beam)
-    return look.haze + np.exp(-np.abs(forward) * look.extinction) * (grey - look.haze)
+        tangent = (column + 0.5 - lens.centre_u) / lens.focal
+        grey = grey * (look.night_light + beam(look, np.maximum(forward, 0.0), tangent))
+    grey = look.haze + np.exp(-np.abs(forward) * look.extinction) * (grey - look.haze)
+    return grey + veil(scene, column, lens.z / np.maximum(forward, 1e-3), forward)
 
 
 def inside(x, y, corners):

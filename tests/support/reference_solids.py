@@ -5,6 +5,7 @@ import math
 import warnings
 
 import numpy as np
+from support.reference_air import beam, row_slope, veil
 from support.reference_ground import inside
 
 from lgmd_gym.camera.objects import MODEL_MARK, is_picture
@@ -13,12 +14,14 @@ from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
 from lgmd_gym.camera.render.models import all_models
 
 
-def ordered_solids(scene, rays):
+def ordered_solids(scene, rays, row, column):
     """Return the coverage and the grey of each solid in each pixel, and its contrast, from far to near.
 
     Args:
         scene: `ReferenceCamera`.
         rays: `Rays`.
+        row: Row of each pixel.
+        column: Column of each pixel.
 
     Returns:
         Triples of arrays, shape (pixels,). The order of two solids may differ from pixel to pixel.
@@ -27,7 +30,10 @@ def ordered_solids(scene, rays):
     for item in scene.objects:
         if item.model != MODEL_MARK:
             solids = [_solid(scene, item, solid, rays) for solid in range(*models.models[item.model])]
-            found += _with_distances([solid for solid in solids if solid is not None])
+            solids = [solid for solid in solids if solid is not None]
+            away = math.hypot(item.x - scene.lens.x, item.y - scene.lens.y)
+            light = veil(scene, column, row_slope(scene.lens, row), away) if solids else 0.0
+            found += _with_distances([(cover, grey + light, *rest) for cover, grey, *rest in solids])
     if not found:
         return []
     *layers, away = (np.stack(values) for values in zip(*found, strict=True))
@@ -127,8 +133,7 @@ def _face_light(scene, item, normal):
     if scene.look.night:
         dx, dy = item.x - lens.x, item.y - lens.y
         ahead, across = dx * lens.cos_yaw + dy * lens.sin_yaw, dy * lens.cos_yaw - dx * lens.sin_yaw
-        beam = math.exp(-max(ahead, 0.0) / 26.0 - (across / max(ahead, 1.0) / 0.26) ** 2)
-        light *= 0.04 + 1.25 * beam
+        light *= scene.look.night_light + beam(scene.look, max(ahead, 0.0), across / max(ahead, 1.0))
     return light
 
 

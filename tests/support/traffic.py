@@ -3,6 +3,7 @@
 import numpy as np
 
 from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.traffic.batch import IN_LABORATORY
 from lgmd_gym.benchmark.traffic.observer import Observer
 from lgmd_gym.benchmark.traffic.recording import record_traffic
 from lgmd_gym.benchmark.traffic.replay import Replay
@@ -16,6 +17,7 @@ HOLD, BRAKE = np.array([0.0], np.float32), np.array([-1.0], np.float32)
 class EmptyHighway(HighwayTraffic):
     """A highway without other cars, or with one stationary car at a distance [m] between centres."""
 
+    appearance = IN_LABORATORY
     stationary_car_at: float | None = None
     warm_up = 0.0
 
@@ -53,10 +55,10 @@ class Recorded:
         steps: Steps of all decisions.
     """
 
-    def __init__(self, kind, seed=0, sensor_config=None, config=None):
+    def __init__(self, kind, seed=0, sensor_config=None, config=None, appearance=IN_LABORATORY):
         self.sensor_config = sensor_config or SensorConfig()
         observer = Observer(self.sensor_config)
-        self.recording = record_traffic(kind, seed, observer.sensors, 0, observer.fps, config)
+        self.recording = record_traffic(kind, seed, observer.sensors, 0, observer.fps, appearance, config)
         self.steps = [observer.observe([moment])[0] for moment in self.recording.moments]
 
     def replay(self, agent):

@@ -6,6 +6,8 @@ a tree's crown is an ellipse, drawn out along the same direction.
 
 import math
 
+import numpy as np
+
 from lgmd_gym.camera.objects import MODEL_BARRIER, MODEL_BOX, MODEL_MARK, MODEL_TREE
 from lgmd_gym.camera.pose import side_tangent
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
@@ -14,7 +16,8 @@ from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.order import first_from
 
 _FADE_START, _FADE_END = 100.0, 150.0  # shadows fade out between these distances from the lens [m]
-_CROWN_CORNERS = 8
+_CROWN = np.array([(math.cos(0.25 * math.pi * k), math.sin(0.25 * math.pi * k)) for k in range(8)])
+"""Corners of the octagon that a tree's crown is drawn as."""
 _MOST_SHIFT = 8.0  # length of a shadow per height; at lower elevations of the sun, shadows end there
 
 
@@ -114,11 +117,10 @@ def _crown_outline(layer, lens, obj, away):
     shift = math.sqrt(away[0] * away[0] + away[1] * away[1])
     c, s = (away[0] / shift, away[1] / shift) if shift > 1e-9 else (1.0, 0.0)
     long = math.sqrt(radius * radius + (half * shift) ** 2)
-    for k in range(_CROWN_CORNERS):
-        angle = 2.0 * math.pi * k / _CROWN_CORNERS
-        a, b = long * math.cos(angle), radius * math.sin(angle)
+    for k in range(_CROWN.shape[0]):
+        a, b = long * _CROWN[k, 0], radius * _CROWN[k, 1]
         _write_corner(layer, lens, k, x + a * c - b * s, y + a * s + b * c)
-    return _CROWN_CORNERS
+    return _CROWN.shape[0]
 
 
 @kernel

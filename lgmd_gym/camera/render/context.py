@@ -7,7 +7,7 @@ import numpy as np
 from lgmd_gym.camera.effects import noise_table
 from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, choose_objects
 from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.camera.pose import noise_start, pose_lens
+from lgmd_gym.camera.pose import noise_start, pose_lens, pose_on_car
 from lgmd_gym.camera.render.buffers import Buffers, Tables, Views, make_buffers
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.exposure import follow_exposure
@@ -17,6 +17,7 @@ from lgmd_gym.camera.render.panorama import panorama_table
 from lgmd_gym.camera.render.raster import draw_frames
 from lgmd_gym.camera.render.sky import skyline
 from lgmd_gym.camera.render.texture import ground_texture
+from lgmd_gym.camera.render.windscreen import dashboard_key, dashboard_pattern
 from lgmd_gym.camera.road_geometry import RoadGeometry
 from lgmd_gym.camera.worlds import draw_world
 
@@ -26,11 +27,11 @@ _MAX_JOINED = 8  # tables that a workspace remembers
 def tables_key(p: CameraParams) -> tuple[Any, ...]:
     """Return the parameters that cameras of one frame size must have in common to share `SharedTables`."""
     world = draw_world(p.world)
-    ground = (world.asphalt, world.verge, world.skyline) if world.drawn else (p.seed, p.linear_light)
-    if p.panorama == "skyline":
-        return ground
-    # The table of a panorama includes light and fog, at the resolution of the lens.
-    return *ground, p.panorama, p.seed, p.light, p.visibility_m, p.focal_px
+    key = (world.asphalt, world.verge, world.skyline) if world.drawn else (p.seed, p.linear_light)
+    if p.panorama != "skyline":
+        # The table of a panorama includes light and fog, at the resolution of the lens.
+        key = *key, p.panorama, p.seed, p.light, p.visibility_m, p.focal_px
+    return *key, dashboard_key(p)
 
 
 class SharedTables:
@@ -52,6 +53,7 @@ class SharedTables:
             skyline=skyline(100_000 + world.skyline if world.drawn else p.seed),
             noise=noise_table(0 if world.drawn else p.seed),
             panorama=panorama_table(p),
+            dashboard=dashboard_pattern(dashboard_key(p), p.shape),
         )
         self.bundle = Bundle(tuple(tables), tuple(all_models(linear=p.linear_light)))
 
@@ -76,14 +78,14 @@ class Workspace:
         self._scene: tuple[Bundle, ...] = ()
         self._joined: dict[Bundle, Bundle] = {}
 
-    def join(self, batch: Bundle, world: Bundle, roads: Bundle, tables: Bundle) -> Bundle:
+    def join(self, batch: Bundle, scene_table: Bundle, roads: Bundle, tables: Bundle) -> Bundle:
         """Return the inputs of `draw_cameras`; they are remembered until a road has to move."""
-        scene = batch, world, roads
+        scene = batch, scene_table, roads
         if scene != self._scene or len(self._joined) > _MAX_JOINED:
             self._scene, self._joined = scene, {}
         joined = self._joined.get(tables)
         if joined is None:
-            joined = Bundle(batch.arrays, world.arrays, roads.arrays, tables.arrays, self._arrays)
+            joined = Bundle(batch.arrays, scene_table.arrays, roads.arrays, tables.arrays, self._arrays)
             self._joined[tables] = joined
         return joined
 
@@ -107,9 +109,9 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
             `SharedTables`, and as scratch memory, `OBJECT` records of shape (512,) and the fields of
             `Buffers`.
     """
-    batch, world, roads, tables, space = inputs.arrays
+    batch, scene_table, roads, tables, space = inputs.arrays
     tables_indices, cameras, mounts, lenses, views = batch
-    scenes, objects, counts = world
+    scenes, objects, counts = scene_table
     surface, lines, roadside, spans = roads
     lookup_tables, models = tables
     chosen, buffers = space
@@ -128,6 +130,8 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
             views.looks[env, k].paved = float(span[6])
             if views.looks[env, k].auto_exposure_s > 0.0:
                 follow_exposure(views.exposures[env, k], scene, views.looks[env, k].auto_exposure_s)
+            if views.own_cars[env, k].bonnet > 0.0:
+                pose_on_car(mount, scene, views.own_cars[env, k])
             count = choose_objects(lens, mount, objects[env], counts[env], chosen)
             road = RoadGeometry(
                 surface[span[0] : span[1]],
@@ -138,7 +142,7 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
             rows = (
                 views.looks[env, k : k + 1], views.beams[env, k : k + 1], views.skies[env, k : k + 1],
                 views.sky_aims[env, k : k + 1], views.noise_starts[env, k : k + 1],
-                views.exposures[env, k : k + 1],
+                views.exposures[env, k : k + 1], views.own_cars[env, k : k + 1],
             )  # fmt: skip
             draw_frames(
                 frames[env, k : k + 1], lenses[env, k : k + 1], rows, road, lookup_tables, models, chosen,

@@ -62,8 +62,8 @@ def add_sun_glare(image, lens, look):
     f, height, width = lens.focal, image.shape[0], image.shape[1]
     right = (look.sun_y * lens.cos_yaw - look.sun_x * lens.sin_yaw) / depth
     down = (level * lens.sin_pitch - look.sun_z * lens.cos_pitch) / depth
-    u = lens.centre_u + f * (right * lens.cos_roll - down * lens.sin_roll)
-    v = lens.centre_v + f * (right * lens.sin_roll + down * lens.cos_roll)
+    u = lens.centre_u + f * (right * lens.cos_roll + down * lens.sin_roll)
+    v = lens.centre_v + f * (down * lens.cos_roll - right * lens.sin_roll)
     scale, peak = nb.float32(1.0 / (f * _SUN_RADIUS) ** 2), nb.float32(look.glare)
     for i in range(height):
         dy = nb.float32(i + 0.5 - v)

@@ -6,11 +6,13 @@ those of the middle of the part of the row below the horizon; with a roll of 0.5
 the sides of a frame of 160 columns.
 """
 
+from typing import Any, NamedTuple
+
 import numba as nb
 import numpy as np
 
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, sum_differences, winding
-from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.camera.render.jit import inlined_kernel, kernel
 from lgmd_gym.camera.render.texture_sampling import (
     bend_of,
     bent_texels,
@@ -77,26 +79,53 @@ def _without_traces(road):
     return at_least(road, splat(nb.float32(1e-4)))
 
 
-@kernel
-def _ground_light(look, tables, line, x, y, coverages):
+class Surface(NamedTuple):
+    """Light of the ground in all lanes of a vector; see `LOOK` for the terms.
+
+    Attributes:
+        sunny: Whether the sun casts shadows.
+    """
+
+    asphalt: Any
+    asphalt_gain: Any
+    verge: Any
+    verge_gain: Any
+    paint: Any
+    shadow_limit: Any
+    cast: Any
+    sunny: bool
+
+
+@inlined_kernel
+def _surface_of(look):
+    """Return the `Surface` of a `LOOK` record, once per row: in loops, compilers read records again."""
+    return Surface(
+        splat(nb.float32(look.asphalt)), splat(nb.float32(look.asphalt_gain)),
+        splat(nb.float32(look.verge)), splat(nb.float32(look.verge_gain)), splat(nb.float32(look.paint)),
+        splat(nb.float32(look.shadow_limit)), splat(nb.float32(look.cast)), look.cast > 0.0,
+    )  # fmt: skip
+
+
+@inlined_kernel
+def _ground_light(surface, tables, line, x, y, coverages):
     """Return the light of sixteen pixels by day: verge, asphalt, paint and shadow by their coverage."""
     road, paint, shadow, cast = coverages
     zero, one, half = splat(nb.float32(0.0)), splat(nb.float32(1.0)), splat(nb.float32(0.5))
     road = _without_traces(road)
     grain = verge = zero
     if any_above(road, zero) or any_above(paint, zero):
-        grain = splat(nb.float32(look.asphalt_gain)) * sample(tables.asphalt, line, x, y)
+        grain = surface.asphalt_gain * sample(tables.asphalt, line, x, y)
     if any_above(one, road):
-        verge = splat(nb.float32(look.verge_gain)) * sample(tables.verge, line, x, y)
-    asphalt, verge = splat(nb.float32(look.asphalt)) + grain, splat(nb.float32(look.verge)) + verge
+        verge = surface.verge_gain * sample(tables.verge, line, x, y)
+    asphalt, verge = surface.asphalt + grain, surface.verge + verge
     grey = madd(road, asphalt, (one - road) * verge)
     # Worn paint shows half of the asphalt's grain.
     paint = minimum(maximum(paint, zero), one)
-    grey = madd(paint, madd(half, grain, splat(nb.float32(look.paint))) - grey, grey)
-    grey = grey * (one - minimum(maximum(shadow, zero), splat(nb.float32(look.shadow_limit))))
-    if look.cast > 0.0:
+    grey = madd(paint, madd(half, grain, surface.paint) - grey, grey)
+    grey = grey * (one - minimum(maximum(shadow, zero), surface.shadow_limit))
+    if surface.sunny:
         # Shadows that overlap are no darker than one.
-        grey = grey * (one - splat(nb.float32(look.cast)) * minimum(maximum(cast, zero), one))
+        grey = grey * (one - surface.cast * minimum(maximum(cast, zero), one))
     return grey
 
 
@@ -114,7 +143,7 @@ def shade_row(image, row, horizon, coverage, view, tables):
     """
     width, stride = image.shape[1], coverage.shape[2]
     road, paint, shadow, cast = coverage[ROAD], coverage[PAINT], coverage[SHADOW], coverage[CAST]
-    sunny = view.look.cast > 0.0
+    surface = _surface_of(view.look)
     line = texture_line(view.lens, row, tables.level_start)
     x, y, step_x, step_y = fixed_line(line)
     whole, bent = row >= horizon.bottom, line.bend != 0.0
@@ -132,7 +161,7 @@ def shade_row(image, row, horizon, coverage, view, tables):
         cover_road, sum_road = sum_differences(road, at, count, sum_road)
         cover_paint, sum_paint = sum_differences(paint, at, count, sum_paint)
         cover_shadow, sum_shadow = sum_differences(shadow, at, count, sum_shadow)
-        if sunny:
+        if surface.sunny:
             cover_cast, sum_cast = sum_differences(cast, at, count, sum_cast)
         coverages = (cover_road, cover_paint, cover_shadow, cover_cast)
         if not whole:
@@ -147,7 +176,7 @@ def shade_row(image, row, horizon, coverage, view, tables):
         if bent:
             away_x, away_y = bent_texels(bend, t)
             at_x, at_y = x + away_x, y + away_y
-        grey = _ground_light(view.look, tables, line, at_x, at_y, coverages)
+        grey = _ground_light(surface, tables, line, at_x, at_y, coverages)
         grey = through_air(grey, air, view.beam, j)
         if not whole:
             behind = load_part(image, pixel, count)

@@ -29,6 +29,14 @@ def kernel(function: Callable[..., Any]) -> Any:
     return _compile(function, fastmath={"contract", "nsz"}, _nrt=False)
 
 
+def inlined_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a kernel that becomes part of each caller; the rest is as for `kernel`.
+
+    It serves short kernels that are called for every edge or row: a call passes an array as eleven numbers.
+    """
+    return _compile(function, fastmath={"contract", "nsz"}, _nrt=False, forceinline=True)
+
+
 def outer_kernel(function: Callable[..., Any]) -> Any:
     """Compile a kernel that receives `Bundle`s, which count references; the rest is as for `kernel`."""
     return _compile(function, fastmath={"contract", "nsz"}, _nrt=True)

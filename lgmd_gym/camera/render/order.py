@@ -154,8 +154,8 @@ def _meets_view(one, other):
     """Return whether the azimuths of two extents overlap, and the first is not entirely beyond the other."""
     if one[2] > other[3]:
         return False
-    apart = abs(one[0] - other[0]) % 4.0
-    return min(apart, 4.0 - apart) < one[1] + other[1]
+    apart = abs(one[0] - other[0])  # below 8, because middles are from -2 to 6
+    return min(min(apart, abs(apart - 4.0)), 8.0 - apart) < one[1] + other[1]
 
 
 @kernel

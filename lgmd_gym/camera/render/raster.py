@@ -16,12 +16,15 @@ from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.markings import add_lines
 from lgmd_gym.camera.render.models import Models
 from lgmd_gym.camera.render.order import distance, first_from, order_objects, visible
+from lgmd_gym.camera.render.own_car import draw_bonnet
 from lgmd_gym.camera.render.panorama import draw_panorama
 from lgmd_gym.camera.render.sensor import expose
 from lgmd_gym.camera.render.shadows import add_shadow
 from lgmd_gym.camera.render.sky import draw_sky
 from lgmd_gym.camera.render.solids import Air, draw_object
+from lgmd_gym.camera.render.veil import add_sky_veil
 from lgmd_gym.camera.render.weather import light_at
+from lgmd_gym.camera.render.windscreen import add_reflections
 from lgmd_gym.camera.roadside import PLANT_RANGE
 
 
@@ -50,9 +53,12 @@ def draw_distance(image, view, tables, horizon, buffers):
             draw_panorama(sky, lens, tables.panorama, horizon)
         else:
             draw_sky(sky, lens, tables.skyline, view.look, horizon, buffers)
-    for i in range(int(min(max(math.ceil(horizon.bottom), 0.0), image.shape[0]))):
+    rows = int(min(max(math.ceil(horizon.bottom), 0.0), image.shape[0]))
+    for i in range(rows):
         for j in range(image.shape[1]):
             image[i, j] = sky[i, j]
+    if view.look.veil > 0.0:
+        add_sky_veil(image, view, rows)
 
 
 @kernel
@@ -99,7 +105,7 @@ def draw_solids(image, view, models, objects, order, n, layer):
         # Objects fade in over the last sixth of their range.
         opacity = min(1.0, 6.0 * (1.0 - away / obj.range))
         clear = math.exp(-away * look.extinction) if look.extinction > 0.0 else 1.0
-        draw_object(image, lens, look, obj, models, Air(light, clear, opacity), layer)
+        draw_object(image, view, obj, models, Air(light, clear, opacity, away), layer)
         if look.night > 0.0:
             budget = add_glare(image, lens, obj, models.lamps[obj.model], clear * opacity, budget)
 
@@ -121,6 +127,8 @@ def draw_light(view, road, tables, models, objects, count, buffers):
     draw_ground(image, view, buffers.ground, tables, horizon)
     solids = SolidLayer(buffers.solids, buffers.corners, buffers.uv, buffers.axes, buffers.greys)
     draw_solids(image, view, models, objects, order, n, solids)
+    if view.own_car.bonnet > 0.0:
+        draw_bonnet(image, lens, view.own_car)
     if view.look.glare > 0.0:
         add_sun_glare(image, lens, view.look)
 
@@ -145,9 +153,10 @@ def draw_frames(out, lenses, views, road, tables, models, objects, count, buffer
     for k in range(out.shape[0]):
         end, start = lenses[k, 0], lenses[k, 1]
         look, beam, sky, sky_aim = views.looks[k], views.beams[k], views.skies[k], views.sky_aims[k]
+        own_car = views.own_cars[k]
         steps = blur_steps(end, start, look.shutter_s, objects, count) if look.shutter_s > 0.0 else 1
         if steps == 1:
-            view = View(end, look, beam, sky, sky_aim)
+            view = View(end, look, beam, sky, sky_aim, own_car)
             draw_light(view, road, tables, models, objects, count, buffers)
         else:
             total[:] = nb.float32(0.0)
@@ -155,10 +164,12 @@ def draw_frames(out, lenses, views, road, tables, models, objects, count, buffer
                 ago = (step + 0.5) / steps
                 lens_before(end, start, ago, moment)
                 move_objects(objects, count, -ago * look.shutter_s)
-                view = View(moment, look, beam, sky, sky_aim)
+                view = View(moment, look, beam, sky, sky_aim, own_car)
                 draw_light(view, road, tables, models, objects, count, buffers)
                 move_objects(objects, count, ago * look.shutter_s)
                 add_weighted(total, image, nb.float32(1.0 / steps))
             overwrite(image, total)
+        if own_car.reflected > 0.0:
+            add_reflections(image, tables.dashboard, own_car.reflected)
         gain = adapt_exposure(views.exposures[k], image, look) if look.auto_exposure_s > 0.0 else 1.0
         expose(out[k], image, look, gain, tables.noise, views.noise_starts[k])

@@ -4,6 +4,7 @@ from lgmd_gym.camera.effects import ASPHALT_GREY, PAINT_GREY
 from lgmd_gym.camera.objects import (
     MODEL_BARRIER,
     MODEL_BOX,
+    MODEL_DECK,
     MODEL_MARK,
     MODEL_POST,
     MODEL_RAIL,
@@ -54,6 +55,9 @@ def add_shadow(layer, lens, obj, look):
         _add_mark(layer, lens, obj, look)
         return
     if obj.model == MODEL_POST or obj.model == MODEL_RAIL:
+        return
+    # A bridge keeps the light of the sky from the road below it, thin things overhead do not.
+    if obj.base > 0.0 and obj.model != MODEL_DECK:
         return
     lean = look.under_lean * obj.height
     centre = (obj.x + lean * look.sun_x, obj.y + lean * look.sun_y)

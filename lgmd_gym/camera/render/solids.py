@@ -11,6 +11,7 @@ from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_projec
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, UNDER
 from lgmd_gym.camera.render.order import distance
+from lgmd_gym.camera.render.veil import row_slope, veil_at
 from lgmd_gym.simd import LANES, any_above, load_part, madd, magnitude, maximum, minimum, splat, store_part
 
 _HALF = 0.55  # reach of the models from their centre, as a share of their length and width
@@ -24,11 +25,13 @@ class Air(NamedTuple):
         light: Light on the object; 1 by day.
         transmission: Share of the object's contrast that remains behind the fog.
         opacity: Share of the object that is drawn; below 1 near the end of its range.
+        away: Distance of the object [m].
     """
 
     light: float
     transmission: float
     opacity: float
+    away: float
 
 
 @kernel
@@ -118,8 +121,9 @@ def _grey(role, value, light, obj, look, air):
 
 
 @kernel
-def draw_object(image, lens, look, obj, models, air, layer):
+def draw_object(image, view, obj, models, air, layer):
     """Draw one object over the image."""
+    lens, look = view.lens, view.look
     place_object(lens, look, obj, layer.axes)
     if _outside(lens, layer.axes):
         return
@@ -135,7 +139,7 @@ def draw_object(image, lens, look, obj, models, air, layer):
             height, width = image.shape
             rows = (int(max(v0, 0.0)), int(min(math.ceil(v1), height)))
             columns = (int(max(u0, 0.0)), int(min(math.ceil(u1) + 1.0, width)))
-            _compose(image, layer, rows, columns, air, look.haze)
+            _compose(image, layer, rows, columns, air, view)
 
 
 @kernel
@@ -179,15 +183,18 @@ def _add_solid(layer, lens, look, obj, models, solid, size, air):
 
 
 @kernel
-def _compose(image, layer, rows, columns, air, haze):
+def _compose(image, layer, rows, columns, air, view):
     """Draw the layer over a part of the image and clear it; `rows` and `columns` are (first, last + 1)."""
+    look, veiled = view.look, view.look.veil > 0.0
     width, stride = image.shape[1], layer.coverage.shape[2]
     covers, greys = layer.coverage[0], layer.coverage[1]
     zero, one, trace = splat(nb.float32(0.0)), splat(nb.float32(1.0)), splat(_TRACE)
     clear = splat(nb.float32(air.transmission))
-    murk = splat(nb.float32((1.0 - air.transmission) * haze))
+    murk = splat(nb.float32((1.0 - air.transmission) * look.haze))
     for i in range(rows[0], rows[1]):
-        sum_cover = sum_grey = zero
+        sum_cover = sum_grey = veil = zero
+        if veiled:
+            veil = splat(nb.float32(veil_at(look, view.lens.z, row_slope(view.lens, i), air.away)))
         # The last edges may be in the two columns right of the solid.
         for j in range(columns[0], min(columns[1] + 2, stride), LANES):
             at, pixel = i * stride + j, i * width + j
@@ -198,4 +205,6 @@ def _compose(image, layer, rows, columns, air, haze):
             cover = minimum(maximum(cover, zero), one)
             behind = load_part(image, pixel, width - j)
             light = madd(grey, clear, cover * murk)
+            if veiled:
+                light = madd(cover * veil, load_part(view.beam, j, width - j), light)
             store_part(image, pixel, width - j, madd(behind, one - cover, light))

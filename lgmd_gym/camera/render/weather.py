@@ -5,20 +5,22 @@ from typing import NamedTuple
 
 import numba as nb
 
-from lgmd_gym.camera.effects import BEAM_WIDTH
+from lgmd_gym.camera.effects import BEAM_REACH, BEAM_WIDTH
 from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.camera.render.veil import veil_at
 from lgmd_gym.simd import load_part, madd, splat
-
-_BEAM_REACH = 26.0  # the low beam falls to 1/e over this distance [m]
 
 
 @kernel
 def light_at(ahead, across, look):
-    """Return the light at a point `ahead` and `across` of the lens [m]: 1 by day, the low beam at night."""
+    """Return the light at a point `ahead` and `across` of the lens [m]: 1 by day, the low beam at night.
+
+    Fog takes its share of the beam on the way to the point, too.
+    """
     if look.night == 0.0:
         return 1.0
-    tan = across / max(ahead, 1.0)
-    beam = math.exp(-max(ahead, 0.0) / _BEAM_REACH - (tan / BEAM_WIDTH) ** 2)
+    tan, way = across / max(ahead, 1.0), max(ahead, 0.0)
+    beam = math.exp(-way / BEAM_REACH - way * look.extinction - (tan / BEAM_WIDTH) ** 2)
     return look.night_light + look.beam_gain * beam
 
 
@@ -26,7 +28,8 @@ class RowAir(NamedTuple):
     """Headlights (if `night`), reflections (if `wet`) and fog (if `foggy`) on a row of ground.
 
     The light is `dark` plus `gain` times the low beam; the share `gloss` of it is replaced by `mirrored`; the
-    fog leaves the share `clear` of the contrast to `haze`.
+    fog leaves the share `clear` of the contrast to `haze`; `veil` times the fall-off of the low beam is the
+    light that it scatters back.
     """
 
     night: bool
@@ -38,6 +41,7 @@ class RowAir(NamedTuple):
     foggy: bool
     clear: float
     haze: float
+    veil: float
 
 
 @kernel
@@ -47,14 +51,16 @@ def row_air(look, ahead, height):
     The distance is below 0 behind a lens that points down.
     """
     night, foggy = look.night > 0.0, look.extinction > 0.0
-    gain = look.beam_gain * math.exp(-max(ahead, 0.0) / _BEAM_REACH) if night else 0.0
+    way = max(ahead, 0.0)
+    gain = look.beam_gain * math.exp(-way / BEAM_REACH - way * look.extinction) if night else 0.0
     clear = math.exp(-abs(ahead) * look.extinction) if foggy else 1.0
     # A rough wet surface reflects the sky as water does, by Schlick's approximation, and half of the water
     # stands on it: at 20 m from a lens 1.2 m high a quarter of the light.
     grazing = 1.0 - height / math.sqrt(height * height + ahead * ahead)
     gloss = 0.5 * (0.02 + 0.98 * grazing**5) if look.wet > 0.0 else 0.0
-    mirrored = look.horizon
-    return RowAir(night, look.night_light, gain, look.wet > 0.0, gloss, mirrored, foggy, clear, look.haze)
+    veil = veil_at(look, height, height / max(ahead, 1e-3), way) if look.veil > 0.0 else 0.0
+    wet, mirrored = look.wet > 0.0, look.horizon
+    return RowAir(night, look.night_light, gain, wet, gloss, mirrored, foggy, clear, look.haze, veil)
 
 
 @kernel
@@ -68,4 +74,7 @@ def through_air(grey, air, beam, column):
     if air.foggy:
         haze = splat(nb.float32(air.haze))
         grey = madd(splat(nb.float32(air.clear)), grey - haze, haze)
+        if air.veil > 0.0:
+            fall_off = load_part(beam, column, beam.shape[0] - column)
+            grey = madd(splat(nb.float32(air.veil)), fall_off, grey)
     return grey

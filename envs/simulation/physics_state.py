@@ -1,4 +1,4 @@
-"""`World`: the state of one or more episodes as arrays."""
+"""`PhysicsState`: the state of one or more episodes as arrays."""
 
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ START_RANGE = 500.0  # [m], range of the random start position, which varies the
 
 
 class Placement(NamedTuple):
-    """A scenario placed on the road, ready to be loaded into a `World`.
+    """A scenario placed on the road, ready to be loaded into a `PhysicsState`.
 
     Attributes:
         scenario: The scenario.
@@ -74,7 +74,7 @@ def _bodies(rows: list[tuple[Any, ...]], scripts: list[np.ndarray], tables: list
     return bodies
 
 
-class World:
+class PhysicsState:
     """The episodes of N environments as arrays; the arguments of the compiled functions.
 
     Args:
