@@ -66,6 +66,11 @@ def camera_fields(world: int | None, condition: str, road: str | None) -> dict[s
     return {"world": world, "condition": condition, "road": road}
 
 
+def world_number(fields: dict[str, Any]) -> int:
+    """Return the number of the world among camera fields, -1 in the laboratory."""
+    return -1 if fields["world"] is None else fields["world"]
+
+
 def brake_of(fields: dict[str, Any]) -> BrakeParams | None:
     """Return the brake of the world among camera fields; None in the laboratory.
 

@@ -19,9 +19,9 @@ from lgmd_gym.envs.info import INFO_KEYS
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.envs.scene import SceneArrays, write_scene
+from lgmd_gym.envs.simulation.physics_state import PhysicsState
 from lgmd_gym.envs.simulation.road import BrakingRoad
 from lgmd_gym.envs.simulation.vehicles import EgoCar
-from lgmd_gym.envs.simulation.world import World
 from lgmd_gym.envs.spaces import EgoState, make_action
 from lgmd_gym.errors import check_keys, check_mapping, shown
 
@@ -156,7 +156,7 @@ class BrakingEnv(EgoBrakeEnv):
         weights = RewardParams(**reward)
         super().configure(config)
         self.config["reward"], self.weights = reward, weights.record()[None]
-        self._world = World(1)
+        self._state = PhysicsState(1)
         self._clock, self._outcome = make_clock(1), make_outcome(1)
 
     def define_spaces(self) -> None:
@@ -233,8 +233,8 @@ class BrakingEnv(EgoBrakeEnv):
         self.camera_fields = self.camera_fields | draw.camera_fields
         self.brake = self.episode_brake(draw.brake)
         brakes = self.brake.record(self.config["throttle"])[None]
-        self._world.load(0, placement, self.brake.max_demands(self.config["policy_frequency"]))
-        physics = tuple(make_physics(self._world, brakes, self.weights))
+        self._state.load(0, placement, self.brake.max_demands(self.config["policy_frequency"]))
+        physics = tuple(make_physics(self._state, brakes, self.weights))
         self.road = BrakingRoad(draw.make_network(), self.np_random, physics, self._clock.demands)
         self.controlled_vehicles = [self.road.ego]
         start_episodes(0, 1, _SELECTED, physics, tuple(self._clock), tuple(self._outcome))

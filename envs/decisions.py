@@ -13,7 +13,7 @@ from lgmd_gym.envs.dynamics.episode import Physics, is_terminated, is_truncated
 from lgmd_gym.envs.dynamics.jit import Arrays, compiled
 from lgmd_gym.envs.info import INFO, write_info
 from lgmd_gym.envs.reward import step_reward
-from lgmd_gym.envs.simulation.world import World
+from lgmd_gym.envs.simulation.physics_state import PhysicsState
 
 
 class Clock(NamedTuple):
@@ -48,11 +48,11 @@ class Outcome(NamedTuple):
     truncated: np.ndarray
 
 
-def make_physics(world: World, brakes: np.ndarray, weights: np.ndarray) -> Physics:
-    """Return the arrays of a world; make them again after `World.load` has replaced arrays."""
+def make_physics(state: PhysicsState, brakes: np.ndarray, weights: np.ndarray) -> Physics:
+    """Return the arrays of a state; make them again after `PhysicsState.load` has replaced arrays."""
     return Physics(
-        world.bodies, world.episodes, world.egos, world.lines, world.pending, world.segments, world.paths,
-        world.before, world.parts, brakes, weights,
+        state.bodies, state.episodes, state.egos, state.lines, state.pending, state.segments, state.paths,
+        state.before, state.parts, brakes, weights,
     )  # fmt: skip
 
 

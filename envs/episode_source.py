@@ -8,7 +8,7 @@ from highway_env.road.road import RoadNetwork
 
 from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.camera.worlds import LABORATORY, draw_world
-from lgmd_gym.envs.appearance import Appearance, brake_of
+from lgmd_gym.envs.appearance import Appearance, brake_of, world_number
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.scenarios.distribution import (
     LEVELS,
@@ -17,9 +17,10 @@ from lgmd_gym.envs.scenarios.distribution import (
     draw_scenario,
     level_generator,
 )
+from lgmd_gym.envs.scenarios.free_lanes import free_lane
 from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.envs.simulation.network import road_network
-from lgmd_gym.envs.simulation.world import Placement, place
+from lgmd_gym.envs.simulation.physics_state import Placement, place
 
 
 class Draw(NamedTuple):
@@ -70,11 +71,12 @@ class FixedScenario:
     def __init__(self, scenario: Scenario, appearance: Appearance | None = None) -> None:
         self.first = scenario
         self.appearance = appearance or Appearance(world=LABORATORY)
+        self._free_lane = free_lane(scenario)
 
     def draw(self, rng: np.random.Generator) -> Draw:
         """Return the next episode."""
         placement = place(self.first, rng)
-        fields = self.appearance.draw(rng)
+        fields = self.appearance.draw(rng) | {"queue_lane": self._free_lane}
         return Draw(placement, fields, {"world": world_number(fields)}, brake_of(fields))
 
 
@@ -120,13 +122,10 @@ class RandomLevels:
         """Return the next episode."""
         level = self.start_level + int(rng.integers(self.num_levels))
         generator = level_generator(self.split, level)
-        placement = place(draw_scenario(generator), generator)
+        scenario = draw_scenario(generator)
+        placement = place(scenario, generator)
         world = self.appearance.draw(level_generator(self.split, level, part=2))
         fields = world | draw_camera_fields(self.split, level, self.conditions)
+        fields["queue_lane"] = free_lane(scenario)
         info = {"level": level, "condition": fields["condition"], "world": world_number(fields)}
         return Draw(placement, fields, info, brake_of(fields))
-
-
-def world_number(fields: dict[str, Any]) -> int:
-    """Return the number of the world among camera fields, -1 in the laboratory."""
-    return -1 if fields["world"] is None else fields["world"]

@@ -31,15 +31,15 @@ class Physics(NamedTuple):
     """Arrays of the physics, the environments along the first axis.
 
     Attributes:
-        bodies: See `World`.
-        episodes: See `World`.
-        egos: See `World`.
-        lines: See `World`.
-        pending: See `World`.
-        segments: See `World`.
-        paths: See `World`.
-        before: See `World`.
-        parts: See `World`.
+        bodies: See `PhysicsState`.
+        episodes: See `PhysicsState`.
+        egos: See `PhysicsState`.
+        lines: See `PhysicsState`.
+        pending: See `PhysicsState`.
+        segments: See `PhysicsState`.
+        paths: See `PhysicsState`.
+        before: See `PhysicsState`.
+        parts: See `PhysicsState`.
         brakes: `BRAKE` records, shape (N,).
         weights: `REWARD` records, shape (N,).
     """

@@ -7,6 +7,7 @@ from lgmd_gym.envs.dynamics.bend import Bend, Pose, arc
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (
+    BRIDGE_SHADOW,
     EGO_LENGTH,
     EGO_WIDTH,
     LANE_WIDTH,
@@ -14,13 +15,14 @@ from lgmd_gym.envs.scenarios.scenario import (
     Actor,
     RoadPlan,
     Scenario,
+    bridge_shadow,
 )
 from lgmd_gym.errors import check_flag, check_whole, check_within
 
 if TYPE_CHECKING:
     from lgmd_gym.envs.dynamics.path import Path
 
-STEEL, SHADOW, RAIL = 150, 30, 175  # grey levels
+STEEL, RAIL = 150, 175  # grey levels
 RAIL_PIECE, RAIL_HEIGHT, RAIL_DEPTH = 4.0, 0.75, 0.3  # [m]
 CURVE_LENGTH = 120.0  # [m], limit of the length of a curve with a guard rail
 
@@ -58,7 +60,9 @@ def drive_over_plate(ego_speed: float = 80 * KMH, shade: int = STEEL) -> Scenari
 
 
 @family("BridgeShadow")
-def drive_through_shadow(ego_speed: float = 80 * KMH, length: float = 12.0, shade: int = SHADOW) -> Scenario:
+def drive_through_shadow(
+    ego_speed: float = 80 * KMH, length: float = 12.0, shade: int = BRIDGE_SHADOW
+) -> Scenario:
     """The ego drives through the shadow of a bridge; not a threat.
 
     Args:
@@ -68,14 +72,7 @@ def drive_through_shadow(ego_speed: float = 80 * KMH, length: float = 12.0, shad
     """
     speed = check_speed("ego_speed", ego_speed)
     shadow_length = check_within("length", length, 1.0, 100.0, "m")
-    shadow = Actor(
-        gap=START_TTC * speed,
-        kind="road_marking",
-        shade=check_whole("shade", shade, 0, 255),
-        length=shadow_length,
-        width=40.0,
-        height=0.0,
-    )
+    shadow = bridge_shadow(START_TTC * speed, shadow_length, check_whole("shade", shade, 0, 255))
     duration = START_TTC + shadow_length / speed + 2.0
     return Scenario(family="BridgeShadow", ego_speed=speed, duration=duration, actors=(shadow,))
 

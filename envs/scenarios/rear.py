@@ -14,6 +14,7 @@ from lgmd_gym.envs.scenarios.scenario import (
     TARGET_WIDTH,
     Actor,
     Scenario,
+    bridge_shadow,
 )
 from lgmd_gym.errors import check_flag, check_within, shown
 
@@ -172,14 +173,22 @@ def follow_steadily(ego_speed: float = 50 * KMH, headway: float = 2.0, shade: in
 
 @family("BrakeRelease")
 def lead_brakes_and_releases(
-    ego_speed: float = 50 * KMH, headway: float = 1.5, speed_drop: float = 5.0, shade: int | None = None
+    ego_speed: float = 50 * KMH,
+    headway: float = 1.5,
+    speed_drop: float = 5.0,
+    shadow_length: float = 0.0,
+    shade: int | None = None,
 ) -> Scenario:
     """The ego follows a car that brakes briefly and regains its speed without contact; not a threat.
+
+    With a bridge's shadow, the lead car begins to brake as it reaches the shadow: brake lights, a shorter
+    distance and a dark edge on the road come at the same time.
 
     Args:
         ego_speed: Initial speed of both cars, in (0, 40] [m/s].
         headway: Initial time headway, in [0.3, 10] [s].
         speed_drop: Speed that the lead car loses and regains at 2.5 m/s², in [0.1, ego_speed] [m/s].
+        shadow_length: Length of a bridge's shadow along the road, in [0, 100]; 0 for none [m].
         shade: Grey level of the lead car in [0, 255]; None to draw it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
@@ -193,8 +202,10 @@ def lead_brakes_and_releases(
         )
     braking = Segment(start=LEAD_IN, acceleration=-RELEASE, final_speed=speed - drop)
     accelerating = Segment(start=LEAD_IN, acceleration=RELEASE, final_speed=speed)
-    lead = Actor(gap=gap, speed=speed, profile=(braking, accelerating), shade=shade)
-    return Scenario(family="BrakeRelease", ego_speed=speed, duration=10.0, actors=(lead,))
+    actors = [Actor(gap=gap, speed=speed, profile=(braking, accelerating), shade=shade)]
+    if check_within("shadow_length", shadow_length, 0.0, 100.0, "m") > 0.0:
+        actors.append(bridge_shadow(gap + LEAD_IN * speed, shadow_length))
+    return Scenario(family="BrakeRelease", ego_speed=speed, duration=10.0, actors=tuple(actors))
 
 
 def _gap(speed: float, gap: float | None, headway: float | None) -> float:

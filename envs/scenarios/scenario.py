@@ -24,6 +24,7 @@ LANE_WIDTH = 3.5  # [m], Euro NCAP AEB C2C v4.3.1, 7.1
 ACTOR_KINDS = ("car", "box", "road_marking")
 ROAD_KINDS = ("straight", "two-way", "curve", "crossing")
 MAX_LANES = 100
+BRIDGE_SHADOW = 30  # grey level
 START_TTC = 5.0
 """Time from the start to the first possible contact at the scripted speeds [s]: 1 s more than the protocols'
 T0 of 4 s, so that braking from the start counts as premature."""
@@ -80,6 +81,17 @@ class Actor:
             check_whole("shade", self.shade, 0, 255)
         for name in ("length", "width", "height"):
             check_within(name, getattr(self, name), 0.0, 1000.0, "m")
+
+
+def bridge_shadow(gap: float, length: float, shade: int = BRIDGE_SHADOW) -> Actor:
+    """Return the shadow of a bridge across the road.
+
+    Args:
+        gap: Distance from the ego's front bumper to the shadow [m].
+        length: Length along the road [m].
+        shade: Grey level in [0, 255].
+    """
+    return Actor(gap=gap, kind="road_marking", shade=shade, length=length, width=40.0, height=0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,7 +26,7 @@ class TrafficEgo(TrafficCar):
         brake: Response to demands; None for the default.
 
     Attributes:
-        driver_acceleration: Acceleration demanded by the IDM driver, >= −6 [m/s²].
+        driver_acceleration: Acceleration demanded by the IDM driver, >= −6 and within the brake [m/s²].
         current_acceleration: Acceleration of the car [m/s²].
         yaw_rate: Mean yaw rate over the last step, + to the right [rad/s].
         travelled: Distance travelled since the reset [m].

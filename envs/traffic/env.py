@@ -11,7 +11,7 @@ from gymnasium import spaces
 from highway_env.envs.common.abstract import AbstractEnv
 
 from lgmd_gym.envs import surrogate_safety
-from lgmd_gym.envs.appearance import Appearance
+from lgmd_gym.envs.appearance import Appearance, brake_of, world_number
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.envs.spaces import ContinuousDemand, EgoState
 from lgmd_gym.envs.traffic.ego import TrafficEgo
@@ -60,7 +60,8 @@ class TrafficEnv(EgoBrakeEnv):
 
     Roads and cars are highway-env's: subclasses also inherit from one of its environments. The seed draws the
     traffic, and the time headway of each driver, in [0.4, 1.5] s. The ego keeps its lane or route, driven by
-    IDM. The demand passes through the brake model of `BrakingEnv`.
+    IDM. The demand passes through the brake model of `BrakingEnv`, with the brake of the world; the driver
+    brakes no harder than that brake can.
 
     ## Action Space
 
@@ -93,6 +94,7 @@ class TrafficEnv(EgoBrakeEnv):
     | `target_speed` | speed along the ego's heading of the first car ahead [m/s] | nothing within 300 m |
     | `side` | part of the ego in contact: "front", "rear", "side"; "" without contact | |
     | `distance` | distance travelled since the reset [m] | |
+    | `world` | number of the world, −1 for the laboratory | |
 
     ## Arguments
 
@@ -178,6 +180,9 @@ class TrafficEnv(EgoBrakeEnv):
 
     def _reset(self) -> None:
         """Build the scene and simulate the warm-up; repeat until the warm-up is free of ego contact."""
+        # A generator of its own: the draws of the traffic are the same in every world.
+        self.camera_fields = {**self.appearance.draw(self.np_random.spawn(1)[0]), **self.camera_overrides}
+        self.brake = self.episode_brake(brake_of(self.camera_fields))
         while True:
             self._jam_steps = 0
             self._build()
@@ -187,8 +192,6 @@ class TrafficEnv(EgoBrakeEnv):
                 break
         self.ego.travelled = 0.0
         self.steps = self._jam_steps = 0
-        # A generator of its own: the traffic of a seed is the same in every world.
-        self.camera_fields = {**self.appearance.draw(self.np_random.spawn(1)[0]), **self.camera_overrides}
 
     def _build(self) -> None:
         super()._reset()
@@ -244,6 +247,7 @@ class TrafficEnv(EgoBrakeEnv):
             "required_deceleration": required_deceleration(bodies),
             "target_speed": float(lead["speed"] * cos(lead["heading"] - ego.heading)) if index else inf,
             "distance": ego.travelled,
+            "world": world_number(self.camera_fields),
         }
 
 

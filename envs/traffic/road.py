@@ -98,7 +98,7 @@ class TrafficRoad(RegulatedRoad):
                 "steering": float(record["steering"]),
                 "acceleration": float(record["acceleration"]),
             }
-            ego.driver_acceleration = ego.action["acceleration"]
+            ego.driver_acceleration = max(ego.action["acceleration"], -ego.brake.max_deceleration)
 
     def step(self, dt: float) -> None:
         """Advance all cars by `dt` [s], or up to the ego's first contact; call `act` before."""

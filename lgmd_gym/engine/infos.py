@@ -60,13 +60,13 @@ class InfoArrays:
 
     def _append_frames(self, first: int, last: int, due: np.ndarray) -> None:
         """Append the present camera frame of the environments in a range to their traces."""
-        sensors, world = self._simulation.sensors, self._simulation.world
+        sensors, state = self._simulation.sensors, self._simulation.state
         assert sensors is not None
         assert self._traces is not None
         for index in (first + np.flatnonzero(due[first:last])).tolist():
             response = Response(*(field[index].copy() for field in sensors.responses))
-            time = float(world.episodes[index]["steps"]) / self._simulation.rates.simulation
-            speed = float(world.bodies[index, 0]["speed"])
+            time = float(state.episodes[index]["steps"]) / self._simulation.rates.simulation
+            speed = float(state.bodies[index, 0]["speed"])
             self._traces[index].append(TraceFrame(time, speed, response))
 
     def _take_traces(self, selected: np.ndarray) -> np.ndarray:

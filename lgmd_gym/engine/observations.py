@@ -32,8 +32,8 @@ class Observations:
     def read(self, copy: bool = False) -> Any:
         """Return the present observations, in new arrays with `copy`."""
         arrays: Any = self._empty() if copy or self._copy else self._arrays
-        sensors, world = self._simulation.sensors, self._simulation.world
-        egos = world.bodies[:, 0]
+        sensors, state = self._simulation.sensors, self._simulation.state
+        egos = state.bodies[:, 0]
         if sensors is None:
             return self._base(arrays)
         for name in SIGNALS:
@@ -48,9 +48,9 @@ class Observations:
         return arrays
 
     def _base(self, out: np.ndarray) -> np.ndarray:
-        egos = self._simulation.world.bodies[:, 0]
+        egos = self._simulation.state.bodies[:, 0]
         out[:, 0], out[:, 1] = egos["speed"], egos["acceleration"]
-        out[:, 2] = self._simulation.world.egos["yaw_rate"]
+        out[:, 2] = self._simulation.state.egos["yaw_rate"]
         return out
 
     def _yaw_rates(self, headings: np.ndarray) -> np.ndarray:

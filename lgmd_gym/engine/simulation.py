@@ -19,7 +19,7 @@ from lgmd_gym.envs.dynamics.brake import BRAKE, BrakeParams
 from lgmd_gym.envs.episode_source import Draw
 from lgmd_gym.envs.reward import REWARD
 from lgmd_gym.envs.scene import SceneArrays
-from lgmd_gym.envs.simulation.world import World
+from lgmd_gym.envs.simulation.physics_state import PhysicsState
 from lgmd_gym.neuron.threads import Threads
 from lgmd_gym.sensing.sensor_array import SensorArray
 
@@ -60,7 +60,7 @@ class Simulation:
         threads: Number of threads that share the environments of a step, including the calling one.
 
     Attributes:
-        world: State of the episodes.
+        state: State of the episodes.
         brakes: `BRAKE` records of the present episodes, shape (N,).
         weights: `REWARD` records, shape (N,); set them before the first `load`.
         outcome: Results of the last step or start of each environment.
@@ -79,7 +79,7 @@ class Simulation:
         threads: int = 1,
     ) -> None:
         self.num_envs, self.rates, self.sensors = num_envs, rates, sensors
-        self.world = World(num_envs)
+        self.state = PhysicsState(num_envs)
         self._throttle = throttle
         self.brakes, self.weights = np.zeros(num_envs, BRAKE), np.zeros(num_envs, REWARD)
         self.clock, self.outcome = make_clock(num_envs), make_outcome(num_envs)
@@ -100,7 +100,7 @@ class Simulation:
             network: Its highway-env road network; not used without sensors.
             brake: Its brake, see `EgoBrakeEnv.episode_brake`.
         """
-        if self.world.load(index, draw.placement, brake.max_demands(self.rates.policy)):
+        if self.state.load(index, draw.placement, brake.max_demands(self.rates.policy)):
             self._link()
         self.brakes[index] = brake.record(self._throttle)
         if self.sensors is not None:
@@ -150,7 +150,7 @@ class Simulation:
 
     def _link(self) -> None:
         """Collect the arrays of the physics."""
-        self.physics: Any = tuple(make_physics(self.world, self.brakes, self.weights))
+        self.physics: Any = tuple(make_physics(self.state, self.brakes, self.weights))
 
     def _make_scenes(self) -> SceneArrays:
         if self.sensors is None:

@@ -11,6 +11,7 @@ MODES = ["NextStep", "SameStep", "Disabled"]
 LEVELS = env_id("RandomBraking")
 FAST = {"ego_speed": 3.0}  # a second of braking ends the episode
 TWO_LENSES = ["wide", {"name": "fovea", "shape": [60, 100]}]
+FRAMES = {"include_frame": True}
 
 ARGUMENTS = {
     "two cameras": {"camera": TWO_LENSES},
@@ -26,6 +27,8 @@ ARGUMENTS = {
     "brake": {"config": {"max_deceleration": 5.0, "dead_time": 0.3}},
     "condition": {"condition": "night", "include_frame": True},
     "neuron": {"params": {"t_sf": 10.0}},
+    "own car": {"camera": {"name": "wide", "bonnet": True, "windscreen": 0.05, "gaze": "path"}, **FRAMES},
+    "night fog": {"camera": {"name": "wide", "light": "night", "visibility_m": 30.0}, **FRAMES},
     "automatic exposure": {"camera": {"name": "wide", "auto_exposure_s": 0.3}, "include_frame": True},
 }
 

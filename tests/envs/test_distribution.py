@@ -20,6 +20,7 @@ from lgmd_gym.envs.scenarios.distribution import (
     draw_scenario,
     level_generator,
 )
+from lgmd_gym.envs.scenarios.free_lanes import free_lane
 from lgmd_gym.wrappers.vector import LGMDObservation as LGMDVector
 
 HOLD = np.zeros(1, np.float32)
@@ -103,7 +104,8 @@ def test_levels_set_condition_and_texture_of_the_camera():
         _, info = env.reset(seed=seed)
         used = env.get_wrapper_attr("sensors").cameras[0]["fovea"]
         bare = CameraParams.preset("fovea").with_condition(info["condition"])
-        assert used.params == replace(bare, texture=used.params.texture, world=info["world"], road="normal")
+        changed = {"texture": used.params.texture, "world": info["world"], "road": "normal"}
+        assert used.params == replace(bare, **changed, queue_lane=free_lane(env.unwrapped.scenario))
         assert info["world"] in SPLIT_WORLDS["validation"]
         assert np.array_equal(env.get_wrapper_attr("frames")["fovea"], EgoCamera(used.params).render(env))
         textures.setdefault(info["condition"], []).append(used.params.texture)

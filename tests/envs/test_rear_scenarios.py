@@ -126,3 +126,13 @@ def test_lead_car_that_brakes_and_releases():
     assert (default.gap, default.profile[0].final_speed) == (
         pytest.approx(1.5 * 50 / 3.6), pytest.approx(50 / 3.6 - 5),
     )  # fmt: skip
+
+
+def test_the_lead_car_brakes_as_it_reaches_the_shadow():
+    made = scenario("BrakeRelease", ego_speed=10.0, headway=2.0, shadow_length=12.0)
+    lead, shadow = made.actors
+    braking = lead.profile[0]
+    assert shadow.gap == lead.gap + 10.0 * braking.start
+    assert (shadow.length, shadow.kind) == (12.0, "road_marking")
+    assert scenario("BrakeRelease", ego_speed=10.0, headway=2.0).actors == (lead,)
+    invalid("BrakeRelease", "shadow_length", shadow_length=-1.0)

@@ -15,7 +15,9 @@ from highway_env.vehicle.behavior import IDMVehicle
 from support.records import records
 from support.traffic import BRAKE, HOLD, BlockedHighway, EmptyHighway, car_states, run_for
 
+from lgmd_gym.envs.dynamics.brake import draw_brake
 from lgmd_gym.envs.traffic.contacts import contact_time
+from lgmd_gym.envs.traffic.drivers import TrafficCar
 from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, idm, steer
 from lgmd_gym.envs.traffic.lanes import LaneTable
 from lgmd_gym.envs.traffic.places import CAR, neighbours
@@ -156,6 +158,28 @@ def test_brake_has_dead_time_build_up_and_limit():
     position = ego.position.copy()
     run_for(env, 2, BRAKE)
     assert ego.position.tolist() == position.tolist()
+
+
+def test_the_brake_is_that_of_the_world():
+    env = make_traffic("highway", camera=None, world=8003, condition="rain")
+    _, info = env.reset(seed=0)
+    assert info["world"] == 8003
+    brake = env.ego.brake
+    assert brake == env.brake == draw_brake(8003, wet=True)
+    assert brake.max_deceleration < 7.0
+    infos = run_for(env, 3, BRAKE)
+    assert -env.ego.current_acceleration == pytest.approx(brake.max_deceleration)
+    assert max(info["deceleration"] for info in infos) <= brake.max_deceleration + 1e-9
+    assert make_traffic("highway", camera=None, world="laboratory").reset(seed=0)[1]["world"] == -1
+
+
+def test_the_driver_brakes_no_harder_than_the_brake_can():
+    env = EmptyHighway({"max_deceleration": 3.0})
+    env.reset(seed=0)
+    env.road.vehicles.append(TrafficCar(env.road, env.ego.position + np.array([12.0, 0.0]), speed=0.0))
+    env.road.vehicles[-1].crashed = True
+    infos = run_for(env, 0.4)
+    assert min(info["driver_acceleration"] for info in infos) == -3.0
 
 
 def test_ten_seconds_at_standstill_truncate_the_episode():
