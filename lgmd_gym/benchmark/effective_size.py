@@ -51,8 +51,8 @@ def effective_size(
     outcomes = np.asarray(flags, float)
     if outcomes.size == 0:
         return 0.0
-    by_case, by_world = _numbered(cases), _numbered(worlds or [None] * len(outcomes))
-    by_cell = _numbered(list(zip(by_case.tolist(), by_world.tolist(), strict=True)))
+    by_case, by_world = numbered(cases), numbered(worlds or [None] * len(outcomes))
+    by_cell = numbered(list(zip(by_case.tolist(), by_world.tolist(), strict=True)))
     cells = float(by_cell.max() + 1)
     ways = [groups for groups in (by_case, by_world) if groups.max() > 0]
     share = outcomes.mean()
@@ -85,7 +85,7 @@ def t_quantile(degrees: int) -> float:
     return float(sum(term / degrees**power for power, term in enumerate(terms)))
 
 
-def _numbered(labels: Sequence[Hashable]) -> np.ndarray:
+def numbered(labels: Sequence[Hashable]) -> np.ndarray:
     """Return the labels as whole numbers from 0 on, in order of appearance."""
     numbers: dict[Hashable, int] = {}
     return np.array([numbers.setdefault(label, len(numbers)) for label in labels])

@@ -1,8 +1,9 @@
 """Intervals of rates, counts and means.
 
 Rates have Wilson's interval for an effective sample size, see `effective_size`; counts have Garwood's exact
-Poisson interval, and means a bootstrap that draws whole cases and whole worlds: runs of one case or of one
-world are correlated, so drawing single episodes would give an interval that is too narrow.
+Poisson interval (for counts in clusters see `event_counts`), and means a bootstrap that draws whole cases and
+whole worlds: runs of one case or of one world are correlated, so drawing single episodes would give an
+interval that is too narrow.
 """
 
 import math

@@ -80,6 +80,7 @@ def _near_miss() -> tuple[Case, ...]:
     suite = "near-miss"
     return (
         *speed_cases(suite, "BrakeRelease", [50, 80]),
+        *speed_cases(suite, "BrakeRelease", [50, 80], tail="/shadow", shadow_length=12.0),
         *speed_cases(suite, "CutIn", [50, 80]),
         *speed_cases(suite, "CrossingClears", [30, 40, 50], tail="/right", side="right"),
         *speed_cases(suite, "CrossingClears", [30, 40, 50], tail="/left", side="left"),

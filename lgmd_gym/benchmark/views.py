@@ -68,7 +68,7 @@ class Views:
     def batch_infos(self) -> dict[str, Any]:
         """Return the infos of all environments, for simulations with one camera frame per decision."""
         infos, responses = self._simulation.outcome.infos, self._sensors.responses
-        times: Any = self._simulation.world.episodes["steps"] / self._simulation.rates.simulation
+        times: Any = self._simulation.state.episodes["steps"] / self._simulation.rates.simulation
         speeds: Any = infos["ego_speed"]
         trace = (TraceFrame(times, speeds, responses),)
         alerts = responses.alert.any(axis=1)

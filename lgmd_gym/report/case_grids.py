@@ -3,7 +3,7 @@
 import re
 from typing import NamedTuple
 
-from lgmd_gym.benchmark.analysis.ncap_points import REAR_CASE, ROW_COLOURS
+from lgmd_gym.benchmark.analysis.ncap_points import REAR_CASE, ROW_COLOURS, colour_weight
 from lgmd_gym.benchmark.analysis.protocol_limits import relative_impact
 from lgmd_gym.benchmark.protocols import OVERLAPS
 from lgmd_gym.benchmark.rows import Row
@@ -16,7 +16,7 @@ AXES = {"overlap": "overlap [%]", "location": "impact location [%]", "target": "
 class GridCell(NamedTuple):
     """Result of one case over all seeds."""
 
-    colour: str  # CSS class
+    colour: str  # CSS class: of the Euro NCAP colour, "contact" or "premature"
     text: str  # highest relative impact speed [km/h]; "*" marks premature braking
     tooltip: str
 
@@ -65,15 +65,17 @@ def _grid(
 
 
 def _cell(rows: list[Row] | None, suite: str) -> GridCell | None:
-    """Return the cell of one case, with the colour of its worst seed."""
+    """Return the cell of one case: highest impact speed, and the colour of the seed that earns least."""
     if rows is None:
         return None
     worst = max(rows, key=relative_impact)
+    colours = [ROW_COLOURS[suite](row) for row in sorted(rows, key=relative_impact, reverse=True)]
+    colour = min(colours, key=colour_weight)
     contacts = sum(bool(row["collision"]) for row in rows)
     premature = sum(bool(row["premature_brake"]) for row in rows)
     text = f"{relative_impact(worst) / KMH:.0f}" if contacts else "0" + ("*" if premature else "")
     tooltip = f"{worst['case']}: contact in {contacts} of {len(rows)} seeds, premature braking in {premature}"
-    return GridCell(ROW_COLOURS[suite](worst), text, tooltip)
+    return GridCell(colour, text, tooltip)
 
 
 def _head_speed(head: str) -> int:

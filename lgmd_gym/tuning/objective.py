@@ -16,22 +16,22 @@ import numpy as np
 from joblib import delayed
 
 from lgmd_gym.agents import BRAKE, HOLD, Agent, Rule, make_agent
-from lgmd_gym.benchmark.case import Case, level_case
+from lgmd_gym.benchmark.case import level_case
 from lgmd_gym.benchmark.episode import Episode, make_env, play
 from lgmd_gym.benchmark.metrics import Counterfactual
 from lgmd_gym.benchmark.rows import Row, make_row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
-from lgmd_gym.benchmark.task import Task, run_task
+from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
 from lgmd_gym.benchmark.worker_processes import run_parallel
-from lgmd_gym.camera.worlds import LABORATORY
+from lgmd_gym.camera.worlds import SPLIT_WORLDS
+from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.envs.scenarios.distribution import LEVELS
 from lgmd_gym.errors import check_known, check_whole
 
 FIRST_SEED = {"train": 1000, "validation": 2000}  # of the false-reaction suite; reports use seeds from 0
 MAX_SEEDS = 1000  # the seeds of the splits do not overlap
 MAX_CACHED = 4  # sensor configurations whose recordings are kept
-TEXTURE_RANGE = (0.5, 1.6)  # asphalt contrast, relative to the natural one
 AGENT_SENSORS = SensorConfig()  # each agent's own cameras
 MINIMAL_SENSORS = SensorConfig(camera={"name": "wide", "shape": [8, 8]})  # for agents without sensors
 
@@ -116,7 +116,9 @@ class FixedOnsetBrake(Agent):
 
 
 class Objective:
-    """Evaluation of rules on random levels and false-reaction cases, each with its own road texture.
+    """Evaluation of rules on random levels and false-reaction cases, each in a world of its own.
+
+    The worlds are those of the split; false-reaction cases have the camera condition of their world.
 
     Args:
         split: "train" or "validation".
@@ -129,10 +131,17 @@ class Objective:
         check_known("split", split, FIRST_SEED)
         self.jobs = check_whole("jobs", jobs, 1)
         levels, seeds = check_whole("levels", levels, 0, LEVELS), check_whole("seeds", seeds, 0, MAX_SEEDS)
-        self.episodes = [(level_case(split, split, number), number) for number in range(levels)]
-        cases = find_suite("false-reaction").cases
-        first = FIRST_SEED[split]
-        self.episodes += [(case, seed) for seed in range(first, first + seeds) for case in cases]
+        worlds, first = SPLIT_WORLDS[split], FIRST_SEED[split]
+        # A level has a world of its own, whatever the world of the task.
+        self.tasks = [
+            Task(NO_BRAKE, level_case(split, split, number), number, MINIMAL_SENSORS, world=worlds.start)
+            for number in range(levels)
+        ]
+        for seed in range(first, first + seeds):
+            for index, case in enumerate(find_suite("false-reaction").cases):
+                world = int(np.random.default_rng([7, seed, index]).integers(worlds.start, worlds.stop))
+                task = Task(NO_BRAKE, case, seed, MINIMAL_SENSORS, condition=MIXED, world=world)
+                self.tasks.append(task)
         self._cache: dict[str, list[NoBrakeRecording]] = {}  # by sensor configuration, latest used last
         self._rows: dict[tuple[int, int | None], Row] = {}  # by episode and onset of braking
 
@@ -153,7 +162,7 @@ class Objective:
         recordings = self.recordings(sensors)
         keys = list(enumerate(find_onset(rule, recording) for recording in recordings))
         missing = [key for key in keys if key not in self._rows]
-        arguments = ((*self.episodes[i], recordings[i].counterfactual, onset) for i, onset in missing)
+        arguments = ((self.tasks[i], recordings[i].counterfactual, onset) for i, onset in missing)
         self._rows.update(zip(missing, self._map(simulate_onset, arguments), strict=True))
         return ObjectiveValue.from_rows(self._rows[key] for key in keys)
 
@@ -162,17 +171,16 @@ class Objective:
         key = json.dumps(asdict(sensors.plain))
         recordings = self._cache.pop(key, None)
         if recordings is None:
-            arguments = ((case, seed, with_texture(sensors, seed)) for case, seed in self.episodes)
-            recordings = self._map(record, arguments)
+            recordings = self._map(record, ((replace(task, sensor_config=sensors),) for task in self.tasks))
         self._cache = dict([*self._cache.items(), (key, recordings)][-MAX_CACHED:])
         return recordings
 
     def closed_loop_rows(self, agent: str, sensors: SensorConfig) -> list[Row]:
         """Simulate an agent in closed loop and return one row for each episode."""
-        counterfactuals = self._map(simulate_no_brake, self.episodes)
+        counterfactuals = self._map(simulate_no_brake, ((task,) for task in self.tasks))
         tasks = (
-            (Task(agent, case, seed, with_texture(sensors, seed), counterfactual),)
-            for (case, seed), counterfactual in zip(self.episodes, counterfactuals, strict=True)
+            (replace(task, agent=agent, sensor_config=sensors, counterfactual=counterfactual),)
+            for task, counterfactual in zip(self.tasks, counterfactuals, strict=True)
         )
         rows = [result.row for result in self._map(run_task, tasks)]
         error = next((row["error"] for row in rows if row["error"] is not None), None)
@@ -189,11 +197,11 @@ def is_latching(agent: Agent) -> bool:
     return isinstance(agent, Rule) and agent.latching
 
 
-def record(case: Case, seed: int, sensors: SensorConfig) -> NoBrakeRecording:
+def record(task: Task) -> NoBrakeRecording:
     """Simulate an episode without braking and return its recording."""
     recorder = ObservationRecorder()
-    episode = _simulate(case, seed, sensors, recorder)
-    return NoBrakeRecording(seed, Counterfactual.of(episode), recorder.steps)
+    episode = _simulate(task, recorder)
+    return NoBrakeRecording(task.seed, Counterfactual.of(episode), recorder.steps)
 
 
 def find_onset(rule: Agent, recording: NoBrakeRecording) -> int | None:
@@ -205,29 +213,20 @@ def find_onset(rule: Agent, recording: NoBrakeRecording) -> int | None:
     return None
 
 
-def simulate_onset(case: Case, seed: int, counterfactual: Counterfactual, onset: int | None) -> Row:
+def simulate_onset(task: Task, counterfactual: Counterfactual, onset: int | None) -> Row:
     """Return the row of an episode with full braking from a decision on."""
-    episode = _simulate(case, seed, MINIMAL_SENSORS, FixedOnsetBrake(onset))
-    return make_row("", case, seed, episode, counterfactual)
+    episode = _simulate(task, FixedOnsetBrake(onset))
+    return make_row("", task.case, task.seed, episode, counterfactual)
 
 
-def simulate_no_brake(case: Case, seed: int) -> Counterfactual:
+def simulate_no_brake(task: Task) -> Counterfactual:
     """Return the outcome of an episode without braking."""
-    return Counterfactual.of(_simulate(case, seed, MINIMAL_SENSORS, FixedOnsetBrake(None)))
+    return Counterfactual.of(_simulate(task, FixedOnsetBrake(None)))
 
 
-def with_texture(sensors: SensorConfig, seed: int) -> SensorConfig:
-    """Return a sensor configuration with the road texture of a seed."""
-    rng = np.random.default_rng([7, seed])
-    texture = {"seed": 10_000 + seed, "texture": round(float(rng.uniform(*TEXTURE_RANGE)), 3)}
-    cameras: Any = sensors.camera if isinstance(sensors.camera, list) else [sensors.camera]
-    textured = [{**({"name": item} if isinstance(item, str) else item), **texture} for item in cameras]
-    return replace(sensors, camera=textured)
-
-
-def _simulate(case: Case, seed: int, sensors: SensorConfig, agent: Agent) -> Episode:
-    env = make_env(case, sensors, {"world": LABORATORY} | dict(case.arguments))
+def _simulate(task: Task, agent: Agent) -> Episode:
+    env = make_env(task.case, task.sensor_config, task.arguments)
     try:
-        return play(env, agent, seed)
+        return play(env, agent, task.seed)
     finally:
         env.close()

@@ -209,8 +209,21 @@ def test_case_grids_of_ncap2023():
         ("green", "0"),
     ]
     assert (cells["50"][3].colour, cells["50"][3].text) == ("red", "50")
-    assert cells["10"][0].text == "0*"
+    assert (cells["10"][0].colour, cells["10"][0].text) == ("premature", "0*")
     assert case_grids(rows, "a", "quick") == []
+
+
+def test_a_cell_has_the_highest_impact_speed_and_the_colour_of_the_seed_that_earns_least():
+    values = {"case": "ncap2023/CCRs/v50/overlap100", "ego_speed": 50 / 3.6, "target_speed": 0.0}
+    speed = 5.0 / 3.6  # yellow at 50 km/h
+    contact = {"collision": True, "impact_speed": speed, "relative_impact_speed": speed}
+    rows = [
+        threat_row(seed=0, **values, **contact, premature_brake=False),
+        threat_row(seed=1, **values, collision=False, premature_brake=True),
+    ]
+    for order in (rows, rows[::-1]):
+        ((_, (cell,)),) = case_grids(order, "a", "ncap2023")[0].lines
+        assert (cell.colour, cell.text) == ("premature", "5")
 
 
 def test_illustrated_agent_is_the_first_with_a_neuron():

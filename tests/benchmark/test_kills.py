@@ -26,6 +26,14 @@ speeds_kmh = [30]
 """
 
 
+@pytest.fixture(scope="module", autouse=True)
+def sigint_is_not_ignored():
+    """In the background of a shell without job control it is, also in the processes that the tests start."""
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, previous)
+
+
 @pytest.fixture(scope="module")
 def suite(tmp_path_factory):
     path = tmp_path_factory.mktemp("suite") / "tiny.toml"

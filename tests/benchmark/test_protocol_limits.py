@@ -7,7 +7,7 @@ import pytest
 from support.rows import suite_rows, threat_row
 
 from lgmd_gym.benchmark.analysis.compare import compare_rows
-from lgmd_gym.benchmark.analysis.ncap_points import points_2023, points_2026, row_colour_2023
+from lgmd_gym.benchmark.analysis.ncap_points import points_2023, points_2026, row_colour_2023, row_colour_2026
 from lgmd_gym.benchmark.analysis.protocol_limits import (
     check_fmvss127,
     check_green,
@@ -17,7 +17,7 @@ from lgmd_gym.benchmark.analysis.protocol_limits import (
     meets_r152,
     r152_limit,
 )
-from lgmd_gym.benchmark.analysis.tables import limit_table, score_tables
+from lgmd_gym.benchmark.analysis.tables import limit_table, score_tables, tables_by_case
 from lgmd_gym.benchmark.summary import write_summary
 from lgmd_gym.envs.dynamics.units import KMH
 
@@ -103,6 +103,17 @@ def test_agent_without_runs_does_not_meet_r152():
     assert not meets_r152([], "a")
 
 
+def test_many_agents_are_in_several_tables():
+    rows = [impact_row("CCRs/v20", 20, 0, 0) | {"agent": f"a{number}"} for number in range(9)]
+    agents = [row["agent"] for row in rows]
+    for suite in ("r152", "quick"):
+        rows = [row | {"avoided": True, "premature_brake": False, "speed_reduction": 5.0} for row in rows]
+        tables = tables_by_case(rows, agents, suite)
+        assert len(tables) == 2
+        headers = [str(column.header).replace("\n", "") for table in tables for column in table.columns]
+        assert [name for name in headers if name in agents] == agents
+
+
 def test_suite_without_limits_has_no_limit_table():
     assert limit_table([impact_row("CCRs/v20", 20, 0, 0)], ["a"], "quick") is None
 
@@ -124,6 +135,16 @@ def test_premature_braking_fails_fmvss127():
         (False, "no contact"),
         (True, "no contact"),
     ]
+
+
+def test_premature_braking_is_not_green_and_earns_no_points():
+    """The tests begin 4 s before contact (T0); `always-brake` stops before that."""
+    premature = impact_row("CCRs/v50", 50, 0, 0, premature_brake=True)
+    assert check_green(premature) == (False, "green")
+    assert row_colour_2023(premature) == row_colour_2026(premature) == "premature"
+    for suite, points in (("ncap2023", points_2023), ("ncap2026", points_2026)):
+        rows = [row | {"premature_brake": True} for row in suite_rows(suite, lambda case, speed: False)]
+        assert {item.earned for item in points(rows, "a")} == {0.0}
 
 
 def test_colours_2026_match_the_published_bands():

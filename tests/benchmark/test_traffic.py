@@ -13,12 +13,14 @@ from lgmd_gym.agents.rule import excitation
 from lgmd_gym.agents.stopping_zone import StoppingZone
 from lgmd_gym.benchmark.episode import Step, rollout
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
+from lgmd_gym.benchmark.traffic.batch import IN_LABORATORY, Drive, TrafficTask, run_traffic_task
 from lgmd_gym.benchmark.traffic.observer import Observer
 from lgmd_gym.benchmark.traffic.recording import fork, look_ahead, record_traffic
 from lgmd_gym.benchmark.traffic.replay import RESEED, LiveEpisode
 from lgmd_gym.benchmark.traffic.rows import KEYS, BrakingEvent, measure
 from lgmd_gym.benchmark.traffic.schedule import CameraSchedule
+from lgmd_gym.envs.appearance import Appearance
+from lgmd_gym.envs.dynamics.brake import draw_brake
 from lgmd_gym.envs.traffic.emergencies import Emergencies
 from lgmd_gym.envs.traffic.registration import KINDS, register_traffic, traffic_id
 
@@ -144,10 +146,27 @@ def test_live_episode_observes_the_same_as_the_wrapper_while_braking(merge):
         assert same_inputs(live.step(BRAKE), Step(observation, info, 0.0, terminated or truncated))
 
 
+def test_live_episode_continues_in_the_world_of_the_recording():
+    """Also the brake is that of the world, which is wet in the rain."""
+    appearance = Appearance(world=8003, condition="rain")
+    recorded = Recorded("merge", 0, SENSORS, {"duration": 6}, appearance)
+    live = LiveEpisode(recorded.recording, 30, SENSORS)
+    assert live.env.brake == draw_brake(8003, wet=True)
+    steps = [live.step(HOLD) for _ in range(20)]
+    assert all(map(same_inputs, steps, recorded.steps[31:]))
+    env = gym.make(
+        traffic_id("merge"), camera="fovea", trace=True, config={"duration": 6}, world=8003, condition="rain"
+    )
+    env.reset(seed=0)
+    for step in recorded.steps[1:20]:
+        observation, _, terminated, truncated, info = env.step(to_action(HOLD))
+        assert same_inputs(step, Step(observation, info, 0.0, terminated or truncated))
+
+
 def scheduled_steps(kind, seed, agent, config):
     """Return the recording, the schedule and the steps of an agent whose unread cameras are not drawn."""
     observer = Observer(SENSORS.for_agent(agent))
-    recording = record_traffic(kind, seed, observer.sensors, 0, observer.fps, config)
+    recording = record_traffic(kind, seed, observer.sensors, 0, observer.fps, IN_LABORATORY, config)
     schedule = CameraSchedule(recording.moments, [agent], len(observer.sensors.names))
     observer.play_first_pass([recording.moments], [schedule])
     schedule.plan_second_pass()

@@ -68,7 +68,7 @@ def test_table_shows_rates_with_intervals(summary_rows):
     text = console.export_text()
     assert "0.3 [0.0–1.9]" in text
     assert "b (1 errors)" in text
-    assert "[exact" in text
+    assert "clustered by drive" in text
 
 
 def test_upper_bound_of_no_false_activation_in_300_km():

@@ -3,7 +3,10 @@
 import pytest
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.episode import make_env
 from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.camera.worlds import SPLIT_WORLDS
+from lgmd_gym.envs.appearance import brake_of, world_condition
 from lgmd_gym.tuning import objective as objective_module
 from lgmd_gym.tuning.objective import Objective, ObjectiveValue, find_onset, is_latching
 
@@ -30,9 +33,9 @@ def test_the_value_is_avoided_energy_minus_the_cost_of_false_activations():
 @pytest.mark.parametrize(
     ("agent", "levels", "seeds"),
     [
-        ("spike-threshold:threshold=60", 3, 0),
-        pytest.param("spike-threshold:threshold=60", 8, 0, marks=pytest.mark.slow),
-        pytest.param("frame-difference:level=2", 8, 0, marks=pytest.mark.slow),
+        ("frame-difference", 3, 0),
+        pytest.param("spike-threshold:threshold=150,frames=3", 12, 0, marks=pytest.mark.slow),
+        pytest.param("frame-difference", 12, 0, marks=pytest.mark.slow),
         pytest.param("stopping-zone", 20, 1, marks=pytest.mark.slow),
     ],
 )
@@ -54,16 +57,36 @@ def test_replay_on_recordings_equals_closed_loop(agent, levels, seeds):
 
 def test_recordings_of_the_latest_four_sensors_are_cached(monkeypatch):
     objective, recorded = Objective("train", 1, 0), []
-    monkeypatch.setattr(objective_module, "record", lambda *args: recorded.append(args[-1]) or args[-1])
+
+    def record(task):
+        recorded.append(task.sensor_config)
+        return task.sensor_config
+
+    monkeypatch.setattr(objective_module, "record", record)
     wide, tele, fovea, standard, paper = (
         SensorConfig(camera=name) for name in ("wide", "tele", "fovea", "standard", "paper")
     )
     for sensors in (wide, tele, fovea, standard, wide, paper, wide, tele):
-        assert objective.recordings(sensors)[0].camera[0]["name"] == sensors.camera
-    assert [item.camera[0]["name"] for item in recorded] == [
+        assert objective.recordings(sensors)[0].camera == sensors.camera
+    assert [item.camera for item in recorded] == [
         *("wide", "tele", "fovea", "standard", "paper"),
         "tele",  # the least recently used when paper was recorded
     ]
+
+
+@pytest.mark.parametrize("split", ["train", "validation"])
+def test_episodes_are_in_worlds_of_the_split(split):
+    """Also the brake is that of the world."""
+    tasks = Objective(split, 2, 1).tasks
+    cases = tasks[2:]
+    assert {task.world for task in cases} < set(SPLIT_WORLDS[split])
+    assert len({task.world for task in cases}) > 30
+    level, case = (make_env(task.case, task.sensor_config, task.arguments) for task in (tasks[0], cases[0]))
+    assert level.reset(seed=0)[1]["world"] in SPLIT_WORLDS[split]
+    assert case.reset(seed=0)[1]["world"] == cases[0].world
+    fields = case.unwrapped.camera_fields
+    assert fields["condition"] == world_condition(cases[0].world)
+    assert case.unwrapped.brake == brake_of(fields)
 
 
 def test_only_latching_rules_are_replayed():

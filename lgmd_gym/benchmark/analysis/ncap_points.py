@@ -4,6 +4,7 @@
 50 km/h only. A contact at another speed earns nothing, so the points are a lower bound. CCCscp is left out.
 2026 (Frontal Collisions v1.1, 5.3): the standard range of the rear scenarios. The suite covers too little of
 the extended range and the robustness layer for points.
+A run in which the brakes are applied before the test begins (T0, 4 s before contact) earns nothing in either.
 """
 
 import re
@@ -29,6 +30,7 @@ MAXIMUM_2023_CCRB = 4.0
 MAXIMA_2026 = {"CCRs": 1.2, "CCRm": 2.4, "CCRb": 1.6}  # standard range
 GATE = 20.0  # CCRs earns nothing after a contact at this speed or below [km/h]
 UNKNOWN_COLOUR = "contact"  # contact whose colour is not published
+PREMATURE = "premature"  # in place of a colour: the brakes were applied before the test began
 
 
 class ScenarioPoints(NamedTuple):
@@ -42,10 +44,12 @@ class ScenarioPoints(NamedTuple):
 
 
 def row_colour_2023(row: Row) -> str:
-    """Return the colour of a row of suite ncap2023, or `UNKNOWN_COLOUR`.
+    """Return the colour of a row of suite ncap2023, `UNKNOWN_COLOUR` or `PREMATURE`.
 
     The colour depends on the impact speed in CCRs and CCRb, and on the relative impact speed in CCRm.
     """
+    if row["premature_brake"]:
+        return PREMATURE
     if not row["collision"]:
         return "green"
     family = row["case"].split("/")[1]
@@ -56,8 +60,15 @@ def row_colour_2023(row: Row) -> str:
 
 
 def row_colour_2026(row: Row) -> str:
-    """Return the colour of a row of suite ncap2026."""
+    """Return the colour of a row of suite ncap2026, or `PREMATURE`."""
+    if row["premature_brake"]:
+        return PREMATURE
     return colour_2026(row["ego_speed"] / KMH, relative_impact(row) / KMH)
+
+
+def colour_weight(colour: str) -> float:
+    """Return the share of points that a colour earns; 0 for `UNKNOWN_COLOUR` and `PREMATURE`."""
+    return COLOUR_WEIGHTS.get(colour, 0.0)
 
 
 def points_2023(rows: list[Row], agent: str) -> list[ScenarioPoints]:
@@ -82,7 +93,7 @@ def _points_2023_ccrb(rows: list[Row], agent: str) -> float:
     weights: dict[str, list[float]] = {}
     for row in _completed(rows, agent):
         if BRAKING_LEAD_CASE.search(row["case"]):
-            weights.setdefault(row["case"], []).append(COLOUR_WEIGHTS[row_colour_2023(row)])
+            weights.setdefault(row["case"], []).append(colour_weight(row_colour_2023(row)))
     return sum(sum(of_case) / len(of_case) for of_case in weights.values())
 
 
@@ -119,7 +130,7 @@ def _mean_weights(
         if case := REAR_CASE.search(row["case"]):
             scenario = case["family"] + (", warned driver" if case["warned"] else "")
             key = scenario, int(case["speed"]), int(case["place"])
-            weights.setdefault(key, []).append(COLOUR_WEIGHTS.get(colour(row), 0.0))
+            weights.setdefault(key, []).append(colour_weight(colour(row)))
     return {key: sum(of_cell) / len(of_cell) for key, of_cell in weights.items()}
 
 

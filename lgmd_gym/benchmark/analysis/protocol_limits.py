@@ -108,8 +108,9 @@ def check_fmvss127(row: Row) -> tuple[bool, str]:
 
 
 def check_green(row: Row) -> tuple[bool, str]:
-    """Check a row of suite ncap2026 for the colour green."""
-    return colour_2026(row["ego_speed"] / KMH, relative_impact(row) / KMH) == "green", "green"
+    """Check a row of suite ncap2026 for the colour green; premature braking fails, as in `check_r152`."""
+    green = colour_2026(row["ego_speed"] / KMH, relative_impact(row) / KMH) == "green"
+    return green and not row["premature_brake"], "green"
 
 
 LIMIT_CHECKS = {"r152": check_r152, "fmvss127": check_fmvss127, "ncap2026": check_green}

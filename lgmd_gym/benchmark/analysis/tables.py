@@ -18,13 +18,14 @@ from lgmd_gym.benchmark.summary import (
 )
 from lgmd_gym.envs.dynamics.units import KMH
 
+AGENTS_PER_TABLE = 7
 SCORE_CAPTION = (
     f"k/n [{INTERVAL_TEXT}, in %]; mean speed reduction in km/h [95 %, bootstrap over cases and worlds]; "
     "median TTC in s; premature: more than 4 s before contact, does not count as avoided"
 )
 LIMIT_CAPTION = (
-    "runs that meet the limit, of n (highest relative impact speed in km/h); premature braking fails r152 "
-    "and fmvss127; derived from the protocol, no rating"
+    "runs that meet the limit, of n (highest relative impact speed in km/h); premature braking fails; "
+    "derived from the protocol, no rating"
 )
 
 
@@ -110,6 +111,15 @@ def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
             rate_text(item.false_activations),
         )
     return table
+
+
+def tables_by_case(rows: list[Row], agents: list[str], suite: str) -> list[Table]:
+    """Return the results per case, compared with the protocol's limits if the suite has limits.
+
+    Each table has `AGENTS_PER_TABLE` agents at most, because more columns do not fit into a terminal.
+    """
+    parts = [agents[i : i + AGENTS_PER_TABLE] for i in range(0, len(agents), AGENTS_PER_TABLE)]
+    return [limit_table(rows, part, suite) or case_table(rows, part) for part in parts]
 
 
 def case_table(rows: list[Row], agents: list[str]) -> Table:

@@ -2,11 +2,10 @@
 
 import traceback
 from dataclasses import dataclass
-from typing import Any
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.episode import Step
-from lgmd_gym.benchmark.rows import WORLD, Row, new_row
+from lgmd_gym.benchmark.rows import Row, new_row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.observer import Observer
 from lgmd_gym.benchmark.traffic.reader import Moment
@@ -15,6 +14,10 @@ from lgmd_gym.benchmark.traffic.replay import Replay
 from lgmd_gym.benchmark.traffic.rows import KEYS, measure, traffic_case
 from lgmd_gym.benchmark.traffic.schedule import WARM_UP, CameraSchedule
 from lgmd_gym.camera import CLEAR
+from lgmd_gym.camera.worlds import LABORATORY, check_world
+from lgmd_gym.envs.appearance import Appearance
+
+IN_LABORATORY = Appearance(world=LABORATORY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,13 +28,13 @@ class Drive:
         kind: Kind of traffic.
         seed: Seed of the traffic and the agents.
         agents: Agent strings.
-        camera_fields: Fields that set the world of the cameras, see `camera_fields`.
+        appearance: World, condition and road; the world must not be None.
     """
 
     kind: str
     seed: int
     agents: tuple[str, ...]
-    camera_fields: tuple[tuple[str, Any], ...] = ()
+    appearance: Appearance = IN_LABORATORY
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +106,9 @@ class _PlayedDrive:
         num_cameras = len(observer.sensors.names)
         self.schedule = CameraSchedule((), (), num_cameras)
         try:
-            observer.sensors.set_camera_fields(index, dict(drive.camera_fields))
-            recording = record_traffic(drive.kind, drive.seed, observer.sensors, index, observer.fps)
+            recording = record_traffic(
+                drive.kind, drive.seed, observer.sensors, index, observer.fps, drive.appearance
+            )
             playing = {name: make_agent(name) for name in agents}
             self.schedule = CameraSchedule(recording.moments, list(playing.values()), num_cameras)
         except Exception:
@@ -137,7 +141,7 @@ class _PlayedDrive:
         self.replays.pop(agent, None)
         drive = self.drive
         case = traffic_case(drive.kind, drive.seed)
-        world = dict(drive.camera_fields).get(WORLD)
+        world = check_world(drive.appearance.world)
         self.rows[agent] = new_row(KEYS, agent, case, drive.seed, self._condition, world=world, **values)
 
 

@@ -13,8 +13,8 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import Result
 from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
 from lgmd_gym.benchmark.traffic.rows import traffic_case
-from lgmd_gym.camera import CLEAR
-from lgmd_gym.envs.appearance import MIXED, camera_fields
+from lgmd_gym.camera.worlds import LABORATORY
+from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.traffic.registration import traffic_id
 
 DRIVES_PER_TASK = 10  # two seeds of every kind; more drives delay the rows and use more memory
@@ -53,10 +53,9 @@ class TrafficPlan(Plan):
                     agents = tuple(agent for agent in self.config.agents if (agent, *key) not in done)
                     if agents:
                         world = self.config.world(seed, index)
-                        # The other conditions are part of the sensor configuration.
-                        name = MIXED if condition == MIXED else CLEAR
-                        fields = camera_fields(world, name, self.config.road)
-                        drives.append(Drive(kind, seed, agents, tuple(fields.items())))
+                        chosen = LABORATORY if world is None else world
+                        appearance = Appearance(world=chosen, condition=condition, road=self.config.road)
+                        drives.append(Drive(kind, seed, agents, appearance))
             for first in range(0, len(drives), DRIVES_PER_TASK):
                 batch = tuple(drives[first : first + DRIVES_PER_TASK])
                 tasks.append(TrafficTask(batch, sensor_config, condition))

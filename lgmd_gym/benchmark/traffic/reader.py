@@ -73,6 +73,7 @@ class SceneReader:
     def reset(self, seed: int) -> Moment:
         """Reset the environment and read the first frame."""
         _, info = self.env.reset(seed=seed)
+        self.sensors.set_camera_fields(self.index, self.env.camera_fields)
         on_road_step(self.env, self._on_substep)
         self._substeps, self._frames = 0, []
         self._read()

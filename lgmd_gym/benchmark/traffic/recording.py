@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from lgmd_gym.benchmark.traffic.reader import Moment, SceneReader
+from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON, Emergencies, simulate_driver
 from lgmd_gym.envs.traffic.env import JAM_SPEED, TrafficEnv
 from lgmd_gym.envs.traffic.registration import make_traffic
@@ -76,6 +77,7 @@ def record_traffic(
     sensors: SensorArray,
     index: int,
     fps: float,
+    appearance: Appearance,
     config: dict[str, Any] | None = None,
 ) -> TrafficRecording:
     """Record one episode of traffic without an agent.
@@ -86,9 +88,11 @@ def record_traffic(
         sensors: Cameras that will draw the frames.
         index: Index of the episode among the environments of the cameras.
         fps: Camera frame rate [Hz].
+        appearance: World, condition and road.
         config: Configuration of `TrafficEnv`.
     """
     env: Any = make_traffic(kind, camera=None, config=config)
+    env.appearance = appearance
     reader = SceneReader(env, sensors, index, fps)
     moments, snapshots = [reader.reset(seed)], [fork(env)]
     while not moments[-1].done:

@@ -34,6 +34,7 @@ class LiveEpisode:
         self.env = recording.fork(decision)
         self._observer = Observer(sensor_config)
         sensors = self._observer.sensors
+        sensors.set_camera_fields(0, self.env.camera_fields)
         sensors.set_road(0, self.env.road)
         first = 0 if warm_up is None else max(decision - warm_up, 0)
         for moment in recording.moments[first : decision + 1]:

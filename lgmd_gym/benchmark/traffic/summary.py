@@ -1,12 +1,13 @@
-"""Summaries of the traffic suite: false activations per 100 km, with an exact interval."""
+"""Summaries of the traffic suite: false activations per 100 km, with a clustered interval."""
 
 from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from lgmd_gym.benchmark.event_counts import count_interval
 from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.statistics import Rate, poisson_interval
-from lgmd_gym.benchmark.summary import by_agent, by_condition, rate_of, write_csv
+from lgmd_gym.benchmark.statistics import Rate
+from lgmd_gym.benchmark.summary import by_agent, by_condition, cases_and_worlds, rate_of, write_csv
 
 PER = 100_000.0  # [m], reference distance of the rates
 COLUMNS = (
@@ -43,6 +44,7 @@ class TrafficSummary(NamedTuple):
         alerts: Number of alerts.
         brakes: Number of braking events beyond 0.25 g.
         false_activations: Number of these that were not needed.
+        false_bounds: 95 % interval of their expected number, see `count_interval`.
         moving: Time in motion without braking by the agent [s].
         needed: Part of it in which a brake is needed, and therefore never false [s].
         avoided: Episodes without contact among those with contact without braking.
@@ -59,6 +61,7 @@ class TrafficSummary(NamedTuple):
     alerts: int
     brakes: int
     false_activations: int
+    false_bounds: tuple[float, float]
     moving: float
     needed: float
     avoided: Rate
@@ -79,21 +82,23 @@ class TrafficSummary(NamedTuple):
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval of the false activations [1/100 km]."""
-        low, high = poisson_interval(self.false_activations)
+        low, high = self.false_bounds
         return (self.per_100km(low) if low else 0.0), self.per_100km(high)
 
 
 def summarise_traffic(agent: str, kind: str, rows: list[Row]) -> TrafficSummary:
     """Return the summary of one agent's rows."""
     played = [row for row in rows if row["error"] is None]
+    events, distances = ([row[key] for row in played] for key in ("false_activations", "distance"))
     return TrafficSummary(
         agent,
         kind,
         drives=len(played),
-        distance=sum(row["distance"] for row in played),
+        distance=sum(distances),
         alerts=sum(row["alerts"] for row in played),
         brakes=sum(row["brakes"] for row in played),
-        false_activations=sum(row["false_activations"] for row in played),
+        false_activations=sum(events),
+        false_bounds=count_interval(events, distances, *cases_and_worlds(played)),
         moving=sum(row["moving_time"] for row in played),
         needed=sum(row["needed_time"] for row in played),
         avoided=rate_of([row for row in played if row["threat"]], "avoided"),
@@ -124,7 +129,7 @@ def write_traffic_summary(rows: list[Row], path: Path) -> None:
 
 def _line(item: TrafficSummary, condition: str) -> list[Any]:
     """Return the values of `COLUMNS`; rates are empty without distance."""
-    counts = (item.false_activations, *poisson_interval(item.false_activations))
+    counts = (item.false_activations, *item.false_bounds)
     driven = item.distance > 0.0
     return [
         item.agent,

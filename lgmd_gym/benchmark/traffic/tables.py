@@ -10,8 +10,8 @@ from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON
 
 CAPTION = (
     f"false: without it, no contact and no required deceleration of {EMERGENCY:g} m/s² within {HORIZON:g} s; "
-    "[exact Poisson 95 % interval]; needed: share of the time in motion in which a brake is not false; "
-    "contacts (of these rear-ended)"
+    "[95 % interval, clustered by drive and world]; needed: share of the time in motion in which a brake is "
+    "not false; contacts (of these rear-ended)"
 )
 HEADINGS = (
     "km",
