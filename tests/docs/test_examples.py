@@ -6,8 +6,11 @@ from pathlib import Path
 
 import gymnasium as gym
 import pytest
+from support.rows import threat_row
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark import RunConfig
+from lgmd_gym.benchmark.stored_run import StoredRun
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "docs" / "examples"
@@ -140,3 +143,29 @@ def test_vector_cleanrl(capsys):
     assert len(returns) >= 2
     assert all(-30.0 < value < 15.0 for value in returns)
     assert "mean return" in capsys.readouterr().out
+
+
+def test_all_scores():
+    """One column per run; cases with an FCW driver are left out."""
+    config = RunConfig(suite="r152", agents=("no-brake", "a"), seeds=1)
+    values = {"avoided": True, "premature_brake": False, "speed_reduction": 5.0, "fcw_driver": False}
+    rows = [
+        threat_row(case=f"r152/CCRs/v{speed}", world=world, **values)
+        for speed, world in ((20, 8000), (40, 8001))
+    ]
+    rows.append(rows[0] | {"fcw_driver": True, "avoided": False, "seed": 1})
+    false = [row | {"threat": False, "false_activation": row["world"] == 8000} for row in rows[:2]]
+    quiet = RunConfig(suite="false-reaction", agents=("a",), seeds=1, worlds=0)
+    drive = {"distance": 5e4, "false_activations": 1, "moving_time": 9.0, "needed_time": 0.0}
+    drive |= {"side": "", "alerts": 1, "brakes": 1, "collision": False, "peak_deceleration": 9.0}
+    traffic = RunConfig(suite="traffic", agents=("a",), seeds=1, conditions=("mixed",))
+    runs = [StoredRun(config, rows, False), StoredRun(quiet, false, False)]
+    runs.append(StoredRun(traffic, [rows[0] | drive | {"threat": False}], False))
+    heading, _, none, a = load("all_scores").table(runs)
+    assert "r152: avoided, 2 cases × 2 worlds, clear" in heading
+    assert "false-reaction: false activations, 2 cases in the laboratory, clear" in heading
+    assert "traffic: false activations per 100 km, 1 case × 1 world, mixed" in heading
+    assert a.startswith("| a | 2/2 [")
+    assert "| 1/2 [" in a
+    assert "| 2.0 [" in a
+    assert none == "| no-brake | – | – | – |"
