@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lgmd_gym.camera.objects import BRAKE_LIGHT_MPS2, MAX_RANGE, MODEL_BOX, MODEL_CAR, MODEL_MARK
-from lgmd_gym.envs.dynamics.bodies import BOX, CAR
+from lgmd_gym.envs.dynamics.bodies import CAR, ROAD_MARKING
 from lgmd_gym.envs.dynamics.episode import Physics
 from lgmd_gym.envs.dynamics.jit import Arrays, compiled
 
@@ -48,6 +48,6 @@ def write_scene(i: int, rate: float, physics: Arrays, arrays: Arrays) -> None:
         item.cos, item.sin = math.cos(body.heading), math.sin(body.heading)
         item.length, item.width, item.height, item.shade = body.length, body.width, body.height, body.shade
         item.range = MAX_RANGE
-        item.model = MODEL_CAR if body.kind == CAR else MODEL_BOX if body.kind == BOX else MODEL_MARK
+        item.model = MODEL_CAR if body.kind == CAR else MODEL_MARK if body.kind == ROAD_MARKING else MODEL_BOX
         item.braking = 1 if body.kind == CAR and body.acceleration < BRAKE_LIGHT_MPS2 else 0
     arrays.counts[i] = count - 1

@@ -90,4 +90,4 @@ def _is_straight(body: Any) -> bool:
 @compiled
 def _motion(body: Any, paths: np.ndarray) -> PathMotion:
     cells = paths[body.path : body.path_end]
-    return PathMotion(cells, body.travelled, body.speed, body.length, body.width)
+    return PathMotion(cells, body.travelled, body.speed, body.length, body.width, body.reference)

@@ -9,11 +9,11 @@ from lgmd_gym.envs.dynamics.brake import next_part
 from lgmd_gym.envs.dynamics.contact import Rectangle
 from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.longitudinal import advance
-from lgmd_gym.envs.dynamics.path import pose_at
+from lgmd_gym.envs.dynamics.path import centre_at
 from lgmd_gym.envs.dynamics.speed_profile import SCRIPT_FIELDS, step_script
 from lgmd_gym.envs.dynamics.units import MAX_SPEED
 
-EGO, CAR, BOX, ROAD_MARKING = 0, 1, 2, 3  # kinds of bodies
+EGO, CAR, BOX, ROAD_MARKING, PEDESTRIAN, BICYCLE, MOTORCYCLE = 0, 1, 2, 3, 4, 5, 6  # kinds of bodies
 REGAIN_TIME = 0.5  # [s] within which the driver regains the scripted speed after braking
 
 BODY = np.dtype(
@@ -22,14 +22,14 @@ BODY = np.dtype(
             (name, np.float64)
             for name in ("x", "y", "heading", "speed", "acceleration", "travelled", "steering")
         ),
-        *((name, np.float64) for name in ("length", "width", "height", "shade")),
+        *((name, np.float64) for name in ("length", "width", "height", "shade", "reference")),
         *((name, np.int64) for name in ("kind", "path", "path_end")),
         *SCRIPT_FIELDS,
     ]
 )
 """A body: centre [m], heading [rad], speed [m/s], acceleration [m/s²], distance along its path [m], steering
-angle of highway-env's bicycle model [rad], size [m], grey level, kind, and the rows of its path in a table
-(first and last + 1); then its script."""
+angle of highway-env's bicycle model [rad], size [m], grey level, distance of its centre ahead of the point
+that follows its path [m], kind, and the rows of its path in a table (first and last + 1); then its script."""
 
 EGO_STATE = np.dtype([("on_script", np.int64), ("yaw_rate", np.float64)])
 """Whether the ego still follows its script, as no demand has become active; mean yaw rate over the last step,
@@ -66,7 +66,7 @@ def move(body: Any, paths: np.ndarray, distance: float) -> None:
     """Move a body along its path by a distance [m]."""
     before = body.heading
     body.travelled += distance
-    pose = pose_at(paths[body.path : body.path_end], body.travelled)
+    pose = centre_at(paths[body.path : body.path_end], body.travelled, body.reference)
     body.x, body.y, body.heading = pose.x, pose.y, pose.heading
     body.steering = 0.0
     if body.path_end - body.path > 1 and distance > 0.0:

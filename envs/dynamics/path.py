@@ -70,6 +70,15 @@ def pose_at(table: np.ndarray, distance: float) -> Pose:
 
 
 @compiled
+def centre_at(table: np.ndarray, distance: float, reference: float) -> Pose:
+    """Return the pose of a body's centre, which is `reference` [m] ahead of the point on the path."""
+    pose = pose_at(table, distance)
+    if reference == 0.0:
+        return pose
+    return Pose(pose.x + reference * cos(pose.heading), pose.y + reference * sin(pose.heading), pose.heading)
+
+
+@compiled
 def advance_pose(x: float, y: float, heading: float, curvature: float, slope: float, distance: float) -> Pose:
     """Return the pose after a distance on a clothoid.
 

@@ -12,7 +12,7 @@ from lgmd_gym.envs.dynamics.bodies import copy_motion
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.longitudinal import advance
-from lgmd_gym.envs.dynamics.path import pose_at
+from lgmd_gym.envs.dynamics.path import centre_at
 from lgmd_gym.envs.dynamics.speed_profile import step_script
 
 PARTS = 16  # of a step
@@ -124,7 +124,7 @@ def _outline_at(bodies: np.ndarray, i: int, step: Any, part: float) -> Rectangle
     if body.travelled == start:
         return Rectangle(body.x, body.y, body.heading, body.length, body.width)
     distance, _ = progress(bodies, i, step, part)
-    pose = pose_at(step.paths[body.path : body.path_end], start + distance)
+    pose = centre_at(step.paths[body.path : body.path_end], start + distance, body.reference)
     return Rectangle(pose.x, pose.y, pose.heading, body.length, body.width)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.jit import compiled
-from lgmd_gym.envs.dynamics.path import pose_at
+from lgmd_gym.envs.dynamics.path import centre_at
 
 
 class PathMotion(NamedTuple):
@@ -18,6 +18,7 @@ class PathMotion(NamedTuple):
     speed: float  # [m/s]
     length: float  # [m]
     width: float  # [m]
+    reference: float = 0.0  # distance of the centre ahead of the point on the path [m]
 
 
 @compiled
@@ -77,5 +78,5 @@ def gap_on_path(one: Any, standing: Rectangle, horizon: float, step: float) -> f
 @compiled
 def _outline(motion: Any, distance: float) -> Rectangle:  # pragma: no cover
     """Return the outline `distance` metres further along the path."""
-    pose = pose_at(motion.table, motion.travelled + distance)
+    pose = centre_at(motion.table, motion.travelled + distance, motion.reference)
     return Rectangle(pose.x, pose.y, pose.heading, motion.length, motion.width)

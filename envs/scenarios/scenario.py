@@ -17,11 +17,13 @@ from lgmd_gym.errors import (
 )
 
 EGO_LENGTH, EGO_WIDTH = 4.3, 1.8  # [m]
+WHEELBASE = 2.67  # [m]
+REAR_AXLE = WHEELBASE / 2  # [m], distance of the ego's centre ahead of its rear axle
 # Global Vehicle Target of ISO 19206-3, bounding box of Euro NCAP's OpenSCENARIO catalogue.
 TARGET_LENGTH, TARGET_WIDTH, TARGET_HEIGHT = 4.023, 1.712, 1.427  # [m]
 TARGET_TRACK, TYRE_WIDTH = 1.434, 0.205  # [m]; the track is of that catalogue, the tyre of a common size
 LANE_WIDTH = 3.5  # [m], Euro NCAP AEB C2C v4.3.1, 7.1
-ACTOR_KINDS = ("car", "box", "road_marking")
+ACTOR_KINDS = ("car", "box", "road_marking", "pedestrian", "bicycle", "motorcycle")
 ROAD_KINDS = ("straight", "two-way", "curve", "crossing")
 MAX_LANES = 100
 BRIDGE_SHADOW = 30  # grey level
@@ -45,11 +47,14 @@ class Actor:
         speed: Initial speed along its path, in [0, 40] [m/s].
         profile: Scripted changes of speed, in order of their start.
         path: Bends driven from the start on; empty for a straight path.
-        kind: "car"; "box", a solid object; or "road_marking", a flat object that the ego drives over.
+        kind: "car"; "pedestrian"; "bicycle" or "motorcycle", with a rider; "box", a solid object; or
+            "road_marking", a flat object that the ego drives over.
         shade: Grey level in [0, 255]; None to draw it from the environment's seed.
         length: Length [m].
         width: Width [m].
         height: Height [m].
+        reference: Distance of the centre ahead of the point that follows the path, such as the rear axle, in
+            [-20, 20] [m].
     """
 
     gap: float
@@ -63,6 +68,7 @@ class Actor:
     length: float = TARGET_LENGTH
     width: float = TARGET_WIDTH
     height: float = TARGET_HEIGHT
+    reference: float = 0.0
 
     def __post_init__(self) -> None:
         # As float, because small integers of numpy overflow in calculations.
@@ -81,6 +87,7 @@ class Actor:
             check_whole("shade", self.shade, 0, 255)
         for name in ("length", "width", "height"):
             check_within(name, getattr(self, name), 0.0, 1000.0, "m")
+        check_within("reference", self.reference, -20.0, 20.0, "m")
 
 
 def bridge_shadow(gap: float, length: float, shade: int = BRIDGE_SHADOW) -> Actor:
@@ -139,6 +146,10 @@ class Scenario:
         ego_profile: Scripted changes of the ego's speed, in order of their start.
         ego_path: Bends that the ego drives from the start on; empty for a straight path.
         road: Layout of the road.
+        ego_length: Length of the ego, in [1, 20] [m].
+        ego_width: Width of the ego, in [0.5, 4] [m].
+        ego_reference: Distance of the ego's centre ahead of the point that follows `ego_path`, in [-20, 20]
+            [m]; see `REAR_AXLE`.
     """
 
     family: str
@@ -148,6 +159,9 @@ class Scenario:
     ego_profile: tuple[Segment, ...] = ()
     ego_path: tuple[Bend, ...] = ()
     road: RoadPlan = field(default_factory=RoadPlan)
+    ego_length: float = EGO_LENGTH
+    ego_width: float = EGO_WIDTH
+    ego_reference: float = 0.0
 
     def __post_init__(self) -> None:
         check_text("family", self.family)
@@ -157,6 +171,9 @@ class Scenario:
         check_type("road", self.road, RoadPlan)
         check_speed("ego_speed", self.ego_speed, zero=bool(self.ego_profile))
         check_profile(self.ego_speed, self.ego_profile)
+        check_within("ego_length", self.ego_length, 1.0, 20.0, "m")
+        check_within("ego_width", self.ego_width, 0.5, 4.0, "m")
+        check_within("ego_reference", self.ego_reference, -20.0, 20.0, "m")
         if check_finite("duration", self.duration) <= 0.0:
             raise ValueError(f"duration must be > 0 s, got {shown(self.duration)}")
 

@@ -1,18 +1,37 @@
 """`PhysicsState`: the state of one or more episodes as arrays."""
 
+from math import cos, sin
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.bend import Pose
-from lgmd_gym.envs.dynamics.bodies import BODY, BOX, CAR, EGO, EGO_STATE, ROAD_MARKING, STEP_START
+from lgmd_gym.envs.dynamics.bend import Bend, Pose
+from lgmd_gym.envs.dynamics.bodies import (
+    BICYCLE,
+    BODY,
+    BOX,
+    CAR,
+    EGO,
+    EGO_STATE,
+    MOTORCYCLE,
+    PEDESTRIAN,
+    ROAD_MARKING,
+    STEP_START,
+)
 from lgmd_gym.envs.dynamics.brake import DELAY_LINE
 from lgmd_gym.envs.dynamics.episode import EPISODE
 from lgmd_gym.envs.dynamics.path import path_table
 from lgmd_gym.envs.dynamics.speed_profile import segment_table
-from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, EGO_WIDTH, LANE_WIDTH, Actor, Scenario
+from lgmd_gym.envs.scenarios.scenario import LANE_WIDTH, Actor, Scenario
 
-KINDS = {"car": CAR, "box": BOX, "road_marking": ROAD_MARKING}
+KINDS = {
+    "car": CAR,
+    "box": BOX,
+    "road_marking": ROAD_MARKING,
+    "pedestrian": PEDESTRIAN,
+    "bicycle": BICYCLE,
+    "motorcycle": MOTORCYCLE,
+}
 EGO_HEIGHT = 1.5  # [m]
 SHADES = (30, 220)  # range of random grey levels
 START_RANGE = 500.0  # [m], range of the random start position, which varies the road texture
@@ -45,25 +64,33 @@ def place(scenario: Scenario, rng: np.random.Generator) -> Placement:
     shaded = list(zip(scenario.actors, drawn, strict=True))
     # highway-env keeps cars and other objects in two lists, and the camera reads them in this order.
     shaded.sort(key=lambda item: item[0].kind != "car")
-    tables = [path_table(start, scenario.ego_path)]
+    tables = [_path_of(start, scenario.ego_reference, scenario.ego_path)]
     scripts = [segment_table(scenario.ego_profile)]
-    rows: list[tuple[Any, ...]] = [(*start, scenario.ego_speed, EGO_LENGTH, EGO_WIDTH, EGO_HEIGHT, 0.0, EGO)]
+    size = (scenario.ego_length, scenario.ego_width, EGO_HEIGHT)
+    rows: list[tuple[Any, ...]] = [(*start, scenario.ego_speed, *size, 0.0, scenario.ego_reference, EGO)]
     for actor, shade in shaded:
-        centre = start.x + EGO_LENGTH / 2 + actor.gap + actor.length / 2
+        centre = start.x + scenario.ego_length / 2 + actor.gap + actor.length / 2
         pose = Pose(centre, start.y - actor.lateral_offset, -actor.heading)
-        tables.append(path_table(pose, actor.path))
+        tables.append(_path_of(pose, actor.reference, actor.path))
         scripts.append(segment_table(actor.profile))
         grey = shade if actor.shade is None else int(actor.shade)
-        rows.append((*pose, actor.speed, actor.length, actor.width, actor.height, grey, KINDS[actor.kind]))
+        size = (actor.length, actor.width, actor.height)
+        rows.append((*pose, actor.speed, *size, grey, actor.reference, KINDS[actor.kind]))
     return Placement(
         scenario, start, tuple(actor for actor, _ in shaded), _bodies(rows, scripts, tables),
         np.concatenate(scripts), np.concatenate(tables),
     )  # fmt: skip
 
 
+def _path_of(centre: Pose, reference: float, bends: tuple[Bend, ...]) -> np.ndarray:
+    """Return the cells of the path of the point `reference` [m] behind a body's centre."""
+    x, y = centre.x - reference * cos(centre.heading), centre.y - reference * sin(centre.heading)
+    return path_table(Pose(x, y, centre.heading), bends)
+
+
 def _bodies(rows: list[tuple[Any, ...]], scripts: list[np.ndarray], tables: list[np.ndarray]) -> np.ndarray:
     bodies = np.zeros(len(rows), BODY)
-    names = ("x", "y", "heading", "speed", "length", "width", "height", "shade", "kind")
+    names = ("x", "y", "heading", "speed", "length", "width", "height", "shade", "reference", "kind")
     for name, column in zip(names, zip(*rows, strict=True), strict=True):
         bodies[name] = column
     bodies["script_speed"] = bodies["speed"]

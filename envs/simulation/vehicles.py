@@ -8,7 +8,15 @@ from highway_env.road.road import Road
 from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Landmark, Obstacle
 
-from lgmd_gym.envs.dynamics.bodies import BOX, CAR, EGO, ROAD_MARKING
+from lgmd_gym.envs.dynamics.bodies import (
+    BICYCLE,
+    BOX,
+    CAR,
+    EGO,
+    MOTORCYCLE,
+    PEDESTRIAN,
+    ROAD_MARKING,
+)
 
 
 class _Body:
@@ -83,11 +91,23 @@ class ScriptedCar(PathCar):
 
 
 class Box(_Body, Obstacle):
-    """A solid box: a pedestrian, a sign, a rail, a post."""
+    """A solid box: a sign, a rail, a post."""
 
     def __init__(self, road: Road, body: np.void) -> None:
         super().__init__(road, body)
         self.shade = int(body["shade"])
+
+
+class Pedestrian(Box):
+    """A pedestrian who follows the path and speed profile of its `Actor`."""
+
+
+class Bicycle(Box):
+    """A bicycle with its rider."""
+
+
+class Motorcycle(Box):
+    """A motorcycle with its rider."""
 
 
 class RoadMarking(_Body, Landmark):
@@ -98,4 +118,12 @@ class RoadMarking(_Body, Landmark):
         self.shade = int(body["shade"])
 
 
-CLASSES: dict[int, Any] = {EGO: EgoCar, CAR: ScriptedCar, BOX: Box, ROAD_MARKING: RoadMarking}
+CLASSES: dict[int, Any] = {
+    EGO: EgoCar,
+    CAR: ScriptedCar,
+    BOX: Box,
+    ROAD_MARKING: RoadMarking,
+    PEDESTRIAN: Pedestrian,
+    BICYCLE: Bicycle,
+    MOTORCYCLE: Motorcycle,
+}

@@ -8,7 +8,6 @@ from support.reference_physics import PASSED_DISTANCE, Body, Ego, Motion
 
 from lgmd_gym.envs import FAMILIES, BrakingEnv, make_scenario
 from lgmd_gym.envs.dynamics.bend import Pose
-from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH
 
 
 class ReferenceEpisode:
@@ -22,9 +21,9 @@ class ReferenceEpisode:
         self.solid = [actor.kind != "road_marking" for actor in actors]
         self.bodies = []
         for actor in actors:
-            centre = float(x) + EGO_LENGTH / 2 + actor.gap + actor.length / 2
+            centre = float(x) + scenario.ego_length / 2 + actor.gap + actor.length / 2
             pose = Pose(centre, float(y) - actor.lateral_offset, -actor.heading)
-            size = actor.length, actor.width
+            size = actor.length, actor.width, actor.reference
             self.bodies.append(Body(pose, actor.path, actor.speed, actor.profile, *size))
         self.closed_in, self.contact = False, None
 

@@ -23,7 +23,7 @@ class Box:
         self.motion = PathMotion(path.table, travelled, speed, length, width)
 
     def outline(self, distance):
-        return Rectangle(*self.path.pose(self.motion.travelled + distance), *self.motion[3:])
+        return Rectangle(*self.path.pose(self.motion.travelled + distance), *self.motion[3:5])
 
 
 def clearance(one, other):

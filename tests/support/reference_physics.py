@@ -7,7 +7,6 @@ from math import asin, atan, copysign, cos, hypot, inf, sin, sqrt, tan
 
 from lgmd_gym.envs.dynamics.bend import Pose
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
-from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, EGO_WIDTH
 
 GAUSS = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 8 / 18), (0.5 + 0.15**0.5, 5 / 18))
 MAX_SPEED, REGAIN_TIME, PASSED_DISTANCE = 40.0, 0.5, 2.0
@@ -109,16 +108,22 @@ class Script:
 class Body:
     """A body on a path."""
 
-    def __init__(self, pose, bends, speed, profile, length, width):
-        self.path, self.script = Path(pose, bends), Script(speed, profile)
+    def __init__(self, pose, bends, speed, profile, length, width, reference=0.0):
+        x, y, heading = pose
+        start = Pose(x - reference * cos(heading), y - reference * sin(heading), heading)
+        self.path, self.script, self.reference = Path(start, bends), Script(speed, profile), reference
         self.length, self.width = float(length), float(width)
         self.x, self.y, self.heading = pose
         self.speed, self.acceleration, self.travelled, self.steering = speed, 0.0, 0.0, 0.0
 
+    def centre(self, travelled):
+        x, y, heading = self.path.pose(travelled)
+        return Pose(x + self.reference * cos(heading), y + self.reference * sin(heading), heading)
+
     def move(self, distance):
         before = self.heading
         self.travelled += distance
-        self.x, self.y, self.heading = self.path.pose(self.travelled)
+        self.x, self.y, self.heading = self.centre(self.travelled)
         self.steering = 0.0
         if not self.path.straight and distance > 0.0:
             turned = (self.heading - before) / distance * self.length / 2
@@ -135,7 +140,13 @@ class Ego(Body):
 
     def __init__(self, scenario, start, brake, throttle):
         super().__init__(
-            start, scenario.ego_path, scenario.ego_speed, scenario.ego_profile, EGO_LENGTH, EGO_WIDTH
+            start,
+            scenario.ego_path,
+            scenario.ego_speed,
+            scenario.ego_profile,
+            scenario.ego_length,
+            scenario.ego_width,
+            scenario.ego_reference,
         )
         self.brake, self.throttle = brake, throttle
         self.demand = self.last_put = self.time = self.yaw_rate = 0.0
@@ -219,7 +230,7 @@ class Motion:
 
     def outline(self, part):
         """Return the outline at a part of the step."""
-        pose = self.body.path.pose(self.start + self.progress(part)[0])
+        pose = self.body.centre(self.start + self.progress(part)[0])
         return Rectangle(*pose, self.body.length, self.body.width)
 
     def uniform(self):
