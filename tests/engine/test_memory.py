@@ -47,7 +47,12 @@ def test_peak(num_envs, limit_mib):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_no_growth(threads):
-    """Memory after 200,000 steps of environments equals that after 100,000."""
-    first, second = peaks(16, threads, 100_000, 100_000)
-    print(f"\n{first:.1f} MiB after 100,000 steps, {second:.1f} after 200,000")
-    assert second - first < 5
+    """Memory does not keep growing over 200,000 steps of environments.
+
+    A leak grows in both halves of the run. A new peak in one half only, such as two large roads that are built at
+    the same time, is none.
+    """
+    values = peaks(16, threads, 70_000, 70_000, 70_000)
+    print(f"\n{values} MiB after 70,000, 140,000 and 210,000 steps")
+    first, second, third = values
+    assert min(second - first, third - second) < 3
