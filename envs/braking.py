@@ -71,9 +71,10 @@ class BrakingEnv(EgoBrakeEnv):
 
     ## Episode End
 
-    Terminated: at contact; when the ego reaches a standstill that is not scripted; when the ego has become
-    slower than all actors ahead of it after having closed in on one, and their scripts have ended (Euro NCAP
-    AEB C2C v4.3.1, 8.4.3); when the ego has passed all actors. Truncated: after the scenario's duration.
+    Terminated: at contact; when the ego reaches a standstill that is not scripted, unless a car or
+    motorcycle is about to touch it; when the ego has become slower than all actors ahead of it after having
+    closed in on one, and their scripts have ended (Euro NCAP AEB C2C v4.3.1, 8.4.3); when the ego has passed
+    all actors. Truncated: after the scenario's duration.
 
     ## Info
 
@@ -89,7 +90,7 @@ class BrakingEnv(EgoBrakeEnv):
     | `thw` | time headway gap / v [s] | nothing ahead, or standstill |
     | `drac` | deceleration rate to avoid a crash Δv² / (2·gap) [m/s²] | nothing ahead, or contact |
     | `required_deceleration` | DRAC minus the lead's acceleration, >= 0 [m/s²] | nothing ahead, or contact |
-    | `target_speed` | speed of the first actor [m/s] | no solid actor |
+    | `target_speed` | speed of the first solid actor [m/s] | no solid actor |
     | `collision`, `crashed` | whether the ego has had contact | |
     | `impact_speed` | ego speed at contact [m/s] | no contact |
     | `relative_impact_speed` | the same minus the other's speed along the ego's heading [m/s] | no contact |

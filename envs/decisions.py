@@ -14,6 +14,7 @@ from lgmd_gym.envs.dynamics.jit import Arrays, compiled
 from lgmd_gym.envs.info import INFO, write_info
 from lgmd_gym.envs.reward import step_reward
 from lgmd_gym.envs.simulation.physics_state import PhysicsState
+from lgmd_gym.envs.surrogate_safety import is_approached
 
 
 class Clock(NamedTuple):
@@ -116,7 +117,8 @@ def finish_decisions(
         outcome.rewards[i] = step_reward(
             bodies[0], ego, episode, physics.brakes[i], physics.weights[i], info.ttc, dt
         )
-        outcome.terminated[i] = is_terminated(bodies, episode)
+        standing = bodies[0].speed == 0.0 and is_approached(bodies, episode.bodies, physics.paths[i])
+        outcome.terminated[i] = is_terminated(bodies, episode, standing)
         outcome.truncated[i] = is_truncated(episode)
 
 

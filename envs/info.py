@@ -1,11 +1,12 @@
 """The info of a braking environment as a record."""
 
-from math import cos, inf
+from math import inf
 from typing import Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, ego_braking
+from lgmd_gym.envs.dynamics.bodies import ego_braking
+from lgmd_gym.envs.dynamics.episode import speed_along_ego
 from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.surrogate_safety import contact_time, headway, lead_of, rate_to_avoid_crash
 
@@ -38,12 +39,9 @@ def write_info(bodies: np.ndarray, episode: Any, ego: Any, paths: np.ndarray, in
     info.thw, info.drac, info.required_deceleration = headway(gap, here.speed), inf, inf
     if lead > 0:
         other = bodies[lead]
-        closing_speed = here.speed - other.speed * cos(other.heading - here.heading)
+        closing_speed = here.speed - speed_along_ego(here, other)
         info.drac = rate_to_avoid_crash(gap, closing_speed)
         info.required_deceleration = max(info.drac - other.acceleration, 0.0)
     info.impact_speed, info.relative_impact_speed = episode.impact_speed, episode.relative_impact_speed
     info.deceleration = ego_braking(here, ego)
-    info.target_speed = inf
-    for i in range(episode.bodies - 1, 0, -1):
-        if bodies[i].kind != ROAD_MARKING:
-            info.target_speed = bodies[i].speed
+    info.target_speed = bodies[episode.target].speed if episode.target > 0 else inf

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, outline_of
+from lgmd_gym.envs.dynamics.bodies import CAR, MOTORCYCLE, ROAD_MARKING, outline_of
 from lgmd_gym.envs.dynamics.contact import first_touch
 from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.swept_contact import PathMotion, gap_on_path, time_on_paths
@@ -68,6 +68,25 @@ def contact_time(bodies: np.ndarray, count: int, paths: np.ndarray) -> float:
             time = time_on_paths(_motion(ego, paths), _motion(body, paths), TTC_HORIZON, TTC_STEP)
         ttc = min(ttc, time)
     return ttc
+
+
+@compiled
+def is_approached(bodies: np.ndarray, count: int, paths: np.ndarray) -> bool:
+    """Return whether a car or motorcycle touches the ego within 10 s if the ego stands and others keep speed.
+
+    Pedestrians and bicycles do not count: they stop in front of a standing car. Arguments: see `lead_of`.
+    """
+    ego = bodies[0]
+    standing = PathMotion(
+        paths[ego.path : ego.path_end], ego.travelled, 0.0, ego.length, ego.width, ego.reference
+    )
+    for i in range(1, count):
+        body = bodies[i]
+        if body.speed == 0.0 or (body.kind != CAR and body.kind != MOTORCYCLE):
+            continue
+        if time_on_paths(standing, _motion(body, paths), TTC_HORIZON, TTC_STEP) < inf:
+            return True
+    return False
 
 
 @compiled

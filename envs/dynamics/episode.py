@@ -13,7 +13,7 @@ PASSED_DISTANCE = 2.0  # [m] behind the ego's rear beyond which an actor has bee
 
 EPISODE = np.dtype(
     [
-        *((name, np.int64) for name in ("bodies", "touched", "closed_in", "steps")),
+        *((name, np.int64) for name in ("bodies", "target", "touched", "closed_in", "steps")),
         *((name, np.float64) for name in ("impact_speed", "relative_impact_speed")),
         *(
             (name, np.float64)
@@ -21,10 +21,11 @@ EPISODE = np.dtype(
         ),
     ]
 )
-"""State of an episode: number of bodies, index of the body in contact with the ego (0 without contact),
-whether the ego has closed in on an actor, simulation steps; ego speed and speed relative to the other body at
-contact, inf without contact [m/s]; time after the last decision and duration [s], highest scripted speed
-[m/s], ego speed [m/s] and acceleration [m/s²] before the last decision."""
+"""State of an episode: number of bodies; index of the target's body, 0 without one; index of the body in
+contact with the ego, 0 without contact; whether the ego has closed in on an actor; simulation steps; ego speed
+and speed relative to the other body at contact, inf without contact [m/s]; time after the last decision and
+duration [s], highest scripted speed [m/s], ego speed [m/s] and acceleration [m/s²] before the last
+decision."""
 
 
 class Physics(NamedTuple):
@@ -105,7 +106,7 @@ def step_bodies(
             _move_back(bodies, i, step, time)
     here, other = bodies[0], bodies[touched]
     episode.touched, episode.impact_speed = touched, here.speed
-    episode.relative_impact_speed = here.speed - other.speed * cos(other.heading - here.heading)
+    episode.relative_impact_speed = here.speed - speed_along_ego(here, other)
 
 
 @compiled
@@ -149,13 +150,19 @@ def _is_uniform(body: Any, before: Any) -> bool:
 
 
 @compiled
-def is_terminated(bodies: np.ndarray, episode: Any) -> bool:
-    """Return whether the episode is over, see `BrakingEnv`; updates `closed_in`, once per decision."""
+def is_terminated(bodies: np.ndarray, episode: Any, approached: bool) -> bool:
+    """Return whether the episode is over, see `BrakingEnv`; updates `closed_in`, once per decision.
+
+    Args:
+        bodies: `BODY` records, the ego first.
+        episode: `EPISODE` record.
+        approached: Whether a vehicle is about to touch a standing ego, see `is_approached`.
+    """
     ego = bodies[0]
     if episode.touched > 0:
         return True
     if ego.speed == 0.0:
-        return ego.script_speed > 0.0
+        return ego.script_speed > 0.0 and not approached
     solid, left, resolved = 0, 0, True
     for i in range(1, episode.bodies):
         body = bodies[i]
@@ -165,10 +172,11 @@ def is_terminated(bodies: np.ndarray, episode: Any) -> bool:
         if _is_passed(ego, body):
             continue
         left += 1
-        if ego.speed > body.speed:
+        along = speed_along_ego(ego, body)
+        if ego.speed > along:
             episode.closed_in = 1
         ended, straight = body.segment == body.segment_end, body.path_end - body.path == 1
-        resolved = resolved and ended and straight and ego.speed < body.speed
+        resolved = resolved and ended and straight and ego.speed < along
     if solid == 0:
         return False
     return left == 0 or (episode.closed_in > 0 and resolved)
@@ -176,10 +184,16 @@ def is_terminated(bodies: np.ndarray, episode: Any) -> bool:
 
 @compiled
 def _is_passed(ego: Any, body: Any) -> bool:
-    """Return whether a body is behind the ego's rear and not faster than the ego."""
+    """Return whether a body is behind the ego's rear and not faster than the ego along its heading."""
     dx, dy = body.x - ego.x, body.y - ego.y
     behind = -(dx * cos(ego.heading) + dy * sin(ego.heading)) - (ego.length + body.length) / 2
-    return behind > PASSED_DISTANCE and body.speed <= ego.speed
+    return behind > PASSED_DISTANCE and speed_along_ego(ego, body) <= ego.speed
+
+
+@compiled
+def speed_along_ego(ego: Any, body: Any) -> float:
+    """Return a body's speed along the ego's heading [m/s]."""
+    return body.speed * cos(body.heading - ego.heading)
 
 
 @compiled

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from lgmd_gym.envs.dynamics.bend import Bend, Pose, arc
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.scenarios.registry import family
+from lgmd_gym.envs.scenarios.road_users import ADULT
 from lgmd_gym.envs.scenarios.scenario import (
     BRIDGE_SHADOW,
     EGO_LENGTH,
@@ -98,19 +99,15 @@ def pass_pedestrian(
     walking = check_speed("walking_speed", walking_speed, zero=True)
     if walking >= speed:
         raise ValueError(f"walking_speed must be below ego_speed {speed:g} m/s, got {walking:g}")
-    width, depth = 0.5, 0.6
-    aside = EGO_WIDTH / 2 + check_within("clearance", clearance, 0.2, 10.0, "m") + width / 2
+    aside = EGO_WIDTH / 2 + check_within("clearance", clearance, 0.2, 10.0, "m") + ADULT.width / 2
     walker = Actor(
         gap=START_TTC * (speed - walking),
         lateral_offset=-aside,
         speed=walking,
-        kind="box",
         shade=shade,
-        length=depth,
-        width=width,
-        height=1.75,
+        **ADULT.fields,
     )
-    duration = START_TTC + (depth + EGO_LENGTH) / (speed - walking) + 2.0
+    duration = START_TTC + (ADULT.length + EGO_LENGTH) / (speed - walking) + 2.0
     return Scenario(family="PedestrianPass", ego_speed=speed, duration=duration, actors=(walker,))
 
 

@@ -40,6 +40,8 @@ START_RANGE = 500.0  # [m], range of the random start position, which varies the
 class Placement(NamedTuple):
     """A scenario placed on the road, ready to be loaded into a `PhysicsState`.
 
+    The target is the first solid actor of the scenario.
+
     Attributes:
         scenario: The scenario.
         start: Initial pose of the ego.
@@ -47,6 +49,7 @@ class Placement(NamedTuple):
         bodies: `BODY` records, the ego first; rows of paths and segments count from 0.
         segments: Table of the scripts' segments, float64, shape (n, 4).
         paths: Table of the paths' cells, float64, shape (n, 6).
+        target: Index of the target's body; 0 without a solid actor.
     """
 
     scenario: Scenario
@@ -55,6 +58,7 @@ class Placement(NamedTuple):
     bodies: np.ndarray
     segments: np.ndarray
     paths: np.ndarray
+    target: int
 
 
 def place(scenario: Scenario, rng: np.random.Generator) -> Placement:
@@ -76,9 +80,11 @@ def place(scenario: Scenario, rng: np.random.Generator) -> Placement:
         grey = shade if actor.shade is None else int(actor.shade)
         size = (actor.length, actor.width, actor.height)
         rows.append((*pose, actor.speed, *size, grey, actor.reference, KINDS[actor.kind]))
+    solid = [actor for actor in scenario.actors if actor.kind != "road_marking"]
+    target = 1 + next(i for i, (actor, _) in enumerate(shaded) if actor is solid[0]) if solid else 0
     return Placement(
         scenario, start, tuple(actor for actor, _ in shaded), _bodies(rows, scripts, tables),
-        np.concatenate(scripts), np.concatenate(tables),
+        np.concatenate(scripts), np.concatenate(tables), target,
     )  # fmt: skip
 
 
@@ -152,8 +158,8 @@ class PhysicsState:
         self.lines[index] = (0.0, 0.0, 0.0, 0)
         self.egos[index] = (1, 0.0)
         self.episodes[index] = (
-            count, 0, 0, 0, np.inf, np.inf, 0.0, scenario.duration, scenario.top_speed, scenario.ego_speed,
-            0.0,
+            count, placement.target, 0, 0, 0, np.inf, np.inf, 0.0, scenario.duration, scenario.top_speed,
+            scenario.ego_speed, 0.0,
         )  # fmt: skip
         return grown
 

@@ -20,7 +20,6 @@ from lgmd_gym.engine.actions import Demands
 from lgmd_gym.engine.episodes import EpisodeQueue, Prepared
 from lgmd_gym.engine.simulation import Rates, Simulation
 from lgmd_gym.envs.braking import BrakingEnv
-from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING
 from lgmd_gym.envs.info import INFO_KEYS
 from lgmd_gym.envs.registration import make_source
 from lgmd_gym.neuron import LGMDParams
@@ -133,13 +132,13 @@ class BatchPlayer:
         prepared = self._episodes[index]
         assert prepared is not None
         placement = prepared.draw.placement
-        solid = placement.bodies[1:][placement.bodies["kind"][1:] != ROAD_MARKING]
+        target = placement.bodies[placement.target]
         info = self._simulation.outcome.infos[index]
         episode = Episode.of(
             self._recorder.series(index),
             dict(zip(INFO_KEYS, info.tolist(), strict=True)),
             placement.scenario,
-            float(solid[0]["shade"]) if len(solid) else float("nan"),
+            float(target["shade"]) if placement.target else float("nan"),
             self._simulation.rates.camera,
             float(self._returns[index]),
             prepared.draw.info["world"],

@@ -2,8 +2,17 @@
 
 from dataclasses import dataclass
 
-from lgmd_gym.benchmark import protocols
 from lgmd_gym.benchmark.case import Case, level_case, make_case, speed_cases
+from lgmd_gym.benchmark.protocols.car_to_car_2023 import braking_lead, ncap2023
+from lgmd_gym.benchmark.protocols.frontal_2026 import ncap2026, ncap2026_extended, ncap2026_robustness
+from lgmd_gym.benchmark.protocols.regulations import (
+    fmvss127,
+    fmvss127_pedestrian,
+    nhtsa_manoeuvres,
+    r152,
+    r152_vru,
+)
+from lgmd_gym.benchmark.protocols.vulnerable_2023 import ncap2023_vru
 from lgmd_gym.errors import check_known, check_text, unknown_name
 
 TRAFFIC = "traffic"  # the suite without cases, see `lgmd_gym.benchmark.traffic`
@@ -31,7 +40,7 @@ def _quick() -> tuple[Case, ...]:
     return (
         *speed_cases("quick", "CCRs", [10, 20, 30, 40, 50]),
         *speed_cases("quick", "CCRm", [30, 50, 70]),
-        *protocols.braking_lead("quick"),
+        *braking_lead("quick"),
         *speed_cases("quick", "AdjacentPass", [50]),
         *speed_cases("quick", "Following", [30, 50, 80]),
         *speed_cases("quick", "EmptyRoad", [30, 50, 80]),
@@ -43,7 +52,7 @@ def _speeds() -> tuple[Case, ...]:
     return (
         *speed_cases("speeds", "CCRs", list(range(10, 85, 5))),
         *speed_cases("speeds", "CCRm", list(range(30, 85, 10))),
-        *protocols.braking_lead("speeds"),
+        *braking_lead("speeds"),
         *speed_cases("speeds", "AdjacentPass", list(range(30, 90, 10))),
         *speed_cases("speeds", "Following", list(range(30, 120, 20))),
         *speed_cases("speeds", "EmptyRoad", list(range(30, 120, 20))),
@@ -85,6 +94,7 @@ def _near_miss() -> tuple[Case, ...]:
         *speed_cases(suite, "CrossingClears", [30, 40, 50], tail="/right", side="right"),
         *speed_cases(suite, "CrossingClears", [30, 40, 50], tail="/left", side="left"),
         *speed_cases(suite, "PedestrianPass", [30, 50]),
+        *speed_cases(suite, "BicyclePass", [30, 50]),
     )
 
 
@@ -93,23 +103,41 @@ _ALL = (
     Suite("speeds", _speeds(), "aligned approaches and driving without a threat at all speeds"),
     Suite(
         "ncap2023",
-        protocols.ncap2023(),
-        "Euro NCAP AEB Car-to-Car 2023: CCRs, CCRm, CCRb, CCCscp; without CCFtap, CCFhos and CCFhol",
+        ncap2023(),
+        "Euro NCAP AEB Car-to-Car 2023: CCRs, CCRm, CCRb, CCCscp, CCFtap, CCFhos, CCFhol",
     ),
+    Suite("ncap2023-vru", ncap2023_vru(), "Euro NCAP AEB VRU 2023: pedestrians, bicycles, CMFtap, by day"),
     Suite(
         "ncap2026",
-        protocols.ncap2026(),
-        "Euro NCAP Frontal Collisions 2026: rear scenarios, standard range, and part of the robustness layer",
+        ncap2026(),
+        "Euro NCAP Frontal Collisions 2026: standard range",
+    ),
+    Suite("ncap2026-extended", ncap2026_extended(), "Euro NCAP Frontal Collisions 2026: extended range"),
+    Suite(
+        "ncap2026-robustness",
+        ncap2026_robustness(),
+        "Euro NCAP Frontal Collisions 2026: public part of the robustness layer",
     ),
     Suite(
         "r152",
-        protocols.r152(),
+        r152(),
         "UN R152 car-to-car tests, for the impact-speed limits of 5.2.1.4 only",
     ),
     Suite(
         "fmvss127",
-        protocols.fmvss127(),
+        fmvss127(),
         "49 CFR 571.127 lead-vehicle tests without manual braking, without its warning requirement",
+    ),
+    Suite("r152-vru", r152_vru(), "UN R152 pedestrian and bicycle tests, for the impact-speed limits only"),
+    Suite(
+        "fmvss127-pedestrian",
+        fmvss127_pedestrian(),
+        "49 CFR 571.127 pedestrian tests by day and with the lower beam",
+    ),
+    Suite(
+        "nhtsa-false-activation",
+        nhtsa_manoeuvres(),
+        "seven track manoeuvres of NHTSA in which braking is a false activation",
     ),
     Suite("false-reaction", _false_reaction(), "driving in which braking is a false activation"),
     Suite("near-miss", _near_miss(), "near misses that resolve without braking"),

@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 from lgmd_gym.benchmark.analysis.ncap_points import REAR_CASE, ROW_COLOURS, colour_weight
 from lgmd_gym.benchmark.analysis.protocol_limits import relative_impact
-from lgmd_gym.benchmark.protocols import OVERLAPS
+from lgmd_gym.benchmark.protocols.car_to_car_2023 import OVERLAPS
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.envs.dynamics.units import KMH
 
-CROSSING_CASE = re.compile(r"/CCCscp/(?:v(?P<speed>\d+)|from-stop)/target(?P<target>\d+)$")
+CROSSING_CASE = re.compile(r"/CCCscp/(?:v(?P<speed>\d+)|from-stop)/target(?P<target>\d+)(?:-\w+)?$")
 AXES = {"overlap": "overlap [%]", "location": "impact location [%]", "target": "target speed [km/h]"}
 
 

@@ -33,7 +33,7 @@ CASES = (
     find_case("quick/CCRs/v50"),
     find_case("quick/EmptyRoad/v80"),
     find_case("false-reaction/CurveGuardRail/v50/left"),
-    find_case("ncap2026/CCRs/v30/robust-night"),
+    find_case("ncap2026-robustness/CCRs/v30/night"),
     level_case("random", "test", 3),
 )
 

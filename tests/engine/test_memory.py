@@ -49,8 +49,8 @@ def test_peak(num_envs, limit_mib):
 def test_no_growth(threads):
     """Memory does not keep growing over 200,000 steps of environments.
 
-    A leak grows in both halves of the run. A new peak in one half only, such as two large roads that are built at
-    the same time, is none.
+    A leak grows in both halves of the run. A new peak in one half only is none: two large roads, for example,
+    may be built at the same time.
     """
     values = peaks(16, threads, 70_000, 70_000, 70_000)
     print(f"\n{values} MiB after 70,000, 140,000 and 210,000 steps")

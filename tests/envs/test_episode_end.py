@@ -14,10 +14,10 @@ NO_SEGMENTS = np.zeros((0, 4))
 ORIGIN = Pose(0.0, 0.0, 0.0)
 
 
-def ends(ego, *rows, closed_in=0, touched=0):
+def ends(ego, *rows, closed_in=0, touched=0, approached=False):
     table, _ = bodies(ego, *rows)
     episode = record(EPISODE, bodies=len(rows) + 1, closed_in=closed_in, touched=touched)
-    return bool(is_terminated(table, episode)), int(episode.closed_in)
+    return bool(is_terminated(table, episode, approached)), int(episode.closed_in)
 
 
 RUNNING = {"speed": 10.0, "script_speed": 10.0}
@@ -29,6 +29,7 @@ def test_contact_and_standstill_end_an_episode():
     assert ends(RUNNING, AHEAD, touched=1)[0]
     assert ends({"speed": 0.0, "script_speed": 10.0}, AHEAD)[0]
     assert not ends({"speed": 0.0, "script_speed": 0.0}, AHEAD)[0]  # waits as scripted
+    assert not ends({"speed": 0.0, "script_speed": 10.0}, AHEAD, approached=True)[0]
     assert not ends({"speed": 0.001, "script_speed": 10.0}, AHEAD)[0]
 
 
@@ -73,6 +74,19 @@ def test_closing_in_is_remembered():
     assert ends(RUNNING, faster | {"path_end": 3}, closed_in=1)[0] is False  # in a bend
     assert ends(RUNNING, faster, AHEAD, closed_in=1)[0] is False
     assert ends(RUNNING, faster, {"x": -9.0}, closed_in=1)[0] is True
+
+
+def test_crossing_actors_neither_lead_nor_follow():
+    """Only the speed along the ego's heading counts: that of a crossing actor is 0."""
+    crossing = {"x": 30.0, "y": -20.0, "speed": 15.0, "heading": pi / 2}
+    assert ends(RUNNING, crossing) == (False, 1)
+    assert not ends(RUNNING, crossing, closed_in=1)[0]
+    assert ends(RUNNING, crossing | {"x": -6.001})[0]
+    assert not ends(RUNNING, crossing | {"x": -5.9})[0]
+    assert not ends(RUNNING, crossing | {"heading": pi / 3}, closed_in=1)[
+        0
+    ]  # 7.5 m/s along the ego's heading
+    assert ends(RUNNING, crossing | {"heading": 0.5}, closed_in=1)[0]  # 13.2 m/s
 
 
 def test_duration():

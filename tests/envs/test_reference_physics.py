@@ -8,6 +8,7 @@ from support.reference_physics import PASSED_DISTANCE, Body, Ego, Motion
 
 from lgmd_gym.envs import FAMILIES, BrakingEnv, make_scenario
 from lgmd_gym.envs.dynamics.bend import Pose
+from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 
 
 class ReferenceEpisode:
@@ -18,6 +19,7 @@ class ReferenceEpisode:
         self.env = env
         self.ego = Ego(scenario, Pose(float(x), float(y), 0.0), env.brake, env.config["throttle"])
         actors = sorted(scenario.actors, key=lambda actor: actor.kind != "car")
+        self.vehicles = [actor.kind in ("car", "motorcycle") for actor in actors]
         self.solid = [actor.kind != "road_marking" for actor in actors]
         self.bodies = []
         for actor in actors:
@@ -74,19 +76,32 @@ class ReferenceEpisode:
         if self.contact is not None:
             return True
         if ego.speed == 0.0:
-            return ego.script.speed > 0.0
+            return ego.script.speed > 0.0 and not self.approached()
         others = [body for body, solid in zip(self.bodies, self.solid, strict=True) if solid]
         left = [body for body in others if not self.passed(body)]
-        self.closed_in = self.closed_in or any(ego.speed > body.speed for body in left)
+        self.closed_in = self.closed_in or any(ego.speed > self.along(body) for body in left)
         resolved = all(
-            not body.script.left and body.path.straight and ego.speed < body.speed for body in left
+            not body.script.left and body.path.straight and ego.speed < self.along(body) for body in left
         )
         return bool(others) and (not left or (self.closed_in and resolved))
 
     def passed(self, body):
         ego = self.ego
         along = (body.x - ego.x) * cos(ego.heading) + (body.y - ego.y) * sin(ego.heading)
-        return -along - (ego.length + body.length) / 2 > PASSED_DISTANCE and body.speed <= ego.speed
+        return -along - (ego.length + body.length) / 2 > PASSED_DISTANCE and self.along(body) <= ego.speed
+
+    def along(self, body):
+        return body.speed * cos(body.heading - self.ego.heading)
+
+    def approached(self):
+        """Return whether a vehicle touches the standing ego, in steps of 1 ms at constant speed."""
+        here = Rectangle(self.ego.x, self.ego.y, self.ego.heading, self.ego.length, self.ego.width)
+        for body, vehicle in zip(self.bodies, self.vehicles, strict=True):
+            for number in range(10_000 if vehicle and body.speed > 0.0 else 0):
+                pose = body.centre(body.travelled + body.speed * 0.001 * number)
+                if first_touch(here, Rectangle(*pose, body.length, body.width), 0.0, 0.0) == 0.0:
+                    return True
+        return False
 
 
 @pytest.mark.parametrize("family", FAMILIES)
