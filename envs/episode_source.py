@@ -83,8 +83,9 @@ class FixedScenario:
 class RandomLevels:
     """A random level per episode.
 
-    A level is a random scenario with a number. Half of the levels are threats (CCRs, CCRm, CCRb, CCCscp),
-    half are non-threats (all other families). A level fixes the family and its arguments, the grey levels,
+    A level is a random scenario with a number. Half of the levels are threats: the car-to-car, motorcycle,
+    pedestrian and bicycle families of the protocols, see `lgmd_gym.envs.scenarios.distribution`. Half are
+    non-threats: all other families. A level fixes the family and its arguments, the grey levels,
     the world, the camera condition (night, fog, …) and the contrast of the road texture, in every process.
     The splits are disjoint, and so are their worlds: training never uses a level or a world of validation or
     test. The environment's seed selects the levels; `info` adds `level` (the number), `world` (its number, or

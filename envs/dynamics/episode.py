@@ -22,9 +22,9 @@ EPISODE = np.dtype(
     ]
 )
 """State of an episode: number of bodies; index of the target's body, 0 without one; index of the body in
-contact with the ego, 0 without contact; whether the ego has closed in on an actor; simulation steps; ego speed
-and speed relative to the other body at contact, inf without contact [m/s]; time after the last decision and
-duration [s], highest scripted speed [m/s], ego speed [m/s] and acceleration [m/s²] before the last
+contact with the ego, 0 without contact; whether the ego has closed in on an actor; simulation steps; ego
+speed and speed relative to the other body at contact, inf without contact [m/s]; time after the last decision
+and duration [s], highest scripted speed [m/s], ego speed [m/s] and acceleration [m/s²] before the last
 decision."""
 
 

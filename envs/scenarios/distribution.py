@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.camera import CONDITIONS
-from lgmd_gym.envs.dynamics.units import KMH
+from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS
 from lgmd_gym.envs.scenarios.registry import make_scenario
 from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.errors import check_items, check_known, check_whole
@@ -14,8 +14,6 @@ from lgmd_gym.errors import check_items, check_known, check_whole
 SPLITS = ("train", "validation", "test")
 LEVELS = 1_000_000  # per split
 THREAT_SHARE = 0.5
-SPEED_KMH = (10.0, 80.0)
-HEADWAY = (0.5, 3.0)  # [s]; in FMVSS 127 a lead car brakes 12 m ahead at 80 km/h, a headway of 0.54 s
 
 
 def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> tuple[int, int]:
@@ -56,100 +54,6 @@ def draw_camera_fields(split: str, level: int, conditions: Sequence[str]) -> dic
 def draw_scenario(rng: np.random.Generator) -> Scenario:
     """Return a random scenario: a threat with probability `THREAT_SHARE`, otherwise a non-threat."""
     families = THREATS if rng.random() < THREAT_SHARE else NON_THREATS
-    names = list(families)
-    name = names[int(rng.integers(len(names)))]
-    return make_scenario(name, **families[name](rng))
-
-
-def _speed(rng: np.random.Generator, low: float = SPEED_KMH[0], high: float = SPEED_KMH[1]) -> float:
-    return float(rng.uniform(low, high)) * KMH
-
-
-def _flag(rng: np.random.Generator) -> bool:
-    return bool(rng.random() < 0.5)
-
-
-def _side(rng: np.random.Generator) -> str:
-    return "left" if _flag(rng) else "right"
-
-
-def _overlap(rng: np.random.Generator) -> float:
-    """Return 1 (aligned) with probability 0.5, otherwise an overlap of 0.4 to 1 on either side."""
-    if _flag(rng):
-        return 1.0
-    return float(rng.uniform(0.4, 1.0)) * (1.0 if _flag(rng) else -1.0)
-
-
-def _moving(rng: np.random.Generator) -> dict[str, Any]:
-    speed = _speed(rng, 30.0)
-    return {
-        "ego_speed": speed,
-        "target_speed": speed * float(rng.uniform(0.2, 0.7)),
-        "overlap": _overlap(rng),
-    }
-
-
-def _braking(rng: np.random.Generator) -> dict[str, Any]:
-    return {
-        "ego_speed": _speed(rng, 30.0),
-        "headway": float(rng.uniform(*HEADWAY)),
-        "deceleration": float(rng.uniform(2.0, 6.0)),
-        "build_up": float(rng.uniform(0.3, 1.0)),
-        "overlap": _overlap(rng),
-    }
-
-
-def _adjacent(rng: np.random.Generator) -> dict[str, Any]:
-    offset = float(rng.uniform(3.0, 3.7)) * (1.0 if _flag(rng) else -1.0)
-    return {"ego_speed": _speed(rng), "lateral_offset": offset, "cars": int(rng.integers(1, 7))}
-
-
-def _rail(rng: np.random.Generator) -> dict[str, Any]:
-    radius = float(rng.uniform(40.0, 200.0))
-    top = min(SPEED_KMH[1], (3.5 * radius) ** 0.5 / KMH)
-    return {"ego_speed": _speed(rng, 20.0, top), "radius": radius, "left": _flag(rng)}
-
-
-# Functions that draw the arguments of each family.
-THREATS: dict[str, Any] = {
-    "CCRs": lambda rng: {"ego_speed": _speed(rng), "overlap": _overlap(rng)},
-    "CCRm": _moving,
-    "CCRb": _braking,
-    "CCCscp": lambda rng: {
-        "ego_speed": _speed(rng, 20.0, 60.0),
-        "target_speed": _speed(rng, 20.0, 60.0),
-        "side": _side(rng),
-    },
-}
-NON_THREATS: dict[str, Any] = {
-    "Following": lambda rng: {"ego_speed": _speed(rng), "headway": float(rng.uniform(*HEADWAY))},
-    "BrakeRelease": lambda rng: {
-        "ego_speed": _speed(rng, 40.0),
-        "headway": float(rng.uniform(1.5, 2.5)),
-        "speed_drop": float(rng.uniform(2.0, 5.0)),
-    },
-    "AdjacentPass": _adjacent,
-    "PassBetween": lambda rng: {"ego_speed": _speed(rng, 30.0), "inner_gap": float(rng.uniform(4.0, 5.0))},
-    "Overtaken": lambda rng: {"ego_speed": _speed(rng, 30.0), "excess": _speed(rng, 10.0, 40.0)},
-    "Oncoming": lambda rng: {"ego_speed": _speed(rng, 30.0), "oncoming_speed": _speed(rng, 30.0)},
-    "CutIn": lambda rng: {"ego_speed": _speed(rng, 30.0), "gap": float(rng.uniform(10.0, 25.0))},
-    "CutOut": lambda rng: {"ego_speed": _speed(rng, 30.0), "headway": float(rng.uniform(1.2, 2.5))},
-    "EmptyRoad": lambda rng: {"ego_speed": _speed(rng)},
-    "SteelPlate": lambda rng: {"ego_speed": _speed(rng, 30.0), "shade": int(rng.integers(110, 200))},
-    "BridgeShadow": lambda rng: {"ego_speed": _speed(rng, 30.0), "length": float(rng.uniform(5.0, 20.0))},
-    "PedestrianPass": lambda rng: {
-        "ego_speed": _speed(rng, 20.0, 50.0),
-        "clearance": float(rng.uniform(1.0, 1.5)),
-    },
-    "CurveGuardRail": _rail,
-    "CrossingClears": lambda rng: {
-        "ego_speed": _speed(rng, 20.0, 60.0),
-        "target_speed": _speed(rng, 20.0, 60.0),
-        "side": _side(rng),
-        "clear_by": float(rng.uniform(1.2, 2.5)),
-    },
-    "TurnBeforeOncoming": lambda rng: {"left": _flag(rng)},
-    "LeadTurnsOff": lambda rng: {"left": _flag(rng)},
-    "CurveObjectOutside": lambda rng: {"left": _flag(rng)},
-    "LaneClosure": lambda rng: {"ego_speed": _speed(rng, 25.0, 55.0), "left": _flag(rng)},
-}
+    weights = np.cumsum([family.weight for family in families.values()])
+    name = list(families)[int(np.searchsorted(weights, rng.random() * weights[-1], side="right"))]
+    return make_scenario(name, **families[name].draw(rng))

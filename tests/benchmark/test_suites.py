@@ -1,5 +1,7 @@
 """The suites against the numbers of the protocol documents, and the bounding agents in every case."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
@@ -12,10 +14,11 @@ from lgmd_gym.benchmark.rows import make_row
 from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.envs.dynamics.units import KMH
+from lgmd_gym.envs.scenarios.random_arguments import THREATS
 
-SLOW_SUITES = ("ncap2023", "speeds")
-THREAT_SUITES = ("quick", "speeds", "ncap2023", "ncap2026", "r152", "fmvss127", "random")
-APPROACH = ("CCRs", "CCRm", "CCRb", "CCCscp")
+SLOW_SUITES = ("ncap2023", "ncap2023-vru", "ncap2026", "ncap2026-extended", "speeds")
+NO_THREAT_SUITES = ("false-reaction", "near-miss", "nhtsa-false-activation")
+UNAVOIDABLE = ("CCFhos", "CCFhol")  # by braking: the oncoming car does not stop
 
 
 def play_without_camera(case, agent_name, seed=0):
@@ -55,16 +58,20 @@ def violations(case):
     """Return the expectations on the bounding agents that a case does not meet."""
     rows = bounding_rows(case)
     never, always, oracle = rows["no-brake"], rows["always-brake"], rows["ttc-oracle"]
-    threat = case.scenario.family in APPROACH
+    threat, avoidable = case.scenario.family in THREATS, case.scenario.family not in UNAVOIDABLE
     fault = "premature_brake" if threat else "false_activation"
     expectations = {
         "no-brake has contact exactly in approaches": never["collision"] is threat,
         "a contact of no-brake is a threat": never["threat"] is threat,
-        "the suite is declared to hold threats": not threat or case.suite in THREAT_SUITES,
+        "the suite is declared to hold threats": not threat or case.suite not in NO_THREAT_SUITES,
         "approaches start more than 4.5 s before contact": not threat or never["duration"] > 4.5,
-        "always-brake avoids no contact validly": not always["avoided"] and not always["collision"],
+        "always-brake avoids no contact validly": not always["avoided"],
+        "always-brake has contact only with oncoming cars": not always["collision"] or not avoidable,
         "always-brake brakes falsely or prematurely": always[fault],
-        "the oracle avoids every threat": not threat or oracle["avoided"],
+        "the oracle avoids every threat": not (threat and avoidable) or oracle["avoided"],
+        # In 2 s the brake takes 9 m/s² times 1.77 s, the time without latency, dead time and half the build-up.
+        "the oracle brakes for oncoming cars": avoidable
+        or oracle["impact_speed"] < max(never["impact_speed"] - 15.5, 0.01),
         "the oracle brakes for threats only": threat or oracle["peak_deceleration"] == 0.0,
         "the oracle has no false activation": not oracle["false_activation"],
     }
@@ -74,22 +81,50 @@ def violations(case):
     return [f"{case.name}: {expectation}" for expectation, met in expectations.items() if not met]
 
 
-def test_case_counts_match_the_documents():
-    def count(suite, family, fcw=False):
-        return sum(c.family == family and c.fcw_driver is fcw for c in SUITES[suite].cases)
+# Cells of the OpenSCENARIO variation files of Euro NCAP 2023 and 2026, with the names of the files. 2023 has
+# no file of CCCscp (30 cells of the test protocol), and a single file for each turn of CPTA to the near side.
+CAR_TO_CAR_2023 = {"CCRs": 45, "CCRs_FCW": 30, "CCRm": 55, "CCRb": 4, "CCFtap": 9, "CCFhos": 2, "CCFhol": 2}
+VULNERABLE_2023 = {
+    "CPNA": 11 + 11, "CPFA": 11, "CPNCO": 11, "CPLA": 7 + 9, "CPTA": 3 + 3 + 1 + 1, "CPRA": 2 + 6, "CBNA": 11,
+    "CBNAO": 11, "CBFA": 11, "CBLA": 7 + 8, "CMFtap": 9,
+}  # fmt: skip
+STANDARD_2026 = {
+    "CCRs": 25, "CCRs_FCW": 15, "CCRm": 55, "CCRb": 30, "CCCscp": 50, "CCFtap": 9, "CCFhos": 18, "CMRs": 15,
+    "CMRs_FCW": 9, "CMRb": 18, "CMCscp": 50, "CMFtap": 9, "CPNA": 36, "CPFA": 12, "CPNCO": 12, "CPLA": 12,
+    "CPLA_FCW": 8, "CBNA": 12, "CBNAO": 12, "CBFA": 12, "CBLA": 5, "CBLA_FCW": 4,
+}  # fmt: skip
+EXTENDED_2026 = {
+    "CCRs": 10, "CCRs_FCW": 6, "CCRm": 22, "CCRb": 47, "CCCscp": 16, "CCFtap": 7, "CCFhos": 14, "CMRs": 10,
+    "CMRs_FCW": 6, "CMRb": 37, "CMCscp": 16, "CMFtap": 7, "CPNA": 24, "CPFA": 48, "CPNCO": 24, "CPLA": 36,
+    "CPLA_FCW": 24, "CBNA": 18, "CBNAO": 18, "CBFA": 18, "CBLA": 15, "CBLA_FCW": 12,
+}  # fmt: skip
+COUNTS = {
+    "ncap2023": CAR_TO_CAR_2023 | {"CCCscp": 30},
+    "ncap2023-vru": VULNERABLE_2023,
+    "ncap2026": STANDARD_2026,
+    "ncap2026-extended": EXTENDED_2026,
+    "r152": {"CCRs": 4, "CCRm": 2},
+    "r152-vru": {"CPNA": 4, "CBNA": 4},
+    "fmvss127": {"CCRs": 8, "CCRm": 5, "CCRb": 8},
+    # 49 CFR 571.127, table 2 to S8.1.1, in steps of 10 km/h: right 25 and 50 %, left, obstructed, standing
+    # and along the path; in darkness right 50 %, standing and along the path.
+    "fmvss127-pedestrian": {"CPNA": 6 + 6 + 6, "CPFA": 6, "CPNCO": 5, "CPLA": 6 + 7 + 6 + 7},
+}
 
-    assert count("ncap2023", "CCRs") == 45
-    assert count("ncap2023", "CCRs", fcw=True) == 30
-    assert count("ncap2023", "CCRm") == 55
-    assert count("ncap2023", "CCRb") == 4
-    assert count("ncap2023", "CCCscp") == 30
-    assert count("ncap2026", "CCRs") == 5 * 5 + 8 + 2 + 2
-    assert count("ncap2026", "CCRs", fcw=True) == 3 * 5
-    assert count("ncap2026", "CCRm") == 11 * 5 + 2 + 2
-    assert count("ncap2026", "CCRb") == 6 * 5 + 2 + 2 + 4
-    assert count("r152", "CCRs") == 4
-    assert count("r152", "CCRm") == 2
+
+@pytest.mark.parametrize("suite", COUNTS)
+def test_case_counts_match_the_documents(suite):
+    names = [case.family + ("_FCW" if case.fcw_driver else "") for case in SUITES[suite].cases]
+    assert Counter(names) == COUNTS[suite]
+    assert len({case.name for case in SUITES[suite].cases}) == len(names)
+    unnamed = {(case.family, case.fcw_driver, *case.arguments) for case in SUITES[suite].cases}
+    assert len(unnamed) == len(names)
+
+
+def test_arguments_of_a_case():
     assert find_case("ncap2023/CCRs/v30/overlap-50").arguments == (("ego_speed", 8.333333), ("overlap", -0.5))
+    night = find_case("ncap2026/CPNA/v30/location75-night")
+    assert dict(night.arguments) == {"ego_speed": 8.333333, "impact_location": 0.75, "condition": "night"}
 
 
 @pytest.mark.parametrize(

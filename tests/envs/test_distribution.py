@@ -13,14 +13,9 @@ from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs import FAMILIES
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.episode_source import RandomLevels
-from lgmd_gym.envs.scenarios.distribution import (
-    LEVELS,
-    NON_THREATS,
-    THREATS,
-    draw_scenario,
-    level_generator,
-)
+from lgmd_gym.envs.scenarios.distribution import LEVELS, draw_scenario, level_generator
 from lgmd_gym.envs.scenarios.free_lanes import free_lane
+from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS
 from lgmd_gym.wrappers.vector import LGMDObservation as LGMDVector
 
 HOLD = np.zeros(1, np.float32)
@@ -55,7 +50,7 @@ def test_levels_include_the_headways_of_fmvss127():
     cases = [dict(case.arguments) for case in find_suite("fmvss127").cases if case.family == "CCRb"]
     shortest = min(arguments["gap"] / arguments["ego_speed"] for arguments in cases)
     for draw in THREATS["CCRb"], NON_THREATS["Following"]:
-        drawn = [draw(level_generator("train", level))["headway"] for level in range(2000)]
+        drawn = [draw.draw(level_generator("train", level))["headway"] for level in range(2000)]
         assert min(drawn) < shortest
         assert max(drawn) > 2.5
 

@@ -50,7 +50,8 @@ def test_actors_that_are_passed(body, over):
     assert ends(RUNNING, body)[0] is over
     assert ends(RUNNING | {"x": 70.0}, body | {"x": 70.0 + body["x"]})[0] is over
     heading = pi / 2
-    turned = {"x": 70.0 - body.get("y", 0.0), "y": body["x"] - 30.0, "speed": body.get("speed", 0.0)}
+    turned = {"x": 70.0 - body.get("y", 0.0), "y": body["x"] - 30.0, "heading": heading}
+    turned["speed"] = body.get("speed", 0.0)
     assert ends(RUNNING | {"x": 70.0, "y": -30.0, "heading": heading}, turned)[0] is over
 
 

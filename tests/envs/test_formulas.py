@@ -7,13 +7,28 @@ import pytest
 from support.records import bodies, record
 
 from lgmd_gym.envs.dynamics.bend import Pose, arc
-from lgmd_gym.envs.dynamics.bodies import BOX, EGO_STATE, ROAD_MARKING, ego_braking
+from lgmd_gym.envs.dynamics.bodies import (
+    BICYCLE,
+    BOX,
+    CAR,
+    EGO_STATE,
+    MOTORCYCLE,
+    PEDESTRIAN,
+    ROAD_MARKING,
+    ego_braking,
+)
 from lgmd_gym.envs.dynamics.brake import BRAKE, BrakeParams
 from lgmd_gym.envs.dynamics.episode import EPISODE
 from lgmd_gym.envs.dynamics.path import path_table, pose_at
 from lgmd_gym.envs.info import INFO, write_info
 from lgmd_gym.envs.reward import REWARD, RewardParams, step_reward
-from lgmd_gym.envs.surrogate_safety import contact_time, headway, lead_of, rate_to_avoid_crash
+from lgmd_gym.envs.surrogate_safety import (
+    contact_time,
+    headway,
+    is_approached,
+    lead_of,
+    rate_to_avoid_crash,
+)
 
 WEIGHTS = {"contact": 10.0, "impact": 8.0, "progress": 1.0, "brake": 2.0, "jerk": 0.5, "need_ttc": 4.0}
 
@@ -64,18 +79,41 @@ def test_required_deceleration_is_drac_minus_the_acceleration_of_the_lead_car(ac
 
 
 def test_info_without_a_body_ahead():
-    info = info_of(EGO, {"x": -20.0, "speed": 3.0})
+    info = info_of(EGO, {"x": -20.0, "speed": 3.0}, target=1)
     assert (info.gap, info.thw, info.drac, info.required_deceleration, info.ttc) == (inf, inf, inf, inf, inf)
     assert (info.speed, info.ego_speed, info.target_speed) == (10.0, 10.0, 3.0)
     info = info_of(EGO, {"x": -20.0, "speed": 30.0})
     assert (info.gap, info.ttc) == (inf, pytest.approx(16 / 20))  # a contact at the rear
 
 
-def test_target_speed_is_that_of_the_first_body_that_is_not_a_marking():
+def test_target_speed_is_that_of_the_target():
     marking = {"x": 10.0, "speed": 1.0, "kind": ROAD_MARKING}
-    assert info_of(EGO, marking, {"x": 30.0, "speed": 3.0}, {"x": 25.0, "speed": 5.0}).target_speed == 3.0
+    others = ({"x": 30.0, "speed": 3.0}, {"x": 25.0, "speed": 5.0})
+    assert info_of(EGO, marking, *others, target=2).target_speed == 3.0
+    assert info_of(EGO, marking, *others, target=3).target_speed == 5.0
     info = info_of(EGO, marking)
     assert (info.target_speed, info.gap, info.ttc) == (inf, inf, inf)
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        # Oncoming in the ego's lane: contact after (50 - 4) / 10 s.
+        ({"x": 50.0, "heading": pi, "speed": 10.0, "kind": CAR}, True),
+        ({"x": 50.0, "heading": pi, "speed": 10.0, "kind": MOTORCYCLE}, True),
+        ({"x": 50.0, "heading": pi, "speed": 10.0, "kind": PEDESTRIAN}, False),
+        ({"x": 50.0, "heading": pi, "speed": 10.0, "kind": BICYCLE}, False),
+        ({"x": 50.0, "heading": pi, "speed": 0.0, "kind": CAR}, False),
+        ({"x": 50.0, "heading": pi, "speed": 4.5, "kind": CAR}, False),  # more than 10 s away
+        ({"x": 50.0, "speed": 10.0, "kind": CAR}, False),  # drives away
+        ({"x": 50.0, "y": 2.01, "heading": pi, "speed": 10.0, "kind": CAR}, False),  # the cars are 2 m wide
+        ({"x": 1.0, "y": -30.0, "heading": pi / 2, "speed": 10.0, "kind": CAR}, True),  # into the side
+        ({"x": 3.1, "y": -30.0, "heading": pi / 2, "speed": 10.0, "kind": CAR}, False),  # past the front
+    ],
+)
+def test_vehicles_that_are_about_to_touch_a_standing_ego(body, expected):
+    table, paths = bodies({"speed": 0.0}, {"x": 500.0}, body)
+    assert is_approached(table, 3, paths) is expected
 
 
 @pytest.mark.parametrize("touched", [0, 1])

@@ -31,7 +31,7 @@ def test_flat_objects():
 
 def test_pedestrian():
     made = scenario("PedestrianPass", ego_speed=10.0, clearance=1.5, walking_speed=2.0)
-    size = {"kind": "box", "length": 0.6, "width": 0.5, "height": 1.75}
+    size = {"kind": "pedestrian", "length": 0.6, "width": 0.5, "height": 1.8}
     check_actor(made.actors[0], gap=40.0, lateral_offset=-(0.9 + 1.5 + 0.25), speed=2.0, **size)
     assert (made.ego_speed, made.duration) == (10.0, pytest.approx(5 + 4.9 / 8 + 2))
     default = scenario("PedestrianPass")

@@ -4,11 +4,14 @@ The ego is 4.3 m by 1.8 m, the target car 4.023 m by 1.712 m, a lane is 3.5 m wi
 contact is 5 s after the start.
 """
 
+import numpy as np
 import pytest
 
+from lgmd_gym.envs.dynamics.bodies import BICYCLE, CAR, EGO, PEDESTRIAN
 from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.scenarios.registry import make_scenario
+from lgmd_gym.envs.scenarios.registry import FAMILIES, make_scenario
 from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
+from lgmd_gym.envs.simulation.physics_state import place
 
 
 def test_highest_scripted_speed():
@@ -60,21 +63,34 @@ def test_lanes_of_a_road():
         RoadPlan(kind="curved")
 
 
-@pytest.mark.parametrize(
-    ("name", "ego_kmh", "target_kmh"),
-    [
+# Default speeds of ego and target [km/h].
+DEFAULTS = [
+    ("CMRs", 50, 0), ("CMRb", 50, 50), ("CMCscp", 30, 30), ("CMFtap", 15, 45), ("CCFtap", 15, 45),
+    ("CCFhos", 50, 50), ("CCFhol", 50, 50), ("CPNA", 40, 0), ("CPFA", 40, 0), ("CPNCO", 40, 0),
+    ("CPLA", 40, 5), ("CPTA", 10, 0), ("CPRA", 4, 0), ("CBLA", 50, 15),
+    # Of 3.36 s of acceleration to 15 km/h, 2.44 s are before the start: 15 · 2.44 / 3.36.
+    ("CBNA", 40, 10.893), ("CBNAO", 40, 3.294), ("CBFA", 40, 11.746),
+    ("BicyclePass", 30, 0), ("BottsDots", 72.4, 0), ("AdjacentBraking", 72.4, 72.4),
+    ("CurveStandingCar", 72.4, 0),
         ("CCRs", 50, 0), ("CCRm", 50, 20), ("CCRb", 50, 50), ("Following", 50, 50), ("BrakeRelease", 50, 50),
         ("CCCscp", 30, 30), ("CrossingClears", 40, 40), ("AdjacentPass", 50, 0), ("PassBetween", 80, 0),
         ("Overtaken", 80, 110), ("Oncoming", 80, 80), ("CutIn", 50, 55), ("CutOut", 50, 50),
         ("EmptyRoad", 50, 0), ("SteelPlate", 80, 0), ("BridgeShadow", 80, 0), ("PedestrianPass", 30, 5),
         ("CurveGuardRail", 50, 0), ("TurnBeforeOncoming", 30, 0), ("LeadTurnsOff", 40, 40),
         ("CurveObjectOutside", 30, 0), ("LaneClosure", 40, 0),
-    ],
-)  # fmt: skip
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "ego_kmh", "target_kmh"), DEFAULTS)
 def test_default_speeds(name, ego_kmh, target_kmh):
+    """A bicycle of CBNA and CBFA accelerates at the start; a pedestrian waits."""
     made = make_scenario(name)
     speeds = {"ego": made.ego_speed, "target": made.actors[0].speed if made.actors else 0.0}
-    assert speeds == pytest.approx({"ego": ego_kmh / 3.6, "target": target_kmh / 3.6})
+    assert speeds == pytest.approx({"ego": ego_kmh / 3.6, "target": target_kmh / 3.6}, rel=1e-3)
+
+
+def test_every_family_has_default_speeds():
+    assert {name for name, *_ in DEFAULTS} == set(FAMILIES)
 
 
 def test_default_distances():
@@ -92,3 +108,32 @@ def test_default_sides():
         assert make_scenario(name) == make_scenario(name, side="right")
     assert make_scenario("CCRs") == make_scenario("CCRs", beside=False)
     assert make_scenario("CCCscp") == make_scenario("CCCscp", from_stop=False)
+
+
+def test_the_target_is_the_first_solid_actor():
+    """Cars come first among the bodies, as in highway-env's lists; the target may be another one."""
+    rng = np.random.default_rng(0)
+    for family, kind, index in (
+        ("CPNCO", PEDESTRIAN, 3),
+        ("CBNA", BICYCLE, 3),
+        ("CCCscp", CAR, 1),
+        ("CCFhol", CAR, 1),
+        ("BrakeRelease", CAR, 1),
+        ("SteelPlate", EGO, 0),
+        ("EmptyRoad", EGO, 0),
+    ):
+        placement = place(make_scenario(family), rng)
+        assert (placement.target, placement.bodies[placement.target]["kind"]) == (index, kind)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("ego_length", 0.5, r"ego_length must be in \[1, 20\] m, got 0.5"),
+        ("ego_width", 4.5, r"ego_width must be in \[0.5, 4\] m, got 4.5"),
+        ("ego_reference", 25.0, r"ego_reference must be in \[-20, 20\] m, got 25"),
+    ],
+)
+def test_size_of_the_ego(name, value, message):
+    with pytest.raises(ValueError, match=message):
+        Scenario(family="CCRs", ego_speed=10.0, duration=5.0, **{name: value})
