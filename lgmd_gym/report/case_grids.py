@@ -1,15 +1,21 @@
-"""Coloured grids of the Euro NCAP suites: ego speed by overlap, or by target speed."""
+"""Coloured grids of the Euro NCAP suites: ego speed by overlap, impact location or target speed."""
 
 import re
 from typing import NamedTuple
 
-from lgmd_gym.benchmark.analysis.ncap_points import REAR_CASE, ROW_COLOURS, colour_weight
+from lgmd_gym.benchmark.analysis.ncap_points import ROW_COLOURS, colour_weight
 from lgmd_gym.benchmark.analysis.protocol_limits import relative_impact
 from lgmd_gym.benchmark.protocols.car_to_car_2023 import OVERLAPS
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.envs.dynamics.units import KMH
 
-CROSSING_CASE = re.compile(r"/CCCscp/(?:v(?P<speed>\d+)|from-stop)/target(?P<target>\d+)(?:-\w+)?$")
+LOCATED_CASE = re.compile(
+    r"/(?P<family>\w+)/v(?P<speed>\d+)(?P<warned>-warned)?/(?P<axis>overlap|location)(?P<place>-?\d+)"
+    r"(?P<night>-night)?$"
+)
+PAIRED_CASE = re.compile(
+    r"/(?P<family>\w+)/(?:v(?P<speed>\d+)|from-stop)/target(?P<target>\d+)(?:-(?P<side>\w+))?$"
+)
 AXES = {"overlap": "overlap [%]", "location": "impact location [%]", "target": "target speed [km/h]"}
 
 
@@ -44,12 +50,14 @@ def case_grids(rows: list[Row], agent: str, suite: str) -> list[CaseGrid]:
 
 
 def _position(case: str) -> tuple[str, str, str, int] | None:
-    """Return family, axis, row heading and column of a case; None for a case without a grid."""
-    if rear := REAR_CASE.search(case):
-        head = rear["speed"] + (" warned" if rear["warned"] else "")
-        return rear["family"], rear["axis"], head, int(rear["place"])
-    if crossing := CROSSING_CASE.search(case):
-        return "CCCscp", "target", crossing["speed"] or "from stop", int(crossing["target"])
+    """Return title, axis, row heading and column of a case; None for a case without a grid."""
+    if located := LOCATED_CASE.search(case):
+        head = located["speed"] + (" warned" if located["warned"] else "")
+        title = located["family"] + (" at night" if located["night"] else "")
+        return title, located["axis"], head, int(located["place"])
+    if paired := PAIRED_CASE.search(case):
+        title = paired["family"] + (f" from the {paired['side']}" if paired["side"] else "")
+        return title, "target", paired["speed"] or "from stop", int(paired["target"])
     return None
 
 

@@ -9,7 +9,7 @@ from lgmd_gym.benchmark.analysis.compare_tables import change_text
 from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, load_traces
 from lgmd_gym.benchmark.analysis.ncap_points import SUITE_POINTS
 from lgmd_gym.benchmark.analysis.plots import difference_figure, froc_figure, trace_figure
-from lgmd_gym.benchmark.analysis.protocol_limits import meets_r152
+from lgmd_gym.benchmark.analysis.protocol_limits import R152_SUITES, meets_r152
 from lgmd_gym.benchmark.analysis.tables import (
     agent_summaries,
     limit_lines,
@@ -85,7 +85,8 @@ def _condition(data: ReportData, name: str, rows: list[Row]) -> dict[str, Any]:
     """Return the tables of one camera condition."""
     braking = [agent for agent in data.agents if agent != NO_BRAKE]
     points = SUITE_POINTS.get(data.suite)
-    met = [agent for agent in data.agents if meets_r152(rows, agent)] if data.suite == "r152" else None
+    judged = data.agents if data.suite in R152_SUITES else None
+    met = judged and [agent for agent in judged if meets_r152(rows, agent)]
     return {
         "name": name,
         "sample": Sample.of(rows),

@@ -195,8 +195,10 @@ def test_case_grids_of_ncap2023():
         "ncap2023", lambda case, _: case.endswith(("CCRs/v50/overlap75", "CCRs/v40/overlap100"))
     )
     rows = [row | {"premature_brake": row["case"].endswith("CCRs/v10/overlap-50")} for row in rows]
-    crossing, moving, standing = case_grids(rows, "a", "ncap2023")
-    assert [grid.title for grid in (crossing, moving, standing)] == ["CCCscp: a", "CCRm: a", "CCRs: a"]
+    crossing, turning, moving, standing = case_grids(rows, "a", "ncap2023")
+    titles = [grid.title for grid in (crossing, turning, moving, standing)]
+    assert titles == ["CCCscp: a", "CCFtap: a", "CCRm: a", "CCRs: a"]
+    assert (turning.columns, [head for head, _ in turning.lines]) == ([30, 45, 60], ["10", "15", "20"])
     assert standing.columns == [-50, -75, 100, 75, 50]
     assert standing.axis == "overlap [%]"
     assert crossing.lines[0][0] == "from stop"
@@ -211,6 +213,22 @@ def test_case_grids_of_ncap2023():
     assert (cells["50"][3].colour, cells["50"][3].text) == ("red", "50")
     assert (cells["10"][0].colour, cells["10"][0].text) == ("premature", "0*")
     assert case_grids(rows, "a", "quick") == []
+
+
+def test_case_grids_of_ncap2026_have_lights_and_sides():
+    rows = suite_rows("ncap2026", lambda case, _: case.endswith("CPNA/v30/location75-night"))
+    grids = {grid.title: grid for grid in case_grids(rows, "a", "ncap2026")}
+    assert {"CPNA: a", "CPNA at night: a", "CCCscp from the left: a", "CMCscp from the right: a"} <= set(
+        grids
+    )
+    night = dict(grids["CPNA at night: a"].lines)
+    assert [(cell.colour, cell.text) for cell in night["30"]] == [
+        ("green", "0"),
+        ("green", "0"),
+        ("contact", "30"),
+    ]
+    assert all(cell.colour == "green" for cells in dict(grids["CPNA: a"].lines).values() for cell in cells)
+    assert grids["CMCscp from the right: a"].columns == [20, 30, 40, 50, 60]
 
 
 def test_a_cell_has_the_highest_impact_speed_and_the_colour_of_the_seed_that_earns_least():

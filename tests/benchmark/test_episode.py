@@ -18,7 +18,7 @@ THREAT = Counterfactual(True, 5.0, 10.0)
 
 def test_night_case_renders_dark_frames():
     means = {}
-    for name in ("CCRs/v30/location50", "CCRs/v30/robust-night"):
+    for name in ("CPNA/v30/location50", "CPNA/v30/location50-night"):
         env = make_env(find_case(f"ncap2026/{name}"), SensorConfig("wide"))
         env.reset(seed=0)
         means[name] = env.get_wrapper_attr("frames")["wide"].mean()

@@ -32,6 +32,18 @@ R152_TABLE = [
     (50, 25, 25),
     (60, 35, 35),
 ]
+# 5.2.3.4: with a bicycle.
+R152_BICYCLE_TABLE = [
+    (20, 0, 0),
+    (38, 0, 0),
+    (39, 10, 0),
+    (40, 10, 0),
+    (41, 25, 25),
+    (45, 25, 25),
+    (50, 30, 30),
+    (55, 35, 35),
+    (60, 40, 40),
+]
 
 
 def impact_row(case, ego, target, impact, **values):
@@ -44,6 +56,12 @@ def impact_row(case, ego, target, impact, **values):
 def test_r152_limits_match_the_regulation():
     computed = [(speed, r152_limit(speed, "laden"), r152_limit(speed, "unladen")) for speed, *_ in R152_TABLE]
     assert computed == R152_TABLE
+
+
+@pytest.mark.parametrize(("target", "table"), [("pedestrian", R152_TABLE), ("bicycle", R152_BICYCLE_TABLE)])
+def test_r152_limits_of_vulnerable_road_users(target, table):
+    computed = [(v, *(r152_limit(v, load, target) for load in ("laden", "unladen"))) for v, *_ in table]
+    assert computed == table
 
 
 def test_r152_has_no_limit_above_60_kmh():
@@ -60,6 +78,11 @@ def test_r152_has_no_limit_above_60_kmh():
         ("CCRs/v60", 60, 0, 35, True, "≤ 35 km/h unladen"),
         ("CCRs/v60", 60, 0, 35.1, False, "≤ 35 km/h unladen"),
         ("CCRm/v60", 60, 20, 0.5, False, "≤ 0 km/h unladen"),  # 40 km/h relative speed
+        ("CPNA/v40", 40, 5, 1, False, "≤ 0 km/h laden"),
+        ("CPNA/v60", 60, 5, 35, True, "≤ 35 km/h unladen"),  # the target crosses: 60 km/h relative speed
+        ("CBNA/v38", 38, 15, 0, True, "≤ 0 km/h laden"),
+        ("CBNA/v40", 40, 15, 1, False, "≤ 0 km/h unladen"),
+        ("CBNA/v60", 60, 15, 40, True, "≤ 40 km/h unladen"),
     ],
 )
 def test_check_r152_uses_relative_speed_and_load(case, ego, target, impact, met, limit):
@@ -86,6 +109,21 @@ def test_r152_allows_a_tenth_of_the_runs_to_fail(failed, met):
         ["≤ 0 km/h unladen"],
         [f"{10 - failed}/10 (5)" if failed else "10/10"],
     ]
+
+
+def test_r152_allows_a_fifth_of_the_runs_with_bicycles_to_fail():
+    def meets(pedestrians, bicycles):
+        cases = [("CPNA/v20", pedestrians), ("CBNA/v20", bicycles)]
+        rows = [
+            impact_row(case, 20, 5, 5 if seed < failed else 0, seed=seed)
+            for case, failed in cases
+            for seed in range(10)
+        ]
+        return meets_r152(rows, "a")
+
+    assert meets(1, 2)
+    assert not meets(2, 2)
+    assert not meets(1, 3)
 
 
 def test_limit_results_leave_out_errors_and_non_threats():

@@ -69,7 +69,7 @@ def violations(case):
         "always-brake has contact only with oncoming cars": not always["collision"] or not avoidable,
         "always-brake brakes falsely or prematurely": always[fault],
         "the oracle avoids every threat": not (threat and avoidable) or oracle["avoided"],
-        # In 2 s the brake takes 9 m/s² times 1.77 s, the time without latency, dead time and half the build-up.
+        # In 2 s the brake takes 9 m/s² times 1.77 s: less latency, dead time and half the build-up.
         "the oracle brakes for oncoming cars": avoidable
         or oracle["impact_speed"] < max(never["impact_speed"] - 15.5, 0.01),
         "the oracle brakes for threats only": threat or oracle["peak_deceleration"] == 0.0,

@@ -2,8 +2,8 @@
 
 2023 (Assessment Protocol Collision Avoidance v10.4.1, 3.3.2): the colour bands are published as numbers for
 50 km/h only. A contact at another speed earns nothing, so the points are a lower bound. CCCscp is left out.
-2026 (Frontal Collisions v1.1, 5.3): the standard range of the rear scenarios. The suite covers too little of
-the extended range and the robustness layer for points.
+2026 (Frontal Collisions v1.1, 5.3): the standard range of the car-to-car rear scenarios. The points of the
+other scenarios, of the extended range and of the robustness layer are left out.
 A run in which the brakes are applied before the test begins (T0, 4 s before contact) earns nothing in either.
 """
 
@@ -60,9 +60,14 @@ def row_colour_2023(row: Row) -> str:
 
 
 def row_colour_2026(row: Row) -> str:
-    """Return the colour of a row of suite ncap2026, or `PREMATURE`."""
+    """Return the colour of a row of a suite ncap2026, `UNKNOWN_COLOUR` or `PREMATURE`.
+
+    The colours of contacts are public for CCRs, CCRm and CCRb.
+    """
     if row["premature_brake"]:
         return PREMATURE
+    if row["collision"] and not row["case"].split("/")[1].startswith("CCR"):
+        return UNKNOWN_COLOUR
     return colour_2026(row["ego_speed"] / KMH, relative_impact(row) / KMH)
 
 
@@ -110,7 +115,12 @@ def points_2026(rows: list[Row], agent: str) -> list[ScenarioPoints]:
     return points
 
 
-ROW_COLOURS: dict[str, Callable[[Row], str]] = {"ncap2023": row_colour_2023, "ncap2026": row_colour_2026}
+ROW_COLOURS: dict[str, Callable[[Row], str]] = {
+    "ncap2023": row_colour_2023,
+    "ncap2023-vru": row_colour_2023,
+    "ncap2026": row_colour_2026,
+    "ncap2026-extended": row_colour_2026,
+}
 SUITE_POINTS: dict[str, Callable[[list[Row], str], list[ScenarioPoints]]] = {
     "ncap2023": points_2023,
     "ncap2026": points_2026,

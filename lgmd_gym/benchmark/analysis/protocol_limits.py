@@ -8,11 +8,18 @@ from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import case_order, cases_and_worlds
 from lgmd_gym.envs.dynamics.units import KMH
 
-# UN R152 Rev.2, 5.2.1.4, M1: relative speed -> highest relative impact speed, both in km/h. Between two
-# columns the limit of the higher speed holds.
-R152_SPEEDS = (40, 42, 45, 50, 55, 60)
-R152_LIMITS = {"laden": (0, 10, 15, 25, 30, 35), "unladen": (0, 0, 15, 25, 30, 35)}
-R152_FAILURES = 0.10  # highest share of failed runs (6.10.1)
+# UN R152 Rev.2, 5.2.1.4, 5.2.2.4 and 5.2.3.4, M1, by target: relative speeds, and the highest relative impact
+# speeds at maximum mass and in running order, all in km/h. Between two columns the limit of the higher speed
+# holds.
+R152_LIMITS = {
+    "car": ((40, 42, 45, 50, 55, 60), (0, 10, 15, 25, 30, 35), (0, 0, 15, 25, 30, 35)),
+    "pedestrian": ((40, 42, 45, 50, 55, 60), (0, 10, 15, 25, 30, 35), (0, 0, 15, 25, 30, 35)),
+    "bicycle": ((38, 40, 45, 50, 55, 60), (0, 10, 25, 30, 35, 40), (0, 0, 25, 30, 35, 40)),
+}
+R152_FAILURES = {"car": 0.10, "pedestrian": 0.10, "bicycle": 0.20}  # highest share of failed runs (6.10.1)
+R152_TARGETS = {"CPNA": "pedestrian", "CBNA": "bicycle"}  # by family; a car in the others
+R152_LADEN = ("CCRs/v40", "CPNA/v40", "CBNA/v38")  # cases at maximum mass
+R152_SUITES = ("r152", "r152-vru")
 
 # Euro NCAP Frontal Collisions 2026, 5.3.1: ego speed -> upper edges of the colours, relative impact speed,
 # both in km/h. An edge belongs to the worse colour.
@@ -44,28 +51,36 @@ def relative_impact(row: Row) -> float:
     return row["relative_impact_speed"] or 0.0
 
 
-def r152_limit(relative_kmh: float, load: str) -> float:
+def r152_limit(relative_kmh: float, load: str, target: str = "car") -> float:
     """Return the highest relative impact speed that UN R152 allows an M1 car [km/h].
 
     Args:
         relative_kmh: Relative speed at the start, in [0, 60] [km/h].
         load: "laden" (maximum mass) or "unladen" (running order).
+        target: "car", "pedestrian" or "bicycle".
 
     Raises:
         ValueError: Above 60 km/h, where the regulation sets no limit.
     """
-    for speed, limit in zip(R152_SPEEDS, R152_LIMITS[load], strict=True):
+    speeds, laden, unladen = R152_LIMITS[target]
+    for speed, limit in zip(speeds, laden if load == "laden" else unladen, strict=True):
         if relative_kmh <= speed + 1e-6:
             return float(limit)
     raise ValueError(f"relative_kmh must be at most 60, the highest speed in UN R152, got {relative_kmh:g}")
 
 
 def r152_load(case: str) -> str:
-    """Return the load state whose limit applies to a case of suite r152.
+    """Return the load state whose limit applies to a case of suite r152 or r152-vru.
 
-    The regulation tests 40 km/h laden only and the other speeds in both states; unladen is the stricter one.
+    The regulation tests 40 km/h (bicycle: 38 km/h) laden only and the other speeds in both states; unladen is
+    the stricter one.
     """
-    return "laden" if case.endswith("CCRs/v40") else "unladen"
+    return "laden" if case.endswith(R152_LADEN) else "unladen"
+
+
+def r152_target(case: str) -> str:
+    """Return the kind of target of a case of suite r152 or r152-vru."""
+    return R152_TARGETS.get(case.split("/")[1], "car")
 
 
 def colour_2026(ego_kmh: float, impact_kmh: float) -> str:
@@ -86,34 +101,40 @@ def colour_2026(ego_kmh: float, impact_kmh: float) -> str:
 
 
 def check_r152(row: Row) -> tuple[bool, str]:
-    """Compare a row of suite r152 with the impact speed limit of its relative speed and load.
+    """Compare a row of suite r152 or r152-vru with the impact speed limit of its relative speed and load.
 
-    Premature braking fails, because it begins before the start of the test (T0).
+    The relative speed to a crossing pedestrian or bicycle is that of the ego. Premature braking fails,
+    because it begins before the start of the test (T0).
     """
-    load = r152_load(row["case"])
-    limit = r152_limit(round((row["ego_speed"] - row["target_speed"]) / KMH, 3), load)
+    load, target = r152_load(row["case"]), r152_target(row["case"])
+    along = row["target_speed"] if target == "car" else 0.0
+    limit = r152_limit(round((row["ego_speed"] - along) / KMH, 3), load, target)
     met = relative_impact(row) / KMH <= limit + 1e-9 and not row["premature_brake"]
     return met, f"≤ {limit:g} km/h {load}"
 
 
 def check_fmvss127(row: Row) -> tuple[bool, str]:
-    """Check a row of suite fmvss127 for contact and for premature braking.
+    """Check a row of suite fmvss127 or fmvss127-pedestrian for contact and for premature braking.
 
-    49 CFR 571.127 S5.1.3 requires that the brakes are applied when a collision is imminent, and that no
-    contact follows. Until then the test speed is maintained: from a time to collision of 5.0 s on (S7.2,
-    S7.3.2, S7.4.2), or from 3 s before the lead vehicle brakes (S7.5.2). The standard sets no time for
-    "imminent"; as in `check_r152`, braking more than 4 s before the contact of `no-brake` fails.
+    49 CFR 571.127 S5.1.3 and S5.2.3 require that the brakes are applied when a collision is imminent, and
+    that no contact follows. Until then the test speed is maintained: from a time to collision of 5.0 s on
+    (S7.2, S7.3.2, S7.4.2) or 4.0 s (S8.2), or from 3 s before the lead vehicle brakes (S7.5.2). The standard
+    sets no time for "imminent"; as in `check_r152`, braking more than 4 s before the contact of `no-brake`
+    fails.
     """
     return not row["collision"] and not row["premature_brake"], "no contact"
 
 
 def check_green(row: Row) -> tuple[bool, str]:
-    """Check a row of suite ncap2026 for the colour green; premature braking fails, as in `check_r152`."""
-    green = colour_2026(row["ego_speed"] / KMH, relative_impact(row) / KMH) == "green"
-    return green and not row["premature_brake"], "green"
+    """Check a row of a suite ncap2026 for green, no contact; premature braking fails, as in `check_r152`."""
+    return not row["collision"] and not row["premature_brake"], "green"
 
 
-LIMIT_CHECKS = {"r152": check_r152, "fmvss127": check_fmvss127, "ncap2026": check_green}
+LIMIT_CHECKS = {
+    **dict.fromkeys(R152_SUITES, check_r152),
+    **dict.fromkeys(("fmvss127", "fmvss127-pedestrian"), check_fmvss127),
+    **dict.fromkeys(("ncap2026", "ncap2026-extended", "ncap2026-robustness"), check_green),
+}
 
 
 def limit_results(rows: list[Row], agent: str, check: LimitCheck) -> list[LimitResult]:
@@ -130,10 +151,13 @@ def limit_results(rows: list[Row], agent: str, check: LimitCheck) -> list[LimitR
 
 
 def meets_r152(rows: list[Row], agent: str) -> bool:
-    """Return whether an agent meets the impact speed limits of UN R152 5.2.1.4 in simulation.
+    """Return whether an agent meets the impact speed limits of UN R152 in simulation.
 
-    As in 6.10.1, at most 10 % of all runs may fail.
+    As in 6.10.1, at most 10 % of all runs with cars and with pedestrians, and 20 % with bicycles, may fail.
     """
     results = limit_results(rows, agent, check_r152)
-    runs, met = sum(item.met.n for item in results), sum(item.met.k for item in results)
-    return runs > 0 and runs - met <= R152_FAILURES * runs
+    for target, share in R152_FAILURES.items():
+        met = [item.met for item in results if r152_target(item.case) == target]
+        if sum(rate.n - rate.k for rate in met) > share * sum(rate.n for rate in met):
+            return False
+    return bool(results)

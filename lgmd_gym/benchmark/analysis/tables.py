@@ -5,7 +5,12 @@ from typing import NamedTuple
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from lgmd_gym.benchmark.analysis.protocol_limits import LIMIT_CHECKS, limit_results, meets_r152
+from lgmd_gym.benchmark.analysis.protocol_limits import (
+    LIMIT_CHECKS,
+    R152_SUITES,
+    limit_results,
+    meets_r152,
+)
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import Mean, Rate
 from lgmd_gym.benchmark.summary import (
@@ -142,9 +147,9 @@ def limit_table(rows: list[Row], agents: list[str], suite: str) -> Table | None:
     threatened = {row["agent"] for row in rows if row["threat"] and row["error"] is None}
     shown = [agent for agent in agents if agent in threatened]
     caption = f"{Sample.of(rows)}; {LIMIT_CAPTION}"
-    if suite == "r152":
+    if suite in R152_SUITES:
         met = ", ".join(agent for agent in shown if meets_r152(rows, agent)) or "none"
-        caption += f"\nmeets the impact speed limits of UN R152 5.2.1.4 in simulation: {met}"
+        caption += f"\nmeets the impact speed limits of UN R152 in simulation: {met}"
     table = Table(title=f"{suite}: limits of the protocol", caption=caption, box=SIMPLE_HEAD)
     table.add_column("case", overflow="fold")
     table.add_column("limit")
