@@ -169,3 +169,28 @@ def test_all_scores():
     assert "| 1/2 [" in a
     assert "| 2.0 [" in a
     assert none == "| no-brake | – | – | – |"
+
+
+def test_real_cars():
+    """A line per agent and run; premature braking and contact are failures."""
+    cases = ("CCRs/v10", "CCRs/v80", "CCRm/v70", "CCRm/v60", "CCRb/v80/brake0.5g-gap12")
+    impact = {"collision": True, "avoided": False, "relative_impact_speed": 10 / 3.6}
+    rows = [threat_row(case=f"fmvss127/{case}", avoided=True) for case in cases]
+    rows[1] |= impact
+    rows.append(rows[0] | {"seed": 1, "avoided": False, "premature_brake": True})
+    config = RunConfig(suite="fmvss127", agents=("a",), seeds=2)
+    *_, line = load("real_cars").table([StoredRun(config, rows, False)])
+    assert line == "| `a`, worlds | 1/3 (10 km/h) | 1/1 | 0/0 | 1/1 |"
+
+
+def test_frontier(tmp_path, capsys, monkeypatch):
+    script, picture = load("frontier"), tmp_path / "frontier.png"
+    arguments = ["frontier.py", "--suites", "r152-vru", "--camera", "standard", "--to", str(picture)]
+    monkeypatch.setattr("sys.argv", arguments)
+    script.main()
+    heads, _, bicycle, pedestrian = capsys.readouterr().out.splitlines()
+    assert "growth in `standard` [px/frame]" in heads
+    assert len({line.count("|") for line in (heads, bicycle, pedestrian)}) == 1
+    assert bicycle.startswith("| CBNA | 4 | 4/4 |")
+    assert pedestrian.startswith("| CPNA | 4 | 4/4 |")
+    assert picture.stat().st_size > 10_000
