@@ -3,9 +3,8 @@
 from math import pi
 
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
-from lgmd_gym.envs.scenarios.crossing_users import crossing_actor
 from lgmd_gym.envs.scenarios.registry import family
-from lgmd_gym.envs.scenarios.road_users import ADULT, BICYCLE, CHILD, RoadUser
+from lgmd_gym.envs.scenarios.road_users import ADULT, BICYCLE, CHILD, RoadUser, crossing_actor
 from lgmd_gym.envs.scenarios.scenario import (
     AFTERMATH,
     EGO_WIDTH,

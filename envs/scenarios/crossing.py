@@ -5,7 +5,7 @@ from math import pi
 from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.scenarios.registry import family
-from lgmd_gym.envs.scenarios.road_users import LARGE_CAR, MOTORCYCLE, SMALL_CAR, parked_row
+from lgmd_gym.envs.scenarios.road_users import LARGE_CAR, MOTORCYCLE, SIDES, SMALL_CAR, parked_row
 from lgmd_gym.envs.scenarios.scenario import (
     AFTERMATH,
     EGO_LENGTH,
@@ -20,7 +20,6 @@ from lgmd_gym.envs.scenarios.scenario import (
 )
 from lgmd_gym.errors import check_flag, check_known, check_within
 
-SIDES = {"right": 1.0, "left": -1.0}
 START_GAP = 2.9  # [m] from a stopped ego to the target's path (AEB C2C v4.3.1, 8.2.5)
 SIDE_IMPACT = 0.1  # of the ego's length behind its front, where a motorcycle strikes it
 WAITING, PULL_AWAY = 4.5, 1.5  # [s], [m/s²], not specified by the protocol

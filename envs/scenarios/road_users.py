@@ -1,5 +1,6 @@
 """Pedestrians, two-wheelers and parked cars of the tests, and their motion before a contact."""
 
+from math import pi
 from typing import Any, NamedTuple
 
 from lgmd_gym.envs.dynamics.segment import Segment
@@ -7,12 +8,18 @@ from lgmd_gym.envs.scenarios.scenario import (
     ADULT_SIZE,
     BICYCLE_SIZE,
     CHILD_SIZE,
+    EGO_WIDTH,
     MOTORCYCLE_SIZE,
+    START_TTC,
     TARGET_HEIGHT,
     TARGET_LENGTH,
     TARGET_WIDTH,
     Actor,
 )
+from lgmd_gym.errors import check_known, check_within
+
+SIDES = {"right": 1.0, "left": -1.0}
+"""Sides from which road users cross, with the sign of their direction, + to the left."""
 
 
 class RoadUser(NamedTuple):
@@ -100,3 +107,31 @@ def parked_row(front: float, inner: float, cars: tuple[RoadUser, ...], spacing: 
         row.append(Actor(gap=front - car.length, lateral_offset=aside, **car.fields))
         front -= car.length + spacing
     return tuple(row)
+
+
+def crossing_actor(
+    user: RoadUser, ego_speed: float, side: str, impact_location: float, run: tuple[float, float, float],
+    shade: int | None,
+) -> Actor:  # fmt: skip
+    """Return a road user whose impact point is at the impact location 5 s after the start.
+
+    Args:
+        user: The road user.
+        ego_speed: Ego speed [m/s].
+        side: Side from which the road user comes, "right" or "left".
+        impact_location: Position across the ego's width, 0 the right side and 1 the left.
+        run: Speed [m/s], distance at that speed [m], and distance of the acceleration before it [m].
+        shade: Grey level; None to draw it from the seed.
+    """
+    check_known("side", side, SIDES)
+    to_left, motion = SIDES[side], run_up(START_TTC, *run)
+    aim = (check_within("impact_location", impact_location, 0.1, 0.9) - 0.5) * EGO_WIDTH
+    return Actor(
+        gap=START_TTC * ego_speed + user.width / 2 - user.length / 2,
+        lateral_offset=aim - to_left * (user.impact_point + motion.distance),
+        heading=to_left * pi / 2,
+        speed=motion.speed,
+        profile=motion.profile,
+        shade=shade,
+        **user.fields,
+    )

@@ -1,59 +1,18 @@
 """Turns across the path of another road user: Euro NCAP's CCFtap, CMFtap and CPTA."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
-from math import cos, pi, radians, sin, tan
+from math import cos, pi, sin, tan
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose
+from lgmd_gym.envs.dynamics.bend import Pose
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.road_users import ADULT, MOTORCYCLE, TARGET_CAR, RoadUser, run_up
-from lgmd_gym.envs.scenarios.scenario import (
-    AFTERMATH,
-    EGO_LENGTH,
-    LANE_WIDTH,
-    REAR_AXLE,
-    START_TTC,
-    WHEELBASE,
-    Actor,
-    RoadPlan,
-    Scenario,
-)
+from lgmd_gym.envs.scenarios.scenario import LANE_WIDTH, Actor, Scenario
+from lgmd_gym.envs.scenarios.turn_geometry import Turn, contact_in_turn, turn_of, turning_ego
 from lgmd_gym.errors import check_flag, check_known, check_within
 
-FIRST_RADIUS = 1500.0  # [m] at the start of the clothoid
-BEFORE_TURN = 2.0  # [s] from the start to the turn; T0 is 1 s before it
 DIRECTIONS = {"same": 1.0, "opposite": -1.0}
 PEDESTRIAN_LINE = 9.5  # [m] between the centre line of the ego's road and the pedestrian's path
-FRONT = REAR_AXLE + EGO_LENGTH / 2  # [m] from the rear axle to the front bumper
-
-
-@dataclass(frozen=True, slots=True)
-class _Turn:
-    """A turn of 90° of the ego's front axle: clothoid, arc and clothoid.
-
-    Attributes:
-        radius: Radius of the arc [m].
-        clothoid_deg: Change of heading on each clothoid [degrees].
-        arc_deg: Change of heading on the arc [degrees].
-    """
-
-    radius: float
-    clothoid_deg: float
-    arc_deg: float
-
-    def bends(self, left: bool) -> tuple[Bend, ...]:
-        """Return the path of the front axle."""
-        sign = 1.0 if left else -1.0
-        low, high = sign / FIRST_RADIUS, sign / self.radius
-        length = 2.0 * radians(self.clothoid_deg) / (1.0 / FIRST_RADIUS + 1.0 / self.radius)
-        arc = Bend(radians(self.arc_deg) * self.radius, high)
-        return Bend(length, low, high), arc, Bend(length, high, low)
-
-
-# Highest ego speed [km/h] of each turn, Euro NCAP Frontal Collisions v1.1, 1.2.4.
-TURNS = {10: _Turn(9.0, 20.62, 48.76), 15: _Turn(11.75, 20.93, 48.14), 25: _Turn(14.75, 21.79, 46.42)}
 
 
 @family("CCFtap")
@@ -110,7 +69,7 @@ def turn_towards_pedestrian(
     check_known("direction", direction, DIRECTIONS)
     ahead, line = DIRECTIONS[direction], _pedestrian_line(left)
     speed, walking = _turning_speed(ego_speed), 5 * KMH
-    ego = _turning_ego(speed, left, _pedestrian_contact(_turn_of(speed), left, ahead))
+    ego = turning_ego(speed, left, _pedestrian_contact(turn_of(speed), left, ahead))
     # The pedestrian starts 6 m before the contact if it comes from the far kerb, else 9.5 m.
     start = 6.0 if left and direction == "opposite" else 9.5
     run = run_up(ego.contact, walking, start - 2.0, 2.0)
@@ -139,8 +98,8 @@ def _hip(front: Pose, line: float) -> tuple[float, float]:
 
 
 @lru_cache
-def _pedestrian_contact(turn: _Turn, left: bool, ahead: float) -> tuple[float, Pose]:
-    """Return the contact with the pedestrian, see `_contact`."""
+def _pedestrian_contact(turn: Turn, left: bool, ahead: float) -> tuple[float, Pose]:
+    """Return the contact with the pedestrian, see `contact_in_turn`."""
     line = _pedestrian_line(left)
 
     def clearance(front: Pose) -> float:
@@ -151,49 +110,20 @@ def _pedestrian_contact(turn: _Turn, left: bool, ahead: float) -> tuple[float, P
         reach = (abs(forward) * ADULT.length + abs(aside) * ADULT.width) / 2
         return x * forward + y * aside - reach
 
-    return _contact(turn, left, clearance)
+    return contact_in_turn(turn, left, clearance)
 
 
 @lru_cache
-def _crossing_contact(turn: _Turn, width: float) -> tuple[float, Pose]:
-    """Return the contact with an oncoming road user of a width [m], see `_contact`."""
-    return _contact(turn, True, lambda front: LANE_WIDTH - width / 2 - front.y)
-
-
-@dataclass(frozen=True, slots=True)
-class _TurningEgo:
-    """The ego's turn up to the contact.
-
-    Attributes:
-        path: Path of the rear axle.
-        junction: Distance from the ego's initial centre to the centre of the crossing road [m].
-        contact: Time of the contact [s].
-        front: Middle of the ego's front at the contact, relative to that at the start, + left; heading.
-    """
-
-    path: tuple[Bend, ...]
-    junction: float
-    contact: float
-    front: Pose
-
-    def scenario(self, name: str, speed: float, actor: Actor) -> Scenario:
-        """Return the scenario with an actor."""
-        return Scenario(
-            family=name,
-            ego_speed=speed,
-            duration=self.contact + AFTERMATH,
-            actors=(actor,),
-            ego_path=self.path,
-            road=RoadPlan(kind="crossing", distance=self.junction),
-            ego_reference=REAR_AXLE,
-        )
+def _crossing_contact(turn: Turn, width: float) -> tuple[float, Pose]:
+    """Return the contact with an oncoming road user of a width [m], see `contact_in_turn`."""
+    return contact_in_turn(turn, True, lambda front: LANE_WIDTH - width / 2 - front.y)
 
 
 def _turn_across(
     name: str, user: RoadUser, ego_speed: float, target_speed: float, shade: int | None
 ) -> Scenario:
     speed, oncoming = _turning_speed(ego_speed), check_speed("target_speed", target_speed)
-    ego = _turning_ego(speed, True, _crossing_contact(_turn_of(speed), user.width))
+    ego = turning_ego(speed, True, _crossing_contact(turn_of(speed), user.width))
     target = Actor(
         gap=ego.front.x + oncoming * ego.contact,
         lateral_offset=LANE_WIDTH,
@@ -207,69 +137,3 @@ def _turn_across(
 
 def _turning_speed(ego_speed: float) -> float:
     return check_within("ego_speed", check_speed("ego_speed", ego_speed), 0.0, 25.02 * KMH, "m/s")
-
-
-def _turn_of(speed: float) -> _Turn:
-    """Return the turn that the ego drives at a speed [m/s]."""
-    return next(turn for limit, turn in TURNS.items() if speed <= (limit + 0.02) * KMH)
-
-
-def _turning_ego(speed: float, left: bool, contact: tuple[float, Pose]) -> _TurningEgo:
-    """Return the ego's turn with a contact that is at least 5 s after the start.
-
-    Args:
-        speed: Ego speed [m/s].
-        left: Whether the ego turns left.
-        contact: See `_contact`.
-    """
-    # A module that loads numba; the registration of the scenario families must not.
-    from lgmd_gym.envs.dynamics.path import Path
-
-    turn, (way, front) = _turn_of(speed), contact
-    straight = max(BEFORE_TURN * speed, START_TTC * speed - way)
-    length = sum(bend.length for bend in turn.bends(left))
-    end = (
-        Path(Pose(0.0, 0.0, 0.0), turn.bends(left)).pose(length).x
-    )  # of the front axle, from the turn's start
-    lane = LANE_WIDTH / 2 if left else -LANE_WIDTH / 2  # of the crossing road, into which the ego turns
-    path = (Bend(straight), *_rear_path(turn, left))
-    moved = Pose(straight + front.x, front.y, front.heading)
-    return _TurningEgo(path, REAR_AXLE + straight + end - lane, (straight + way) / speed, moved)
-
-
-@lru_cache
-def _rear_path(turn: _Turn, left: bool) -> tuple[Bend, ...]:
-    """Return the path of the rear axle from the time at which the front axle begins the turn."""
-    # A module that loads numba; the registration of the scenario families must not.
-    from lgmd_gym.envs.dynamics.steered_path import rear_axle_path
-
-    return rear_axle_path(turn.bends(left), WHEELBASE)
-
-
-def _contact(turn: _Turn, left: bool, clearance: Callable[[Pose], float]) -> tuple[float, Pose]:
-    """Return the place of a contact in a turn, by bisection.
-
-    Args:
-        turn: The turn.
-        left: Whether the ego turns left.
-        clearance: Returns a distance for the middle of the ego's front that decreases along the turn and is 0
-            at the contact.
-
-    Returns:
-        Distance that the rear axle has covered in the turn [m]; position of the middle of the ego's front
-        relative to that at the start of the turn, + left, and the heading.
-    """
-    from lgmd_gym.envs.dynamics.path import Path
-
-    path = Path(Pose(-FRONT, 0.0, 0.0), _rear_path(turn, left))
-
-    def front(way: float) -> Pose:
-        pose = path.pose(way)
-        x, y = pose.x + FRONT * cos(pose.heading), pose.y + FRONT * sin(pose.heading)
-        return Pose(x, -y, -pose.heading)
-
-    low, high = 1.0, float(path.table[-1, 0])  # after 1 m the ego has turned a little
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if clearance(front(middle)) > 0.0 else (low, middle)
-    return low, front(low)
