@@ -5,8 +5,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgmd_gym.camera.objects import BRAKE_LIGHT_MPS2, MAX_RANGE, MODEL_BOX, MODEL_CAR, MODEL_MARK
-from lgmd_gym.envs.dynamics.bodies import CAR, ROAD_MARKING
+from lgmd_gym.camera.objects import (
+    BRAKE_LIGHT_MPS2,
+    MAX_RANGE,
+    MODEL_BICYCLE,
+    MODEL_BOX,
+    MODEL_CAR,
+    MODEL_MARK,
+    MODEL_MOTORCYCLE,
+    MODEL_PEDESTRIAN,
+)
+from lgmd_gym.envs.dynamics.bodies import BICYCLE, CAR, MOTORCYCLE, PEDESTRIAN, ROAD_MARKING
 from lgmd_gym.envs.dynamics.episode import Physics
 from lgmd_gym.envs.dynamics.jit import Arrays, compiled
 
@@ -48,6 +57,20 @@ def write_scene(i: int, rate: float, physics: Arrays, arrays: Arrays) -> None:
         item.cos, item.sin = math.cos(body.heading), math.sin(body.heading)
         item.length, item.width, item.height, item.shade = body.length, body.width, body.height, body.shade
         item.range = MAX_RANGE
-        item.model = MODEL_CAR if body.kind == CAR else MODEL_MARK if body.kind == ROAD_MARKING else MODEL_BOX
+        item.model, item.travelled = _model_of(body.kind), body.travelled
         item.braking = 1 if body.kind == CAR and body.acceleration < BRAKE_LIGHT_MPS2 else 0
     arrays.counts[i] = count - 1
+
+
+@compiled
+def _model_of(kind: int) -> int:
+    """Return the model that a kind of body is drawn with."""
+    if kind == CAR:
+        return MODEL_CAR
+    if kind == ROAD_MARKING:
+        return MODEL_MARK
+    if kind == PEDESTRIAN:
+        return MODEL_PEDESTRIAN
+    if kind == BICYCLE:
+        return MODEL_BICYCLE
+    return MODEL_MOTORCYCLE if kind == MOTORCYCLE else MODEL_BOX

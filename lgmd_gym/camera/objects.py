@@ -24,6 +24,7 @@ MODEL_SMALL, MODEL_SUV, MODEL_VAN, MODEL_TRAILER, MODEL_BUS = 9, 10, 11, 12, 13
 MODEL_BEAM, MODEL_DECK, MODEL_PANEL, MODEL_BOARD, MODEL_SIGNAL = 14, 15, 16, 17, 18
 MODEL_ROUND_SIGN, MODEL_TRIANGLE_SIGN, MODEL_PLATE_SIGN, MODEL_POWER_POLE = 19, 20, 21, 22
 MODEL_WALL, MODEL_HEDGE, MODEL_HOUSE, MODEL_LAMP, MODEL_THICKET = 23, 24, 25, 26, 27
+MODEL_PEDESTRIAN, MODEL_BICYCLE, MODEL_MOTORCYCLE = 28, 29, 30  # figures, in the order of their tables
 OUTLINE = -1.0
 """Shade of a ground mark that is painted as an outline; other shades fill it."""
 FIRST_INDEXED = -2.0
@@ -33,20 +34,34 @@ OBJECT = np.dtype(
     [
         *((name, np.float64) for name in ("x", "y", "cos", "sin", "length", "width", "height", "shade")),
         *(("braking", np.int64), ("model", np.int64), ("range", np.float64), ("speed", np.float64)),
-        ("base", np.float64),
+        *((name, np.float64) for name in ("base", "travelled")),
     ]
 )
 """An object: centre [m], heading, size [m], grey of the body, brake lights, model, range [m], speed [m/s],
-height of the underside, 0 for all that stands on the ground [m]; `height` is that of the top.
+height of the underside, 0 for all that stands on the ground [m]; `height` is that of the top, with a rider;
+distance travelled, which moves the legs of pedestrians and cyclists [m].
 
 A vehicle has the model `MODEL_CAR`; `choose_objects` draws large ones as trucks.
 """
-_RECORD = struct.Struct("=8d2q3d")  # packing is twice as fast as assigning a record
+_RECORD = struct.Struct("=8d2q4d")  # packing is twice as fast as assigning a record
 
 BRAKE_LIGHT_MPS2 = -0.5
 """Acceleration below which the brake lights are on [m/s²]."""
 _MOUNT_REACH = 100.0  # upper bound of the distance between a lens and the ego's centre [m]
 _TALL_M, _LONG_M, _TRUCK_HEIGHT_M = 2.2, 7.5, 2.8  # a taller or longer car is drawn as a truck
+FIGURES = {
+    "Pedestrian": (MODEL_PEDESTRIAN, 1.8),
+    "Bicycle": (MODEL_BICYCLE, 1.86),
+    "Motorcycle": (MODEL_MOTORCYCLE, 1.45),
+}
+"""Models and default heights of classes with these names [m]; the height of a two-wheeler includes its rider."""
+JACKET = 60.0
+"""Grey of a jacket without a grey of its own: dark, as that of test dummies."""
+_SHADES = {
+    MODEL_MARK: OUTLINE,
+    MODEL_BARRIER: 185.0,
+    **{model: JACKET for model, _ in FIGURES.values()},
+}
 _MODELS: dict[type, tuple[int, float]] = {}
 
 
@@ -146,7 +161,7 @@ def _write(item: Any, x: float, y: float, place: int, records: memoryview, row: 
     model, height = _MODELS.get(item.__class__) or _default_appearance(item.__class__)
     shade = getattr(item, "shade", None)
     if shade is None:
-        shade = OUTLINE if model == MODEL_MARK else 185.0 if model == MODEL_BARRIER else FIRST_INDEXED - place
+        shade = _SHADES.get(model, FIRST_INDEXED - place)
     elif model == MODEL_BARRIER:
         model = MODEL_BOX  # an obstacle with a grey of its own has no stripes
     action = getattr(item, "action", None)
@@ -154,7 +169,7 @@ def _write(item: Any, x: float, y: float, place: int, records: memoryview, row: 
     _RECORD.pack_into(
         records, row * _RECORD.size,
         x, y, math.cos(heading), math.sin(heading), item.LENGTH, item.WIDTH, getattr(item, "HEIGHT", height),
-        shade, braking, model, MAX_RANGE, getattr(item, "speed", 0.0), 0.0,
+        shade, braking, model, MAX_RANGE, getattr(item, "speed", 0.0), 0.0, getattr(item, "travelled", 0.0),
     )  # fmt: skip
 
 
@@ -162,6 +177,12 @@ def _write(item: Any, x: float, y: float, place: int, records: memoryview, row: 
 def is_picture(model):
     """Return whether a model is a flat picture that faces the lens."""
     return MODEL_POST <= model <= MODEL_CROWN
+
+
+@kernel
+def is_figure(model):
+    """Return whether a model is a pedestrian or a two-wheeler with its rider."""
+    return MODEL_PEDESTRIAN <= model <= MODEL_MOTORCYCLE
 
 
 @exact_kernel
@@ -185,6 +206,8 @@ def choose_objects(lens, mount, objects, count, chosen):
         chosen[n] = objects[i]
         obj = chosen[n]
         n += 1
+        if is_figure(obj.model) and mount.box != 0:
+            obj.model = MODEL_BOX
         if obj.model == MODEL_CAR:
             if mount.box != 0:
                 obj.model = MODEL_BOX
@@ -210,7 +233,10 @@ def light_of_code(grey, linear):
 def _default_appearance(cls: type) -> tuple[int, float]:
     """Return model and default height [m] of a class of objects, from the names of its base classes."""
     names = {base.__name__ for base in cls.__mro__}
-    if "Landmark" in names:
+    figure = [FIGURES[name] for name in FIGURES if name in names]
+    if figure:
+        model = figure[0]
+    elif "Landmark" in names:
         model = MODEL_MARK, 0.0
     elif "Obstacle" in names:
         model = MODEL_BARRIER, 1.0

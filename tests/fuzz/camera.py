@@ -16,7 +16,7 @@ sys.path[:0] = [str(Path(__file__).parents[1])]
 
 from highway_env.vehicle.kinematics import Vehicle
 from support.fuzz import run_cases
-from support.roads import add_car, add_mark, add_obstacle, env_of, ring_road, straight_env
+from support.roads import FIGURES, add_car, add_figure, add_mark, add_obstacle, env_of, ring_road, straight_env
 
 import lgmd_gym  # noqa: F401 - registers the environments
 from lgmd_gym.camera import CameraParams, EgoCamera
@@ -85,10 +85,21 @@ def draw_scene(rng):
             add_mark(env, *at, size=tuple(rng.uniform(0.1, 20.0, 2)))
         elif body == 1:
             add_obstacle(env, *at)
+        elif body == 2:
+            add_random_figure(env, rng, *at)
         else:
             size, speed = rng.uniform((0.1, 0.1, 0.1), (30.0, 5.0, 5.0)), float(rng.uniform(-40.0, 40.0))
             add_car(env, *at, heading=float(rng.uniform(-4.0, 4.0)), size=tuple(size), speed=speed)
     return ("ring" if kind == 1 else "straight"), env
+
+
+def add_random_figure(env, rng, x, y):
+    """Add a pedestrian or a two-wheeler, of its usual size or of a size without proportion."""
+    kind, size = str(rng.choice(list(FIGURES))), None
+    if rng.random() < 0.3:
+        size = tuple(rng.uniform((0.1, 0.1, 0.1), (3.0, 1.0, 3.0)))
+    heading, speed, travelled = rng.uniform((-4.0, -2.0, -50.0), (4.0, 10.0, 50.0)).tolist()
+    add_figure(env, kind, x, y, heading=heading, size=size, speed=speed, travelled=travelled)
 
 
 @functools.cache

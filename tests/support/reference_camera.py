@@ -207,17 +207,20 @@ def objects_of(env, p):
 
 def _appearance(item, place, p):
     """Return an object as it is drawn; vehicles without a shade get one by their place in the list."""
-    model, height = kinds._default_appearance(type(item))
+    named, height = kinds._default_appearance(type(item))
+    model = named
     height, shade = getattr(item, "HEIGHT", height), getattr(item, "shade", None)
     if model == kinds.MODEL_CAR and (height > 2.2 or item.LENGTH > 7.5) and p.vehicles == "car":
         model, height = kinds.MODEL_TRUCK, max(height, 2.8)
-    plain = {kinds.MODEL_CAR: p.vehicles == "box", kinds.MODEL_BARRIER: shade is not None}
+    figures = {model: p.vehicles == "box" for model, _ in kinds.FIGURES.values()}
+    plain = {**figures, kinds.MODEL_CAR: p.vehicles == "box", kinds.MODEL_BARRIER: shade is not None}
     if plain.get(model, False):
         model = kinds.MODEL_BOX
     if shade is None:
         turns = (0.29 + 0.6180339887498949 * place + 0.7548776662466927 * p.seed) % 1.0
         fixed = {kinds.MODEL_MARK: kinds.OUTLINE, kinds.MODEL_BARRIER: 185.0}
-        shade = fixed.get(model, 30.0 + 195.0 * turns)
+        fixed |= {model: 60.0 for model, _ in kinds.FIGURES.values()}
+        shade = fixed.get(named, 30.0 + 195.0 * turns)
     return SimpleNamespace(
         x=float(item.position[0]),
         y=float(item.position[1]),
@@ -231,6 +234,8 @@ def _appearance(item, place, p):
         model=model,
         range=kinds.MAX_RANGE,
         base=0.0,
+        speed=float(getattr(item, "speed", 0.0)),
+        travelled=float(getattr(item, "travelled", 0.0)),
     )
 
 

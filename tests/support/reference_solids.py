@@ -6,10 +6,10 @@ import warnings
 
 import numpy as np
 from support.reference_air import beam, row_slope, veil
-from support.reference_ground import inside
+from support.reference_figures import figure_layers
+from support.reference_geometry import camera_axes, covered
 
-from lgmd_gym.camera.objects import MODEL_MARK, is_picture
-from lgmd_gym.camera.render.coverage import NEAR
+from lgmd_gym.camera.objects import MODEL_MARK, is_figure, is_picture
 from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
 from lgmd_gym.camera.render.models import all_models
 
@@ -28,10 +28,13 @@ def ordered_solids(scene, rays, row, column):
     """
     models, found = all_models(linear=False), []
     for item in scene.objects:
-        if item.model != MODEL_MARK:
+        away = math.hypot(item.x - scene.lens.x, item.y - scene.lens.y)
+        if is_figure(item.model):
+            light = veil(scene, column, row_slope(scene.lens, row), away)
+            found += figure_layers(scene, item, rays, light)
+        elif item.model != MODEL_MARK:
             solids = [_solid(scene, item, solid, rays) for solid in range(*models.models[item.model])]
             solids = [solid for solid in solids if solid is not None]
-            away = math.hypot(item.x - scene.lens.x, item.y - scene.lens.y)
             light = veil(scene, column, row_slope(scene.lens, row), away) if solids else 0.0
             found += _with_distances([(cover, grey + light, *rest) for cover, grey, *rest in solids])
     if not found:
@@ -73,18 +76,18 @@ def _solid(scene, item, solid, rays):
             continue
         corners = _corners(scene, item, models, face)
         normal = np.cross(corners[1] - corners[0], corners[2] - corners[1])
-        covered = _covered(lens, corners, rays)
-        if normal @ corners[0] >= 0.0 or not covered.any():
+        hit = covered(lens, corners, rays)
+        if normal @ corners[0] >= 0.0 or not hit.any():
             continue
         grey = _covered_grey(scene, item, models, face, _face_light(scene, item, normal), rays)
         distance = np.full(rays.v.shape, away / lens.focal)
         if not is_picture(item.model):
             with np.errstate(divide="ignore"):
                 distance = (normal @ corners[0]) / (rays.direction @ normal)
-        covers = covers + rays.mean(covered)
+        covers = covers + rays.mean(hit)
         light = light + rays.mean(grey)
-        contrast = np.maximum(contrast, np.ptp(grey, axis=1) * (rays.mean(covered) > 0.0))
-        distances[covered] = distance[covered]
+        contrast = np.maximum(contrast, np.ptp(grey, axis=1) * (rays.mean(hit) > 0.0))
+        distances[hit] = distance[hit]
     if not np.any(covers):
         return None
     inverse = 1.0 / np.maximum(covers, 1e-12)
@@ -102,33 +105,13 @@ def _corners(scene, item, models, polygon):
         cos, sin = dx / away, dy / away
     x = dx + a * item.length * cos - b * item.width * sin
     y = dy + a * item.length * sin + b * item.width * cos
-    return _camera_axes(lens, x, y, item.base + c * (item.height - item.base) - lens.z)
-
-
-def _camera_axes(lens, x, y, z):
-    ahead, right = x * lens.cos_yaw + y * lens.sin_yaw, y * lens.cos_yaw - x * lens.sin_yaw
-    depth = ahead * lens.cos_pitch + z * lens.sin_pitch
-    return np.stack((depth, right, ahead * lens.sin_pitch - z * lens.cos_pitch), axis=-1)
-
-
-def _covered(lens, corners, rays):
-    """Return whether rays go through a polygon, which is cut at the near plane."""
-    points = []
-    for start, end in zip(np.roll(corners, 1, axis=0), corners, strict=True):
-        if (start[0] >= NEAR) != (end[0] >= NEAR):
-            points.append(start + (NEAR - start[0]) / (end[0] - start[0]) * (end - start))
-        if end[0] >= NEAR:
-            points.append(end)
-    if len(points) < 3:
-        return np.zeros(rays.v.shape, dtype=bool)
-    flat = np.array([(right / depth, down / depth) for depth, right, down in points])
-    return inside(rays.direction[..., 1] / lens.focal, rays.direction[..., 2] / lens.focal, flat)
+    return camera_axes(lens, x, y, item.base + c * (item.height - item.base) - lens.z)
 
 
 def _face_light(scene, item, normal):
     """Return the light on a face: from the sky, the sun and, at night, the low beam."""
     lens = scene.lens
-    sun = _camera_axes(lens, scene.look.sun_x, scene.look.sun_y, scene.look.sun_z)
+    sun = camera_axes(lens, scene.look.sun_x, scene.look.sun_y, scene.look.sun_z)
     light = scene.look.ambient + scene.look.direct * max(0.0, float(normal @ sun) / np.linalg.norm(normal))
     if scene.look.night:
         dx, dy = item.x - lens.x, item.y - lens.y
@@ -145,7 +128,7 @@ def _covered_grey(scene, item, models, face, light, rays):
     away = math.hypot(item.x - scene.lens.x, item.y - scene.lens.y)
     size = scene.lens.focal * (item.height - item.base) / max(away - 0.5 * item.length, 1.0)
     greys = {face: _grey(scene, item, models, face, light)}
-    out = greys[face] * _covered(scene.lens, _corners(scene, item, models, face), rays)
+    out = greys[face] * covered(scene.lens, _corners(scene, item, models, face), rays)
     for detail in range(face + 1, len(models.parent)):
         parent = models.parent[detail]
         if parent not in greys:
@@ -154,8 +137,8 @@ def _covered_grey(scene, item, models, face, light, rays):
         if weight <= 0.0:
             continue
         greys[detail] = _grey(scene, item, models, detail, light)
-        covered = _covered(scene.lens, _corners(scene, item, models, detail), rays)
-        out += weight * covered * (greys[detail] - greys[parent])
+        hit = covered(scene.lens, _corners(scene, item, models, detail), rays)
+        out += weight * hit * (greys[detail] - greys[parent])
     return out
 
 

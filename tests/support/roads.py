@@ -79,6 +79,29 @@ def add_obstacle(env, x, y, shade=None):
     return obstacle
 
 
+FIGURES = {
+    kind: (type(kind, (Obstacle,), {}), size)
+    for kind, size in (
+        ("Pedestrian", (0.6, 0.5, 1.8)),
+        ("Bicycle", (1.89, 0.5, 1.86)),
+        ("Motorcycle", (2.08, 0.79, 1.45)),
+    )
+}
+"""Classes of figures by name, as the camera reads them, and their usual sizes."""
+
+
+def add_figure(env, kind, x, y, shade=None, heading=0.0, size=None, speed=0.0, travelled=0.0):
+    """Add a "Pedestrian", "Bicycle" or "Motorcycle" of length, width and height."""
+    cls, usual = FIGURES[kind]
+    figure = cls(env.road, [x, y], heading, speed)
+    figure.LENGTH, figure.WIDTH, figure.HEIGHT = usual if size is None else size
+    figure.travelled = travelled
+    if shade is not None:
+        figure.shade = shade
+    env.road.objects.append(figure)
+    return figure
+
+
 def lens_x(env):
     """World x of the default lens of an ego that heads along +x."""
     return env.vehicle.position[0] + EGO_LENGTH / 2 - 1.7

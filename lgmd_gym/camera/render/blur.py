@@ -76,6 +76,7 @@ def move_objects(objects, count, time_s):
         obj = objects[i]
         obj.x += time_s * obj.speed * obj.cos
         obj.y += time_s * obj.speed * obj.sin
+        obj.travelled += time_s * obj.speed
 
 
 @kernel

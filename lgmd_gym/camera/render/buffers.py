@@ -6,6 +6,7 @@ import numpy as np
 
 from lgmd_gym.camera.objects import MAX_DRAWN
 from lgmd_gym.camera.pinhole import LENS
+from lgmd_gym.camera.render.figure_builder import MAX_JOINTS
 
 
 class Views(NamedTuple):
@@ -78,6 +79,7 @@ class Buffers(NamedTuple):
         quad: x, y of four corners on the ground, float64, shape (8,) [m].
         axes: Axes of an object, see `place_object`, float64, shape (5, 3).
         greys: Grey and light of the polygons of all models, float64, shape (polygons, 2).
+        joints: Joints of a figure, see `pose_figure`, then as (depth, right, down), float64, shape (56, 3) [m].
         order: Indices of the objects in drawing order, int64, shape (512,).
         distances: Distances of the objects from the lens, float64, shape (512,) [m].
         extents: Middle and half of an object's azimuths [quarter turns] and its least and greatest distance
@@ -97,6 +99,7 @@ class Buffers(NamedTuple):
     quad: np.ndarray
     axes: np.ndarray
     greys: np.ndarray
+    joints: np.ndarray
     order: np.ndarray
     distances: np.ndarray
     extents: np.ndarray
@@ -121,6 +124,7 @@ class SolidLayer(NamedTuple):
     uv: np.ndarray
     axes: np.ndarray
     greys: np.ndarray
+    joints: np.ndarray
 
 
 def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
@@ -137,6 +141,7 @@ def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
         quad=np.zeros(8),
         axes=np.zeros((5, 3)),
         greys=np.zeros((polygons, 2)),
+        joints=np.zeros((MAX_JOINTS, 3)),
         order=np.zeros(MAX_DRAWN, dtype=np.int64),
         distances=np.zeros(MAX_DRAWN),
         extents=np.zeros((MAX_DRAWN, 4)),

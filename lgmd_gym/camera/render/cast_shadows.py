@@ -8,7 +8,14 @@ import math
 
 import numpy as np
 
-from lgmd_gym.camera.objects import MODEL_BARRIER, MODEL_BOX, MODEL_MARK, MODEL_TREE
+from lgmd_gym.camera.objects import (
+    MODEL_BARRIER,
+    MODEL_BOX,
+    MODEL_MARK,
+    MODEL_PEDESTRIAN,
+    MODEL_TREE,
+    is_figure,
+)
 from lgmd_gym.camera.pose import side_tangent
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
 from lgmd_gym.camera.render.ground import CAST
@@ -18,6 +25,15 @@ from lgmd_gym.camera.render.order import first_from
 _FADE_START, _FADE_END = 100.0, 150.0  # shadows fade out between these distances from the lens [m]
 _CROWN = np.array([(math.cos(0.25 * math.pi * k), math.sin(0.25 * math.pi * k)) for k in range(8)])
 """Corners of the octagon that a tree's crown is drawn as."""
+_FIGURE_BOXES = np.array(
+    [
+        [(0.22, 0.22, 0.0, 0.52, 1.0), (0.2, 0.45, 0.5, 0.97, 1.0)],
+        [(0.5, 0.06, 0.0, 0.4, 0.6), (0.17, 0.4, 0.2, 1.0, 1.0)],
+        [(0.48, 0.2, 0.0, 0.55, 1.0), (0.2, 0.4, 0.5, 1.0, 1.0)],
+    ]
+)
+"""The shadow of a figure is that of two boxes, legs or wheels, then body: half of length and width and lower and
+upper end, as shares of those of the figure, and weight."""
 _MOST_SHIFT = 8.0  # length of a shadow per height; at lower elevations of the sun, shadows end there
 
 
@@ -63,10 +79,19 @@ def _add_shadow_of(layer, lens, obj, away):
     if obj.model == MODEL_TREE:
         n = _crown_outline(layer, lens, obj, away)
         _add_outline(layer, lens, n, weight)
-        n = _box_outline(layer, lens, obj, away, 0.12 * obj.width, 0.0, 0.3 * obj.height)
+        trunk = 0.06 * obj.width
+        n = _box_outline(layer, lens, obj, away, (trunk, trunk), (0.0, 0.3 * obj.height))
         _add_outline(layer, lens, n, weight)
         return
-    n = _box_outline(layer, lens, obj, away, 0.0, obj.base, obj.height)
+    if is_figure(obj.model):
+        for k in range(2):
+            box = _FIGURE_BOXES[obj.model - MODEL_PEDESTRIAN, k]
+            sides, heights = (box[0] * obj.length, box[1] * obj.width), (box[2] * obj.height, box[3] * obj.height)
+            n = _box_outline(layer, lens, obj, away, sides, heights)
+            _add_outline(layer, lens, n, box[4] * weight)
+        return
+    sides = (0.5 * obj.length, 0.5 * obj.width)
+    n = _box_outline(layer, lens, obj, away, sides, (obj.base, obj.height))
     _add_outline(layer, lens, n, weight)
 
 
@@ -80,12 +105,13 @@ def _write_corner(layer, lens, i, x, y):
 
 
 @kernel
-def _box_outline(layer, lens, obj, away, size, low, high):
-    """Write the outline of a box's shadow, between two heights [m]; returns the number of its corners.
+def _box_outline(layer, lens, obj, away, sides, heights):
+    """Write the outline of a box's shadow; returns the number of its corners.
 
-    `size` replaces length and width unless it is 0 [m].
+    `sides` are half the length and half the width of the box, `heights` its lower and upper end [m].
     """
-    hx, hy = 0.5 * (size if size > 0.0 else obj.length), 0.5 * (size if size > 0.0 else obj.width)
+    hx, hy = sides
+    low, high = heights
     dx, dy = obj.x - lens.x, obj.y - lens.y
     along, across = away[0] * obj.cos + away[1] * obj.sin, away[1] * obj.cos - away[0] * obj.sin
     n = 0

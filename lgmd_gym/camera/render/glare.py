@@ -28,8 +28,8 @@ def add_glare(image, lens, obj, lamps, clear, budget):
     c, s = obj.cos, obj.sin
     up = lamps[1] * obj.height
     around = lamps[0] == 0.0
-    for k in range(1 if around else 2):
-        side = lamps[0] if k == 1 else -lamps[0]
+    for k in range(2 if lamps[0] > 0.0 else 1):
+        side = max(lamps[0], 0.0) * (1.0 if k == 1 else -1.0)
         x = obj.x + 0.5 * obj.length * c - side * obj.width * s - lens.x
         y = obj.y + 0.5 * obj.length * s + side * obj.width * c - lens.y
         away = math.sqrt(x * x + y * y)

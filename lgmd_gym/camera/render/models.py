@@ -16,6 +16,7 @@ from lgmd_gym.camera.render.clutter_models import (
     add_thicket,
     add_wall,
 )
+from lgmd_gym.camera.render.figure_models import FigureTables, figure_tables
 from lgmd_gym.camera.render.long_models import add_bus, add_trailer
 from lgmd_gym.camera.render.model_builder import BODY, ModelBuilder
 from lgmd_gym.camera.render.overhead_models import (
@@ -55,8 +56,9 @@ class Models(NamedTuple):
         splits: Height from below which the solids of a model are drawn in reverse, as a share of its height,
             float64, shape (models,).
         lamps: Distance of a model's headlights from its middle as a share of its width, 0 for one lamp that
-            shines in all directions, and their height as a share of its height, 0 for none, float64, shape
-            (models, 2).
+            shines in all directions, below 0 for one headlight, and their height as a share of its height, 0
+            for none, float64, shape (models, 2).
+        figures: Tables of the models that have no solids: pedestrians and two-wheelers.
     """
 
     corners: np.ndarray
@@ -69,6 +71,7 @@ class Models(NamedTuple):
     models: np.ndarray
     splits: np.ndarray
     lamps: np.ndarray
+    figures: FigureTables
 
 
 @lru_cache(maxsize=2)
@@ -98,6 +101,8 @@ def all_models(linear: bool) -> Models:
         add_sign(b, corners)
     for add in (add_power_pole, add_wall, add_hedge, add_house, add_lamp, add_thicket):
         add(b)
+    for lamps in ((0.0, 0.0), (0.0, 0.0), (-1.0, 0.6)):  # a motorcycle has one headlight
+        b.model(lamps=lamps)
     corners = np.zeros((len(b.corners), _MAX_CORNERS, 3))
     for index, points in enumerate(b.corners):
         corners[index, : len(points)] = points
@@ -112,6 +117,7 @@ def all_models(linear: bool) -> Models:
         models=np.array(b.models),
         splits=np.array(b.splits),
         lamps=np.array(b.lamps),
+        figures=figure_tables(linear),
     )
 
 

@@ -4,11 +4,12 @@ import math
 
 import numba as nb
 
-from lgmd_gym.camera.objects import MODEL_MARK, light_of_code
+from lgmd_gym.camera.objects import MODEL_MARK, is_figure, light_of_code
 from lgmd_gym.camera.render.blur import add_weighted, blur_steps, lens_before, move_objects, overwrite
 from lgmd_gym.camera.render.buffers import Buffers, GroundLayer, SolidLayer, Tables, View, Views
 from lgmd_gym.camera.render.cast_shadows import add_cast_shadows
 from lgmd_gym.camera.render.exposure import adapt_exposure
+from lgmd_gym.camera.render.figures import draw_figure
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare, add_sun_glare
 from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
 from lgmd_gym.camera.render.horizon import horizon_of
@@ -105,7 +106,10 @@ def draw_solids(image, view, models, objects, order, n, layer):
         # Objects fade in over the last sixth of their range.
         opacity = min(1.0, 6.0 * (1.0 - away / obj.range))
         clear = math.exp(-away * look.extinction) if look.extinction > 0.0 else 1.0
-        draw_object(image, view, obj, models, Air(light, clear, opacity, away), layer)
+        if is_figure(obj.model):
+            draw_figure(image, view, obj, models.figures, Air(light, clear, opacity, away), layer)
+        else:
+            draw_object(image, view, obj, models, Air(light, clear, opacity, away), layer)
         if look.night > 0.0:
             budget = add_glare(image, lens, obj, models.lamps[obj.model], clear * opacity, budget)
 
@@ -125,7 +129,7 @@ def draw_light(view, road, tables, models, objects, count, buffers):
     if cast_shadows:
         add_cast_shadows(ground, view, objects, vehicles, road.roadside)
     draw_ground(image, view, buffers.ground, tables, horizon)
-    solids = SolidLayer(buffers.solids, buffers.corners, buffers.uv, buffers.axes, buffers.greys)
+    solids = SolidLayer(buffers.solids, buffers.corners, buffers.uv, buffers.axes, buffers.greys, buffers.joints)
     draw_solids(image, view, models, objects, order, n, solids)
     if view.own_car.bonnet > 0.0:
         draw_bonnet(image, lens, view.own_car)

@@ -9,11 +9,15 @@ from lgmd_gym.camera.objects import (
     MODEL_POST,
     MODEL_RAIL,
     MODEL_TREE,
+    is_figure,
     light_of_code,
 )
 from lgmd_gym.camera.render.ground import PAINT, SHADOW, add_ground_quad
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.order import distance
+
+# Legs and wheels keep less of the sky's light from the road than a body close above it.
+_FIGURE_SPREAD, _FIGURE_SHARE = 0.3, 0.6
 
 
 @kernel
@@ -68,7 +72,10 @@ def add_shadow(layer, lens, obj, look):
         return
     # Nested rectangles: the light falls off from the outer one to the inner one.
     spread = look.under_box if obj.model == MODEL_BOX or obj.model == MODEL_BARRIER else 1.0
+    dark = look.under_body
+    if is_figure(obj.model):
+        spread, dark = _FIGURE_SPREAD, _FIGURE_SHARE * look.under_body
     inmost = -0.5 * min(obj.length, obj.width)
     for ring in range(int(look.under_rings)):
         grow = max(spread * (look.under_first + look.under_step * ring), inmost)
-        _add_footprint(layer, SHADOW, lens, obj, centre, grow, look.under_body)
+        _add_footprint(layer, SHADOW, lens, obj, centre, grow, dark)

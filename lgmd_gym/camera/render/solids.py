@@ -35,7 +35,7 @@ class Air(NamedTuple):
 
 
 @kernel
-def _to_axes(lens, x, y, z, out, i):
+def to_axes(lens, x, y, z, out, i):
     """Write a world vector as (depth, right, down) to row i of `out`."""
     ahead, right = x * lens.cos_yaw + y * lens.sin_yaw, y * lens.cos_yaw - x * lens.sin_yaw
     down = ahead * lens.sin_pitch - z * lens.cos_pitch
@@ -53,11 +53,11 @@ def place_object(lens, look, obj, axes):
         away = max(math.sqrt(dx * dx + dy * dy), 1e-6)
         c, s = dx / away, dy / away
     # int64, because a kernel is compiled anew for each literal argument.
-    _to_axes(lens, dx, dy, obj.base - lens.z, axes, np.int64(0))
-    _to_axes(lens, c * obj.length, s * obj.length, 0.0, axes, np.int64(1))
-    _to_axes(lens, -s * obj.width, c * obj.width, 0.0, axes, np.int64(2))
-    _to_axes(lens, 0.0, 0.0, obj.height - obj.base, axes, np.int64(3))
-    _to_axes(lens, look.sun_x, look.sun_y, look.sun_z, axes, np.int64(4))
+    to_axes(lens, dx, dy, obj.base - lens.z, axes, np.int64(0))
+    to_axes(lens, c * obj.length, s * obj.length, 0.0, axes, np.int64(1))
+    to_axes(lens, -s * obj.width, c * obj.width, 0.0, axes, np.int64(2))
+    to_axes(lens, 0.0, 0.0, obj.height - obj.base, axes, np.int64(3))
+    to_axes(lens, look.sun_x, look.sun_y, look.sun_z, axes, np.int64(4))
 
 
 @kernel
@@ -70,7 +70,7 @@ def _place_corners(fractions, n, axes, corners):
 
 
 @kernel
-def _outside(lens, axes):
+def outside(lens, axes):
     """Return whether an object is entirely beyond the left, right, upper or lower side of the frame.
 
     The planes through the lens and the sides of the frame are tested against the box around the object.
@@ -102,7 +102,7 @@ def _face_light(corners, axes, look):
 
 
 @kernel
-def _grey(role, value, light, obj, look, air):
+def grey_of(role, value, light, obj, look, air):
     """Return the grey of a polygon; lamps emit light, all else reflects it.
 
     The gap below a vehicle has the light of the shaded road behind it, whatever the light on the face.
@@ -125,7 +125,7 @@ def draw_object(image, view, obj, models, air, layer):
     """Draw one object over the image."""
     lens, look = view.lens, view.look
     place_object(lens, look, obj, layer.axes)
-    if _outside(lens, layer.axes):
+    if outside(lens, layer.axes):
         return
     # Apparent height [px], at a distance of 1 m or more.
     size = lens.focal * (obj.height - obj.base) / max(distance(lens, obj) - 0.5 * obj.length, 1.0)
@@ -139,7 +139,7 @@ def draw_object(image, view, obj, models, air, layer):
             height, width = image.shape
             rows = (int(max(v0, 0.0)), int(min(math.ceil(v1), height)))
             columns = (int(max(u0, 0.0)), int(min(math.ceil(u1) + 1.0, width)))
-            _compose(image, layer, rows, columns, air, view)
+            compose(image, layer, rows, columns, air, view)
 
 
 @kernel
@@ -171,7 +171,7 @@ def _add_solid(layer, lens, look, obj, models, solid, size, air):
         # The edges of a polygon left of the frame would cancel.
         if right <= 0.0 or bottom <= 0.0 or left >= width or top >= height:
             continue
-        grey = _grey(models.role[p], models.value[p], light, obj, look, air)
+        grey = grey_of(models.role[p], models.value[p], light, obj, look, air)
         greys[p, 0], greys[p, 1] = grey, light
         # Also a detail, which may protrude from its face: the layer is cleared within the bounds.
         u0, v0, u1, v1 = min(u0, left), min(v0, top), max(u1, right), max(v1, bottom)
@@ -183,7 +183,7 @@ def _add_solid(layer, lens, look, obj, models, solid, size, air):
 
 
 @kernel
-def _compose(image, layer, rows, columns, air, view):
+def compose(image, layer, rows, columns, air, view):
     """Draw the layer over a part of the image and clear it; `rows` and `columns` are (first, last + 1)."""
     look, veiled = view.look, view.look.veil > 0.0
     width, stride = image.shape[1], layer.coverage.shape[2]
