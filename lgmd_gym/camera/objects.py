@@ -54,9 +54,9 @@ FIGURES = {
     "Bicycle": (MODEL_BICYCLE, 1.86),
     "Motorcycle": (MODEL_MOTORCYCLE, 1.45),
 }
-"""Models and default heights of classes with these names [m]; the height of a two-wheeler includes its rider."""
+"""Models and default heights [m] of classes by name; the height of a two-wheeler includes its rider."""
 JACKET = 60.0
-"""Grey of a jacket without a grey of its own: dark, as that of test dummies."""
+"""Grey of a figure without a grey of its own: a dark jacket, as that of test dummies."""
 _SHADES = {
     MODEL_MARK: OUTLINE,
     MODEL_BARRIER: 185.0,

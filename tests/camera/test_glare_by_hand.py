@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.records import lens_of, record
 
-from lgmd_gym.camera.objects import BODY_MODELS, MODEL_CAR, MODEL_LAMP, MODEL_TRUCK, OBJECT
+from lgmd_gym.camera.objects import BODY_MODELS, MODEL_CAR, MODEL_LAMP, MODEL_MOTORCYCLE, MODEL_TRUCK, OBJECT
 from lgmd_gym.camera.pinhole import project
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
 from lgmd_gym.camera.render.models import all_models
@@ -102,7 +102,7 @@ def test_lamps_shine_forwards(turn, share, side, bearing):
 
 
 def test_which_objects_have_glare():
-    shining = {MODEL_LAMP, *(body.model for body in BODY_MODELS.values())}
+    shining = {MODEL_LAMP, MODEL_MOTORCYCLE, *(body.model for body in BODY_MODELS.values())}
     for model in range(len(all_models(linear=False).models)):
         image, _ = halos({"x": 20.0, "model": model})
         assert image.any() == (model in shining)

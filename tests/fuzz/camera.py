@@ -16,7 +16,16 @@ sys.path[:0] = [str(Path(__file__).parents[1])]
 
 from highway_env.vehicle.kinematics import Vehicle
 from support.fuzz import run_cases
-from support.roads import FIGURES, add_car, add_figure, add_mark, add_obstacle, env_of, ring_road, straight_env
+from support.roads import (
+    FIGURES,
+    add_car,
+    add_figure,
+    add_mark,
+    add_obstacle,
+    env_of,
+    ring_road,
+    straight_env,
+)
 
 import lgmd_gym  # noqa: F401 - registers the environments
 from lgmd_gym.camera import CameraParams, EgoCamera

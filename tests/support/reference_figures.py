@@ -22,10 +22,12 @@ def figure_layers(scene, item, rays, veil):
     points = _in_camera(lens, item, joints)
     origin = _in_camera(lens, item, np.zeros(3))
     axes = [_in_camera(lens, item, unit) - origin for unit in np.eye(3)]
-    layers = []
+    turn = math.atan2(lens.y - item.y, lens.x - item.x) - math.atan2(item.sin, item.cos)
+    facing, layers = math.cos(turn), []
     for place, index in enumerate(tables.orders[row, _direction(lens, item)][: tables.counts[row, 0]]):
         part = tables.parts[row, index]
         weight = opacity * (min(1.0, size / part["fine"] - 1.0) if part["fine"] else 1.0)
+        weight *= min(1.0, part["abeam"] + part["facing"] * facing)
         if weight <= 0.0:
             continue
         outlines = _wheel(points[part["a"]], part, thick, axes)
@@ -74,7 +76,7 @@ def _walk(item, height, joints):
     unit = height / 1.8
     stride = 2.0 * math.pi * item.travelled / (2.0 * 0.43 * height)
     amount = np.clip(abs(item.speed) / 0.8, 0.0, 1.0)
-    ahead, behind = (np.clip(0.5 * item.length - part * unit, 0.0, 0.22 * height) for part in (0.16, 0.06))
+    ahead, behind = (np.clip(0.5 * item.length - part * unit, 0.0, 0.22 * height) for part in (0.165, 0.06))
     swing = 0.5 * amount * (ahead + behind) * math.sin(stride)
     sunk = unit * 0.84 - math.sqrt((unit * 0.84) ** 2 - swing**2)
     joints[8:, 2] -= sunk
@@ -90,7 +92,7 @@ def _walk(item, height, joints):
         toe[0] = ankle[0] + 0.157 * unit * math.cos(pitch)
         toe[2] = max(ankle[2] + 0.157 * unit * math.sin(pitch), 0.035 * unit)
         shoulder, elbow, hand = joints[arm : arm + 3]
-        turn = -0.45 * amount * forward * min(1.0, 3.0 * item.length / height)
+        turn = -0.36 * amount * forward * min(1.0, 3.0 * item.length / height)
         elbow[::2] = shoulder[::2] + 0.3 * unit * np.array([math.sin(turn), -math.cos(turn)])
         turn += 0.12 + 0.5 * max(turn, 0.0)
         hand[::2] = elbow[::2] + 0.26 * unit * np.array([math.sin(turn), -math.cos(turn)])
@@ -155,7 +157,7 @@ def _wheel(centre, part, thick, axes):
         (part["hole"], -half, part["spokes"] - 1.0),
     ):
         radius = thick * swell * radius
-        if share > 0.0 or radius * abs(shown) > thick * part["wide_a"]:
+        if share > 0.0 or thick * part["hole"] * abs(shown) > thick * part["wide_a"]:
             ring = np.cos(angles) * (radius * forward + wider) + np.sin(angles) * radius * up
             outlines.append((centre + ring, share))
     return outlines

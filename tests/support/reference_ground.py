@@ -85,8 +85,10 @@ def _marks_and_shadows(scene, x, y):
             item.base == 0.0 or model == kinds.MODEL_DECK
         ):
             for ring in range(int(look.under_rings)):
-                grow = max(look.under_first + look.under_step * ring, -0.5 * min(item.length, item.width))
-                shadow += look.under_body * _footprint(x, y, item, at, grow)
+                spread, dark = (0.3, 0.6) if kinds.is_figure(model) else (1.0, 1.0)
+                grow = spread * (look.under_first + look.under_step * ring)
+                grow = max(grow, -0.5 * min(item.length, item.width))
+                shadow += dark * look.under_body * _footprint(x, y, item, at, grow)
     return paint, shadow
 
 

@@ -79,7 +79,7 @@ class Buffers(NamedTuple):
         quad: x, y of four corners on the ground, float64, shape (8,) [m].
         axes: Axes of an object, see `place_object`, float64, shape (5, 3).
         greys: Grey and light of the polygons of all models, float64, shape (polygons, 2).
-        joints: Joints of a figure, see `pose_figure`, then as (depth, right, down), float64, shape (56, 3) [m].
+        joints: Joints of a figure, see `pose_figure`; then in camera axes, float64, shape (56, 3) [m].
         order: Indices of the objects in drawing order, int64, shape (512,).
         distances: Distances of the objects from the lens, float64, shape (512,) [m].
         extents: Middle and half of an object's azimuths [quarter turns] and its least and greatest distance

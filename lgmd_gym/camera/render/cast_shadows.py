@@ -32,8 +32,8 @@ _FIGURE_BOXES = np.array(
         [(0.48, 0.2, 0.0, 0.55, 1.0), (0.2, 0.4, 0.5, 1.0, 1.0)],
     ]
 )
-"""The shadow of a figure is that of two boxes, legs or wheels, then body: half of length and width and lower and
-upper end, as shares of those of the figure, and weight."""
+"""The shadow of a figure is that of two boxes, legs or wheels, then body: half of length and width, lower and
+upper end, as shares of length, width and height of the figure, and weight."""
 _MOST_SHIFT = 8.0  # length of a shadow per height; at lower elevations of the sun, shadows end there
 
 
@@ -86,7 +86,10 @@ def _add_shadow_of(layer, lens, obj, away):
     if is_figure(obj.model):
         for k in range(2):
             box = _FIGURE_BOXES[obj.model - MODEL_PEDESTRIAN, k]
-            sides, heights = (box[0] * obj.length, box[1] * obj.width), (box[2] * obj.height, box[3] * obj.height)
+            sides, heights = (
+                (box[0] * obj.length, box[1] * obj.width),
+                (box[2] * obj.height, box[3] * obj.height),
+            )
             n = _box_outline(layer, lens, obj, away, sides, heights)
             _add_outline(layer, lens, n, box[4] * weight)
         return

@@ -21,16 +21,19 @@ PART = np.dtype(
     [
         *((name, np.int64) for name in ("shape", "a", "b", "role")),
         *((name, np.float64) for name in ("deep_a", "wide_a", "deep_b", "wide_b", "cap")),
-        *((name, np.float64) for name in ("hole", "spokes", "value", "fine")),
+        *((name, np.float64) for name in ("hole", "spokes", "value", "fine", "facing", "abeam")),
     ]
 )
-"""A part of a figure: shape; joints at its ends (a wheel has one); role and value as those of a face; radii at
-both ends as seen from the side and from behind, and reach of the round ends beyond the joints [m]; radius of
-a wheel's hole [m] and the share of it that spokes cover; apparent height of the figure at which the part
-starts to fade in; it is complete at twice that height [px]. A wheel has the radius `deep_a` and half the
-thickness `wide_a`."""
+"""A part of a figure: shape; joints at its ends (a wheel has one); role and value as those of a face; radii
+at both ends as seen from the side and from behind, and reach of the round ends beyond the joints [m]; radius
+of a wheel's hole [m] and the share of it that spokes cover; apparent height of the figure at which the part
+starts to fade in; it is complete at twice that height [px]; change of its opacity with the cosine of the
+azimuth of the lens, from 1 ahead to -1 behind, and opacity when the lens is abeam; (0, 1) for all directions.
+A wheel has the radius `deep_a` and half the thickness `wide_a`."""
 
 Place = tuple[float, float, float]
+View = tuple[float, float]
+ANY, AHEAD, BEHIND, HAIR = (0.0, 1.0), (1.7, 0.5), (-1.7, 0.5), (-1.7, 1.0)  # `facing` and `abeam` of parts
 
 
 @dataclass
@@ -60,6 +63,7 @@ class Figure:
     def limb(
         self, a: int, b: int, radii: tuple[float, float], value: float, place: Place,
         *, wide: tuple[float, float] | None = None, cap: float = 0.8, role: int = FIXED, fine: float = 0.0,
+        seen: View = ANY,
     ) -> None:  # fmt: skip
         """Add a limb.
 
@@ -73,26 +77,31 @@ class Figure:
             cap: Reach of the round ends beyond the joints, as a multiple of the smaller radius.
             role: Role as that of a face.
             fine: Apparent height of the figure at which the limb starts to fade in [px].
+            seen: Directions that it is drawn in: ANY, AHEAD, BEHIND or HAIR.
         """
         wide = radii if wide is None else wide
         reach = cap * min(*radii, *wide)
         self.parts.append(
-            (LIMB, a, b, role, radii[0], wide[0], radii[1], wide[1], reach, 0.0, 0.0, value, fine)
+            (LIMB, a, b, role, radii[0], wide[0], radii[1], wide[1], reach, 0.0, 0.0, value, fine, *seen)
         )
         self.places.append(place)
 
     def dot(
-        self, joint: int, radius: float, value: float, place: Place, role: int = FIXED, fine: float = 0.0
-    ) -> None:
+        self, joint: int, radius: float, value: float, place: Place, role: int = FIXED,
+        fine: float = 0.0, seen: View = ANY,
+    ) -> None:  # fmt: skip
         """Add a round part around a joint."""
-        self.limb(joint, joint, (radius, radius), value, place, role=role, fine=fine, cap=1.0)
+        self.limb(joint, joint, (radius, radius), value, place, role=role, fine=fine, cap=1.0, seen=seen)
 
-    def wheel(self, joint: int, radius: float, half: float, hole: float, value: float, spokes: float) -> None:
+    def wheel(
+        self, joint: int, sizes: tuple[float, float, float], value: float, spokes: float, place: Place
+    ) -> None:
         """Add a wheel: radius, half its thickness and radius of its hole [m], grey level, share of spokes."""
+        radius, half, hole = sizes
         self.parts.append(
-            (WHEEL, joint, joint, FIXED, radius, half, radius, half, 0.0, hole, spokes, value, 0.0)
+            (WHEEL, joint, joint, FIXED, radius, half, radius, half, 0.0, hole, spokes, value, 0.0, *ANY)
         )
-        self.places.append((float(self.joints[joint, 0]), 0.0, 0.0))
+        self.places.append(place)
 
     def orders(self) -> np.ndarray:
         """Return the parts from far to near for four directions of the lens, shape (4, parts).

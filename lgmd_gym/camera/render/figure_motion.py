@@ -68,7 +68,7 @@ def _walk(obj, tall, joints, used):
     phase = math.pi * obj.travelled / max(STEP * size, 1e-3)
     amount = min(1.0, abs(obj.speed) / _FULL_STEP)
     # With the foot, the leg reaches as far ahead and behind as the length allows.
-    ahead = max(min(0.5 * obj.length - 0.16 * tall, 0.22 * size), 0.0)
+    ahead = max(min(0.5 * obj.length - 0.165 * tall, 0.22 * size), 0.0)
     behind = max(min(0.5 * obj.length - 0.06 * tall, 0.22 * size), 0.0)
     swing = 0.5 * amount * (ahead + behind) * math.sin(phase)
     sunk = tall * _LEG - math.sqrt(max((tall * _LEG) ** 2 - swing * swing, 0.0))
@@ -88,7 +88,7 @@ def _walk(obj, tall, joints, used):
         toe, foot = LEG * i + TOE, 0.157 * tall
         joints[toe, 0] = joints[ankle, 0] + foot * math.cos(turn)
         joints[toe, 2] = max(joints[ankle, 2] + foot * math.sin(turn), 0.035 * tall)
-        _swing_arm(joints, SHOULDER + ARM * i, -0.45 * amount * s * min(1.0, 3.0 * obj.length / size), tall)
+        _swing_arm(joints, SHOULDER + ARM * i, -0.36 * amount * s * min(1.0, 3.0 * obj.length / size), tall)
 
 
 @kernel
@@ -104,7 +104,7 @@ def _swing_arm(joints, shoulder, turn, tall):
 
 @kernel
 def _bend(joints, leg, bone):
-    """Place the knee of a leg, ahead of the line from its hip to its ankle, with bones of equal length [m]."""
+    """Place the knee of a leg ahead of the line from hip to ankle, with bones of equal length [m]."""
     hip, knee, ankle = leg + HIP, leg + KNEE, leg + ANKLE
     x, z = joints[ankle, 0] - joints[hip, 0], joints[ankle, 2] - joints[hip, 2]
     square = max(x * x + z * z, 1e-12)

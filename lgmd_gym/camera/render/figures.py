@@ -1,7 +1,7 @@
 """Kernels of figures: pedestrians and riders.
 
-A limb is one polygon: its outline, as seen from the lens. That is a third of the faces of a box, round from
-every direction, and no face appears or vanishes when the limb turns.
+A limb is one polygon: its outline, as seen from the lens. That is a third of the faces that a box shows, it
+is round from every direction, and no face appears or vanishes when the limb turns.
 """
 
 import math
@@ -18,44 +18,41 @@ from lgmd_gym.camera.render.solids import compose, grey_of, outside, place_objec
 
 _RETURN = 12.0  # light that a reflector returns, relative to that of a white surface in the same beam
 _ROUND = 0.55  # half the width of the round end of a limb, relative to the limb
-_WHEEL_SIDES = 16
-_CIRCLE = np.array(
-    [
-        (math.cos(2.0 * math.pi * (k + 0.5) / _WHEEL_SIDES), math.sin(2.0 * math.pi * (k + 0.5) / _WHEEL_SIDES))
-        for k in range(_WHEEL_SIDES)
-    ]
+_ANGLES = 2.0 * math.pi / 16 * (np.arange(16) + 0.5)
+_CIRCLE = np.stack((np.cos(_ANGLES), np.sin(_ANGLES)), axis=1) * math.sqrt(
+    math.pi / 8.0 / math.sin(math.pi / 8.0)
 )
-_SWELL = math.sqrt(2.0 * math.pi / _WHEEL_SIDES / math.sin(2.0 * math.pi / _WHEEL_SIDES))
-"""Radius of the polygon with the area of a circle of radius 1."""
+"""Corners of the polygon that a wheel is drawn as, which has the area of a circle of radius 1."""
 
 
 @kernel
 def draw_figure(image, view, obj, tables, air, layer):
     """Draw a pedestrian or a two-wheeler with its rider over the image; `tables` are `FigureTables`."""
-    lens, look, joints = view.lens, view.look, layer.joints
-    place_object(lens, look, obj, layer.axes)
+    lens, figure = view.lens, obj.model - MODEL_PEDESTRIAN
+    place_object(lens, view.look, obj, layer.axes)
     if outside(lens, layer.axes):
         return
-    thick = pose_figure(obj, tables, joints)
-    figure = obj.model - MODEL_PEDESTRIAN
+    thick = pose_figure(obj, tables, layer.joints)
     _to_camera(lens, obj, layer, tables.counts[figure, 1])
     size = lens.focal * (obj.height - obj.base) / max(distance(lens, obj) - 0.5 * obj.length, 1.0)
     x, y = lens.x - obj.x, lens.y - obj.y
     ahead, left = x * obj.cos + y * obj.sin, y * obj.cos - x * obj.sin
+    facing = ahead / max(math.sqrt(ahead * ahead + left * left), 1e-6)
     order = tables.orders[figure, (1 if ahead < 0.0 else 0) + (2 if left < 0.0 else 0)]
     height, width = image.shape
     for i in range(tables.counts[figure, 0]):
         part = tables.parts[figure, order[i]]
-        weight = air.opacity
+        weight = air.opacity * min(1.0, part.abeam + part.facing * facing)
         if part.fine > 0.0:
             weight *= min(1.0, size / part.fine - 1.0)
         if not weight > 0.0:
             continue
         if part.shape == WHEEL:
-            u0, v0, u1, v1 = _add_wheel(layer, view, obj, part, thick, weight, air)
+            m = _add_wheel(layer, view, obj, part, thick, weight, air)
         else:
-            u0, v0, u1, v1 = _add_limb(layer, view, obj, part, thick, weight, air)
-        if u1 > u0:
+            m = _add_limb(layer, view, obj, part, thick, weight, air)
+        if m >= 3:
+            u0, v0, u1, v1 = bounds(layer.uv, m)
             rows = (int(max(v0, 0.0)), int(min(math.ceil(v1), height)))
             columns = (int(max(u0, 0.0)), int(min(math.ceil(u1) + 1.0, width)))
             compose(image, layer, rows, columns, air, view)
@@ -75,25 +72,43 @@ def _to_camera(lens, obj, layer, used):
 
 
 @inlined_kernel
-def _round_light(look, axes, vx, vy, vz, mx, my, mz):
-    """Return the mean light on the visible half of a cylinder across the view.
+def _row(table, i):
+    """Return row i of a table of vectors."""
+    return table[i, 0], table[i, 1], table[i, 2]
 
-    (vx, vy, vz) is the direction of view, and (mx, my, mz) that of the cylinder, at right angles to it. The
-    mean of the sun's light over the visible half, weighted by the apparent width, is that of a sphere's
-    phases in a plane.
+
+@inlined_kernel
+def _dot(a, b):
+    """Return the scalar product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined_kernel
+def _cross(a, b):
+    """Return the vector product of two vectors."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inlined_kernel
+def _unit(a):
+    """Return the unit vector in the direction of a vector."""
+    scale = 1.0 / max(math.sqrt(_dot(a, a)), 1e-9)
+    return scale * a[0], scale * a[1], scale * a[2]
+
+
+@inlined_kernel
+def _grey_in_sun(part, obj, view, air, axes, way, along):
+    """Return the grey of a part as a cylinder: `way` is the direction of view, `along` that of its length.
+
+    The light of the sun is its mean over the visible half, weighted by the apparent width. It depends on the
+    angle between sun and view around the cylinder as the light of the moon does on its phase.
     """
-    if look.direct == 0.0:
-        return look.ambient
-    front = -(axes[4, 0] * vx + axes[4, 1] * vy + axes[4, 2] * vz)
-    along = axes[4, 0] * mx + axes[4, 1] * my + axes[4, 2] * mz
-    side = math.sqrt(max(1.0 - front * front - along * along, 0.0))
-    angle = math.atan2(side, front)
-    return look.ambient + 0.25 * look.direct * ((math.pi - angle) * front + side)
-
-
-@kernel
-def _part_grey(part, light, obj, look, air):
-    """Return the grey of a part in `light`, with lamps and reflectors."""
+    look, sun = view.look, _row(axes, 4)
+    light = look.ambient
+    if look.direct > 0.0:
+        front, end = -_dot(sun, way), _dot(sun, along)
+        side = math.sqrt(max(1.0 - front * front - end * end, 0.0))
+        light += 0.25 * look.direct * ((math.pi - math.atan2(side, front)) * front + side)
     if part.role == DAY_LAMP:
         return 255.0
     grey = grey_of(part.role, part.value, light * air.light, obj, look, air)
@@ -102,87 +117,86 @@ def _part_grey(part, light, obj, look, air):
     return grey
 
 
+@inlined_kernel
+def _in_frame(layer, m):
+    """Return whether the projected polygon may be in the frame; edges left of the frame would cancel."""
+    if m < 3:
+        return False
+    left, top, right, bottom = bounds(layer.uv, m)
+    height, width = layer.coverage.shape[1], layer.coverage.shape[2] - 2
+    return right > 0.0 and bottom > 0.0 and left < width and top < height
+
+
 @kernel
 def _add_limb(layer, view, obj, part, thick, weight, air):
-    """Add the outline of a limb to the layer; returns its bounds [px], right < left if it is not in view."""
-    lens, joints, corners, axes = view.lens, layer.joints, layer.corners, layer.axes
-    a, b = part.a, part.b
-    ex, ey, ez = joints[b, 0] - joints[a, 0], joints[b, 1] - joints[a, 1], joints[b, 2] - joints[a, 2]
-    vx, vy, vz = joints[a, 0] + 0.5 * ex, joints[a, 1] + 0.5 * ey, joints[a, 2] + 0.5 * ez
-    norm = 1.0 / max(math.sqrt(vx * vx + vy * vy + vz * vz), 1e-9)
-    vx, vy, vz = norm * vx, norm * vy, norm * vz
-    # Across the limb and the view; for a dot, or a limb along the view, across the vertical and the view.
-    nx, ny, nz = ey * vz - ez * vy, ez * vx - ex * vz, ex * vy - ey * vx
-    norm = math.sqrt(nx * nx + ny * ny + nz * nz)
-    if norm < 1e-6:
-        nx, ny, nz = axes[3, 2] * vy - axes[3, 1] * vz, axes[3, 0] * vz - axes[3, 2] * vx, axes[3, 1] * vx - axes[3, 0] * vy
-        norm = max(math.sqrt(nx * nx + ny * ny + nz * nz), 1e-9)
-    nx, ny, nz = nx / norm, ny / norm, nz / norm
-    mx, my, mz = vy * nz - vz * ny, vz * nx - vx * nz, vx * ny - vy * nx
-    # The radius of an ellipse, `wide` to the left and `deep` at right angles to that, in the direction n.
-    left = nx * axes[2, 0] + ny * axes[2, 1] + nz * axes[2, 2]
-    left *= left
-    first = thick * math.sqrt(part.deep_a * part.deep_a * (1.0 - left) + part.wide_a * part.wide_a * left)
-    last = thick * math.sqrt(part.deep_b * part.deep_b * (1.0 - left) + part.wide_b * part.wide_b * left)
+    """Add the outline of a limb to the layer.
+
+    Returns:
+        Number of corners in `layer.uv`; below 3 if none is in view.
+    """
+    axes, corners = layer.axes, layer.corners
+    a, b = _row(layer.joints, part.a), _row(layer.joints, part.b)
+    length = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    way = _unit((a[0] + 0.5 * length[0], a[1] + 0.5 * length[1], a[2] + 0.5 * length[2]))
+    across = _cross(length, way)
+    if _dot(across, across) < 1e-12:
+        across = _cross(way, _row(axes, 3))  # a round part, or a limb along the view: level
+    across = _unit(across)
+    along = _cross(way, across)
+    # The radius of an ellipse, `wide` to the left and `deep` at right angles to that, in this direction.
+    wide = _dot(across, _row(axes, 2))
+    wide *= wide
+    deep = 1.0 - wide
+    first = thick * math.sqrt(part.deep_a * part.deep_a * deep + part.wide_a * part.wide_a * wide)
+    last = thick * math.sqrt(part.deep_b * part.deep_b * deep + part.wide_b * part.wide_b * wide)
     cap = thick * part.cap
-    for i in range(8):
-        joint, radius, reach = (a, first, -cap) if i < 4 else (b, last, cap)
-        inner = i == 1 or i == 2 or i == 5 or i == 6
-        across = radius if i < 2 or i > 5 else -radius
-        if inner:
-            across *= _ROUND
-        beyond = reach if inner else 0.0
-        corners[i, 0] = joints[joint, 0] + across * nx + beyond * mx
-        corners[i, 1] = joints[joint, 1] + across * ny + beyond * my
-        corners[i, 2] = joints[joint, 2] + across * nz + beyond * mz
-    light = _round_light(view.look, axes, vx, vy, vz, mx, my, mz)
-    grey = _part_grey(part, light, obj, view.look, air)
-    m = clip_and_project(lens, corners, 8, layer.uv)
-    if m < 3:
-        return 0.0, 0.0, -1.0, 0.0
-    u0, v0, u1, v1 = bounds(layer.uv, m)
-    height, width = layer.coverage.shape[1], layer.coverage.shape[2] - 2
-    if u1 <= 0.0 or v1 <= 0.0 or u0 >= width or v0 >= height:
-        return 0.0, 0.0, -1.0, 0.0
+    for k in range(3):
+        side, tip = first * across[k], a[k] - cap * along[k]
+        corners[0, k], corners[1, k] = a[k] + side, tip + _ROUND * side
+        corners[2, k], corners[3, k] = tip - _ROUND * side, a[k] - side
+        side, tip = last * across[k], b[k] + cap * along[k]
+        corners[4, k], corners[5, k] = b[k] - side, tip - _ROUND * side
+        corners[6, k], corners[7, k] = tip + _ROUND * side, b[k] + side
+    m = clip_and_project(view.lens, corners, 8, layer.uv)
+    if not _in_frame(layer, m):
+        return 0
+    grey = _grey_in_sun(part, obj, view, air, axes, way, along)
     add_polygon(layer.coverage, np.int64(0), layer.uv, m, weight, weight * grey)
-    return u0, v0, u1, v1
+    return m
+
+
+@kernel
+def _place_ring(centre, level, radius, wider, layer):
+    """Place the corners of a ring: its radius, and the width that the tyre adds on both sides [m]."""
+    for i in range(_CIRCLE.shape[0]):
+        c, s = _CIRCLE[i, 0], _CIRCLE[i, 1]
+        for k in range(3):
+            g = radius * layer.axes[1, k] + wider * level[k]
+            layer.corners[i, k] = centre[k] + c * g + s * radius * layer.axes[3, k]
 
 
 @kernel
 def _add_wheel(layer, view, obj, part, thick, weight, air):
-    """Add a wheel to the layer as a ring; returns its bounds [px], right < left if it is not in view."""
-    axes, joints = layer.axes, layer.joints
-    x, y, z = joints[part.a, 0], joints[part.a, 1], joints[part.a, 2]
-    norm = 1.0 / max(math.sqrt(x * x + y * y + z * z), 1e-9)
-    vx, vy, vz = norm * x, norm * y, norm * z
-    # Level and across the view: the tyre widens the ring in this direction.
-    hx, hy, hz = axes[3, 1] * vz - axes[3, 2] * vy, axes[3, 2] * vx - axes[3, 0] * vz, axes[3, 0] * vy - axes[3, 1] * vx
-    norm = 1.0 / max(math.sqrt(hx * hx + hy * hy + hz * hz), 1e-9)
-    shown = norm * (hx * axes[1, 0] + hy * axes[1, 1] + hz * axes[1, 2])
-    half = thick * part.wide_a * norm * (1.0 if shown >= 0.0 else -1.0)
-    light = _round_light(view.look, axes, vx, vy, vz, axes[3, 0], axes[3, 1], axes[3, 2])
-    grey = _part_grey(part, light, obj, view.look, air)
-    height, width = layer.coverage.shape[1], layer.coverage.shape[2] - 2
-    u0, v0, u1, v1, sign = 0.0, 0.0, -1.0, 0.0, 0.0
-    for ring in range(2):
-        radius = thick * (part.deep_a if ring == 0 else part.hole) * _SWELL
-        wider = half if ring == 0 else -half
-        if ring == 1 and radius * abs(shown) <= thick * part.wide_a:
-            break  # the tyre closes the hole
-        for i in range(_WHEEL_SIDES):
-            c, s = _CIRCLE[i, 0], _CIRCLE[i, 1]
-            layer.corners[i, 0] = x + c * (radius * axes[1, 0] + wider * hx) + s * radius * axes[3, 0]
-            layer.corners[i, 1] = y + c * (radius * axes[1, 1] + wider * hy) + s * radius * axes[3, 1]
-            layer.corners[i, 2] = z + c * (radius * axes[1, 2] + wider * hz) + s * radius * axes[3, 2]
-        m = clip_and_project(view.lens, layer.corners, _WHEEL_SIDES, layer.uv)
-        if m < 3:
-            break
-        if ring == 0:
-            u0, v0, u1, v1 = bounds(layer.uv, m)
-            if u1 <= 0.0 or v1 <= 0.0 or u0 >= width or v0 >= height:
-                return 0.0, 0.0, -1.0, 0.0
-            sign = weight if winding(layer.uv, m) > 0.0 else -weight
-        else:
-            sign *= -(1.0 - part.spokes)
-        add_polygon(layer.coverage, np.int64(0), layer.uv, m, sign, sign * grey)
-    return u0, v0, u1, v1
+    """Add a wheel to the layer as a ring; returns as `_add_limb` does, for the outer edge."""
+    n, up = _CIRCLE.shape[0], _row(layer.axes, 3)
+    centre = _row(layer.joints, part.a)
+    way = _unit(centre)
+    level = _unit(_cross(up, way))
+    shown = _dot(level, _row(layer.axes, 1))
+    tyre = thick * part.wide_a
+    wider = tyre if shown >= 0.0 else -tyre
+    grey = _grey_in_sun(part, obj, view, air, layer.axes, way, up)
+    if thick * part.hole * abs(shown) > tyre:
+        _place_ring(centre, level, thick * part.hole, -wider, layer)
+        m = clip_and_project(view.lens, layer.corners, n, layer.uv)
+        if _in_frame(layer, m):
+            share = weight * (part.spokes - 1.0)
+            share = share if winding(layer.uv, m) > 0.0 else -share
+            add_polygon(layer.coverage, np.int64(0), layer.uv, m, share, share * grey)
+    _place_ring(centre, level, thick * part.deep_a, wider, layer)
+    m = clip_and_project(view.lens, layer.corners, n, layer.uv)
+    if not _in_frame(layer, m):
+        return 0
+    share = weight if winding(layer.uv, m) > 0.0 else -weight
+    add_polygon(layer.coverage, np.int64(0), layer.uv, m, share, share * grey)
+    return m

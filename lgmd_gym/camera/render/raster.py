@@ -129,7 +129,9 @@ def draw_light(view, road, tables, models, objects, count, buffers):
     if cast_shadows:
         add_cast_shadows(ground, view, objects, vehicles, road.roadside)
     draw_ground(image, view, buffers.ground, tables, horizon)
-    solids = SolidLayer(buffers.solids, buffers.corners, buffers.uv, buffers.axes, buffers.greys, buffers.joints)
+    solids = SolidLayer(
+        buffers.solids, buffers.corners, buffers.uv, buffers.axes, buffers.greys, buffers.joints
+    )
     draw_solids(image, view, models, objects, order, n, solids)
     if view.own_car.bonnet > 0.0:
         draw_bonnet(image, lens, view.own_car)

@@ -1,0 +1,46 @@
+"""The engine and single environments draw pedestrians, bicycles and motorcycles alike."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.vectors import assert_equal_steps, make_pair
+
+from lgmd_gym.envs import env_id
+from lgmd_gym.envs.scenarios import FAMILIES
+from lgmd_gym.envs.scenarios.scenario import ADULT_SIZE, BICYCLE_SIZE, MOTORCYCLE_SIZE
+
+SIZES = {"pedestrian": ADULT_SIZE, "bicycle": BICYCLE_SIZE, "motorcycle": MOTORCYCLE_SIZE}
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    """Replace the pedestrian of a family by three moving figures side by side."""
+    original = FAMILIES["PedestrianPass"]
+
+    def with_figures():
+        made = original(ego_speed=10.0)
+        actors = [
+            replace(
+                made.actors[0], kind=kind, lateral_offset=-2.0 - 1.5 * index, shade=70,
+                length=size[0], width=size[1], height=size[2],
+            )
+            for index, (kind, size) in enumerate(SIZES.items())
+        ]  # fmt: skip
+        return replace(made, actors=tuple(actors))
+
+    monkeypatch.setitem(FAMILIES, "PedestrianPass", with_figures)
+
+
+def no_brake(rng, num_envs):
+    return np.zeros((num_envs, 1), np.float32)
+
+
+@pytest.mark.parametrize("condition", ["clear", "night"])
+def test_engine_equals_single_environments(figures, condition):
+    reference, engine = make_pair(
+        env_id("PedestrianPass"), 2, "SameStep", 1, include_frame=True, condition=condition
+    )
+    assert_equal_steps(reference, engine, 90, np.random.default_rng(0), no_brake)
+    reference.close()
+    engine.close()
