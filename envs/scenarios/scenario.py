@@ -21,10 +21,6 @@ WHEELBASE = 2.67  # [m]
 REAR_AXLE = WHEELBASE / 2  # [m], distance of the ego's centre ahead of its rear axle
 # Global Vehicle Target of ISO 19206-3, bounding box of Euro NCAP's OpenSCENARIO catalogue.
 TARGET_LENGTH, TARGET_WIDTH, TARGET_HEIGHT = 4.023, 1.712, 1.427  # [m]
-# Length, width and height [m] of the targets of ISO 19206-2, -4 and -5, the latter two with their riders.
-# Lengths and widths are those of the same catalogue.
-ADULT_SIZE, CHILD_SIZE = (0.6, 0.5, 1.8), (0.711, 0.298, 1.154)
-BICYCLE_SIZE, MOTORCYCLE_SIZE = (1.89, 0.5, 1.86), (2.08, 0.79, 1.45)
 TARGET_TRACK, TYRE_WIDTH = 1.434, 0.205  # [m]; the track is of that catalogue, the tyre of a common size
 # Length, width and height of the targets of ISO 19206-2 (adult, child), -4 and -5 [m]; the height of a
 # two-wheeler includes its rider.
