@@ -86,7 +86,8 @@ class CameraParams:
             present circle, from its own speed and steering angle only.
         texture: Contrast of asphalt and verge, as a multiple of the natural contrast.
         roadside: Density of posts and trees along the road, as a multiple of the natural density.
-        vehicles: `"car"` for bodies with windows, lights and wheels, `"box"` for plain shaded boxes.
+        vehicles: `"car"` for bodies with windows, lights and wheels, `"box"` for plain shaded boxes, also of
+            pedestrians and two-wheelers.
         panorama: Distant surroundings: `"skyline"` (hills and trees under an even sky), `"natural"`
             (1/f noise with the statistics of natural scenes), or the path of an image. An image is
             converted to grey and wrapped around 360°, with its middle row at the horizon and its left

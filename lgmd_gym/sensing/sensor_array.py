@@ -38,8 +38,8 @@ class SensorArray:
         scenes: `SCENE` records, shape (num_envs,).
         objects: `OBJECT` records, shape (num_envs, 512): vehicles, obstacles and marks of each environment in
             the order of `road.vehicles`, then `road.objects`, without the ego and the roadside. Vehicles of
-            any size are of `MODEL_CAR`; an obstacle with a grey of its own is of `MODEL_BOX`; `range` is
-            `MAX_RANGE`.
+            any size are of `MODEL_CAR`; an obstacle with a grey of its own is of `MODEL_BOX`; pedestrians and
+            two-wheelers have models of their own; `range` is `MAX_RANGE`.
         object_counts: Number of objects, int64, shape (num_envs,).
         enabled: Cameras in use, bool, shape (num_envs, cameras), initially all. A camera that is not enabled
             is neither drawn nor stepped and keeps its last outputs. Its neuron is reset before the first

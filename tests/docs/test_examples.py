@@ -55,6 +55,13 @@ def test_rl_training(capsys, tmp_path):
     assert (tmp_path / "picture.png").stat().st_size > 5_000
 
 
+def test_bodies(tmp_path):
+    sheet = load("bodies").main(tmp_path / "bodies.png", quick=True)
+    assert list(sheet) == ["motorcycle", "small"]
+    assert list(sheet["small"]) == ["day, side", "day, rear", "day, front"]
+    assert sheet["motorcycle"]["day, front"].max() == 255  # the headlight
+
+
 def test_contact_sheet(tmp_path):
     sheet = load("contact_sheet").main(tmp_path / "sheet.png", quick=True)
     assert [list(row) for row in sheet.values()] == [["clear", "night"]] * 2

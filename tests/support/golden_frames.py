@@ -11,7 +11,16 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from highway_env.vehicle.kinematics import Vehicle
-from support.roads import add_car, add_mark, add_obstacle, env_of, ring_road, straight_env
+from support.roads import (
+    add_car,
+    add_figure,
+    add_mark,
+    add_obstacle,
+    env_of,
+    lens_x,
+    ring_road,
+    straight_env,
+)
 
 from lgmd_gym.camera import CONDITIONS, CameraParams, EgoCamera
 
@@ -66,6 +75,22 @@ def curve():
     return env
 
 
+FIGURES = {
+    "pedestrian-crossing": (("Pedestrian", 8.0, 5.0, np.pi / 2, 1.4, 0.5), {"world": 11}),
+    "bicycle-night": (("Bicycle", 12.0, 4.5, 1.0, 4.2, 0.8), {"light": "night"}),
+    "motorcycle-fog": (("Motorcycle", 14.0, 4.0, 0.1, 12.0, 3.0), {"visibility_m": 40.0}),
+}
+"""Kind, distance ahead, y, heading, speed and distance travelled of a figure, and camera fields."""
+
+
+def road_with_figure(kind, ahead, y, heading, speed, travelled):
+    """Return a straight road with one figure."""
+    env = straight_env()
+    x = lens_x(env) + ahead
+    add_figure(env, kind, x, y, 70, heading=heading, speed=speed, travelled=travelled)
+    return env
+
+
 def golden_frames():
     """Return all frames by name, uint8, shape (45, 80)."""
     frames = {}
@@ -76,6 +101,9 @@ def golden_frames():
         frames[f"{lens}-curve"] = EgoCamera(lens, shape=SHAPE).render(curve())
     for name, fields in OPTIONS.items():
         frames[name] = EgoCamera("wide", shape=SHAPE, **fields).render(busy_road())
+    for name, (figure, fields) in FIGURES.items():
+        camera = EgoCamera("standard", shape=SHAPE, **fields)
+        frames[name] = camera.render(road_with_figure(*figure))
     return frames
 
 

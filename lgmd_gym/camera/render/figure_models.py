@@ -1,9 +1,9 @@
 """The figures: a pedestrian, a bicycle and a motorcycle with their riders.
 
 The boxes are those of the targets of ISO 19206-2 (adult, child), -4 and -5; the height of a two-wheeler
-includes its rider. A child is the figure of the adult in its own box. Test dummies have a black shirt and blue
-trousers; here the shade of the object is that of the jacket, and the other parts have greys of their own. The
-bicycle is a city bicycle with wheels of 28 inches.
+includes its rider. A child is the figure of the adult in its own box. Test dummies have a black shirt and
+blue trousers; here the shade of the object is that of the jacket, and the other parts have their own.
+The bicycle is a city bicycle with wheels of 28 inches.
 """
 
 from functools import lru_cache
