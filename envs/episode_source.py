@@ -95,8 +95,8 @@ class RandomLevels:
         split: Set of levels: "train", "validation" or "test", with 1,000,000 levels each.
         start_level: First level in use.
         num_levels: Number of levels in use; 0 for all from `start_level` on.
-        conditions: Camera conditions, drawn with equal probability: "clear", "night", "fog", "rain",
-            "low_sun".
+        conditions: Camera conditions, drawn with equal probability: "clear", "night", "night_upper_beam",
+            "fog", "rain", "low_sun".
         world: Number of the world of all levels, or "laboratory"; None for the world of each level.
         road: See `Appearance`.
 

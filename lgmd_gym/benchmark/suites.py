@@ -132,7 +132,7 @@ _ALL = (
     Suite(
         "fmvss127-pedestrian",
         fmvss127_pedestrian(),
-        "49 CFR 571.127 pedestrian tests by day and with the lower beam",
+        "49 CFR 571.127 pedestrian tests by day and with the lower and the upper beam",
     ),
     Suite(
         "nhtsa-false-activation",

@@ -19,6 +19,7 @@ LOOK = np.dtype(
             *("under_body", "under_lean", "under_first", "under_step", "under_rings", "under_box"),
             *("under_road", "shadow_limit"),
             *("haze", "extinction", "night", "night_light", "beam_gain", "wet", "paved"),
+            *("beam_reach", "beam_stray"),
             *("shot_noise", "read_noise", "shutter_s"),
             *("linear", "auto_exposure_s", "target_grey", "least_gain", "most_gain"),
             *("veil", "lamps_ahead"),
@@ -33,14 +34,18 @@ scale of the skyline's elevations; direction of the sun; light on a face from th
 it is at right angles, as shares of the light on the road; share of light that a cast shadow removes; glare
 in the direction of the sun; the soft shadow below an object, see `shadows.add_shadow`; light of the road
 below a vehicle, 0 in the laboratory; light of the fog and extinction of the air [1/m]; 1.0 for night; light
-at night apart from the low beam, and its peak; 1.0 for a wet and for an all-paved ground; sensor noise [grey
-levels]; exposure time [s]; 1.0 for linear light; time constant [s], target [grey levels] and bounds of the
-gain of the automatic exposure; light of fog in the low beam, see `veil_at`, 0 by day and in clear air;
-distance of the own headlights ahead of the lens [m]; slope of the tone curve at the target grey.
+at night apart from the headlights, and their peak; 1.0 for a wet and for an all-paved ground; distance over
+which the headlights fall to 1/e [m], and their share above the cut-off; sensor noise [grey levels]; exposure
+time [s]; 1.0 for linear light; time constant [s], target [grey levels] and bounds of the gain of the
+automatic exposure; light of fog in the headlights, see `veil_at`, 0 by day and in clear air; distance of the
+own headlights ahead of the lens [m]; slope of the tone curve at the target grey.
 """
 ASPHALT_GREY, PAINT_GREY = 104.0, 208.0  # of the laboratory by day
-BEAM_WIDTH = 0.26  # the low beam falls to 1/e at this tangent of the angle from straight ahead
-BEAM_REACH = 26.0  # the low beam falls to 1/e over this distance [m]
+BEAM_WIDTH = 0.26  # the headlights fall to 1/e at this tangent of the angle from straight ahead
+# Distance over which the headlights fall to 1/e [m], and their share above the cut-off. UN R112 allows 625 cd
+# above that of the low beam and demands 12,500 cd below. The upper beam has no cut-off and four times the
+# light of the low beam at 50 m, an assumption.
+LOW_BEAM, UPPER_BEAM = (26.0, 0.05), (90.0, 1.0)
 WHITE = 255.0  # grey level and light
 SHOT_NOISE, READ_NOISE = 1.2, 0.8
 """Usual noise of the sensor in numbered worlds, see `CameraParams`."""
@@ -92,6 +97,7 @@ def look_of(p: CameraParams) -> np.ndarray:
     _set_sensor(look, p)
     look["night"], look["wet"] = float(p.light == "night"), float(p.wet)
     look["night_light"], look["beam_gain"] = world.street_light, world.beam
+    look["beam_reach"], look["beam_stray"] = UPPER_BEAM if p.upper_beam else LOW_BEAM
     if p.visibility_m > 0.0:
         # Koschmieder: 5 % of the contrast remains at the visibility.
         look["extinction"] = math.log(20.0) / p.visibility_m
@@ -213,7 +219,7 @@ def far_transmission(p: CameraParams) -> float:
 
 
 def beam_profile(p: CameraParams) -> np.ndarray:
-    """Return the low beam's fall-off over the columns of a frame; float32, shape (width,)."""
+    """Return the headlights' fall-off over the columns of a frame; float32, shape (width,)."""
     width = p.shape[1]
     tan = (np.arange(width) + 0.5 - 0.5 * width) / p.focal_px
     return np.exp(-((tan / BEAM_WIDTH) ** 2)).astype(np.float32)

@@ -101,6 +101,7 @@ class CameraParams:
         light: `"day"`, `"night"` or `"low_sun"`. At night, the ego's headlights and the lights of other cars
             are on. A low sun is 4° to 12° above the horizon, near the direction +x; in the laboratory it
             equals day.
+        upper_beam: Whether the ego's headlights are the upper beam, in place of the low beam, at night.
         wet: Whether the road is wet: darker, and lighter towards the horizon, where it reflects the sky.
         visibility_m: Meteorological visibility in fog (5 % contrast, Koschmieder); 0 is clear air [m]. At
             night, the fog scatters light of the own headlights back, see `render.veil`.
@@ -148,6 +149,7 @@ class CameraParams:
     queue_lane: int | None = None
     seed: int = 0
     light: str = "day"
+    upper_beam: bool = False
     wet: bool = False
     visibility_m: float = 0.0
     shot_noise: float = 0.0
@@ -226,7 +228,7 @@ class CameraParams:
         return replace(base, **_with_condition(changes)) if changes else base
 
     def with_condition(self, condition: str) -> CameraParams:
-        """Return this camera under a named condition (`clear`, `night`, `fog`, `rain`, `low_sun`)."""
+        """Return this camera under a named condition (`clear`, `night`, `night_upper_beam`, …)."""
         return CameraParams.make(self, condition=condition)
 
 
@@ -246,7 +248,7 @@ def _check_surroundings(p: CameraParams) -> None:
         raise ValueError(
             f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
         )
-    for name in ("guard_rail", "wet", "linear_light", "bonnet"):
+    for name in ("guard_rail", "upper_beam", "wet", "linear_light", "bonnet"):
         object.__setattr__(p, name, check_flag(f"camera {name}", getattr(p, name)))
 
 
@@ -306,6 +308,7 @@ CLEAR = "clear"
 CONDITIONS: dict[str, dict[str, Any]] = {
     CLEAR: {},
     "night": {"light": "night", "read_noise": 2.0, "shot_noise": 3.0},
+    "night_upper_beam": {"light": "night", "upper_beam": True, "read_noise": 2.0, "shot_noise": 3.0},
     "fog": {"visibility_m": 120.0},
     "rain": {"wet": True, "visibility_m": 600.0, "read_noise": 1.0, "shot_noise": 2.0},
     "low_sun": {"light": "low_sun"},

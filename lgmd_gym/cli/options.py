@@ -39,8 +39,8 @@ class Bench:
     first_seed: Count = None
     """First seed. Default: 0."""
     conditions: Names = None
-    """Camera conditions, each run separately: clear, night, fog, rain, low_sun, or mixed for the condition of
-    each world. Default: clear."""
+    """Camera conditions, each run separately: clear, night, night_upper_beam, fog, rain, low_sun, or mixed
+    for that of each world. Default: clear."""
     worlds: Count = None
     """Number of worlds (asphalt, light, surroundings, brake); 0 for the plain laboratory. Default: 20."""
     first_world: Count = None

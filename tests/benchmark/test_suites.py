@@ -107,8 +107,8 @@ COUNTS = {
     "r152-vru": {"CPNA": 4, "CBNA": 4},
     "fmvss127": {"CCRs": 8, "CCRm": 5, "CCRb": 8},
     # 49 CFR 571.127, table 2 to S8.1.1, in steps of 10 km/h: right 25 and 50 %, left, obstructed, standing
-    # and along the path; in darkness right 50 %, standing and along the path.
-    "fmvss127-pedestrian": {"CPNA": 6 + 6 + 6, "CPFA": 6, "CPNCO": 5, "CPLA": 6 + 7 + 6 + 7},
+    # and along the path; with the lower and the upper beam right 50 %, standing and along the path.
+    "fmvss127-pedestrian": {"CPNA": 6 + 3 * 6, "CPFA": 6, "CPNCO": 5, "CPLA": 3 * (6 + 7)},
 }
 
 

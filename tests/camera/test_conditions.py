@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from support.roads import add_car, straight_env
 
-from lgmd_gym.camera import EgoCamera
+from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera.effects import look_of
+from lgmd_gym.camera.render.weather import light_at
 
 
 def test_fog_night_and_noise_change_contrast_light_and_deviation():
@@ -43,3 +45,18 @@ def test_fog_hides_the_ground_behind_a_lens_that_points_down(light):
     camera.render(env)
     haze = 18.0 if light == "night" else 200.0
     assert camera.light[-1] == pytest.approx(np.full(40, haze), abs=0.1)
+
+
+def test_the_upper_beam_has_four_times_the_light_of_the_low_beam_at_50_m():
+    low, upper = (look_of(CameraParams.make(condition=name))[()] for name in ("night", "night_upper_beam"))
+    for ahead, across, ratio in ((50.0, 0.0, 4.0), (50.0, 10.0, 4.0), (10.0, 0.0, 1.3), (0.0, 0.0, 1.0)):
+        lights = [light_at(ahead, across, look) - look["night_light"] for look in (low, upper)]
+        assert lights[1] / lights[0] == pytest.approx(ratio, rel=0.03)
+    env = straight_env()
+    dark, lit = (EgoCamera("wide", condition=name).render(env) for name in ("night", "night_upper_beam"))
+    assert lit[47:60].mean() > 1.5 * dark[47:60].mean()
+
+
+def test_the_upper_beam_needs_night():
+    env = straight_env()
+    assert np.array_equal(EgoCamera("wide", upper_beam=True).render(env), EgoCamera("wide").render(env))

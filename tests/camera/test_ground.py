@@ -77,7 +77,7 @@ def reference_row(view, tables, coverage, row, behind, part):
     run = view.lens["focal"] * view.lens["cos_pitch"] + v * view.lens["sin_pitch"]
     ahead = view.lens["z"] / fall * run
     if look["night"]:
-        way = (1.0 / 26.0 + look["extinction"]) * ahead
+        way = (1.0 / look["beam_reach"] + look["extinction"]) * ahead
         grey *= look["night_light"] + look["beam_gain"] * np.exp(-way) * view.beam
     if look["wet"]:
         grazing = 1.0 - view.lens["z"] / np.hypot(view.lens["z"], ahead)

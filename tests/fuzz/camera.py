@@ -58,6 +58,7 @@ def draw_camera(rng, name, shape):
         guard_rail=bool(rng.integers(2)),
         seed=int(rng.integers(2)),
         light=str(choice(["day", "night"])),
+        upper_beam=bool(rng.random() < 0.3),
         visibility_m=float(choice([0.0, 0.0, 1e-3, 1.0, 5.0, 100.0])),
         road=str(choice(["still", "rough"])),
         dive_deg=float(choice([0.0, 0.1])),

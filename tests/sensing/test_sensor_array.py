@@ -29,13 +29,14 @@ FIELDS = [
     {"condition": "rain", "texture": 1.4, "auto_exposure_s": 0.2},
     {"condition": "fog", "seed": 5, "roadside": 2.0, "linear_light": True},
     {"condition": "low_sun", "world": 11, "road": "rough"},
+    {"condition": "night_upper_beam", "world": 12},
 ]
 
 
 def scenes():
     """Return environments with different roads, egos and traffic."""
     empty = straight_env(lanes=2, speed=5.0)
-    return [busy_road(), curve(), empty, busy_road(), busy_road()]
+    return [busy_road(), curve(), empty, busy_road(), busy_road(), curve()]
 
 
 def move(envs, step):
@@ -49,7 +50,7 @@ def move(envs, step):
                 car.position[0] += 0.02 * step
 
 
-def make_array(camera=CAMERAS, num_envs=5, **arguments):
+def make_array(camera=CAMERAS, num_envs=len(FIELDS), **arguments):
     sensors = SensorArray(camera, 30.0, LGMDParams(), num_envs, **arguments)
     for index in range(num_envs):
         sensors.set_camera_fields(index, FIELDS[index])
@@ -124,10 +125,10 @@ def test_inactive_environments_keep_frames_and_outputs():
     move(envs, 5)
     for index, env in enumerate(envs):
         sensors.read(env, index)
-    active = np.array([True, False, True, True, False])
+    active = np.array([True, False, True, True, False, False])
     sensors.process(0, 3, active)
-    changed = [not np.array_equal(sensors.frames[0][k], before[0][0][k]) for k in range(5)]
-    assert changed == [True, False, True, False, False]
+    changed = [not np.array_equal(sensors.frames[0][k], before[0][0][k]) for k in range(len(FIELDS))]
+    assert changed == [True, False, True, False, False, False]
     for new, old in zip(sensors.responses, before[1], strict=True):
         np.testing.assert_array_equal(new[[1, 3]], old[[1, 3]])
     assert (sensors.responses.ffi != before[1].ffi)[[0, 2]].all()
@@ -192,7 +193,7 @@ def test_threads_process_disjoint_ranges_at_once():
             apart.read(env, index)
             together.read(env, index)
         together.step()
-        threads = [threading.Thread(target=apart.process, args=(k, k + 1)) for k in range(5)]
+        threads = [threading.Thread(target=apart.process, args=(k, k + 1)) for k in range(len(FIELDS))]
         for thread in threads:
             thread.start()
         for thread in threads:

@@ -6,14 +6,14 @@ _POINTS = 4000
 
 
 def beam(look, ahead, tangent):
-    """Return the light of the low beam at points, as a share of daylight.
+    """Return the light of the headlights at points, as a share of daylight.
 
     Args:
         look: Appearance of the world.
         ahead: Distance ahead of the lens, not below 0 [m].
         tangent: Distance to the side per metre ahead.
     """
-    return np.exp(-ahead / 26.0 - look.extinction * ahead - (tangent / 0.26) ** 2) * look.beam_gain
+    return np.exp(-ahead / look.beam_reach - look.extinction * ahead - (tangent / 0.26) ** 2) * look.beam_gain
 
 
 def veil(scene, column, slope, away):
@@ -30,14 +30,14 @@ def veil(scene, column, slope, away):
     lens, look = scene.lens, scene.look
     if not (look.night and look.extinction):
         return np.zeros(column.shape)
-    start, rate = max(scene.p.mount_setback, 0.0), 2.0 * look.extinction + 1.0 / 26.0
+    start, rate = max(scene.p.mount_setback, 0.0), 2.0 * look.extinction + 1.0 / look.beam_reach
     slope, away = np.broadcast_to(slope, column.shape), np.broadcast_to(away, column.shape)
     remaining = np.exp(-rate * np.maximum(away - start, 0.0))[:, None]
     shares = remaining + (1.0 - remaining) * (np.arange(_POINTS) + 0.5) / _POINTS
     ahead = start - np.log(shares) / rate
     # Full light below the cut-off, which starts at the height of the lamps and falls by 1 %.
     lit = lens.z - slope[:, None] * ahead < 0.65 - 0.01 * ahead
-    mean = np.mean(np.where(lit, 1.0, 0.05), axis=1)
+    mean = np.mean(np.where(lit, 1.0, look.beam_stray), axis=1)
     whole = look.extinction / rate * np.exp(-rate * start) * (1.0 - remaining[:, 0])
     # Fog that lets no light through reflects π/18.5 of it, as a surface of the grey 105 does.
     side = np.exp(-(((column + 0.5 - lens.centre_u) / lens.focal / 0.26) ** 2))

@@ -5,7 +5,7 @@ from lgmd_gym.benchmark.case import Case, make_case, speed_cases, to_mps
 R152_TARGET = 20  # km/h, UN R152 6.5
 STANDING = {"walking_speed": 0.0, "impact_location": 0.25}
 ALONG = {"walking_speed": to_mps(5), "impact_location": 0.25}
-NIGHT = "night"  # condition with the lower beam
+BEAMS = {"lower": "night", "upper": "night_upper_beam"}  # conditions of the tests in darkness
 
 
 def r152() -> tuple[Case, ...]:
@@ -63,8 +63,7 @@ def r152_vru() -> tuple[Case, ...]:
 def fmvss127_pedestrian() -> tuple[Case, ...]:
     """Return the cases of 49 CFR 571.127 S8, table 2, in steps of 10 km/h and at the highest speed.
 
-    The overlap is measured from the right; from the left it is 50 %. In darkness the lower beam is on; tests
-    with the upper beam are not included.
+    The overlap is measured from the right; from the left it is 50 %. In darkness either beam is on.
     """
     suite = "fmvss127-pedestrian"
     crossing, standing, along = list(range(10, 70, 10)), [*range(10, 60, 10), 55], [*range(10, 70, 10), 65]
@@ -75,10 +74,11 @@ def fmvss127_pedestrian() -> tuple[Case, ...]:
         *speed_cases(suite, "CPNCO", list(range(10, 60, 10)), "/right50"),
         *speed_cases(suite, "CPLA", standing, "/standing", **STANDING),
         *speed_cases(suite, "CPLA", along, "/along", **ALONG),
-        *speed_cases(suite, "CPNA", crossing, "/right50-night", condition=NIGHT),
-        *speed_cases(suite, "CPLA", standing, "/standing-night", **STANDING, condition=NIGHT),
-        *speed_cases(suite, "CPLA", along, "/along-night", **ALONG, condition=NIGHT),
     ]
+    for beam, condition in BEAMS.items():
+        rows += speed_cases(suite, "CPNA", crossing, f"/right50-{beam}", condition=condition)
+        rows += speed_cases(suite, "CPLA", standing, f"/standing-{beam}", **STANDING, condition=condition)
+        rows += speed_cases(suite, "CPLA", along, f"/along-{beam}", **ALONG, condition=condition)
     return tuple(rows)
 
 

@@ -1,13 +1,13 @@
-"""Kernels of the veil: light of the own low beam that fog scatters back into the lens at night.
+"""Kernels of the veil: light of the own headlights that fog scatters back into the lens at night.
 
-A ray of the camera meets droplets that the low beam lights. Droplets at the distance x scatter their share of
-it back, and the fog weakens the light on both ways, so that the veil in front of a thing at the distance b is
+A ray of the camera meets droplets in the headlights. Droplets at the distance x scatter their share of it
+back, and the fog weakens the light on both ways, so that the veil in front of a thing at the distance b is
 
-    veil · F · ∫ σ · exp(-x / BEAM_REACH - 2 σ x) dx, over the lit part of 0 ≤ x ≤ b,
+    veil · F · ∫ σ · exp(-x / reach - 2 σ x) dx, over the lit part of 0 ≤ x ≤ b,
 
 with the extinction σ and the beam of `light_at`: F is its fall-off across, which is the same along a ray. The
-integral has a closed form. The beam starts at the headlights and ends at its cut-off, above which it has the
-share `_STRAY` of its light.
+integral has a closed form. The low beam starts at the headlights and ends at its cut-off, above which it has
+a small share of its light; the upper beam has no cut-off.
 
 Approximations: light is scattered once only, in the same share at all angles near 180°, paths are as long as
 their distance ahead, and both headlights are one below the lens. All pixels of an object have its distance.
@@ -17,14 +17,11 @@ import math
 
 import numba as nb
 
-from lgmd_gym.camera.effects import BEAM_REACH
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.simd import LANES, load_part, madd, splat, store_part
 
 _LAMP_HEIGHT = 0.65  # of the headlights above the ground [m]
 _CUT_OFF = 0.01  # the cut-off falls by this much per metre (UN R48: 1 % for headlights below 0.8 m)
-# Intensity above the cut-off over that of the beam: UN R112 allows 625 cd there and demands 12,500 cd below.
-_STRAY = 0.05
 _FAR = 1e9  # distance of the sky [m]
 
 
@@ -38,7 +35,7 @@ def veil_at(look, height, slope, away):
         slope: Fall of the ray per metre ahead; below 0 upwards.
         away: Distance ahead of what the ray meets [m].
     """
-    rate, start = 2.0 * look.extinction + 1.0 / BEAM_REACH, look.lamps_ahead
+    rate, start = 2.0 * look.extinction + 1.0 / look.beam_reach, look.lamps_ahead
     end, fall = max(away, start), slope - _CUT_OFF
     # Where the ray crosses the cut-off: into the beam if it falls faster, else out of it.
     crossing = (height - _LAMP_HEIGHT) / (fall if fall != 0.0 else -1e-9)
@@ -46,7 +43,7 @@ def veil_at(look, height, slope, away):
     last = end if fall > 0.0 else min(max(crossing, start), end)
     lit = math.exp(-rate * first) - math.exp(-rate * last)
     every = math.exp(-rate * start) - math.exp(-rate * end)
-    return look.veil * look.extinction / rate * (lit + _STRAY * (every - lit))
+    return look.veil * look.extinction / rate * (lit + look.beam_stray * (every - lit))
 
 
 @kernel

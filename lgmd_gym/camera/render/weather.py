@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numba as nb
 
-from lgmd_gym.camera.effects import BEAM_REACH, BEAM_WIDTH
+from lgmd_gym.camera.effects import BEAM_WIDTH
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.veil import veil_at
 from lgmd_gym.simd import load_part, madd, splat
@@ -13,23 +13,23 @@ from lgmd_gym.simd import load_part, madd, splat
 
 @kernel
 def light_at(ahead, across, look):
-    """Return the light at a point `ahead` and `across` of the lens [m]: 1 by day, the low beam at night.
+    """Return the light at a point `ahead` and `across` of the lens [m]: 1 by day, the headlights at night.
 
     Fog takes its share of the beam on the way to the point, too.
     """
     if look.night == 0.0:
         return 1.0
     tan, way = across / max(ahead, 1.0), max(ahead, 0.0)
-    beam = math.exp(-way / BEAM_REACH - way * look.extinction - (tan / BEAM_WIDTH) ** 2)
+    beam = math.exp(-way / look.beam_reach - way * look.extinction - (tan / BEAM_WIDTH) ** 2)
     return look.night_light + look.beam_gain * beam
 
 
 class RowAir(NamedTuple):
     """Headlights (if `night`), reflections (if `wet`) and fog (if `foggy`) on a row of ground.
 
-    The light is `dark` plus `gain` times the low beam; the share `gloss` of it is replaced by `mirrored`; the
-    fog leaves the share `clear` of the contrast to `haze`; `veil` times the fall-off of the low beam is the
-    light that it scatters back.
+    The light is `dark` plus `gain` times the headlights; the share `gloss` of it is replaced by `mirrored`;
+    the fog leaves the share `clear` of the contrast to `haze`; `veil` times the fall-off of the headlights is
+    the light that it scatters back.
     """
 
     night: bool
@@ -52,7 +52,7 @@ def row_air(look, ahead, height):
     """
     night, foggy = look.night > 0.0, look.extinction > 0.0
     way = max(ahead, 0.0)
-    gain = look.beam_gain * math.exp(-way / BEAM_REACH - way * look.extinction) if night else 0.0
+    gain = look.beam_gain * math.exp(-way / look.beam_reach - way * look.extinction) if night else 0.0
     clear = math.exp(-abs(ahead) * look.extinction) if foggy else 1.0
     # A rough wet surface reflects the sky as water does, by Schlick's approximation, and half of the water
     # stands on it: at 20 m from a lens 1.2 m high a quarter of the light.
