@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 from support.reference_camera import worst_error
+from support.reference_geometry import camera_axes
 from support.roads import FIGURES, add_car, add_figure, add_obstacle, box_record, lens_x, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera.effects import look_of
 from lgmd_gym.camera.objects import FIGURES as KINDS
 from lgmd_gym.camera.render.figure_builder import (
     ANKLE,
@@ -211,3 +213,26 @@ def test_figure_without_a_grey_has_a_dark_jacket():
     env.road.objects[0].shade = 60
     assert (frame != other).any()
     assert (EgoCamera(params).render(env) == other).all()
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+def test_sun_casts_the_shadow_of_the_rider(kind):
+    """The shadow of what is at 0.75 of the height, and no shadow half a metre beside it."""
+    fields = {"world": 11, "mount_height": 4.0, "pitch_deg": -25.0, "shape": (90, 160), "hfov_deg": 90.0}
+    env, params = posed(kind, 0.3, 9.0, 0.0, **fields)
+    camera, look = EgoCamera(params), look_of(params)
+    camera.render(env)
+    shadowed, lens = camera.light.astype(float), camera._lens
+    figure = env.road.objects.pop()
+    camera.render(env)
+    share = shadowed / camera.light
+    away = -0.75 * figure.HEIGHT / look["sun_z"] * np.array([look["sun_x"], look["sun_y"]])
+    beside = 0.7 * np.array([-away[1], away[0]]) / np.linalg.norm(away)
+    for shift, expected in ((away, 1.0 - look["cast"]), (away + beside, 1.0), (away - beside, 1.0)):
+        x, y = figure.position + shift - (lens["x"], lens["y"])
+        depth, right, down = camera_axes(lens, x, y, -lens["z"])
+        u, v = (
+            lens["centre_u"] + lens["focal"] * right / depth,
+            lens["centre_v"] + lens["focal"] * down / depth,
+        )
+        assert share[int(v), int(u)] == pytest.approx(expected, abs=0.03)

@@ -2,10 +2,13 @@
 
 from dataclasses import replace
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from support.vectors import assert_equal_steps, make_pair
 
+from lgmd_gym.camera.objects import MODEL_BICYCLE, MODEL_MOTORCYCLE, MODEL_PEDESTRIAN
+from lgmd_gym.camera.scene_table import SceneTable
 from lgmd_gym.envs import env_id
 from lgmd_gym.envs.scenarios import FAMILIES
 from lgmd_gym.envs.scenarios.scenario import ADULT_SIZE, BICYCLE_SIZE, MOTORCYCLE_SIZE
@@ -44,3 +47,20 @@ def test_engine_equals_single_environments(figures, condition):
     assert_equal_steps(reference, engine, 90, np.random.default_rng(0), no_brake)
     reference.close()
     engine.close()
+
+
+def test_objects_of_the_road_equal_those_of_the_physics(figures):
+    """Cameras of other highway-env environments read the road; those of this one read the physics."""
+    env = gym.make(env_id("PedestrianPass"))
+    env.reset(seed=0)
+    for _ in range(50):
+        env.step(np.zeros(1, np.float32))
+    table = SceneTable()
+    table.read(env.unwrapped, None)
+    written = env.get_wrapper_attr("sensors").objects[0, : len(SIZES)]
+    assert written["travelled"].min() > 2.0
+    assert written["model"].tolist() == [MODEL_PEDESTRIAN, MODEL_BICYCLE, MODEL_MOTORCYCLE]
+    assert table.object_counts[0] == len(SIZES)
+    for name in written.dtype.names:
+        assert table.objects[0, : len(SIZES)][name].tolist() == written[name].tolist(), name
+    env.close()
