@@ -50,7 +50,7 @@ def move(envs, step):
                 car.position[0] += 0.02 * step
 
 
-def make_array(camera=CAMERAS, num_envs=len(FIELDS), **arguments):
+def make_array(camera=CAMERAS, num_envs=6, **arguments):
     sensors = SensorArray(camera, 30.0, LGMDParams(), num_envs, **arguments)
     for index in range(num_envs):
         sensors.set_camera_fields(index, FIELDS[index])
