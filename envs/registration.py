@@ -7,17 +7,22 @@ from typing import TYPE_CHECKING, Any
 import gymnasium as gym
 
 from lgmd_gym.envs.scenarios import FAMILIES, make_scenario
+from lgmd_gym.envs.scenarios.data import scenario_from_data
 from lgmd_gym.errors import check_keys, check_known, check_text
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
     from lgmd_gym.envs.episode_source import EpisodeSource
+    from lgmd_gym.envs.scenarios.scenario import Scenario
     from lgmd_gym.neuron import NeuronSpec
 
 RANDOM = "RandomBraking"
+SCENARIO = "Scenario"
+"""The id `LGMD/Scenario-v0`, whose argument `scenario` is a scenario as data."""
 _OTHERS = ("camera", "params", "fps", "include_frame", "include_base", "trace", "config", "render_mode")
 _LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions", "world", "road")
 _APPEARANCE = ("world", "condition", "road")
+SCENARIO_ARGUMENT = "scenario"
 
 
 def env_id(family: str) -> str:
@@ -26,8 +31,11 @@ def env_id(family: str) -> str:
 
 
 def register_envs() -> None:
-    """Register `LGMD/<family>-v0` for every scenario family and `LGMD/RandomBraking-v0`; idempotent."""
-    for family in (*FAMILIES, RANDOM):
+    """Register `LGMD/<family>-v0` for every scenario family, `LGMD/RandomBraking-v0` and `LGMD/Scenario-v0`.
+
+    A second call has no effect.
+    """
+    for family in (*FAMILIES, RANDOM, SCENARIO):
         if env_id(family) not in gym.registry:
             gym.register(
                 env_id(family),
@@ -52,7 +60,8 @@ def make_braking(
     """Return a braking environment inside `LGMDObservation`, or without it for `camera=None`.
 
     Args:
-        family: A scenario family for `BrakingEnv`, or "RandomBraking" for random levels.
+        family: A scenario family for `BrakingEnv`, "RandomBraking" for random levels, or "Scenario" for a
+            scenario given as data.
         camera: See `LGMDObservation`; None for no camera, as required by the vectorized
             `lgmd_gym.wrappers.vector.LGMDObservation`.
         params: See `LGMDObservation`.
@@ -65,7 +74,8 @@ def make_braking(
         **arguments: Arguments of the family in SI units; `world`, the number of the world, 0 to 9,999, or
             "laboratory", by default drawn from the training worlds at each reset; `condition`, the camera
             condition, see `CONDITIONS`, or "mixed" for that of the world; `road`, see `Appearance`. For
-            "RandomBraking", arguments of `RandomLevels`.
+            "RandomBraking", arguments of `RandomLevels`. For "Scenario", `scenario`: a `Scenario`, or plain
+            data as in `scenario_from_data`.
 
     Raises:
         ValueError: If an argument, key or name is unknown, or a value is out of range.
@@ -96,13 +106,23 @@ def make_source(family: str, arguments: dict[str, Any], others: Iterable[str] = 
         return RandomLevels(**arguments)
     chosen = {name: arguments[name] for name in _APPEARANCE if name in arguments}
     others = {name: value for name, value in arguments.items() if name not in _APPEARANCE}
-    return FixedScenario(make_scenario(family, **others), Appearance(**chosen))
+    return FixedScenario(_scenario(family, others), Appearance(**chosen))
+
+
+def _scenario(family: str, arguments: dict[str, Any]) -> "Scenario":
+    if family != SCENARIO:
+        return make_scenario(family, **arguments)
+    if SCENARIO_ARGUMENT not in arguments:
+        raise ValueError("LGMD/Scenario-v0 needs the argument scenario, a Scenario or a dict of its fields")
+    return scenario_from_data(arguments[SCENARIO_ARGUMENT])
 
 
 def _argument_names(family: str) -> Iterable[str]:
     if check_text("family", family) == RANDOM:
         return _LEVEL_ARGUMENTS
-    check_known("scenario", family, FAMILIES)
+    if family == SCENARIO:
+        return SCENARIO_ARGUMENT, *_APPEARANCE
+    check_known("scenario", family, (*FAMILIES, RANDOM, SCENARIO))
     return *inspect.signature(FAMILIES[family]).parameters, *_APPEARANCE
 
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.envs.registration import RANDOM
+from lgmd_gym.envs.registration import RANDOM, SCENARIO, SCENARIO_ARGUMENT
+from lgmd_gym.envs.scenarios.data import scenario_from_data, scenario_to_data
 from lgmd_gym.envs.scenarios.distribution import draw_scenario, level_generator
 from lgmd_gym.envs.scenarios.registry import make_scenario
 from lgmd_gym.envs.scenarios.scenario import Scenario
@@ -17,7 +18,8 @@ class Case:
 
     Attributes:
         name: "suite/family/variant", stable across versions.
-        family: Scenario family, as in the id `LGMD/<family>-v0`; for traffic, the kind of traffic.
+        family: Scenario family, as in the id `LGMD/<family>-v0`; "Scenario" for a case with a given scenario;
+            for traffic, the kind of traffic.
         arguments: Keyword arguments of the environment, in SI units.
         fcw_driver: Whether the protocol's driver brakes, 1.2 s after the agent's alert, instead of the
             agent (Euro NCAP AEB C2C v4.3.1, 8.4.6).
@@ -51,6 +53,8 @@ class Case:
         if self.family == RANDOM:
             return draw_scenario(level_generator(arguments["split"], arguments["start_level"]))
         arguments.pop("condition", None)  # an argument of the camera, not of the scenario
+        if self.family == SCENARIO:
+            return scenario_from_data(arguments[SCENARIO_ARGUMENT])
         return make_scenario(self.family, **arguments)
 
 
@@ -62,6 +66,22 @@ def to_mps(kmh: float) -> float:
 def make_case(suite: str, family: str, variant: str, **arguments: Any) -> Case:
     """Return the case `suite/family/variant`."""
     return Case(f"{suite}/{family}/{variant}", family, tuple(arguments.items()))
+
+
+def scenario_case(
+    suite: str, variant: str, scenario: Scenario, fcw_driver: bool = False, **arguments: Any
+) -> Case:
+    """Return the case `suite/family/variant` with a given scenario, which it holds as plain data.
+
+    Args:
+        suite: Name of the suite.
+        variant: Last part of the case's name.
+        scenario: The scenario; its family is the second part of the name.
+        fcw_driver: See `Case`.
+        **arguments: Further arguments of the environment, such as `condition`.
+    """
+    values = {SCENARIO_ARGUMENT: scenario_to_data(scenario)} | arguments
+    return Case(f"{suite}/{scenario.family}/{variant}", SCENARIO, tuple(values.items()), fcw_driver)
 
 
 def speed_cases(

@@ -9,7 +9,7 @@ import tomli_w
 
 from lgmd_gym.benchmark.folder import provenance
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.suite_file import copy_suite, read_toml
+from lgmd_gym.benchmark.suite_file import copy_suite, is_file, read_toml
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.camera import CLEAR, CONDITIONS, CameraSpec
@@ -17,7 +17,7 @@ from lgmd_gym.camera.spec import check_camera
 from lgmd_gym.camera.worlds import SPLIT_WORLDS, WORLDS
 from lgmd_gym.envs.appearance import MIXED, Appearance
 from lgmd_gym.envs.traffic.registration import KINDS
-from lgmd_gym.errors import check_items, check_keys, check_known, check_text, check_whole, shown
+from lgmd_gym.errors import check_items, check_keys, check_known, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
 
 RUN_FILE = "run.toml"
@@ -39,7 +39,8 @@ class RunConfig:
     """Configuration of a run: every setting that affects its rows.
 
     Attributes:
-        suite: Name of a suite, path of a suite file (".toml"), or "traffic".
+        suite: Name of a suite, path of a suite file (".toml") or of an OpenSCENARIO file (".xosc"), path of a
+            folder with OpenSCENARIO files, several of these paths, or "traffic".
         agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
         seeds: Number of seeds, >= 1; for traffic, of every kind.
         first_seed: First seed, >= 0.
@@ -55,7 +56,7 @@ class RunConfig:
         ValueError: If a value is unknown or out of range.
     """
 
-    suite: str = "quick"
+    suite: str | tuple[str, ...] = "quick"
     agents: tuple[str, ...] = DEFAULT_AGENTS
     seeds: int = 3
     first_seed: int = 0
@@ -68,7 +69,7 @@ class RunConfig:
     kinds: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
-        check_text("suite", self.suite)
+        object.__setattr__(self, "suite", _suite(self.suite))
         if self.kinds is not None and self.suite != TRAFFIC:
             raise ValueError(f"kinds applies to suite 'traffic' only, got suite {shown(self.suite)}")
         if self.camera is not None:
@@ -122,8 +123,8 @@ class RunConfig:
 
     @property
     def own_suite(self) -> bool:
-        """Whether the suite is a user's own file."""
-        return self.suite.endswith(".toml")
+        """Whether the suite is given by files of the user."""
+        return is_file(self.suite)
 
     @classmethod
     def load(cls, path: Path) -> "RunConfig":
@@ -142,14 +143,15 @@ class RunConfig:
         except ValueError as error:
             raise ValueError(f"run config {str(path)!r}: {error}") from None
         if config.own_suite:
-            object.__setattr__(config, "suite", str(path.parent / config.suite))
+            suites = (config.suite,) if isinstance(config.suite, str) else config.suite
+            object.__setattr__(config, "suite", _suite(tuple(str(path.parent / suite) for suite in suites)))
         return config
 
     def save(self, folder: Path) -> Path:
         """Write `run.toml`, and a copy of a user's own suite, into a run folder; return the file's path."""
         made = provenance()
         if self.own_suite:
-            copy_suite(Path(self.suite), folder / SUITE_FILE)
+            copy_suite(self.suite, folder / SUITE_FILE)
         head = HEAD.format(file=RUN_FILE, version=made["lgmd_gym"], commit=made["commit"] or "unknown")
         values = {key: value for key, value in self.to_dict().items() if value is not None}
         path = folder / RUN_FILE
@@ -159,6 +161,16 @@ class RunConfig:
     def to_dict(self) -> dict[str, Any]:
         """Return the values for TOML and JSON; a user's own suite is `SUITE_FILE`."""
         return asdict(self) | ({"suite": SUITE_FILE} if self.own_suite else {})
+
+
+def _suite(value: Any) -> str | tuple[str, ...]:
+    """Return the name or path of a suite, or several paths; one path is a string."""
+    if isinstance(value, str):
+        return value
+    paths = check_items("suite", value, str, "strings")
+    if not paths:
+        raise ValueError("suite must contain at least one name or path, got none")
+    return paths[0] if len(paths) == 1 else paths
 
 
 def _names(name: str, values: Iterable[str], kind: str = "", known: Collection[str] = ()) -> tuple[str, ...]:

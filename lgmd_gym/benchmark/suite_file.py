@@ -14,6 +14,15 @@ family = "CCRm"
 name = "warned"                     # mine/CCRm/warned
 fcw_driver = true
 arguments = { ego_speed = 13.89, target_speed = 5.56 }
+
+[[cases]]
+family = "parked"                   # any name
+name = "v30"                        # mine/parked/v30
+arguments = { condition = "night" }
+[cases.scenario]                    # a scenario of one's own, see `lgmd_gym.envs.scenarios.data`
+ego_speed = 8.33
+duration = 9.0
+actors = [{ gap = 40.0, lateral_offset = 1.0 }]
 """
 
 import re
@@ -23,24 +32,48 @@ from typing import Any
 
 import tomli_w
 
-from lgmd_gym.benchmark.case import Case, to_mps
+from lgmd_gym.benchmark.case import Case, scenario_case, to_mps
+from lgmd_gym.benchmark.openscenario import read, read_all
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, Suite, find_suite
+from lgmd_gym.envs.registration import SCENARIO, SCENARIO_ARGUMENT
+from lgmd_gym.envs.scenarios.data import scenario_from_data
 from lgmd_gym.errors import check_keys, check_path, check_text
 
 SUITE_KEYS = ("name", "about", "cases")
-CASE_KEYS = ("family", "name", "speeds_kmh", "fcw_driver", "arguments")
+CASE_KEYS = ("family", "name", "speeds_kmh", "fcw_driver", "arguments", "scenario")
+FILES = (".toml", ".xosc")
 NAME = re.compile(r"[\w.+-]+(/[\w.+-]+)*")  # names become parts of file names
 
 
-def get_suite(text: str) -> Suite:
-    """Return the suite of a name, or of a file if the text ends in ".toml".
+def is_file(suite: str | tuple[str, ...]) -> bool:
+    """Return whether a suite is given by files or a folder instead of a name."""
+    return not isinstance(suite, str) or suite.endswith(FILES) or (suite not in SUITES and Path(suite).is_dir())
+
+
+def get_suite(text: str | tuple[str, ...]) -> Suite:
+    """Return a suite.
+
+    Args:
+        text: Name of a suite; path of a suite file (".toml") or of an OpenSCENARIO file (".xosc"); path of a
+            folder with OpenSCENARIO files; or several paths of OpenSCENARIO files and folders.
 
     Raises:
-        ValueError: If the name is unknown or the file is not a valid suite.
+        ValueError: If the name is unknown or a file is not a valid suite.
     """
+    if isinstance(text, tuple):
+        return read_all(_scenario_files(text))
     if check_text("suite", text).endswith(".toml"):
         return load_suite(check_path("suite", text))
-    return find_suite(text)
+    if text.endswith(".xosc"):
+        return read(check_path("suite", text))
+    return read_all([text]) if is_file(text) else find_suite(text)
+
+
+def _scenario_files(paths: tuple[str, ...]) -> tuple[str, ...]:
+    for path in paths:
+        if not path.endswith(".xosc") and not check_path("suite", path).is_dir():
+            raise ValueError(f"of several suites each must be a .xosc file or a folder, got {path!r}")
+    return paths
 
 
 def load_suite(path: Path) -> Suite:
@@ -71,14 +104,21 @@ def load_suite(path: Path) -> Suite:
     return Suite(name, cases, str(values.get("about", "user suite")))
 
 
-def copy_suite(source: Path, target: Path) -> None:
-    """Copy a suite file, with one table per case."""
-    suite = load_suite(source)
+def copy_suite(source: str | Path | tuple[str, ...], target: Path) -> None:
+    """Write a suite given by files to a suite file, with one table per case.
+
+    The scenarios of OpenSCENARIO files become data, so that a run does not need its sources again.
+    """
+    suite = get_suite(source if isinstance(source, tuple) else str(source))
     tables = []
     for case in suite.cases:
-        variant = case.name.split("/", 2)[2]
-        table: dict[str, Any] = {"family": case.family, "name": variant, "arguments": dict(case.arguments)}
-        tables.append(table | ({"fcw_driver": True} if case.fcw_driver else {}))
+        _, family, variant = case.name.split("/", 2)
+        arguments = dict(case.arguments)
+        scenario = arguments.pop(SCENARIO_ARGUMENT, None) if case.family == SCENARIO else None
+        table: dict[str, Any] = {"family": case.family if scenario is None else family, "name": variant}
+        table |= {"fcw_driver": True} if case.fcw_driver else {}
+        table |= {"arguments": arguments} if arguments else {}
+        tables.append(table | ({} if scenario is None else {"scenario": scenario}))
     text = tomli_w.dumps({"name": suite.name, "about": suite.about, "cases": tables})
     target.write_text(text, encoding="utf-8")
 
@@ -112,6 +152,8 @@ def _cases(suite: str, table: Any) -> list[Case]:
         raise ValueError(f"arguments must be a table, got {arguments!r}")
     if not isinstance(fcw_driver, bool):
         raise ValueError(f"fcw_driver must be true or false, got {fcw_driver!r}")
+    if "scenario" in table:
+        return [_scenario_case(suite, family, table, fcw_driver)]
     speeds = table.get("speeds_kmh")
     if speeds is None:
         name = f"{suite}/{family}/{_text(table, 'name')}"
@@ -130,6 +172,19 @@ def _cases(suite: str, table: Any) -> list[Case]:
         )
         for speed in speeds
     ]
+
+
+def _scenario_case(suite: str, family: str, table: dict[str, Any], fcw_driver: bool) -> Case:
+    """Return the case of a table with a scenario, whose family is that of the table."""
+    arguments, data = table.get("arguments", {}), table["scenario"]
+    check_keys("argument of a case with a scenario", arguments, ("condition", "road", "world"))
+    if "speeds_kmh" in table:
+        raise ValueError("speeds_kmh and scenario exclude each other; write one table per speed")
+    data = {"family": family} | data if isinstance(data, dict) else data
+    scenario = scenario_from_data(data)
+    if scenario.family != family:
+        raise ValueError(f"family {family!r} and scenario.family {scenario.family!r} differ; remove the second")
+    return scenario_case(suite, _text(table, "name"), scenario, fcw_driver, **arguments)
 
 
 def _is_speed(value: Any) -> bool:

@@ -103,7 +103,8 @@ def _new(options: "Bench", executor: "Executor") -> "Run":
     else:
         config = RunConfig.load(options.config)
         check_trust(config.agents, options.config, options.trust)
-    default = Path("runs") / f"{Path(config.suite).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+    first = config.suite if isinstance(config.suite, str) else config.suite[0]
+    default = Path("runs") / f"{Path(first).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
     return Run.new(config, options.out or default, executor)
 
 

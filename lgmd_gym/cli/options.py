@@ -29,8 +29,9 @@ class Bench:
     report.html, run.toml, run.json, time series and one PNG per case. Ctrl-C keeps the finished episodes.
     """
 
-    suite: Name = None
-    """Suite name (see `lgmd-gym list suites`) or path of a suite file, NAME.toml. Default: quick."""
+    suite: Names = None
+    """Suite name (see `lgmd-gym list suites`), path of a suite file, NAME.toml, or paths of OpenSCENARIO files,
+    NAME.xosc, and of folders with such files. Default: quick."""
     agents: Names = None
     """Agents with options, for example spike-threshold:threshold=45,frames=2; MODULE:CLASS for an agent of
     your own. Default: no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""

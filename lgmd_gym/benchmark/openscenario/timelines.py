@@ -1,0 +1,192 @@
+"""Speed of an entity over time: constant, or with linear ramps of speed or acceleration."""
+
+from bisect import bisect_right
+from dataclasses import replace
+from math import inf, sqrt
+from typing import NamedTuple
+
+from lgmd_gym.envs.dynamics.segment import Segment
+
+_CLOSE = 1e-9  # [m/s], [m] or [s]
+
+
+class Piece(NamedTuple):
+    """Motion from a time on: distance, speed, acceleration and its slope at that time."""
+
+    time: float
+    distance: float
+    speed: float
+    acceleration: float = 0.0
+    jerk: float = 0.0
+
+    def after(self, dt: float) -> "Piece":
+        """Return the motion `dt` [s] later."""
+        a, j = self.acceleration, self.jerk
+        distance = self.distance + dt * (self.speed + dt * (a / 2 + dt * j / 6))
+        return Piece(self.time + dt, distance, self.speed + dt * (a + dt * j / 2), a + dt * j, j)
+
+
+class Timeline:
+    """Distance and speed over time.
+
+    Args:
+        speed: Initial speed [m/s].
+
+    Attributes:
+        initial_speed: Initial speed [m/s].
+        segments: Changes of speed, in order.
+    """
+
+    def __init__(self, speed: float = 0.0) -> None:
+        self.initial_speed, self.segments = speed, list[Segment]()
+        self._pieces = [Piece(0.0, 0.0, speed)]
+
+    def at(self, time: float) -> Piece:
+        """Return the motion at a time [s]."""
+        index = max(bisect_right(self._pieces, time, key=lambda piece: piece.time) - 1, 0)
+        piece = self._pieces[index]
+        return piece.after(time - piece.time)
+
+    def change(self, time: float, acceleration: float, final_speed: float, build_up: float = 0.0) -> float:
+        """Change the speed from a time on; the changes after that time are dropped.
+
+        Args:
+            time: Start [s].
+            acceleration: Full acceleration [m/s²].
+            final_speed: Speed at the end [m/s].
+            build_up: Time to the full acceleration [s].
+
+        Returns:
+            The time of the end [s].
+        """
+        self._cut(time)
+        now = self._pieces[-1]
+        if abs(final_speed - now.speed) < _CLOSE:
+            return time
+        self.segments.append(
+            Segment(start=time, acceleration=acceleration, build_up=build_up, final_speed=final_speed)
+        )
+        self._pieces += _ramp(now, acceleration, final_speed, build_up)
+        return self._pieces[-1].time
+
+    def copy_from(self, time: float, other: "Timeline") -> None:
+        """Follow the speed of another timeline from a time on."""
+        self._cut(time)
+        for segment in other.segments:
+            if segment.start >= time:
+                self.change(segment.start, segment.acceleration, segment.final_speed, segment.build_up)
+
+    def time_of(self, distance: float) -> float:
+        """Return the first time at which a distance is reached [s]; inf if it never is."""
+        for piece, end in zip(self._pieces, [*(item.time for item in self._pieces[1:]), inf], strict=True):
+            if piece.distance >= distance - _CLOSE:
+                return piece.time
+            if end < inf and piece.after(end - piece.time).distance < distance:
+                continue
+            return _reach(piece, distance, end)
+        return inf
+
+    def _cut(self, time: float) -> None:
+        """Drop what comes after a time; a change that is under way ends with its present speed."""
+        now = self.at(time)
+        kept = [item for item in self.segments if item.start < time - _CLOSE]
+        if kept and abs(now.acceleration) > 0.0:
+            kept[-1] = replace(kept[-1], final_speed=now.speed)
+        self.segments = kept
+        self._pieces = [piece for piece in self._pieces if piece.time < time - _CLOSE]
+        self._pieces.append(Piece(time, now.distance, now.speed))
+
+
+def _ramp(now: Piece, acceleration: float, final_speed: float, build_up: float) -> list[Piece]:
+    """Return the pieces of a change of speed, and the constant speed after it."""
+    change, pieces = final_speed - now.speed, []
+    if build_up > 0.0:
+        jerk = acceleration / build_up
+        lasts = sqrt(2.0 * change / jerk)
+        first = now._replace(acceleration=0.0, jerk=jerk)
+        if lasts <= build_up:
+            end = first.after(lasts)
+            return [first, Piece(end.time, end.distance, final_speed)]
+        pieces, now = [first], first.after(build_up)
+    steady = Piece(now.time, now.distance, now.speed, acceleration)
+    end = steady.after((final_speed - now.speed) / acceleration)
+    return [*pieces, steady, Piece(end.time, end.distance, final_speed)]
+
+
+def _reach(piece: Piece, distance: float, end: float) -> float:
+    """Return the time at which a piece reaches a distance; inf if it stops before."""
+    missing = distance - piece.distance
+    if piece.acceleration == 0.0 and piece.jerk == 0.0:
+        return piece.time + missing / piece.speed if piece.speed > 0.0 else inf
+    low, high = 0.0, end - piece.time
+    for _ in range(200):
+        middle = (low + high) / 2
+        if piece.after(middle).distance < distance:
+            low = middle
+        else:
+            high = middle
+    return piece.time + high
+
+
+class Approach(NamedTuple):
+    """Changes of speed with which an entity reaches a place at a time: start, acceleration, final speed."""
+
+    changes: tuple[tuple[float, float, float], ...]
+
+
+def synchronise(
+    now: Piece, distance: float, duration: float, final_speed: float | None, steady: tuple[float, float]
+) -> Approach:
+    """Return the changes of speed with which an entity covers a distance in a given time.
+
+    The entity has the final speed for the steady distance or time at the end. Before, it waits and then
+    accelerates evenly, or accelerates at once and then keeps the final speed, whichever covers the distance;
+    if neither does, it reaches an intermediate speed in half of the time.
+
+    Args:
+        now: Motion at present.
+        distance: Distance to the place [m].
+        duration: Time until the place has to be reached [s].
+        final_speed: Speed at the place [m/s]; None for the one that results from a constant acceleration.
+        steady: Distance [m] and time [s] at the end with the final speed; the larger one counts.
+
+    Raises:
+        ValueError: If no forward motion fits.
+    """
+    start, speed = now.time, now.speed
+    if duration <= 0.0 or distance <= 0.0:
+        raise ValueError(f"{distance:.3g} m in {duration:.3g} s cannot be reached; start further away")
+    if final_speed is None:
+        final_speed = 2.0 * distance / duration - speed
+        if final_speed < 0.0:
+            raise ValueError(f"{distance:.3g} m in {duration:.3g} s from {speed:.3g} m/s needs a reversal")
+        return _checked(((start, (final_speed - speed) / duration, final_speed),), start, speed)
+    rest = max(steady[1], steady[0] / final_speed) if final_speed > 0.0 else steady[1]
+    time, length = duration - rest, distance - rest * final_speed
+    if time <= 0.0 or length < -_CLOSE:
+        raise ValueError(f"no room before the {rest:.3g} s at constant speed; start further away")
+    mean, change = length / time, final_speed - speed
+    if abs(change) > _CLOSE and 0.0 < (mean - speed) / change < 1.0:
+        share = (mean - speed) / change  # of the final speed in the mean speed
+        ramp = 2.0 * share * time if share <= 0.5 else 2.0 * (1.0 - share) * time
+        begin = start + time - ramp if share <= 0.5 else start
+        return _checked(((begin, change / ramp, final_speed),), start, speed)
+    if abs(change) <= _CLOSE and abs(mean - speed) * time < 1e-6:
+        return Approach(())
+    middle = 2.0 * mean - (speed + final_speed) / 2
+    half = time / 2
+    return _checked(
+        ((start, (middle - speed) / half, middle), (start + half, (final_speed - middle) / half, final_speed)),
+        start,
+        speed,
+    )
+
+
+def _checked(changes: tuple[tuple[float, float, float], ...], start: float, speed: float) -> Approach:
+    for begin, acceleration, final_speed in changes:
+        if final_speed < 0.0:
+            raise ValueError(f"a speed of {final_speed:.3g} m/s would be needed; start later or further away")
+        if abs(acceleration) > 12.0:
+            raise ValueError(f"an acceleration of {acceleration:.3g} m/s² would be needed; start earlier")
+        assert begin >= start - _CLOSE, (begin, start, speed)
+    return Approach(changes)
