@@ -47,7 +47,9 @@ NAME = re.compile(r"[\w.+-]+(/[\w.+-]+)*")  # names become parts of file names
 
 def is_file(suite: str | tuple[str, ...]) -> bool:
     """Return whether a suite is given by files or a folder instead of a name."""
-    return not isinstance(suite, str) or suite.endswith(FILES) or (suite not in SUITES and Path(suite).is_dir())
+    return (
+        not isinstance(suite, str) or suite.endswith(FILES) or (suite not in SUITES and Path(suite).is_dir())
+    )
 
 
 def get_suite(text: str | tuple[str, ...]) -> Suite:
@@ -183,7 +185,9 @@ def _scenario_case(suite: str, family: str, table: dict[str, Any], fcw_driver: b
     data = {"family": family} | data if isinstance(data, dict) else data
     scenario = scenario_from_data(data)
     if scenario.family != family:
-        raise ValueError(f"family {family!r} and scenario.family {scenario.family!r} differ; remove the second")
+        raise ValueError(
+            f"family {family!r} and scenario.family {scenario.family!r} differ; remove the second"
+        )
     return scenario_case(suite, _text(table, "name"), scenario, fcw_driver, **arguments)
 
 

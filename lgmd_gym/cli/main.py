@@ -39,6 +39,7 @@ COMMANDS: dict[str, type] = {
     "train": options.Train,
     "tune": options.Tune,
     "list": options.List,
+    "scenario": options.Scenario,
     "gallery": options.Gallery,
     "doctor": options.Doctor,
 }

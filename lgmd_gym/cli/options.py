@@ -30,8 +30,8 @@ class Bench:
     """
 
     suite: Names = None
-    """Suite name (see `lgmd-gym list suites`), path of a suite file, NAME.toml, or paths of OpenSCENARIO files,
-    NAME.xosc, and of folders with such files. Default: quick."""
+    """Suite name (see `lgmd-gym list suites`), path of a suite file, NAME.toml, or paths of OpenSCENARIO
+    files, NAME.xosc, and of folders with such files. Default: quick."""
     agents: Names = None
     """Agents with options, for example spike-threshold:threshold=45,frames=2; MODULE:CLASS for an agent of
     your own. Default: no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""
@@ -285,6 +285,26 @@ class List:
 
     what: Positional[Literal["all", "suites", "agents", "envs", "cameras"]] = "all"
     """Table to print."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """Compare OpenSCENARIO files with their intent, or export a case as such a file.
+
+    lgmd-gym scenario check PATH [PATH ...] plays every cell of the files and folders without braking, and
+    prints one row per file: the cells, the contacts, and the largest deviations of impact location, impact
+    speed and time from what the parameters and positions of the file state. lgmd-gym scenario export CASE
+    --to FILE.xosc writes a case as OpenSCENARIO 1.3, and its road as OpenDRIVE next to it.
+    """
+
+    action: Positional[Literal["check", "export"]]
+    """Compare files, or export a case."""
+    targets: Positional[tuple[str, ...]]
+    """Files and folders to compare; or the name of a case, for example quick/CCRs/v30."""
+    to: File = None
+    """OpenSCENARIO file to write (.xosc); must not exist."""
+    jobs: int = 2
+    """Number of processes that compare files."""
 
 
 @dataclass(frozen=True, kw_only=True)

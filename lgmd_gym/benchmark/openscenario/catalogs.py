@@ -78,6 +78,8 @@ def _folders(locations: Element) -> list[Path]:
         directory = Element(node, locations.scope).child("Directory")
         folder = locations.node.file.parent / directory.text("path")
         if not folder.is_dir():
-            raise directory.error(f"the folder {directory.text('path')!r} does not exist; check CatalogLocations")
+            raise directory.error(
+                f"the folder {directory.text('path')!r} does not exist; check CatalogLocations"
+            )
         folders.append(folder)
     return list(dict.fromkeys(folders))

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import cos, sin
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +64,8 @@ def check_files(paths: Sequence[str | Path], jobs: int = 1) -> Iterator[CheckedF
 
     files = [file for path in paths for file in find_files(check_path("path", path))]
     jobs = min(check_whole("jobs", jobs, 1), len(files))
-    yield from Parallel(n_jobs=jobs, return_as="generator")(delayed(check_file)(file) for file in files)
+    results: Any = Parallel(n_jobs=jobs, return_as="generator")(delayed(check_file)(file) for file in files)
+    yield from results
 
 
 def check_file(path: Path) -> CheckedFile:

@@ -1,8 +1,8 @@
 """Compilation of a scenario to time scripts: our actors follow paths and segments of speed.
 
 Triggers and synchronisations are solved for the ego's undisturbed motion, as on a test track: an ego that
-brakes does not change the motion of the others. The episode begins `START_TTC` before the first contact, or 1 s
-before the first change of speed of an entity if that is earlier: a longer wait at the start is cut, and a
+brakes does not change the motion of the others. The episode begins `START_TTC` before the first contact, or
+1 s before the first change of speed of an entity if that is earlier: a longer wait at the start is cut, and a
 shorter one is extended at constant speeds.
 
 An ego that drives backwards is compiled to one that drives forwards with its leading end: the camera looks in
@@ -29,19 +29,21 @@ LEAD_IN = 1.0  # [s] at constant speeds before the first change of speed
 HORIZON = 120.0  # [s] within which a contact is searched for
 DURATION = "lgmd_gym.duration"
 """Property of the file: duration of the episode [s]; the episode then begins at the file's start."""
-IGNORED_TAGS = frozenset(
+_TAGS = (
     "FileHeader VariableDeclarations MonitorDeclarations StopTrigger Performance SceneGraphFile UsedArea "
-    "TrafficSignals TimeOfDay DomeImage Wind AdditionalAxle License".split()
+    "TrafficSignals TimeOfDay DomeImage Wind AdditionalAxle License"
 )
+IGNORED_TAGS = frozenset(_TAGS.split())
 """Elements without an effect on us, with all that they contain."""
-IGNORED_ATTRIBUTES = frozenset(
+_ATTRIBUTES = (
     "name z mass model model3d role h p r Weather.fractionalCloudCover Weather.cloudState Sun.elevation "
     "Sun.azimuth Sun.intensity Sun.illuminance Weather.atmosphericPressure Weather.temperature "
     "FrontAxle.maxSteering FrontAxle.wheelDiameter FrontAxle.trackWidth FrontAxle.positionZ "
     "RearAxle.maxSteering RearAxle.wheelDiameter RearAxle.trackWidth RearAxle.positionZ "
     "Vehicle.vehicleCategory Pedestrian.pedestrianCategory MiscObject.miscObjectCategory "
-    "Precipitation.precipitationIntensity Precipitation.intensity Controller.controllerType".split()
+    "Precipitation.precipitationIntensity Precipitation.intensity Controller.controllerType"
 )
+IGNORED_ATTRIBUTES = frozenset(_ATTRIBUTES.split())
 """Attributes without an effect on us."""
 
 
@@ -58,6 +60,7 @@ class Compiled:
         target: The entity that the ego touches first, or the one it comes nearest to; None without one.
         world: The world, for positions.
         root: Root element with the values of the parameters.
+        properties: Properties of the file.
     """
 
     scenario: Scenario
@@ -68,6 +71,7 @@ class Compiled:
     target: Mover | None
     world: World
     root: Element
+    properties: dict[str, str]
 
 
 def compile_scenario(root: Element, family: str) -> Compiled:
@@ -109,11 +113,14 @@ def _file(item: Element) -> Path:
 def _compile(root: Element, world: World, ego: Mover, family: str, condition: str) -> Compiled:
     others = [item for item in world.movers.values() if item is not ego and not item.deleted]
     contact, target = _first_contact(ego, [item for item in others if item.body.kind != "road_marking"])
-    duration = _duration(root)
+    properties = _properties(root)
+    duration = float(properties[DURATION]) if DURATION in properties else None
     start = 0.0 if duration is not None else _start(contact, [ego, *others])
-    others.sort(key=lambda item: item is not target)
     if duration is None:
-        duration = (contact if contact < inf else _last_change([ego, *others]) + START_TTC) - start + AFTERMATH
+        others.sort(key=lambda item: item is not target)
+        duration = (
+            (contact if contact < inf else _last_change([ego, *others]) + START_TTC) - start + AFTERMATH
+        )
     length = ego.body.length
     base, _, _ = _pose(ego, start)
     scenario = Scenario(
@@ -128,17 +135,14 @@ def _compile(root: Element, world: World, ego: Mover, family: str, condition: st
         ego_width=ego.body.width,
         ego_reference=_pose(ego, start)[1] if _bends(ego, start) else 0.0,
     )
-    return Compiled(scenario, condition, start, contact, ego, target, world, root)
+    return Compiled(scenario, condition, start, contact, ego, target, world, root, properties)
 
 
-def _duration(root: Element) -> float | None:
-    """Return the duration that an exported file states, or None."""
+def _properties(root: Element) -> dict[str, str]:
+    """Return the properties of a file, such as those of an exported one."""
     header = root.find("FileHeader")
-    properties = None if header is None else header.find("Properties")
-    for item in () if properties is None else properties.all("Property"):
-        if item.text("name") == DURATION:
-            return item.number("value")
-    return None
+    block = None if header is None else header.find("Properties")
+    return {} if block is None else {item.text("name"): item.text("value") for item in block.all("Property")}
 
 
 def _start(contact: float, movers: list[Mover]) -> float:
@@ -194,7 +198,7 @@ def _actor(mover: Mover, ego: Place, ego_length: float, start: float) -> Actor:
 
 
 def _first_contact(ego: Mover, others: list[Mover]) -> tuple[float, Mover | None]:
-    """Return the time of the first contact, inf for none, and the other body or the one that comes nearest."""
+    """Return the time of the first contact, inf for none, and the body touched or else the nearest one."""
     found, target, nearest = inf, None, inf
     for other in others:
         time, distance = _contact(ego, other, min(found, HORIZON))

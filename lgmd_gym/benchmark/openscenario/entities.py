@@ -178,4 +178,6 @@ def _wheelbase(item: Element) -> float:
 
 def _properties(item: Element) -> dict[str, str]:
     block = item.find("Properties")
-    return {} if block is None else {entry.text("name"): entry.text("value") for entry in block.all("Property")}
+    return (
+        {} if block is None else {entry.text("name"): entry.text("value") for entry in block.all("Property")}
+    )

@@ -13,7 +13,9 @@ from lgmd_gym.errors import shown, unknown_name
 Value = float | bool
 MAX_LENGTH = 5000  # characters
 MAX_DEPTH = 100  # of nested groups
-_TOKEN = re.compile(r"\s*(\$\{?\w+\}?|\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?|[A-Za-z_]\w*|[-+*/%(),])")
+_TOKEN = re.compile(
+    r"\s*(\$\{?\w+\}?|\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?|[A-Za-z_]\w*|[-+*/%(),])"
+)
 CONSTANTS: dict[str, Value] = {"pi": math.pi, "PI": math.pi, "e": math.e, "true": True, "false": False}
 
 
@@ -39,7 +41,7 @@ _FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
     "acos": (1, math.acos),
     "atan": (1, math.atan),
     "sign": (1, _sign),
-    "abs": (1, abs),
+    "abs": (1, math.fabs),
     "max": (2, max),
     "min": (2, min),
 }
@@ -187,7 +189,9 @@ class _Parser:
         try:
             return float(function(*values))
         except ValueError:
-            raise ValueError(f"{name}({', '.join(f'{value:g}' for value in values)}) is not defined") from None
+            raise ValueError(
+                f"{name}({', '.join(f'{value:g}' for value in values)}) is not defined"
+            ) from None
 
     def _parameter(self, name: str) -> Value:
         if name not in self._parameters:

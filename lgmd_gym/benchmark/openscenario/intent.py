@@ -6,12 +6,13 @@ It is computed from the resolved parameters and positions of the file, without t
   reaches its `TargetPositionMaster` at the initial speed along its path. The target's reference point is then
   at `TargetPosition`. Location: the middle of the target's front in the axes of the ego's body.
 * For crossing pedestrians and bicyclists (`VRU_collisionPointOffset`), the location is that of the point this
-  far ahead of the reference point: at the share `ImpactLocation` or `Overlap` of the ego's width from the side
-  that the target comes from, and in the middle without these parameters.
+  far ahead of the reference point: at the share `ImpactLocation` or `Overlap` of the ego's width, and in the
+  middle without these parameters. The side from which the share counts is that of the synchronisation
+  positions, because the files count it from the right (CBFA) or from the target's side (CPFA).
 * Rear and head-on scenarios: the target's centre is at the share `ImpactLocation` of the ego's width, from
-  the right; `Overlap` of a car is the overlapped share of the ego's width, and ±100 is aligned. The time follows
-  from the initial distance and the speeds. For a target that brakes (`isTargetbraking`, `isCCRbraking`), it
-  follows from headway, delay and deceleration; for one that starts (`Target_accelerationDist`,
+  the right; `Overlap` of a car is the overlapped share of the ego's width, and ±100 is aligned. The time
+  follows from the initial distance and the speeds. For a target that brakes (`isTargetbraking`,
+  `isCCRbraking`), it follows from headway, delay and deceleration; for one that starts (`Target_accelerationDist`,
   `Target_steadyStateDist`), from the time it needs for these distances after its trigger.
 * CCFhol: contact is intended `GVT_laneChangeTTC` after the lane change of `Trajectory_laneChangeDistance` at
   constant speed, which begins at the synchronisation, with both cars aligned.
@@ -19,7 +20,7 @@ It is computed from the resolved parameters and positions of the file, without t
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import copysign, inf, sin, sqrt
+from math import copysign, inf, sqrt
 
 from lgmd_gym.benchmark.openscenario.compiler import Compiled
 from lgmd_gym.benchmark.openscenario.nodes import Element, Node
@@ -112,9 +113,8 @@ def _synchronised(compiled: Compiled, action: Element, values: _Values) -> Inten
     if point is None:
         return Intent(goal / speed, speed, seen.moved(target.front).y, target.front)
     share = values.get("ImpactLocation", "Overlap")
-    side = 1.0 if sin(seen.heading) > 0.0 else -1.0  # + for a target from the right
-    lateral = side * ego.body.width * ((50.0 if share is None else share) / 100.0 - 0.5)
-    return Intent(goal / speed, speed, lateral, point)
+    beside = ego.body.width * abs((50.0 if share is None else share) / 100.0 - 0.5)
+    return Intent(goal / speed, speed, copysign(beside, seen.moved(point).y), point)
 
 
 def _along(compiled: Compiled, values: _Values) -> Intent:
@@ -127,8 +127,6 @@ def _along(compiled: Compiled, values: _Values) -> Intent:
     if share is None and overlap is not None and (target.body.kind != "car"):
         share = overlap
     lateral = None if share is None else width * (share / 100.0 - 0.5)
-    if ego.backwards and lateral is not None:
-        lateral = abs(lateral)  # the protocol does not state the side
     if share is None and overlap is not None:
         beside = target.body.width / 2 + width / 2 - abs(overlap) / 100.0 * width
         lateral = 0.0 if abs(overlap) == 100.0 else copysign(beside, overlap)

@@ -76,7 +76,9 @@ def _check_type(name: str, kind: str, value: str, source: Node) -> None:
         try:
             number = float(value)
         except ValueError:
-            raise source.error(f"parameter {name} of type {kind} must be a number, got {shown(value)}") from None
+            raise source.error(
+                f"parameter {name} of type {kind} must be a number, got {shown(value)}"
+            ) from None
         if kind != "double" and number != floor(number):
             raise source.error(f"parameter {name} of type {kind} must be a whole number, got {shown(value)}")
     elif kind == "boolean" and value not in ("true", "false", "0", "1"):
@@ -90,7 +92,7 @@ def _check_constraints(item: Element, name: str, value: str, source: Node) -> No
     for group in groups:
         rules = [(entry.choice("rule", RULES), entry.text("value")) for entry in group]
         try:
-            met = all([compare(value, rule, bound) for rule, bound in rules])
+            met = all(compare(value, rule, bound) for rule, bound in rules)
         except ValueError as error:
             raise item.error(f"parameter {name}: {error}") from None
         if met:

@@ -17,6 +17,8 @@ from lgmd_gym.errors import check_path
 SUFFIX = ".xosc"
 FAMILY = "Scenario_ID"  # parameter that names the family
 VERSIONS = ("1", "2", "3")
+DRIVER = "lgmd_gym.fcw_driver"
+"""Property of the file: whether the driver brakes after the alert."""
 FCW = "_FCW"
 """Part of the name of a file or of its `Scenario_ID` that marks tests in which the driver brakes."""
 
@@ -48,8 +50,8 @@ def read(path: str | Path) -> Suite:
         path: A scenario, or a file that varies the parameters of one.
 
     Raises:
-        ValueError: If the file cannot be read, or contains something that is not supported. The message begins
-            with the file and line.
+        ValueError: If the file cannot be read, or contains something that is not supported. The message
+            begins with the file and line.
     """
     path = check_path("path", path)
     suite = file_name(path.stem)
@@ -140,7 +142,11 @@ def _cells(path: Path, file: Path, root: Node, given: Iterable[dict[str, Assignm
         varied.append({name: item.value for name, item in assignments.items()})
     names = variants(varied, [cell.scenario.ego_speed for cell in cells])
     return [
-        Cell(name, cell, FCW in path.stem or FCW in cell.scenario.family)
+        Cell(
+            name,
+            cell,
+            FCW in path.stem or FCW in cell.scenario.family or cell.properties.get(DRIVER) == "true",
+        )
         for name, cell in zip(names, cells, strict=True)
     ]
 

@@ -153,6 +153,7 @@ class RoadNetwork:
             ValueError: If there is no way.
         """
         starts = (1, -1) if direction is None else (direction,)
+        queue: list[tuple[float, str, int, tuple[tuple[str, int], ...]]]
         queue = [(self.road(first).length, first, way, ((first, way),)) for way in starts]
         seen = set[tuple[str, int]]()
         while queue:

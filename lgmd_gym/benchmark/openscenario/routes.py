@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from math import pi
 from typing import NamedTuple
 
@@ -39,7 +40,7 @@ class Route:
             ValueError: If there is none.
         """
         steps: list[tuple[Road, int]] = []
-        for (road, lane, s), (other, _, after) in zip(stops[:-1], stops[1:], strict=True):
+        for (road, lane, s), (other, _, after) in pairwise(stops):
             direction = None if lane is None or lane == 0 else road.direction(lane)
             if road is other and after != s:
                 direction = 1 if after > s else -1

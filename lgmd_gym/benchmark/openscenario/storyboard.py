@@ -3,11 +3,12 @@
 from dataclasses import dataclass, field
 from math import inf
 
-from lgmd_gym.benchmark.openscenario.actions import Run, global_action, private_action, settle
+from lgmd_gym.benchmark.openscenario.actions import Run, global_action, private_action
 from lgmd_gym.benchmark.openscenario.conditions import States, Trigger, read_trigger
 from lgmd_gym.benchmark.openscenario.entities import Mover
 from lgmd_gym.benchmark.openscenario.nodes import Element
 from lgmd_gym.benchmark.openscenario.parameters import declare
+from lgmd_gym.benchmark.openscenario.path_actions import settle
 from lgmd_gym.benchmark.openscenario.world import World
 
 

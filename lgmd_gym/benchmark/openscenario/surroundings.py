@@ -94,8 +94,12 @@ def _curve(road: Road, direction: int, t: float, s: float) -> RoadPlan:
 
 def _straight(road: Road, direction: int, s: float, t: float) -> RoadPlan:
     lanes = road.lanes(s)
-    driving = {number: road.lane_centre(number, s) for number, lane in lanes.items() if lane.kind == "driving"}
-    own = sorted((n for n in driving if road.direction(n) == direction), key=lambda n: -direction * driving[n])
+    driving = {
+        number: road.lane_centre(number, s) for number, lane in lanes.items() if lane.kind == "driving"
+    }
+    own = sorted(
+        (n for n in driving if road.direction(n) == direction), key=lambda n: -direction * driving[n]
+    )
     if not own or any(_width(road, number, s) > _WIDEST for number in own):
         return RoadPlan()
     index = min(range(len(own)), key=lambda i: abs(driving[own[i]] - t))
@@ -109,5 +113,3 @@ def _width(road: Road, lane: int, s: float) -> float:
     edge = 0.0 if inner == 0 else _width(road, inner, s) / 2
     first = road.lane_centre(0, s) if inner == 0 else road.lane_centre(inner, s)
     return 2.0 * (abs(road.lane_centre(lane, s) - first) - edge)
-
-

@@ -176,7 +176,10 @@ def synchronise(
     middle = 2.0 * mean - (speed + final_speed) / 2
     half = time / 2
     return _checked(
-        ((start, (middle - speed) / half, middle), (start + half, (final_speed - middle) / half, final_speed)),
+        (
+            (start, (middle - speed) / half, middle),
+            (start + half, (final_speed - middle) / half, final_speed),
+        ),
         start,
         speed,
     )

@@ -225,7 +225,7 @@ def _beside(item: tuple[Road, float, float], place: Place) -> float:
 
 
 def _in_lane(road: Road, lane: int, s: float, offset: float) -> Place:
-    """Return the place in a lane, with the heading of its traffic; the offset is + left of the road's line."""
+    """Return the place in a lane, with the heading of its traffic; the offset is + left of the line."""
     place = road.at(s, road.lane_centre(lane, s) + offset)
     return place if lane == 0 or road.direction(lane) > 0 else place.turned(pi)
 
@@ -238,4 +238,6 @@ def _lane_at(road: Road, s: float, t: float) -> int:
 def _shifted(road: Road, lane: int, change: int) -> int:
     """Return the lane `change` lanes to the left; lane 0 has no width and does not count."""
     other = lane + change
-    return other + (1 if change > 0 else -1) if change and (other == 0 or (other > 0) != (lane > 0)) else other
+    return (
+        other + (1 if change > 0 else -1) if change and (other == 0 or (other > 0) != (lane > 0)) else other
+    )

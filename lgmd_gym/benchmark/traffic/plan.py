@@ -10,6 +10,7 @@ from lgmd_gym.benchmark.executor import TaskMap
 from lgmd_gym.benchmark.plan import Plan
 from lgmd_gym.benchmark.rows import Row, RowKey, key_of
 from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.task import Result
 from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
 from lgmd_gym.benchmark.traffic.rows import traffic_case
@@ -25,7 +26,7 @@ class TrafficPlan(Plan):
 
     def __init__(self, config: RunConfig) -> None:
         super().__init__(config)
-        self.suite = config.suite
+        self.suite = TRAFFIC
         self.kinds: tuple[str, ...] = config.kinds or ()
 
     def keys(self) -> set[RowKey]:
