@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import inf
 
 from lgmd_gym.benchmark.openscenario.entity_conditions import Test, entity_test, meets
-from lgmd_gym.benchmark.openscenario.nodes import Element
+from lgmd_gym.benchmark.openscenario.nodes import Element, LocatedError
 from lgmd_gym.benchmark.openscenario.parameters import RULES, compare
 from lgmd_gym.benchmark.openscenario.world import World
 
@@ -142,9 +142,11 @@ def _by_value(item: Element, states: States) -> tuple[Test, Callable[[], float] 
         limit, rule = found.number("value"), found.choice("rule", RULES[1:5])
         return (lambda time: meets(time, rule, limit)), (lambda: limit)
     if found.tag == "ParameterCondition":
-        name, rule, bound = found.text("parameterRef"), found.choice("rule", RULES), found.text("value")
+        name, rule, bound = found.name_of("parameterRef"), found.choice("rule", RULES), found.text("value")
         try:
-            met = compare(found.resolve(f"${name.removeprefix('$')}"), rule, bound)
+            met = compare(found.resolve(f"${name}"), rule, bound)
+        except LocatedError:
+            raise
         except ValueError as error:
             raise found.error(str(error)) from None
         return (lambda time: met), (lambda: inf)

@@ -173,7 +173,7 @@ def _wheelbase(item: Element) -> float:
     if axles is None:
         return 0.0
     positions = [axle.number("positionX") for axle in axles.all("FrontAxle", "RearAxle")]
-    return max(positions) - min(positions) if positions else 0.0
+    return max(positions) - min(positions) if len(positions) > 1 else 0.0
 
 
 def _properties(item: Element) -> dict[str, str]:

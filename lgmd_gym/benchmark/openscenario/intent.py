@@ -12,8 +12,9 @@ It is computed from the resolved parameters and positions of the file, without t
 * Rear and head-on scenarios: the target's centre is at the share `ImpactLocation` of the ego's width, from
   the right; `Overlap` of a car is the overlapped share of the ego's width, and ±100 is aligned. The time
   follows from the initial distance and the speeds. For a target that brakes (`isTargetbraking`,
-  `isCCRbraking`), it follows from headway, delay and deceleration; for one that starts (`Target_accelerationDist`,
-  `Target_steadyStateDist`), from the time it needs for these distances after its trigger.
+  `isCCRbraking`), it follows from headway, delay and deceleration; for one that starts
+  (`Target_accelerationDist`, `Target_steadyStateDist`), from the time it needs for these distances after its
+  trigger.
 * CCFhol: contact is intended `GVT_laneChangeTTC` after the lane change of `Trajectory_laneChangeDistance` at
   constant speed, which begins at the synchronisation, with both cars aligned.
 """

@@ -125,6 +125,14 @@ class Element:
             return default
         return self.resolve(raw)
 
+    def name_of(self, name: str) -> str:
+        """Return an attribute with the name of a parameter, without its "$"."""
+        raw = self.node.attributes.get(name)
+        if raw is None:
+            raise self.error(f"{self.tag} needs the attribute {name!r}")
+        self.node.read.add(name)
+        return raw.removeprefix("$")
+
     def resolve(self, raw: str) -> str:
         """Return a text with `$name` or `${...}` replaced by its value."""
         if raw.startswith("${") and raw.endswith("}"):

@@ -58,7 +58,7 @@ def declare(parent: Element, given: Mapping[str, Assignment]) -> dict[str, str]:
     declarations = parent.find("ParameterDeclarations")
     for item in () if declarations is None else declarations.all("ParameterDeclaration"):
         item = Element(item.node, scope)
-        name = item.text("name").removeprefix("$")
+        name = item.name_of("name")
         default = item.text("value")
         value, source = given.get(name, Assignment(default, item.node))
         kind = item.choice("parameterType", (*_NUMBERS, "string", "boolean", "dateTime"))
@@ -109,7 +109,7 @@ def assignments(parent: Element) -> dict[str, Assignment]:
     block = parent.find("ParameterAssignments")
     given = {}
     for item in () if block is None else block.all("ParameterAssignment"):
-        given[item.text("parameterRef").removeprefix("$")] = Assignment(item.text("value"), item.node)
+        given[item.name_of("parameterRef")] = Assignment(item.text("value"), item.node)
     return given
 
 
@@ -143,7 +143,7 @@ def _axis(item: Element) -> list[dict[str, Assignment]]:
         sets = list(item.only("ValueSetDistribution").all("ParameterValueSet"))
         axis = [
             {
-                entry.text("parameterRef"): Assignment(entry.text("value"), entry.node)
+                entry.name_of("parameterRef"): Assignment(entry.text("value"), entry.node)
                 for entry in values.all("ParameterAssignment")
             }
             for values in sets
@@ -153,7 +153,7 @@ def _axis(item: Element) -> list[dict[str, Assignment]]:
         return axis
     if item.tag != "DeterministicSingleParameterDistribution":
         raise item.error(f"{item.tag} is not supported; use DeterministicSingleParameterDistribution")
-    name = item.text("parameterName").removeprefix("$")
+    name = item.name_of("parameterName")
     values = item.only("DistributionSet", "DistributionRange")
     if values.tag == "DistributionSet":
         axis = [{name: Assignment(entry.text("value"), entry.node)} for entry in values.all("Element")]

@@ -55,6 +55,8 @@ def follow_trajectory(item: Element, mover: Mover, world: World, time: float) ->
     offset = item.number("initialDistanceOffset", 0.0)
     if mover.front_axle:
         base = mover.body.wheelbase
+        if base == 0.0:
+            raise item.error(f"the front axle of {mover.name!r} cannot be its control point without Axles")
         track = Track(track.start.moved(-base), rear_axle_path(track.bends, base))
     if time == 0.0:
         mover.track, mover.start, mover.follows = track.part(offset), track.at(offset), True

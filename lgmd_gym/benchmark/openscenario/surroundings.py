@@ -1,9 +1,9 @@
 """Surroundings: the road plan and the camera condition of a scenario."""
 
-from math import cos, sin
+from math import cos, pi, sin
 
 from lgmd_gym.benchmark.openscenario.nodes import Element
-from lgmd_gym.benchmark.openscenario.paths import Place
+from lgmd_gym.benchmark.openscenario.paths import Place, Track
 from lgmd_gym.benchmark.openscenario.roads import Road, RoadNetwork
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.envs.scenarios.scenario import RoadPlan
@@ -66,9 +66,10 @@ def road_plan(network: RoadNetwork, ego: Place, located: tuple[Road, float, floa
         return RoadPlan(kind="crossing", distance=ahead[0])
     direction = 1 if cos(ego.heading - road.at(s).heading) > 0.0 else -1
     bends = road.bends(direction, 0.0)
+    curve = None
     if any(bend.curvature or bend.last_curvature for bend in bends):
-        return _curve(road, direction, t, s)
-    return _straight(road, direction, s, t)
+        curve = _curve(road, direction, t, ego)
+    return curve or _straight(road, direction, s, t)
 
 
 def _crossing(road: Road, ego: Place) -> float | None:
@@ -79,17 +80,16 @@ def _crossing(road: Road, ego: Place) -> float | None:
     return line.x - line.y * cos(line.heading) / sin(line.heading)
 
 
-def _curve(road: Road, direction: int, t: float, s: float) -> RoadPlan:
-    bends = list(road.bends(direction, t))
-    distance = 0.0
+def _curve(road: Road, direction: int, t: float, ego: Place) -> RoadPlan | None:
+    """Return the arcs ahead of the ego, or None if there are none."""
+    begin = road.at(0.0, t) if direction > 0 else road.at(road.length, t).turned(pi)
+    lane = Track(begin, road.bends(direction, t))
+    bends, distance = list(lane.part(lane.nearest(ego)).bends), 0.0
     while bends and bends[0].curvature == bends[0].last_curvature == 0.0:
         distance += bends.pop(0).length
-    while bends and bends[-1].curvature == bends[-1].last_curvature == 0.0:
-        bends.pop()
     if any(bend.curvature != bend.last_curvature for bend in bends):
         raise ValueError(f"spirals of the ego's road {road.name} are not supported; use arcs")
-    along = s if direction > 0 else road.length - s
-    return RoadPlan(kind="curve", distance=distance - along, bends=tuple(bends))
+    return RoadPlan(kind="curve", distance=distance, bends=tuple(bends)) if bends else None
 
 
 def _straight(road: Road, direction: int, s: float, t: float) -> RoadPlan:
