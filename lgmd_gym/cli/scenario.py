@@ -32,6 +32,7 @@ def _check(options: "Scenario") -> int:
     console, start = make_console(), time.perf_counter()
     checked = list(check_files(options.targets, options.jobs))
     table = Table(*COLUMNS, title="largest deviations from the intent of the file")
+    table.columns[0].overflow = "fold"
     for column in table.columns[1:]:
         column.justify = "right"
     for item in checked:
@@ -44,7 +45,7 @@ def _check(options: "Scenario") -> int:
 
 
 def _row(item: "CheckedFile") -> list[str]:
-    name = str(Path(*item.path.parts[-2:]))
+    name = str(Path(*item.path.with_suffix("").parts[-2:]))
     deviations = (100.0 * item.location, 3.6 * item.speed, item.time)
     texts = [
         "–" if isnan(value) else format(value, f".{digits}f")

@@ -97,7 +97,7 @@ def test_names_of_cells(tmp_path):
         ([{"R": "1", "alpha": "x"}, {"R": "2", "alpha": "y"}], ["v36/r1", "v36/r2"]),
         ([{"road": "../a/b_Lit.xodr", "light": "Sunny"}, {"road": "../a/b.xodr", "light": "Night"}],
          ["v36/sunny", "v36/night"]),
-        ([{"Target_init_speed_kph": "20"}, {"Target_init_speed_kph": "30.5"}], ["v36/target20", "v36/target30.5"]),
+        ([{"GVT_init_speed_kph": "20"}, {"GVT_init_speed_kph": "30.5"}], ["v36/target20", "v36/target30.5"]),
         ([{"VRU_Entry": "NCAP_Adult"}, {"VRU_Entry": "NCAP Child!"}], ["v36/adult", "v36/ncap-child"]),
     ],
 )  # fmt: skip
@@ -114,7 +114,8 @@ def test_fcw_cells_have_the_driver(tmp_path):
 
 def weather(inside):
     return (
-        f'<GlobalAction><EnvironmentAction><Environment name="e"><Weather fractionalCloudCover="zeroOktas">{inside}'
+        '<GlobalAction><EnvironmentAction><Environment name="e"><Weather fractionalCloudCover="zeroOktas">'
+        f"{inside}"
         "</Weather></Environment></EnvironmentAction></GlobalAction>"
     )
 
@@ -172,7 +173,13 @@ def from_catalog(folder, entry="Long", kind="car", locations=LOCATIONS, assigned
 
 @pytest.mark.parametrize(
     ("kind", "expected"),
-    [("car", "car"), ("truck", "car"), ("motorbike", "motorcycle"), ("bicycle", "bicycle"), ("trailer", "box")],
+    [
+        ("car", "car"),
+        ("truck", "car"),
+        ("motorbike", "motorcycle"),
+        ("bicycle", "bicycle"),
+        ("trailer", "box"),
+    ],
 )
 def test_entries_of_catalogs(tmp_path, kind, expected):
     actor = from_catalog(tmp_path, kind=kind)
@@ -180,10 +187,11 @@ def test_entries_of_catalogs(tmp_path, kind, expected):
 
 
 def test_parameters_of_entries(tmp_path):
-    assigned = '<ParameterAssignments><ParameterAssignment parameterRef="length" value="6.5"/></ParameterAssignments>'
+    assigned = '<ParameterAssignment parameterRef="length" value="6.5"/>'
+    assigned = f"<ParameterAssignments>{assigned}</ParameterAssignments>"
     assert from_catalog(tmp_path, assigned=assigned).length == 6.5
     assert from_catalog(tmp_path, "Walker").kind == "pedestrian"
-    with pytest.raises(ValueError, match="unknown parameter 'width'; known: length|unknown parameter 'width'"):
+    with pytest.raises(ValueError, match="unknown parameter 'width'"):
         from_catalog(tmp_path, assigned=assigned.replace('"length"', '"width"'))
     with pytest.raises(ValueError, match="unknown entry of catalog 'Cars' 'Lang'; did you mean 'Long'"):
         from_catalog(tmp_path, "Lang")
@@ -197,9 +205,11 @@ WIDE = LANES.replace('a="3.5"', 'a="28"')
 THREE = (
     '<lanes><laneSection s="0"><right>'
     + "".join(
-        f'<lane id="-{n}" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>' for n in (1, 2, 3)
+        f'<lane id="-{n}" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
+        for n in (1, 2, 3)
     )
-    + '<lane id="-4" type="border"><width sOffset="0" a="2" b="0" c="0" d="0"/></lane></right></laneSection></lanes>'
+    + '<lane id="-4" type="border"><width sOffset="0" a="2" b="0" c="0" d="0"/></lane></right>'
+    + "</laneSection></lanes>"
 )
 CROSSING = road_file(road(0, 0, 0, 0, 1000), road(1, 200, -100, 1.5707963267948966, 200))
 
@@ -227,7 +237,9 @@ def test_road_plans(tmp_path, roads, lane, plan):
 def test_the_plan_of_a_curve(tmp_path):
     """The ego's lane is 1.75 m outside of the line, of which 900 m are left."""
     arc = road(0, 0, 0, 0, 1000, '<arc curvature="0.005"/>')
-    start = private("Ego", f"<TeleportAction><Position>{lane_position(100)}</Position></TeleportAction>", speed(10))
+    start = private(
+        "Ego", f"<TeleportAction><Position>{lane_position(100)}</Position></TeleportAction>", speed(10)
+    )
     plan = compiled(tmp_path, scenario(start, entities=vehicle("Ego")), road_file(arc)).scenario.road
     assert plan.kind == "curve"
     (bend,) = plan.bends
@@ -248,7 +260,7 @@ def test_the_touched_entity_is_the_first_actor(tmp_path):
 
 
 def test_an_episode_keeps_the_acceleration_of_the_target(tmp_path):
-    """The target accelerates from 1 to 3 s; the ego needs 60 m / (10 - 4 m/s) or so: the episode begins at 0 s."""
+    """The target accelerates from 0 to 2 s: the episode begins 1 s before. 116 m close with 6 m/s."""
     init = START.replace('s="160"', 's="220"')
     accelerate = event("E", speed(4, "rate", "linear", 2), "")
     found = compiled(tmp_path, scenario(init, story("Target", accelerate)))
@@ -262,12 +274,18 @@ def test_an_episode_keeps_the_acceleration_of_the_target(tmp_path):
     ("change", "message"),
     [
         (("<Story name", "<Monitor/><Story name"), "Monitor in Storyboard is not supported; remove it"),
-        (('name="G"', 'name="G" shuffle="1"'), "ManeuverGroup shuffle is not supported; remove the attribute"),
+        (
+            ('name="G"', 'name="G" shuffle="1"'),
+            "ManeuverGroup shuffle is not supported; remove the attribute",
+        ),
         (('maximumExecutionCount="1"', 'maximumExecutionCount="2"'), "maximumExecutionCount must be 1"),
         (('name="Ego"', 'name="Car"'), r"unknown entity 'Ego'"),
         (('revMinor="3"', 'revMinor="4"'), "OpenSCENARIO 1.4 is not supported; use 1.1, 1.2 or 1.3"),
         (('<Center x="0.0" y="0"', '<Center x="0.0" y="0.1"'), "a bounding box beside the centreline"),
-        (("<OpenSCENARIO>", '<!DOCTYPE a [<!ENTITY b "c">]><OpenSCENARIO>'), "a document type is not supported"),
+        (
+            ("<OpenSCENARIO>", '<!DOCTYPE a [<!ENTITY b "c">]><OpenSCENARIO>'),
+            "a document type is not supported",
+        ),
         (("</OpenSCENARIO>", ""), "not XML: no element found"),
         (("</Storyboard>", "</Storyboard><Extra/>"), "Extra in OpenSCENARIO is not supported"),
         (("road.xodr", "roads.xodr"), r"roads\.xodr cannot be read: No such file"),
@@ -288,7 +306,9 @@ def test_errors_state_file_and_line(tmp_path, change, message):
 def test_files_without_a_scenario(tmp_path):
     path = tmp_path / "a.xosc"
     path.write_text(CATALOG.format(kind="car"))
-    with pytest.raises(ValueError, match="no Storyboard or ParameterValueDistribution, got FileHeader, Catalog"):
+    with pytest.raises(
+        ValueError, match="no Storyboard or ParameterValueDistribution, got FileHeader, Catalog"
+    ):
         read(path)
     with pytest.raises(ValueError, match="cannot be read: No such file or directory"):
         read(tmp_path / "b.xosc")
@@ -301,7 +321,9 @@ def test_files_without_a_scenario(tmp_path):
 
 def test_known_elements_without_effect(tmp_path):
     text = scenario(START).replace("<StopTrigger/>", "<StopTrigger><Anything unknown='1'/></StopTrigger>")
-    text = text.replace("<CatalogLocations>", "<VariableDeclarations><X/></VariableDeclarations><CatalogLocations>")
+    text = text.replace(
+        "<CatalogLocations>", "<VariableDeclarations><X/></VariableDeclarations><CatalogLocations>"
+    )
     assert len(read(write(tmp_path, text)).cases) == 1
 
 
@@ -317,7 +339,7 @@ def test_several_files_and_folders_are_one_suite(tmp_path):
     assert [case.name for case in read_all([one]).cases] == ["vary/case/v30", "vary/case/v50"]
     assert [case.name for case in get_suite(str(folder)).cases] == expected
     assert [case.name for case in get_suite((str(one), str(two))).cases] == expected
-    with pytest.raises(ValueError, match="each must be a .xosc file or a folder, got 'quick'"):
+    with pytest.raises(ValueError, match=r"each must be a \.xosc file or a folder, got 'quick'"):
         get_suite((str(one), "quick"))
 
 
@@ -357,8 +379,14 @@ def test_own_scenarios_in_suite_files(tmp_path):
     ("change", "message"),
     [
         (("gap", "gaps"), r"unknown key of scenario.actors\[0\] 'gaps'; did you mean 'gap'"),
-        (("condition", "conditions"), "unknown argument of a case with a scenario 'conditions'; did you mean"),
-        (("duration = 9.0", 'duration = 9.0\nfamily = "x"'), "family 'parked' and scenario.family 'x' differ"),
+        (
+            ("condition", "conditions"),
+            "unknown argument of a case with a scenario 'conditions'; did you mean",
+        ),
+        (
+            ("duration = 9.0", 'duration = 9.0\nfamily = "x"'),
+            "family 'parked' and scenario.family 'x' differ",
+        ),
         (('name = "v30"', 'name = "v30"\nspeeds_kmh = [30]'), "speeds_kmh and scenario exclude each other"),
     ],
 )
@@ -397,7 +425,9 @@ def test_several_suites_in_a_configuration(tmp_path):
 
 
 def test_corner_roads_are_read(tmp_path):
-    assert compiled(tmp_path, scenario(START.replace('s="160"', 's="95"').replace('s="100"', 's="20"')), CORNER)
+    assert compiled(
+        tmp_path, scenario(START.replace('s="160"', 's="95"').replace('s="100"', 's="20"')), CORNER
+    )
 
 
 def test_the_environment_of_a_case(tmp_path):

@@ -109,9 +109,9 @@ def world(tmp_path):
 
 
 ROUTE = """<RouteRef><Route name="r" closed="false">
-<Waypoint routeStrategy="shortest"><Position><LanePosition roadId="0" laneId="-1" s="40"/></Position></Waypoint>
-<Waypoint routeStrategy="shortest"><Position><RoadPosition roadId="2" s="50" t="0"/></Position></Waypoint>
-</Route></RouteRef>"""
+<Waypoint routeStrategy="shortest"><Position><LanePosition roadId="0" laneId="-1" s="40"/></Position>
+</Waypoint><Waypoint routeStrategy="shortest"><Position><RoadPosition roadId="2" s="50" t="0"/></Position>
+</Waypoint></Route></RouteRef>"""
 BACK = ROUTE.replace('roadId="0" laneId="-1" s="40"', 'roadId="2" laneId="1" s="100"').replace(
     'RoadPosition roadId="2" s="50"', 'RoadPosition roadId="0" s="0"'
 )
@@ -172,7 +172,10 @@ def test_positions(tmp_path, world, position, expected):
         ('<LanePosition roadId="0" laneId="-4" s="0"/>', "unknown lane of road 0 '-4'"),
         ('<WorldPosition x="near" y="0"/>', "WorldPosition x must be a number, got 'near'"),
         ('<WorldPosition x="0" y="0" p="1"/>', "WorldPosition p must be 0"),
-        ('<RoadPosition roadId="0" s="0" t="0"><Orientation r="1"/></RoadPosition>', "Orientation r must be 0"),
+        (
+            '<RoadPosition roadId="0" s="0" t="0"><Orientation r="1"/></RoadPosition>',
+            "Orientation r must be 0",
+        ),
         ('<RelativeRoadPosition entityRef="Eco" ds="0" dt="0"/>', "unknown entity 'Eco'; did you mean 'Ego'"),
         ('<RelativeLanePosition entityRef="Ego" dLane="0" dsLane="1"/>', "dsLane is not supported; use ds"),
         ('<GeoPosition latitude="0" longitude="0"/>', "GeoPosition in Position is not supported; use Lane"),
@@ -215,8 +218,8 @@ def test_trajectories(tmp_path, world):
 
 CORNERS = (
     '<Polyline><Vertex><Position><WorldPosition x="0" y="0"/></Position></Vertex><Vertex><Position>'
-    '<WorldPosition x="5" y="1"/></Position></Vertex><Vertex><Position><WorldPosition x="9" y="0"/></Position>'
-    "</Vertex></Polyline>"
+    '<WorldPosition x="5" y="1"/></Position></Vertex><Vertex><Position><WorldPosition x="9" y="0"/>'
+    "</Position></Vertex></Polyline>"
 )
 
 
@@ -225,7 +228,10 @@ CORNERS = (
     [
         (shape(CORNERS), "a Polyline with corners is not supported; use a ClothoidSpline"),
         (shape("<Nurbs order='2'/>"), "Nurbs in Shape is not supported; use Polyline or"),
-        (spline((0, 0, 5), start="<Other/>").replace("false", "true"), "a closed Trajectory is not supported"),
+        (
+            spline((0, 0, 5), start="<Other/>").replace("false", "true"),
+            "a closed Trajectory is not supported",
+        ),
         (spline((0, 0, 5), start=""), "without PositionStart is not supported"),
         (spline((0, 0, -5)), "length must be >= 0 m, got -5"),
         (spline((0, 0, 5)).replace("length=", 'hOffset="1" length='), "hOffset must be 0"),

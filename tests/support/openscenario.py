@@ -41,9 +41,7 @@ CORNER = road_file(
     ),
     road(2, 110, 10, 1.5707963267948966, 100),
 )
-BOX = (
-    '<BoundingBox><Center x="{x}" y="0" z="0.7"/><Dimensions length="4" width="2" height="1.5"/></BoundingBox>'
-)
+SIZE = '<Dimensions length="4" width="2" height="1.5"/>'
 AXLES = """<Performance maxSpeed="70" maxAcceleration="9" maxDeceleration="9"/>
 <Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.5" positionX="2.5" positionZ="0.3"/>
 <RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.5" positionX="0" positionZ="0.3"/></Axles>"""
@@ -53,7 +51,8 @@ def vehicle(name, category="car", x=0.0, properties="", extra=""):
     """Return an entity of 4 × 2 m whose centre is `x` [m] ahead of its reference point."""
     return (
         f'<ScenarioObject name="{name}"><Vehicle name="{name}" vehicleCategory="{category}">'
-        f"{BOX.format(x=x)}{AXLES}{properties}</Vehicle>{extra}</ScenarioObject>"
+        f'<BoundingBox><Center x="{x}" y="0" z="0.7"/>{SIZE}</BoundingBox>'
+        f"{AXLES}{properties}</Vehicle>{extra}</ScenarioObject>"
     )
 
 

@@ -56,16 +56,16 @@ class Catalogs:
     def _load(self) -> dict[tuple[str, str], Node]:
         if self._entries is None:
             files = [path for folder in self._folders for path in sorted(folder.glob("*.xosc"))]
-            self._entries = _entries(tuple((path, path.stat().st_mtime_ns) for path in files))
+            self._entries = _entries(tuple(map(parse_file, files)))
         return self._entries
 
 
 @lru_cache(maxsize=32)
-def _entries(files: tuple[tuple[Path, int], ...]) -> dict[tuple[str, str], Node]:
-    """Return the entries of catalog files, given with their times of change, by catalog and name."""
+def _entries(files: tuple[Node, ...]) -> dict[tuple[str, str], Node]:
+    """Return the entries of catalog files by catalog and name."""
     entries = {}
-    for path, _ in files:
-        for catalog in parse_file(path).children:
+    for file in files:
+        for catalog in file.children:
             if catalog.tag == "Catalog":
                 for node in catalog.children:
                     entries[catalog.attributes.get("name", ""), node.attributes.get("name", "")] = node

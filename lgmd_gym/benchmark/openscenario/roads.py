@@ -7,7 +7,7 @@ from heapq import heappop, heappush
 from pathlib import Path
 from typing import NamedTuple
 
-from lgmd_gym.benchmark.openscenario.nodes import Element, parse_file
+from lgmd_gym.benchmark.openscenario.nodes import Element, Node, parse_file
 from lgmd_gym.benchmark.openscenario.paths import Place, Track
 from lgmd_gym.envs.dynamics.bend import Bend
 from lgmd_gym.errors import unknown_name
@@ -179,14 +179,18 @@ class RoadNetwork:
                     yield other.name, side
 
 
-@lru_cache(maxsize=32)
 def read_roads(path: Path) -> RoadNetwork:
     """Return the road network of an OpenDRIVE file.
 
     Raises:
         ValueError: If the file cannot be read, or a geometry is not supported.
     """
-    root = Element(parse_file(path), {})
+    return _network(parse_file(path))
+
+
+@lru_cache(maxsize=32)
+def _network(node: Node) -> RoadNetwork:
+    root = Element(node, {})
     if root.tag != "OpenDRIVE":
         raise root.error(f"an OpenDRIVE file must begin with OpenDRIVE, got {root.tag}")
     roads = [_road(item) for item in root.all("road")]
