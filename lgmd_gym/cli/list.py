@@ -12,7 +12,7 @@ from lgmd_gym.camera.params import PRESETS
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import List
 from lgmd_gym.envs import FAMILIES, env_id
-from lgmd_gym.envs.registration import RANDOM
+from lgmd_gym.envs.registration import RANDOM, SCENARIO, SCENARIO_ARGUMENT
 from lgmd_gym.envs.traffic.registration import KINDS
 
 
@@ -58,6 +58,7 @@ def envs() -> Table:
     table = Table("environment", "arguments (SI)", "description", title="environments")
     for family, function in FAMILIES.items():
         table.add_row(env_id(family), ", ".join(inspect.signature(function).parameters), _summary(function))
+    table.add_row(env_id(SCENARIO), SCENARIO_ARGUMENT, "A scenario given as data, as in `Scenario`.")
     arguments = "split, start_level, num_levels, conditions"
     table.add_row(env_id(RANDOM), arguments, "Draw a new scenario of these families at every reset.")
     return table

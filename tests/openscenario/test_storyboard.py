@@ -188,7 +188,8 @@ def test_changes_of_speed(tmp_path, action, expected):
 
 PROFILE = """<LongitudinalAction><SpeedProfileAction followingMode="follow"><DynamicConstraints
 maxAcceleration="2" maxAccelerationRate="4" maxDeceleration="3"/><SpeedProfileEntry speed="6"/>
-<SpeedProfileEntry speed="3"/><SpeedProfileEntry speed="5" time="2"/></SpeedProfileAction></LongitudinalAction>"""
+<SpeedProfileEntry speed="3"/><SpeedProfileEntry speed="5" time="2"/></SpeedProfileAction>
+</LongitudinalAction>"""
 
 
 def test_speed_profiles_have_a_limit_of_jerk(tmp_path):
@@ -299,7 +300,8 @@ def test_an_entity_follows_its_road(tmp_path):
 
 TURN = """<RoutingAction><FollowTrajectoryAction initialDistanceOffset="{offset}"><TimeReference><None/>
 </TimeReference><TrajectoryFollowingMode followingMode="position"/><TrajectoryRef>
-<Trajectory name="t" closed="false"><Shape><ClothoidSpline><ClothoidSplineSegment curvatureStart="0" curvatureEnd="0" length="30">{start}
+<Trajectory name="t" closed="false"><Shape><ClothoidSpline>
+<ClothoidSplineSegment curvatureStart="0" curvatureEnd="0" length="30">{start}
 </ClothoidSplineSegment><ClothoidSplineSegment curvatureStart="0" curvatureEnd="0.1" length="8"/>
 </ClothoidSpline></Shape></Trajectory></TrajectoryRef></FollowTrajectoryAction></RoutingAction>"""
 START_AT = f"<PositionStart>{world_position(100, -1.75)}</PositionStart>"
