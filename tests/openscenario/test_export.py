@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import fields, is_dataclass, replace
+from importlib import resources
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -18,9 +19,7 @@ from lgmd_gym.benchmark.suites import find_case
 from lgmd_gym.cli.main import run as run_command
 from lgmd_gym.envs import FAMILIES, Actor, BrakingEnv, Scenario, Segment
 
-SCHEMAS = os.environ.get(
-    "LGMD_OPENSCENARIO_SCHEMAS"
-)  # folder with OpenSCENARIO_1_3_1.xsd and opendrive_17_core.xsd
+OPENDRIVE = os.environ.get("LGMD_OPENDRIVE_SCHEMAS")  # folder with opendrive_17_core.xsd of ASAM
 
 
 def exported(folder, case):
@@ -125,15 +124,27 @@ def test_files_have_the_order_of_the_schema():
     assert "None" not in {value for item in root.iter() for value in item.attrib.values()}
 
 
-@pytest.mark.skipif(
-    SCHEMAS is None, reason="LGMD_OPENSCENARIO_SCHEMAS names no folder with the official schemas"
-)
+@pytest.fixture(scope="module")
+def schema():
+    """The official schema of OpenSCENARIO 1.3.0, which ASAM's checker contains."""
+    etree = pytest.importorskip("lxml.etree")
+    folder = resources.files(pytest.importorskip("qc_openscenario"))
+    return etree.XMLSchema(etree.parse(str(folder / "schema" / "1.3.0" / "OpenSCENARIO.xsd")))
+
+
 @pytest.mark.parametrize("family", FAMILIES)
-def test_exports_are_valid_against_the_official_schemas(tmp_path, family):
+def test_exports_are_valid_against_the_official_schema(tmp_path, family, schema):
+    etree = pytest.importorskip("lxml.etree")
+    path, _ = export_case(Case(f"mine/{family}/x", family), tmp_path / "case.xosc")
+    schema.assertValid(etree.parse(str(path)))
+
+
+@pytest.mark.skipif(OPENDRIVE is None, reason="LGMD_OPENDRIVE_SCHEMAS names no folder with ASAM's schemas")
+@pytest.mark.parametrize("family", FAMILIES)
+def test_roads_are_valid_against_the_official_schema(tmp_path, family):
     xmlschema = pytest.importorskip("xmlschema")
-    files = export_case(Case(f"mine/{family}/x", family), tmp_path / "case.xosc")
-    xmlschema.XMLSchema(Path(SCHEMAS) / "OpenSCENARIO_1_3_1.xsd").validate(str(files[0]))
-    xmlschema.XMLSchema11(Path(SCHEMAS) / "opendrive_17_core.xsd").validate(str(files[1]))
+    _, path = export_case(Case(f"mine/{family}/x", family), tmp_path / "case.xosc")
+    xmlschema.XMLSchema11(Path(OPENDRIVE) / "opendrive_17_core.xsd").validate(str(path))
 
 
 def test_the_command_writes_two_files(tmp_path, capsys):
