@@ -25,6 +25,7 @@ from support.openscenario import (
     world_position,
 )
 
+from lgmd_gym.benchmark.openscenario.entity_conditions import meets
 from lgmd_gym.envs.dynamics.bend import Bend
 from lgmd_gym.envs.dynamics.segment import Segment
 
@@ -94,6 +95,15 @@ def test_conditions_of_entities(tmp_path, condition, time):
 def test_standstill_of_the_target(tmp_path):
     trigger = entity_condition('<StandStillCondition duration="1.5"/>', entity="Target")
     assert started(tmp_path, trigger) == pytest.approx(1.5, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rule", "met"),
+    [("greaterThan", False), ("greaterOrEqual", True), ("lessThan", True), ("lessOrEqual", True)],
+)
+def test_values_are_equal_within_a_billionth(rule, met):
+    assert meets(0.3 - 4e-10, rule, 0.3) is met
+    assert meets(0.3 - 4e-9, rule, 0.3) is rule.startswith("less")
 
 
 @pytest.mark.parametrize(
@@ -338,8 +348,8 @@ def test_the_front_axle_as_control_point(tmp_path):
     )
     ego = compiled(tmp_path, scenario(init, entities=entities)).world.movers["Ego"]
     assert ego.place(0.0).x == pytest.approx(97.5)
-    end = ego.place(6.0)
-    assert end.heading == pytest.approx(0.4, abs=1e-3)  # half of 8 m times 0.1 1/m
+    assert ego.place(6.0).heading == pytest.approx(0.4, abs=1e-3)  # half of 8 m times 0.1 1/m
+    assert 0.1 < ego.place(3.8).heading < 0.3  # the front axle is at the end of the clothoid
     with pytest.raises(
         ValueError, match=r"controller property Driver\.ControlPoint\.Mode='Roof' is not supported"
     ):
@@ -358,6 +368,8 @@ def test_driving_backwards_is_turned_around(tmp_path):
     ) + teleport("Target", behind)
     found = compiled(tmp_path, scenario(init, entities=entities))
     (actor,) = found.scenario.actors
+    assert found.world.movers["Target"].place().x == pytest.approx(90.0)
+    assert found.world.movers["Ego"].place(1.0).x == pytest.approx(98.0)
     assert found.contact == pytest.approx((10 - 0.6 - 0.3) / 2)
     assert found.start == pytest.approx(found.contact - 5.0)
     assert actor.gap == pytest.approx(10.0)  # at 2 m/s, 5 s before the contact

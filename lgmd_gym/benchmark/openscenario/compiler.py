@@ -21,7 +21,9 @@ from lgmd_gym.benchmark.openscenario.roads import read_roads
 from lgmd_gym.benchmark.openscenario.storyboard import read_story, run_init
 from lgmd_gym.benchmark.openscenario.surroundings import condition_of, road_plan
 from lgmd_gym.benchmark.openscenario.world import World
+from lgmd_gym.envs.dynamics.bend import Bend
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
+from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.scenarios.scenario import AFTERMATH, START_TTC, Actor, Scenario
 
 EGO = "ego"  # name of the ego, in any case; without one, the first entity
@@ -165,16 +167,15 @@ def _pose(mover: Mover, time: float) -> tuple[Place, float, float]:
     return mover.track.at(motion.distance).moved(reference), reference, motion.speed
 
 
-def _bends(mover: Mover, time: float):
+def _bends(mover: Mover, time: float) -> tuple[Bend, ...]:
+    """Return the bends of a body's path from a time on; none for a body that never moves."""
     assert mover.track is not None
     moves = mover.timeline.segments or mover.timeline.initial_speed > 0.0
     return mover.track.part(mover.timeline.at(time).distance).bends if moves else ()
 
 
-def _profile(mover: Mover, start: float):
-    return tuple(
-        replace(item, start=max(item.start - start, 0.0)) for item in mover.timeline.segments
-    )  # fmt: skip
+def _profile(mover: Mover, start: float) -> tuple[Segment, ...]:
+    return tuple(replace(item, start=max(item.start - start, 0.0)) for item in mover.timeline.segments)
 
 
 def _actor(mover: Mover, ego: Place, ego_length: float, start: float) -> Actor:
