@@ -10,7 +10,9 @@ from support.rows import threat_row
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark import RunConfig
+from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.stored_run import StoredRun
+from lgmd_gym.benchmark.suites import Suite
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "docs" / "examples"
@@ -201,3 +203,23 @@ def test_frontier(tmp_path, capsys, monkeypatch):
     assert bicycle.startswith("| CBNA | 4 | 4/4 |")
     assert pedestrian.startswith("| CPNA | 4 | 4/4 |")
     assert picture.stat().st_size > 10_000
+
+
+def test_protocol_counts(tmp_path, monkeypatch):
+    """Files of a family with locations or turns in its name count as that family."""
+    script = load("protocol_counts")
+    for pattern in script.FILES.values():
+        file = tmp_path / pattern.replace("*", "x")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.touch()
+    families = ("CPNA-25", "CPTAfs", "CPRA_Cm", "CCRs")
+    cells = tuple(Case(f"x/{family}/v10", "Scenario", fcw_driver=family == "CCRs") for family in families)
+    monkeypatch.setattr(script, "read", lambda path: Suite("x", cells, ""))
+    lines = script.table(tmp_path)
+    assert lines[0] == "| family | ncap2023 | ncap2023-vru | ncap2026 | ncap2026-extended |"
+    assert "| CPNA | 0 / 1 | 22 / 1 | 36 / 1 | 24 / 1 |" in lines
+    assert "| CPTA | 0 / 1 | 8 / 1 | 0 / 1 | 0 / 1 |" in lines
+    assert "| CCRs warned | 30 / 1 | 0 / 1 | 15 / 1 | 6 / 1 |" in lines
+    assert lines[-1] == "| all | 177 / 4 | 133 / 4 | 428 / 4 | 435 / 4 |"
+    with pytest.raises(ValueError, match=r"no file .*Variation\*.xosc in '.*other'; pass the folder NCAP"):
+        script.table(tmp_path / "other")
