@@ -44,4 +44,5 @@ def write_info(bodies: np.ndarray, episode: Any, ego: Any, paths: np.ndarray, in
         info.required_deceleration = max(info.drac - other.acceleration, 0.0)
     info.impact_speed, info.relative_impact_speed = episode.impact_speed, episode.relative_impact_speed
     info.deceleration = ego_braking(here, ego)
-    info.target_speed = bodies[episode.target].speed if episode.target > 0 else inf
+    target: Any = bodies[episode.target]
+    info.target_speed = target.speed if episode.target > 0 else inf

@@ -26,7 +26,7 @@ FAST_SCP = tuple(
     (a, b) for slow, fast in product((20, 30), (70, 80)) for a, b in ((slow, fast), (fast, slow))
 )
 FAST_TAP = (*((speed, 80) for speed in (10, 15, 20, 25)), (25, 30), (25, 45), (25, 60))
-BRAKING = {"headway": 1.0, "deceleration": 4.0}  # of CCRb and CMRb
+BRAKING: dict[str, Any] = {"headway": 1.0, "deceleration": 4.0}  # of CCRb and CMRb
 CROSSING = range(10, 70, 10)
 
 
@@ -117,8 +117,8 @@ def ncap2026_robustness() -> tuple[Case, ...]:
     ):
         rows += speed_cases(suite, "CCRb", [50], f"/{variant}", **(BRAKING | change))
     for family, ego, target in (("CCCscp", 40, 40), ("CCFtap", 15, 45), ("CCFhos", 50, 50)):
-        more = {"obstructed": True} if family == "CCCscp" else {}
-        rows += _pairs(suite, family, ((ego, target - 5), (ego, target + 5)), **more)
+        cars: dict[str, Any] = {"obstructed": True} if family == "CCCscp" else {}
+        rows += _pairs(suite, family, ((ego, target - 5), (ego, target + 5)), **cars)
     return tuple(rows)
 
 
