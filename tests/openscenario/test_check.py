@@ -8,6 +8,7 @@ from support.openscenario import (
     START,
     at,
     compiled,
+    entity_condition,
     event,
     lane_position,
     parameter,
@@ -68,13 +69,28 @@ def test_deviations_are_found(tmp_path):
     assert found == pytest.approx((0.0, 0.0, 0.1), abs=1e-6)
 
 
-def test_a_braking_target(tmp_path):
-    """A gap of 20 m at 10 m/s; after 2 s the target brakes with 2 m/s²: contact after another √20 s."""
+@pytest.mark.parametrize("headway", [1.2, 2, 4])
+def test_a_braking_target(tmp_path, headway):
+    """After 2 s the target brakes from 10 to 1 m/s with 2 m/s², in 4.5 s, which closes a gap of 20.25 m."""
     brake = story("Target", event("E", speed(1, "rate", "linear", 2), at(2)))
-    init = EGO + relative(0, 24) + private("Target", speed(10))
+    init = EGO + relative(0, 4 + 10 * headway) + private("Target", speed(10))
     values = {"Ego_speed_kph": 36, "Target_init_speed_kph": 36, "Target_final_speed_kph": 3.6}
-    values |= {"isTargetbraking": "true", "Target_time_headway": 2, "Target_braking_delay": 2}
+    values |= {"isTargetbraking": "true", "Target_time_headway": headway, "Target_braking_delay": 2}
     found = deviations(tmp_path, init, brake, **values, Target_deceleration=2)
+    assert found == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+
+
+def test_a_target_that_starts(tmp_path):
+    """The target starts when the gap is 16 m. It needs 0.8 s for 2 m until it has 5 m/s, and 2 s for 10 m: in
+    these 2.8 s the ego drives 28 m."""
+    near = (
+        '<RelativeDistanceCondition entityRef="Target" relativeDistanceType="longitudinal" value="16" '
+        'freespace="true" rule="lessOrEqual"/>'
+    )
+    start = story("Target", event("E", speed(5, "time", "linear", 0.8), entity_condition(near)))
+    values = {"Ego_speed_kph": 36, "Target_final_speed_kph": 18, "Ego_initTTC": 6, "ImpactLocation": 50}
+    values |= {"Target_accelerationDist": 2, "Target_steadyStateDist": 10}
+    found = deviations(tmp_path, EGO + relative(0, 60 + 16), start, **values)
     assert found == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
 
 
@@ -102,11 +118,13 @@ def test_crossing_pedestrians(tmp_path, share, t, late):
     assert found == pytest.approx((1.5 * late, 0.0, late), abs=1e-3)
 
 
-def test_crossing_cars_are_compared_with_the_synchronisation(tmp_path):
+@pytest.mark.parametrize("reference", [0.0, 1.3])
+def test_crossing_cars_are_compared_with_the_synchronisation(tmp_path, reference):
     """The front's middle is at t = -1.75 m when the ego's front reaches the target's side."""
     init = EGO + private("Target", WALK.format(-60, 30))
-    drive = story("Target", event("E", SYNC.format(157, -3.75).replace('"1.5"', '"12"')))
-    assert deviations(tmp_path, init, drive) == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+    drive = story("Target", event("E", SYNC.format(157, -3.75 - reference).replace('"1.5"', '"12"')))
+    entities = vehicle("Ego") + vehicle("Target", x=reference)
+    assert deviations(tmp_path, init, drive, entities) == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
 
 
 def test_files_without_an_intent(tmp_path):
