@@ -37,7 +37,7 @@ from lgmd_gym.benchmark.openscenario import read, read_all
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, Suite, find_suite
 from lgmd_gym.envs.registration import SCENARIO, SCENARIO_ARGUMENT
 from lgmd_gym.envs.scenarios.data import scenario_from_data
-from lgmd_gym.errors import check_keys, check_path, check_text
+from lgmd_gym.errors import check_items, check_keys, check_path, check_text
 
 SUITE_KEYS = ("name", "about", "cases")
 CASE_KEYS = ("family", "name", "speeds_kmh", "fcw_driver", "arguments", "scenario")
@@ -47,9 +47,12 @@ NAME = re.compile(r"[\w.+-]+(/[\w.+-]+)*")  # names become parts of file names
 
 def is_file(suite: str | tuple[str, ...]) -> bool:
     """Return whether a suite is given by files or a folder instead of a name."""
-    return (
-        not isinstance(suite, str) or suite.endswith(FILES) or (suite not in SUITES and Path(suite).is_dir())
-    )
+    if not isinstance(suite, str) or suite.endswith(FILES):
+        return True
+    try:
+        return bool(suite) and suite not in SUITES and Path(suite).is_dir()
+    except (OSError, ValueError):  # no path, such as a very long name
+        return False
 
 
 def get_suite(text: str | tuple[str, ...]) -> Suite:
@@ -72,7 +75,7 @@ def get_suite(text: str | tuple[str, ...]) -> Suite:
 
 
 def _scenario_files(paths: tuple[str, ...]) -> tuple[str, ...]:
-    for path in paths:
+    for path in check_items("suite", paths, str, "strings"):
         if not path.endswith(".xosc") and not check_path("suite", path).is_dir():
             raise ValueError(f"of several suites each must be a .xosc file or a folder, got {path!r}")
     return paths

@@ -334,13 +334,28 @@ def test_several_files_and_folders_are_one_suite(tmp_path):
     one = varied(folder / "a", values("Ego_speed_kph", 30, 50))
     two = varied(folder / "b", values("Ego_speed_kph", 40))
     expected = ["set/case/a/vary/v30", "set/case/a/vary/v50", "set/case/b/vary/v40"]
-    for paths in ([one, two], [folder], [folder / "a", folder / "b"]):
+    for paths in ([one, two], [folder], [folder / "a", folder / "b"], [one, folder]):
         assert [case.name for case in read_all(paths).cases] == expected
     assert [case.name for case in read_all([one]).cases] == ["vary/case/v30", "vary/case/v50"]
     assert [case.name for case in get_suite(str(folder)).cases] == expected
     assert [case.name for case in get_suite((str(one), str(two))).cases] == expected
     with pytest.raises(ValueError, match=r"each must be a \.xosc file or a folder, got 'quick'"):
         get_suite((str(one), "quick"))
+
+
+@pytest.mark.parametrize(
+    ("suite", "message"),
+    [
+        ((3.5,), r"suite must be a list of strings, got \(3.5,\)"),
+        (3.5, "suite must be a string, got 3.5"),
+        ((), "suite must contain at least one file or folder, got none"),
+        ("x" * 5000, "unknown suite 'xxx"),
+        ("", "unknown suite ''"),
+    ],
+)
+def test_suites_that_are_no_names_or_paths(suite, message):
+    with pytest.raises(ValueError, match=message):
+        get_suite(suite)
 
 
 def test_suite_files_hold_scenarios(tmp_path):

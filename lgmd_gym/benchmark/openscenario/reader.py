@@ -68,7 +68,10 @@ def read_all(paths: Sequence[str | Path]) -> Suite:
     Raises:
         ValueError: See `read`; or if there is no file.
     """
-    files = [file for path in paths for file in find_files(check_path("path", path))]
+    found = [file for path in paths for file in find_files(check_path("path", path))]
+    files = list({file.resolve(): file for file in found}.values())
+    if not files:
+        raise ValueError("suite must contain at least one file or folder, got none")
     if len(files) == 1:
         return read(files[0])
     stems = [file.resolve().with_suffix("").parts for file in files]
@@ -97,7 +100,7 @@ def find_files(path: Path) -> list[Path]:
             found[tag].append(file)
     files = found["ParameterValueDistribution"] or found["Storyboard"]
     if not files:
-        raise ValueError(f"folder {str(path)!r} contains no scenario ({SUFFIX}); check the path")
+        raise ValueError(f"suite: folder {str(path)!r} contains no scenario ({SUFFIX}); check the path")
     return files
 
 
