@@ -223,3 +223,16 @@ def test_protocol_counts(tmp_path, monkeypatch):
     assert lines[-1] == "| all | 177 / 4 | 133 / 4 | 428 / 4 | 435 / 4 |"
     with pytest.raises(ValueError, match=r"no file .*Variation\*.xosc in '.*other'; pass the folder NCAP"):
         script.table(tmp_path / "other")
+
+
+def test_family_scores():
+    config = RunConfig(suite="r152", agents=("no-brake", "a"), seeds=1)
+    values = {"premature_brake": False, "speed_reduction": 5.0, "fcw_driver": False}
+    cases = (("CCRs/v20", True), ("CCRs/v40", False), ("CCRm/v30", True))
+    rows = [threat_row(case=f"r152/{case}", avoided=avoided, **values) for case, avoided in cases]
+    script, run = load("family_scores"), StoredRun(config, rows, False)
+    _, _, slower, standing = script.table(["a"], [run])
+    assert slower.startswith("| r152 | CCRm | 1/1 [")
+    assert standing.startswith("| r152 | CCRs | 1/2 [")
+    with pytest.raises(ValueError, match="the run of r152 has no agent 'b'; it has no-brake, a"):
+        script.table(["b"], [run])

@@ -1,0 +1,49 @@
+"""Scores of some agents in every scenario family of several runs.
+
+    python docs/examples/family_scores.py spike-threshold,stopping-zone,ttc-oracle RUN RUN ...
+
+The first argument names the agents, the others are run folders of `lgmd-gym bench`. A line is a family of a
+suite. A cell contains the threats avoided or, in a family without threats, the episodes with a false activation,
+with an interval. Cases with an FCW driver are left out. The table is in Markdown.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from lgmd_gym.benchmark.analysis.tables import rate_text
+from lgmd_gym.benchmark.stored_run import StoredRun, read_run
+from lgmd_gym.benchmark.summary import summarise, without_fcw_driver
+
+
+def table(agents: Sequence[str], runs: Sequence[StoredRun]) -> list[str]:
+    """Return the lines of the table.
+
+    Raises:
+        ValueError: If a run does not contain one of the agents.
+    """
+    lines = [["suite", "family", *(f"`{agent}`" for agent in agents)]]
+    lines.append(["---"] * len(lines[0]))
+    for run in runs:
+        rows = without_fcw_driver(run.rows)
+        where = run.config.suite + ("" if run.config.worlds else ", laboratory")
+        for family in sorted({row["case"].split("/")[1] for row in rows}):
+            cells = []
+            for agent in agents:
+                if agent not in run.config.agents:
+                    known = ", ".join(run.config.agents)
+                    raise ValueError(f"the run of {run.config.suite} has no agent {agent!r}; it has {known}")
+                of_family = [row for row in rows if row["case"].split("/")[1] == family]
+                result = summarise(agent, "", [row for row in of_family if row["agent"] == agent])
+                cells.append(rate_text(result.avoided if result.avoided.n else result.false_activations))
+            lines.append([where, family, *cells])
+    return [f"| {' | '.join(line)} |" for line in lines]
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    try:
+        print(*table(sys.argv[1].split(","), [read_run(Path(item)) for item in sys.argv[2:]]), sep="\n")
+    except ValueError as error:
+        sys.exit(str(error))
