@@ -3,8 +3,8 @@
     python docs/examples/family_scores.py spike-threshold,stopping-zone,ttc-oracle RUN RUN ...
 
 The first argument names the agents, the others are run folders of `lgmd-gym bench`. A line is a family of a
-suite. A cell contains the threats avoided or, in a family without threats, the episodes with a false activation,
-with an interval. Cases with an FCW driver are left out. The table is in Markdown.
+suite. A cell contains the threats avoided or, in a family without threats, the episodes with a false
+activation, with an interval. Cases with an FCW driver are left out. The table is in Markdown.
 """
 
 import sys
