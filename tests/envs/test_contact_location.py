@@ -7,42 +7,17 @@ from math import cos, sin
 
 import numpy as np
 import pytest
+from support.contacts import ADULT_HIP, CHILD_HIP, CRANK, Contact
+from support.contacts import EGO_LENGTH as LENGTH
+from support.contacts import EGO_WIDTH as WIDTH
 
 from lgmd_gym.envs import BrakingEnv, make_scenario
 
 KMH = 1 / 3.6
-LENGTH, WIDTH = 4.3, 1.8  # of the ego [m]
-ADULT_HIP, CHILD_HIP, CRANK = 0.30 - 0.36, 0.711 / 2 - 0.396, 0.62 - 0.605  # ahead of the centre [m]
 
 
-class Contact:
-    """Ego and target at the first contact of an ego that does not brake."""
-
-    def __init__(self, family, arguments):
-        env = BrakingEnv(make_scenario(family, **arguments), {"simulation_frequency": 60})
-        env.reset(seed=0)
-        done = False
-        while not done:
-            *_, terminated, truncated, self.info = env.step([0.0])
-            done = terminated or truncated
-        self.ego = env.ego
-        index = int(env.road.physics[1]["target"][0])
-        self.target = env.road.items[index]
-        self.touched = int(env.road.physics[1]["touched"][0]) == index
-        self.travelled = env.ego.travelled
-
-    def from_front(self, ahead, aside):
-        """Return a point of the target relative to the middle of the ego's front: ahead and to the left [m].
-
-        Args:
-            ahead: Distance of the point ahead of the target's centre along the target's heading [m].
-            aside: Distance to the left of the target's centreline [m].
-        """
-        heading = self.target.heading
-        x = self.target.position[0] + ahead * cos(heading) + aside * sin(heading) - self.ego.position[0]
-        y = self.target.position[1] + ahead * sin(heading) - aside * cos(heading) - self.ego.position[1]
-        c, s = cos(self.ego.heading), sin(self.ego.heading)
-        return x * c + y * s - LENGTH / 2, x * s - y * c
+def contact_of(family, arguments):
+    return Contact(make_scenario(family, **arguments))
 
 
 def kmh(**speeds):
@@ -70,7 +45,7 @@ CROSSING = [
 @pytest.mark.parametrize(("family", "arguments", "point"), CROSSING)
 def test_crossing_road_users(family, arguments, point):
     """The target's side is at the ego's front, and its impact point at the impact location, after 5 s."""
-    contact = Contact(family, arguments)
+    contact = contact_of(family, arguments)
     _, across = contact.from_front(point, 0.0)
     assert contact.touched
     assert across == pytest.approx((arguments.get("impact_location", 0.5) - 0.5) * WIDTH, abs=0.001)
@@ -93,7 +68,7 @@ def test_crossing_road_users(family, arguments, point):
     ],
 )
 def test_road_users_along_the_path(family, arguments, slower):
-    contact = Contact(family, arguments)
+    contact = contact_of(family, arguments)
     rear, across = contact.from_front(-contact.target.LENGTH / 2, 0.0)
     assert rear == pytest.approx(0.0, abs=0.001)
     assert across == pytest.approx((arguments["impact_location"] - 0.5) * WIDTH, abs=0.001)
@@ -102,7 +77,7 @@ def test_road_users_along_the_path(family, arguments, slower):
 
 def test_motorcycle_brakes_ahead():
     """At 1 s and 4 m/s² within 1 s from 50 km/h, contact is 13.9 m + v·t after s(t) of the motorcycle."""
-    contact = Contact("CMRb", {"headway": 1.0, "impact_location": 0.75} | kmh(ego_speed=50))
+    contact = contact_of("CMRb", {"headway": 1.0, "impact_location": 0.75} | kmh(ego_speed=50))
     rear, across = contact.from_front(-2.08 / 2, 0.0)
     assert (rear, across) == (pytest.approx(0.0, abs=0.001), pytest.approx(0.45, abs=0.001))
     # After 0.5 s the braking equals one of 4 m/s² at once, apart from 1/24·4 m that are lost in the ramp.
@@ -114,7 +89,7 @@ def test_motorcycle_brakes_ahead():
 @pytest.mark.parametrize(("side", "sign"), [("left", 1), ("right", -1)])
 @pytest.mark.parametrize("speeds", [(20, 60), (60, 20), (40, 40)])
 def test_motorcycle_strikes_the_side(side, sign, speeds):
-    contact = Contact("CMCscp", {"side": side} | kmh(ego_speed=speeds[0], target_speed=speeds[1]))
+    contact = contact_of("CMCscp", {"side": side} | kmh(ego_speed=speeds[0], target_speed=speeds[1]))
     ahead, across = contact.from_front(2.08 / 2, 0.0)
     assert ahead == pytest.approx(-0.1 * LENGTH, abs=0.001)
     assert across == pytest.approx(sign * WIDTH / 2, abs=0.001)
@@ -124,7 +99,7 @@ def test_motorcycle_strikes_the_side(side, sign, speeds):
 @pytest.mark.parametrize("location", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("speeds", [(30, 50), (100, 100)])
 def test_head_on_in_the_lane(location, speeds):
-    contact = Contact(
+    contact = contact_of(
         "CCFhos", {"impact_location": location} | kmh(ego_speed=speeds[0], target_speed=speeds[1])
     )
     ahead, across = contact.from_front(4.023 / 2, 0.0)
@@ -136,7 +111,7 @@ def test_head_on_in_the_lane(location, speeds):
 @pytest.mark.parametrize(("speed", "length", "gap"), [(50, 44.0, 13.9), (70, 60.0, 19.4)])
 def test_head_on_after_a_lane_change(speed, length, gap):
     arguments = {"change_length": length, "following_distance": gap} | kmh(ego_speed=speed)
-    contact = Contact("CCFhol", arguments)
+    contact = contact_of("CCFhol", arguments)
     ahead, across = contact.from_front(4.023 / 2, 0.0)
     assert (ahead, across) == (pytest.approx(0.0, abs=0.001), pytest.approx(0.0, abs=0.001))
     made = make_scenario("CCFhol", **arguments)
@@ -154,7 +129,7 @@ def test_head_on_after_a_lane_change(speed, length, gap):
 @pytest.mark.parametrize("target_speed", [30, 80])
 def test_turns_across_the_path(family, width, speed, target_speed):
     """The near corner of the target's front, on its left, meets the middle of the ego's front."""
-    contact = Contact(family, kmh(ego_speed=speed, target_speed=target_speed))
+    contact = contact_of(family, kmh(ego_speed=speed, target_speed=target_speed))
     corner = contact.from_front(contact.target.LENGTH / 2, width / 2)
     assert corner == (pytest.approx(0.0, abs=0.002), pytest.approx(0.0, abs=0.005))
     assert contact.info["impact_speed"] / KMH == pytest.approx(speed)
@@ -167,7 +142,7 @@ def test_turns_across_the_path(family, width, speed, target_speed):
 @pytest.mark.parametrize(("speed", "left"), [(10, True), (15, True), (20, True), (10, False)])
 def test_turns_towards_a_pedestrian(speed, left, direction):
     """The hip is on the ego's centreline, and the nearest corner of the pedestrian at the ego's front."""
-    contact = Contact("CPTA", {"left": left, "direction": direction} | kmh(ego_speed=speed))
+    contact = contact_of("CPTA", {"left": left, "direction": direction} | kmh(ego_speed=speed))
     _, across = contact.from_front(ADULT_HIP, 0.0)
     assert across == pytest.approx(0.0, abs=0.005)
     corners = [contact.from_front(x * 0.3, y * 0.25) for x in (-1, 1) for y in (-1, 1)]
