@@ -17,6 +17,7 @@ from joblib import Parallel, delayed
 from lgmd_gym.benchmark.frontier import Frontier, frontier
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.camera import CameraParams
+from lgmd_gym.plotting.style import saved_figure
 
 COLUMNS: tuple[tuple[str, Callable[[Frontier], float], str], ...] = (
     ("time left [s]", lambda item: item.time_left, "{:.2f}"),
@@ -59,25 +60,23 @@ def table(families: dict[str, list[Frontier]], camera: CameraParams) -> list[str
 
 def draw(families: dict[str, list[Frontier]], camera: CameraParams, path: Path) -> None:
     """Draw growth against bearing, one panel per kind of target and one point per case."""
-    import matplotlib.pyplot as plt
-
-    figure, panels = plt.subplots(2, 2, figsize=(10, 8), sharex=True, sharey=True, layout="constrained")
-    for (prefix, target), axes in zip(TARGETS.items(), panels.flat, strict=True):
-        for family, items in families.items():
-            if family.startswith(prefix):
-                bearings = [abs(item.view.bearing_deg) for item in items]
-                growths = [max(item.growth_px(camera), 0.02) for item in items]
-                axes.scatter(bearings, growths, s=14, alpha=0.7, label=family)
-        axes.axvline(camera.hfov_deg / 2, color="grey", linestyle="--", linewidth=1)
-        axes.axhline(1.0, color="grey", linestyle=":", linewidth=1)
-        axes.set(title=target, yscale="log")
-        if any(family.startswith(prefix) for family in families):
-            axes.legend(frameon=False, fontsize=8, loc="lower right")
-    panels[0, 0].annotate(f" edge of {camera.name}", (camera.hfov_deg / 2, 0.04), fontsize=8, color="grey")
-    figure.supxlabel("bearing of the target's centre from the optical axis [°]")
-    figure.supylabel(f"growth of the target's width in {camera.name} [px/frame]")
-    figure.suptitle("The target at the last decision at which full braking avoids the contact")
-    figure.savefig(path, dpi=100)
+    with saved_figure(path, 2, 2, sharex=True, sharey=True, figsize=(10, 8)) as (figure, panels):
+        for (prefix, target), axes in zip(TARGETS.items(), panels.flat, strict=True):
+            for family, items in families.items():
+                if family.startswith(prefix):
+                    bearings = [abs(item.view.bearing_deg) for item in items]
+                    growths = [max(item.growth_px(camera), 0.02) for item in items]
+                    axes.scatter(bearings, growths, s=14, alpha=0.7, label=family)
+            axes.axvline(camera.hfov_deg / 2, color="grey", linestyle="--", linewidth=1)
+            axes.axhline(1.0, color="grey", linestyle=":", linewidth=1)
+            axes.set(title=target, yscale="log")
+            if any(family.startswith(prefix) for family in families):
+                axes.legend(frameon=False, fontsize=8, loc="lower right")
+        edge = (camera.hfov_deg / 2, 0.04)
+        panels[0, 0].annotate(f" edge of {camera.name}", edge, fontsize=8, color="grey")
+        figure.supxlabel("bearing of the target's centre from the optical axis [°]")
+        figure.supylabel(f"growth of the target's width in {camera.name} [px/frame]")
+        figure.suptitle("The target at the last decision at which full braking avoids the contact")
 
 
 def main() -> None:
