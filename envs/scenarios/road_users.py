@@ -4,6 +4,7 @@ from math import pi
 from typing import Any, NamedTuple
 
 from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.units import MIN_SPEED
 from lgmd_gym.envs.scenarios.scenario import (
     ADULT_SIZE,
     BICYCLE_SIZE,
@@ -85,8 +86,11 @@ def run_up(contact: float, speed: float, steady: float, acceleration_distance: f
     if wait >= 0.0:
         segment = Segment(start=wait, acceleration=strength, final_speed=speed)
         return Run(0.0, (segment,), steady + acceleration_distance)
+    reached = -wait * strength
+    if reached < MIN_SPEED:  # a start from rest; the road user is placed so that it is in time
+        segment = Segment(start=0.0, acceleration=strength, final_speed=speed)
+        return Run(0.0, (segment,), steady + acceleration_distance + wait * speed)
     if contact > steady / speed:  # the episode begins during the acceleration
-        reached = -wait * strength
         segment = Segment(start=0.0, acceleration=strength, final_speed=speed)
         return Run(reached, (segment,), steady + acceleration_distance - reached**2 / (2.0 * strength))
     return Run(speed, (), speed * contact)

@@ -56,7 +56,7 @@ def test_code_blocks_run(path, tmp_path, monkeypatch):
     get_reusable_executor().shutdown(wait=True)  # workers of another page have another working folder
     space = {"__name__": path.stem}
     for kind, block in BLOCK.findall(path.read_text()):
-        assert kind in ("python", "bash", "text", "yaml"), (
+        assert kind in ("python", "bash", "text", "toml", "yaml"), (
             f"{path.name}: unexpected code block of kind {kind!r}"
         )
         if kind == "python":
@@ -65,6 +65,9 @@ def test_code_blocks_run(path, tmp_path, monkeypatch):
         elif kind == "bash":
             for line in block.strip().splitlines():
                 run_line(line)
+        elif kind == "toml":  # a suite
+            (tmp_path / "suite.toml").write_text(block)
+            assert load_suite(tmp_path / "suite.toml").cases
         elif kind == "yaml":  # hyperparameters
             (tmp_path / "hyper.yml").write_text(block)
             file = tmp_path / "hyper.yml"

@@ -45,6 +45,13 @@ def test_every_family_is_drawn():
     assert share == pytest.approx(0.5, abs=0.07)
 
 
+def test_levels_are_valid():
+    """Every drawn argument is in range, and so is every field of the scenario made from it."""
+    for split in ("train", "validation", "test"):
+        for level in range(1500):
+            draw_scenario(level_generator(split, level))
+
+
 def test_levels_include_the_headways_of_fmvss127():
     """In FMVSS 127 a lead car brakes at a headway of 0.54 s."""
     cases = [dict(case.arguments) for case in find_suite("fmvss127").cases if case.family == "CCRb"]

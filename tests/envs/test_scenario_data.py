@@ -9,7 +9,9 @@ import pytest
 
 from lgmd_gym.envs.dynamics.bodies import BICYCLE, CAR, EGO, PEDESTRIAN
 from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
 from lgmd_gym.envs.scenarios.registry import FAMILIES, make_scenario
+from lgmd_gym.envs.scenarios.road_users import run_up
 from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
 from lgmd_gym.envs.simulation.physics_state import place
 
@@ -137,3 +139,15 @@ def test_the_target_is_the_first_solid_actor():
 def test_size_of_the_ego(name, value, message):
     with pytest.raises(ValueError, match=message):
         Scenario(family="CCRs", ego_speed=10.0, duration=5.0, **{name: value})
+
+
+@pytest.mark.parametrize("wait", [1.0, 0.0, -1e-4, -5e-4, -0.5, -2.0, -3.5])
+def test_run_up_ends_at_the_contact(wait):
+    """A road user accelerates to 4 m/s in 6 m and 3 s, and covers 8 m in the next 2 s."""
+    run = run_up(5.0 + wait, 4.0, 8.0, 6.0)
+    script, covered = SpeedProfile(run.speed, run.profile), 0.0
+    for _ in range(1000):
+        covered += script.step((5.0 + wait) / 1000)
+    assert covered == pytest.approx(run.distance, abs=0.02)
+    assert script.speed == pytest.approx(4.0)
+    assert run.speed == 0.0 or run.speed >= 0.001
