@@ -12,6 +12,7 @@ from joblib.externals.loky import get_reusable_executor
 
 from lgmd_gym.agents import AGENTS
 from lgmd_gym.benchmark.rows import KEYS
+from lgmd_gym.benchmark.suite_file import load_suite
 from lgmd_gym.cli import main as cli
 from lgmd_gym.training import TrainConfig
 from lgmd_gym.training.trainer import check_config
