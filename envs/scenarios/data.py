@@ -69,16 +69,11 @@ def _to_data(item: Any) -> dict[str, Any]:
 def _from_data(kind: type, data: Any, place: str) -> Any:
     """Return an instance of a dataclass; `place` is for messages."""
     check_type(place, data, dict)
-    names = [field.name for field in fields(kind)]
-    required = [
-        field.name
-        for field in fields(kind)
-        if field.default is MISSING and field.default_factory is MISSING
-    ]  # fmt: skip
-    check_keys(f"key of {place}", data, names)
-    for name in required:
-        if name not in data:
-            raise ValueError(f"{place} must have the key {name!r}; add it")
+    check_keys(f"key of {place}", data, [field.name for field in fields(kind)])
+    for field in fields(kind):
+        required = field.default is MISSING and field.default_factory is MISSING
+        if required and field.name not in data:
+            raise ValueError(f"{place} must have the key {field.name!r}; add it")
     values = {}
     for name, value in data.items():
         nested, several = _NESTED.get((kind, name), (None, False))

@@ -99,12 +99,11 @@ def play(compiled: Compiled, point: float) -> Impact | None:
         _, _, terminated, truncated, _ = env.step(hold)
         done = terminated or truncated
     physics = env.road.physics
-    touched, bodies = int(physics[1][0]["touched"]), physics[0][0]
-    actors = sorted(compiled.scenario.actors, key=lambda actor: actor.kind != "car")
+    bodies, episode = physics[0][0], physics[1][0]
     env.close()
-    if touched == 0 or actors[touched - 1] is not compiled.scenario.actors[0]:
+    if episode["touched"] == 0 or episode["touched"] != episode["target"]:
         return None
-    ego, other, target = bodies[0], bodies[touched], compiled.target
+    ego, other, target = bodies[0], bodies[episode["touched"]], compiled.target
     assert target is not None
     from_centre = point - target.body.reference
     if target.backwards:

@@ -32,8 +32,8 @@ def short_name(parameter: str) -> str:
 def variants(cells: Sequence[dict[str, str]], speeds: Sequence[float]) -> list[str]:
     """Return a name for each cell; all names are different.
 
-    A name contains the ego's speed in km/h and the values of the parameters that, together with it, tell the
-    cells apart; parameters that vary along with them are left out.
+    A name contains the ego's speed in km/h and the values of the parameters that, together with it,
+    distinguish the cells; parameters that vary along with them are left out.
 
     Args:
         cells: Values of the varied parameters of each cell; the keys of all cells are the same.

@@ -14,7 +14,14 @@ from lgmd_gym.camera.render.figure_builder import DAY_LAMP, REFLECTOR, WHEEL
 from lgmd_gym.camera.render.figure_motion import pose_figure
 from lgmd_gym.camera.render.jit import inlined_kernel, kernel
 from lgmd_gym.camera.render.order import distance
-from lgmd_gym.camera.render.solids import compose, grey_of, outside, place_object, to_axes
+from lgmd_gym.camera.render.solids import (
+    compose,
+    grey_of,
+    outside,
+    place_corners,
+    place_object,
+    to_axes,
+)
 
 _RETURN = 12.0  # light that a reflector returns, relative to that of a white surface in the same beam
 _ROUND = 0.55  # half the width of the round end of a limb, relative to the limb
@@ -65,10 +72,7 @@ def _to_camera(lens, obj, layer, used):
     to_axes(lens, obj.cos, obj.sin, 0.0, axes, np.int64(1))
     to_axes(lens, -obj.sin, obj.cos, 0.0, axes, np.int64(2))
     to_axes(lens, 0.0, 0.0, 1.0, axes, np.int64(3))
-    for j in range(used):
-        a, b, c = joints[j, 0], joints[j, 1], joints[j, 2]
-        for k in range(3):
-            joints[j, k] = axes[0, k] + a * axes[1, k] + b * axes[2, k] + c * axes[3, k]
+    place_corners(joints, used, axes, joints)
 
 
 @inlined_kernel

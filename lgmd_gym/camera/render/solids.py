@@ -61,7 +61,7 @@ def place_object(lens, look, obj, axes):
 
 
 @kernel
-def _place_corners(fractions, n, axes, corners):
+def place_corners(fractions, n, axes, corners):
     """Place the first n corners of a polygon, given as fractions of an object's axes, in camera axes."""
     for i in range(n):
         a, b, c = fractions[i, 0], fractions[i, 1], fractions[i, 2]
@@ -160,7 +160,7 @@ def _add_solid(layer, lens, look, obj, models, solid, size, air):
             weight *= min(1.0, size / models.fine[p] - 1.0)
             if greys[parent, 1] == 0.0 or weight <= 0.0:
                 continue
-        _place_corners(models.corners[p], n, layer.axes, corners)
+        place_corners(models.corners[p], n, layer.axes, corners)
         light = greys[parent, 1] if parent >= 0 else _face_light(corners, layer.axes, look) * air.light
         if light <= 0.0:
             continue
