@@ -20,8 +20,8 @@ class TTCOracle(LatchingAgent):
 
     Args:
         ttc: Threshold, > 0 [s]. The default avoids all contacts of the protocol suites with the default
-            brake. The critical case is a lead car 40 m ahead that brakes at 0.5 g from 80 km/h, in which
-            1.8 s is too late.
+            brake, except with oncoming cars (CCFhos, CCFhol), which no braking avoids. The critical case is a
+            lead car 40 m ahead that brakes at 0.5 g from 80 km/h, in which 1.8 s is too late.
     """
 
     name = "ttc-oracle"

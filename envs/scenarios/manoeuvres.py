@@ -38,8 +38,7 @@ AFTER_PASSING = 2.0  # [s]
 def drive_over_dots(ego_speed: float = 72.4 * KMH) -> Scenario:
     """The ego drives over four rows of raised pavement markers (Botts' dots) in its lane; not a threat.
 
-    The markers are 0.1 m wide and drawn as flat white squares, six to a row. Source: NHTSA, at 40.2 and
-    72.4 km/h (25 and 45 mph).
+    The markers are 0.1 m wide and drawn as flat white squares, six to a row. Source: NHTSA.
 
     Args:
         ego_speed: Ego speed, in (0, 40] [m/s].
@@ -72,8 +71,7 @@ def neighbour_brakes(
     """A car ahead in the lane to the left brakes to a standstill, and the ego passes it; not a threat.
 
     In a curve, both cars turn right: the other car is on the outer lane, straight ahead of the ego's optical
-    axis. Source: NHTSA, on a straight and in a curve at 40.2 and 72.4 km/h; headway, deceleration and radius
-    are assumptions.
+    axis. Source: NHTSA, on a straight and in a curve; headway, deceleration and radius are assumptions.
 
     Args:
         ego_speed: Speed of both cars before the braking, in (0, 40] [m/s].
@@ -120,7 +118,7 @@ def car_at_curve(
     """The ego drives through a right curve past a car that stands in the outer lane; not a threat.
 
     At the entrance the car is straight ahead of the ego before it steers. Source: NHTSA, with a stationary
-    car at the entrance and at the exit of a curve at 40.2 and 72.4 km/h; the radius is an assumption.
+    car at the entrance and at the exit of a curve; the radius is an assumption.
 
     Args:
         ego_speed: Ego speed, in (0, 40] [m/s].

@@ -22,7 +22,7 @@ def turn_across_car(
     """The ego turns left across the path of an oncoming car (Car-to-Car Front Turn-Across-Path).
 
     Without braking, the near corner of the target's front meets the middle of the ego's front. Sources: Euro
-    NCAP AEB Car-to-Car v4.3.1, 8.2.3; Frontal Collisions v1.1, 1.2.4.
+    NCAP AEB Car-to-Car v4.3.1, 8.2; Frontal Collisions v1.1, 1.2.4.
 
     Args:
         ego_speed: Ego speed, in (0, 6.95] [m/s], which is up to 25 km/h.

@@ -32,7 +32,7 @@ R152_TABLE = [
     (50, 25, 25),
     (60, 35, 35),
 ]
-# 5.2.3.4: with a bicycle.
+# 5.2.3: with a bicycle.
 R152_BICYCLE_TABLE = [
     (20, 0, 0),
     (38, 0, 0),

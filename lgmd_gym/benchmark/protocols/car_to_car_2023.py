@@ -5,7 +5,7 @@ from dataclasses import replace
 from lgmd_gym.benchmark.case import Case, make_case, speed_cases, to_mps
 
 OVERLAPS = (-50, -75, 100, 75, 50)  # N1 8.2.2: per cent of the ego's width; the sign is the side
-TAP_SPEEDS = ((10, 15, 20), (30, 45, 60))  # N1 8.2.3: ego and target speeds of CCFtap [km/h]
+TAP_SPEEDS = ((10, 15, 20), (30, 45, 60))  # N1 8.2: ego and target speeds of CCFtap [km/h]
 
 
 def ncap2023() -> tuple[Case, ...]:
@@ -80,7 +80,7 @@ def _crossing(suite: str) -> tuple[Case, ...]:
 
 
 def turns(suite: str, family: str) -> tuple[Case, ...]:
-    """Return the cases of N1 8.2.3 for a target that is turned across."""
+    """Return the cases of N1 8.2 for a target whose path the ego turns across."""
     return tuple(
         make_case(
             suite, family, f"v{speed}/target{target}", ego_speed=to_mps(speed), target_speed=to_mps(target)
