@@ -85,8 +85,8 @@ def fmvss127_pedestrian() -> tuple[Case, ...]:
 def nhtsa_manoeuvres() -> tuple[Case, ...]:
     """Return seven of NHTSA's eight manoeuvres for false activations, each at 25 and 45 mph.
 
-    NHTSA tested at two speeds, which the summary of its report does not state: these are assumptions. The cars
-    at the roadside are six, 0.3 m beside the lane. Driving under a bridge is left out.
+    NHTSA tested at two speeds, which the summary of its report does not state: these are assumptions. The
+    roadside has six parked cars, 0.3 m beside the lane. Driving under a bridge is left out.
     """
     suite, rows = "nhtsa-false-activation", list[Case]()
     for mph, kmh in ((25, 40.2), (45, 72.4)):
