@@ -162,7 +162,7 @@ class TrafficRoad(RegulatedRoad):
         for car in vehicles:
             values.extend(car.state(self._lanes))
         cars = self._constants.copy()
-        _numbers(cars)[: len(vehicles), : len(CAR_STATE)] = np.frombuffer(values).reshape(len(vehicles), -1)
+        _numbers(cars)[: len(vehicles), : len(CAR_STATE)] = np.array(values).reshape(-1, len(CAR_STATE))
         return cars
 
     def _read_constants(self) -> np.ndarray:
@@ -244,4 +244,4 @@ class TrafficRoad(RegulatedRoad):
 
 def _numbers(cars: np.ndarray) -> np.ndarray:
     """Return a view of `CAR` records as float64, shape (cars, fields)."""
-    return cars.view(np.float64).reshape(len(cars), -1)
+    return cars.view(np.float64).reshape(len(cars), cars.itemsize // 8)

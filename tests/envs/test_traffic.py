@@ -48,6 +48,15 @@ def test_seeds_vary_the_traffic():
     assert positions[0] == positions[2] != positions[1]
 
 
+def test_an_intersection_may_begin_without_other_cars():
+    """highway-env keeps each of its cars with a probability, and removes those near the ego."""
+    env = make_traffic("intersection", camera=None)
+    env.reset(seed=0)
+    road = env.unwrapped.road
+    road.vehicles.clear()
+    assert len(road.read()) == len(road.items)
+
+
 def stock_road(kind, road):
     """Return highway-env's road with copies of the cars of a traffic road."""
     cars = copy.deepcopy(road.vehicles, {id(road): None, id(road.network): road.network})
