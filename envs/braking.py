@@ -63,7 +63,7 @@ class BrakingEnv(EgoBrakeEnv):
     | jerk | `jerk` = 0.05 | − abs(Δa) / a_max |
     | needless braking | `brake` = 2 | − dt · a / a_max, unless a contact is less than `need_ttc` = 4 s away |
     | contact | `contact` = 10 | − 1 |
-    | impact | `impact` = 10 | − (v_rel / v_script)², with the relative impact speed v_rel |
+    | impact | `impact` = 10 | − min(v_rel / v_script, 1)², with the relative impact speed v_rel |
 
     Here v_script is the highest scripted ego speed, a the deceleration beyond the script, Δa the change of
     the ego's acceleration, and a_max the `max_deceleration` of the episode's brake. A contact costs more than

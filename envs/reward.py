@@ -21,7 +21,7 @@ class RewardParams:
 
     Attributes:
         contact: Cost of a contact.
-        impact: Additional cost of a contact at a relative impact speed equal to the scripted speed;
+        impact: Additional cost of a contact at a relative impact speed of at least the scripted speed; below,
             proportional to the square of the relative impact speed, as the energy is.
         progress: Gain per second at the scripted speed [1/s].
         brake: Cost of full braking while no contact is within `need_ttc` [1/s].
@@ -62,7 +62,8 @@ def step_reward(body: Any, ego: Any, episode: Any, brake: Any, weights: Any, ttc
     reward = weights.progress * dt * min((episode.last_speed + body.speed) / (2.0 * scripted), 1.0)
     reward -= weights.jerk * abs(body.acceleration - episode.last_acceleration) / brake.max_deceleration
     if episode.touched > 0:
-        return reward - weights.contact - weights.impact * (episode.relative_impact_speed / scripted) ** 2
+        severity = min(episode.relative_impact_speed / scripted, 1.0)
+        return reward - weights.contact - weights.impact * severity**2
     braking = ego_braking(body, ego)
     if braking > 0.0 and ttc >= weights.need_ttc:
         reward -= weights.brake * dt * braking / brake.max_deceleration
