@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lgmd_gym.camera.aim import FIXED, GAZES
 from lgmd_gym.camera.effects import LOOK, beam_profile, in_world, look_of, texture_gains
 from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pinhole import LENS
@@ -123,7 +124,7 @@ class CameraBatch:
         mount, mounted = self._mounts[index, member], _prepare(p).mount
         right, up = gaze or (0.0, 0.0)
         mount["yaw_deg"], mount["pitch_deg"] = mounted["yaw_deg"] + right, mounted["pitch_deg"] + up
-        mount["path"] = gaze is None and p.gaze == "path"
+        mount["gaze"] = GAZES[p.gaze] if gaze is None else FIXED
 
     def draw(
         self,

@@ -21,6 +21,8 @@ from lgmd_gym.errors import (
 )
 
 MAX_PATH = 4096  # characters
+MIN_STOP = 4.0
+"""Least stopping distance of the gaze `"stopping"` [m]."""
 MAX_WIDTH = 4096
 """Maximum width and height of a frame [px]."""
 
@@ -49,6 +51,12 @@ _BOUNDS = {
     "auto_exposure_s": _Interval(0.0, 60.0, True, True, "s (0 is a fixed exposure)"),
     "dive_deg": _Interval(0.0, 2.0, True, True, "degrees per m/s²"),
     "shutter_s": _Interval(0.0, 0.1, True, True, "s"),
+    "reach": _Interval(0.1, 10.0, True, True, "stopping distances"),
+    "span_m": _Interval(0.1, 100.0, True, True, "m"),
+    "offset_m": _Interval(-50.0, 50.0, True, True, "m left of the path"),
+    "lift": _Interval(-5.0, 5.0, True, True, "times the depression of the aim"),
+    "stop_deceleration": _Interval(0.5, 12.0, True, True, "m/s²"),
+    "stop_reaction": _Interval(0.0, 3.0, True, True, "s"),
     "windscreen": _Interval(0.0, 0.2, True, True, "of the light of the sky"),
 }
 ROADS = {"still": 0.0, "smooth": 0.5, "normal": 1.0, "rough": 2.0}
@@ -58,7 +66,7 @@ ROADS = {"still": 0.0, "smooth": 0.5, "normal": 1.0, "rough": 2.0}
 before.
 """
 _CHOICES = {
-    "gaze": ("fixed", "path"),
+    "gaze": ("fixed", "path", "stopping"),
     "vehicles": ("car", "box"),
     "light": ("day", "night", "low_sun"),
     "road": tuple(ROADS),
@@ -83,7 +91,18 @@ class CameraParams:
         pitch_deg: Upward tilt of the optical axis; 0 puts the horizon at half height [degrees].
         yaw_deg: Yaw of the optical axis, + to the right; 0 is straight ahead [degrees].
         gaze: `"fixed"` to the car, or `"path"`: turned towards the car's position in one second on its
-            present circle, from its own speed and steering angle only.
+            present circle, from its own speed and steering angle only; or `"stopping"`: turned and zoomed to
+            the point of that circle at `reach` stopping distances, see `camera.aim`.
+        reach: Distance of the aim of the gaze `"stopping"` as a multiple of the stopping distance.
+        span_m: Width of the frame at that distance; replaces `hfov_deg` [m].
+        offset_m: Distance of the aim left of the ego's path [m].
+        lift: Elevation of the optical axis, as a multiple of the angle from the horizon down to the aim.
+        stop_deceleration: Deceleration of the stopping distance on a dry road; two thirds of it on a wet one
+            [m/s²]. The least of all worlds is 7.5.
+        stop_reaction: Time from a demand to full braking [s].
+        stabilised: Whether the rotation of the body is compensated with a gyroscope, see
+            `body_motion.residual_motion`.
+        calibrated: Whether the sensor knows the errors of its mount up to a tenth, see `pose.CALIBRATED`.
         texture: Contrast of asphalt and verge, as a multiple of the natural contrast.
         roadside: Density of posts and trees along the road, as a multiple of the natural density.
         vehicles: `"car"` for bodies with windows, lights and wheels, `"box"` for plain shaded boxes, also of
@@ -140,6 +159,14 @@ class CameraParams:
     pitch_deg: float = 0.0
     yaw_deg: float = 0.0
     gaze: str = "fixed"
+    reach: float = 1.0
+    span_m: float = 2.4
+    offset_m: float = 0.0
+    lift: float = 0.0
+    stop_deceleration: float = 7.5
+    stop_reaction: float = 0.5
+    stabilised: bool = False
+    calibrated: bool = False
     texture: float = 1.0
     roadside: float = 1.0
     vehicles: str = "car"
@@ -175,6 +202,8 @@ class CameraParams:
             object.__setattr__(self, "queue_lane", check_whole("camera queue_lane", self.queue_lane, 0))
         for name, known in _CHOICES.items():
             check_known(f"camera {name}", getattr(self, name), known)
+        if self.gaze == "stopping":
+            _check_zoom(self)
         if self.bonnet:
             _check_behind_windscreen(self)
 
@@ -248,8 +277,24 @@ def _check_surroundings(p: CameraParams) -> None:
         raise ValueError(
             f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
         )
-    for name in ("guard_rail", "upper_beam", "wet", "linear_light", "bonnet"):
+    flags = ("guard_rail", "upper_beam", "wet", "linear_light", "bonnet", "stabilised", "calibrated")
+    for name in flags:
         object.__setattr__(p, name, check_flag(f"camera {name}", getattr(p, name)))
+
+
+def _check_zoom(p: CameraParams) -> None:
+    """Check the zoom of the gaze `"stopping"`, and that nothing depends on a constant focal length."""
+    nearest = MIN_STOP * p.reach + p.mount_setback
+    if not p.span_m <= 4.0 * nearest:
+        raise ValueError(
+            f"camera span_m must be at most {4.0 * nearest:.3g} m, four times the least distance of the aim "
+            f"from the lens, got {p.span_m:g}; reduce span_m or increase reach"
+        )
+    for name, usual in (("panorama", "skyline"), ("bonnet", False), ("windscreen", 0.0)):
+        if getattr(p, name) != usual:
+            raise ValueError(
+                f"camera {name} must be {usual!r} with gaze='stopping', got {shown(getattr(p, name))}"
+            )
 
 
 def _check_behind_windscreen(p: CameraParams) -> None:

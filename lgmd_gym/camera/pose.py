@@ -4,7 +4,28 @@ import math
 
 import numpy as np
 
-from lgmd_gym.camera.body_motion import HEAVE, PITCH, ROLL, YAW, body_motion, road_gain
+from lgmd_gym.camera.aim import (
+    AIM,
+    GAZES,
+    PATH,
+    STOPPING,
+    aim_depth,
+    aim_focal,
+    aim_of,
+    aim_pitch,
+    aim_yaw,
+    path_yaw,
+    slip_and_yaw_rate,
+)
+from lgmd_gym.camera.body_motion import (
+    HEAVE,
+    PITCH,
+    ROLL,
+    YAW,
+    body_motion,
+    residual_motion,
+    road_gain,
+)
 from lgmd_gym.camera.effects import NOISE_LOG2
 from lgmd_gym.camera.params import ROADS, CameraParams
 from lgmd_gym.camera.render.jit import exact_kernel
@@ -15,30 +36,35 @@ MOUNT = np.dtype(
         *((name, np.float64) for name in ("setback", "left", "height", "yaw_deg", "pitch_deg")),
         *((name, np.float64) for name in ("road", "dive_deg", "shutter_s")),
         *((name, np.float64) for name in ("focal", "centre_u", "centre_v", "linear")),
-        *((name, np.int64) for name in ("path", "noisy", "box", "drawn", "seed")),
+        *((name, np.int64) for name in ("gaze", "stabilised", "noisy", "box", "drawn", "seed")),
+        ("aim", AIM),
     ]
 )
 """How a camera sits on the car and moves with it, as the kernels read it.
 
-The fields of `CameraParams`; amplitude of the road in `ROADS`; focal length and image centre [px]; 1 for
-linear light, the gaze `"path"`, sensor noise, `vehicles="box"` and a numbered world.
+The fields of `CameraParams`; amplitude of the road in `ROADS`; focal length and image centre [px]; gaze, see
+`camera.aim`; 1 for linear light, a stabilised lens, sensor noise, `vehicles="box"` and a numbered world.
 """
-
-_PATH_S = 1.0  # look-ahead time of the gaze "path" [s]
-_PATH_MAX = math.radians(40.0)
+CALIBRATED = 0.1
+"""Share of the errors of a calibrated mount that remains: 0.05° and 1 cm at most. An assumption: a car that
+drives for minutes measures the direction of its lens from the vanishing point of its own motion."""
+_GYRO_DIVE = 0.02  # share of the dive that remains of a stabilised lens
 
 
 def mount_of(p: CameraParams) -> np.ndarray:
     """Return the `MOUNT` record of a camera, shape ()."""
     height, width = p.shape
     world = draw_world(p.world)
+    left, lens_height = (CALIBRATED if p.calibrated else 1.0), height_of(p, world)
+    known_height = lens_height - left * (lens_height - p.mount_height)
     values = (
-        *(p.mount_setback, p.mount_left, height_of(p, world)),
-        *(p.yaw_deg + world.yaw_error_deg, p.pitch_deg + world.pitch_error_deg),
-        *(ROADS[p.road], p.dive_deg, p.shutter_s),
+        *(p.mount_setback, p.mount_left, lens_height),
+        *(p.yaw_deg + left * world.yaw_error_deg, p.pitch_deg + left * world.pitch_error_deg),
+        *(ROADS[p.road], p.dive_deg * (_GYRO_DIVE if p.stabilised else 1.0), p.shutter_s),
         *(p.focal_px, 0.5 * width, 0.5 * height, p.linear_light),
-        *(p.gaze == "path", p.shot_noise > 0.0 or p.read_noise > 0.0, p.vehicles == "box"),
+        *(GAZES[p.gaze], p.stabilised, p.shot_noise > 0.0 or p.read_noise > 0.0, p.vehicles == "box"),
         *(world.drawn, seed_of(p)),
+        aim_of(p, known_height),
     )
     return np.array(values, dtype=MOUNT)
 
@@ -54,17 +80,11 @@ def seed_of(p: CameraParams) -> int:
 
 
 @exact_kernel
-def _slip_and_yaw_rate(scene):
-    """Return slip angle [rad] and yaw rate [rad/s] of highway-env's kinematic bicycle."""
-    slip = math.atan(0.5 * math.tan(scene.steering))
-    return slip, scene.speed * math.sin(slip) / (0.5 * scene.length)
-
-
-@exact_kernel
-def _path_yaw(scene):
-    """Return the direction, relative to the heading, of the ego's position in one second [rad]."""
-    slip, rate = _slip_and_yaw_rate(scene)
-    return max(-_PATH_MAX, min(_PATH_MAX, slip + 0.5 * (rate * _PATH_S)))
+def _rotation(mount, axis, time_s):
+    """Return the rotation of a lens about one axis due to the road, at `MEAN_SPEED` [degrees]."""
+    if mount.stabilised != 0:
+        return residual_motion(mount.seed, axis, time_s)
+    return body_motion(mount.seed, axis, time_s)
 
 
 @exact_kernel
@@ -80,8 +100,8 @@ def _tilt(mount, scene, time_s, turn, gain):
     """
     pitch = roll = 0.0
     if gain > 0.0:
-        body_pitch = gain * body_motion(mount.seed, PITCH, time_s)
-        body_roll = gain * body_motion(mount.seed, ROLL, time_s)
+        body_pitch = gain * _rotation(mount, PITCH, time_s)
+        body_roll = gain * _rotation(mount, ROLL, time_s)
         c, s = math.cos(turn), math.sin(turn)
         pitch, roll = body_pitch * c - body_roll * s, body_roll * c + body_pitch * s
     if mount.dive_deg > 0.0:
@@ -92,8 +112,10 @@ def _tilt(mount, scene, time_s, turn, gain):
 @exact_kernel
 def _yaw_on_car(mount, scene):
     """Return the yaw of a lens relative to the car [degrees]."""
-    if mount.path != 0:
-        return mount.yaw_deg + math.degrees(_path_yaw(scene))
+    if mount.gaze == PATH:
+        return mount.yaw_deg + math.degrees(path_yaw(scene))
+    if mount.gaze == STOPPING:
+        return mount.yaw_deg + math.degrees(aim_yaw(mount.aim, scene, aim_depth(mount.aim, scene.speed)))
     return mount.yaw_deg
 
 
@@ -121,7 +143,7 @@ def pose_lens(mount, scene, ago_s, lens):
     """
     x, y, heading, time_s = scene.x, scene.y, scene.heading, scene.time_s
     if ago_s > 0.0:
-        slip, rate = _slip_and_yaw_rate(scene)
+        slip, rate = slip_and_yaw_rate(scene)
         distance, course = scene.speed * ago_s, heading + slip - 0.5 * rate * ago_s
         x, y = x - distance * math.cos(course), y - distance * math.sin(course)
         heading, time_s = heading - rate * ago_s, time_s - ago_s
@@ -134,13 +156,18 @@ def pose_lens(mount, scene, ago_s, lens):
     if gain > 0.0:
         # Above the ground.
         z = max(z + gain * body_motion(mount.seed, HEAVE, time_s), 0.1 * z)
-        yaw_deg += gain * body_motion(mount.seed, YAW, time_s)
+        yaw_deg += gain * _rotation(mount, YAW, time_s)
     yaw = heading + math.radians(yaw_deg)
-    pitch = math.radians(mount.pitch_deg) + tilt
+    pitch, focal = math.radians(mount.pitch_deg) + tilt, mount.focal
+    lens.turn = 0.0
+    if mount.gaze == STOPPING:
+        depth = aim_depth(mount.aim, scene.speed)
+        pitch += aim_pitch(mount.aim, depth)
+        focal, lens.turn = aim_focal(mount.aim, depth), yaw - heading
     lens.x, lens.y, lens.z = x + forward * c + mount.left * s, y + forward * s - mount.left * c, z
     lens.cos_yaw, lens.sin_yaw = math.cos(yaw), math.sin(yaw)
     lens.cos_pitch, lens.sin_pitch = math.cos(pitch), math.sin(pitch)
-    lens.focal, lens.centre_u, lens.centre_v = mount.focal, mount.centre_u, mount.centre_v
+    lens.focal, lens.centre_u, lens.centre_v = focal, mount.centre_u, mount.centre_v
     lens.cos_roll, lens.sin_roll = math.cos(roll), math.sin(roll)
     lens.yaw, lens.pitch, lens.roll = yaw, pitch, roll
 

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.camera.aim import MAX_TURN
 from lgmd_gym.camera.body_motion import MAX_DEG, PITCH, ROLL, YAW
 from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, View, read_objects
-from lgmd_gym.camera.params import ROADS, CameraParams
+from lgmd_gym.camera.params import MIN_STOP, ROADS, CameraParams
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.scene import SCENE, Ego, read_scene
 
-_PATH_DEG = 40.0  # bound of the gaze "path"
 _MAX_SPREAD = math.radians(170.0)
 _MAX_DECELERATION = 12.0  # bound of the deceleration in `pose` [m/s²]
 
@@ -74,7 +74,7 @@ def view_of(cameras: Sequence[CameraParams]) -> View | None:
     """Return the directions that cameras look in; None if they look all around, or if there are none."""
     if not cameras or any(_may_look_behind(p) for p in cameras):
         return None
-    margins = [(_PATH_DEG if p.gaze == "path" else 0.0) + ROADS[p.road] * MAX_DEG[YAW] for p in cameras]
+    margins = [_max_turn_deg(p) + ROADS[p.road] * MAX_DEG[YAW] for p in cameras]
     first = min(p.yaw_deg - margin for p, margin in zip(cameras, margins, strict=True))
     last = max(p.yaw_deg + margin for p, margin in zip(cameras, margins, strict=True))
     if math.radians(last - first) > _MAX_SPREAD:
@@ -83,10 +83,28 @@ def view_of(cameras: Sequence[CameraParams]) -> View | None:
     return View(math.radians(first), math.radians(last), reach)
 
 
+def _max_turn_deg(p: CameraParams) -> float:
+    """Return the largest turn of a lens relative to its mount [degrees]."""
+    if p.gaze == "fixed":
+        return 0.0
+    aside = math.atan(abs(p.offset_m) / _least_depth(p)) if p.gaze == "stopping" else 0.0
+    return math.degrees(MAX_TURN + aside)
+
+
+def _least_depth(p: CameraParams) -> float:
+    """Return the least distance of the aim of the gaze `"stopping"` from the lens [m]."""
+    return MIN_STOP * p.reach + p.mount_setback
+
+
 def _may_look_behind(p: CameraParams) -> bool:
     """Return whether a pitched camera may see what is straight below or above it, or behind it."""
     # To the side of the car, its pitch is roll.
     roll = ROADS[p.road] * (MAX_DEG[PITCH] + MAX_DEG[ROLL])
-    pitch = math.radians(min(abs(p.pitch_deg) + _MAX_DECELERATION * p.dive_deg + roll, 90.0))
+    pitch_deg, focal = abs(p.pitch_deg), p.focal_px
+    if p.gaze == "stopping":
+        depth = _least_depth(p)
+        pitch_deg += math.degrees(abs(p.lift) * math.atan((p.mount_height + 0.1) / depth))
+        focal = p.shape[1] * depth / p.span_m
+    pitch = math.radians(min(pitch_deg + _MAX_DECELERATION * p.dive_deg + roll, 90.0))
     half_height = 0.5 * (p.shape[0] + p.shape[1] * math.sin(math.radians(roll)))
-    return p.focal_px * math.cos(pitch) <= (half_height + 1.0) * math.sin(pitch)
+    return focal * math.cos(pitch) <= (half_height + 1.0) * math.sin(pitch)

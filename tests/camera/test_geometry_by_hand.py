@@ -65,7 +65,8 @@ def test_options_of_the_mount():
     for fields in ({"shot_noise": 0.05}, {"read_noise": 0.05}, {"shot_noise": 1.0, "read_noise": 1.0}):
         assert mount(**fields)["noisy"] == 1
     assert mount(shot_noise=0.0, read_noise=0.0)["noisy"] == 0
-    assert [mount(gaze=gaze)["path"] for gaze in ("path", "fixed")] == [1, 0]
+    assert [mount(gaze=gaze)["gaze"] for gaze in ("fixed", "path", "stopping")] == [0, 1, 2]
+    assert [mount(stabilised=flag)["stabilised"] for flag in (True, False)] == [1, 0]
     assert [mount(vehicles=kind)["box"] for kind in ("box", "car")] == [1, 0]
     values = mount(seed=17, shutter_s=0.01)
     assert (values["seed"], values["shutter_s"]) == (17, 0.01)

@@ -41,6 +41,10 @@ def test_no_object_that_is_left_out_would_be_in_the_frame():
             frame = camera.render(env)
             camera._stage._view = None  # read all objects
             np.testing.assert_array_equal(camera.render(env), frame)
+        camera = EgoCamera(gaze="stopping", offset_m=8.0, span_m=9.0, lift=-0.6, road="rough")
+        frame = camera.render(env)
+        camera._stage._view = None
+        np.testing.assert_array_equal(camera.render(env), frame)
 
 
 def test_copies_read_into_their_own_records():

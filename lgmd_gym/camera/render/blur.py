@@ -63,7 +63,7 @@ def lens_before(end, start, ago, out):
     out.yaw = end.yaw + ago * (start.yaw - end.yaw)
     out.pitch = end.pitch + ago * (start.pitch - end.pitch)
     out.roll = end.roll + ago * (start.roll - end.roll)
-    out.focal, out.centre_u, out.centre_v = end.focal, end.centre_u, end.centre_v
+    out.focal, out.centre_u, out.centre_v, out.turn = end.focal, end.centre_u, end.centre_v, end.turn
     out.cos_yaw, out.sin_yaw = math.cos(out.yaw), math.sin(out.yaw)
     out.cos_pitch, out.sin_pitch = math.cos(out.pitch), math.sin(out.pitch)
     out.cos_roll, out.sin_roll = math.cos(out.roll), math.sin(out.roll)

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.camera.aim import STOPPING
 from lgmd_gym.camera.effects import noise_table
 from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, choose_objects
 from lgmd_gym.camera.params import CameraParams
@@ -17,6 +18,7 @@ from lgmd_gym.camera.render.panorama import panorama_table
 from lgmd_gym.camera.render.raster import draw_frames
 from lgmd_gym.camera.render.sky import skyline
 from lgmd_gym.camera.render.texture import ground_texture
+from lgmd_gym.camera.render.weather import aim_beam
 from lgmd_gym.camera.render.windscreen import dashboard_key, dashboard_pattern
 from lgmd_gym.camera.road_geometry import RoadGeometry
 from lgmd_gym.camera.worlds import draw_world
@@ -128,6 +130,8 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
             if mount.noisy != 0:
                 views.noise_starts[env, k] = noise_start(mount, scene, lens)
             views.looks[env, k].paved = float(span[6])
+            if mount.gaze == STOPPING and views.looks[env, k].night > 0.0:
+                aim_beam(views.beams[env, k], lens)
             if views.looks[env, k].auto_exposure_s > 0.0:
                 follow_exposure(views.exposures[env, k], scene, views.looks[env, k].auto_exposure_s)
             if views.own_cars[env, k].bonnet > 0.0:

@@ -95,6 +95,7 @@ def draw_ground(image, view, coverage, tables, horizon):
 def draw_solids(image, view, models, objects, order, n, layer):
     """Draw the solid objects from far to near, and their glare."""
     lens, look = view.lens, view.look
+    along, aside = math.cos(lens.turn), math.sin(lens.turn)
     budget = BUDGET_PX
     for i in range(n):
         obj = objects[order[i]]
@@ -102,7 +103,9 @@ def draw_solids(image, view, models, objects, order, n, layer):
             continue
         dx, dy = obj.x - lens.x, obj.y - lens.y
         away, ahead = distance(lens, obj), dx * lens.cos_yaw + dy * lens.sin_yaw
-        light = light_at(ahead, dy * lens.cos_yaw - dx * lens.sin_yaw, look)
+        across = dy * lens.cos_yaw - dx * lens.sin_yaw
+        # The headlights are fixed to the car.
+        light = light_at(ahead * along - across * aside, across * along + ahead * aside, look)
         # Objects fade in over the last sixth of their range.
         opacity = min(1.0, 6.0 * (1.0 - away / obj.range))
         clear = math.exp(-away * look.extinction) if look.extinction > 0.0 else 1.0

@@ -12,6 +12,22 @@ from lgmd_gym.simd import load_part, madd, splat
 
 
 @kernel
+def aim_beam(beam, lens):
+    """Write the fall-off of the headlights over the columns of a lens that is turned relative to the car.
+
+    Args:
+        beam: Fall-off to write, float32, shape (width,); see `Views.beams`.
+        lens: `LENS` record.
+    """
+    turn = math.tan(lens.turn)
+    for j in range(beam.shape[0]):
+        tan = (j + 0.5 - lens.centre_u) / lens.focal
+        ahead = 1.0 - tan * turn  # cosine of the direction relative to the car, up to a factor
+        across = (tan + turn) / ahead
+        beam[j] = nb.float32(math.exp(-((across / BEAM_WIDTH) ** 2)) if ahead > 1e-3 else 0.0)
+
+
+@kernel
 def light_at(ahead, across, look):
     """Return the light at a point `ahead` and `across` of the lens [m]: 1 by day, the headlights at night.
 

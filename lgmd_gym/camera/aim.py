@@ -1,0 +1,87 @@
+"""Direction and zoom of a lens on the ego car: fixed, along the path, or to the stopping distance.
+
+The gaze `"stopping"` keeps a part of the road in the frame that the car reaches when it brakes: its distance
+follows the ego's speed, and its direction the ego's steering angle. A frame of a given size then contains the
+same part of the lane at every speed. Other pixels of a real sensor are read; nothing moves.
+"""
+
+import math
+
+import numpy as np
+
+from lgmd_gym.camera.params import MIN_STOP, CameraParams
+from lgmd_gym.camera.render.jit import exact_kernel
+
+FIXED, PATH, STOPPING = 0, 1, 2  # values of `gaze`
+GAZES = {"fixed": FIXED, "path": PATH, "stopping": STOPPING}
+MAX_TURN = math.radians(40.0)
+"""Bound of the turn towards the path [rad]."""
+_PATH_S = 1.0  # look-ahead time of the gaze "path" [s]
+_WET = 2.0 / 3.0  # deceleration on a wet road over that on a dry one
+
+AIM = np.dtype(
+    [
+        *((name, np.float64) for name in ("reach", "span", "offset", "lift", "deceleration", "reaction")),
+        *((name, np.float64) for name in ("setback", "height", "width")),
+    ]
+)
+"""Aim of the gaze `"stopping"`, as the kernels read it: fields of `CameraParams`; deceleration on the present
+road; height of the lens as the sensor knows it [m]; width of the frame [px]."""
+
+
+def aim_of(p: CameraParams, known_height: float) -> np.ndarray:
+    """Return the `AIM` record of a camera, shape ().
+
+    Args:
+        p: Its parameters.
+        known_height: Height of the lens above the ground as far as the sensor knows it [m].
+    """
+    deceleration = p.stop_deceleration * (_WET if p.wet else 1.0)
+    values = (p.reach, p.span_m, p.offset_m, p.lift, deceleration, p.stop_reaction)
+    return np.array((*values, p.mount_setback, known_height, p.shape[1]), dtype=AIM)
+
+
+@exact_kernel
+def slip_and_yaw_rate(scene):
+    """Return slip angle [rad] and yaw rate [rad/s] of highway-env's kinematic bicycle."""
+    slip = math.atan(0.5 * math.tan(scene.steering))
+    return slip, scene.speed * math.sin(slip) / (0.5 * scene.length)
+
+
+@exact_kernel
+def path_yaw(scene):
+    """Return the direction, relative to the heading, of the ego's position in one second [rad]."""
+    slip, rate = slip_and_yaw_rate(scene)
+    return max(-MAX_TURN, min(MAX_TURN, slip + 0.5 * (rate * _PATH_S)))
+
+
+@exact_kernel
+def aim_depth(aim, speed):
+    """Return the distance of the aim from the lens at an ego speed [m]."""
+    v = max(speed, 0.0)
+    distance = v * v / (2.0 * aim.deceleration) + v * aim.reaction
+    return max(distance, MIN_STOP) * aim.reach + aim.setback
+
+
+@exact_kernel
+def aim_yaw(aim, scene, depth):
+    """Return the direction of the aim, at a distance from the lens [m], relative to the heading [rad]."""
+    slip, _ = slip_and_yaw_rate(scene)
+    forward = 0.5 * scene.length - aim.setback  # of the lens, from the ego's centre
+    way = depth + forward
+    course = slip + math.sin(slip) / scene.length * way  # half of the turn on the way to the aim
+    ahead = max(way * math.cos(course) - forward, 0.5 * depth)
+    turn = math.atan(way * math.sin(course) / ahead)
+    return max(-MAX_TURN, min(MAX_TURN, turn)) - math.atan(aim.offset / depth)
+
+
+@exact_kernel
+def aim_pitch(aim, depth):
+    """Return the elevation of the optical axis for an aim at a distance from the lens [m] [rad]."""
+    return aim.lift * math.atan(aim.height / depth)
+
+
+@exact_kernel
+def aim_focal(aim, depth):
+    """Return the focal length for an aim at a distance from the lens [m] [px]."""
+    return aim.width * depth / aim.span
