@@ -14,6 +14,7 @@ from lgmd_gym.camera.pose import MOUNT, mount_of
 from lgmd_gym.camera.render.buffers import Views
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.context import SharedTables, Workspace, draw_cameras, tables_key
+from lgmd_gym.camera.render.exposure import STATE_SIZE
 from lgmd_gym.camera.render.own_car import OWN_CAR, own_car_of
 
 
@@ -69,7 +70,7 @@ class CameraBatch:
             skies=np.zeros((*size, *shape), dtype=np.float32),
             sky_aims=np.full((*size, 3), np.nan),
             noise_starts=np.zeros(size, dtype=np.int64),
-            exposures=np.full((*size, 3), np.nan),
+            exposures=np.full((*size, STATE_SIZE), np.nan),
             own_cars=np.zeros(size, OWN_CAR),
         )
         # Index of the tables, camera, mount and lenses of each camera, and the fields of its view.

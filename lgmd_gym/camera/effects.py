@@ -23,7 +23,7 @@ LOOK = np.dtype(
             *("shot_noise", "read_noise", "shutter_s"),
             *("linear", "auto_exposure_s", "target_grey", "least_gain", "most_gain"),
             *("veil", "lamps_ahead"),
-            "contrast",
+            *("contrast", "contrast_s"),
         )
     ]
 )
@@ -38,7 +38,8 @@ at night apart from the headlights, and their peak; 1.0 for a wet and for an all
 which the headlights fall to 1/e [m], and their share above the cut-off; sensor noise [grey levels]; exposure
 time [s]; 1.0 for linear light; time constant [s], target [grey levels] and bounds of the gain of the
 automatic exposure; light of fog in the headlights, see `veil_at`, 0 by day and in clear air; distance of the
-own headlights ahead of the lens [m]; slope of the tone curve at the target grey.
+own headlights ahead of the lens [m]; slope of the tone curve at the target grey; time constant of the control
+of the contrast, 0 for none [s].
 """
 ASPHALT_GREY, PAINT_GREY = 104.0, 208.0  # of the laboratory by day
 BEAM_WIDTH = 0.26  # the headlights fall to 1/e at this tangent of the angle from straight ahead
@@ -144,7 +145,7 @@ def _set_sensor(look: np.ndarray, p: CameraParams) -> None:
     look["linear"], look["auto_exposure_s"] = float(p.linear_light), p.auto_exposure_s
     world = draw_world(p.world)
     look["target_grey"] = (world.night_exposure if night else 1.0) * world.exposure_grey
-    look["contrast"] = world.contrast
+    look["contrast"], look["contrast_s"] = world.contrast, p.contrast_s
     look["least_gain"], look["most_gain"] = (0.5, 6.0) if night else (0.25, 8.0)
 
 

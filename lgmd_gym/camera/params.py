@@ -49,6 +49,7 @@ _BOUNDS = {
     "shot_noise": _Interval(0.0, 10.0, True, True, "grey levels at mid-grey"),
     "read_noise": _Interval(0.0, 50.0, True, True, "grey levels"),
     "auto_exposure_s": _Interval(0.0, 60.0, True, True, "s (0 is a fixed exposure)"),
+    "contrast_s": _Interval(0.0, 60.0, True, True, "s (0 is a fixed contrast)"),
     "dive_deg": _Interval(0.0, 2.0, True, True, "degrees per m/s²"),
     "shutter_s": _Interval(0.0, 0.1, True, True, "s"),
     "reach": _Interval(0.1, 10.0, True, True, "stopping distances"),
@@ -138,6 +139,9 @@ class CameraParams:
         auto_exposure_s: Time constant of the gain that brings the mean of the frames before to grey 110
             [s]; the first frame of an episode has its own gain. 0 disables it. The gain is 1/4 to 8 by day
             and 1 to 24 at night.
+        contrast_s: Time constant of a contrast control [s], which brings the standard deviation of the frames
+            before to 25 grey levels with a gain of 0.5 to 3, and their mean to 110; 0 disables it. Fog and a
+            dark road then weaken the responses of a neuron less, and a bright skyline raises them less.
         bonnet: Whether the own car's bonnet is visible at the bottom of the frame, see `render.own_car`. It
             is fixed to the car: neither the road nor the motion of the body moves it in the frame. With the
             mount of `wide`, it covers the lowest 11 rows; in `standard`, `tele` and `fovea` it is below the
@@ -186,6 +190,7 @@ class CameraParams:
     shutter_s: float = 0.0
     linear_light: bool = False
     auto_exposure_s: float = 0.0
+    contrast_s: float = 0.0
     bonnet: bool = False
     windscreen: float = 0.0
 

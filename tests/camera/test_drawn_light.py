@@ -8,7 +8,7 @@ from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.clutter import Clutter, place_clutter
 from lgmd_gym.camera.effects import look_of, noise_table
 from lgmd_gym.camera.objects import MODEL_LAMP, MODEL_THICKET, MODEL_TREE
-from lgmd_gym.camera.render.sensor import expose
+from lgmd_gym.camera.render.sensor import expose, fixed_tone
 from lgmd_gym.camera.worlds import SPLIT_WORLDS, World, draw_world
 
 TRAINING = [draw_world(number) for number in SPLIT_WORLDS["train"][:300]]
@@ -22,7 +22,7 @@ def test_tone_curve_is_steeper_around_the_target_of_the_exposure(grey, expected)
     assert (look["contrast"], look["target_grey"]) == (1.0, 110.0)
     look["contrast"] = 1.5
     image, out = np.full((3, 20), grey**2 / 255.0, np.float32), np.zeros((3, 20), np.uint8)
-    expose(out, image, look[()], 1.0, noise_table(0), 0)
+    expose(out, image, look[()], 1.0, fixed_tone(look[()]), noise_table(0), 0)
     assert np.abs(out.astype(int) - expected).max() <= 1
 
 

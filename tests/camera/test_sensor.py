@@ -11,8 +11,15 @@ from support.roads import add_mark, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.effects import look_of, noise_table
-from lgmd_gym.camera.render.exposure import adapt_exposure, follow_exposure
-from lgmd_gym.camera.render.sensor import expose
+from lgmd_gym.camera.render.exposure import (
+    CONTRAST_GREY,
+    CONTRAST_MEAN,
+    STATE_SIZE,
+    adapt_contrast,
+    adapt_exposure,
+    follow_exposure,
+)
+from lgmd_gym.camera.render.sensor import expose, fixed_tone
 from lgmd_gym.camera.scene import SCENE
 
 BRIDGE = {"size": (200.0, 60.0), "shade": 10.0}
@@ -21,7 +28,8 @@ BRIDGE = {"size": (200.0, 60.0), "shade": 10.0}
 def exposed(light, gain=1.0, start=0, **fields):
     """Return the frame of an even light, shape (200, 201)."""
     image, out = np.full((200, 201), light, np.float32), np.zeros((200, 201), np.uint8)
-    expose(out, image, look_of(CameraParams(**fields))[()], gain, noise_table(0), start)
+    look = look_of(CameraParams(**fields))[()]
+    expose(out, image, look, gain, fixed_tone(look), noise_table(0), start)
     return out
 
 
@@ -59,7 +67,7 @@ def test_gain_amplifies_noise():
 def test_gain_brings_the_mean_light_to_mid_grey(linear):
     look = look_of(CameraParams(auto_exposure_s=1.0, linear_light=linear))[()]
     target = 110.0**2 / 255.0 if linear else 110.0
-    exposure = np.full(3, np.nan)
+    exposure = np.full(STATE_SIZE, np.nan)
     assert adapt_exposure(exposure, np.full((9, 21), 40.0, np.float32), look) == pytest.approx(target / 40.0)
     # The next frame has the same gain, and calls for another one.
     assert adapt_exposure(exposure, np.full((9, 21), 20.0, np.float32), look) == pytest.approx(target / 40.0)
@@ -71,23 +79,62 @@ def test_gain_brings_the_mean_light_to_mid_grey(linear):
 )
 def test_gain_is_bounded(light, night, gain):
     look = look_of(CameraParams(auto_exposure_s=1.0, light=("day", "night")[night]))[()]
-    assert adapt_exposure(np.full(3, np.nan), np.full((8, 8), light, np.float32), look) == pytest.approx(gain)
+    assert adapt_exposure(
+        np.full(STATE_SIZE, np.nan), np.full((8, 8), light, np.float32), look
+    ) == pytest.approx(gain)
 
 
 def test_gain_approaches_with_the_time_constant():
     scenes = records(
         SCENE, *({"time_s": time, "steps": step} for time, step in ((2.0, 20), (2.3, 23), (0.1, 1)))
     )
-    exposure = np.array([1.0, 4.0, 1.5])
-    follow_exposure(exposure, scenes[0], 0.5)
+    look = look_of(CameraParams(auto_exposure_s=0.5, contrast_s=1.0))[()]
+    exposure = np.array([1.0, 4.0, 1.5, 100.0, 20.0, 50.0, 10.0])
+    follow_exposure(exposure, scenes[0], look)
     # One time constant: the logarithm has gone 63 % of its way.
-    assert exposure == pytest.approx([4.0 ** (1.0 - exp(-1.0)), 4.0, 2.0])
-    follow_exposure(exposure, scenes[0], 0.5)
+    assert exposure[:3] == pytest.approx([4.0 ** (1.0 - exp(-1.0)), 4.0, 2.0])
+    assert exposure[3:] == pytest.approx([50 + 50 * exp(-0.5), 10 + 10 * exp(-0.5), 50.0, 10.0])
+    follow_exposure(exposure, scenes[0], look)
     assert exposure[0] == pytest.approx(4.0 ** (1.0 - exp(-1.0)))  # no time has passed
-    follow_exposure(exposure, scenes[1], 0.5)
+    follow_exposure(exposure, scenes[1], look)
     assert exposure[0] == pytest.approx(4.0 ** (1.0 - exp(-1.6)))
-    follow_exposure(exposure, scenes[2], 0.5)
+    follow_exposure(exposure, scenes[2], look)
     assert np.isnan(exposure[0])  # the clock has gone back
+
+
+@pytest.mark.parametrize("linear", [False, True])
+@pytest.mark.parametrize(
+    ("deviation", "gain"), [(10.0, 2.5), (50.0, 0.5), (90.0, 0.5), (4.0, 3.0), (25.0, 1.0)]
+)
+def test_contrast_control_brings_mean_and_deviation_to_those_of_every_frame(linear, deviation, gain):
+    """Without noise: half of the pixels are darker and half lighter than the mean by the deviation."""
+    grey = 120.0 + np.where(np.arange(1600).reshape(40, 40) % 2 == 0, -deviation, deviation)
+    image = (grey**2 / 255.0 if linear else grey).astype(np.float32)
+    look = look_of(CameraParams(contrast_s=1.0, linear_light=linear))[()]
+    exposure, out = np.full(STATE_SIZE, np.nan), np.zeros((40, 40), np.uint8)
+    tone = adapt_contrast(exposure, image, look, 1.0, 1.0)
+    assert tone[0] == pytest.approx(gain, rel=1e-4)
+    expose(out, image, look, 1.0, tone, noise_table(0), 0)
+    assert out.mean() == pytest.approx(CONTRAST_MEAN, abs=0.6)
+    assert out.std() == pytest.approx(gain * deviation, abs=0.6)
+    assert (gain * deviation == CONTRAST_GREY) == (gain not in (0.5, 3.0) or deviation == 50.0)
+    # A frame of another contrast gets the same tone curve at first.
+    assert adapt_contrast(exposure, np.full_like(image, 60.0), look, 1.0, 1.0) == tone
+    assert exposure[6] == pytest.approx(0.0, abs=1e-2)
+
+
+def test_contrast_of_fog_is_amplified_over_time():
+    """A road in fog: the contrast of the frame is brought to that of every frame."""
+    env = straight_env()
+    plain, controlled = (
+        EgoCamera("fovea", condition="fog", roadside=0.0, contrast_s=contrast_s) for contrast_s in (0.0, 0.4)
+    )
+    deviations = []
+    for frame in range(60):
+        env.steps = frame
+        deviations.append([float(camera.render(env).std()) for camera in (plain, controlled)])
+    assert deviations[-1][0] < 0.8 * CONTRAST_GREY
+    assert deviations[-1][1] == pytest.approx(CONTRAST_GREY, rel=0.05)
 
 
 def drive_under_a_bridge(camera):

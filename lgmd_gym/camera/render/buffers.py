@@ -18,7 +18,7 @@ class Views(NamedTuple):
         skies: The last sky, float32, shape (cameras, height, width).
         sky_aims: Yaw, pitch and roll of the last sky, float64, shape (cameras, 3).
         noise_starts: Index of the frame's first number in the noise table, int64, shape (cameras,).
-        exposures: State of the automatic exposure, see `exposure`, float64, shape (cameras, 3).
+        exposures: State of exposure and contrast control, see `exposure`, float64, shape (cameras, 7).
         own_cars: `OWN_CAR` records, shape (cameras,).
     """
 

@@ -132,8 +132,8 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
             views.looks[env, k].paved = float(span[6])
             if mount.gaze == STOPPING and views.looks[env, k].night > 0.0:
                 aim_beam(views.beams[env, k], lens)
-            if views.looks[env, k].auto_exposure_s > 0.0:
-                follow_exposure(views.exposures[env, k], scene, views.looks[env, k].auto_exposure_s)
+            if views.looks[env, k].auto_exposure_s > 0.0 or views.looks[env, k].contrast_s > 0.0:
+                follow_exposure(views.exposures[env, k], scene, views.looks[env, k])
             if views.own_cars[env, k].bonnet > 0.0:
                 pose_on_car(mount, scene, views.own_cars[env, k])
             count = choose_objects(lens, mount, objects[env], counts[env], chosen)

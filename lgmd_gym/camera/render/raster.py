@@ -8,7 +8,7 @@ from lgmd_gym.camera.objects import MODEL_MARK, is_figure, light_of_code
 from lgmd_gym.camera.render.blur import add_weighted, blur_steps, lens_before, move_objects, overwrite
 from lgmd_gym.camera.render.buffers import Buffers, GroundLayer, SolidLayer, Tables, View, Views
 from lgmd_gym.camera.render.cast_shadows import add_cast_shadows
-from lgmd_gym.camera.render.exposure import adapt_exposure
+from lgmd_gym.camera.render.exposure import adapt_contrast, adapt_exposure
 from lgmd_gym.camera.render.figures import draw_figure
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare, add_sun_glare
 from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
@@ -19,7 +19,7 @@ from lgmd_gym.camera.render.models import Models
 from lgmd_gym.camera.render.order import distance, first_from, order_objects, visible
 from lgmd_gym.camera.render.own_car import draw_bonnet
 from lgmd_gym.camera.render.panorama import draw_panorama
-from lgmd_gym.camera.render.sensor import expose
+from lgmd_gym.camera.render.sensor import expose, fixed_tone
 from lgmd_gym.camera.render.shadows import add_shadow
 from lgmd_gym.camera.render.sky import draw_sky
 from lgmd_gym.camera.render.solids import Air, draw_object
@@ -181,4 +181,7 @@ def draw_frames(out, lenses, views, road, tables, models, objects, count, buffer
         if own_car.reflected > 0.0:
             add_reflections(image, tables.dashboard, own_car.reflected)
         gain = adapt_exposure(views.exposures[k], image, look) if look.auto_exposure_s > 0.0 else 1.0
-        expose(out[k], image, look, gain, tables.noise, views.noise_starts[k])
+        tone = fixed_tone(look)
+        if look.contrast_s > 0.0:
+            tone = adapt_contrast(views.exposures[k], image, look, gain, tone[0])
+        expose(out[k], image, look, gain, tone, tables.noise, views.noise_starts[k])

@@ -12,7 +12,15 @@ _MID_GREY = 128.0  # where the noise levels of a sensor without a display curve 
 
 
 @kernel
-def expose(out, image, look, gain, noise, start):
+def fixed_tone(look):
+    """Return slope and offset of the tone curve of a world: none without linear light."""
+    if look.linear > 0.0:
+        return look.contrast, look.target_grey * (1.0 - look.contrast)
+    return 1.0, 0.0
+
+
+@kernel
+def expose(out, image, look, gain, tone, noise, start):
     """Amplify and encode the light, add the sensor's noise and round to grey values.
 
     Args:
@@ -20,17 +28,19 @@ def expose(out, image, look, gain, noise, start):
         image: Light; the noise is added in place unless the light is linear.
         look: Noise levels, and whether the light is linear.
         gain: Amplification of light and noise.
+        tone: Slope of the tone curve, and the grey that it adds, see `fixed_tone`.
         noise: Standard normal numbers, see `noise_table`.
         start: Index of this frame's first number in `noise`.
     """
     height, width = out.shape
     mask = (1 << NOISE_LOG2) - 1
     if look.linear > 0.0:
-        _encode(out, image, look, gain, noise, start, mask)
+        _encode(out, image, look, gain, tone, noise, start, mask)
         return
     zero = nb.float32(0.0)
     black, half, white = splat(zero), splat(nb.float32(0.5)), splat(nb.float32(255.0))
     noisy, scale = look.shot_noise > 0.0 or look.read_noise > 0.0, splat(nb.float32(gain))
+    slope, shift = splat(nb.float32(tone[0])), splat(nb.float32(tone[1]))
     shot, read = nb.float32(look.shot_noise**2 / _MID_GREY), nb.float32(look.read_noise**2)
     for i in range(height):
         if noisy:
@@ -42,11 +52,13 @@ def expose(out, image, look, gain, noise, start):
             light = maximum(load_part(image, at, count), black)
             if gain != 1.0:
                 light = light * scale
+            if tone[0] != 1.0 or tone[1] != 0.0:
+                light = maximum(madd(light, slope, shift), black)
             store_bytes(out, at, count, minimum(light, white) + half)
 
 
 @kernel
-def _encode(out, image, look, gain, noise, start, mask):
+def _encode(out, image, look, gain, tone, noise, start, mask):
     """Encode linear light as its square root, with noise.
 
     The square root of a number of photons has the same deviation for any number, so the photon noise of the
@@ -57,8 +69,7 @@ def _encode(out, image, look, gain, noise, start, mask):
     black, half, white = splat(nb.float32(0.0)), splat(nb.float32(0.5)), splat(nb.float32(255.0))
     scale = splat(nb.float32(gain * 255.0))
     level = math.sqrt(gain) * math.sqrt(look.shot_noise**2 + look.read_noise**2)
-    contrast = splat(nb.float32(look.contrast))
-    offset = splat(nb.float32(look.target_grey * (1.0 - look.contrast)))
+    slope, shift = splat(nb.float32(tone[0])), splat(nb.float32(tone[1]))
     noisy, level16 = level > 0.0, splat(nb.float32(level))
     for i in range(height):
         first = (start + i * width) & mask
@@ -67,5 +78,5 @@ def _encode(out, image, look, gain, noise, start, mask):
             code = square_root(maximum(load_part(image, at, count), black) * scale)
             if noisy:
                 code = madd(level16, load_part(noise, first + j, count), code)
-            code = madd(contrast, code, offset)
+            code = madd(slope, code, shift)
             store_bytes(out, at, count, minimum(maximum(code, black), white) + half)
