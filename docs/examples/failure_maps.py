@@ -181,9 +181,9 @@ def play_all(unit: Unit) -> list[Result]:
     return list(play_unit(unit))
 
 
-def play(tasks: Sequence[Task], jobs: int) -> list[Result]:
-    """Return the results of tasks, in any order."""
-    parts = run_parallel((delayed(play_all)(unit) for unit in make_units(tasks, jobs)), jobs)
+def play(tasks: Sequence[Task], jobs: int, agents: tuple[str, ...]) -> list[Result]:
+    """Return the results of tasks; each process makes all agents at its first task, see `make_units`."""
+    parts = run_parallel((delayed(play_all)(unit) for unit in make_units(tasks, jobs, agents)), jobs)
     results = [result for part in parts for result in part]
     failed = next((result.row["error"] for result in results if result.row["error"]), None)
     if failed:
@@ -206,15 +206,16 @@ def play_plane(plane: Plane, agents: Sequence[str], bound: str, worlds: range, j
             for cell, world in cells
         ]
 
+    every = tuple(dict.fromkeys((*agents, bound)))
     textures = {cell.texture for cell, _ in cells}
     no_views = dict.fromkeys(textures, NO_VIEW)
-    unbraked = play(tasks(NO_BRAKE, no_views), jobs)
+    unbraked = play(tasks(NO_BRAKE, no_views), jobs, every)
     truths = {key_of(result.row)[1:]: result.counterfactual for result in unbraked}
     maps = {}
-    for agent in dict.fromkeys((*agents, bound)):
+    for agent in every:
         views = {texture: sensors_of(agent, texture) for texture in textures} if agent in agents else no_views
         paired = [replace(task, counterfactual=truths[task.key[1:]]) for task in tasks(agent, views)]
-        maps[agent] = to_map(plane, [result.row for result in play(paired, jobs)], worlds)
+        maps[agent] = to_map(plane, [result.row for result in play(paired, jobs, every)], worlds)
     return maps
 
 

@@ -4,6 +4,7 @@ import importlib.util
 import re
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
 import gymnasium as gym
 import numpy as np
@@ -17,6 +18,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.stored_run import StoredRun
 from lgmd_gym.benchmark.suites import Suite
 from lgmd_gym.camera import CameraParams
+from lgmd_gym.neuron import LGMDParams
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "docs" / "examples"
@@ -213,7 +215,7 @@ def test_failure_maps(tmp_path, capsys, monkeypatch):
     """The maps of an oracle follow from its threshold; roads, textures and worlds reach the tasks."""
     script, picture, agent = load("failure_maps"), tmp_path / "maps.png", "ttc-oracle:ttc=4.5"
     played, play = [], script.play
-    monkeypatch.setattr(script, "play", lambda tasks, jobs: played.extend(tasks) or play(tasks, jobs))
+    monkeypatch.setattr(script, "play", lambda tasks, *rest: played.extend(tasks) or play(tasks, *rest))
     options = f"--agents {agent} --planes vibration brake curve --worlds 2 --roads still rough"
     grids = "--textures 1 2.5 --decelerations 5 9.5 --radii 60 inf --speeds 20 80"
     vibration, brake, curve = script.main([*options.split(), *grids.split(), "--to", str(picture)])
@@ -241,14 +243,13 @@ def test_failure_maps(tmp_path, capsys, monkeypatch):
         script.main(options.split())
 
 
-def test_failure_maps_cells():
+def test_failure_maps_cells(monkeypatch):
     script = load("failure_maps")
     assert script.edges(np.array([[0.9, 0.8], [np.nan, 1.0]])) == [([1, 1], [0, 1]), ([1, 2], [1, 1])]
     own = SensorConfig().for_agent(make_agent("stopping-zone"))
     changed = script.sensors_of("stopping-zone", 2.5)
     expected = [CameraParams.make(lens, texture=2.5) for lens in own.camera]
     assert [CameraParams.make(lens) for lens in changed.camera] == expected
-    assert changed.params == own.params
     assert script.width_cell(0.3, 36.0, 8000).case.scenario.actors[0].width == 0.3
     right, left = (script.curve_cell(100.0, 36.0, world).case.scenario for world in (8000, 8001))
     assert [bend.curvature for bend in (*right.ego_path, *left.ego_path)] == [-0.01, 0.01]
@@ -260,6 +261,10 @@ def test_failure_maps_cells():
     assert target.gap + 4.1615 == pytest.approx(100.0 * np.sin(0.541615), abs=1e-3)
     assert script.curve_cell(100.0, 72.0, 8000) is not None  # 4 m/s²
     assert script.curve_cell(100.0, 72.5, 8000) is None
+    own = SimpleNamespace(camera="fovea", neuron=LGMDParams.off_only(), include_frame=True)
+    monkeypatch.setattr(script, "make_agent", lambda agent: own)
+    expected = SensorConfig([{"name": "fovea", "texture": 2.5}], own.neuron, include_frame=True)
+    assert script.sensors_of("own", 2.5) == expected
 
 
 def test_protocol_counts(tmp_path, monkeypatch):
