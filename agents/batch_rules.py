@@ -13,11 +13,12 @@ import numpy as np
 from lgmd_gym.agents.base import BRAKE, FPS, HOLD
 from lgmd_gym.agents.batch import BatchAgent
 from lgmd_gym.agents.rule import excitation
-from lgmd_gym.agents.zones import NUM_ZONES, zone_indices
+from lgmd_gym.agents.zones import LOW_FIELD, NUM_FIELDS, NUM_ZONES
 
 if TYPE_CHECKING:
     from lgmd_gym.agents.field_rules import FieldRule
     from lgmd_gym.agents.rule import Rule
+    from lgmd_gym.agents.stopping_zone import StoppingZone
 
 
 class BatchReading(NamedTuple):
@@ -53,11 +54,11 @@ class ConsecutiveFrameCounts:
     """`ConsecutiveFrames` for many conditions.
 
     Args:
-        required: Number of frames, >= 1.
+        required: Number of frames, >= 1, of each condition or of all.
         shape: Shape of the conditions, the environments along the first axis.
     """
 
-    def __init__(self, required: int, shape: tuple[int, ...]) -> None:
+    def __init__(self, required: int | np.ndarray, shape: tuple[int, ...]) -> None:
         self.required = required
         self.counts = np.zeros(shape, np.int64)
 
@@ -249,34 +250,26 @@ class FieldBatch(RuleBatch):
 class StoppingZoneBatch(RuleBatch):
     """`StoppingZone` in N environments."""
 
-    def __init__(self, rule: "Rule", num_envs: int) -> None:
+    rule: "StoppingZone"
+
+    def __init__(self, rule: "StoppingZone", num_envs: int) -> None:
         super().__init__(rule, num_envs)
-        p, shape = self.params, (num_envs, NUM_ZONES)
-        self._ground_streaks = ConsecutiveFrameCounts(p.frames, shape)
-        self._near_streaks = ConsecutiveFrameCounts(p.near_frames, shape)
-        self._frames_since_upright = np.full(shape, p.memory)
-        self._gates = YawRateGates(p.yaw_rate, p.settle, num_envs)
-        self._rows, self._zones = np.arange(num_envs), np.arange(NUM_ZONES)
+        self._streaks = ConsecutiveFrameCounts(rule.required, (num_envs, NUM_FIELDS))
+        self._ages = np.full((num_envs, NUM_FIELDS), self.params.memory)
 
     def reset(self, index: int, seed: int | None = None) -> None:
         """Release the brake and clear all state of environment `index`."""
         super().reset(index, seed)
-        for each in (self._ground_streaks, self._near_streaks, self._gates):
-            each.reset(index)
-        self._frames_since_upright[index] = self.params.memory
+        self._streaks.reset(index)
+        self._ages[index] = self.params.memory
 
     def should_brake(self, reading: BatchReading) -> np.ndarray:
-        """Return whether an upright obstacle is in the zone for the ego speed or in a nearer one."""
+        """Return whether an upright obstacle is in a zone."""
         p = self.params
-        self.rule.require_cameras(reading.potential.shape[1], 2 * NUM_ZONES)
-        levels = excitation(reading.potential)
-        ground, upright = levels[:, :NUM_ZONES], levels[:, NUM_ZONES:]
-        on_ground = ground >= p.ground
-        entered = self._ground_streaks.update(on_ground)
-        near = self._near_streaks.update(on_ground & (upright >= p.near_upright))
-        self._frames_since_upright = (self._frames_since_upright + 1) * (upright < p.upright)
-        active = self._gates.update(reading.yaw_rate) & (reading.speed > p.crawl)
-        zones, nearest = zone_indices(reading.speed), zone_indices(p.near_share * reading.speed)
-        confirmed = self._frames_since_upright[self._rows, zones] < p.memory
-        nearer = (self._zones >= nearest[:, None]) & (self._zones < zones[:, None])
-        return active & ((entered[self._rows, zones] & confirmed) | (near & nearer).any(axis=1))
+        self.rule.require_cameras(reading.potential.shape[1], NUM_FIELDS)
+        reached = self._streaks.update(excitation(reading.potential) >= self.rule.thresholds)
+        self._ages = (self._ages + 1) * ~reached
+        active = (reading.speed > p.crawl) & (np.abs(reading.yaw_rate) <= p.yaw_rate)
+        upright, low = np.split(self._ages[:, NUM_ZONES:] < p.memory, [NUM_ZONES], axis=1)
+        standing = self.rule.zones & reached[:, :NUM_ZONES] & upright & low[:, LOW_FIELD]
+        return active & standing.any(axis=1)

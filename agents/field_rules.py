@@ -10,15 +10,14 @@ from lgmd_gym.agents.batch import BatchAgent
 from lgmd_gym.agents.batch_rules import FieldBatch
 from lgmd_gym.agents.filters import ConsecutiveFrames, YawRateGate
 from lgmd_gym.agents.params import RuleParams, parameter
-from lgmd_gym.agents.rule import Rule, SensorReading, excitation
+from lgmd_gym.agents.rule import Rule, SensorReading, excitation, read_ahead
 from lgmd_gym.agents.zones import (
+    DRY_DECELERATION,
     FULL_DECELERATION,
     LENS_SETBACK,
-    NUM_ZONES,
+    REACTION,
     stopping_distance,
-    zone_cameras,
-    zone_ends,
-    zone_index,
+    zone_camera,
 )
 
 NESTED_DEG = (5.0, 7.0, 10.0, 14.0, 20.0, 40.0)  # horizontal fields of view, narrowest first
@@ -52,6 +51,16 @@ class FieldRule(Rule):
             for streak, level in zip(self._streaks, excitation(reading.membrane_potential), strict=True)
         ]
         return self._gate.update(reading.yaw_rate) and reached[self.field_index(reading.speed)]
+
+    def cameras_in_use(
+        self, speed: np.ndarray, yaw_rate: np.ndarray, potential: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return when the field for the speed is read; see `Agent.cameras_in_use`."""
+        gate = YawRateGate(self.params.yaw_rate, self.params.settle)
+        active = np.array([gate.update(rate) for rate in yaw_rate.tolist()], np.bool_)
+        fields = np.array([self.field_index(value) for value in speed.tolist()])
+        read = active[:, None] & (np.arange(self.num_fields) == fields[:, None])
+        return read_ahead(read, self.params.frames - 1)
 
     def field_index(self, speed: float) -> int:
         """Return the index of the field for an ego speed [m/s]."""
@@ -114,36 +123,38 @@ class DangerZoneParams(RuleParams):
     Attributes:
         level: Excitation threshold, > 0; see `lgmd_gym.agents.rule.excitation`.
         frames: Number of consecutive camera frames at or above the level, >= 1.
-        reaction: Reaction time of the stopping distance, > 0 [s]; determines the zones.
+        deceleration: Deceleration of the stopping distance on a dry road, > 0 [m/s²]; determines the field.
+        reaction: Reaction time of the stopping distance, > 0 [s]; determines the field.
         yaw_rate: Absolute yaw rate above which the rule is inactive, > 0 [rad/s].
         settle: Number of latest camera frames that must be free of such yaw rates, >= 1.
     """
 
     level: float = parameter(4.0, 2.0, 9.0)
     frames: int = parameter(3, 1, 12)
-    reaction: float = parameter(0.4, 0.25, 0.6, affects_camera=True)
-    yaw_rate: float = parameter(0.03, 0.01, 0.3)
-    settle: int = parameter(15, 1, 60)
+    deceleration: float = parameter(DRY_DECELERATION, 6.0, 9.0, affects_camera=True)
+    reaction: float = parameter(REACTION, 0.3, 0.7, affects_camera=True)
+    yaw_rate: float = parameter(0.05, 0.02, 0.3)
+    settle: int = parameter(1, 1, 60)
 
 
 class DangerZone(FieldRule):
-    """Brakes fully on the excitation of the ground field for the ego speed.
+    """Brakes fully on the excitation of one ground field, whose far end is at the stopping distance.
 
-    This is `StoppingZone` without upright fields: the ground field belongs to the zone with the next higher
-    design speed. Shadows and steel plates cause false activations. Condition: see `FieldRule`.
+    This is `StoppingZone` with one zone and without upright and low fields. Shadows, patches and steel plates
+    cause false activations. Condition: see `FieldRule`.
 
     Observes `membrane_potential`, `ego_speed`, `ego_yaw_rate`. Parameters: `DangerZoneParams`.
     """
 
     name = "danger-zone"
     Params = DangerZoneParams
-    num_fields = NUM_ZONES
+    num_fields = 1
 
     @property
     def camera(self) -> list[dict[str, Any]]:
-        """Ground fields in order of design speed."""
-        return zone_cameras(zone_ends(FULL_DECELERATION, self.params.reaction))[:NUM_ZONES]
+        """The ground field."""
+        return [zone_camera("ground", 1.0, self.params.deceleration, self.params.reaction)]
 
     def field_index(self, speed: float) -> int:
-        """Return the index of the zone for the ego speed."""
-        return zone_index(speed)
+        """Return 0, the index of the only field."""
+        return 0

@@ -72,18 +72,6 @@ def read_ahead(read: np.ndarray, frames: int) -> np.ndarray:
     return counts[np.minimum(first + frames + 1, len(read))] > counts[first]
 
 
-def held(condition: np.ndarray, frames: int) -> np.ndarray:
-    """Return whether a condition has held in the last `frames` frames, bool, shape (frames, columns).
-
-    Args:
-        condition: bool, shape (frames, columns).
-        frames: Number of frames, the present one included, >= 1.
-    """
-    counts = np.concatenate([np.zeros((1, condition.shape[1]), np.int64), np.cumsum(condition, axis=0)])
-    last = np.arange(1, len(counts))
-    return counts[last] - counts[np.maximum(last - frames, 0)] == frames
-
-
 class Rule(LatchingAgent):
     """Base class: brakes fully once `should_brake` returns True for a camera frame, and latches.
 

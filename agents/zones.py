@@ -1,26 +1,35 @@
-"""Geometry of the stopping zones: one pair of camera fields for each design speed.
+"""Geometry of the stopping zones: parts of the ego's path, at multiples of the stopping distance.
 
-A zone is the part of the ego lane in front of the point at which the car stops after full braking. Its ground
-field covers the road surface of the zone. Its upright field covers a band at the horizon with the same width.
+The far end of a zone is at its reach, a multiple of the stopping distance at the present speed. Its fields
+are 2.4 m wide there at every speed, see the gaze `"stopping"` of `CameraParams`. A field is a band of rows:
+the ground field covers the road surface in front of the far end, the low field what stands there up to the
+height of the lens, and the upright field the horizon.
 """
 
-from bisect import bisect_left
-from math import atan, degrees
 from typing import Any, TypeVar
 
 import numpy as np
 
-SPEEDS_KMH = (10, 20, 25, 30, 40, 50, 60, 70, 80, 90)  # design speed of each zone
-NUM_ZONES = len(SPEEDS_KMH)
-KMH = 1 / 3.6  # [m/s]
-_SPEEDS = [speed * KMH for speed in SPEEDS_KMH]  # [m/s]
-FULL_DECELERATION = 9.0  # deceleration of full braking [m/s²]
-LENS_HEIGHT, LENS_SETBACK = 1.2, 1.7  # lens above the road and behind the front bumper [m]
-HALF_WIDTH = 1.2  # half the width of a field at the far end of its zone [m]
-# Frame shape (height, width) [px] and pitch of the two kinds of field. The unit of pitch is the angle from
-# the horizon down to the zone's far end. In this unit the ground field spans -1.75 to -1.0 and the upright
-# field -0.15 to 0.35. A car of 1.4 m height at the far end reaches 0.19. A guard rail stays below 0.
-FIELDS = {"ground": ((30, 80), -1.375), "upright": ((20, 80), 0.1)}
+REACHES = (0.28, 0.4, 0.55, 0.75, 1.0, 1.35, 1.8)
+"""Reach of each zone, nearest first."""
+NUM_ZONES = len(REACHES)
+LOW_ZONES = (3, 4, 5)
+"""Zones with a low field."""
+LOW_FIELD = (0, 0, 0, 0, 1, 2, 2)
+"""Index of the low field for each zone: its own, or that of the nearest zone with one."""
+NUM_FIELDS = 2 * NUM_ZONES + len(LOW_ZONES)
+SPAN_M = 2.4  # width of a field at the far end of its zone
+CONTRAST_S = 0.5  # time constant of the contrast control of each field [s]
+DRY_DECELERATION, REACTION = (
+    7.5,
+    0.5,
+)  # of the stopping distance [m/s², s]; see `CameraParams.stop_deceleration`
+# Frame shape (height, width) [px] and elevation of each kind of field. The unit of elevation is the angle
+# from the horizon down to the zone's far end. In this unit a ground field spans -1.43 to -0.98, a low field
+# -0.9 to -0.3 and an upright field -0.15 to 0.35. The top of a car 1.4 m high at the far end is at 0.17.
+FIELDS = {"ground": ((18, 80), -1.2), "upright": ((20, 80), 0.1), "low": ((24, 80), -0.6)}
+FULL_DECELERATION = 9.0  # deceleration of full braking in the laboratory [m/s²]
+LENS_SETBACK = 1.7  # distance of the lens behind the front bumper [m]
 
 Speed = TypeVar("Speed", float, np.ndarray)
 
@@ -30,34 +39,41 @@ def stopping_distance(speed: Speed, deceleration: float, reaction: float) -> Spe
     return speed**2 / (2 * deceleration) + speed * reaction
 
 
-def zone_ends(deceleration: float, reaction: float) -> np.ndarray:
-    """Return the stopping distance for each design speed: the far ends of the zones, shape (10,) [m]."""
-    return stopping_distance(np.array(SPEEDS_KMH) * KMH, deceleration, reaction)
+def zone_cameras(deceleration: float = DRY_DECELERATION, reaction: float = REACTION) -> list[dict[str, Any]]:
+    """Return the cameras of all fields: seven ground fields, seven upright fields, three low fields.
+
+    Args:
+        deceleration: Deceleration of the stopping distance on a dry road [m/s²].
+        reaction: Reaction time of the stopping distance [s].
+    """
+    zones = {"ground": REACHES, "upright": REACHES, "low": [REACHES[zone] for zone in LOW_ZONES]}
+    return [
+        zone_camera(kind, reach, deceleration, reaction)
+        for kind, reaches in zones.items()
+        for reach in reaches
+    ]
 
 
-def zone_index(speed: float) -> int:
-    """Return the index of the zone for a speed [m/s]: the next higher design speed, at most the last."""
-    return min(bisect_left(_SPEEDS, speed), NUM_ZONES - 1)
+def zone_camera(kind: str, reach: float, deceleration: float, reaction: float) -> dict[str, Any]:
+    """Return the camera of one field.
 
-
-def zone_indices(speeds: np.ndarray) -> np.ndarray:
-    """Return the index of the zone for each speed [m/s], see `zone_index`."""
-    return np.minimum(np.searchsorted(_SPEEDS, speeds), NUM_ZONES - 1)
-
-
-def zone_cameras(ends: np.ndarray) -> list[dict[str, Any]]:
-    """Return the cameras for zones with given far ends [m]: ten ground fields, then ten upright fields."""
-    cameras: list[dict[str, Any]] = []
-    for name, (shape, pitch) in FIELDS.items():
-        for speed, end in zip(SPEEDS_KMH, ends, strict=True):
-            depth = float(end) + LENS_SETBACK
-            cameras.append(
-                {
-                    "name": f"{name}{speed}",
-                    "shape": list(shape),
-                    "hfov_deg": round(2 * degrees(atan(HALF_WIDTH / depth)), 4),
-                    "pitch_deg": round(pitch * degrees(atan(LENS_HEIGHT / depth)), 4),
-                    "gaze": "path",
-                }
-            )
-    return cameras
+    Args:
+        kind: A key of `FIELDS`.
+        reach: Reach of the zone.
+        deceleration: Deceleration of the stopping distance on a dry road [m/s²].
+        reaction: Reaction time of the stopping distance [s].
+    """
+    shape, lift = FIELDS[kind]
+    return {
+        "name": f"{kind}{reach:g}",
+        "shape": list(shape),
+        "gaze": "stopping",
+        "reach": reach,
+        "span_m": SPAN_M,
+        "lift": lift,
+        "stop_deceleration": deceleration,
+        "stop_reaction": reaction,
+        "stabilised": True,
+        "calibrated": True,
+        "contrast_s": CONTRAST_S,
+    }

@@ -127,8 +127,6 @@ class FeatureHistory:
     def __init__(self, features: FeatureConfig) -> None:
         self.features = features
         self._required = {source_observation(name) for name in features.inputs}
-        if any(name in ZONE_INPUTS for name in features.inputs):
-            self._required |= {"ego_speed", "ego_yaw_rate"}
         self._required.discard(FRAME)  # `update` does not process frames
         self.reset()
 
@@ -139,7 +137,7 @@ class FeatureHistory:
         self._speed: np.ndarray | None = None
         self._peak: np.ndarray | None = None
         names = [name for name in self.features.inputs if name in ZONE_INPUTS]
-        self._zones = {name: ZoneFeatures(name, PEAK_DECAY) for name in names}
+        self._zones = {name: ZoneFeatures(name) for name in names}
 
     def update(self, observation: dict[str, Any]) -> None:
         """Process an observation of `LGMDObservation`.
@@ -155,8 +153,7 @@ class FeatureHistory:
             frequency = np.asarray(observation["spike_frequency"])
             self._peak = frequency if self._peak is None else np.maximum(frequency, PEAK_DECAY * self._peak)
         for zones in self._zones.values():
-            speed, yaw_rate = (float(observation[name][0]) for name in ("ego_speed", "ego_yaw_rate"))
-            zones.update(observation[zones.source], speed, yaw_rate)
+            zones.update(observation[zones.source])
 
     def stack(self) -> dict[str, np.ndarray]:
         """Append the present features to the history and return the history of each input."""

@@ -1,27 +1,33 @@
-"""The camera fields of `stopping-zone` as parts of a wide frame."""
+"""Narrow camera fields along the path, as parts of a wide frame."""
 
 from collections.abc import Mapping
-from math import cos, radians, sin, tan
+from math import atan, cos, degrees, radians, sin, tan
 from typing import Any
 
 import numpy as np
 
 from lgmd_gym.agents.rule import excitation
-from lgmd_gym.agents.stopping_zone import StoppingZone
+from lgmd_gym.agents.zones import FULL_DECELERATION, LENS_SETBACK, stopping_distance
 from lgmd_gym.neuron import LGMD
 
 MIN_SCALE = 0.3  # pixels of the frame per pixel of a field, below which a field is left out
-KINDS = ("upright", "ground")
+SPEEDS_KMH = (10, 20, 25, 30, 40, 50, 60, 70, 80, 90)
+"""Ego speeds, each of which has an upright and a ground field at the stopping distance."""
+# Excitation threshold, frame shape (height, width) [px] and pitch of each kind of field. The unit of pitch is
+# the angle from the horizon down to the road at the stopping distance.
+KINDS = {"upright": (0.5, (20, 80), 0.1), "ground": (3.0, (30, 80), -1.375)}
+LENS_HEIGHT, SPAN_M, REACTION = 1.2, 2.4, 0.4  # height [m], width at the stopping distance [m], time [s]
 
 
 class Fields:
-    """Upright and ground fields of `StoppingZone`, resampled from frames, with one neuron per field.
+    """Upright and ground fields at the stopping distances of ten speeds, with one neuron per field.
 
     A field is a pinhole camera of its own; its pixels are interpolated in the frame, with several samples per
     pixel if the frame is finer. The frame's optical axis is assumed horizontal and straight ahead, so that
     the horizon is at half height. Fields that the frame does not cover, or whose pixels are smaller than 0.3
     pixels of the frame, are left out: of 432×240 px over 90°, upright fields for 10 to 50 km/h and ground
-    fields for 20 to 50 km/h remain. `policy:zones` reads the same fields.
+    fields for 20 to 50 km/h remain. The fields of `stopping-zone` are similar, but follow the speed and have
+    contrast control; the speed of real clips is unknown.
 
     Args:
         shape: (height, width) of the frames [px].
@@ -33,16 +39,14 @@ class Fields:
     """
 
     def __init__(self, shape: tuple[int, int], fps: float, hfov_deg: float) -> None:
-        rule = StoppingZone()
-        self._thresholds = {"upright": rule.params.upright, "ground": rule.params.ground}
         self._samples: dict[str, list[np.ndarray]] = {kind: [] for kind in KINDS}
         self.names: dict[str, list[str]] = {kind: [] for kind in KINDS}
-        for camera in rule.camera:
-            kind = next(kind for kind in KINDS if camera["name"].startswith(kind))
-            samples = field_samples(camera, shape, hfov_deg)
-            if samples is not None:
-                self._samples[kind].append(samples)
-                self.names[kind].append(camera["name"])
+        for kind in KINDS:
+            for camera in field_cameras(kind):
+                samples = field_samples(camera, shape, hfov_deg)
+                if samples is not None:
+                    self._samples[kind].append(samples)
+                    self.names[kind].append(camera["name"])
         self._neurons = {
             kind: [LGMD(samples.shape[3:], fps) for samples in items] for kind, items in self._samples.items()
         }
@@ -57,7 +61,19 @@ class Fields:
         potential = [neuron.step(resample(frame, samples)).membrane_potential for samples, neuron in pairs]
         if not potential:
             return float("nan")
-        return float(np.mean(excitation(np.array(potential)) >= self._thresholds[kind]))
+        return float(np.mean(excitation(np.array(potential)) >= KINDS[kind][0]))
+
+
+def field_cameras(kind: str) -> list[dict[str, Any]]:
+    """Return the cameras of the fields of a kind, a key of `KINDS`, in order of speed."""
+    _, shape, pitch = KINDS[kind]
+    cameras = []
+    for speed_kmh in SPEEDS_KMH:
+        depth = stopping_distance(speed_kmh / 3.6, FULL_DECELERATION, REACTION) + LENS_SETBACK
+        hfov_deg, down_deg = 2 * degrees(atan(SPAN_M / 2 / depth)), degrees(atan(LENS_HEIGHT / depth))
+        angles = {"hfov_deg": round(hfov_deg, 4), "pitch_deg": round(pitch * down_deg, 4)}
+        cameras.append({"name": f"{kind}{speed_kmh}", "shape": list(shape), **angles})
+    return cameras
 
 
 def field_samples(camera: Mapping[str, Any], shape: tuple[int, int], hfov_deg: float) -> np.ndarray | None:

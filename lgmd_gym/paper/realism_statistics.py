@@ -53,7 +53,7 @@ def drive_statistics(frames: Iterable[np.ndarray], fps: float, optics: Optics) -
     are over all pixels of all frames; RMS contrast (standard deviation of the grey) and absolute difference
     of successive frames are means over the frames. The slope is that of log power over log frequency, see
     `spectrum_slope`. F̂ is that of `LGMD` with default parameters on the whole frame. A field is excited if
-    its excitation reaches the threshold of `StoppingZone`; the share is a mean over the fields, see `Fields`.
+    its excitation reaches the threshold of its kind; the share is a mean over the fields, see `Fields`.
     The first eight frames of F̂ and excitation are left out. All statistics but the excitation of fields are
     those of the frame without its ignored bottom.
 

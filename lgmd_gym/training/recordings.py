@@ -21,7 +21,7 @@ from lgmd_gym.training.offline.traffic import TrafficRecorder
 
 FILE_SIZE = 100  # largest number of seeds in one file
 TRAFFIC_RATIO = 4  # training episodes in traffic per validation episode in traffic
-FORMAT = 4  # of the files; recordings of another format are rejected
+FORMAT = 5  # of the files; recordings of another format are rejected
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,12 @@
-"""Inputs of policies: scaling, history, and the fields of `stopping-zone` relative to the ego speed."""
+"""Inputs of policies: scaling, history, and the fields of `stopping-zone`."""
 
 import numpy as np
 import pytest
-from support.agents import to_potential
+from support.agents import to_potential, zone_levels
 
 from lgmd_gym.agents.policies.features import CLIP, PEAK_DECAY, FeatureConfig, FeatureHistory, shrink_frame
-from lgmd_gym.agents.policies.zone_features import ZONE_INPUTS
-from lgmd_gym.agents.zones import FIELDS, NUM_ZONES, SPEEDS_KMH
-
-ZEROS = ([0.0] * 6, [0.0] * 5)
+from lgmd_gym.agents.policies.zone_features import NUM_ZONE_FEATURES, TIME_CONSTANTS_S, ZONE_INPUTS
+from lgmd_gym.agents.zones import NUM_FIELDS, NUM_ZONES, REACHES
 
 
 def observe(frequency, speed=10.0):
@@ -46,94 +44,54 @@ def test_peaks_decay_per_observation_and_speed_changes_span_a_decision():
     assert changes == pytest.approx([0.0, -0.5, -0.9], abs=1e-6)
 
 
-def observe_zones(fields, speed=10.0, yaw_rate=0.0):
-    """Return an observation of the cameras of `stopping-zone`.
-
-    `fields` maps (design speed [km/h], kind of field) to an excitation.
-    """
-    excitation = np.zeros(2 * NUM_ZONES)
-    for (zone, kind), value in fields.items():
-        excitation[SPEEDS_KMH.index(zone) + NUM_ZONES * list(FIELDS).index(kind)] = value
-    return {
-        "membrane_potential": to_potential(excitation),
-        "spike_frequency": 10.0 * excitation,
-        "ffi": excitation,
-        "ego_speed": np.array([speed], np.float32),
-        "ego_yaw_rate": np.array([yaw_rate], np.float32),
-    }
-
-
-# Fields at 10 m/s (36 km/h), with the feature that each one is expected in.
-ZONE_FIELDS = {
-    (40, "ground"): 3.0,  # zone for the speed
-    (40, "upright"): 1.5,
-    (50, "ground"): 6.0,  # next farther zone
-    (30, "upright"): 9.0,  # nearer zone with an inactive ground field: does not count
-    (25, "ground"): 0.9,  # nearer zone: the smaller value counts
-    (25, "upright"): 1.2,
-    (10, "ground"): 9.0,  # zone for less than half the speed: does not count
-    (10, "upright"): 9.0,
-}
-
-
-def zone_features(history, *observations, name="zones"):
-    """Return the confirmed values (the last one twice: two and four frames) and the peaks, before tanh."""
-    scale = ZONE_INPUTS[name][1]
-    features = scale * np.arctanh(stack(history, *observations)[name].astype(np.float64))
-    return features[:6].round(2).tolist(), features[6:].round(2).tolist()
+def observe_zones(levels):
+    """Return an observation of the cameras of `stopping-zone` for excitations, shape (17,)."""
+    return {"membrane_potential": to_potential(levels), "spike_frequency": 20.0 * levels, "ffi": levels}
 
 
 def zone_history(name="zones"):
     return FeatureHistory(FeatureConfig(inputs=(name,), history=1))
 
 
+def zone_features(history, *levels, name="zones"):
+    """Return the features after frames with these excitations: levels, then averages, (4, fields)."""
+    features = stack(history, *(observe_zones(level) for level in levels))[name]
+    assert features.shape == (NUM_ZONE_FEATURES,)
+    return features.reshape(-1, NUM_FIELDS)
+
+
 @pytest.mark.parametrize("name", ZONE_INPUTS)
-def test_zone_features_are_ordered_by_the_ego_speed(name):
-    factor = 10.0 if name == "zones_spikes" else 1.0
-    selected = np.array([3.0, 1.5, 6.0, 0.0, 0.9]) * factor
-    confirmed, peak = zone_features(zone_history(name), observe_zones(ZONE_FIELDS), name=name)
-    assert confirmed == pytest.approx([*selected, selected[-1]], abs=0.01)  # the first frame is confirmed
-    assert peak == pytest.approx(selected.tolist(), abs=0.01)
+def test_zone_features_are_the_logarithm_of_the_signal(name):
+    """Each input has the same scale here: 20 spikes/s count as an excitation or an F̂ of 1."""
+    levels = zone_levels(ground=7.0, upright=1.0, low={1.35: 3.0})
+    first = zone_features(zone_history(name), levels, name=name)[0]
+    assert first == pytest.approx(np.log1p(2.0 * levels) / 3.4, abs=1e-6)
+    assert first.max() == pytest.approx(np.log(15.0) / 3.4, abs=1e-6)
 
 
-def test_above_the_last_design_speed_the_last_zone_is_also_the_farther_one():
-    confirmed, _ = zone_features(zone_history(), observe_zones({(90, "ground"): 3.0}, speed=40.0))
-    assert confirmed[:4] == pytest.approx([3.0, 0.0, 3.0, 0.0], abs=0.01)
+def test_zone_features_take_the_smaller_level_of_two_frames():
+    history, low, high = zone_history(), zone_levels(ground=1.0), zone_levels(ground=5.0)
+    zone = REACHES.index(1.0)
+    single = np.log1p(2.0 * 1.0) / 3.4
+    assert zone_features(history, low)[0, zone] == pytest.approx(single, abs=1e-6)
+    assert zone_features(history, high, low)[0, zone] == pytest.approx(single, abs=1e-6)
+    assert zone_features(history, high)[0, zone] == pytest.approx(single, abs=1e-6)
+    assert zone_features(history, high, high)[0, zone] == pytest.approx(np.log1p(10.0) / 3.4, abs=1e-6)
 
 
-def test_zone_features_are_confirmed_by_consecutive_frames():
-    history = zone_history()
-    empty, ground = observe_zones({}), observe_zones({(40, "ground"): 3.0})
-    near = observe_zones({(30, "ground"): 2.0, (30, "upright"): 4.0})
-    assert zone_features(history, empty) == ZEROS
-    confirmed, peak = zone_features(history, ground, empty, empty)  # one frame gives only a peak
-    assert confirmed == [0.0] * 6
-    assert peak[0] == pytest.approx(3.0 * PEAK_DECAY**2, abs=0.01)
-    confirmed, _ = zone_features(history, ground, ground, empty)  # two earlier frames confirm
-    assert confirmed == pytest.approx([3.0, 0, 0, 0, 0, 0], abs=0.01)
-    assert zone_features(history, empty)[0] == [0.0] * 6  # cleared by the last decision
-    assert zone_features(history, near, near, near)[0] == pytest.approx([0, 0, 0, 0, 2.0, 0], abs=0.01)
-    assert zone_features(history, near)[0] == pytest.approx([0, 0, 0, 0, 2.0, 2.0], abs=0.01)
-
-
-def test_zone_features_are_zero_during_and_after_turns():
-    history, fields = zone_history(), {(40, "ground"): 3.0}
-    assert zone_features(history, observe_zones(fields, yaw_rate=0.02))[1][0] == pytest.approx(3.0, abs=0.01)
-    assert zone_features(history, observe_zones(fields, yaw_rate=-0.04)) == ZEROS
-    assert zone_features(history, *[observe_zones(fields)] * 14) == ZEROS  # half a second
-    assert zone_features(history, *[observe_zones(fields)] * 2)[0][0] == pytest.approx(3.0, abs=0.01)
-
-
-def test_zone_features_are_zero_at_a_crawl():
-    history, fields = zone_history(), {(10, "ground"): 3.0, (10, "upright"): 3.0}
-    assert zone_features(history, *[observe_zones(fields, speed=2.4)] * 3) == ZEROS
-    active = zone_features(history, *[observe_zones(fields, speed=2.6)] * 2)
-    assert active[0][0] == pytest.approx(3.0, abs=0.01)
+def test_averages_approach_the_level_with_their_time_constants():
+    """The gain of each frame is dt / (dt + τ)."""
+    history, levels, zone = zone_history(), zone_levels(upright=4.0), NUM_ZONES + REACHES.index(1.0)
+    averages = zone_features(history, *[levels] * 12)[1:, zone] / (np.log1p(8.0) / 3.4)
+    expected = [1.0 - (1.0 - 1.0 / (1.0 + 30.0 * tau)) ** 12 for tau in TIME_CONSTANTS_S]
+    assert averages == pytest.approx(expected, abs=1e-6)
+    history.reset()
+    assert np.all(zone_features(history, np.zeros(NUM_FIELDS)) == 0.0)
 
 
 def test_missing_or_other_observations_are_rejected():
     two_cameras = observe(1.0) | {"membrane_potential": np.array([0.5, 0.6]), "ego_yaw_rate": np.zeros(1)}
-    with pytest.raises(ValueError, match="requires the 20 cameras of stopping-zone, got 2; train with"):
+    with pytest.raises(ValueError, match="requires the 17 cameras of stopping-zone, got 2; train with"):
         zone_history().update(two_cameras)
     with pytest.raises(ValueError, match="requires the observation 'ffi', got"):
         FeatureHistory(FeatureConfig(inputs=("ffi",))).update(observe(1.0))

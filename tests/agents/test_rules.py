@@ -108,7 +108,7 @@ def test_the_cameras_of_an_agent_are_used_unless_the_user_names_others():
     agent = make_agent("stopping-zone")
     own = SensorConfig().for_agent(agent)
     assert own.camera == agent.camera
-    assert own.label.startswith("ground10+ground20+")
+    assert own.label.startswith("ground0.28+ground0.4+")
     assert SensorConfig("tele").for_agent(agent).camera == "tele"
     assert SensorConfig().for_agent(make_agent("no-brake")).camera == "fovea"
     assert SensorConfig().for_agent(make_agent("frame-difference")).include_frame

@@ -9,8 +9,8 @@ import pytest
 from support.traffic import Recorded
 
 from lgmd_gym.agents import BRAKE, HOLD, Agent, make_agent, to_action
+from lgmd_gym.agents.field_rules import FieldRule
 from lgmd_gym.agents.rule import excitation
-from lgmd_gym.agents.stopping_zone import StoppingZone
 from lgmd_gym.benchmark.episode import Step, rollout
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.batch import IN_LABORATORY, Drive, TrafficTask, run_traffic_task
@@ -189,7 +189,7 @@ def motion(recording):
 
 @pytest.mark.parametrize(("kind", "seed"), [("two-way", 1), ("intersection", 1)])
 def test_readings_of_warmed_up_neurons_equal_those_with_all_cameras(kind, seed):
-    agent, config = make_agent("stopping-zone"), {"duration": 14}
+    agent, config = make_agent("nested-fields"), {"duration": 14}
     recording, schedule, steps = scheduled_steps(kind, seed, agent, config)
     every = Recorded(kind, seed, SENSORS.for_agent(agent), config).steps
     expected, found = excitation(potentials(every)), excitation(potentials(steps))
@@ -216,9 +216,9 @@ def test_rows_of_a_batch_equal_those_of_single_drives():
 @pytest.mark.parametrize("kind", ["wall", *(pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS)])
 def test_cameras_that_are_not_read_do_not_change_the_row(monkeypatch, wall_kinds, kind):
     """The rule brakes for the stationary car of "wall"."""
-    task = TrafficTask((Drive(kind, 0, ("stopping-zone",)),), SENSORS)
+    task = TrafficTask((Drive(kind, 0, ("nested-fields",)),), SENSORS)
     (scheduled,) = run_traffic_task(task)
-    monkeypatch.setattr(StoppingZone, "cameras_in_use", lambda *arguments: None)
+    monkeypatch.setattr(FieldRule, "cameras_in_use", lambda *arguments: None)
     assert run_traffic_task(task) == [scheduled]
     assert scheduled["brakes"] > 0 or kind != "wall"
 

@@ -6,9 +6,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from lgmd_gym.agents.stopping_zone import StoppingZone
 from lgmd_gym.paper.realism_drives import Optics
-from lgmd_gym.paper.realism_fields import Fields, field_samples, resample
+from lgmd_gym.paper.realism_fields import Fields, field_cameras, field_samples, resample
 from lgmd_gym.paper.realism_statistics import STATISTICS, drive_statistics, spectrum_slope
 
 OPTICS = Optics((60, 100), 30, 90.0)
@@ -117,7 +116,7 @@ def test_pixels_of_a_field_by_hand():
 
 def test_fields_equal_frames_of_their_cameras():
     """A field resampled from a fine wide frame shows what a camera of that field shows."""
-    cameras = [item for item in StoppingZone().camera if item["name"] in ("upright20", "ground20")]
+    cameras = [field_cameras(kind)[1] for kind in ("upright", "ground")]  # at 20 km/h
     wide = {"name": "clip", "shape": [480, 864], "hfov_deg": 90.0}
     env = gym.make("LGMD/CCRs-v0", camera=[wide, *cameras], ego_speed=8.0, world="laboratory")
     env.reset(seed=0)

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgmd_gym.agents.rule import SensorReading
-from lgmd_gym.agents.zones import NUM_ZONES, zone_index
+from lgmd_gym.agents.zones import LOW_ZONES, NUM_FIELDS, NUM_ZONES, REACHES
 
 
 class TraceFrame(NamedTuple):
@@ -54,17 +54,23 @@ def frequency_reading(frequency, speed=8.0, yaw_rate=0.0):
     return SensorReading(np.array([frequency]), np.full(1, 0.5), speed, yaw_rate)
 
 
-def zone_reading(speed=13.0, yaw_rate=0.0, ground=None, upright=None):
-    """Return the reading of the cameras of `stopping-zone`.
+def zone_levels(ground=None, upright=None, low=None):
+    """Return excitations of the fields of `stopping-zone`, shape (17,).
 
-    `ground` and `upright` are excitations of the zone for `speed`, or dicts of excitations by zone index.
+    Each argument is the excitation at a reach of 1, or a dict of excitations by reach.
     """
-    excitation = np.zeros(2 * NUM_ZONES)
-    for offset, value in ((0, ground), (NUM_ZONES, upright)):
-        values = {zone_index(speed): value} if np.isscalar(value) else value or {}
-        for zone, level in values.items():
-            excitation[offset + zone] = level
-    return SensorReading(np.zeros(2 * NUM_ZONES), to_potential(excitation), speed, yaw_rate)
+    levels = np.zeros(NUM_FIELDS)
+    low_reaches = [REACHES[zone] for zone in LOW_ZONES]
+    groups = ((0, REACHES, ground), (NUM_ZONES, REACHES, upright), (2 * NUM_ZONES, low_reaches, low))
+    for offset, reaches, value in groups:
+        for reach, level in ({1.0: value} if np.isscalar(value) else value or {}).items():
+            levels[offset + list(reaches).index(reach)] = level
+    return levels
+
+
+def zone_reading(speed=13.0, yaw_rate=0.0, **levels):
+    """Return the reading of the cameras of `stopping-zone`; `levels` are those of `zone_levels`."""
+    return SensorReading(np.zeros(NUM_FIELDS), to_potential(zone_levels(**levels)), speed, yaw_rate)
 
 
 def any_brake(rule, readings):

@@ -36,7 +36,7 @@ def test_the_value_is_avoided_energy_minus_the_cost_of_false_activations():
         ("frame-difference", 6, 0),
         pytest.param("spike-threshold:threshold=150,frames=3", 12, 0, marks=pytest.mark.slow),
         pytest.param("frame-difference", 12, 0, marks=pytest.mark.slow),
-        pytest.param("stopping-zone", 20, 1, marks=pytest.mark.slow),
+        pytest.param("stopping-zone", 17, 1, marks=pytest.mark.slow),
     ],
 )
 def test_replay_on_recordings_equals_closed_loop(agent, levels, seeds):
