@@ -44,7 +44,8 @@ class FeatureConfig:
         inputs: Observation keys and inputs derived from them: `speed_change`, the change since the last
             decision; `spike_peak`, the decaying peak of the spike frequency; and, with the cameras of
             `stopping-zone`, `zones`, `zones_spikes` and `zones_ffi` (see `ZoneFeatures`).
-        history: Number of decisions in the history, including the present one, >= 1.
+        history: Number of decisions in the history, including the present one, >= 1; `zones` and its variants
+            contain averages over time and have no history.
         repeat: Number of environment decisions per decision of the policy, >= 1. At 30 Hz, 3 gives 10 Hz.
         shrink: Side of the pixel blocks that frames are averaged over, >= 1 [px].
         latch: Whether the first demand of -0.5 or less is held until the episode ends.
@@ -105,8 +106,12 @@ class FeatureConfig:
             if name in ZONE_INPUTS:
                 check_zone_shape(name, shape)
                 size = NUM_ZONE_FEATURES
-            boxes[name] = (-CLIP, CLIP, (self.history * size,), np.float32)
+            boxes[name] = (-CLIP, CLIP, (self.history_of(name) * size,), np.float32)
         return boxes
+
+    def history_of(self, name: str) -> int:
+        """Return the number of decisions in the history of an input."""
+        return 1 if name in ZONE_INPUTS else self.history
 
 
 def source_observation(name: str) -> str:
@@ -160,7 +165,8 @@ class FeatureHistory:
         stacked = {}
         for name in self.features.inputs:
             value = self._feature(name)
-            filled = deque([value] * self.features.history, self.features.history)
+            length = self.features.history_of(name)
+            filled = deque([value] * length, length)
             history = self._history.setdefault(name, filled)
             history.append(value)
             stacked[name] = np.concatenate(history, axis=-1)

@@ -69,6 +69,15 @@ def test_zone_features_are_the_logarithm_of_the_signal(name):
     assert first.max() == pytest.approx(np.log(15.0) / 3.4, abs=1e-6)
 
 
+def test_zone_features_have_no_history():
+    features = FeatureConfig(inputs=("zones", "ego_speed"), history=3)
+    history, observation = FeatureHistory(features), observe_zones(zone_levels()) | observe(0.0)
+    stacked = stack(history, observation)
+    sizes = features.box_arguments({name: value.shape for name, value in observation.items()})
+    for name, size in (("zones", NUM_ZONE_FEATURES), ("ego_speed", 3)):
+        assert stacked[name].shape == sizes[name][2] == (size,)
+
+
 def test_zone_features_take_the_smaller_level_of_two_frames():
     history, low, high = zone_history(), zone_levels(ground=1.0), zone_levels(ground=5.0)
     zone = REACHES.index(1.0)

@@ -65,7 +65,7 @@ def test_policy_does_not_react_to_own_acceleration(acceleration):
     times = np.arange(0.0, 8.0, 1 / 30)
     for speed in (0.0 if acceleration > 0 else 24.0) + acceleration * times:
         observation = {
-            "membrane_potential": np.full(20, 0.55, np.float32),
+            "membrane_potential": np.full(17, 0.55, np.float32),
             "ego_speed": np.array([speed], np.float32),
             "ego_yaw_rate": np.zeros(1, np.float32),
         }

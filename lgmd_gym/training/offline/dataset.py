@@ -88,7 +88,7 @@ class OfflineDataset:
 
     def _with_history(self, name: str, columns: np.ndarray, starts: np.ndarray) -> torch.Tensor:
         """Return an input with its history, oldest first; the first decision fills missing ones."""
-        lags = range(self._features.history - 1, -1, -1)
+        lags = range(self._features.history_of(name) - 1, -1, -1)
         parts = [self._inputs[name][starts + np.maximum(columns - lag, 0)] for lag in lags]
         joined = np.concatenate(parts, axis=-1)
         return torch.from_numpy(np.moveaxis(joined, -1, 1).copy() if name == FRAME else joined)
