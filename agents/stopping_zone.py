@@ -28,8 +28,7 @@ class StoppingZoneParams(RuleParams):
     Attributes:
         deceleration: Deceleration of the stopping distance on a dry road, > 0 [m/s²]; determines the zones.
         reaction: Time from the demand to full braking, > 0 [s]; determines the zones.
-        reach: Greatest reach of the zones that brake, > 0. Zones at greater distances are read as well, but do
-            not brake.
+        reach: Greatest reach of the zones that brake, > 0.
         ground: Excitation threshold of ground fields, > 0.
         upright: Excitation threshold of upright fields, > 0.
         low: Excitation threshold of low fields, > 0.
@@ -63,10 +62,10 @@ class StoppingZone(Rule):
     upright and low field of a zone. The fields are parts of a stabilised, calibrated camera with contrast
     control, and follow the ego's path. An empty road does not excite the ground fields.
 
-    Condition: in one of the zones up to `reach`, G ≥ `ground` in `frames` consecutive frames, while U ≥ `upright` in
-    `upright_frames` and L ≥ `low` in `low_frames` consecutive frames that ended within the last `memory`
-    frames; at a speed above `crawl` and a yaw rate of at most `yaw_rate`. Flat marks and shadows excite
-    ground fields alone.
+    Condition: in one of the zones up to `reach`, G ≥ `ground` in `frames` consecutive frames, while U ≥
+    `upright` in `upright_frames` and L ≥ `low` in `low_frames` consecutive frames that ended within the last
+    `memory` frames; at a speed above `crawl` and a yaw rate of at most `yaw_rate`. Flat marks and shadows
+    excite ground fields alone.
 
     The stopping distance is that of `deceleration` on a dry road and of two thirds of it on a wet one: the
     sensor knows that the road is wet, as a car with a rain sensor does.

@@ -6,6 +6,7 @@ from support.agents import NeuronResponse, TraceFrame
 
 from lgmd_gym.agents import AGENTS, make_agent
 from lgmd_gym.agents.policies import batch as policy_batch
+from lgmd_gym.agents.zones import LOW_ZONES, NUM_ZONES
 
 BATCH_AGENTS = [name for name in AGENTS if make_agent(name).batch(1) is not None]
 OPTIONS = {"graded": ":fall=0.5", "random-brake": ":rate=1", "nested-fields": ":level=1,frames=2"}
@@ -25,12 +26,24 @@ def random_step(rng, agent):
         "membrane_potential": potential.astype(np.float32),
         "ffi": rng.uniform(0.0, 9.0, (NUM_ENVS, cameras)).astype(np.float32),
         "ego_speed": speeds[:, None].astype(np.float32),
-        "ego_yaw_rate": (turning * 0.05).astype(np.float32),
+        "ego_yaw_rate": (turning * 0.1).astype(np.float32),
     }
     infos = {
         "lgmd/alert": (frequency >= 30.0).any(axis=1),
         "lgmd/trace": (TraceFrame(NeuronResponse(frequency, potential), speeds),),
     }
+    return observations, infos
+
+
+def approach_step(rng, step):
+    """Return a random step in which the fields of `stopping-zone` are excited one after the other."""
+    observations, infos = random_step(rng, make_agent("stopping-zone"))
+    phase = 8.0 * ((step + 13 * np.arange(NUM_ENVS)) % 70)[:, None] / 70
+    zones = np.array([*range(NUM_ZONES), *range(NUM_ZONES), *LOW_ZONES])
+    entered = phase > NUM_ZONES - 1 - zones
+    level = entered * np.repeat([8.0, 4.0, 6.0], (NUM_ZONES, NUM_ZONES, len(LOW_ZONES)))
+    noise = rng.exponential(0.1, level.shape)
+    observations["membrane_potential"] = (1.0 / (1.0 + np.exp(-level - noise))).astype(np.float32)
     return observations, infos
 
 
@@ -45,7 +58,7 @@ def single_step(observations, infos, index, trace):
     return observation, info
 
 
-def check_batch(name, steps, trace=True):
+def check_batch(name, steps, trace=True, draw=None):
     """Compare a batch with single agents, and return the demands, shape (steps, environments)."""
     rng = np.random.default_rng(5)
     agents = [make_agent(name) for _ in range(NUM_ENVS)]
@@ -55,7 +68,7 @@ def check_batch(name, steps, trace=True):
         batch.reset(index, index)
     active, demands = np.ones(NUM_ENVS, np.bool_), []
     for step in range(steps):
-        observations, infos = random_step(rng, agents[0])
+        observations, infos = draw(rng, step) if draw else random_step(rng, agents[0])
         given = infos if trace else {"lgmd/alert": infos["lgmd/alert"]}
         actions = batch.act_batch(observations, given, active)
         assert (actions.shape, actions.dtype) == ((NUM_ENVS, 1), np.float32)
@@ -90,7 +103,7 @@ def test_batch_equals_single_agents_on_random_sequences(name, trace):
 def test_batch_of_a_policy_equals_single_policies(monkeypatch, lead):
     pytest.importorskip("stable_baselines3")
     monkeypatch.setattr(policy_batch, "SAFE_LEAD", lead)
-    demands = check_batch("policy:zones", 120)
+    demands = check_batch("policy:zones", 120, draw=approach_step)
     assert 0.02 < np.mean(demands < 0.0) < 0.999
 
 
