@@ -237,7 +237,7 @@ def test_tasks_of_a_failing_batch_run_one_by_one(monkeypatch):
 def test_cameras_that_an_agent_does_not_support_give_error_rows():
     tasks = make_tasks("stopping-zone", CASES[:1], sensors=SensorConfig("fovea"))
     for result in play_batches(tasks):
-        assert "requires its own 20 cameras, got 1" in result.row["error"]
+        assert "requires its own 17 cameras, got 1" in result.row["error"]
 
 
 def test_top_views_are_rendered():

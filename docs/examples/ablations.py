@@ -1,0 +1,127 @@
+"""Ablations of a sensor: scores of an agent with one property of its cameras removed at a time.
+
+    python docs/examples/ablations.py stopping-zone --worlds 20 --jobs 2 --to docs/ablations.png
+
+Each arm plays the suites r152 (contacts avoided without premature braking) and false-reaction (false
+activations) in test worlds, in the condition and with the brake of each world. In r152 every case is played
+once in every world, in false-reaction in `--seeds` of them. Thresholds and weights of the agent are those of
+the complete sensor. The table has 95 % intervals that cluster by case and world, and is in Markdown.
+"""
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.analysis.tables import rate_text
+from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.statistics import Rate
+from lgmd_gym.benchmark.suites import find_suite
+from lgmd_gym.benchmark.summary import rate_of
+from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
+from lgmd_gym.camera.worlds import SPLIT_WORLDS
+from lgmd_gym.envs.appearance import MIXED
+from lgmd_gym.plotting.style import COLOURS, saved_figure
+
+NO_VIEW = SensorConfig({"name": "wide", "shape": [8, 8]})  # no-brake needs no useful image
+SUITES = {"r152": "avoided", "false-reaction": "false_activation"}
+TITLES = {"r152": "r152: contacts avoided [%]", "false-reaction": "false-reaction: false activations [%]"}
+
+Camera = Mapping[str, Any]
+
+
+def halved(camera: Camera) -> dict[str, Any]:
+    """Return a camera with half of the rows and columns over the same field of view."""
+    return {**camera, "shape": [side // 2 for side in camera["shape"]]}
+
+
+def without(**fields: Any) -> Callable[[Camera], dict[str, Any]]:
+    """Return a change of a camera that replaces fields."""
+    return lambda camera: {**camera, **fields}
+
+
+ARMS: dict[str, Callable[[Camera], dict[str, Any]]] = {
+    "complete sensor": dict,
+    "no stabilisation": without(stabilised=False),
+    "no calibration": without(calibrated=False),
+    "no contrast control": without(contrast_s=0.0),
+    "half the pixels per row and column": halved,
+}
+
+
+def play(agent: str, arm: str, suite: str, worlds: range, seeds: int, jobs: int, every: int) -> list[Row]:
+    """Return the rows of an arm in a suite."""
+    own = SensorConfig().for_agent(make_agent(agent))
+    cameras: Any = own.camera
+    if not isinstance(cameras, list):
+        raise ValueError(f"agent {agent!r} has no cameras of its own; use for example stopping-zone")
+    changed = SensorConfig([ARMS[arm](camera) for camera in cameras], own.params)
+    schedule = RunConfig(suite=suite, seeds=seeds, worlds=len(worlds), first_world=worlds.start)
+    cases = find_suite(suite).cases[::every]
+
+    def row(index: int, seed: int) -> Row:
+        world = schedule.world(seed, index)
+        assert world is not None
+        place: dict[str, Any] = {"condition": MIXED, "world": world}
+        truth = run_task(Task(NO_BRAKE, cases[index], seed, NO_VIEW, **place)).counterfactual
+        return run_task(Task(agent, cases[index], seed, changed, truth, **place)).row
+
+    order = [(index, seed) for index in range(len(cases)) for seed in range(seeds)]
+    rows: Any = Parallel(n_jobs=jobs)(delayed(row)(*each) for each in order)
+    failed = next((row["error"] for row in rows if row["error"]), None)
+    if failed:
+        raise RuntimeError(failed)
+    return rows
+
+
+def draw(file: Path, agent: str, rates: Mapping[str, Mapping[str, Rate]]) -> None:
+    """Draw the rates of all arms with their intervals, one panel per suite."""
+    with saved_figure(file, 1, len(SUITES), sharey=True, figsize=(9.0, 2.4)) as (figure, panels):
+        for axes, suite in zip(panels, SUITES, strict=True):
+            values = [rates[arm][suite] for arm in rates]
+            shares = np.array([100.0 * rate.k / rate.n for rate in values])
+            limits = 100.0 * np.array([(rate.low, rate.high) for rate in values]).T
+            places = np.arange(len(values))[::-1]
+            axes.barh(places, shares, color=COLOURS[2], height=0.6)
+            errors = np.abs(limits - shares)
+            axes.errorbar(shares, places, xerr=errors, fmt="none", ecolor=COLOURS[0], capsize=2)
+            axes.set_yticks(places, list(rates))
+            axes.set(xlim=(0, 100), title=TITLES[suite])
+            axes.grid(axis="y", visible=False)
+        figure.suptitle(f"{agent}: one property of the sensor removed at a time")
+
+
+def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, Rate]]:
+    """Print the table, draw the figure, and return the rates by arm and suite."""
+    parser = argparse.ArgumentParser(description="Ablations of a sensor")
+    parser.add_argument("agent", nargs="?", default="stopping-zone")
+    parser.add_argument("--arms", nargs="+", choices=ARMS, default=list(ARMS))
+    parser.add_argument("--worlds", type=int, default=20)
+    parser.add_argument("--seeds", type=int, default=3, help="runs of each case of false-reaction")
+    parser.add_argument("--every", type=int, default=1, help="every n-th case of each suite only")
+    parser.add_argument("--jobs", type=int, default=1, help="number of processes")
+    parser.add_argument("--to", type=Path, help="picture to write")
+    chosen = parser.parse_args(arguments)
+    first = SPLIT_WORLDS["test"].start
+    worlds, rates = range(first, first + chosen.worlds), {}
+    print(f"| {chosen.agent} | {' | '.join(TITLES.values())} |\n|---|---|---|")
+    for arm in chosen.arms:
+        rates[arm] = {}
+        for suite, key in SUITES.items():
+            seeds = chosen.worlds if suite == "r152" else min(chosen.seeds, chosen.worlds)
+            rows = play(chosen.agent, arm, suite, worlds, seeds, chosen.jobs, chosen.every)
+            rates[arm][suite] = rate_of(rows, key)
+        print(f"| {arm} | {' | '.join(map(rate_text, rates[arm].values()))} |", flush=True)
+    if chosen.to:
+        draw(chosen.to, chosen.agent, rates)
+    return rates
+
+
+if __name__ == "__main__":
+    main()
