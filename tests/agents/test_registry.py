@@ -34,7 +34,7 @@ def test_options_from_a_file_are_overridden_by_the_string(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text("ground = 2.5\nframes = 4\n")
     agent = make_agent(f"stopping-zone:toml={file},frames=5")
-    assert (agent.params.ground, agent.params.frames, agent.params.upright) == (2.5, 5, 0.5)
+    assert (agent.params.ground, agent.params.frames, agent.params.upright) == (2.5, 5, 0.6)
     for text, message in (("grund = 2.5\n", "did you mean 'ground'"), ("ground =\n", "is not TOML")):
         file.write_text(text)
         with pytest.raises(ValueError, match=message):

@@ -66,7 +66,8 @@ class ReferenceEpisode:
         total = weights["progress"] * dt * min((speed + ego.speed) / (2.0 * scripted), 1.0)
         total -= weights["jerk"] * abs(ego.acceleration - acceleration) / full
         if self.contact is not None:
-            return total - weights["contact"] - weights["impact"] * (self.contact[1] / scripted) ** 2
+            severity = min(self.contact[1] / scripted, 1.0)
+            return total - weights["contact"] - weights["impact"] * severity**2
         if ego.braking > 0.0 and self.env.ttc >= weights["need_ttc"]:
             total -= weights["brake"] * dt * ego.braking / full
         return total

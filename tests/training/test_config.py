@@ -67,7 +67,7 @@ def test_cameras_are_presets_or_those_of_an_agent():
     assert TrainConfig.from_hyperparams("sac", camera="wide").camera == "wide"
     assert list(TrainConfig.from_hyperparams("sac").camera) == ["fovea", "tele", "wide"]
     camera = TrainConfig.from_hyperparams("sac", sensors_of="stopping-zone").camera
-    assert camera[0]["name"] == "ground10"
+    assert camera[0]["name"] == "ground0.28"
     with pytest.raises(ValueError, match="agent 'spike-threshold' has no cameras of its own"):
         TrainConfig.from_hyperparams("sac", sensors_of="spike-threshold")
 
