@@ -9,7 +9,12 @@ from lgmd_gym.agents.policies import batch as policy_batch
 from lgmd_gym.agents.zones import LOW_ZONES, NUM_ZONES
 
 BATCH_AGENTS = [name for name in AGENTS if make_agent(name).batch(1) is not None]
-OPTIONS = {"graded": ":fall=0.5", "random-brake": ":rate=1", "nested-fields": ":level=1,frames=2"}
+OPTIONS = {
+    "graded": ":fall=0.5",
+    "random-brake": ":rate=1",
+    "nested-fields": ":level=1,frames=2",
+    "stopping-zone": ":reach=0.75,ground=2,upright_frames=2",
+}
 NUM_ENVS = 7
 
 

@@ -112,3 +112,31 @@ def test_the_cameras_of_an_agent_are_used_unless_the_user_names_others():
     assert SensorConfig("tele").for_agent(agent).camera == "tele"
     assert SensorConfig().for_agent(make_agent("no-brake")).camera == "fovea"
     assert SensorConfig().for_agent(make_agent("frame-difference")).include_frame
+
+
+def first_brake(agent, potential, speed, yaw_rate):
+    """Return the index of the first reading at which the rule brakes, or None."""
+    agent.reset(0)
+    for index, values in enumerate(zip(potential, potential, speed, yaw_rate, strict=True)):
+        if agent.should_brake(SensorReading(*values)):
+            return index
+    return None
+
+
+@pytest.mark.parametrize("options", ["level=1.5,frames=6,settle=5", "level=1,frames=2,settle=1"])
+def test_readings_of_cameras_that_are_not_in_use_have_no_effect(options):
+    rng, agent = np.random.default_rng(7), make_agent(f"nested-fields:{options}")
+    braked, unread = 0, []
+    for _ in range(60):
+        speed = np.clip(10 + np.cumsum(rng.normal(0.0, 0.6, 150)), 0.0, 28.0)
+        yaw_rate = np.where(rng.uniform(size=150) < 0.02, 0.1, 0.0)
+        # Levels that persist for some frames, mostly below the threshold.
+        levels = np.repeat(rng.exponential(rng.uniform(0.3, 1.0), (15, 6)), 10, axis=0)
+        potential, arbitrary = 1 / (1 + np.exp(-levels)), rng.uniform(0.5, 1.0, levels.shape)
+        read = agent.cameras_in_use(speed, yaw_rate)
+        expected = first_brake(agent, potential, speed, yaw_rate)
+        assert first_brake(agent, np.where(read, potential, arbitrary), speed, yaw_rate) == expected
+        braked += expected is not None
+        unread.append(1.0 - read.mean())
+    assert 10 < braked < 60
+    assert np.mean(unread) > 0.4

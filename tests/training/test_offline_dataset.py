@@ -48,6 +48,19 @@ def test_a_lower_decision_rate_uses_every_third_decision():
     )
 
 
+def test_zone_inputs_have_no_history():
+    """The 17 fields of `stopping-zone`: four values each, whatever the history of the other inputs."""
+    episode = synthetic_episode(5)
+    potential = np.random.default_rng(0).uniform(0.5, 1.0, (5, 17)).astype(np.float32)
+    episode.observations["membrane_potential"] = potential
+    features = FeatureConfig(inputs=("zones", "ego_speed"), history=3, repeat=1)
+    inputs = OfflineDataset([episode], features).batch([0]).inputs
+    assert {name: tuple(values.shape) for name, values in inputs.items()} == {
+        "zones": (5, 68),
+        "ego_speed": (5, 3),
+    }
+
+
 def test_frames_have_their_history_in_the_channels():
     features = FeatureConfig(inputs=("frame", "ego_speed"), history=3, repeat=1)
     episodes = [synthetic_episode(2, frames=True), synthetic_episode(4, seed=1, frames=True)]
