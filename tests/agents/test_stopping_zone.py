@@ -110,7 +110,7 @@ def play(agent, case):
     [
         ("r152/CCRs/v42", True),
         # A lead car nearer than the stopping distance from the start.
-        pytest.param("fmvss127/CCRb/v80/brake0.5g-gap12", True, marks=pytest.mark.slow),
+        pytest.param("fmvss127/CCRb/v80/brake0.3g-gap12", True, marks=pytest.mark.slow),
         ("false-reaction/SteelPlate/v60", False),
         pytest.param("false-reaction/CutOut/v50", False, marks=pytest.mark.slow),
     ],
