@@ -128,7 +128,7 @@ def test_what_breaks_first(capsys):
     example.CHANGES["camera pitched up 20°"] = (example.pitched(20.0), {})
     example.first_table("stopping-zone", 1, 1, ("clear", "camera pitched up 20°"), every=14)
     clear, sky = capsys.readouterr().out.splitlines()[2:]
-    assert clear.startswith("| clear | 2/2 [34–100] | 0/2 [0–66] | 0/3 ")
+    assert clear.startswith("| clear | 2/2 [34–100] | 0/2 [0–66] | 1/3 ")
     assert clear.endswith("| 2 cases × 1 world, 3 cases × 1 world |")  # threats, non-threats
     assert sky.startswith("| camera pitched up 20° | 0/2 ")
     example.second_table("stopping-zone", 1, 1, every=6)
