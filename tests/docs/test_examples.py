@@ -135,7 +135,7 @@ def test_what_breaks_first(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "| target, texture: 1 case × 1 world | day | night | fog |"
     assert len(lines) == 2 + 9
-    assert "| asphalt (104), texture 1.6 | 1/1 " in "".join(lines)
+    assert "| light (220), texture 1.6 | 1/1 " in "".join(lines)
 
 
 def test_every_example_has_a_test():
