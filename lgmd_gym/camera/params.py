@@ -6,17 +6,16 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, NamedTuple
+from typing import Any
 
+from lgmd_gym.camera.bounds import BOUNDS, checked_number
 from lgmd_gym.camera.worlds import check_world
 from lgmd_gym.errors import (
-    check_finite,
     check_flag,
     check_keys,
     check_known,
     check_size,
     check_whole,
-    is_integer,
     shown,
 )
 
@@ -27,39 +26,6 @@ MAX_WIDTH = 4096
 """Maximum width and height of a frame [px]."""
 
 
-class _Interval(NamedTuple):
-    low: float
-    high: float
-    low_allowed: bool
-    high_allowed: bool
-    unit: str
-
-
-_BOUNDS = {
-    "hfov_deg": _Interval(1.0, 170.0, False, False, "degrees"),
-    "mount_height": _Interval(0.0, 100.0, False, True, "m above the ground"),
-    "mount_setback": _Interval(-10.0, 50.0, True, True, "m behind the front bumper"),
-    "mount_left": _Interval(-10.0, 10.0, True, True, "m left of the centreline"),
-    "pitch_deg": _Interval(-60.0, 60.0, True, True, "degrees"),
-    "yaw_deg": _Interval(-360.0, 360.0, True, True, "degrees"),
-    "texture": _Interval(0.0, 5.0, True, True, "times the natural contrast"),
-    "roadside": _Interval(0.0, 4.0, True, True, "times the natural density"),
-    "seed": _Interval(0, 2**32 - 1, True, True, ""),
-    "visibility_m": _Interval(0.0, 1e6, True, True, "m (0 is clear air)"),
-    "shot_noise": _Interval(0.0, 10.0, True, True, "grey levels at mid-grey"),
-    "read_noise": _Interval(0.0, 50.0, True, True, "grey levels"),
-    "auto_exposure_s": _Interval(0.0, 60.0, True, True, "s (0 is a fixed exposure)"),
-    "contrast_s": _Interval(0.0, 60.0, True, True, "s (0 is a fixed contrast)"),
-    "dive_deg": _Interval(0.0, 2.0, True, True, "degrees per m/s²"),
-    "shutter_s": _Interval(0.0, 0.1, True, True, "s"),
-    "reach": _Interval(0.1, 10.0, True, True, "stopping distances"),
-    "span_m": _Interval(0.1, 100.0, True, True, "m"),
-    "offset_m": _Interval(-50.0, 50.0, True, True, "m left of the path"),
-    "lift": _Interval(-5.0, 5.0, True, True, "times the depression of the aim"),
-    "stop_deceleration": _Interval(0.5, 12.0, True, True, "m/s²"),
-    "stop_reaction": _Interval(0.0, 3.0, True, True, "s"),
-    "windscreen": _Interval(0.0, 0.2, True, True, "of the light of the sky"),
-}
 ROADS = {"still": 0.0, "smooth": 0.5, "normal": 1.0, "rough": 2.0}
 """Motion of the car's body on each road, as a multiple of the measured motion in `body_motion`.
 
@@ -199,8 +165,8 @@ class CameraParams:
         if not isinstance(self.name, str) or not self.name:
             raise ValueError(f"camera name must be a non-empty string, got {shown(self.name)}")
         object.__setattr__(self, "shape", check_size("camera shape", self.shape, 4, MAX_WIDTH))
-        for name, bound in _BOUNDS.items():
-            object.__setattr__(self, name, _checked_number(name, getattr(self, name), bound))
+        for name in BOUNDS:
+            object.__setattr__(self, name, checked_number(name, getattr(self, name)))
         _check_surroundings(self)
         object.__setattr__(self, "world", None if self.world is None else check_world(self.world))
         if self.queue_lane is not None:
@@ -316,33 +282,6 @@ def _check_behind_windscreen(p: CameraParams) -> None:
 
 def _field_names() -> list[str]:
     return [field.name for field in fields(CameraParams)]
-
-
-def checked_number(name: str, value: Any) -> float | int:
-    """Return the value of a numeric field of `CameraParams`.
-
-    Raises:
-        ValueError: If it is not a number, or out of range.
-    """
-    return _checked_number(name, value, _BOUNDS[name])
-
-
-def _checked_number(name: str, value: Any, bound: _Interval) -> float | int:
-    check_finite(f"camera {name}", value)
-    value = int(value) if is_integer(value) else float(value)
-    above = value >= bound.low if bound.low_allowed else value > bound.low
-    below = value <= bound.high if bound.high_allowed else value < bound.high
-    if not (above and below):
-        opening, closing = "[" if bound.low_allowed else "(", "]" if bound.high_allowed else ")"
-        interval = f"{opening}{bound.low:g}, {bound.high:g}{closing}"
-        raise ValueError(
-            f"camera {name} must be in {interval} {bound.unit}".rstrip() + f", got {shown(value)}"
-        )
-    if name == "seed":
-        if not isinstance(value, int):
-            raise ValueError(f"camera seed must be an integer, got {shown(value)}")
-        return value
-    return float(value)
 
 
 PRESETS: dict[str, CameraParams] = {

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 from lgmd_gym.camera import BIRDSEYE, BirdsEye, CameraItem, CameraParams, CameraSpec
+from lgmd_gym.camera.bounds import checked_number
 from lgmd_gym.camera.objects import View
-from lgmd_gym.camera.params import checked_number
 from lgmd_gym.camera.road_pool import RoadKey, road_key
 from lgmd_gym.camera.scene_table import view_of
 from lgmd_gym.camera.spec import is_top_view
