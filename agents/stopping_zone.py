@@ -60,7 +60,7 @@ class StoppingZone(Rule):
     The rule has seven zones, whose far ends are at 0.28 to 1.8 stopping distances, and 17 fields with one
     neuron each; see `lgmd_gym.agents.zones`. G, U and L are the excitations k/(n σ3) of the ground,
     upright and low field of a zone. The fields are parts of a stabilised, calibrated camera with contrast
-    control, and follow the ego's path. An empty road does not excite the ground fields.
+    control, and follow the ego's path. Plain asphalt does not excite the ground fields.
 
     Condition: in one of the zones up to `reach`, G ≥ `ground` in `frames` consecutive frames, while U ≥
     `upright` in `upright_frames` and L ≥ `low` in `low_frames` consecutive frames that ended within the last
