@@ -50,3 +50,28 @@ def test_frame_of_a_rolling_camera_is_the_middle_of_a_larger_frame(hfov_deg):
             add_car(env, 9.0 + 6.0 * k, rng.uniform(-9.0, 13.0), 40 + 40 * k, heading=rng.uniform(-3.0, 3.0))
         crop, frame = _crop_and_frame(env, hfov_deg, road="rough", seed=1, roadside=2.0, texture=0.0)
         assert np.mean(np.abs(crop - frame) > 1) < 0.002
+
+
+@pytest.mark.parametrize("world", [2, 3, 5, 8])
+@pytest.mark.parametrize(("rows", "lift"), [(18, -1.2), (20, 0.1), (24, -0.6)])
+def test_field_of_a_stopping_zone_is_the_middle_of_a_larger_frame(world, rows, lift):
+    """Most of the roadside is above a field of the ground, and close shadows are below one at the horizon."""
+    margin = (64, 120)
+    large_shape = rows + 2 * margin[0], 80 + 2 * margin[1]
+    env = straight_env(x=0.3, speed=14.0)
+    add_car(env, 18.0, 0.5, 40)
+    for x in range(0, 60, 6):
+        env.vehicle.position[0] = float(x)
+        large = _light(env, large_shape, 2.4 * large_shape[1] / 80, lift, world)
+        small = _light(env, (rows, 80), 2.4, lift, world)
+        crop = large[margin[0] : -margin[0], margin[1] : -margin[1]]
+        # The order of objects that hide each other in turn depends on their number.
+        assert np.mean(np.abs(crop - small) > 1.0) < 0.01
+        assert small.std() > 0.1
+
+
+def _light(env, shape, span_m, lift, world):
+    """Return the light of a frame without noise: that of the sensor depends on the size of the frame."""
+    camera = EgoCamera(shape=shape, span_m=span_m, gaze="stopping", lift=lift, world=world)
+    camera.render(env)
+    return camera.light.copy()

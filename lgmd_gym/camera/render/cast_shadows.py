@@ -19,6 +19,7 @@ from lgmd_gym.camera.objects import (
 from lgmd_gym.camera.pose import side_tangent
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
 from lgmd_gym.camera.render.ground import CAST
+from lgmd_gym.camera.render.ground_band import outside_band
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.order import first_from
 
@@ -70,6 +71,8 @@ def _add_shadow_of(layer, lens, obj, away):
     mx, my = dx + 0.5 * obj.height * away[0], dy + 0.5 * obj.height * away[1]
     radius = 0.5 * (obj.length + obj.width + shift)
     ahead, across = mx * lens.cos_yaw + my * lens.sin_yaw, my * lens.cos_yaw - mx * lens.sin_yaw
+    if outside_band(lens, ahead, radius):
+        return
     tan = side_tangent(lens)
     if tan >= 0.0 and (
         ahead < -radius or abs(across) > max(ahead, 0.0) * tan + radius * math.sqrt(1.0 + tan * tan)

@@ -10,7 +10,7 @@ import math
 import numba as nb
 
 from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.simd import LANES, load_part, maximum, minimum, splat, square_root, total
+from lgmd_gym.simd import LANES, load_part, madd, maximum, minimum, splat, square_root, total
 
 _EVERY = 4  # rows between those that are measured
 _GAIN, _CALLED, _TIME, _MEAN, _DEVIATION, _LAST_MEAN, _LAST_DEVIATION = range(7)
@@ -104,13 +104,14 @@ def adapt_contrast(exposure, image, look, gain, slope):
 def _moments(image, linear, gain):
     """Return mean and standard deviation of the codes of a frame, at most white in each pixel."""
     height, width = image.shape
-    sums, squares = 0.0, 0.0
+    zero, white, scale = splat(nb.float32(0.0)), splat(nb.float32(255.0)), splat(nb.float32(gain))
+    sums, squares = zero, zero
     for i in range(height):
-        for j in range(width):
-            light = max(image[i, j], nb.float32(0.0)) * gain
-            code = min(math.sqrt(light * 255.0) if linear else light, 255.0)
-            sums += code
-            squares += code * code
+        for j in range(0, width, LANES):
+            # Lanes beyond the row are loaded as 0 and add nothing.
+            light = maximum(load_part(image, i * width + j, width - j), zero) * scale
+            code = minimum(square_root(light * white) if linear else light, white)
+            sums, squares = sums + code, madd(code, code, squares)
     count = height * width
-    mean = sums / count
-    return mean, math.sqrt(max(squares / count - mean * mean, 0.0))
+    mean = total(sums) / count
+    return mean, math.sqrt(max(total(squares) / count - mean * mean, 0.0))

@@ -6,12 +6,14 @@ those of the middle of the part of the row below the horizon; with a roll of 0.5
 the sides of a frame of 160 columns.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numba as nb
 import numpy as np
 
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, sum_differences, winding
+from lgmd_gym.camera.render.ground_band import ground_band
 from lgmd_gym.camera.render.jit import inlined_kernel, kernel
 from lgmd_gym.camera.render.texture_sampling import (
     bend_of,
@@ -45,13 +47,17 @@ ROAD, PAINT, SHADOW, CAST = np.int64(0), np.int64(1), np.int64(2), np.int64(3)
 def add_ground_quad(layer, k, lens, quad, weight):
     """Add a quad of the ground, given as x, y of its four corners, to channel k."""
     corners = layer.corners
+    nearest, farthest = math.inf, -math.inf
     for i in range(4):
         dx, dy = quad[2 * i] - lens.x, quad[2 * i + 1] - lens.y
         ahead = dx * lens.cos_yaw + dy * lens.sin_yaw
+        nearest, farthest = min(nearest, ahead), max(farthest, ahead)
         corners[i, 0] = ahead * lens.cos_pitch - lens.z * lens.sin_pitch
         corners[i, 1] = dy * lens.cos_yaw - dx * lens.sin_yaw
         corners[i, 2] = ahead * lens.sin_pitch + lens.z * lens.cos_pitch
-    add_quad(layer, k, lens, weight)
+    near, far = ground_band(lens)
+    if farthest > near and nearest < far:
+        add_quad(layer, k, lens, weight)
 
 
 @kernel

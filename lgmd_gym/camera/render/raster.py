@@ -12,6 +12,7 @@ from lgmd_gym.camera.render.exposure import adapt_contrast, adapt_exposure
 from lgmd_gym.camera.render.figures import draw_figure
 from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare, add_sun_glare
 from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
+from lgmd_gym.camera.render.ground_band import above_or_below
 from lgmd_gym.camera.render.horizon import horizon_of
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.markings import add_lines
@@ -30,12 +31,18 @@ from lgmd_gym.camera.roadside import PLANT_RANGE
 
 
 @kernel
-def append_roadside(lens, roadside, look, objects, count):
-    """Append the roadside within range to the objects; returns the new count."""
+def append_roadside(lens, roadside, look, lamps, objects, count):
+    """Append the roadside within range to the objects; returns the new count.
+
+    At night, objects with a lamp above or below the frame are kept: their halos may be in it. `lamps` is that
+    of `Models`.
+    """
     n, low = roadside.shape[0], first_from(roadside, lens.x - PLANT_RANGE)
     while low < n and roadside[low].x < lens.x + PLANT_RANGE and count < objects.shape[0]:
         dx, dy = roadside[low].x - lens.x, roadside[low].y - lens.y
-        if dx * dx + dy * dy < PLANT_RANGE * PLANT_RANGE and visible(lens, roadside[low]):
+        near = dx * dx + dy * dy < PLANT_RANGE * PLANT_RANGE
+        lit = look.night > 0.0 and lamps[roadside[low].model, 1] != 0.0
+        if near and visible(lens, roadside[low]) and (lit or not above_or_below(lens, roadside[low])):
             objects[count] = roadside[low]
             if objects[count].model != MODEL_MARK:
                 objects[count].shade = light_of_code(objects[count].shade, look.linear)
@@ -123,7 +130,7 @@ def draw_light(view, road, tables, models, objects, count, buffers):
     image, lens, order = buffers.image, view.lens, buffers.order
     cast_shadows = view.look.cast > 0.0
     vehicles = count
-    count = append_roadside(lens, road.roadside, view.look, objects, count)
+    count = append_roadside(lens, road.roadside, view.look, models.lamps, objects, count)
     n = order_objects(lens, objects, count, order, buffers.distances, buffers.extents)
     horizon = horizon_of(lens)
     draw_distance(image, view, tables, horizon, buffers)

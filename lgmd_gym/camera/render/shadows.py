@@ -13,6 +13,7 @@ from lgmd_gym.camera.objects import (
     light_of_code,
 )
 from lgmd_gym.camera.render.ground import PAINT, SHADOW, add_ground_quad
+from lgmd_gym.camera.render.ground_band import outside_band
 from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.order import distance
 
@@ -65,6 +66,10 @@ def add_shadow(layer, lens, obj, look):
         return
     lean = look.under_lean * obj.height
     centre = (obj.x + lean * look.sun_x, obj.y + lean * look.sun_y)
+    ahead = (centre[0] - lens.x) * lens.cos_yaw + (centre[1] - lens.y) * lens.sin_yaw
+    widest = max(look.under_first, look.under_first + look.under_step * look.under_rings, 0.0)
+    if outside_band(lens, ahead, 0.5 * (obj.length + obj.width) + 1.5 * widest):
+        return
     if obj.model == MODEL_TREE:
         dark = min(0.4, 0.8 - distance(lens, obj) / 60.0)
         if dark > 0.0:
