@@ -6,24 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lgmd_gym.neuron import general_kernel, kernels, state
+from lgmd_gym.neuron.frame_neuron import FrameNeuron
 from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
-from lgmd_gym.neuron.response import Response
-from lgmd_gym.neuron.scalars import RESPONSE, initial_scalars, pack_constants
-from lgmd_gym.neuron.threads import Threads
-from lgmd_gym.neuron.validation import (
-    checked_fps,
-    checked_frames,
-    checked_num,
-    checked_region,
-    checked_selection,
-    checked_shape,
-    checked_threads,
-)
-
-_UINT8 = np.dtype(np.uint8)
+from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
+from lgmd_gym.neuron.validation import checked_region
 
 
-class LGMD:
+class LGMD(FrameNeuron):
     """One or N locust looming neurons, stepped frame by frame.
 
     The first frame has no predecessor, so it causes no change and no spikes. A step starts no thread unless
@@ -68,14 +57,8 @@ class LGMD:
         roi: tuple[int, int, int, int] | None = None,
         threads: int | None = None,
     ) -> None:
-        self.shape = checked_shape(shape)
-        self.fps = checked_fps(fps)
+        super().__init__(shape, fps, num, threads)
         self.params = LGMDParams.make(params)
-        self.num = checked_num(num, self.shape)
-        self._threads = Threads(checked_threads(threads))
-        self._count = 1 if self.num is None else self.num
-        self._frames_shape = self.shape if self.num is None else (self.num, *self.shape)
-        self._all_active = np.ones(self._count, np.bool_)
 
         # I and Ce reach one pixel beyond the mask. A signed S is not 0 there, so its Ce reaches two pixels.
         margin = 1 if self.params.on_off else 2
@@ -87,73 +70,18 @@ class LGMD:
         self._previous = np.zeros((self._count, *region_shape), np.uint8)
         self._fast = kernels.supports(self.params)
         if self._fast:
-            self._maps: tuple[NDArray[Any], ...] = state.allocate(self._count, region_shape)
+            self._maps = state.allocate(self._count, region_shape)
         else:
             paths = 2 if self.params.on_off else 1
             self._maps = general_kernel.allocate(self._count, region_shape, self.params.n_p, paths)
 
-    def step(self, frame: ArrayLike, active: ArrayLike | None = None) -> Response:
-        """Process one frame per neuron.
-
-        Args:
-            frame: Grey luminance in 0-255, uint8 or float, shape (H, W), or (N, H, W) for N neurons; row 0
-                is the top. Any memory layout is accepted; contiguous uint8 arrays are not copied.
-            active: Selection of the neurons to step, bool, shape (N,); None for all. The other neurons
-                keep their state and their last outputs, and their frames are ignored.
-
-        Returns:
-            Python scalars for a single neuron, new arrays of shape (N,) for N neurons.
-
-        Raises:
-            ValueError: For a frame of another shape, or with values that are not luminance in 0-255.
-            TypeError: For a frame of another dtype.
-        """
-        selected = self._all_active if active is None else checked_selection("active", active, self._count)
-        if type(frame) is not np.ndarray or (
-            frame.dtype is not _UINT8 or frame.shape != self._frames_shape or not frame.flags.c_contiguous
-        ):
-            frame = checked_frames(frame, self._frames_shape, None if active is None else selected)
-        if frame.dtype != self._previous.dtype:
-            frame = self._as_float(frame)
-        frames = frame[None] if self.num is None else frame
-        if self._threads.count == 1:
-            self.step_range(0, self._count, frames, selected)
-        else:
-            self._threads.run(self.step_range, self._count, (frames, selected))
-        return self._response()
-
     def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
-        """Step the active neurons among first..last-1, without a check of the arguments.
-
-        Threads may step disjoint ranges at once.
-
-        Args:
-            first: First neuron.
-            last: Last neuron + 1.
-            frames: Frames of all N neurons, contiguous uint8, shape (N, H, W).
-            active: Selection of the neurons to step, bool, shape (N,).
-        """
+        """Step the active neurons among first..last-1; see `FrameNeuron.step_range`."""
         kernel = cast(Any, kernels if self._fast else general_kernel).step
         kernel(
             first, last, frames, self._previous, self._y0, self._x0, self._weight, active, self._scalars,
             self._const, *self._maps,
         )  # fmt: skip
-
-    @property
-    def outputs(self) -> NDArray[np.float64]:
-        """The scalar state; the first eight columns are the fields of `Response`, shape (N, at least 8)."""
-        return self._scalars
-
-    def reset(self, mask: ArrayLike | None = None) -> None:
-        """Return to the state before the first frame.
-
-        Args:
-            mask: Selection of the neurons to reset, bool, shape (N,); None for all.
-        """
-        selected = self._all_active if mask is None else checked_selection("mask", mask, self._count)
-        self._scalars[selected] = self._initial
-        for values in self._maps:
-            values[selected] = 0
 
     @property
     def layers(self) -> dict[str, NDArray[np.float32]]:
@@ -173,17 +101,6 @@ class LGMD:
             images[name] = image[0] if self.num is None else image
         return images
 
-    def _response(self) -> Response:
-        if self.num is None:
-            frequency, spikes, k, k_hat, f, w, latency, alert = self._scalars[0, RESPONSE].tolist()
-            return Response(frequency, int(spikes), k, k_hat, f, w, latency, alert > 0.0)
-        frequency, spikes, k, k_hat, f, w, latency, alert = self._scalars[:, RESPONSE].T.copy()
-        return Response(frequency, spikes.astype(np.int64), k, k_hat, f, w, latency, alert > 0.0)
-
-    def _as_float(self, frame: NDArray[Any]) -> NDArray[np.float32]:
-        """Return the frame as float32, and store luminance as float32 from now on."""
+    def _use_floats(self) -> None:
+        super()._use_floats()
         self._previous = self._previous.astype(np.float32, copy=False)
-        return frame.astype(np.float32, copy=False)
-
-    def __repr__(self) -> str:
-        return f"LGMD(shape={self.shape}, fps={self.fps:g}, num={self.num})"

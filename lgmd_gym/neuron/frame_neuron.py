@@ -1,0 +1,126 @@
+"""FrameNeuron: base class of the neuron models, with steps of one or N neurons."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lgmd_gym.neuron.response import Response
+from lgmd_gym.neuron.scalars import RESPONSE
+from lgmd_gym.neuron.threads import Threads
+from lgmd_gym.neuron.validation import (
+    checked_fps,
+    checked_frames,
+    checked_num,
+    checked_selection,
+    checked_shape,
+    checked_threads,
+)
+
+_UINT8 = np.dtype(np.uint8)
+
+
+class FrameNeuron:
+    """One or N neurons of a model, stepped frame by frame.
+
+    Subclasses set `_initial`, `_scalars` and `_maps`, and implement `step_range` and `layers`.
+
+    Args:
+        shape: (height, width) of the frames [px].
+        fps: Frame rate [Hz].
+        num: Number of neurons N, each with its own frames; None for a single neuron with scalar outputs.
+        threads: Number of threads that share the neurons of a step; None or 1 for the calling thread only.
+    """
+
+    _initial: NDArray[np.float64]  # scalar state before the first frame
+    _scalars: NDArray[np.float64]  # scalar state of each neuron
+    _maps: tuple[NDArray[Any], ...]  # state of each neuron that is 0 before the first frame
+
+    def __init__(self, shape: tuple[int, int], fps: float, num: int | None, threads: int | None) -> None:
+        self.shape = checked_shape(shape)
+        self.fps = checked_fps(fps)
+        self.num = checked_num(num, self.shape)
+        self._threads = Threads(checked_threads(threads))
+        self._count = 1 if self.num is None else self.num
+        self._frames_shape = self.shape if self.num is None else (self.num, *self.shape)
+        self._frames_dtype: np.dtype[Any] = _UINT8
+        self._all_active = np.ones(self._count, np.bool_)
+
+    def step(self, frame: ArrayLike, active: ArrayLike | None = None) -> Response:
+        """Process one frame per neuron.
+
+        Args:
+            frame: Grey luminance in 0-255, uint8 or float, shape (H, W), or (N, H, W) for N neurons; row 0
+                is the top. Any memory layout is accepted; contiguous uint8 arrays are not copied.
+            active: Selection of the neurons to step, bool, shape (N,); None for all. The other neurons
+                keep their state and their last outputs, and their frames are ignored.
+
+        Returns:
+            Python scalars for a single neuron, new arrays of shape (N,) for N neurons.
+
+        Raises:
+            ValueError: For a frame of another shape, or with values that are not luminance in 0-255.
+            TypeError: For a frame of another dtype.
+        """
+        selected = self._all_active if active is None else checked_selection("active", active, self._count)
+        if type(frame) is not np.ndarray or (
+            frame.dtype is not _UINT8 or frame.shape != self._frames_shape or not frame.flags.c_contiguous
+        ):
+            frame = checked_frames(frame, self._frames_shape, None if active is None else selected)
+        if frame.dtype != self._frames_dtype:
+            self._use_floats()
+            frame = frame.astype(np.float32, copy=False)
+        frames = frame[None] if self.num is None else frame
+        if self._threads.count == 1:
+            self.step_range(0, self._count, frames, selected)
+        else:
+            self._threads.run(self.step_range, self._count, (frames, selected))
+        return self._response()
+
+    def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
+        """Step the active neurons among first..last-1, without a check of the arguments.
+
+        Threads may step disjoint ranges at once.
+
+        Args:
+            first: First neuron.
+            last: Last neuron + 1.
+            frames: Frames of all N neurons, contiguous uint8, shape (N, H, W).
+            active: Selection of the neurons to step, bool, shape (N,).
+        """
+        raise NotImplementedError
+
+    @property
+    def outputs(self) -> NDArray[np.float64]:
+        """The scalar state; the first eight columns are the fields of `Response`, shape (N, at least 8)."""
+        return self._scalars
+
+    def reset(self, mask: ArrayLike | None = None) -> None:
+        """Return to the state before the first frame.
+
+        Args:
+            mask: Selection of the neurons to reset, bool, shape (N,); None for all.
+        """
+        selected = self._all_active if mask is None else checked_selection("mask", mask, self._count)
+        self._scalars[selected] = self._initial
+        for values in self._maps:
+            values[selected] = 0
+
+    @property
+    def layers(self) -> dict[str, NDArray[np.float32]]:
+        """Maps of the last frame by name; new arrays of shape (H, W), or (N, H, W) for N neurons."""
+        raise NotImplementedError
+
+    def _response(self) -> Response:
+        if self.num is None:
+            frequency, spikes, k, k_hat, f, w, latency, alert = self._scalars[0, RESPONSE].tolist()
+            return Response(frequency, int(spikes), k, k_hat, f, w, latency, alert > 0.0)
+        frequency, spikes, k, k_hat, f, w, latency, alert = self._scalars[:, RESPONSE].T.copy()
+        return Response(frequency, spikes.astype(np.int64), k, k_hat, f, w, latency, alert > 0.0)
+
+    def _use_floats(self) -> None:
+        """Process frames as float32 from now on: a frame of another dtype than uint8 was given."""
+        self._frames_dtype = np.dtype(np.float32)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}(shape={self.shape}, fps={self.fps:g}, num={self.num})"
