@@ -24,6 +24,8 @@ MIN_STOP = 4.0
 """Least stopping distance of the gaze `"stopping"` [m]."""
 MAX_WIDTH = 4096
 """Maximum width and height of a frame [px]."""
+MIN_LPLC2 = 16
+"""Minimum width and height of a frame for LPLC2 units with arms of 8 px [px]."""
 
 
 ROADS = {"still": 0.0, "smooth": 0.5, "normal": 1.0, "rough": 2.0}
@@ -33,6 +35,7 @@ ROADS = {"still": 0.0, "smooth": 0.5, "normal": 1.0, "rough": 2.0}
 before.
 """
 _CHOICES = {
+    "detector": ("lgmd", "lplc2"),
     "gaze": ("fixed", "path", "stopping"),
     "vehicles": ("car", "box"),
     "light": ("day", "night", "low_sun"),
@@ -51,6 +54,8 @@ class CameraParams:
     Attributes:
         name: Label of the camera; its results are stored under this key.
         shape: `(height, width)` of the frame [px].
+        detector: Model that processes the frames: `"lgmd"` (`LGMD`), or `"lplc2"` (`LPLC2` with its default
+            parameters, for frames of at least 16 × 16 px).
         hfov_deg: Horizontal field of view, in (1, 170) [degrees].
         mount_height: Height of the lens above the ground [m].
         mount_setback: Distance of the lens behind the front bumper [m].
@@ -122,6 +127,7 @@ class CameraParams:
 
     name: str = "custom"
     shape: tuple[int, int] = (90, 160)
+    detector: str = "lgmd"
     hfov_deg: float = 60.0
     mount_height: float = 1.2
     mount_setback: float = 1.7
@@ -173,6 +179,11 @@ class CameraParams:
             object.__setattr__(self, "queue_lane", check_whole("camera queue_lane", self.queue_lane, 0))
         for name, known in _CHOICES.items():
             check_known(f"camera {name}", getattr(self, name), known)
+        if self.detector == "lplc2" and min(self.shape) < MIN_LPLC2:
+            raise ValueError(
+                f"camera shape must be at least {MIN_LPLC2} × {MIN_LPLC2} px with detector='lplc2', got "
+                f"{self.shape}; use a larger shape"
+            )
         if self.gaze == "stopping":
             _check_zoom(self)
         if self.bonnet:

@@ -41,8 +41,7 @@ class Observations:
         arrays["ego_speed"][:, 0] = egos["speed"]
         arrays["ego_yaw_rate"][:, 0] = self._yaw_rates(egos["heading"])
         if self._include_frame:
-            # Cameras of one frame shape are one group.
-            np.copyto(arrays["frame"], sensors.frames[0].transpose(0, 2, 3, 1))
+            np.copyto(arrays["frame"], sensors.stacked_frames().transpose(0, 2, 3, 1))
         if self._include_base:
             self._base(arrays["base"])
         return arrays

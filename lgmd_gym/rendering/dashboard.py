@@ -59,7 +59,8 @@ class Dashboard:
         cameras = self.ranked_cameras()
         self._enlarged = cameras[0]
         self._camera_panel.draw(canvas, cameras)
-        panels.draw_layers(canvas, self._observer.sensors.layers(self._enlarged))
+        sensors = self._observer.sensors
+        panels.draw_layers(canvas, sensors.detectors[self._enlarged], sensors.layers(self._enlarged))
         potential = self._observer.response.membrane_potential
         self._trace_panel.draw(canvas, float(potential[self._enlarged]))
         panels.draw_bars(canvas, state)
@@ -85,7 +86,6 @@ class Dashboard:
         canvas = Canvas(SIZE)
         canvas.clear()
         canvas.text((24, 29), self._title, 18, anchor="lm")
-        panels.draw_layer_names(canvas)
         self._trace_panel.draw_background(canvas)
         canvas.text((panels.TOP_VIEW[0], 548), "top view (highway-env)", 15, FAINT, "lm")
         canvas.save_background()

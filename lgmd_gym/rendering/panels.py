@@ -16,13 +16,26 @@ CAMERA_COLOURS = (SKY, INK, PURPLE, GREEN)  # of the traces, in the order of the
 
 CAMERA_FRAME: Box = (24, 60, 824, 510)
 INSET = (192, 108)  # [px], size of the inset of each further camera
-LAYERS: dict[str, tuple[str, Box]] = {
-    "P": ("P  change, ON and OFF", (848, 60, 1044, 170)),
-    "I": ("I  delayed inhibition", (1060, 60, 1256, 170)),
-    "S": ("S  remaining excitation", (848, 200, 1044, 310)),
-    "G": ("G  grouped excitation", (1060, 200, 1256, 310)),
+# Name, label, value of full brightness and whether the sign is drawn, for each layer of a detector's picture.
+LAYERS = {
+    "lgmd": (
+        ("P", "P  change, ON and OFF", 64.0, True),
+        ("I", "I  delayed inhibition", 64.0, False),
+        ("S", "S  remaining excitation", 64.0, False),
+        ("G", "G  grouped excitation", 64.0, False),
+    ),
+    "lplc2": (
+        ("right", "motion to the right", 32.0, True),
+        ("down", "motion downwards", 32.0, True),
+        ("units", "responses of the units", 8.0, False),
+    ),
 }
-LAYER_GAIN = 4.0  # full brightness at a layer value of 64
+LAYER_BOXES: tuple[Box, ...] = (
+    (848, 60, 1044, 170),
+    (1060, 60, 1256, 170),
+    (848, 200, 1044, 310),
+    (1060, 200, 1256, 310),
+)
 BARS: Box = (848, 350, 1256, 510)
 TOP_VIEW: Box = (668, 562, 1256, 694)
 TOP_VIEW_SCALING = 5.5  # [px/m]
@@ -99,21 +112,22 @@ class CameraPanel:
         canvas.clip(None)
 
 
-def draw_layers(canvas: Canvas, maps: dict[str, np.ndarray]) -> None:
-    """Draw the maps P, I, S and G of a neuron's last frame."""
-    for layer, (_, box) in LAYERS.items():
-        values = maps[layer]
-        if layer == "P":
-            colours = SIGNED[np.clip(127.5 + 0.5 * LAYER_GAIN * values, 0, 255).astype(np.uint8)]
+def draw_layers(canvas: Canvas, detector: str, maps: dict[str, np.ndarray]) -> None:
+    """Draw the maps of a neuron's last frame and their labels.
+
+    Args:
+        canvas: The canvas.
+        detector: See `CameraParams`.
+        maps: The maps by name.
+    """
+    for (name, label, full, signed), box in zip(LAYERS[detector], LAYER_BOXES, strict=False):
+        levels = maps[name] * (255.0 / full)
+        if signed:
+            colours = SIGNED[np.clip(127.5 + 0.5 * levels, 0, 255).astype(np.uint8)]
         else:
-            colours = HEAT[np.clip(LAYER_GAIN * values, 0, 255).astype(np.uint8)]
+            colours = HEAT[np.clip(levels, 0, 255).astype(np.uint8)]
         canvas.paste(colours, box)
-
-
-def draw_layer_names(canvas: Canvas) -> None:
-    """Draw the names of the maps."""
-    for name, box in LAYERS.values():
-        canvas.text((box[0], box[3] + 5), name, 13, FAINT)
+        canvas.text((box[0], box[3] + 5), label, 13, FAINT)
 
 
 # Name, full scale, unit and colour of each bar.

@@ -88,7 +88,7 @@ class Variants:
             fields: Fields of `CameraParams`, and optionally `condition`.
 
         Raises:
-            ValueError: If a field is unknown or out of range, or changes the shape of a camera.
+            ValueError: If a field is unknown or out of range, or changes the shape or detector of a camera.
         """
         others = {name: value for name, value in fields.items() if name != "texture"}
         texture = fields.get("texture")
@@ -105,11 +105,13 @@ class Variants:
     def _build(self, fields: dict[str, Any]) -> Variant:
         params = tuple(None if base is None else CameraParams.make(base, **fields) for base in self._base)
         for base, changed in zip(self._base, params, strict=True):
-            if base is not None and changed is not None and changed.shape != base.shape:
-                raise ValueError(
-                    f"camera_fields must keep the shape {base.shape} of camera {base.name!r}, got "
-                    f"{changed.shape}; set the shape in the camera argument"
-                )
+            for name in ("shape", "detector"):
+                kept, given = getattr(base, name, None), getattr(changed, name, None)
+                if kept != given:
+                    raise ValueError(
+                        f"camera_fields must keep the {name} {kept} of camera {base.name!r}, got {given}; "
+                        f"set the {name} in the camera argument"
+                    )
         known = [p for p in params if p is not None]
         placeholder = road_key(known[0]) if known else (0.0, 0, False, False, None)
         keys = tuple(placeholder if p is None else road_key(p) for p in params)

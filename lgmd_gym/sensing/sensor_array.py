@@ -13,7 +13,7 @@ from lgmd_gym.neuron import LGMDParams, Response
 from lgmd_gym.neuron.threads import Threads
 from lgmd_gym.sensing.cameras import Variants, make_cameras
 from lgmd_gym.sensing.kernels import NUMBERS, SIGNALS
-from lgmd_gym.sensing.sensor_group import SensorGroup
+from lgmd_gym.sensing.sensor_group import SensorGroup, make_neurons
 
 
 class SensorArray:
@@ -35,6 +35,7 @@ class SensorArray:
         num_envs: Number of environments.
         names: Names of the cameras.
         shapes: Frame shapes (height, width) of the cameras [px].
+        detectors: Detectors of the cameras, see `CameraParams`.
         scenes: `SCENE` records, shape (num_envs,).
         objects: `OBJECT` records, shape (num_envs, 512): vehicles, obstacles and marks of each environment in
             the order of `road.vehicles`, then `road.objects`, without the ego and the roadside. Vehicles of
@@ -44,8 +45,8 @@ class SensorArray:
         enabled: Cameras in use, bool, shape (num_envs, cameras), initially all. A camera that is not enabled
             is neither drawn nor stepped and keeps its last outputs. Its neuron is reset before the first
             frame after a pause.
-        frames: The last frames, one array per frame shape, uint8, shape (num_envs, cameras of that shape,
-            height, width); see `frame_of`.
+        frames: The last frames, one array per frame shape and detector, uint8, shape (num_envs, cameras of
+            that kind, height, width); see `frame_of` and `stacked_frames`.
         responses: The last outputs of the neurons, arrays of shape (num_envs, cameras), updated in place.
         signals: The `SIGNALS` among them, float64, shape (num_envs, 3, cameras).
     """
@@ -64,6 +65,9 @@ class SensorArray:
         cameras = make_cameras(camera)
         self.names = list(cameras)
         self.shapes = [item.shape for item in cameras.values()]
+        self.detectors = [
+            item.detector if isinstance(item, CameraParams) else "lgmd" for item in cameras.values()
+        ]
         self._top_views = [
             {k: item for k, item in enumerate(made.values()) if isinstance(item, BirdsEye)}
             for made in (cameras, *(make_cameras(camera) for _ in range(num_envs - 1)))
@@ -81,14 +85,19 @@ class SensorArray:
         numbers = np.zeros((num_envs, len(NUMBERS), len(self.names)))
         self._outputs = numbers, np.zeros(size, np.int64), np.zeros(size, np.bool_)
         self._threads = Threads(threads or 1)
-        by_shape: dict[tuple[int, int], list[int]] = {}
-        for index, shape in enumerate(self.shapes):
-            by_shape.setdefault(shape, []).append(index)
+        by_kind: dict[tuple[tuple[int, int], str], list[int]] = {}
+        for index, kind in enumerate(zip(self.shapes, self.detectors, strict=True)):
+            by_kind.setdefault(kind, []).append(index)
         self._groups = [
             SensorGroup(
-                shape, members, unchanged.params, fps, params, self.enabled, self._stale, self._outputs
+                make_neurons(detector, shape, fps, params, num_envs * len(members)),
+                members,
+                unchanged.params,
+                self.enabled,
+                self._stale,
+                self._outputs,
             )
-            for shape, members in by_shape.items()
+            for (shape, detector), members in by_kind.items()
         ]
         # Index of each camera's group, and of the camera in that group.
         self._locations = [
@@ -150,7 +159,7 @@ class SensorArray:
             fields: Fields of `CameraParams`, and optionally `condition`; None or empty for no change.
 
         Raises:
-            ValueError: If a field is unknown or out of range, or changes the shape of a camera.
+            ValueError: If a field is unknown or out of range, or changes the shape or detector of a camera.
         """
         fields = fields or {}
         if fields == self._fields[index]:
@@ -198,6 +207,16 @@ class SensorArray:
         """Return a view of the last frame of one camera of environment `index`, uint8, (height, width)."""
         group, row = self._locations[camera]
         return self._groups[group].frames[index, row]
+
+    def stacked_frames(self) -> np.ndarray:
+        """Return the last frames of cameras with one shape, uint8, shape (num_envs, cameras, height, width).
+
+        A view if all cameras have the same detector, else a new array.
+        """
+        if len(self._groups) == 1:
+            return self.frames[0]
+        frames = [self.frames[group][:, row] for group, row in self._locations]
+        return np.stack(frames, axis=1)
 
     def response_of(self, index: int = 0) -> Response:
         """Return a copy of the last outputs of environment `index`, arrays of shape (cameras,)."""

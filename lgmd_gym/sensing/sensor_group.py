@@ -1,4 +1,4 @@
-"""SensorGroup: the cameras of a sensor array with one frame shape, and their neurons."""
+"""SensorGroup: the cameras of a sensor array with one frame shape and one detector, and their neurons."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,19 +9,35 @@ from lgmd_gym.camera import CameraParams
 from lgmd_gym.camera.batch import CameraBatch
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.context import Workspace
-from lgmd_gym.neuron import LGMD, LGMDParams
+from lgmd_gym.neuron import LGMD, LPLC2, LGMDParams
+from lgmd_gym.neuron.frame_neuron import FrameNeuron
 from lgmd_gym.sensing.kernels import collect_outputs, select_cameras
 
 
-class SensorGroup:
-    """Cameras with one frame shape, and their neurons.
+def make_neurons(
+    detector: str, shape: tuple[int, int], fps: float, params: LGMDParams, num: int
+) -> FrameNeuron:
+    """Return `num` neurons.
 
     Args:
+        detector: See `CameraParams`.
         shape: Frame shape (height, width) [px].
+        fps: Camera frame rate [Hz].
+        params: Parameters of the LGMD; of LPLC2, only those of the adaptation and the spikes.
+        num: Number of neurons.
+    """
+    if detector == "lplc2":
+        return LPLC2(shape, fps, num=num, spikes=params)
+    return LGMD(shape, fps, params, num)
+
+
+class SensorGroup:
+    """Cameras with one frame shape and one detector, and their neurons.
+
+    Args:
+        neuron: num_envs * len(members) neurons, ordered by environment, then by camera.
         members: Indices of the cameras.
         params: Parameters of all cameras of the array; None for a top view.
-        fps: Camera frame rate [Hz].
-        neuron_params: Parameters of the neurons.
         enabled: Cameras in use, bool, shape (num_envs, cameras).
         stale: Cameras that have missed a frame, bool, shape (num_envs, cameras).
         outputs: Outputs of all neurons, see `collect_outputs`.
@@ -29,25 +45,23 @@ class SensorGroup:
     Attributes:
         members: Indices of the cameras.
         batch: The cameras.
-        neuron: num_envs * len(members) neurons, ordered by environment, then by camera.
+        neuron: The neurons.
         frames: The last frames, uint8, shape (num_envs, members, height, width).
     """
 
     def __init__(
         self,
-        shape: tuple[int, int],
+        neuron: FrameNeuron,
         members: list[int],
         params: Sequence[CameraParams | None],
-        fps: float,
-        neuron_params: LGMDParams,
         enabled: np.ndarray,
         stale: np.ndarray,
         outputs: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> None:
         self.members = members
         size = num_envs, _ = len(enabled), len(members)
+        self.neuron, shape = neuron, neuron.shape
         self.batch = CameraBatch([params[k] for k in members], shape, members, num_envs)
-        self.neuron = LGMD(shape, fps, neuron_params, num_envs * len(members))
         self.frames = np.zeros((*size, *shape), np.uint8)
         cameras = np.array(members, dtype=np.int64)
         self._selected, self._fresh = np.zeros(size, np.bool_), np.zeros(size, np.bool_)

@@ -76,8 +76,8 @@ def make_observation(
         "ego_speed": np.array([speed], dtype=np.float32),
         "ego_yaw_rate": np.array([yaw_rate], dtype=np.float32),
     }
-    if include_frame:  # all cameras have the same shape
-        observation["frame"] = sensors.frames[0][index].transpose(1, 2, 0).copy()
+    if include_frame:
+        observation["frame"] = sensors.stacked_frames()[index].transpose(1, 2, 0).copy()
     return observation
 
 

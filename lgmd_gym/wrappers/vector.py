@@ -114,7 +114,7 @@ class LGMDObservation(VectorWrapper):
         motions = np.array([recorder.motion for recorder in self._recorders], dtype=np.float32)
         observation["ego_speed"], observation["ego_yaw_rate"] = motions[:, :1].copy(), motions[:, 1:].copy()
         if self.include_frame:  # all cameras have the same shape
-            observation["frame"] = self.sensors.frames[0].transpose(0, 2, 3, 1).copy()
+            observation["frame"] = self.sensors.stacked_frames().transpose(0, 2, 3, 1).copy()
         if self.include_base:
             observation["base"] = base
         return observation

@@ -17,6 +17,10 @@ ARGUMENTS = {
     "two cameras": {"camera": TWO_LENSES},
     "frames of two cameras": {"camera": ["wide", "fovea"], "include_frame": True},
     "frames of three decisions in two": {"config": {"policy_frequency": 20}, "trace": True},
+    "two detectors": {
+        "camera": ["wide", {"name": "side", "yaw_deg": 30.0, "detector": "lplc2"}, "tele"],
+        **FRAMES,
+    },
     "several frames per decision": {"config": {"policy_frequency": 10}, "trace": True},
     "fast camera": {"fps": 60, "trace": True},
     "simulation at 30 Hz": {"config": {"simulation_frequency": 30}},

@@ -12,6 +12,7 @@ from support.roads import add_car, straight_env
 from lgmd_gym import LGMD, BirdsEye, CameraParams, EgoCamera, LGMDParams
 from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.camera.objects import OBJECT
+from lgmd_gym.neuron import LPLC2
 from lgmd_gym.sensing.sensor_array import SensorArray
 
 SMALL = {"shape": (45, 80)}
@@ -22,6 +23,7 @@ CAMERAS = [
     {"name": "back", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box"},
     {"name": "path", "shape": (45, 80), "gaze": "path", "panorama": "natural", "mount_left": 0.4},
     {"name": "driver", "shape": (45, 80), "gaze": "path", "bonnet": True, "windscreen": 0.1},
+    {"name": "side", "shape": (45, 80), "yaw_deg": 30.0, "detector": "lplc2"},
 ]
 FIELDS = [
     {},
@@ -60,7 +62,8 @@ def make_array(camera=CAMERAS, num_envs=6, **arguments):
 def reference(camera, fields):
     """Return a camera and a neuron of their own."""
     own = EgoCamera(CameraParams.make(camera), **fields)
-    return own, LGMD(own.shape, 30.0, LGMDParams())
+    model = LPLC2 if own.params.detector == "lplc2" else LGMD
+    return own, model(own.shape, 30.0)
 
 
 @pytest.mark.parametrize("threads", [None, 3])
@@ -250,8 +253,10 @@ def test_invalid_camera_fields_raise():
         sensors.set_camera_fields(0, {"textur": 1.0})
     with pytest.raises(ValueError, match=r"camera texture must be in \[0, 5\]"):
         sensors.set_camera_fields(0, {"texture": 9.0})
-    with pytest.raises(ValueError, match=r"must keep the shape \(45, 80\) of camera 'wide', got \(9, 9\)"):
-        sensors.set_camera_fields(0, {"shape": (9, 9)})
+    with pytest.raises(ValueError, match=r"must keep the shape \(45, 80\) of camera 'wide', got \(20, 20\)"):
+        sensors.set_camera_fields(0, {"shape": (20, 20)})
+    with pytest.raises(ValueError, match="must keep the detector lgmd of camera 'wide', got lplc2"):
+        sensors.set_camera_fields(0, {"detector": "lplc2"})
 
 
 def test_conditions_are_covered():
