@@ -41,7 +41,11 @@ _BOUNDS: dict[str, _Bound] = {
     "t_sf": _POSITIVE, "t_ffi": _SCALE, "ffi_delay": _Bound(0, 1), "on_off_residue": _Bound(0.0, 0.99),
     "max_spikes": _Bound(1.0, infinite=True), "k_0": _Bound(0.0, 0.5),
 }  # fmt: skip
-_CHOICES = {"delay": ("recursive", "two-tap"), "latency": ("clamp", "jump")}
+_CHOICES = {
+    "delay": ("recursive", "two-tap"),
+    "latency": ("clamp", "jump"),
+    "spikes_from": ("adapted", "membrane"),
+}
 
 
 def checked_field(name: str, default: Any, value: Any) -> Any:

@@ -143,8 +143,8 @@ def step(
 
     `frames` (N, H, W) and `previous`, the last frames of the region (N, h, w), are uint8 or float32. The
     region starts at (y0, x0); `weight` holds its pixel weights, (h, w) float32, or is of shape (0, 0) if all
-    are 1. `active` is (N,) bool. `scalars` (N, RING + n_ts) and `const` are float64, indexed by the names in
-    `scalars`. The other arguments are the maps of `allocate`.
+    are 1. `active` is (N,) bool. `scalars` (N, RING + window) and `const` are float64, indexed by the names
+    in `scalars`. The other arguments are the maps of `allocate`.
     """
     for n in range(first, last):
         if not active[n]:

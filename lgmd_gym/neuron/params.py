@@ -68,6 +68,10 @@ class LGMDParams:
         warm_start: Whether the filters of E and F start at their first input instead of 0; default True.
             If False, gratings cause spikes in the first frames.
         whole_ms: Whether the frame interval is truncated to whole milliseconds; default False.
+        spikes_from: Potential in the exponent of eq. 11: "adapted", that after SFA, or "membrane", K itself,
+            as printed; default "adapted".
+        extra_frame: Whether the sum of eq. 12 has n_ts + 1 terms over n_ts frame intervals, as printed;
+            default False: n_ts terms.
         max_spikes: Largest number of spikes of a frame; default `inf`, >= 1.
         k_0: K and adapted K before the first change; default 0.5, 0 to 0.5.
 
@@ -110,6 +114,8 @@ class LGMDParams:
     latency: Literal["clamp", "jump"] = "clamp"
     warm_start: bool = True
     whole_ms: bool = False
+    spikes_from: Literal["adapted", "membrane"] = "adapted"
+    extra_frame: bool = False
     max_spikes: float = math.inf
     k_0: float = 0.5
 
@@ -129,9 +135,23 @@ class LGMDParams:
         """Coefficients a_1..a_{n_p} of equation 1."""
         return tuple(1.0 / (1.0 + math.exp(min(self.u * i, 700.0))) for i in range(1, self.n_p + 1))
 
+    @property
+    def window(self) -> int:
+        """Number of terms in the sum of equation 12 [frames]."""
+        return self.n_ts + self.extra_frame
+
     def frame_interval_ms(self, fps: float) -> float:
         """Return the frame interval dt of the filters [ms] at a frame rate [Hz]."""
         return float(math.floor(1000.0 / fps)) if self.whole_ms else 1000.0 / fps
+
+    @classmethod
+    def literal(cls) -> Self:
+        """Return the parameters for the equations as printed in the paper.
+
+        Spikes follow from K instead of the adapted potential (eq. 11), the sum of eq. 12 has seven terms, and
+        the filters start at 0. The page on the neuron has the effect of each of these deviations.
+        """
+        return cls(spikes_from="membrane", extra_frame=True, warm_start=False)
 
     @classmethod
     def released(cls) -> Self:

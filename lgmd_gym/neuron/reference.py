@@ -62,7 +62,7 @@ class ReferenceLGMD:
         self.f_hat = self.f_last = 0.0
         self.first_change = True
         self.k = self.k_hat = p.k_0
-        self.window = [0] * p.n_ts
+        self.window = [0] * (p.n_ts + p.extra_frame)
         self.g = zeros
         self.layers = dict.fromkeys("PEISG", zeros)
 
@@ -155,7 +155,8 @@ class ReferenceLGMD:
         rise, keep = k - self.k, 1.0 / (1.0 + self.dt / p.tau_s) if p.tau_s > 0 else 0.0
         self.k_hat = max(0.5, keep * (self.k_hat + rise if rise <= p.t_sfa else k))
         self.k = k
-        spikes = int(min(p.max_spikes, math.floor(math.exp(p.sigma_4 * (self.k_hat - p.t_sp)))))
+        potential = self.k_hat if p.spikes_from == "adapted" else self.k
+        spikes = int(min(p.max_spikes, math.floor(math.exp(p.sigma_4 * (potential - p.t_sp)))))
         self.window = [*self.window[1:], spikes]
         rate = 1000.0 / self.dt if p.whole_ms else self.fps
         frequency = sum(self.window) * rate / p.n_ts

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lgmd_gym.neuron.params import LGMDParams
 
-# Indices of the scalar state: Response, internal state, then a ring buffer of the spikes of n_ts frames.
+# Indices of the scalar state: Response, internal state, then a ring buffer of the spikes of `window` frames.
 FREQUENCY, SPIKES, K, K_HAT, F, W, LATENCY, ALERT = range(8)
 AGE, F_HAT, K_SUM, COUNT, GAIN_G, RING = range(8, 14)
 RESPONSE = slice(0, 8)
@@ -23,8 +23,8 @@ RESPONSE = slice(0, 8)
 (
     N_PIXELS, GAIN_F, T_F, SIGMA_1, SIGMA_2, TAU_G, DT, SIGMA_3, KEEP, T_SFA, SIGMA_4, T_SP, N_TS, RATE, T_SF,
     T_FFI, FFI_DELAY, LATENCY_JUMPS, WARM_START, MAX_SPIKES, DELTA_C, C_W, T_G, THETA_1, THETA_2, THETA_3,
-    RESIDUE, TWO_TAP, N_P, GAIN_2, WEIGHT, TAP,
-) = (*range(30), 32, 35)  # fmt: skip
+    RESIDUE, TWO_TAP, N_P, FROM_K, WINDOW, GAIN_2, WEIGHT, TAP,
+) = (*range(32), 34, 37)  # fmt: skip
 
 
 def pack_constants(params: LGMDParams, fps: float, n_pixels: int) -> NDArray[np.float64]:
@@ -43,15 +43,15 @@ def pack_constants(params: LGMDParams, fps: float, n_pixels: int) -> NDArray[np.
             n_pixels, dt / (dt + p.tau_1), p.t_f, p.sigma_1, p.sigma_2, p.tau_g, dt, p.sigma_3, keep, p.t_sfa,
             p.sigma_4, p.t_sp, p.n_ts, rate, p.t_sf, p.t_ffi, p.ffi_delay, p.latency == "jump", p.warm_start,
             p.max_spikes, p.delta_c, p.c_w, p.t_de / p.c_de, p.theta_1, p.theta_2, p.theta_3,
-            p.on_off_residue, p.delay == "two-tap", p.n_p, *(dt / (dt + tau) for tau in p.tau_2), *p.weights,
-            *p.persistence,
+            p.on_off_residue, p.delay == "two-tap", p.n_p, p.spikes_from == "membrane", p.window,
+            *(dt / (dt + tau) for tau in p.tau_2), *p.weights, *p.persistence,
         ]
     )  # fmt: skip
 
 
 def initial_scalars(params: LGMDParams) -> NDArray[np.float64]:
-    """Return the scalar state of a neuron before its first frame, shape (RING + n_ts,)."""
-    row = np.zeros(RING + params.n_ts)
+    """Return the scalar state of a neuron before its first frame, shape (RING + window,)."""
+    row = np.zeros(RING + params.window)
     row[[K, K_HAT, W, LATENCY]] = params.k_0, params.k_0, params.sigma_1, params.tau_g
     return row
 
@@ -83,9 +83,10 @@ def fire(row: NDArray, const: NDArray, sum_g: float | np.floating) -> None:
     rise = k - row[K]
     adapted = const[KEEP] * (row[K_HAT] + rise if rise <= const[T_SFA] else k)
     row[K], row[K_HAT] = k, max(0.5, adapted)
-    spikes = min(const[MAX_SPIKES], math.floor(math.exp(const[SIGMA_4] * (row[K_HAT] - const[T_SP]))))
+    potential = row[K] if const[FROM_K] > 0.0 else row[K_HAT]
+    spikes = min(const[MAX_SPIKES], math.floor(math.exp(const[SIGMA_4] * (potential - const[T_SP]))))
 
-    slot = RING + int(row[AGE]) % int(const[N_TS])
+    slot = RING + int(row[AGE]) % int(const[WINDOW])
     row[COUNT] += spikes - row[slot]
     row[slot] = row[SPIKES] = spikes
     row[FREQUENCY] = row[COUNT] * const[RATE] / const[N_TS]

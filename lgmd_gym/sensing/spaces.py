@@ -106,11 +106,12 @@ def yaw_rate(heading: float, previous: float, elapsed: float) -> float:
 
 
 def max_spike_frequency(params: LGMDParams, fps: float) -> float:
-    """Return the upper bound of the spike frequency [spikes/s], from K̂ <= τ_s / (τ_s + dt)."""
+    """Return the upper bound of the spike frequency [spikes/s], from K <= 1 and K̂ <= τ_s / (τ_s + dt)."""
     interval_ms = params.frame_interval_ms(fps)
-    max_k_hat = 1.0 if isinf(params.tau_s) else params.tau_s / (params.tau_s + interval_ms)
-    spikes = floor(exp(params.sigma_4 * (max_k_hat - params.t_sp)))
-    return min(spikes, params.max_spikes) * 1000.0 / interval_ms
+    adapts = params.spikes_from == "adapted" and not isinf(params.tau_s)
+    highest = params.tau_s / (params.tau_s + interval_ms) if adapts else 1.0
+    spikes = floor(exp(params.sigma_4 * (highest - params.t_sp)))
+    return min(spikes, params.max_spikes) * params.window / params.n_ts * 1000.0 / interval_ms
 
 
 def max_ffi(params: LGMDParams) -> float:

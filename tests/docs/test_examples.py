@@ -94,6 +94,16 @@ def test_ablations(tmp_path, capsys):
 
 
 @pytest.mark.slow
+def test_deviations(capsys):
+    effects = load("deviations").main()
+    assert capsys.readouterr().out.count("\n") == 2 + len(effects)
+    default, literal = effects["default"], effects["`literal`"]
+    assert (default.silent_gratings, default.frames[2]) == (30, 0)
+    assert literal.silent_gratings < 30
+    assert literal.peak > effects["spikes from K (eq. 11)"].peak > default.peak
+
+
+@pytest.mark.slow
 def test_on_record(capsys):
     """The result on recorded episodes equals that of the closed loop."""
     example = load("on_record")

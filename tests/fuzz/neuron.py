@@ -36,6 +36,8 @@ CHANGES = {
     "delay": lambda rng: str(rng.choice(["recursive", "two-tap"])),
     "latency": lambda rng: str(rng.choice(["clamp", "jump"])),
     "warm_start": lambda rng: bool(rng.integers(2)),
+    "spikes_from": lambda rng: str(rng.choice(["adapted", "membrane"])),
+    "extra_frame": lambda rng: bool(rng.integers(2)),
     "n_ts": lambda rng: int(rng.integers(1, 12)),
 }
 

@@ -30,7 +30,7 @@ def test_constants_by_hand():
         theta_2=3.0, theta_3=4.0, c_w=5.0, delta_c=0.5, c_de=0.25, t_de=10.0, t_f=30.0, sigma_1=0.75,
         sigma_2=0.125, tau_g=35.0, sigma_3=1.25, tau_s=100.0, t_sfa=0.0625, sigma_4=6.0, t_sp=0.625, n_ts=4,
         t_sf=45.0, t_ffi=55.0, ffi_delay=1, on_off_residue=0.375, delay="two-tap", latency="jump",
-        max_spikes=7.0,
+        max_spikes=7.0, spikes_from="membrane", extra_frame=True,
     )  # fmt: skip
     const = sc.pack_constants(params, FPS, PIXELS)
     expected = {
@@ -38,7 +38,8 @@ def test_constants_by_hand():
         "DT": 25, "SIGMA_3": 1.25, "KEEP": 0.8, "T_SFA": 0.0625, "SIGMA_4": 6, "T_SP": 0.625, "N_TS": 4,
         "RATE": 40, "T_SF": 45, "T_FFI": 55, "FFI_DELAY": 1, "LATENCY_JUMPS": 1, "WARM_START": 1,
         "MAX_SPIKES": 7, "DELTA_C": 0.5, "C_W": 5, "T_G": 40, "THETA_1": 2, "THETA_2": 3, "THETA_3": 4,
-        "RESIDUE": 0.375, "TWO_TAP": 1, "N_P": 1, "GAIN_2": 0.5, "WEIGHT": 1.5, "TAP": 1 / (1 + exp(0.5)),
+        "RESIDUE": 0.375, "TWO_TAP": 1, "N_P": 1, "FROM_K": 1, "WINDOW": 5, "GAIN_2": 0.5, "WEIGHT": 1.5,
+        "TAP": 1 / (1 + exp(0.5)),
     }  # fmt: skip
     assert {name: const[getattr(sc, name)] for name in expected} == pytest.approx(expected)
     assert const[sc.GAIN_2 : sc.GAIN_2 + 3] == pytest.approx([0.5, 0.25, 0.2])
@@ -194,6 +195,22 @@ def test_spike_frequency_counts_the_last_frames():
     assert [frequency for _, frequency, _ in seen] == pytest.approx([40 * count / 3 for count in counts])
     assert [spikes for spikes, _, _ in seen] == [1, 1, 0, 1, 0, 0, 0]
     assert row[sc.AGE] == 7
+
+
+def test_an_extra_frame_counts_with_the_divisor_of_the_others():
+    row, const = neuron(n_ts=3, extra_frame=True, t_sp=0.5, max_spikes=1.0, t_ffi=1.0)
+    seen = []
+    for _ in range(5):
+        excite(row, const, 0.0, f=1.0)
+        seen.append(row[sc.FREQUENCY])
+    assert seen == pytest.approx([40 * count / 3 for count in (1, 2, 3, 4, 4)])
+
+
+@pytest.mark.parametrize(("source", "spikes"), [("adapted", 0.0), ("membrane", 3.0)])
+def test_spikes_follow_from_the_adapted_or_the_membrane_potential(source, spikes):
+    row, const = neuron(spikes_from=source, t_sp=0.68, sigma_4=10.0, tau_s=25.0, t_sfa=0.0)  # K is halved
+    excite(row, const, sum_for(0.8))
+    assert (row[sc.K], row[sc.SPIKES]) == (pytest.approx(0.8), spikes)
 
 
 @pytest.mark.parametrize(("t_sf", "alert"), [(39.999, 1.0), (40.0, 1.0), (40.001, 0.0)])

@@ -25,6 +25,12 @@ def test_released_preset_has_the_values_of_the_released_code():
     assert [p.frame_interval_ms(fps) for fps in (30.0, 18.0, 25.0)] == [33.0, 55.0, 40.0]
 
 
+def test_literal_preset_differs_in_three_fields():
+    changed = {"spikes_from": "membrane", "extra_frame": True, "warm_start": False}
+    assert LGMDParams.literal().to_dict() == LGMDParams().to_dict() | changed
+    assert (LGMDParams().window, LGMDParams.literal().window) == (6, 7)
+
+
 def test_persistence_follows_equation_1():
     assert LGMDParams(n_p=3).persistence == pytest.approx([0.268941, 0.119203, 0.047426], abs=1e-6)
     assert LGMDParams(n_p=0).persistence == ()

@@ -4,6 +4,7 @@ from lgmd_gym.neuron import LGMD, LGMDParams
 
 PRESETS = {
     "default": LGMDParams(),
+    "literal": LGMDParams.literal(),
     "released": LGMDParams.released(),
     "fixed_inhibition": LGMDParams.fixed_inhibition(),
     "off_only": LGMDParams.off_only(),
