@@ -35,7 +35,7 @@ ROADS = {"still": 0.0, "smooth": 0.5, "normal": 1.0, "rough": 2.0}
 before.
 """
 _CHOICES = {
-    "detector": ("lgmd", "lplc2"),
+    "detector": ("lgmd", "lplc2", "dsn"),
     "gaze": ("fixed", "path", "stopping"),
     "vehicles": ("car", "box"),
     "light": ("day", "night", "low_sun"),
@@ -54,8 +54,8 @@ class CameraParams:
     Attributes:
         name: Label of the camera; its results are stored under this key.
         shape: `(height, width)` of the frame [px].
-        detector: Model that processes the frames: `"lgmd"` (`LGMD`), or `"lplc2"` (`LPLC2` with its default
-            parameters, for frames of at least 16 × 16 px).
+        detector: Model that processes the frames: `"lgmd"` (`LGMD`), `"lplc2"` (`LPLC2`, for frames of at
+            least 16 × 16 px) or `"dsn"` (`DSN`), the last two with their default parameters.
         hfov_deg: Horizontal field of view, in (1, 170) [degrees].
         mount_height: Height of the lens above the ground [m].
         mount_setback: Distance of the lens behind the front bumper [m].

@@ -1,10 +1,12 @@
-"""Looming neurons: the LGMD with its reference model and danger zone, and an LPLC2 model."""
+"""Neurons: the LGMD with its reference model and danger zone, LPLC2, and a direction-selective neuron."""
 
 from lgmd_gym.neuron.danger_zone import danger_zone
+from lgmd_gym.neuron.dsn import DSN, DSNParams
 from lgmd_gym.neuron.lplc2 import LPLC2
 from lgmd_gym.neuron.lplc2_params import LPLC2Params
 from lgmd_gym.neuron.model import LGMD
 from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.response import Response
 
-__all__ = ["LGMD", "LPLC2", "LGMDParams", "LPLC2Params", "NeuronSpec", "Response", "danger_zone"]
+__all__ = ["DSN", "LGMD", "LPLC2", "DSNParams", "LGMDParams", "LPLC2Params", "NeuronSpec", "Response"]
+__all__ += ["danger_zone"]

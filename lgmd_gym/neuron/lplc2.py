@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from lgmd_gym.neuron import lplc2_kernels
 from lgmd_gym.neuron.frame_neuron import FrameNeuron
-from lgmd_gym.neuron.lplc2_params import LPLC2Params, LPLC2Spec
+from lgmd_gym.neuron.lplc2_params import LPLC2Params
+from lgmd_gym.neuron.motion_params import MotionSpec
 from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
 
@@ -58,7 +59,7 @@ class LPLC2(FrameNeuron):
         self,
         shape: tuple[int, int],
         fps: float = 30.0,
-        params: LPLC2Spec = None,
+        params: MotionSpec = None,
         num: int | None = None,
         *,
         spikes: NeuronSpec = None,
@@ -76,9 +77,7 @@ class LPLC2(FrameNeuron):
         self._scalars = np.tile(self._initial, (self._count, 1))
         constants = LGMDParams.make({**stage.to_dict(), "sigma_3": p.sigma})
         self._const = pack_constants(constants, self.fps, n_pixels=1)
-        dt = 1000.0 / self.fps
-        gains = [dt / (dt + tau) for tau in (p.tau_mean_ms, p.tau_delay_ms)]
-        self._gains = np.array(gains, np.float32)
+        self._gains = np.array(p.gains(self.fps), np.float32)
         self._sizes = np.array([p.radius_px, p.stride_px, p.vertical], np.int64)
         height, width = self.shape
         grid = tuple((side - 2 * p.radius_px) // p.stride_px + 1 for side in self.shape)

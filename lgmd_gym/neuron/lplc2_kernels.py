@@ -1,57 +1,17 @@
-"""Kernels of the LPLC2 model: motion of neighbouring pixels, and units with four arms."""
+"""Kernels of the LPLC2 model: units with four arms."""
 
 import math
 
-import numpy as np
 from numba import njit
 
+from lgmd_gym.neuron.motion_kernels import (
+    detect_motion_down,
+    detect_motion_right,
+    filter_light,
+    start,
+    update_delay,
+)
 from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
-
-
-@njit(cache=True, nogil=True)
-def _photoreceptors(frame, mean, on, off, gain):
-    """Subtract the mean light and split the difference into ON and OFF (eq. 1 and 2)."""
-    height, width = mean.shape
-    for y in range(height):
-        for x in range(width):
-            change = np.float32(frame[y, x]) - mean[y, x]
-            mean[y, x] += gain * change
-            on[y, x], off[y, x] = max(change, np.float32(0.0)), max(-change, np.float32(0.0))
-
-
-@njit(inline="always")
-def _compressed(correlation):
-    """Return the signed square root."""
-    return math.copysign(math.sqrt(abs(correlation)), correlation)
-
-
-@njit(cache=True, nogil=True)
-def _motion(on, off, late_on, late_off, right, down):
-    """Correlate each pixel with the next one to the right and below (eq. 4); returns the sum of |right|."""
-    height, width = on.shape
-    total = 0.0
-    for y in range(height):
-        for x in range(width - 1):
-            value = late_on[y, x] * on[y, x + 1] - on[y, x] * late_on[y, x + 1]
-            value += late_off[y, x] * off[y, x + 1] - off[y, x] * late_off[y, x + 1]
-            right[y, x] = _compressed(value)
-            total += abs(right[y, x])
-    for y in range(height - 1):
-        for x in range(width):
-            value = late_on[y, x] * on[y + 1, x] - on[y, x] * late_on[y + 1, x]
-            value += late_off[y, x] * off[y + 1, x] - off[y, x] * late_off[y + 1, x]
-            down[y, x] = _compressed(value)
-    return total
-
-
-@njit(cache=True, nogil=True)
-def _delay(on, off, late_on, late_off, gain):
-    """Update the delayed ON and OFF (eq. 3)."""
-    height, width = on.shape
-    for y in range(height):
-        for x in range(width):
-            late_on[y, x] += gain * (on[y, x] - late_on[y, x])
-            late_off[y, x] += gain * (off[y, x] - late_off[y, x])
 
 
 @njit(cache=True, nogil=True)
@@ -121,14 +81,13 @@ def step(
             continue
         row = scalars[n]
         if row[AGE] == 0.0:
-            for y in range(mean.shape[1]):
-                for x in range(mean.shape[2]):
-                    mean[n, y, x] = frames[n, y, x]
+            start(frames[n], mean[n])
             row[AGE] = 1.0
             continue
-        _photoreceptors(frames[n], mean[n], on[n], off[n], gains[0])
-        total = _motion(on[n], off[n], late_on[n], late_off[n], right[n], down[n])
-        _delay(on[n], off[n], late_on[n], late_off[n], gains[1])
+        filter_light(frames[n], mean[n], on[n], off[n], gains[0])
+        _, total = detect_motion_right(on[n], off[n], late_on[n], late_off[n], right[n])
+        detect_motion_down(on[n], off[n], late_on[n], late_off[n], down[n])
+        update_delay(on[n], off[n], late_on[n], late_off[n], gains[1])
         across, along = tables[n, 0], tables[n, 1]
         _integrate(right[n], across)
         if sizes[2] != 0:

@@ -29,6 +29,7 @@ LAYERS = {
         ("down", "motion downwards", 32.0, True),
         ("units", "responses of the units", 8.0, False),
     ),
+    "dsn": (("right", "motion to the right", 32.0, True),),
 }
 LAYER_BOXES: tuple[Box, ...] = (
     (848, 60, 1044, 170),

@@ -9,7 +9,7 @@ from lgmd_gym.camera import CameraParams
 from lgmd_gym.camera.batch import CameraBatch
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.context import Workspace
-from lgmd_gym.neuron import LGMD, LPLC2, LGMDParams
+from lgmd_gym.neuron import DSN, LGMD, LPLC2, LGMDParams
 from lgmd_gym.neuron.frame_neuron import FrameNeuron
 from lgmd_gym.sensing.kernels import collect_outputs, select_cameras
 
@@ -23,12 +23,13 @@ def make_neurons(
         detector: See `CameraParams`.
         shape: Frame shape (height, width) [px].
         fps: Camera frame rate [Hz].
-        params: Parameters of the LGMD; of LPLC2, only those of the adaptation and the spikes.
+        params: Parameters of the LGMD; of the other models, only those of the adaptation and the spikes.
         num: Number of neurons.
     """
-    if detector == "lplc2":
-        return LPLC2(shape, fps, num=num, spikes=params)
-    return LGMD(shape, fps, params, num)
+    if detector == "lgmd":
+        return LGMD(shape, fps, params, num)
+    model = LPLC2 if detector == "lplc2" else DSN
+    return model(shape, fps, num=num, spikes=params)
 
 
 class SensorGroup:

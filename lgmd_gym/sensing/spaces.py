@@ -35,9 +35,12 @@ def make_space(
         ValueError: For `include_frame` with cameras of different shapes.
     """
     count = (len(sensors.names),)
+    # A direction-selective neuron is inhibited below 0.5 by motion against its direction.
+    lowest = [0.0 if detector == "dsn" else min(params.k_0, 0.5) for detector in sensors.detectors]
+    low = np.array(lowest, np.float32)
     parts: dict[str, spaces.Space[Any]] = {
         "spike_frequency": spaces.Box(0.0, max_spike_frequency(params, fps), count, np.float32),
-        "membrane_potential": spaces.Box(min(params.k_0, 0.5), 1.0, count, np.float32),
+        "membrane_potential": spaces.Box(low, np.ones(count, np.float32), dtype=np.float32),
         "ffi": spaces.Box(0.0, max_ffi(params), count, np.float32),
         "ego_speed": spaces.Box(-SPEED_BOUND, SPEED_BOUND, (1,), np.float32),
         # The heading changes by at most half a turn per simulation step.

@@ -45,7 +45,8 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     ======================  ==========================  =================================================
     ``spike_frequency``     (cameras,)                  spikes of the last n_ts frames [spikes/s], from 0
                                                         to about 10 · fps
-    ``membrane_potential``  (cameras,)                  K (eq. 10), 0.5 to 1
+    ``membrane_potential``  (cameras,)                  K (eq. 10), 0.5 to 1; from 0 with
+                                                        ``detector="dsn"``
     ``ffi``                 (cameras,)                  F̂ [grey levels], 0 to 255 / (1 − Σ a_i)
     ``ego_speed``           (1,)                        ego speed [m/s], −100 to 100
     ``ego_yaw_rate``        (1,)                        mean yaw rate of the decision [rad/s], positive

@@ -17,8 +17,8 @@ ARGUMENTS = {
     "two cameras": {"camera": TWO_LENSES},
     "frames of two cameras": {"camera": ["wide", "fovea"], "include_frame": True},
     "frames of three decisions in two": {"config": {"policy_frequency": 20}, "trace": True},
-    "two detectors": {
-        "camera": ["wide", {"name": "side", "yaw_deg": 30.0, "detector": "lplc2"}, "tele"],
+    "three detectors": {
+        "camera": ["wide", *({"name": name, "yaw_deg": 30.0, "detector": name} for name in ("lplc2", "dsn"))],
         **FRAMES,
     },
     "several frames per decision": {"config": {"policy_frequency": 10}, "trace": True},

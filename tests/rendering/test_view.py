@@ -8,7 +8,7 @@ from support.rollouts import BRAKE, HOLD
 
 from lgmd_gym import LGMDObservation, LGMDView
 from lgmd_gym.rendering import canvas
-from lgmd_gym.rendering.panels import CAMERA_COLOURS, CAMERA_FRAME, TOP_VIEW
+from lgmd_gym.rendering.panels import CAMERA_COLOURS, CAMERA_FRAME, LAYER_BOXES, TOP_VIEW
 from lgmd_gym.rendering.state import DisplayState
 from lgmd_gym.rendering.trace_panel import PLOT, SpikeTracePanel
 
@@ -173,3 +173,24 @@ def test_unsupported_environments_raise():
 def test_render_before_reset_raises():
     with pytest.raises(RuntimeError, match="reset must be called before render"):
         LGMDView(approach()).render()
+
+
+@pytest.mark.parametrize("detector", ["lplc2", "dsn"])
+def test_layers_are_those_of_the_detector(detector):
+    camera = {"name": "side", "yaw_deg": 10.0, "detector": detector}
+    pictures = []
+    for item in (camera, camera | {"detector": "lgmd"}):
+        env = LGMDView(approach(camera=item))
+        env.reset(seed=0)
+        for _ in range(10):
+            env.step(HOLD)
+        pictures.append(env.render())
+        env.close()
+    (left, top, right, bottom), *_ = LAYER_BOXES
+    first, second = (picture[top:bottom, left:right] for picture in pictures)
+    assert len(np.unique(first)) > 10
+    assert not np.array_equal(first, second)
+    left, top, right, bottom = LAYER_BOXES[3]  # only the LGMD has four layers
+    assert len(np.unique(pictures[0][top:bottom, left:right])) < len(
+        np.unique(pictures[1][top:bottom, left:right])
+    )

@@ -12,7 +12,7 @@ from support.roads import add_car, straight_env
 from lgmd_gym import LGMD, BirdsEye, CameraParams, EgoCamera, LGMDParams
 from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.camera.objects import OBJECT
-from lgmd_gym.neuron import LPLC2
+from lgmd_gym.neuron import DSN, LPLC2
 from lgmd_gym.sensing.sensor_array import SensorArray
 
 SMALL = {"shape": (45, 80)}
@@ -24,7 +24,9 @@ CAMERAS = [
     {"name": "path", "shape": (45, 80), "gaze": "path", "panorama": "natural", "mount_left": 0.4},
     {"name": "driver", "shape": (45, 80), "gaze": "path", "bonnet": True, "windscreen": 0.1},
     {"name": "side", "shape": (45, 80), "yaw_deg": 30.0, "detector": "lplc2"},
+    {"name": "flow", "shape": (30, 40), "yaw_deg": -30.0, "detector": "dsn"},
 ]
+MODELS = {"lgmd": LGMD, "lplc2": LPLC2, "dsn": DSN}
 FIELDS = [
     {},
     {"condition": "night", "texture": 0.7, "visibility_m": 40.0},
@@ -62,8 +64,7 @@ def make_array(camera=CAMERAS, num_envs=6, **arguments):
 def reference(camera, fields):
     """Return a camera and a neuron of their own."""
     own = EgoCamera(CameraParams.make(camera), **fields)
-    model = LPLC2 if own.params.detector == "lplc2" else LGMD
-    return own, model(own.shape, 30.0)
+    return own, MODELS[own.params.detector](own.shape, 30.0)
 
 
 @pytest.mark.parametrize("threads", [None, 3])

@@ -1,0 +1,56 @@
+"""Parameters that the models of motion detectors share."""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Self, TypeAlias
+
+from lgmd_gym.errors import check_keys, check_positive, shown
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionParams:
+    """Parameters of motion detectors; see `LPLC2` for the equations.
+
+    Attributes:
+        tau_mean_ms: Time constant of the mean light that photoreceptors subtract, > 0 [ms].
+        tau_delay_ms: Time constant of the delay of the motion detectors, > 0 [ms].
+        sigma: Response at which K = 0.73, > 0 [grey levels].
+
+    Raises:
+        ValueError: For a value out of range or of another type.
+    """
+
+    tau_mean_ms: float = 100.0
+    tau_delay_ms: float = 30.0
+    sigma: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("tau_mean_ms", "tau_delay_ms", "sigma"):
+            object.__setattr__(self, name, check_positive(name, getattr(self, name)))
+
+    def gains(self, fps: float) -> tuple[float, float]:
+        """Return the gains dt / (dt + τ) of the mean light and of the delay at a frame rate [Hz]."""
+        dt = 1000.0 / fps
+        return dt / (dt + self.tau_mean_ms), dt / (dt + self.tau_delay_ms)
+
+    @classmethod
+    def make(cls, spec: "Self | Mapping[str, Any] | None") -> Self:
+        """Return the parameters for a `params` argument: an instance, a mapping, or None for the defaults.
+
+        Raises:
+            ValueError: For an unknown key, a value out of range, or another type.
+        """
+        if spec is None:
+            return cls()
+        if isinstance(spec, cls):
+            return spec
+        if isinstance(spec, Mapping):
+            known = (field.name for field in dataclasses.fields(cls))
+            check_keys(f"{cls.__name__.removesuffix('Params')} parameter", spec, known)
+            return cls(**spec)
+        raise ValueError(f"params must be {cls.__name__}, a mapping or None, got {shown(spec)}")
+
+
+MotionSpec: TypeAlias = MotionParams | Mapping[str, Any] | None
+"""The `params` argument of models of motion detectors; None for the default parameters."""
