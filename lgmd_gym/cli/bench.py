@@ -126,8 +126,7 @@ def _print_tables(benchmark: "Run", console: Console) -> None:
         agents = list(dict.fromkeys([NO_BRAKE, *config.agents]))
         for table in tables.score_tables(rows, agents, title):
             console.print(table)
-        for table in tables.tables_by_case(rows, agents, suite):
-            console.print(table)
+        console.print(tables.table_by_case(rows, agents, suite))
 
 
 def _title(benchmark: "Run") -> str:

@@ -16,7 +16,7 @@ def run(options: Compare) -> int:
     if options.arms is None:
         _compare_pairs(options, make_console())
     else:
-        _compare_arms(options, options.arms, make_console(width=120))
+        _compare_arms(options, options.arms, make_console())
     return 0
 
 

@@ -5,14 +5,22 @@ import sys
 
 from rich.console import Console
 
+from lgmd_gym.cli.fit import FittedTables
 
-def make_console(width: int = 110) -> Console:
-    """Return a console for stdout; files and pipes get a fixed width [columns].
+WIDTH = 80  # columns of a file or pipe
 
-    It prints text as it is: names of users may look like rich's markup or emoji codes.
+
+def make_console() -> Console:
+    """Return a console for stdout that fits tables into its width.
+
+    Files and pipes get the width in the variable COLUMNS, else that of `WIDTH` columns. The console prints
+    text as it is: names of users may look like rich's markup or emoji codes.
     """
     console = Console(markup=False, emoji=False)
-    return console if console.is_terminal else Console(markup=False, emoji=False, width=width)
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console = Console(markup=False, emoji=False, width=WIDTH)
+    console.push_render_hook(FittedTables(console))
+    return console
 
 
 def io_reason(error: OSError) -> str:

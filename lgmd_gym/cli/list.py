@@ -27,40 +27,42 @@ def run(options: List) -> int:
 
 def suites() -> Table:
     """Return the suites with their number of cases per family."""
-    table = Table("suite", "cases", "families", "description", title="suites")
+    table = Table("suite", "cases", "description", title="suites")
     for name, suite in SUITES.items():
         counts: dict[str, int] = {}
         for case in suite.cases:
             kind = case.family + (" with FCW driver" if case.fcw_driver else "")
             counts[kind] = counts.get(kind, 0) + 1
         families = ", ".join(f"{family} {count}" for family, count in counts.items())
-        table.add_row(name, str(len(suite.cases)), families, suite.about)
+        table.add_row(name, str(len(suite.cases)), _entry(suite.about, "families", families))
     description = "IDM traffic on highway-env's roads; the agent can only brake; false activations per 100 km"
-    table.add_row(TRAFFIC, "one per seed", ", ".join(KINDS), description)
+    table.add_row(TRAFFIC, "one per\nseed", _entry(description, "kinds", ", ".join(KINDS)))
     return table
 
 
 def agents() -> Table:
     """Return the agents with their options."""
-    table = Table("agent", "options", "description", title="agents")
+    table = Table("agent", "description", title="agents")
     for name, cls in AGENTS.items():
         options = ", ".join(f"{option}={default:g}" for option, default in cls.options().items())
-        table.add_row(name, options, _summary(cls))
+        table.add_row(name, _entry(_summary(cls), "options", options))
     for name in shipped_policies():
         algo = read_card(find_policy(name))["algo"].upper()
         description = f'Policy trained with {algo}; requires the extra "train". Loading it unpickles code.'
-        table.add_row(f"policy:{name}", "", description)
+        table.add_row(f"policy:{name}", description)
     return table
 
 
 def envs() -> Table:
     """Return the environments with their arguments."""
-    table = Table("environment", "arguments (SI)", "description", title="environments")
+    table = Table("environment", "description", title="environments (arguments in SI units)")
     for family, function in FAMILIES.items():
-        table.add_row(env_id(family), ", ".join(inspect.signature(function).parameters), _summary(function))
-    table.add_row(env_id(SCENARIO), SCENARIO_ARGUMENT, "A scenario given as data, as in `Scenario`.")
-    arguments = "split, start_level, num_levels, conditions"
-    table.add_row(env_id(RANDOM), arguments, "Draw a new scenario of these families at every reset.")
+        arguments = ", ".join(inspect.signature(function).parameters)
+        table.add_row(env_id(family), _entry(_summary(function), "arguments", arguments))
+    about = "A scenario given as data, as in `Scenario`."
+    table.add_row(env_id(SCENARIO), _entry(about, "argument", SCENARIO_ARGUMENT))
+    about = "Draw a new scenario of these families at every reset."
+    table.add_row(env_id(RANDOM), _entry(about, "arguments", "split, start_level, num_levels, conditions"))
     return table
 
 
@@ -72,6 +74,11 @@ def cameras() -> Table:
         table.add_row(name, f"{width}×{height}", f"{params.hfov_deg:g}°", f"{params.pixels_per_degree:.1f}")
     table.add_row("birdseye", "highway-env's top view", "", "")
     return table
+
+
+def _entry(description: str, kind: str, details: str) -> str:
+    """Return a description with the details of a kind below it, if there are any."""
+    return f"{description}\n{kind}: {details}" if details else description
 
 
 def _summary(item: object) -> str:

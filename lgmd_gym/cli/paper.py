@@ -40,7 +40,7 @@ def run(options: Paper) -> int:
     out = video.default_out(options.out, "paper")
     with video.run_folder(out, settings) as folder:
         clip_results = _experiments(options, jobs, folder)
-    make_console(120).print(f"claims and figures: {out}", soft_wrap=True)
+    make_console().print(f"claims and figures: {out}", soft_wrap=True)
     return video.print_errors(clip_results)
 
 
@@ -49,7 +49,7 @@ def _experiments(options: Paper, jobs: Sequence[ClipJob], folder: Path) -> list[
     with video.progress_bar("paper", experiments.STEPS) as set_progress:
         steps = iter(range(1, experiments.STEPS + 1))
         results = experiments.run_experiments(lambda: set_progress(next(steps)), options.picture)
-    console, clip_results, detections = make_console(120), [], None
+    console, clip_results, detections = make_console(), [], None
     if jobs:
         clip_results, detections = _process_all_configs(folder, jobs, console)
     claims = evaluate_claims(results, detections)

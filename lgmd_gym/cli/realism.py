@@ -33,7 +33,7 @@ def run(options: Paper) -> int:
     with video.run_folder(out, settings) as folder:
         drives = _all_values(jobs, optics, options.night, simulated_drives(worlds, seeds))
         _write(drives, folder)
-    make_console(120).print(f"tables and figure: {out}", soft_wrap=True)
+    make_console().print(f"tables and figure: {out}", soft_wrap=True)
     return 0
 
 
@@ -51,7 +51,7 @@ def _all_values(
 
 
 def _write(drives: Sequence[DriveValues], folder: Path) -> None:
-    comparisons, console = compare(drives), make_console(120)
+    comparisons, console = compare(drives), make_console()
     write_comparisons(comparisons, drives, folder)
     realism_figure(comparisons, folder / "realism.png")
     for table in comparison_tables(comparisons):

@@ -36,7 +36,7 @@ def run(options: Video) -> int:
     out = default_out(options.out, "video")
     with run_folder(out, {"clips": [job.clip for job in jobs], "configs": configs}) as folder:
         results = _process_all(options, jobs, configs, folder)
-    make_console(120).print(f"traces and figures: {out}", soft_wrap=True)
+    make_console().print(f"traces and figures: {out}", soft_wrap=True)
     return print_errors(results)
 
 
@@ -45,7 +45,7 @@ def _process_all(
 ) -> list[ClipResult]:
     """Process the clips with every configuration, print the tables and return all results."""
     folders = make_clip_folders(folder, jobs)
-    console, results, detections = make_console(120), [], {}
+    console, results, detections = make_console(), [], {}
     for name, config in configs.items():
         suffix = f"-{name}" if len(configs) > 1 else ""
         batch = process_clips(

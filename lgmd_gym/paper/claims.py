@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
@@ -250,9 +249,9 @@ def claim_table(rows: Sequence[ClaimResult]) -> Table:
     """Return the claims as a terminal table."""
     colours = {HOLDS: "green", PARTLY: "yellow", FAILS: "red"}
     title = "the paper's claims (T_sf = 30 spikes/s at 30 Hz unless stated otherwise)"
-    table = Table(title=title, box=SIMPLE_HEAD, show_lines=True, expand=True)
-    for name, ratio in (("claim", 5), ("measured", 9), ("result", 2), ("depends on", 5)):
-        table.add_column(name, ratio=ratio)
+    table = Table(title=title, show_lines=True)
+    for name in ("claim", "measured", "result", "depends on"):
+        table.add_column(name)
     for row in rows:
         table.add_row(row.claim, row.measured, Text(row.result, colours[row.result]), row.factor)
     return table

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from lgmd_gym.paper.realism import Comparison, DriveValues
@@ -24,7 +23,7 @@ def comparison_tables(comparisons: Sequence[Comparison]) -> list[Table]:
     """Return one terminal table per group."""
     tables = []
     for group, rows in _groups(comparisons).items():
-        table = Table(title=_title(group, rows), caption=CAPTION, box=SIMPLE_HEAD)
+        table = Table(title=_title(group, rows), caption=CAPTION)
         table.add_column(COLUMNS[0])
         for name in COLUMNS[1:]:
             table.add_column(name, justify="right")

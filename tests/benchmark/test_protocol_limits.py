@@ -17,7 +17,7 @@ from lgmd_gym.benchmark.analysis.protocol_limits import (
     meets_r152,
     r152_limit,
 )
-from lgmd_gym.benchmark.analysis.tables import limit_table, score_tables, tables_by_case
+from lgmd_gym.benchmark.analysis.tables import limit_table, score_tables
 from lgmd_gym.benchmark.summary import write_summary
 from lgmd_gym.envs.dynamics.units import KMH
 
@@ -139,17 +139,6 @@ def test_limit_results_leave_out_errors_and_non_threats():
 
 def test_agent_without_runs_does_not_meet_r152():
     assert not meets_r152([], "a")
-
-
-def test_many_agents_are_in_several_tables():
-    rows = [impact_row("CCRs/v20", 20, 0, 0) | {"agent": f"a{number}"} for number in range(9)]
-    agents = [row["agent"] for row in rows]
-    for suite in ("r152", "quick"):
-        rows = [row | {"avoided": True, "premature_brake": False, "speed_reduction": 5.0} for row in rows]
-        tables = tables_by_case(rows, agents, suite)
-        assert len(tables) == 2
-        headers = [str(column.header).replace("\n", "") for table in tables for column in table.columns]
-        assert [name for name in headers if name in agents] == agents
 
 
 def test_suite_without_limits_has_no_limit_table():

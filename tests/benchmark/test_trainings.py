@@ -159,11 +159,12 @@ def run_folder(tmp_path_factory):
     return folder / "run"
 
 
-def test_command_prints_one_line_per_arm(run_folder, capsys):
+def test_command_prints_one_line_per_arm(run_folder, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
     assert cli.run(["compare", str(run_folder), "--arms", "rule=spike-threshold*", "ttc-oracle"]) == 0
     text = capsys.readouterr().out
-    assert re.search(r"^ +rule +2 ", text, re.MULTILINE)
-    assert re.search(r"ttc-oracle +1 .* 100 \[21, 100\]", text)
+    assert re.search(r"^rule +2 ", text, re.MULTILINE)
+    assert re.search(r"ttc-oracle +1 .* 100 \[21,100\]", text)
 
 
 def test_command_makes_every_agent_an_arm_by_default(run_folder, capsys):

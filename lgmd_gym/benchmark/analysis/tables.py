@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from lgmd_gym.benchmark.analysis.protocol_limits import (
@@ -23,7 +22,6 @@ from lgmd_gym.benchmark.summary import (
 )
 from lgmd_gym.envs.dynamics.units import KMH
 
-AGENTS_PER_TABLE = 7
 SCORE_CAPTION = (
     f"k/n [{INTERVAL_TEXT}, in %]; mean speed reduction in km/h [95 %, bootstrap over cases and worlds]; "
     "median TTC in s; premature: more than 4 s before contact, does not count as avoided"
@@ -102,7 +100,7 @@ def score_tables(rows: list[Row], agents: list[str], title: str) -> list[Table]:
 
 
 def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
-    table = Table(title=title, caption=f"{Sample.of(rows)}; {SCORE_CAPTION}", box=SIMPLE_HEAD)
+    table = Table(title=title, caption=f"{Sample.of(rows)}; {SCORE_CAPTION}")
     table.add_column("agent", overflow="fold", min_width=15)
     for heading in ("avoided", "speed\nreduction", "TTC at\nbraking", "premature", "false\nactivation"):
         table.add_column(heading, justify="right")
@@ -118,13 +116,9 @@ def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
     return table
 
 
-def tables_by_case(rows: list[Row], agents: list[str], suite: str) -> list[Table]:
-    """Return the results per case, compared with the protocol's limits if the suite has limits.
-
-    Each table has `AGENTS_PER_TABLE` agents at most, because more columns do not fit into a terminal.
-    """
-    parts = [agents[i : i + AGENTS_PER_TABLE] for i in range(0, len(agents), AGENTS_PER_TABLE)]
-    return [limit_table(rows, part, suite) or case_table(rows, part) for part in parts]
+def table_by_case(rows: list[Row], agents: list[str], suite: str) -> Table:
+    """Return the results per case, compared with the protocol's limits if the suite has limits."""
+    return limit_table(rows, agents, suite) or case_table(rows, agents)
 
 
 def case_table(rows: list[Row], agents: list[str]) -> Table:
@@ -132,7 +126,7 @@ def case_table(rows: list[Row], agents: list[str]) -> Table:
     present = {row["agent"] for row in rows}
     shown = [agent for agent in agents if agent in present]
     title = "per case: threats avoided, or non-threats without false activation, of n"
-    table = Table(title=title, caption=str(Sample.of(rows)), box=SIMPLE_HEAD)
+    table = Table(title=title, caption=str(Sample.of(rows)))
     table.add_column("case", overflow="fold")
     _add_agent_columns(table, shown)
     for line in success_lines(rows, shown):
@@ -150,7 +144,7 @@ def limit_table(rows: list[Row], agents: list[str], suite: str) -> Table | None:
     if suite in R152_SUITES:
         met = ", ".join(agent for agent in shown if meets_r152(rows, agent)) or "none"
         caption += f"\nmeets the impact speed limits of UN R152 in simulation: {met}"
-    table = Table(title=f"{suite}: limits of the protocol", caption=caption, box=SIMPLE_HEAD)
+    table = Table(title=f"{suite}: limits of the protocol", caption=caption)
     table.add_column("case", overflow="fold")
     table.add_column("limit")
     _add_agent_columns(table, shown)

@@ -1,6 +1,5 @@
 """Tables of the traffic suite for the terminal."""
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from lgmd_gym.benchmark.rows import Row
@@ -30,17 +29,18 @@ def traffic_table(rows: list[Row], agents: list[str], title: str, by_kind: bool 
         rows: Rows of the traffic suite.
         agents: Agents in the order of the lines.
         title: Title of the table.
-        by_kind: Whether each kind of traffic has its own line.
+        by_kind: Whether each kind of traffic has its own line, below that of its agent.
     """
-    table = Table(title=title, caption=f"{Sample.of(rows)}; {CAPTION}", box=SIMPLE_HEAD)
-    table.add_column("agent", overflow="fold", min_width=15)
-    if by_kind:
-        table.add_column("traffic")
+    table = Table(title=title, caption=f"{Sample.of(rows)}; {CAPTION}")
+    table.add_column("agent\n  traffic" if by_kind else "agent", overflow="fold", min_width=15)
     for heading in HEADINGS:
         table.add_column(heading, justify="right")
     order = {agent: index for index, agent in enumerate(agents)}
     items = traffic_summaries(rows, by_kind)
+    agent = None
     for item in sorted(items, key=lambda item: order.get(item.agent, len(order))):
+        if by_kind and item.agent != agent:
+            table.add_row(agent := item.agent)
         table.add_row(*_cells(item, by_kind))
     return table
 
@@ -51,8 +51,7 @@ def _cells(item: TrafficSummary, by_kind: bool) -> list[str]:
     if item.distance > 0.0:
         rate = f"{item.per_100km(item.false_activations):.1f} [{low:.1f}–{high:.1f}]"
     return [
-        item.agent + (f" ({item.errors} errors)" if item.errors else ""),
-        *([item.kind] if by_kind else []),
+        (f"  {item.kind}" if by_kind else item.agent) + (f" ({item.errors} errors)" if item.errors else ""),
         f"{item.distance / 1000:.1f}",
         rate,
         f"{item.false_activations}/{item.brakes}",

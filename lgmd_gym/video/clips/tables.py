@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from lgmd_gym.video.clips.batch import ClipResult
@@ -86,7 +85,7 @@ def _table(
     text: Sequence[str], numbers: Sequence[str], title: str | None = None, note: str | None = None
 ) -> Table:
     """Return an empty table with columns of text on the left and of numbers on the right."""
-    table = Table(title=title, caption=note, box=SIMPLE_HEAD, caption_justify="left")
+    table = Table(title=title, caption=note, caption_justify="left")
     for name in text:
         table.add_column(name, overflow="fold")
     for name in numbers:
