@@ -9,7 +9,7 @@ import numpy as np
 
 from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.options import check_options, parse_agent
-from lgmd_gym.errors import shown
+from lgmd_gym.errors import shown, unknown_name
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -78,9 +78,13 @@ def make_user_agent(text: str) -> AgentAdapter:
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
     try:
-        agent_class = getattr(import_module(module), class_name)
-    except (ImportError, AttributeError, ValueError, TypeError) as error:
+        names = vars(import_module(module))
+    except (ImportError, ValueError, TypeError) as error:
         raise ValueError(f"agent {shown(name)} cannot be imported ({error}); write module:Class") from None
+    if class_name not in names:
+        classes = [f"{module}:{item}" for item, value in names.items() if isinstance(value, type)]
+        raise unknown_name("agent class", name, classes)
+    agent_class = names[class_name]
     if not hasattr(agent_class, "act"):
         raise ValueError(f"agent {shown(name)} has no method act(observation, info)")
     options = parse_agent(f"{module}:{''.join(rest)}")[1]

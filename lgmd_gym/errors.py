@@ -9,7 +9,8 @@ from typing import Any, cast
 
 import numpy as np
 
-MAX_LISTED = 40  # names that a message lists in full
+MAX_LISTED = 20  # names that a message lists in full
+MAX_CLOSEST = 3  # names that it suggests from a longer list
 MAX_SHOWN = 160  # characters of a value in a message
 
 
@@ -154,34 +155,36 @@ def is_integer(value: object) -> bool:
     return not isinstance(value, bool) and isinstance(value, Integral)
 
 
-def check_known(kind: str, name: Any, known: Collection[str]) -> str:
+def check_known(kind: str, name: Any, known: Collection[str], hint: str = "") -> str:
     """Return `name` if it is one of the known strings, or raise `unknown_name`."""
     if not isinstance(name, str) or name not in known:
-        raise unknown_name(kind, name, known)
+        raise unknown_name(kind, name, known, hint)
     return name
 
 
-def unknown_name(kind: str, name: object, known: Iterable[str]) -> ValueError:
+def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") -> ValueError:
     """Return a ValueError for an unknown name; its message suggests the closest known name.
 
     Args:
         kind: Kind of the named thing, for example "agent" or "camera preset".
         name: The unknown name.
-        known: Valid names.
+        known: Valid names; of more than `MAX_LISTED`, the closest `MAX_CLOSEST` are suggested.
+        hint: How to list all of them, for example "lgmd-gym list cases prints all names".
 
     Example:
         >>> unknown_name("agent", "spike-treshold", ["no-brake", "spike-threshold"])
         ValueError("unknown agent 'spike-treshold'; did you mean 'spike-threshold'?")
     """
     names, text = sorted(known), name[:MAX_SHOWN] if isinstance(name, str) else shown(name)
-    if closest := get_close_matches(text, names, n=1, cutoff=0.5):
-        fix = f"did you mean {closest[0]!r}?"
+    count = MAX_CLOSEST if len(names) > MAX_LISTED else 1
+    if closest := get_close_matches(text, names, n=count, cutoff=0.5):
+        fix = f"did you mean {' or '.join(map(repr, closest))}?"
     elif len(names) > MAX_LISTED:
-        closest = get_close_matches(text, names, n=5, cutoff=0.0)
+        closest = get_close_matches(text, names, n=count, cutoff=0.0)
         fix = f"closest of {len(names)} names: {', '.join(closest)}"
     else:
         fix = f"known: {', '.join(names) or 'none'}"
-    return ValueError(f"unknown {kind} {shown(name)}; {fix}")
+    return ValueError(f"unknown {kind} {shown(name)}; {fix}{f'; {hint}' if hint else ''}")
 
 
 def check_keys(kind: str, given: Iterable[str], known: Iterable[str]) -> None:

@@ -168,5 +168,5 @@ def find_case(name: str) -> Case:
         ValueError: If the name is unknown.
     """
     known = {case.name: case for suite in SUITES.values() for case in suite.cases}
-    check_known("case", name, known)
+    check_known("case", name, known, "lgmd-gym list cases prints all names")
     return known[name]

@@ -9,12 +9,16 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from lgmd_gym.cli.console import make_console
+from lgmd_gym.cli.options import refuse_unused
 from lgmd_gym.cli.params import read_params
 
 if TYPE_CHECKING:
     from lgmd_gym.benchmark.executor import Executor
     from lgmd_gym.benchmark.runner import Run
     from lgmd_gym.cli.options import Bench
+
+# Options that have an effect on a resumed run.
+RESUME_OPTIONS = ("resume", "trust", "jobs", "backend", "address", "plots", "report")
 
 
 def run(options: "Bench") -> int:
@@ -70,6 +74,7 @@ def _resume(options: "Bench", executor: "Executor", console: Console) -> "Run":
     from lgmd_gym.benchmark.runner import Run
 
     assert options.resume is not None
+    refuse_unused(options, "--resume", RESUME_OPTIONS)
     benchmark = Run.resume(options.resume, executor, options.trust)
     repaired = " after removal of an incomplete last line" if benchmark.folder.repaired else ""
     console.print(f"resuming with {len(benchmark.rows)} of {benchmark.total} episodes{repaired}")

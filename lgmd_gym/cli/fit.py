@@ -88,6 +88,9 @@ def _widen(columns: list[Column], widths: list[int], console: Console) -> list[i
             widths = needed
             break
     rest = console.width - _total(widths)
+    if rest < 0:  # of a part with the fewest columns: words of the widest one are broken, but names last
+        index = max(range(len(widths)), key=lambda i: (i > 0, widths[i]))
+        widths[index] = max(widths[index] + rest, 1)
     for index, column in enumerate(columns):
         texts = [Text(str(column.header)), *(_texts(column) if column.justify != "right" else [])]
         wider = min(max(_line_width(texts), widths[index]), widths[index] + max(rest, 0))
@@ -141,7 +144,7 @@ def _part(table: Table, columns: list[Column], widths: list[int]) -> Table:
         (0, 1, 0, 0),
     )
     part.columns = [
-        replace(column, width=width, ratio=None, min_width=None, _index=number)
+        replace(column, width=width, overflow="fold", ratio=None, min_width=None, _index=number)
         for number, (column, width) in enumerate(zip(columns, widths, strict=True))
     ]
     return part

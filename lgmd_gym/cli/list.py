@@ -1,6 +1,9 @@
-"""The `list` command: suites, agents, environments and cameras as tables."""
+"""The `list` command: suites, agents, environments, cameras and cases as tables."""
 
 import inspect
+import os
+import pydoc
+import sys
 from collections.abc import Callable
 
 from rich.table import Table
@@ -19,9 +22,16 @@ from lgmd_gym.envs.traffic.registration import KINDS
 def run(options: List) -> int:
     """Print one table, or all of them."""
     console = make_console()
-    for name, table in TABLES.items():
-        if options.what in ("all", name):
-            console.print(table())
+    with console.capture() as capture:
+        for name, table in TABLES.items():
+            if options.what == name or (options.what == "all" and name != "cases"):
+                console.print(table())
+    text = capture.get()
+    if options.pager and console.is_terminal and text.count("\n") >= console.height:
+        os.environ.setdefault("LESS", "FRX")  # show colours, and leave the text on the screen
+        pydoc.pager(text)
+    else:
+        sys.stdout.write(text)
     return 0
 
 
@@ -76,6 +86,23 @@ def cameras() -> Table:
     return table
 
 
+def cases() -> Table:
+    """Return the cases of all suites with their arguments."""
+    table = Table("case", "arguments (SI units)", title="cases")
+    for suite in SUITES.values():
+        for case in suite.cases:
+            arguments = (f"{name}={_value(value)}" for name, value in case.arguments)
+            table.add_row(case.name, ", ".join(arguments))
+    return table
+
+
+def _value(value: object) -> str:
+    """Return a number with four digits; of other values, the name or the type."""
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value) if isinstance(value, str | int) else f"<{type(value).__name__}>"
+
+
 def _entry(description: str, kind: str, details: str) -> str:
     """Return a description with the details of a kind below it, if there are any."""
     return f"{description}\n{kind}: {details}" if details else description
@@ -91,4 +118,5 @@ TABLES: dict[str, Callable[[], Table]] = {
     "agents": agents,
     "envs": envs,
     "cameras": cameras,
+    "cases": cases,
 }

@@ -1,9 +1,7 @@
 """Entry point of the `lgmd-gym` command: parse the arguments and run one command."""
 
 import contextlib
-import inspect
 import io
-import re
 import sys
 from importlib import import_module
 from typing import Annotated, Any, Union
@@ -11,21 +9,25 @@ from typing import Annotated, Any, Union
 import tyro
 from tyro.conf import subcommand
 
+from lgmd_gym._version import __version__
 from lgmd_gym.cli import options
 from lgmd_gym.cli.console import drop_output, io_reason
+from lgmd_gym.cli.help import description, documented, summary, wrapped_output
+from lgmd_gym.cli.parser_errors import one_line
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.system.signals import raise_on_signals
 
 DESCRIPTION = """Simulate emergency braking on the spike frequency of a locust looming neuron (LGMD).
 
 Examples:
-  lgmd-gym bench                                 run all agents on the quick suite (about a minute)
-  lgmd-gym drive LGMD/CCRs-v0 --video out.mp4    record one approach as a video
-  lgmd-gym compare runs/A runs/B                 print the paired differences of two runs
-  lgmd-gym video CLIP.mp4                        plot the spikes for a dash-camera clip
-  lgmd-gym tune --agent nested-fields            search the parameters of a rule
+  lgmd-gym bench                               run agents on the suite quick
+  lgmd-gym drive LGMD/CCRs-v0 --video out.mp4  record one approach as a video
+  lgmd-gym compare runs/A runs/B               compare two runs in pairs
+  lgmd-gym video CLIP.mp4                      plot the spikes for a video clip
+  lgmd-gym tune --agent nested-fields          search the parameters of a rule
 
-Arguments are in SI units; case names contain speeds in km/h. Every command has its own --help."""
+Arguments are in SI units; case names contain speeds in km/h. Every command has its own --help.
+lgmd-gym --version prints the version."""
 
 INTERRUPTED = 130  # exit code of a command that was interrupted
 
@@ -58,8 +60,12 @@ def run(argv: list[str] | None = None) -> int:
 
 
 def _run(argv: list[str] | None) -> int:
+    arguments = sys.argv[1:] if argv is None else argv
+    if arguments[:1] == ["--version"]:
+        print(f"lgmd-gym {__version__}")
+        return 0
     try:
-        command = _parse(argv)
+        command = _parse(arguments)
         name = next(name for name, cls in COMMANDS.items() if isinstance(command, cls))
         code = import_module(f"lgmd_gym.cli.{name}").run(command)
         sys.stdout.flush()
@@ -76,18 +82,17 @@ def _run(argv: list[str] | None) -> int:
         return INTERRUPTED
 
 
-def _parse(argv: list[str] | None) -> Any:
+def _parse(arguments: list[str]) -> Any:
     """Parse the arguments; a parser error becomes a one-line ValueError."""
-    arguments = sys.argv[1:] if argv is None else argv
     if not arguments:
         raise ValueError(f"a command is required: {', '.join(COMMANDS)}; see lgmd-gym --help")
     if arguments[0] not in (*COMMANDS, "-h", "--help"):
         raise unknown_name("command", arguments[0], COMMANDS)
     stderr = io.StringIO()
     try:
-        with contextlib.redirect_stderr(stderr):
+        with contextlib.redirect_stderr(stderr), wrapped_output():
             return tyro.cli(
-                _command_type(),
+                _command_type(arguments[0]),
                 prog="lgmd-gym",
                 description=DESCRIPTION,
                 args=arguments,
@@ -100,28 +105,15 @@ def _parse(argv: list[str] | None) -> Any:
     except SystemExit as stop:
         if not stop.code:
             raise
-        raise ValueError(_one_line(stderr.getvalue(), arguments[0])) from None
+        raise ValueError(one_line(stderr.getvalue(), arguments[0])) from None
 
 
-def _command_type() -> Any:
-    """Return the union of all option classes, each with its name and a one-line description."""
+def _command_type(chosen: str) -> Any:
+    """Return the union of all option classes, each with its name; the chosen command has its whole help."""
     commands = []
     for name, cls in COMMANDS.items():
-        summary = (inspect.getdoc(cls) or "").splitlines()[0]
-        commands.append(Annotated[cls, subcommand(name=name, description=summary)])
+        if name == chosen:
+            commands.append(Annotated[documented(cls), subcommand(name=name, description=description(cls))])
+        else:
+            commands.append(Annotated[cls, subcommand(name=name, description=summary(cls))])
     return Union[tuple(commands)]  # noqa: UP007  (built from a table)
-
-
-def _one_line(box: str, command: str) -> str:
-    """Return the message in the parser's box, with the nearest option of the command if the box has one."""
-    lines = [line.strip("│╭╰╮╯|+ ") for line in re.sub(r"\x1b\[[0-9;]*m", "", box).splitlines()[1:]]
-    text = " ".join("──" if re.fullmatch("[─-]+", line) else line for line in lines if line)
-    text = re.sub(r" \(applied to [^)]*\)| Arguments are applied .* matter\.", "", text)
-    message = re.split(r" ?──", text.removeprefix("── "))[0]
-    if value := re.match(r"Error parsing (--[a-z-]+):.*?('.*?')", message):
-        message = f"{value[1]} has the invalid value {value[2]}"
-    for suggestion in text.partition("Perhaps you meant:")[2].split(" --help"):
-        option = re.search(rf"--[a-z-]+(?=.* in lgmd-gym {command}$)", suggestion)
-        if option:
-            return f"{message}; did you mean {option[0]}?"
-    return f"{message}; see lgmd-gym {command} --help"

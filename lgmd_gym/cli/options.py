@@ -1,24 +1,36 @@
 """Options of each command; attribute docstrings are the help texts."""
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
+# Optional values with a readable placeholder in the help.
+Name = Annotated[str | None, arg(metavar="NAME")]
+Names = Annotated[tuple[str, ...] | None, arg(metavar="NAME [NAME ...]")]
+Count = Annotated[int | None, arg(metavar="N")]
+Number = Annotated[float | None, arg(metavar="X")]
+File = Annotated[Path | None, arg(metavar="PATH")]
+SecondFile = Annotated[Path | None, arg(metavar="[PATH]")]
 
-def _default_hint(default: str) -> str:
-    """Return the hint after a help text; an option without a default has none."""
-    return "" if default in ("", "None") else f"(default: {default})"
 
+def refuse_unused(options: Any, flag: str, used: Collection[str]) -> None:
+    """Raise ValueError for options that have no effect beside a flag and differ from their defaults.
 
-# Optional values whose help shows a readable placeholder and no "None".
-Name = Annotated[str | None, arg(metavar="NAME", help_behavior_hint=_default_hint)]
-Names = Annotated[tuple[str, ...] | None, arg(metavar="NAME [NAME ...]", help_behavior_hint=_default_hint)]
-Count = Annotated[int | None, arg(metavar="N", help_behavior_hint=_default_hint)]
-Number = Annotated[float | None, arg(metavar="X", help_behavior_hint=_default_hint)]
-File = Annotated[Path | None, arg(metavar="PATH", help_behavior_hint=_default_hint)]
-SecondFile = Annotated[Path | None, arg(metavar="[PATH]", help_behavior_hint=_default_hint)]
+    Args:
+        options: Options of a command.
+        flag: The flag, for example "--resume".
+        used: Names of the options that have an effect.
+    """
+    given = [
+        f"--{item.name.replace('_', '-')}"
+        for item in fields(options)
+        if item.name not in used and getattr(options, item.name) != item.default
+    ]
+    if given:
+        raise ValueError(f"{flag} uses the settings of its run and ignores {', '.join(given)}; remove them")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +113,7 @@ class Drive:
     Every picture shows the camera frame, the neuron's layers and spikes, and the road from above.
     """
 
-    target: Positional[str]
+    target: Annotated[Positional[str], arg(metavar="ENV|CASE|TRAFFIC")]
     """Environment id (LGMD/CCRs-v0), case (quick/CCRs/v30) or kind of traffic (traffic/merge)."""
     agent: str = "spike-threshold"
     """Agent, with options as in spike-threshold:threshold=45."""
@@ -117,7 +129,7 @@ class Drive:
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
     params: File = None
     """TOML file of LGMD parameters."""
-    set: Annotated[tuple[str, ...], arg(metavar="NAME=NUMBER [...]", help_behavior_hint=_default_hint)] = ()
+    set: Annotated[tuple[str, ...], arg(metavar="NAME=NUMBER [...]")] = ()
     """Scenario arguments in SI units, for example --set ego_speed=8.3 shade=40."""
 
 
@@ -129,7 +141,7 @@ class Video:
     overlay.mp4.
     """
 
-    clips: Positional[tuple[str, ...]]
+    clips: Annotated[Positional[tuple[str, ...]], arg(metavar="CLIP [CLIP ...]")]
     """Video files in any format that ffmpeg reads, or folders with video files."""
     configs: tuple[str, ...] = ("paper",)
     """Named configurations of the neuron, compared in one table if several: paper, conservative, paper-18hz,
@@ -149,13 +161,11 @@ class Video:
     drop_duplicates: Number = None
     """Skip frames whose difference is below this fraction of the typical difference, for example 0.25; 0
     disables the filter. Default: from the configuration."""
-    size: Annotated[tuple[int, int] | None, arg(metavar="WIDTH HEIGHT", help_behavior_hint=_default_hint)] = (
-        None
-    )
+    size: Annotated[tuple[int, int] | None, arg(metavar="WIDTH HEIGHT")] = None
     """Size to scale to [px]. Default: the clip's."""
     roi: Annotated[
         tuple[int, int, int, int] | None,
-        arg(metavar="TOP LEFT HEIGHT WIDTH", help_behavior_hint=_default_hint),
+        arg(metavar="TOP LEFT HEIGHT WIDTH"),
     ] = None
     """Region of interest of the neuron [px]. Default: the whole frame."""
     overlay: bool = False
@@ -215,9 +225,7 @@ class Train:
     """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change and
     ego_yaw_rate; also frame; with the cameras of stopping-zone, also zones, zones_spikes and zones_ffi.
     Default: from the hyperparameters."""
-    demands: Annotated[tuple[float, ...] | None, arg(metavar="[X ...]", help_behavior_hint=_default_hint)] = (
-        None
-    )
+    demands: Annotated[tuple[float, ...] | None, arg(metavar="[X ...]")] = None
     """Demands that the policy chooses from, from -1 (full braking) to 1; --demands alone for a continuous
     demand. Default: 0 -0.4 -1 for ppo and dqn, continuous for sac, 0 -1 for offline."""
     n_timesteps: Count = None
@@ -281,10 +289,15 @@ class Tune:
 
 @dataclass(frozen=True, kw_only=True)
 class List:
-    """List suites, agents, environments and cameras."""
+    """List suites, agents, environments, cameras or cases.
 
-    what: Positional[Literal["all", "suites", "agents", "envs", "cameras"]] = "all"
-    """Table to print."""
+    A list that is longer than the terminal opens in a pager ($PAGER, else less).
+    """
+
+    what: Positional[Literal["all", "suites", "agents", "envs", "cameras", "cases"]] = "all"
+    """Table to print; all has no cases."""
+    pager: bool = True
+    """Use a pager in a terminal."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -299,7 +312,7 @@ class Scenario:
 
     action: Positional[Literal["check", "export"]]
     """Compare files, or export a case."""
-    targets: Positional[tuple[str, ...]]
+    targets: Annotated[Positional[tuple[str, ...]], arg(metavar="PATH|CASE [PATH ...]")]
     """Files and folders to compare; or the name of a case, for example quick/CCRs/v30."""
     to: File = None
     """OpenSCENARIO file to write (.xosc); must not exist."""

@@ -4,12 +4,14 @@ import sys
 import time
 from pathlib import Path
 
-from lgmd_gym.cli.options import Train
+from lgmd_gym.cli.options import Train, refuse_unused
 from lgmd_gym.training import TrainConfig, resume, train
 
 
 def run(options: Train) -> int:
     """Train a policy, or resume a training run, and print the path of the policy."""
+    if options.resume is not None:
+        refuse_unused(options, "--resume", ("resume", "jobs"))
     _check_installed()
     folder = options.resume or options.out or _default_folder(options.algo)
     progress = sys.stderr.isatty()

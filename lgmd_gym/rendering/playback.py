@@ -65,7 +65,8 @@ def make_target(target: str, arguments: dict[str, Any], **options: Any) -> gym.E
         return gym.make(target, **options, **arguments)
     cases = [case.name for suite in SUITES.values() for case in suite.cases]
     if target not in cases:
-        raise unknown_name("environment or case", target, [*ids, *cases, *traffic])
+        hint = "lgmd-gym list envs and lgmd-gym list cases print all names"
+        raise unknown_name("environment or case", target, [*ids, *cases, *traffic], hint)
     case = find_case(target)
     return gym.make(env_id(case.family), **options, **{**dict(case.arguments), **arguments})
 

@@ -70,7 +70,7 @@ def test_a_duplicate_name_is_rejected():
         ("random-brake:rate=0", "rate must be a number > 0, got 0"),
         ("no-brake:x=1", "unknown option of agent no-brake 'x'"),
         ("nowhere.at_all:Agent", "cannot be imported"),
-        ("math:Agent", "cannot be imported"),
+        ("math:Agent", "unknown agent class 'math:Agent'; known: none"),
         ("collections:OrderedDict", "has no method act"),
         (f"{USER_AGENT}:levle=3", "did you mean 'level'"),
     ],

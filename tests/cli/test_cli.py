@@ -1,5 +1,6 @@
 """End-to-end tests of the command line."""
 
+import itertools
 import json
 import os
 import signal
@@ -7,9 +8,11 @@ import subprocess
 import sys
 import time
 
+import docstring_parser
 import pytest
 from support.runs import SMALL_SUITE
 
+from lgmd_gym import __version__
 from lgmd_gym.cli import main as cli
 from lgmd_gym.video import VideoReader
 
@@ -82,14 +85,41 @@ def test_help_lists_every_command(capsys):
         assert f"• {name}" in text
 
 
-@pytest.mark.parametrize("command", cli.COMMANDS)
-def test_help_of_a_command_is_readable(command, capsys):
+@pytest.mark.parametrize("columns", ["80", "100", None])
+@pytest.mark.parametrize("command", [None, *cli.COMMANDS])
+def test_help_of_a_command_is_readable(command, columns, capsys, monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    if columns:
+        monkeypatch.setenv("COLUMNS", columns)
     with pytest.raises(SystemExit) as stop:
-        cli.run([command, "--help"])
+        cli.run([command, "--help"] if command else ["--help"])
     assert not stop.value.code
     text = capsys.readouterr().out
-    assert "{None}" not in text
-    assert "(default: None)" not in text
+    for word in ("{None}", "default: None", "default: False", "STR", "INT", "FLOAT"):
+        assert word not in text
+    lines = text.splitlines()
+    assert max(map(len, lines)) <= int(columns or 80)
+    words = set(text.split())
+    for cls in [cli.COMMANDS[command]] if command else []:
+        for item in docstring_parser.parse_from_object(cls).params:
+            assert set(item.description.split()) <= words  # no word is broken
+        assert set(cls.__doc__.split()) <= words
+
+
+def test_lines_of_a_help_text_break_only_where_they_are_full(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        cli.run(["bench", "--help"])
+    text = capsys.readouterr().out
+    start = text.index("Suite name (see")
+    lines = text[start : text.index("Default: quick.")].splitlines()
+    for line, following in itertools.pairwise(lines):
+        assert 17 + len(line.strip()) + 1 + len(following.split()[0]) > 76
+
+
+def test_version(capsys):
+    assert cli.run(["--version"]) == 0
+    assert capsys.readouterr().out == f"lgmd-gym {__version__}\n"
 
 
 @pytest.mark.parametrize(
@@ -97,6 +127,8 @@ def test_help_of_a_command_is_readable(command, capsys):
     [
         ([], "a command is required: bench, compare, drive"),
         (["benc"], "did you mean 'bench'?"),
+        (["bench", "--resume", "run", "--seeds", "4", "--out", "x"], "ignores --seeds, --out; remove them"),
+        (["train", "--resume", "run", "--algo", "ppo"], "ignores --algo; remove them"),
         (["bench", "--agent", "no-brake"], "did you mean --agents?"),
         (["bench", "--seeds", "x"], "--seeds has the invalid value 'x'"),
         (["train", "--config", "run.toml"], "see lgmd-gym train --help"),
@@ -123,7 +155,15 @@ def test_help_of_a_command_is_readable(command, capsys):
         (["drive", "LGMD/CCRs-v0", "--video", "nowhere/out.mp4"], "does not exist; create it first"),
         (["drive", "LGMD/CCRs-v0", "--video", "x" * 300 + ".mp4"], "is not a path: File name too long"),
         (["train", "--env", "nix"], "env 'nix' cannot be made"),
-        (["list", "agent"], "agent"),
+        (["list", "agent"], "unknown value of what 'agent'; did you mean 'agents'?"),
+        (["scenario", "chek", "x"], "unknown value of action 'chek'; did you mean 'check'?"),
+        (["bench", "--backend", "dusk"], "unknown value of --backend 'dusk'; did you mean 'dask'?"),
+        (["drive"], "drive requires ENV|CASE|TRAFFIC; see lgmd-gym drive --help"),
+        (["bench", "--seeds"], "--seeds requires a value; see lgmd-gym bench --help"),
+        (["drive", "nix"], "; lgmd-gym list envs and lgmd-gym list cases print all names"),
+        (["scenario", "export", "quick/nix", "--to", "x.xosc"], "; lgmd-gym list cases prints all names"),
+        (["bench", "--agents", "json:JSONDecodr"], "did you mean 'json:JSONDecoder'?"),
+        (["bench", "--agents", "nix:Nix"], "(No module named 'nix')"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_two(arguments, words, capsys, monkeypatch, tmp_path):
