@@ -13,6 +13,7 @@ from lgmd_gym.agents.base import FPS
 from lgmd_gym.agents.filters import ConsecutiveFrames, YawRateGate
 from lgmd_gym.agents.params import RuleParams, parameter
 from lgmd_gym.agents.rule import Rule, SensorReading, sensor_readings
+from lgmd_gym.system.extras import missing_extra
 
 
 class ImageRule(Rule):
@@ -117,7 +118,7 @@ class FlowDivergence(ImageRule):
         try:
             import cv2
         except ImportError:
-            raise ValueError(f"agent {self.name} requires OpenCV; pip install 'lgmd-gym[flow]'") from None
+            raise missing_extra(f"agent {self.name}", "flow") from None
         self._cv2 = cv2
         super().__init__(params, **options)
 

@@ -16,6 +16,7 @@ from lgmd_gym.agents.batch import BatchAgent
 from lgmd_gym.agents.policies.batch import PolicyBatch
 from lgmd_gym.agents.policies.features import FRAME, FeatureConfig, FeatureHistory
 from lgmd_gym.errors import check_path, check_text, shown, unknown_name
+from lgmd_gym.system.extras import missing_extra
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -183,7 +184,7 @@ def _load_model(path: Path, algo: str) -> Any:
         import stable_baselines3
         import torch
     except ImportError:
-        raise ValueError('a policy requires stable-baselines3; pip install "lgmd-gym[train]"') from None
+        raise missing_extra("a policy", "train") from None
     torch.set_num_threads(1)  # small network; episodes run in parallel processes
     try:
         return getattr(stable_baselines3, str(algo).upper()).load(path, device="cpu")

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from lgmd_gym._version import __version__
 from lgmd_gym.benchmark.worker_processes import signals_blocked, worker_options
 from lgmd_gym.errors import check_text, check_whole
+from lgmd_gym.system.extras import missing_extra
 
 if TYPE_CHECKING:
     from joblib import Parallel
@@ -151,7 +152,7 @@ def _connect(address: str) -> Any:
     try:
         from distributed import Client
     except ImportError:
-        raise ValueError("a Dask cluster requires dask; pip install 'lgmd-gym[cluster]'") from None
+        raise missing_extra("a Dask cluster", "cluster") from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # hide long tracebacks
     try:
         return Client(address, timeout=CONNECT, set_as_default=False)

@@ -15,6 +15,7 @@ from rich.text import Text
 
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Doctor
+from lgmd_gym.system.extras import install_command
 
 PACKAGE = "lgmd-gym"
 SELF_TEST_S = 2.0  # Wall time of the self-test [s].
@@ -108,8 +109,7 @@ def _check_training() -> Finding:
     try:
         return Finding("training", OK, ", ".join(f"{name} {version(name)}" for name in names))
     except PackageNotFoundError as error:
-        fix = 'in a clone of the repository: pip install -c constraints.txt ".[train]"'
-        return Finding("training", NOTE, f"{error.name} is not installed", fix)
+        return Finding("training", NOTE, f"{error.name} is not installed", install_command("train"))
 
 
 def check_cache() -> list[Finding]:

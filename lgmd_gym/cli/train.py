@@ -2,9 +2,11 @@
 
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 from lgmd_gym.cli.options import Train, refuse_unused
+from lgmd_gym.system.extras import missing_extra
 from lgmd_gym.training import TrainConfig, resume, train
 
 
@@ -29,13 +31,8 @@ def run(options: Train) -> int:
 
 
 def _check_installed() -> None:
-    try:
-        import stable_baselines3  # noqa: F401
-        import yaml  # noqa: F401
-    except ImportError as error:
-        raise ValueError(
-            f'training requires the extra "train" ({error}): pip install "lgmd-gym[train]"'
-        ) from None
+    if not all(map(find_spec, ("stable_baselines3", "tensorboard", "yaml"))):
+        raise missing_extra("training", "train")
 
 
 def _config_of(options: Train) -> TrainConfig:

@@ -8,13 +8,13 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
+from lgmd_gym.system.extras import missing_extra
+
 try:
     from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env import VecEnv
-except ImportError as error:
-    raise ImportError(
-        f'SB3VecEnv requires the extra "train" ({error}): pip install "lgmd-gym[train]"'
-    ) from None
+except ImportError:
+    raise ImportError(str(missing_extra("SB3VecEnv", "train"))) from None
 
 Indices = int | Iterable[int] | None
 _FINAL = ("final_obs", "final_info")

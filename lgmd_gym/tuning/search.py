@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.system.extras import missing_extra
 from lgmd_gym.tuning.objective import Objective, ObjectiveValue
 from lgmd_gym.tuning.space import Proposal, SearchSpace, agent_string, rule_options, sensor_config
 
@@ -45,7 +46,7 @@ def tune(
         from optuna.exceptions import OptunaError
         from sqlalchemy.exc import SQLAlchemyError
     except ImportError:
-        raise ValueError("tune requires Optuna; pip install 'lgmd-gym[train]'") from None
+        raise missing_extra("tune", "train") from None
 
     def evaluate_trial(number: int, proposal: Proposal) -> float:
         value = evaluate(space, proposal, train)
