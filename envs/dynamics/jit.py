@@ -6,6 +6,10 @@ from typing import Any, TypeAlias, TypeVar
 
 from numba import njit
 
+from lgmd_gym.system.compilation import report_compilation
+
+report_compilation()
+
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 Arrays: TypeAlias = tuple[Any, ...]

@@ -18,6 +18,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
 from lgmd_gym.benchmark.units import make_units
+from lgmd_gym.benchmark.warm_up import compile_kernels
 
 
 class Plan(ABC):
@@ -52,6 +53,9 @@ class Plan(ABC):
     @abstractmethod
     def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
         """Run the episodes that are not among `rows`, and yield their results as they finish."""
+
+    def warm_up(self) -> None:  # noqa: B027  (optional)
+        """Compile in this process what worker processes would compile each by itself."""
 
     @abstractmethod
     def _make_env(self, sensor_config: SensorConfig) -> gym.Env:
@@ -109,6 +113,10 @@ class CasePlan(Plan):
             if task.key[1:] in counterfactuals
         ]
         yield from self._play(run_tasks, [task for task in others if task.key not in done])
+
+    def warm_up(self) -> None:
+        """Compile the kernels of cameras, neuron and motion."""
+        compile_kernels(self._first_task(0, self.config.first_seed, next(iter(self.sensor_configs))))
 
     def _first_task(self, index: int, seed: int, condition: str) -> Task:
         """Return the task of `no-brake` in a case."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
 from lgmd_gym.benchmark.executor import SERIAL, Executor, PoolLostError
+from lgmd_gym.benchmark.failures import EARLY, failing_agent
 from lgmd_gym.benchmark.file_names import series_name
 from lgmd_gym.benchmark.folder import provenance
 from lgmd_gym.benchmark.rows import Row, key_of
@@ -95,12 +96,17 @@ class Run:
         started, complete, self.stop_reason = time.perf_counter(), False, ""
         try:
             self._describe(False, 0.0)
+            if self.executor.jobs > 1 and self.executor.cluster is None and len(self.rows) < self.total:
+                self.plan.warm_up()
             with self.executor.open() as run_tasks:
                 for result in self.plan.play(run_tasks, list(self.rows)):
                     self._add(result)
                     if progress is not None:
                         progress(result.row)
-            complete = True
+                    if result.row["error"] is not None and (agent := failing_agent(self.rows)):
+                        self.stop_reason = f"every episode of {agent} failed, {EARLY} so far"
+                        break
+            complete = not self.stop_reason
         except KeyboardInterrupt:
             self.stop_reason = INTERRUPTED
         except PoolLostError as error:

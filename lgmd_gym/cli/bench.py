@@ -25,7 +25,9 @@ def run(options: "Bench") -> int:
     """Run a suite and print its summary; return 0 if complete, 1 for failed episodes, 130 for Ctrl-C."""
     from lgmd_gym.agents.registry import outside_code
     from lgmd_gym.benchmark.executor import Executor
+    from lgmd_gym.benchmark.failures import failing_agent, failure_lines
     from lgmd_gym.benchmark.runner import INTERRUPTED
+    from lgmd_gym.benchmark.stored_run import ROWS_FILE
     from lgmd_gym.report.outputs import write_outputs
 
     console = make_console()
@@ -44,11 +46,15 @@ def run(options: "Bench") -> int:
         benchmark.stop_reason = benchmark.stop_reason or f"{error.strerror} while writing the outputs"
     failed = sum(row["error"] is not None for row in benchmark.rows)
     if failed:
-        console.print(f"{failed} episodes failed; their tracebacks are in episodes.jsonl", style="red")
+        console.print(f"{failed} episodes failed; their tracebacks are in {path / ROWS_FILE}:", style="red")
+        for line in failure_lines(benchmark.rows):
+            console.print(f"- {line}")
     if benchmark.stop_reason:
         kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
         resume = f"continue with lgmd-gym bench --resume {path}"
         resume += " --trust" if any(map(outside_code, benchmark.config.agents)) else ""
+        if failing_agent(benchmark.rows):
+            resume = "correct the agent and start a new run, because --resume repeats no failed episode"
         console.print(f"{benchmark.stop_reason}: {kept}; {resume}", style="yellow", soft_wrap=True)
     console.print(f"run folder: {path}", soft_wrap=True)
     if not complete and benchmark.stop_reason == INTERRUPTED:

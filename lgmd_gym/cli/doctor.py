@@ -43,9 +43,7 @@ class Finding:
 
 def run(options: Doctor) -> int:
     """Run all checks and print the findings; return 1 for any fault, else 0."""
-    console = make_console()
-    with console.status("compiling kernels (up to a minute on first use)"):
-        return int(print_findings(run_checks(), console) > 0)
+    return int(print_findings(run_checks(), make_console()) > 0)
 
 
 def run_checks() -> Iterator[Finding]:

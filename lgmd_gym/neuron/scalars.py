@@ -13,6 +13,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from lgmd_gym.neuron.params import LGMDParams
+from lgmd_gym.system.compilation import report_compilation
+
+report_compilation()
 
 # Indices of the scalar state: Response, internal state, then a ring buffer of the spikes of `window` frames.
 FREQUENCY, SPIKES, K, K_HAT, F, W, LATENCY, ALERT = range(8)

@@ -7,6 +7,9 @@ from typing import Any
 import numba as nb
 
 from lgmd_gym import simd
+from lgmd_gym.system.compilation import report_compilation
+
+report_compilation()
 
 # Name, mtime and size of every file of the camera, and of the vectors that it uses.
 _STAMP = tuple(

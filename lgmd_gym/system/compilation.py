@@ -1,0 +1,120 @@
+"""Progress of numba's compilation on stderr: the first use of a kernel on a machine takes a while.
+
+Compilations of less than `DELAY_S` are silent, and all are if the variable LGMD_GYM_QUIET is set. Of several
+worker processes one prints its progress. There is no thread, because the process may fork.
+"""
+
+import contextlib
+import fcntl
+import os
+import sys
+import tempfile
+import time
+from multiprocessing import current_process
+from typing import Any
+
+from numba.core import event
+
+VARIABLE = "LGMD_GYM_QUIET"
+DELAY_S = 2.0  # compilation without a line
+REPEAT_S = 10.0  # compilation between two lines in a file, a pipe or a worker process
+REFRESH_S = 0.2  # time between two updates of the line in a terminal
+PAUSE_S = 30.0  # time without compilation after which the next one counts as new
+START = "compiling kernels for their first use, which takes about a minute; later runs load them"
+
+
+class CompilationReporter(event.Listener):
+    """Prints how many functions numba has compiled, in which time, and which is next.
+
+    A terminal has one line that is overwritten and erased in the end; a file gets a line every `REPEAT_S`.
+
+    Attributes:
+        count: Number of functions compiled.
+        seconds: Time spent on them [s].
+    """
+
+    def __init__(self) -> None:
+        self._clock = time.monotonic
+        self._depth = 0
+        self._begin = self._end = self._printed = 0.0
+        self._silent: bool | None = None  # None before the first line
+        self.count, self.seconds = 0, 0.0
+
+    def on_start(self, event: Any) -> None:
+        """Print the progress; the compilation of a called function is part of that of its caller."""
+        now = self._clock()
+        if self._depth == 0:
+            if now - self._end > PAUSE_S:
+                self.count, self.seconds, self._printed, self._silent = 0, 0.0, 0.0, None
+            self._begin = now
+        self._depth += 1
+        seconds = self.seconds + now - self._begin
+        if seconds >= DELAY_S:
+            self._report(seconds, event.data["dispatcher"].py_func)
+
+    def on_end(self, event: Any) -> None:
+        """Add the time of a compilation; erase the line in a terminal."""
+        self._depth, self.count, self._end = self._depth - 1, self.count + 1, self._clock()
+        if self._depth == 0:
+            self.seconds += self._end - self._begin
+            if self._printed and _is_terminal():
+                self._write("", "\r")
+
+    def _report(self, seconds: float, function: Any) -> None:
+        if self._silent is None:
+            self._silent = bool(os.environ.get(VARIABLE)) or not _is_first_worker()
+            self._write(START)
+            self._printed = seconds
+        elif seconds - self._printed >= (REFRESH_S if _is_terminal() else REPEAT_S):
+            name = f"{function.__module__}.{function.__qualname__}".removeprefix("lgmd_gym.")
+            text = f"compiling: {self.count} functions in {seconds:.0f} s, now {name}"
+            self._write(*((text[:68], "\r") if _is_terminal() else (text,)))
+            self._printed = seconds
+
+    def _write(self, text: str, end: str = "\n") -> None:
+        if not self._silent:
+            erase = "\x1b[2K" if _is_terminal() else ""
+            with contextlib.suppress(OSError, ValueError, AttributeError):  # closed, or no stderr
+                sys.stderr.write(erase + (f"lgmd-gym: {text}" if text else "") + end)
+                sys.stderr.flush()
+
+
+def _is_terminal() -> bool:
+    """Return whether the line can be overwritten: not in a worker, nor above a progress bar.
+
+    A progress bar replaces sys.stderr.
+    """
+    stream = sys.stderr
+    return stream is not None and stream is sys.__stderr__ and stream.isatty() and _is_main()
+
+
+def _is_main() -> bool:
+    return current_process().name == "MainProcess"
+
+
+_lock: Any = None  # the open lock file of this worker
+
+
+def _is_first_worker() -> bool:
+    """Return whether this is the main process, or the first of this user's workers that compile now."""
+    global _lock
+    if _is_main():
+        return True
+    path = os.path.join(tempfile.gettempdir(), f"lgmd-gym-compiling-{os.getuid()}")
+    try:
+        _lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        fcntl.flock(_lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+_reporter: CompilationReporter | None = None
+
+
+def report_compilation() -> None:
+    """Print the progress of compilations from now on; a second call has no effect."""
+    global _reporter
+    if _reporter is None:
+        _reporter = CompilationReporter()
+        event.register("numba:compile", _reporter)

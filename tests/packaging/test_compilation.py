@@ -1,0 +1,151 @@
+"""Progress of numba's compilation on stderr."""
+
+import importlib
+import io
+import sys
+from types import SimpleNamespace
+
+import numba
+import pytest
+
+from lgmd_gym.benchmark import warm_up
+from lgmd_gym.benchmark.executor import Executor
+from lgmd_gym.benchmark.plan import CasePlan
+from lgmd_gym.benchmark.runner import Run
+from lgmd_gym.system import compilation
+
+
+def kernel():
+    """Stand for a function that is compiled."""
+
+
+kernel.__module__ = "lgmd_gym.camera.render"
+EVENT = SimpleNamespace(data={"dispatcher": SimpleNamespace(py_func=kernel)})
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.fixture
+def reporter(monkeypatch):
+    monkeypatch.delenv(compilation.VARIABLE, raising=False)
+    now = [100.0]
+    reporter = compilation.CompilationReporter()
+    reporter._clock = lambda: now[0]
+
+    def compile_for(*seconds):
+        """Compile a caller with called functions, each for some seconds."""
+        reporter.on_start(EVENT)
+        for each in seconds:
+            reporter.on_start(EVENT)
+            now[0] += each
+            reporter.on_end(EVENT)
+        reporter.on_end(EVENT)
+
+    reporter.compile_for, reporter.now = compile_for, now
+    return reporter
+
+
+def test_a_short_compilation_is_silent(reporter, capsys):
+    reporter.compile_for(0.9, 0.9, 0.1)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_long_compilation_prints_what_it_does(reporter, capsys):
+    reporter.compile_for(*[1.0] * 25)
+    first, *others = capsys.readouterr().err.splitlines()
+    assert first == f"lgmd-gym: {compilation.START}"
+    assert others == [
+        "lgmd-gym: compiling: 12 functions in 12 s, now camera.render.kernel",
+        "lgmd-gym: compiling: 22 functions in 22 s, now camera.render.kernel",
+    ]
+
+
+def test_time_adds_up_over_kernels_but_not_over_pauses(reporter, capsys):
+    reporter.compile_for(1.5)
+    reporter.now[0] += compilation.PAUSE_S + 1.0
+    reporter.compile_for(1.5)
+    assert capsys.readouterr().err == ""
+    reporter.compile_for(1.0, 1.0)
+    assert compilation.START in capsys.readouterr().err
+
+
+def test_the_variable_switches_it_off(reporter, monkeypatch, capsys):
+    monkeypatch.setenv(compilation.VARIABLE, "1")
+    reporter.compile_for(*[1.0] * 25)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_terminal_has_one_line_that_is_erased(reporter, monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr(sys, "__stderr__", terminal)
+    reporter.compile_for(*[1.0] * 5)
+    first, *rest = terminal.getvalue().split("\n")
+    assert compilation.START in first
+    assert "\n".join(rest).count("\r") == 3
+    assert rest[-1].endswith("\x1b[2K\r")
+
+
+def test_of_two_workers_one_reports(reporter, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr(compilation, "current_process", lambda: SimpleNamespace(name="LokyProcess-1"))
+    assert compilation._is_first_worker()
+    held = compilation._lock  # open until the end of the first worker
+    reporter.compile_for(*[1.0] * 5)
+    assert capsys.readouterr().err == ""
+    compilation.os.close(held)
+
+
+def test_numba_is_observed(monkeypatch, capsys):
+    monkeypatch.delenv(compilation.VARIABLE, raising=False)
+    monkeypatch.setattr(compilation, "DELAY_S", 0.0)
+    monkeypatch.setattr(compilation, "_reporter", None)
+    compilation.report_compilation()
+    observer = compilation._reporter
+    compilation.report_compilation()
+    assert compilation._reporter is observer
+    try:
+        assert numba.njit(lambda x: x + 1)(1) == 2
+        assert observer.count >= 1
+    finally:
+        compilation.event.unregister("numba:compile", observer)
+    assert compilation.START in capsys.readouterr().err
+
+
+def run_with(jobs, tmp_path, make_config):
+    run = Run.new(make_config, tmp_path / f"run{jobs}", Executor(jobs))
+    run.plan.play = lambda run_tasks, rows: iter(())
+    run.play()
+
+
+def test_kernels_are_compiled_before_the_workers_start(monkeypatch, tmp_path):
+    from lgmd_gym.benchmark import RunConfig
+
+    played = []
+    monkeypatch.setattr(warm_up, "play_unit", lambda unit: iter([played.append(unit)]))
+    config = RunConfig(suite="quick", agents=("no-brake",), seeds=1)
+    run_with(2, tmp_path, config)
+    cached = all(map(warm_up._is_cached, (warm_up.draw_cameras, warm_up.advance)))
+    assert len(played) == (not cached)
+    monkeypatch.setattr(warm_up, "_is_cached", lambda kernel: False)
+    played.clear()
+    run_with(1, tmp_path, config)
+    assert played == []
+    (tmp_path / "again").mkdir()
+    run_with(2, tmp_path / "again", config)
+    (unit,) = played
+    assert [task.key for task in unit.tasks] == [CasePlan(config)._first_task(0, 0, "clear").key]
+
+
+def test_a_kernel_that_was_compiled_is_cached(tmp_path, monkeypatch):
+    (tmp_path / "one_kernel.py").write_text(
+        "import numba\n@numba.njit(cache=True)\ndef twice(x): return 2 * x\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    twice = importlib.import_module("one_kernel").twice
+    assert not warm_up._is_cached(twice)
+    twice(1)
+    assert warm_up._is_cached(twice)
