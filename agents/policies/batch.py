@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgmd_gym.agents.batch import BatchAgent
-from lgmd_gym.agents.policies.features import FeatureHistory
 
 if TYPE_CHECKING:
     from lgmd_gym.agents.policies.policy import Policy
@@ -30,7 +29,7 @@ class PolicyBatch(BatchAgent):
     def __init__(self, policy: "Policy", num_envs: int) -> None:
         super().__init__(num_envs)
         self._policy = policy
-        self._histories = [FeatureHistory(policy.features) for _ in range(num_envs)]
+        self._histories = [policy.make_inputs() for _ in range(num_envs)]
         self._decisions = np.zeros(num_envs, np.int64)
         self._demands = np.zeros(num_envs)
 
@@ -60,7 +59,7 @@ class PolicyBatch(BatchAgent):
 
     def _decide(self, inputs: Sequence[dict[str, np.ndarray]]) -> list[float]:
         """Return the demands for the inputs of several environments."""
-        policy, demands = self._policy, self._policy.card["demands"]
+        policy, demands = self._policy, self._policy.card.demands
         if not demands or len(inputs) == 1:
             return [policy.decide(item) for item in inputs]
         values = action_values(

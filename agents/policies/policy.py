@@ -1,9 +1,6 @@
-"""`Policy`: a stable-baselines3 model as an agent, and the card in its file."""
+"""`Policy`: a stable-baselines3 model as an agent."""
 
-import json
 import sys
-import zipfile
-import zlib
 from functools import cache
 from multiprocessing import current_process
 from pathlib import Path
@@ -14,31 +11,33 @@ import numpy as np
 from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.batch import BatchAgent
 from lgmd_gym.agents.policies.batch import PolicyBatch
-from lgmd_gym.agents.policies.features import FRAME, FeatureConfig, FeatureHistory
+from lgmd_gym.agents.policies.card import policy_card
+from lgmd_gym.agents.policies.features import FRAME, SCALES, FeatureConfig
+from lgmd_gym.agents.policies.inputs import PolicyInputs, load_normalizer, make_inputs
 from lgmd_gym.errors import check_path, check_text, shown, unknown_name
 from lgmd_gym.system.extras import missing_extra
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
+    from lgmd_gym.neuron import NeuronSpec
 
-CARD = "lgmd_gym.json"  # member of the model's zip file
-_ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError)
+RAW_INPUTS = (*SCALES, FRAME)  # observations of `LGMDObservation`
 SHIPPED = Path(__file__).parent  # folder of the policies in this package
 
 
 class Policy(Agent):
     """Agent that acts with a trained stable-baselines3 model, without exploration.
 
-    The file is a model of `lgmd-gym train` with a card: a JSON member with the cameras, features and demands.
-    Loading a policy unpickles its file and can run arbitrary code, as with all stable-baselines3 files.
-    Load only files from sources you trust.
+    The file is a model of stable-baselines3 with a card (`PolicyCard`), inside it or beside it: the cameras,
+    features and demands. Loading a policy unpickles its file and can run arbitrary code, as with all
+    stable-baselines3 files. Load only files from sources you trust.
 
     Args:
         path: Zip file, or name of a policy in this package.
 
     Attributes:
-        card: Card of the file.
-        features: Inputs of the policy.
+        card: The card.
+        features: Inputs of the policy and its decision rate.
         model: The stable-baselines3 model.
 
     Raises:
@@ -50,26 +49,54 @@ class Policy(Agent):
     def __init__(self, path: str) -> None:
         self.name = f"policy:{check_text('path', path)}"
         file = find_policy(path)
-        self.card = read_card(file)
-        self.features = FeatureConfig.from_dict(self.card["features"])
-        self._history = FeatureHistory(self.features)
+        self.card = policy_card(file)
         if file.parent != SHIPPED:
             _announce(file)
-        self.model = _load_model(file, self.card["algo"])
-        self._check_model(file)
+        self.model = _load_model(file, self.card.algo)
+        names = tuple(getattr(self.model.observation_space, "spaces", ()))
+        self._check_model(file, names)
+        raw = FeatureConfig(inputs=names, history=1, repeat=1, shrink=1)
+        self.features = raw if self.card.features is None else self.card.features
+        name = self.card.vec_normalize
+        self._normalizer = None if name is None else load_normalizer(file.parent / name)
+        self._inputs = self.make_inputs()
         self.reset()
 
-    def _check_model(self, file: Path) -> None:
-        """Raise ValueError unless the inputs and actions of the model are those of the card."""
-        inputs = set(getattr(self.model.observation_space, "spaces", ()))
-        actions, demands = getattr(self.model.action_space, "n", None), self.card["demands"]
-        if inputs != set(self.features.inputs) or actions != (len(demands) if demands else None):
-            raise ValueError(f"policy {str(file)!r}: model and card do not belong together; train it again")
+    def _check_model(self, file: Path, names: tuple[str, ...]) -> None:
+        """Raise ValueError unless the inputs, cameras and actions of the model are those of the card."""
+        card, space = self.card, self.model.observation_space
+        expected = set(names) & set(RAW_INPUTS) if card.features is None else set(card.features.inputs)
+        actions, demands = getattr(self.model.action_space, "n", None), card.demands
+        faults: list[str] = []
+        if set(names) != expected or not names:
+            faults.append(f"inputs {', '.join(names) or space} instead of {', '.join(sorted(expected))}")
+        if actions != (len(demands) if demands else None):
+            faults.append(
+                f"{actions or 'continuous'} actions instead of {len(demands or ()) or 'continuous'}"
+            )
+        if not faults and card.features is None and "spike_frequency" in names:
+            cameras = space["spike_frequency"].shape[0], _count(card.camera)
+            faults += [f"{cameras[0]} cameras instead of {cameras[1]}"] if cameras[0] != cameras[1] else []
+        if faults:
+            raise ValueError(
+                f"policy {str(file)!r}: model and card do not belong together: the model has "
+                f"{'; '.join(faults)}; correct the card, or train it again"
+            )
+
+    def make_inputs(self) -> PolicyInputs:
+        """Return the inputs of the policy in one environment."""
+        names = tuple(self.model.observation_space.spaces)
+        return make_inputs(self.card.features, names, self._normalizer)
 
     @property
     def camera(self) -> "CameraSpec":
         """Cameras of the training."""
-        return self.card["camera"]
+        return self.card.camera
+
+    @property
+    def neuron(self) -> "NeuronSpec":
+        """Neuron parameters of the training."""
+        return self.card.neuron
 
     @property
     def include_frame(self) -> bool:  # type: ignore[override]
@@ -84,7 +111,7 @@ class Policy(Agent):
     def reset(self, seed: int | None = None) -> None:
         """Clear the history and release the brake."""
         super().reset(seed)
-        self._history.reset()
+        self._inputs.reset()
         self._decisions = 0
         self._demand = 0.0
 
@@ -92,16 +119,16 @@ class Policy(Agent):
         """Return a new demand at every `repeat`-th call, else the last one; hold a latched demand."""
         if self.features.latches(self._demand):
             return self._demand
-        self._history.update(observation)
+        self._inputs.update(observation)
         if self._decisions % self.features.repeat == 0:
-            self._demand = self.decide(self._history.stack())
+            self._demand = self.decide(self._inputs.stack())
         self._decisions += 1
         return self._demand
 
     def decide(self, inputs: dict[str, np.ndarray]) -> float:
         """Return the demand for the inputs of one decision."""
         action, _ = self.model.predict(inputs, deterministic=True)
-        demands = self.card["demands"]
+        demands = self.card.demands
         return demands[int(action)] if demands else float(np.reshape(action, -1)[0])
 
     def batch(self, num_envs: int) -> BatchAgent:
@@ -130,46 +157,9 @@ def find_policy(text: str) -> Path:
     return path
 
 
-def read_card(path: Path) -> dict[str, Any]:
-    """Return the card of a policy file.
-
-    Raises:
-        ValueError: If the file does not exist or has no card, or if the card is damaged.
-    """
-    try:
-        with zipfile.ZipFile(path) as file:
-            card = json.loads(file.read(CARD))
-    except OSError as error:
-        raise ValueError(f"policy {shown(str(path))} cannot be read: {error.strerror or error}") from None
-    except (KeyError, *_ZIP_ERRORS):
-        raise ValueError(f"{shown(str(path))} is not a policy file: it contains no {CARD}") from None
-    try:
-        _check_card(card)
-    except (AttributeError, TypeError, ValueError) as error:
-        raise ValueError(
-            f"policy {shown(str(path))}: the card is damaged ({error}); train it again"
-        ) from None
-    return card
-
-
-def _check_card(card: Any) -> None:
-    """Raise AttributeError, TypeError or ValueError unless a card describes a policy."""
-    from lgmd_gym.sensing.cameras import make_cameras  # imports numba, which takes half a second
-
-    missing = [key for key in ("algo", "camera", "demands", "features") if key not in card]
-    if missing:
-        raise ValueError(f"{', '.join(missing)} missing")
-    FeatureConfig.from_dict(card["features"])
-    make_cameras(card["camera"])
-    for demand in card["demands"] or ():
-        if isinstance(demand, bool) or not isinstance(demand, int | float) or not -1.0 <= demand <= 1.0:
-            raise ValueError(f"demand {demand!r} is not a number in [-1, 1]")
-
-
-def write_card(path: Path, card: dict[str, Any]) -> None:
-    """Add a card to the zip file of a stable-baselines3 model."""
-    with zipfile.ZipFile(path, "a") as file:
-        file.writestr(CARD, json.dumps(card, indent=1))
+def _count(camera: "CameraSpec") -> int:
+    """Return the number of cameras."""
+    return len(camera) if isinstance(camera, list | tuple) else 1
 
 
 @cache

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from rich.table import Table
 
 from lgmd_gym.agents import AGENTS
-from lgmd_gym.agents.policies.policy import find_policy, read_card, shipped_policies
+from lgmd_gym.agents.policies.card import read_card
+from lgmd_gym.agents.policies.policy import find_policy, shipped_policies
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC
 from lgmd_gym.camera.params import PRESETS
 from lgmd_gym.cli.console import make_console

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import lgmd_gym
-from lgmd_gym.agents.policies.policy import write_card
+from lgmd_gym.agents.policies.card import write_card
 from lgmd_gym.errors import check_keys, check_whole
 from lgmd_gym.system.files import complete_file, new_folder
 from lgmd_gym.system.lock import FolderLock

@@ -6,7 +6,8 @@ import zipfile
 import pytest
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.policies.policy import CARD, SHIPPED
+from lgmd_gym.agents.policies.card import CARD
+from lgmd_gym.agents.policies.policy import SHIPPED
 
 SOURCE = SHIPPED / "zones.zip"
 
@@ -29,7 +30,7 @@ def copy_with_card(path, **values):
         ({"camera": "nix"}, "unknown camera"),
         ({"camera": 7}, "the card is damaged"),
         ({"features": {"inputs": ["zone"]}}, "did you mean 'zones'"),
-        ({"demands": [0.0, -1.5]}, r"demand -1.5 is not a number in \[-1, 1\]"),
+        ({"demands": [0.0, -1.5]}, r"demand must be in \[-1, 1\], got -1.5"),
         ({"demands": [0.0]}, "model and card do not belong together"),
         ({"algo": "nix"}, "cannot be loaded"),
     ],

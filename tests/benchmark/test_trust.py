@@ -3,10 +3,12 @@
 import json
 import sys
 import zipfile
+from types import SimpleNamespace
 
 import pytest
 
 from lgmd_gym.agents.policies import policy
+from lgmd_gym.agents.policies.card import CARD
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.agents.registry import outside_code
 from lgmd_gym.cli import main as cli
@@ -104,9 +106,14 @@ def test_a_line_precedes_the_unpickling_of_a_policy_file(tmp_path, monkeypatch, 
     file = tmp_path / "p.zip"
     card = {"features": FeatureConfig().to_dict(), "algo": "ppo", "camera": "fovea", "demands": None}
     with zipfile.ZipFile(file, "w") as archive:
-        archive.writestr(policy.CARD, json.dumps(card))
-    lines = []
-    monkeypatch.setattr(policy, "_load_model", lambda *_: lines.append(capsys.readouterr().err))
+        archive.writestr(CARD, json.dumps(card))
+    lines, space = [], SimpleNamespace(spaces=dict.fromkeys(FeatureConfig().inputs))
+
+    def load(*_):
+        lines.append(capsys.readouterr().err)
+        return SimpleNamespace(observation_space=space)
+
+    monkeypatch.setattr(policy, "_load_model", load)
     monkeypatch.setattr(policy.Policy, "_check_model", lambda *_: None)
     for _ in range(2):
         policy.Policy(str(file))

@@ -15,7 +15,8 @@ sys.path[:0] = [str(Path(__file__).parents[1])]
 from support.fuzz import run_cases
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.policies.policy import CARD, SHIPPED
+from lgmd_gym.agents.policies.card import CARD
+from lgmd_gym.agents.policies.policy import SHIPPED
 
 SOURCE = SHIPPED / "zones.zip"
 VALUES = (None, True, -1, 0, 7, 1e400, "", "ppo", "nix", [], [None], [2.0], ["zones"], {}, {"a": 1})

@@ -9,7 +9,7 @@ import pytest
 from support.recordings import offline_config, write_yaml
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.policies.policy import read_card
+from lgmd_gym.agents.policies.card import read_card
 from lgmd_gym.cli import main as cli
 from lgmd_gym.system.lock import FolderLock
 from lgmd_gym.training.offline import traffic

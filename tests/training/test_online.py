@@ -10,7 +10,7 @@ import pytest
 from support.recordings import write_yaml
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.policies.policy import read_card
+from lgmd_gym.agents.policies.card import read_card
 from lgmd_gym.training import TrainConfig, resume, train
 from lgmd_gym.training.checkpoints import checkpoints_of, load_checkpoint, save_model
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.policies.policy import find_policy, read_card
+from lgmd_gym.agents.policies.card import read_card
+from lgmd_gym.agents.policies.policy import find_policy
 from lgmd_gym.training import TrainConfig
 from lgmd_gym.training.hyperparams import read_hyperparams
 

@@ -1,0 +1,152 @@
+"""Models of stable-baselines3 that were saved by hand act as agents with a card beside them."""
+
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import lgmd_gym
+from lgmd_gym import benchmark
+from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.policies import PolicyCard, save_card, save_policy
+from lgmd_gym.camera import CameraParams
+
+pytest.importorskip("stable_baselines3")
+
+from stable_baselines3 import PPO
+from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize, unwrap_vec_normalize
+
+from lgmd_gym.engine import SB3VecEnv
+from lgmd_gym.training import PolicyWrapper
+
+ID = "LGMD/RandomBraking-v0"
+DISCRETE = {"action": {"type": "DiscreteDemand", "demands": [0.0, -0.3, -1.0]}}
+
+
+def train(envs):
+    model = PPO("MultiInputPolicy", envs, n_steps=32, batch_size=64, n_epochs=1, seed=0, device="cpu")
+    return model.learn(64)
+
+
+ENVS = {
+    "plain": lambda: SB3VecEnv(ID, num_envs=2, camera=["fovea", "wide"]),
+    "normalized": lambda: VecNormalize(SB3VecEnv(ID, num_envs=2), norm_reward=False),
+    "discrete": lambda: SB3VecEnv(ID, num_envs=2, config=DISCRETE),
+    "wrapper": lambda: VecNormalize(
+        make_vec_env(ID, 2, wrapper_class=PolicyWrapper, wrapper_kwargs={"history": 2, "repeat": 1})
+    ),
+}
+
+
+@pytest.fixture(scope="module", params=ENVS)
+def saved(request, tmp_path_factory):
+    envs = ENVS[request.param]()
+    model = train(envs)
+    return model, envs, save_policy(model, tmp_path_factory.mktemp(request.param) / "model")
+
+
+def test_the_agent_acts_as_the_model_in_its_environment(saved):
+    """The model acts in its own environment, and the agent in one without wrappers, with the same seed."""
+    model, envs, path = saved
+    agent = make_agent(f"policy:{path}")
+    config = {"config": DISCRETE} if agent.card.demands else {}
+    own = gym.make("LGMD/CCRs-v0", ego_speed=8.0, camera=agent.camera, **config)
+    own = own if agent.card.features is None else PolicyWrapper(own, **agent.card.features.to_dict())
+    env = gym.make("LGMD/CCRs-v0", ego_speed=8.0, camera=agent.camera)
+    batch, normalizer, demands = agent.batch(1), unwrap_vec_normalize(envs), []
+    (inputs, _), (observation, info) = own.reset(seed=3), env.reset(seed=3)
+    agent.reset(3)
+    batch.reset(0)
+    for _ in range(20):
+        inputs = normalizer.normalize_obs(inputs) if normalizer else inputs
+        action, _ = model.predict(inputs, deterministic=True)
+        demand = agent.card.demands[int(action)] if agent.card.demands else float(action[0])
+        demands.append(float(agent.act(observation, info)[0]))
+        assert demands[-1] == pytest.approx(demand, abs=1e-6)
+        of_batch = batch.demands({key: x[None] for key, x in observation.items()}, {}, np.array([True]))
+        assert of_batch[0] == pytest.approx(demand, abs=1e-6)
+        inputs, *_ = own.step(action)
+        observation, _, _, _, info = env.step([demand])
+    assert agent.card.demands or len(set(demands)) > 1
+
+
+def test_the_card_describes_the_training(saved):
+    _, envs, path = saved
+    card = make_agent(f"policy:{path}").card
+    assert card == PolicyCard.from_dict(json.loads(path.with_suffix(".json").read_text()))
+    assert (card.vec_normalize is not None) == (unwrap_vec_normalize(envs) is not None)
+    cameras = card.camera if isinstance(card.camera, list) else [card.camera]
+    shape = envs.observation_space["spike_frequency"].shape
+    assert shape == (len(cameras) * (1 if card.features is None else card.features.history),)
+
+
+@pytest.mark.slow
+def test_a_policy_saved_by_hand_runs_in_the_benchmark(saved, tmp_path):
+    config = benchmark.RunConfig(suite="r152", agents=(f"policy:{saved[2]}",), seeds=1)
+    benchmark.run(config, tmp_path / "run", plots=False, report=False)
+    rows = [json.loads(line) for line in (tmp_path / "run" / "episodes.jsonl").read_text().splitlines()]
+    assert len(rows) == 12
+    assert all(row["error"] is None for row in rows)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return train(SB3VecEnv(ID, num_envs=2))
+
+
+def test_a_file_without_card_names_the_remedy(model, tmp_path):
+    path = tmp_path / "best_model.zip"  # as of EvalCallback
+    model.save(path)
+    words = r"has no card; write .*best_model.json.* with .*save_card\(file, env"
+    with pytest.raises(ValueError, match=words) as caught:
+        make_agent(f"policy:{path}")
+    assert "\n" not in str(caught.value)
+    path.with_suffix(".json").write_text('{"algo": "ppo", "camera": "fovea"}')  # the example of the message
+    assert make_agent(f"policy:{path}").camera == "fovea"
+
+
+@pytest.mark.parametrize(("values", "words"), [
+    ({"camera": ["fovea", "wide"]}, "the model has 1 cameras instead of 2"),
+    ({"demands": [0.0, -1.0]}, "the model has continuous actions instead of 2"),
+    ({"features": {"history": 2}}, "the model has inputs ego_speed, .* instead of"),
+    ({"vec_normalize": "nix.pkl"}, "vec_normalize .*nix.pkl' cannot be read: No such file"),
+    ({"vec_normalize": "model.json"}, "vec_normalize .* cannot be loaded"),
+    ({"cameras": "fovea"}, "unknown key of the card 'cameras'; did you mean 'camera'?"),
+    ({"demands": [2.0]}, r"demand must be in \[-1, 1\], got 2.0"),
+    ({"neuron": {"t_ff": 1}}, "unknown LGMD parameter 't_ff'"),
+])  # fmt: skip
+def test_a_wrong_card_is_refused(model, values, words, tmp_path):
+    path = tmp_path / "model.zip"
+    model.save(path)
+    path.with_suffix(".json").write_text(json.dumps({"algo": "ppo", "camera": "fovea"} | values))
+    with pytest.raises(ValueError, match=words) as caught:
+        make_agent(f"policy:{path}")
+    assert "\n" not in str(caught.value)
+
+
+def test_cards_of_other_environments(tmp_path):
+    file = tmp_path / "model.zip"
+    lens = CameraParams.make("wide")
+    env = gym.make("LGMD/CCRs-v0", camera=lens, params=lgmd_gym.LGMDParams(t_sf=40.0))
+    card = save_card(file, env, "ppo", vec_normalize="stats.pkl")
+    assert (card.neuron["t_sf"], card.vec_normalize) == (40.0, "stats.pkl")
+    again = PolicyCard.from_dict(json.loads(file.with_suffix(".json").read_text()))
+    assert CameraParams.make(again.camera) == lens
+
+
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: gym.make("LGMD/CCRs-v0", config={"policy_frequency": 10}), r"PolicyWrapper\(env, repeat=3\)"),
+    (lambda: VecFrameStack(SB3VecEnv(ID), 2), r"PolicyWrapper\(env, history=N\)"),
+    (lambda: gym.make("highway-v0"), "the actions of Discrete.* are no demands"),
+])  # fmt: skip
+def test_an_environment_that_is_not_that_of_an_agent_is_refused(make, words, tmp_path):
+    with pytest.raises(ValueError, match=words):
+        save_card(tmp_path / "model.zip", make(), "ppo")
+
+
+def test_save_policy_needs_an_environment(model, tmp_path):
+    model.save(tmp_path / "model.zip")
+    with pytest.raises(ValueError, match="pass the training environment as env"):
+        save_policy(PPO.load(tmp_path / "model.zip", device="cpu"), tmp_path / "again.zip")
