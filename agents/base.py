@@ -31,10 +31,12 @@ class Agent:
     Attributes:
         name: Name in agent strings, rows and tables.
         include_frame: Whether the observation must contain the camera frames.
+        reads_neuron: Whether its demand depends on the neuron.
     """
 
     name = "agent"
     include_frame = False
+    reads_neuron = True
     _alert = False
 
     @property

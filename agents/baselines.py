@@ -14,6 +14,7 @@ class NoBrake(Agent):
     """Never brakes. A contact of this agent defines a threat."""
 
     name = "no-brake"
+    reads_neuron = False
 
     def batch(self, num_envs: int) -> BatchAgent:
         """Return this agent for `num_envs` environments."""
@@ -28,6 +29,7 @@ class AlwaysBrake(Agent):
     """Brakes fully from the first decision: avoids every contact and brakes prematurely in every episode."""
 
     name = "always-brake"
+    reads_neuron = False
 
     def batch(self, num_envs: int) -> BatchAgent:
         """Return this agent for `num_envs` environments."""
@@ -47,6 +49,7 @@ class RandomBrake(Agent):
     """
 
     name = "random-brake"
+    reads_neuron = False
 
     def __init__(self, rate: float = 0.2, fps: float = FPS) -> None:
         self.rate = check_positive("rate", rate)

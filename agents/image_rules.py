@@ -25,6 +25,7 @@ class ImageRule(Rule):
     """
 
     include_frame = True
+    reads_neuron = False
 
     @property
     def camera(self) -> dict[str, Any]:

@@ -25,6 +25,7 @@ class TTCOracle(LatchingAgent):
     """
 
     name = "ttc-oracle"
+    reads_neuron = False
 
     def __init__(self, ttc: float = 2.0) -> None:
         self.ttc = check_positive("ttc", ttc)
@@ -51,6 +52,7 @@ class StoppingDistanceOracle(LatchingAgent):
     """
 
     name = "stopping-distance-oracle"
+    reads_neuron = False
 
     def __init__(
         self, deceleration: float = FULL_DECELERATION, reaction: float = 0.4, margin: float = 1.5
@@ -103,6 +105,7 @@ class EtaOracle(LatchingAgent):
     """
 
     name = "eta-oracle"
+    reads_neuron = False
 
     def __init__(self, threshold: float = 0.03, alpha: float = 2.0) -> None:
         self.threshold, self.alpha = check_positive("threshold", threshold), check_positive("alpha", alpha)
@@ -125,6 +128,7 @@ class TauOracle(LatchingAgent):
     """
 
     name = "tau-oracle"
+    reads_neuron = False
 
     def __init__(self, tau: float = 1.8) -> None:
         self.tau = check_positive("tau", tau)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
     from lgmd_gym.neuron import NeuronSpec
 
+NOT_NEURONS = (FRAME, "ego_speed", "speed_change", "ego_yaw_rate")
 RAW_INPUTS = (*SCALES, FRAME)  # observations of `LGMDObservation`
 SHIPPED = Path(__file__).parent  # folder of the policies in this package
 
@@ -102,6 +103,11 @@ class Policy(Agent):
     def include_frame(self) -> bool:  # type: ignore[override]
         """Whether camera frames are among the inputs."""
         return FRAME in self.features.inputs
+
+    @property
+    def reads_neuron(self) -> bool:  # type: ignore[override]
+        """Whether outputs of neurons are among the inputs."""
+        return any(name not in NOT_NEURONS for name in self.features.inputs)
 
     @property
     def alert(self) -> bool:

@@ -2,7 +2,6 @@
 
 import inspect
 import json
-from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,6 +84,8 @@ def _normalizer(env: Any) -> Any:
 
 def _values(env: Any) -> dict[str, Any]:
     """Return the fields of the card that follow from the specification of an environment."""
+    from lgmd_gym.camera.spec import plain_values
+
     spec: Any = env.get_attr("spec")[0] if hasattr(env, "get_attr") else getattr(env, "spec", None)
     if spec is None:
         raise ValueError(f"the environment {shown(env)} has no spec; make it with gym.make")
@@ -99,8 +100,8 @@ def _values(env: Any) -> dict[str, Any]:
         )
     features = wrappers.get("PolicyWrapper")
     return {
-        "camera": _plain(sensors.get("camera", "fovea")),
-        "neuron": _plain(sensors.get("params")),
+        "camera": plain_values(sensors.get("camera", "fovea")),
+        "neuron": plain_values(sensors.get("params")),
         "features": None if features is None else FeatureConfig.from_dict(features),
         "demands": _demands(env, config),
     }
@@ -120,10 +121,3 @@ def _demands(env: Any, config: dict[str, Any]) -> tuple[float, ...] | None:
     if action.get("type") != "DiscreteDemand" or len(demands) != space.n:
         raise ValueError(f"the actions of {space} are no demands; use the action type DiscreteDemand")
     return demands
-
-
-def _plain(value: Any) -> Any:
-    """Return cameras or parameters as plain values."""
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value

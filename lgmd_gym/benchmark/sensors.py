@@ -1,11 +1,12 @@
 """Camera and neuron of the agents under test: the user's choice, or each agent's own."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, is_dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from lgmd_gym.agents import Agent
-from lgmd_gym.camera import CLEAR, PRESETS, CameraParams, CameraSpec, with_condition
+from lgmd_gym.camera import CLEAR, CameraSpec, with_condition
+from lgmd_gym.camera.spec import plain_values
 from lgmd_gym.neuron import NeuronSpec
 
 DEFAULT_CAMERA = "fovea"
@@ -42,7 +43,7 @@ class SensorConfig:
     @property
     def plain(self) -> "SensorConfig":
         """The same config as plain values, for JSON and TOML."""
-        return replace(self, camera=_plain(self.camera), params=_plain(self.params))
+        return replace(self, camera=plain_values(self.camera), params=plain_values(self.params))
 
     def with_condition(self, condition: str) -> "SensorConfig":
         """Return the config under a named camera condition.
@@ -67,20 +68,6 @@ class SensorConfig:
     def label(self) -> str:
         """Camera names for rows and titles, as in "fovea" or "zone8+upright8"."""
         return _name(self.camera) if self.camera is not None else "each agent's own"
-
-
-def _plain(value: Any) -> Any:
-    """Return parameters as plain values; of a camera only the fields that differ from its preset.
-
-    Fields of a dict take precedence over a condition, so a dict of all fields would disable conditions.
-    """
-    if isinstance(value, CameraParams):
-        base = asdict(PRESETS.get(value.name, CameraParams()))
-        changes = {name: field for name, field in asdict(value).items() if field != base[name]}
-        return {"name": value.name} | changes
-    if is_dataclass(value) and not isinstance(value, type):
-        return asdict(value)
-    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _name(camera: Any) -> str:

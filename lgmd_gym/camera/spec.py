@@ -1,10 +1,11 @@
 """The `camera` argument of environments and wrappers: types and named conditions."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, is_dataclass
 from typing import Any, TypeAlias, cast
 
-from lgmd_gym.camera.params import CLEAR, CONDITIONS, CameraParams
-from lgmd_gym.errors import check_known
+from lgmd_gym.camera.params import CLEAR, CONDITIONS, PRESETS, CameraParams
+from lgmd_gym.errors import as_tuple, check_known
 
 BIRDSEYE = "birdseye"
 """The camera name of highway-env's top view."""
@@ -66,3 +67,18 @@ def _item_with_condition(camera: CameraItem, condition: str) -> CameraParams:
     if isinstance(camera, Mapping):
         return CameraParams.make({**camera, "condition": condition})
     return CameraParams.make(camera, condition=condition)
+
+
+def plain_values(value: Any) -> Any:
+    """Return a camera or neuron argument as plain values; of a camera only what differs from its preset.
+
+    Fields of a dict take precedence over a condition, so a dict of all fields would disable conditions.
+    """
+    if isinstance(value, CameraParams):
+        base = asdict(PRESETS.get(value.name, CameraParams()))
+        changes = {name: field for name, field in asdict(value).items() if field != base[name]}
+        return {"name": value.name} | changes
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
+    items = as_tuple(value)
+    return value if items is None else [plain_values(item) for item in items]

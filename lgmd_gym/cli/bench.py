@@ -10,7 +10,7 @@ from rich.console import Console
 
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import refuse_unused
-from lgmd_gym.cli.params import read_params
+from lgmd_gym.cli.params import note_unused_params, read_params
 
 if TYPE_CHECKING:
     from lgmd_gym.benchmark.executor import Executor
@@ -23,9 +23,8 @@ RESUME_OPTIONS = ("resume", "trust", "jobs", "backend", "address", "plots", "rep
 
 def run(options: "Bench") -> int:
     """Run a suite and print its summary; return 0 if complete, 1 for failed episodes, 130 for Ctrl-C."""
-    from lgmd_gym.agents.registry import outside_code
     from lgmd_gym.benchmark.executor import Executor
-    from lgmd_gym.benchmark.failures import failing_agent, failure_lines
+    from lgmd_gym.benchmark.failures import failure_lines
     from lgmd_gym.benchmark.runner import INTERRUPTED
     from lgmd_gym.benchmark.stored_run import ROWS_FILE
     from lgmd_gym.report.outputs import write_outputs
@@ -50,16 +49,24 @@ def run(options: "Bench") -> int:
         for line in failure_lines(benchmark.rows):
             console.print(f"- {line}")
     if benchmark.stop_reason:
-        kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
-        resume = f"continue with lgmd-gym bench --resume {path}"
-        resume += " --trust" if any(map(outside_code, benchmark.config.agents)) else ""
-        if failing_agent(benchmark.rows):
-            resume = "correct the agent and start a new run, because --resume repeats no failed episode"
-        console.print(f"{benchmark.stop_reason}: {kept}; {resume}", style="yellow", soft_wrap=True)
+        _print_stop(benchmark, console)
     console.print(f"run folder: {path}", soft_wrap=True)
     if not complete and benchmark.stop_reason == INTERRUPTED:
         return 130
     return int(bool(failed or benchmark.stop_reason))
+
+
+def _print_stop(benchmark: "Run", console: Console) -> None:
+    """Print why a run stopped early, and how to go on."""
+    from lgmd_gym.agents.registry import outside_code
+    from lgmd_gym.benchmark.failures import failing_agent
+
+    kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
+    resume = f"continue with lgmd-gym bench --resume {benchmark.folder.path}"
+    resume += " --trust" if any(map(outside_code, benchmark.config.agents)) else ""
+    if failing_agent(benchmark.rows):
+        resume = "correct the agent and start a new run, because --resume repeats no failed episode"
+    console.print(f"{benchmark.stop_reason}: {kept}; {resume}", style="yellow", soft_wrap=True)
 
 
 def _trust(options: "Bench") -> bool:
@@ -88,6 +95,7 @@ def _resume(options: "Bench", executor: "Executor", console: Console) -> "Run":
 
 
 def _new(options: "Bench", executor: "Executor") -> "Run":
+    from lgmd_gym.agents.registry import make_agent
     from lgmd_gym.benchmark.config import RunConfig
     from lgmd_gym.benchmark.runner import Run
     from lgmd_gym.benchmark.trust import check_trust
@@ -116,7 +124,10 @@ def _new(options: "Bench", executor: "Executor") -> "Run":
         check_trust(config.agents, options.config, options.trust)
     first = config.suite if isinstance(config.suite, str) else config.suite[0]
     default = Path("runs") / f"{Path(first).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
-    return Run.new(config, options.out or default, executor)
+    run = Run.new(config, options.out or default, executor)
+    if options.params is not None:
+        note_unused_params(options.params, map(make_agent, config.agents))
+    return run
 
 
 def _print_tables(benchmark: "Run", console: Console) -> None:

@@ -1,8 +1,11 @@
 """Reading of the `--params` option."""
 
+import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from lgmd_gym.agents import Agent
 from lgmd_gym.neuron import LGMDParams
 
 
@@ -18,3 +21,14 @@ def read_params(path: Path | None) -> dict[str, Any] | None:
         return LGMDParams.from_toml(path).to_dict()
     except OSError as error:
         raise ValueError(f"params file {str(path)!r} cannot be read: {error.strerror}") from None
+
+
+def note_unused_params(path: Path | None, agents: Iterable[Agent]) -> None:
+    """Print a line to stderr for agents whose braking the parameters do not change."""
+    names = [agent.name for agent in agents if not agent.reads_neuron]
+    if path is not None and names:
+        print(
+            f"lgmd-gym: --params {path} does not change the braking of {', '.join(names)}, which does not "
+            "depend on the neuron",
+            file=sys.stderr,
+        )
