@@ -178,13 +178,15 @@ def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") 
     names, text = sorted(known), name[:MAX_SHOWN] if isinstance(name, str) else shown(name)
     count = MAX_CLOSEST if len(names) > MAX_LISTED else 1
     if closest := get_close_matches(text, names, n=count, cutoff=0.5):
-        fix = f"did you mean {' or '.join(map(repr, closest))}?"
+        *others, last = map(repr, closest)
+        fix = f"did you mean {', '.join(others)}{' or ' if others else ''}{last}?"
     elif len(names) > MAX_LISTED:
         closest = get_close_matches(text, names, n=count, cutoff=0.0)
         fix = f"closest of {len(names)} names: {', '.join(closest)}"
     else:
         fix = f"known: {', '.join(names) or 'none'}"
-    return ValueError(f"unknown {kind} {shown(name)}; {fix}{f'; {hint}' if hint else ''}")
+    separator = " " if fix.endswith("?") else "; "
+    return ValueError(f"unknown {kind} {shown(name)}; {fix}{separator if hint else ''}{hint}")
 
 
 def check_keys(kind: str, given: Iterable[str], known: Iterable[str]) -> None:

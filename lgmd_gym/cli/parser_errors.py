@@ -26,7 +26,7 @@ def one_line(box: str, command: str) -> str:
         option = re.search(rf"--[a-z-]+(?=.* in lgmd-gym {command}$)", suggestion)
         if option:
             return f"{message}; did you mean {option[0]}?"
-    return f"{message}; see lgmd-gym {command} --help"
+    return message if message.endswith("?") else f"{message}; see lgmd-gym {command} --help"
 
 
 def _unknown_choice(match: re.Match[str]) -> str:
@@ -39,5 +39,5 @@ _MESSAGES: dict[str, Callable[[re.Match[str]], str]] = {
     r"invalid choice '(.*?)' for argument '(.*?)'\. Expected one of (\(.*?\))": _unknown_choice,
     r"Missing from lgmd-gym (\S+): (\S+)": lambda match: f"{match[1]} requires {match[2]}",
     r"Missing value for argument '(.*?)'": lambda match: f"{match[1]} requires a value",
-    r"Unrecognized (?:or misplaced )?options: (.*)": lambda match: f"unknown option {match[1]}",
+    r"Unrecognized (?:or misplaced )?options: ([^,]*).*": lambda match: f"unknown option {match[1]}",
 }
