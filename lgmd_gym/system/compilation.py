@@ -35,7 +35,7 @@ class CompilationReporter(event.Listener):
 
     def __init__(self) -> None:
         self._clock = time.monotonic
-        self._depth = 0
+        self._depth, self._name = 0, ""
         self._begin = self._end = self._printed = 0.0
         self._silent: bool | None = None  # None before the first line
         self.count, self.seconds = 0, 0.0
@@ -49,8 +49,11 @@ class CompilationReporter(event.Listener):
             self._begin = now
         self._depth += 1
         seconds = self.seconds + now - self._begin
+        function = event.data["dispatcher"].py_func
+        if str(function.__module__).startswith("lgmd_gym."):  # else a part of numba
+            self._name = f"{function.__module__}.{function.__qualname__}".removeprefix("lgmd_gym.")
         if seconds >= DELAY_S:
-            self._report(seconds, event.data["dispatcher"].py_func)
+            self._report(seconds)
 
     def on_end(self, event: Any) -> None:
         """Add the time of a compilation; erase the line in a terminal."""
@@ -60,14 +63,13 @@ class CompilationReporter(event.Listener):
             if self._printed and _is_terminal():
                 self._write("", "\r")
 
-    def _report(self, seconds: float, function: Any) -> None:
+    def _report(self, seconds: float) -> None:
         if self._silent is None:
             self._silent = bool(os.environ.get(VARIABLE)) or not _is_first_worker()
             self._write(START)
             self._printed = seconds
         elif seconds - self._printed >= (REFRESH_S if _is_terminal() else REPEAT_S):
-            name = f"{function.__module__}.{function.__qualname__}".removeprefix("lgmd_gym.")
-            text = f"compiling: {self.count} functions in {seconds:.0f} s, now {name}"
+            text = f"compiling: {self.count} functions in {seconds:.0f} s, now {self._name}"
             self._write(*((text[:68], "\r") if _is_terminal() else (text,)))
             self._printed = seconds
 
