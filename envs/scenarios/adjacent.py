@@ -6,6 +6,7 @@ from lgmd_gym.envs.dynamics.bend import Bend, lane_change
 from lgmd_gym.envs.dynamics.units import KMH, MAX_SPEED, check_speed
 from lgmd_gym.envs.scenarios.registry import family
 from lgmd_gym.envs.scenarios.scenario import (
+    AFTERMATH,
     EGO_LENGTH,
     EGO_WIDTH,
     LANE_WIDTH,
@@ -23,6 +24,8 @@ from lgmd_gym.errors import check_whole, check_within, shown
 CONTACT_OFFSET = (EGO_WIDTH + TARGET_WIDTH) / 2  # [m], lateral offset up to which the cars touch
 QUEUE_SPACING = 2.0  # [m] between the cars of a queue
 AFTER_PASSING = 2.0  # [s] of driving after the last car
+CHANGE_START = 2.0  # [s] after which a car that cuts in leaves its lane
+MIN_CLOSING = 0.5  # [m/s], slowest approach to a car that cuts in; slower ones take minutes
 
 
 @family("AdjacentPass")
@@ -145,26 +148,37 @@ def cut_in(
     change_length: float = 44.0,
     shade: int | None = None,
 ) -> Scenario:
-    """A car that is not slower than the ego changes from the left lane into the ego's lane; not a threat.
+    """A car changes from the left lane into the ego's lane; a threat only if it is slower than the ego.
+
+    The lane change begins after 2 s. With a slower car it begins later if needed, so that the ego covers the
+    gap at least 5 s after the start. A much slower car is passed before it reaches the ego's lane.
 
     Args:
         ego_speed: Ego speed, in (0, 40] [m/s].
         gap: Bumper-to-bumper distance at the start of the lane change, in [2, 200] [m].
-        excess: Speed of the other car minus ego speed, >= 0 [m/s].
+        excess: Speed of the other car minus ego speed, >= 0 or <= -0.5 [m/s].
         change_length: Length of the lane change along the road, in [10, 200] [m].
         shade: Grey level of the other car in [0, 255]; None to draw it from the seed.
     """
     speed = check_speed("ego_speed", ego_speed)
-    faster = check_speed("ego_speed + excess", speed + check_within("excess", excess, 0.0, MAX_SPEED, "m/s"))
-    before = 2.0  # [s] in adjacent lanes
+    distance = check_within("gap", gap, 2.0, 200.0, "m")
+    difference = check_within("excess", excess, -MAX_SPEED, MAX_SPEED, "m/s")
+    if -MIN_CLOSING < difference < 0.0:
+        raise ValueError(f"excess must be >= 0 or <= -{MIN_CLOSING:g} m/s in CutIn, got {shown(excess)}")
+    target_speed = check_speed("ego_speed + excess", speed + difference)
+    before, duration = CHANGE_START, 9.0  # [s] in adjacent lanes; of the episode
+    if difference < 0.0:
+        closing = distance / -difference  # [s] from the start of the lane change
+        before = max(CHANGE_START, START_TTC - closing)
+        duration = before + closing + AFTERMATH
     other = Actor(
-        gap=check_within("gap", gap, 2.0, 200.0, "m") - before * excess,
+        gap=distance - before * difference,
         lateral_offset=LANE_WIDTH,
-        speed=faster,
-        path=_straight_then_change(before * faster, change_length, -LANE_WIDTH),
+        speed=target_speed,
+        path=_straight_then_change(before * target_speed, change_length, -LANE_WIDTH),
         shade=shade,
     )
-    return Scenario(family="CutIn", ego_speed=speed, duration=9.0, actors=(other,))
+    return Scenario(family="CutIn", ego_speed=speed, duration=duration, actors=(other,))
 
 
 @family("CutOut")

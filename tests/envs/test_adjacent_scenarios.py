@@ -9,6 +9,8 @@ from math import pi
 import pytest
 from support.scenarios import check_actor, invalid, scenario
 
+from lgmd_gym.envs.braking import BrakingEnv
+from lgmd_gym.envs.scenarios.distribution import draw_scenario, level_generator
 from lgmd_gym.envs.scenarios.scenario import RoadPlan
 
 
@@ -78,11 +80,85 @@ def test_cut_in():
     default = scenario("CutIn").actors[0]
     assert (default.gap, default.speed) == (pytest.approx(12 - 10 / 3.6), pytest.approx(55 / 3.6))
     assert sum(bend.length for bend in default.path) == pytest.approx(2 * 55 / 3.6 + 44)
-    for name, low, high in (("gap", 2, 200), ("excess", 0, 26), ("change_length", 10, 200)):
+    for name, low, high in (("gap", 2, 200), ("excess", -13.9985, 26), ("change_length", 10, 200)):
         for value in (low, high):
             scenario("CutIn", **{"ego_speed": 14.0, name: value})
         for value in (low - 0.001, high + 0.001):
             invalid("CutIn", name, **{"ego_speed": 14.0, name: value})
+
+
+@pytest.mark.parametrize(
+    # 2 s in the left lane, or longer, so that the front bumper reaches the other's rear 5 s after the start.
+    ("gap", "excess", "before", "duration"),
+    [(8.0, -4.0, 3.0, 3 + 2 + 6), (20.0, -4.0, 2.0, 2 + 5 + 6), (2.0, -0.5, 2.0, 2 + 4 + 6)],
+)
+def test_slower_car_cuts_in(gap, excess, before, duration):
+    made = scenario("CutIn", ego_speed=20.0, gap=gap, excess=excess, change_length=32.0)
+    (actor,) = made.actors
+    # While in the left lane it falls back by `before` times the speed difference.
+    assert (actor.gap, actor.speed) == (gap - before * excess, 20.0 + excess)
+    assert [bend.length for bend in actor.path] == [before * (20 + excess), 8.0, 8.0, 8.0, 8.0]
+    assert (made.ego_speed, made.duration) == (20.0, duration)
+
+
+def test_slower_car_moves_into_the_lane_and_is_hit():
+    env = BrakingEnv(scenario("CutIn", ego_speed=20.0, gap=20.0, excess=-4.0, change_length=32.0))
+    env.reset(seed=0)
+    ego, other = env.road.vehicles
+
+    def advance(seconds):
+        for _ in range(round(30 * seconds)):
+            _, _, terminated, _, info = env.step([0.0])
+        ahead, aside = other.position - ego.position
+        return terminated, ahead - (4.3 + 4.023) / 2, -aside, info
+
+    terminated, distance, aside, _ = advance(2.0)  # the lane change begins
+    assert (distance, aside) == (pytest.approx(20.0), pytest.approx(3.5))
+    _, distance, aside, _ = advance(1.0)  # half of the 2 s of the change, 16 m of 32 m
+    assert (distance, aside) == (pytest.approx(16.0, abs=0.3), pytest.approx(1.75))
+    _, distance, aside, info = advance(1.0)
+    assert (distance, aside) == (pytest.approx(12.0, abs=0.6), pytest.approx(0.0, abs=1e-6))
+    assert not info["collision"]
+    # 12 m minus the 0.4 m by which the change is shorter along the road, at 4 m/s.
+    terminated, _, _, info = advance(distance / 4 + 1 / 30)
+    assert terminated
+    assert info["relative_impact_speed"] == pytest.approx(4.0)
+
+
+def test_much_slower_car_is_passed():
+    """At 15 m/s faster, the ego covers 2 m and both lengths in 0.7 s of a change of 6.4 s."""
+    env = BrakingEnv(scenario("CutIn", ego_speed=20.0, gap=2.0, excess=-15.0, change_length=32.0))
+    env.reset(seed=0)
+    done = False
+    while not done:
+        _, _, terminated, truncated, info = env.step([0.0])
+        done = terminated or truncated
+    assert not info["collision"]
+    assert env.road.vehicles[0].position[0] > env.road.vehicles[1].position[0]
+
+
+def test_bounds_of_a_slower_car():
+    scenario("CutIn", ego_speed=14.0, excess=-0.5)
+    for excess in (-0.499, -0.001):
+        invalid("CutIn", "excess must be >= 0 or <= -0.5 m/s in CutIn", ego_speed=14.0, excess=excess)
+    invalid("CutIn", r"ego_speed \+ excess must be in \(0, 40\] m/s, got 0.0", ego_speed=14.0, excess=-14.0)
+    invalid("CutIn", "excess must be in", ego_speed=14.0, excess=-41.0)
+
+
+@pytest.mark.parametrize(
+    ("level", "ego_speed", "gap", "speed", "straight"),
+    [
+        (15, "0x1.31d12b31234cdp+4", "0x1.3fc5d423207d2p+3", "0x1.480a0ebf5c306p+4", "0x1.480a0ebf5c306p+5"),
+        (103, "0x1.08445f52afd63p+4", "0x1.19feccaa3ac42p+4", "0x1.1e7d42e0e8b9cp+4", "0x1.1e7d42e0e8b9cp+5"),
+    ],
+)
+def test_random_levels_keep_their_bits(level, ego_speed, gap, speed, straight):
+    """Values before slower cars could cut in."""
+    made = draw_scenario(level_generator("train", level))
+    (actor,) = made.actors
+    assert (made.family, made.duration) == ("CutIn", 9.0)
+    values = made.ego_speed, actor.gap, actor.speed, actor.path[0].length
+    assert [value.hex() for value in values] == [ego_speed, gap, speed, straight]
 
 
 def test_cut_out():
