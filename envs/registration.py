@@ -21,7 +21,8 @@ SCENARIO = "Scenario"
 """The id `LGMD/Scenario-v0`, whose argument `scenario` is a scenario as data."""
 _OTHERS = ("camera", "params", "fps", "include_frame", "include_base", "trace", "config", "render_mode")
 _LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions", "world", "road")
-_APPEARANCE = ("world", "condition", "road")
+APPEARANCE = ("world", "condition", "road")
+"""Arguments that set how a scenario looks."""
 SCENARIO_ARGUMENT = "scenario"
 
 
@@ -104,8 +105,8 @@ def make_source(family: str, arguments: dict[str, Any], others: Iterable[str] = 
     check_keys(f"argument of {family}", arguments, {*_argument_names(family), *others})
     if family == RANDOM:
         return RandomLevels(**arguments)
-    chosen = {name: arguments[name] for name in _APPEARANCE if name in arguments}
-    others = {name: value for name, value in arguments.items() if name not in _APPEARANCE}
+    chosen = {name: arguments[name] for name in APPEARANCE if name in arguments}
+    others = {name: value for name, value in arguments.items() if name not in APPEARANCE}
     return FixedScenario(_scenario(family, others), Appearance(**chosen))
 
 
@@ -121,9 +122,9 @@ def _argument_names(family: str) -> Iterable[str]:
     if check_text("family", family) == RANDOM:
         return _LEVEL_ARGUMENTS
     if family == SCENARIO:
-        return SCENARIO_ARGUMENT, *_APPEARANCE
+        return SCENARIO_ARGUMENT, *APPEARANCE
     check_known("scenario", family, (*FAMILIES, RANDOM, SCENARIO))
-    return *inspect.signature(FAMILIES[family]).parameters, *_APPEARANCE
+    return *inspect.signature(FAMILIES[family]).parameters, *APPEARANCE
 
 
 def with_camera(env: gym.Env, camera: "CameraSpec | None", *observation: Any) -> gym.Env:

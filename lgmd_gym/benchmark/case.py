@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.envs.registration import RANDOM, SCENARIO, SCENARIO_ARGUMENT
+from lgmd_gym.envs.registration import APPEARANCE, RANDOM, SCENARIO, SCENARIO_ARGUMENT
 from lgmd_gym.envs.scenarios.data import scenario_from_data, scenario_to_data
 from lgmd_gym.envs.scenarios.distribution import draw_scenario, level_generator
 from lgmd_gym.envs.scenarios.registry import make_scenario
@@ -49,10 +49,9 @@ class Case:
         Raises:
             ValueError: If an argument is unknown or out of range.
         """
-        arguments = dict(self.arguments)
+        arguments = {name: value for name, value in self.arguments if name not in APPEARANCE}
         if self.family == RANDOM:
             return draw_scenario(level_generator(arguments["split"], arguments["start_level"]))
-        arguments.pop("condition", None)  # an argument of the camera, not of the scenario
         if self.family == SCENARIO:
             return scenario_from_data(arguments[SCENARIO_ARGUMENT])
         return make_scenario(self.family, **arguments)

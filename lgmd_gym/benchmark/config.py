@@ -7,9 +7,10 @@ from typing import Any
 
 import tomli_w
 
+from lgmd_gym.benchmark.data_file import read_data
 from lgmd_gym.benchmark.folder import provenance
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.suite_file import copy_suite, is_file, read_toml
+from lgmd_gym.benchmark.suite_file import copy_suite, is_file
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.camera import CLEAR, CONDITIONS, CameraSpec
@@ -39,8 +40,8 @@ class RunConfig:
     """Configuration of a run: every setting that affects its rows.
 
     Attributes:
-        suite: Name of a suite, path of a suite file (".toml") or of an OpenSCENARIO file (".xosc"), path of a
-            folder with OpenSCENARIO files, several of these paths, or "traffic".
+        suite: Name of a suite, path of a suite file (".toml" or ".json") or of an OpenSCENARIO file
+            (".xosc"), path of a folder with OpenSCENARIO files, several of these paths, or "traffic".
         agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
         seeds: Number of seeds, >= 1; for traffic, of every kind.
         first_seed: First seed, >= 0.
@@ -133,7 +134,7 @@ class RunConfig:
         Raises:
             ValueError: If the file cannot be read, a key is unknown or missing, or a value is invalid.
         """
-        values = read_toml(path, "run config")
+        values = read_data(path, "run config")
         try:
             check_keys("key", values, [field.name for field in fields(cls)])
             for key in ("suite", "agents", "seeds"):
