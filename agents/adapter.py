@@ -1,8 +1,5 @@
 """User-defined agents: classes with a method `act`, given as "module:Class"."""
 
-import os
-import sys
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +7,7 @@ import numpy as np
 from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.options import check_options, parse_agent
 from lgmd_gym.errors import shown, unknown_name
+from lgmd_gym.system.user_modules import import_user_module
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -75,12 +73,7 @@ def make_user_agent(text: str) -> AgentAdapter:
     """
     module, class_name, *rest = text.split(":", 2)
     name = f"{module}:{class_name}"
-    if os.getcwd() not in sys.path:
-        sys.path.append(os.getcwd())
-    try:
-        names = vars(import_module(module))
-    except (ImportError, ValueError, TypeError) as error:
-        raise ValueError(f"agent {shown(name)} cannot be imported ({error}); write module:Class") from None
+    names = vars(import_user_module(module, f"agent {shown(name)}"))
     if class_name not in names:
         classes = [f"{module}:{item}" for item, value in names.items() if isinstance(value, type)]
         raise unknown_name("agent class", name, classes)

@@ -10,7 +10,8 @@ if TYPE_CHECKING:
     from lgmd_gym.envs.braking import BrakingEnv
     from lgmd_gym.envs.dynamics.bend import Bend
     from lgmd_gym.envs.dynamics.segment import Segment
-    from lgmd_gym.envs.registration import env_id, register_envs
+    from lgmd_gym.envs.own_families import import_families
+    from lgmd_gym.envs.registration import env_id, register_envs, register_family
     from lgmd_gym.envs.scenarios import FAMILIES, make_scenario
     from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
 
@@ -23,8 +24,10 @@ __all__ = [
     "Scenario",
     "Segment",
     "env_id",
+    "import_families",
     "make_scenario",
     "register_envs",
+    "register_family",
 ]
 
 _MODULES = {
@@ -33,6 +36,8 @@ _MODULES = {
     "make_scenario": "scenarios",
     "env_id": "registration",
     "register_envs": "registration",
+    "register_family": "registration",
+    "import_families": "own_families",
     "Actor": "scenarios.scenario",
     "Bend": "dynamics.bend",
     "Segment": "dynamics.segment",

@@ -1,13 +1,15 @@
 """Registration of the braking environments with Gymnasium."""
 
 import inspect
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 
 from lgmd_gym.envs.scenarios import FAMILIES, make_scenario
 from lgmd_gym.envs.scenarios.data import scenario_from_data
+from lgmd_gym.envs.scenarios.registry import Family
+from lgmd_gym.envs.scenarios.registry import family as add_family
 from lgmd_gym.errors import check_keys, check_known, check_text
 
 if TYPE_CHECKING:
@@ -44,6 +46,31 @@ def register_envs() -> None:
                 vector_entry_point="lgmd_gym.engine:BrakingVectorEnv",
                 kwargs={"family": family},
             )
+
+
+def register_family(name: str) -> Callable[[Family], Family]:
+    """Register an own scenario family and its id `LGMD/<name>-v0`; usable as a decorator.
+
+    The family is a function that returns a `Scenario` with this name as its `family`, or a class with a
+    method `scenario()` that does.
+
+    Raises:
+        ValueError: If the name is taken, or contains other characters than letters, digits, ".", "_", "-".
+
+    Example:
+        >>> @register_family("Slowcoach")
+        ... def follow_slowly(ego_speed: float = 10.0) -> Scenario:
+        ...     lead = Actor(gap=5 * ego_speed, speed=1.0)
+        ...     return Scenario(family="Slowcoach", ego_speed=ego_speed, duration=9.0, actors=(lead,))
+    """
+    add = add_family(name)
+
+    def register(function: Family) -> Family:
+        add(function)
+        register_envs()
+        return function
+
+    return register
 
 
 def make_braking(

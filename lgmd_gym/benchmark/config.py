@@ -52,6 +52,8 @@ class RunConfig:
         camera: See `LGMDObservation`; None for each agent's own, see `Agent.camera`.
         params: See `LGMDObservation`; None for each agent's own or the defaults.
         kinds: Kinds of traffic; None for all. Only for the suite "traffic".
+        modules: Modules with scenario families of the user, see `import_families`; a run folder stores the
+            scenarios instead.
 
     Raises:
         ValueError: If a value is unknown or out of range.
@@ -68,6 +70,7 @@ class RunConfig:
     camera: CameraSpec | None = None
     params: NeuronSpec = None
     kinds: tuple[str, ...] | None = None
+    modules: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "suite", _suite(self.suite))
@@ -84,6 +87,7 @@ class RunConfig:
             "conditions": _names("conditions", self.conditions, "camera condition", (*CONDITIONS, MIXED)),
             "worlds": check_whole("worlds", self.worlds, 0, WORLDS),
             "first_world": check_whole("first_world", self.first_world, 0, WORLDS - max(self.worlds, 1)),
+            "modules": tuple(dict.fromkeys(check_items("modules", self.modules, str, "strings"))),
             "camera": plain.camera,
             "params": plain.params,
         }
@@ -136,7 +140,7 @@ class RunConfig:
         """
         values = read_data(path, "run config")
         try:
-            check_keys("key", values, [field.name for field in fields(cls)])
+            check_keys("key", values, [field.name for field in fields(cls) if field.name != "modules"])
             for key in ("suite", "agents", "seeds"):
                 if key not in values:
                     raise ValueError(f"key {key!r} is missing")
@@ -152,7 +156,7 @@ class RunConfig:
         """Write `run.toml`, and a copy of a user's own suite, into a run folder; return the file's path."""
         made = provenance()
         if self.own_suite:
-            copy_suite(self.suite, folder / SUITE_FILE)
+            copy_suite(self.suite, folder / SUITE_FILE, self.modules)
         head = HEAD.format(file=RUN_FILE, version=made["lgmd_gym"], commit=made["commit"] or "unknown")
         values = {key: value for key, value in self.to_dict().items() if value is not None}
         path = folder / RUN_FILE
@@ -161,7 +165,9 @@ class RunConfig:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the values for TOML and JSON; a user's own suite is `SUITE_FILE`."""
-        return asdict(self) | ({"suite": SUITE_FILE} if self.own_suite else {})
+        values = asdict(self) | ({"suite": SUITE_FILE} if self.own_suite else {})
+        del values["modules"]
+        return values
 
 
 def _suite(value: Any) -> str | tuple[str, ...]:

@@ -81,7 +81,7 @@ class CasePlan(Plan):
 
     def __init__(self, config: RunConfig) -> None:
         super().__init__(config)
-        suite = get_suite(config.suite)
+        suite = get_suite(config.suite, config.modules)
         self.suite, self.cases = suite.name, suite.cases
 
     def keys(self) -> set[RowKey]:

@@ -2,6 +2,7 @@
 
 name = "mine"
 about = "dark cars, by day"
+module = "my_scenarios"             # or "my_scenarios:MyFamily", see `import_families`; optional
 
 [[cases]]
 family = "CCRs"
@@ -36,15 +37,18 @@ from typing import Any
 
 import tomli_w
 
-from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.case import Case, scenario_case
 from lgmd_gym.benchmark.case_table import read_cases, read_name
 from lgmd_gym.benchmark.data_file import read_data
 from lgmd_gym.benchmark.openscenario import read, read_all
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, Suite, find_suite
-from lgmd_gym.envs.registration import SCENARIO, SCENARIO_ARGUMENT, make_source
+from lgmd_gym.benchmark.trust import check_named
+from lgmd_gym.envs.own_families import import_families, is_own
+from lgmd_gym.envs.registration import APPEARANCE, SCENARIO, SCENARIO_ARGUMENT, make_source
+from lgmd_gym.envs.scenarios import FAMILIES
 from lgmd_gym.errors import check_items, check_keys, check_path, check_text
 
-SUITE_KEYS = ("name", "about", "cases")
+SUITE_KEYS = ("name", "about", "module", "cases")
 DATA_FILES = (".toml", ".json")
 FILES = (*DATA_FILES, ".xosc")
 
@@ -59,20 +63,23 @@ def is_file(suite: str | tuple[str, ...]) -> bool:
         return False
 
 
-def get_suite(text: str | tuple[str, ...]) -> Suite:
+def get_suite(text: str | tuple[str, ...], modules: tuple[str, ...] = ()) -> Suite:
     """Return a suite.
 
     Args:
         text: Name of a suite; path of a suite file (".toml" or ".json") or of an OpenSCENARIO file (".xosc");
             path of a folder with OpenSCENARIO files; or several paths of OpenSCENARIO files and folders.
+        modules: Modules with scenario families of the user, see `import_families`; code from outside this
+            package runs only if it is named here.
 
     Raises:
-        ValueError: If the name is unknown or a file is not a valid suite.
+        ValueError: If the name is unknown, a file is not a valid suite, or a module cannot be imported.
     """
+    import_families(modules)
     if isinstance(text, tuple):
         return read_all(_scenario_files(text))
     if check_text("suite", text).endswith(DATA_FILES):
-        return load_suite(check_path("suite", text))
+        return load_suite(check_path("suite", text), modules)
     if text.endswith(".xosc"):
         return read(check_path("suite", text))
     return read_all([text]) if is_file(text) else find_suite(text)
@@ -85,14 +92,41 @@ def _scenario_files(paths: tuple[str, ...]) -> tuple[str, ...]:
     return paths
 
 
-def load_suite(path: Path) -> Suite:
+def declared_modules(suite: str) -> tuple[str, ...]:
+    """Return the modules that a suite file names; none for other suites. They are not imported.
+
+    Raises:
+        ValueError: If the file cannot be read, or `module` is not a string or a list of strings.
+    """
+    if not suite.endswith(DATA_FILES):
+        return ()
+    path = check_path("suite", suite)
+    return _modules_of(path, read_data(path, "suite file"))
+
+
+def _modules_of(path: Path, values: dict[str, Any]) -> tuple[str, ...]:
+    given = values.get("module", [])
+    try:
+        return check_items("module", [given] if isinstance(given, str) else given, str, "strings")
+    except ValueError as error:
+        raise ValueError(f"suite file {str(path)!r}: {error}") from None
+
+
+def load_suite(path: Path, modules: tuple[str, ...] = ()) -> Suite:
     """Read a suite and build every case once, to find invalid values before the first episode.
+
+    Args:
+        path: Suite file.
+        modules: See `get_suite`; they must include those that the file names.
 
     Raises:
         ValueError: If the file cannot be read, a key, family or argument is unknown, a value is out of
-            range, or a case is defined twice.
+            range, a case is defined twice, or the file names another module.
     """
     values = read_data(path, "suite file")
+    declared = _modules_of(path, values)
+    check_named(declared, modules, path)
+    import_families(declared)
     try:
         check_keys("key of a suite", values, SUITE_KEYS)
         name = read_name(values, "name")
@@ -121,14 +155,15 @@ def _check_cases(cases: tuple[Case, ...]) -> None:
             raise ValueError(f"case {case.name!r}: {error}") from None
 
 
-def copy_suite(source: str | Path | tuple[str, ...], target: Path) -> None:
+def copy_suite(source: str | Path | tuple[str, ...], target: Path, modules: tuple[str, ...] = ()) -> None:
     """Write a suite given by files to a suite file, with one table per case.
 
-    The scenarios of OpenSCENARIO files become data, so that a run does not need its sources again.
+    The scenarios of OpenSCENARIO files and of the user's families become data, so that neither a run nor its
+    worker processes need their sources again.
     """
-    suite = get_suite(source if isinstance(source, tuple) else str(source))
+    suite = get_suite(source if isinstance(source, tuple) else str(source), modules)
     tables = []
-    for case in suite.cases:
+    for case in map(_with_data, suite.cases):
         _, family, variant = case.name.split("/", 2)
         arguments = dict(case.arguments)
         scenario = arguments.pop(SCENARIO_ARGUMENT, None) if case.family == SCENARIO else None
@@ -138,3 +173,12 @@ def copy_suite(source: str | Path | tuple[str, ...], target: Path) -> None:
         tables.append(table | ({} if scenario is None else {"scenario": scenario}))
     text = tomli_w.dumps({"name": suite.name, "about": suite.about, "cases": tables})
     target.write_text(text, encoding="utf-8")
+
+
+def _with_data(case: Case) -> Case:
+    """Return a case of a user's family as a case with a given scenario."""
+    if case.family not in FAMILIES or not is_own(case.family):
+        return case
+    variant = case.name.split("/", 2)[2]
+    chosen = {name: value for name, value in case.arguments if name in APPEARANCE}
+    return scenario_case(case.suite, variant, case.scenario, case.fcw_driver, **chosen)

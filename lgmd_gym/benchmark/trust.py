@@ -28,3 +28,24 @@ def check_trust(agents: Iterable[str], source: Path, trust: bool) -> None:
                 "add --trust"
             )
         print(f"lgmd-gym: loading {code}, named in {str(source)!r}", file=sys.stderr)
+
+
+def check_named(declared: Iterable[str], named: Iterable[str], source: Path) -> None:
+    """Check that the user has named the modules with scenario families that a file declares.
+
+    Args:
+        declared: "MODULE" or "MODULE:NAME" in the file.
+        named: Those that the user has named.
+        source: The file.
+
+    Raises:
+        ValueError: If the user has not named one.
+    """
+    known = {text.partition(":")[0] for text in named}
+    for text in declared:
+        module = text.partition(":")[0]
+        if module not in known:
+            raise ValueError(
+                f"{str(source)!r} names module {module!r}, whose code would run; if you trust it, add "
+                f"--module {module} or --trust (in Python, modules=[{module!r}])"
+            )

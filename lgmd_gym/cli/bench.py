@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 
 from lgmd_gym.cli.console import make_console
+from lgmd_gym.cli.modules import chosen_modules
 from lgmd_gym.cli.options import refuse_unused
 from lgmd_gym.cli.params import note_unused_params, read_params
 
@@ -105,6 +106,7 @@ def _new(options: "Bench", executor: "Executor") -> "Run":
         "agents",
         "seeds",
         "first_seed",
+        "module",
         "conditions",
         "worlds",
         "first_world",
@@ -115,7 +117,8 @@ def _new(options: "Bench", executor: "Executor") -> "Run":
     values["params"] = read_params(options.params)
     values = {name: value for name, value in values.items() if value is not None}
     if options.config is None:
-        config = RunConfig(**values)
+        modules = chosen_modules(values.get("suite", ()), values.pop("module", ()), options.trust)
+        config = RunConfig(**values, modules=modules)
     elif values:
         flags = ", ".join(f"--{name.replace('_', '-')}" for name in values)
         raise ValueError(f"--config replaces {flags}; remove the options, or change the file")

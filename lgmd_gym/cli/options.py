@@ -51,6 +51,8 @@ class Bench:
     """Number of seeds per case; a seed sets the start position and the target's grey level. Default: 3."""
     first_seed: Count = None
     """First seed. Default: 0."""
+    module: Names = None
+    """Modules with scenario families of your own: my_scenarios, or my_scenarios:MyFamily."""
     conditions: Names = None
     """Camera conditions, each run separately: clear, night, night_upper_beam, fog, rain, low_sun, or mixed
     for that of each world. Default: clear."""
@@ -69,7 +71,8 @@ class Bench:
     resume: File = None
     """Folder of an interrupted run; runs the missing episodes with the settings of that run."""
     trust: bool = False
-    """Load modules and policy files of agents that --resume or --config names; they can run any code."""
+    """Load modules and policy files that --resume, --config or the suite file names; they can run any
+    code."""
     jobs: int = 2
     """Number of processes."""
     backend: Literal["processes", "dask"] = "processes"
@@ -129,6 +132,10 @@ class Drive:
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
     params: File = None
     """TOML file of LGMD parameters."""
+    module: Names = None
+    """Modules with scenario families of your own: my_scenarios, or my_scenarios:MyFamily."""
+    trust: bool = False
+    """Load the modules that the file names; they can run any code."""
     set: Annotated[tuple[str, ...], arg(metavar="NAME=NUMBER [...]")] = ()
     """Scenario arguments in SI units, for example --set ego_speed=8.3 shade=40."""
 
