@@ -16,6 +16,8 @@ from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Any
 
+import numpy as np
+
 from lgmd_gym.envs.dynamics.bend import Bend
 from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
@@ -62,7 +64,7 @@ def _to_data(item: Any) -> dict[str, Any]:
             several = _NESTED[type(item), field.name][1]
             data[field.name] = [_to_data(part) for part in value] if several else _to_data(value)
         else:
-            data[field.name] = value
+            data[field.name] = value.item() if isinstance(value, np.generic) else value
     return data
 
 

@@ -1,21 +1,24 @@
 """Benchmark: suites of cases, runs on many processes, rows and summaries."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.executor import SERIAL, Executor
+from lgmd_gym.benchmark.suite_file import Source, get_suite
+from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.errors import shown
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Executor", "RunConfig", "run"]
+__all__ = ["Executor", "RunConfig", "get_suite", "run"]
 
 
 def run(
-    config: RunConfig,
+    config: RunConfig | Scenario | Sequence[Scenario | str],
     folder: Path | str | None = None,
     executor: Executor = SERIAL,
     plots: bool = True,
@@ -24,7 +27,8 @@ def run(
     """Run a benchmark and write the same folder as `lgmd-gym bench`.
 
     Args:
-        config: Configuration of the run.
+        config: Configuration of the run; or a scenario, or several scenarios and paths of files, which the
+            default agents play.
         folder: Run folder, which must not exist; None to keep no folder.
         executor: Worker processes or cluster that run the episodes.
         plots: Whether to draw one PNG per case.
@@ -35,7 +39,7 @@ def run(
         for the suite "traffic", `lgmd_gym.benchmark.traffic.rows.KEYS`.
 
     Raises:
-        TypeError: If the configuration is not a `RunConfig`.
+        TypeError: If the configuration is none of these.
         ValueError: If the configuration is invalid, the cluster is not reachable, or the folder exists or
             cannot be created.
         RuntimeError: If the run stopped early, because a worker was killed or the disk is full.
@@ -44,9 +48,15 @@ def run(
         >>> config = RunConfig(suite="quick", agents=("ttc-oracle",), seeds=1)
         >>> table = run(config)  # doctest: +SKIP
     """
-    if not isinstance(config, RunConfig):  # pyright: ignore[reportUnnecessaryIsInstance]
+    if isinstance(config, Scenario | list | tuple):
+        config = RunConfig(suite=cast(Source, config))
+    if not isinstance(config, RunConfig):
         raise TypeError(
             f"config must be a RunConfig, got {shown(config)}; use RunConfig(suite=..., agents=...)"
+        )
+    if not isinstance(folder, str | Path | None):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise TypeError(
+            f"folder must be a path, got {shown(folder)}; agents are in RunConfig(suite=..., agents=...)"
         )
     import pandas as pd
 

@@ -9,16 +9,18 @@ import tomli_w
 
 from lgmd_gym.benchmark.data_file import read_data
 from lgmd_gym.benchmark.folder import provenance
+from lgmd_gym.benchmark.scenario_file import OWN
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.suite_file import copy_suite, is_file
+from lgmd_gym.benchmark.suite_file import Source, copy_suite, is_file
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.camera import CLEAR, CONDITIONS, CameraSpec
 from lgmd_gym.camera.spec import check_camera
 from lgmd_gym.camera.worlds import SPLIT_WORLDS, WORLDS
 from lgmd_gym.envs.appearance import MIXED, Appearance
+from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.envs.traffic.registration import KINDS
-from lgmd_gym.errors import check_items, check_keys, check_known, check_whole, shown
+from lgmd_gym.errors import as_tuple, check_items, check_keys, check_known, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
 
 RUN_FILE = "run.toml"
@@ -40,8 +42,9 @@ class RunConfig:
     """Configuration of a run: every setting that affects its rows.
 
     Attributes:
-        suite: Name of a suite, path of a suite file (".toml" or ".json") or of an OpenSCENARIO file
-            (".xosc"), path of a folder with OpenSCENARIO files, several of these paths, or "traffic".
+        suite: Name of a suite; path of a suite file or scenario file (".toml" or ".json") or of an
+            OpenSCENARIO file (".xosc"); path of a folder with OpenSCENARIO files; a `Scenario`; several paths
+            and scenarios; or "traffic".
         agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
         seeds: Number of seeds, >= 1; for traffic, of every kind.
         first_seed: First seed, >= 0.
@@ -59,7 +62,7 @@ class RunConfig:
         ValueError: If a value is unknown or out of range.
     """
 
-    suite: str | tuple[str, ...] = "quick"
+    suite: Source = "quick"
     agents: tuple[str, ...] = DEFAULT_AGENTS
     seeds: int = 3
     first_seed: int = 0
@@ -131,6 +134,12 @@ class RunConfig:
         """Whether the suite is given by files of the user."""
         return is_file(self.suite)
 
+    @property
+    def label(self) -> str:
+        """Short name of the suite, for names of folders."""
+        first = self.suite[0] if isinstance(self.suite, tuple) else self.suite
+        return Path(first).stem if isinstance(first, str) else OWN
+
     @classmethod
     def load(cls, path: Path) -> "RunConfig":
         """Read a file written by `save`; the path of a suite file is relative to it.
@@ -148,8 +157,9 @@ class RunConfig:
         except ValueError as error:
             raise ValueError(f"run config {str(path)!r}: {error}") from None
         if config.own_suite:
-            suites = (config.suite,) if isinstance(config.suite, str) else config.suite
-            object.__setattr__(config, "suite", _suite(tuple(str(path.parent / suite) for suite in suites)))
+            suites = config.suite if isinstance(config.suite, tuple) else (config.suite,)
+            paths = tuple(str(path.parent / str(suite)) for suite in suites)
+            object.__setattr__(config, "suite", _suite(paths))
         return config
 
     def save(self, folder: Path) -> Path:
@@ -170,14 +180,16 @@ class RunConfig:
         return values
 
 
-def _suite(value: Any) -> str | tuple[str, ...]:
-    """Return the name or path of a suite, or several paths; one path is a string."""
-    if isinstance(value, str):
+def _suite(value: Any) -> Source:
+    """Return the name or path of a suite, a scenario, or several paths and scenarios; one is no tuple."""
+    if isinstance(value, str | Scenario):
         return value
-    paths = check_items("suite", value, str, "strings")
-    if not paths:
-        raise ValueError("suite must contain at least one name or path, got none")
-    return paths[0] if len(paths) == 1 else paths
+    items = as_tuple(value)
+    if items is None or not all(isinstance(item, str | Scenario) for item in items):
+        raise ValueError(f"suite must be a name, paths or scenarios, got {shown(value)}")
+    if not items:
+        raise ValueError("suite must contain at least one name, path or scenario, got none")
+    return items[0] if len(items) == 1 else items
 
 
 def _names(name: str, values: Iterable[str], kind: str = "", known: Collection[str] = ()) -> tuple[str, ...]:

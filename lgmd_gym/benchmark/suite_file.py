@@ -41,20 +41,26 @@ from lgmd_gym.benchmark.case import Case, scenario_case
 from lgmd_gym.benchmark.case_table import read_cases, read_name
 from lgmd_gym.benchmark.data_file import read_data
 from lgmd_gym.benchmark.openscenario import read, read_all
+from lgmd_gym.benchmark.scenario_file import OWN, distinct, is_scenario, own_case, read_scenario
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, Suite, find_suite
 from lgmd_gym.benchmark.trust import check_named
 from lgmd_gym.envs.own_families import import_families, is_own
 from lgmd_gym.envs.registration import APPEARANCE, SCENARIO, SCENARIO_ARGUMENT, make_source
 from lgmd_gym.envs.scenarios import FAMILIES
-from lgmd_gym.errors import check_items, check_keys, check_path, check_text
+from lgmd_gym.envs.scenarios.scenario import Scenario
+from lgmd_gym.errors import check_items, check_keys, check_known, check_path, check_text
 
 SUITE_KEYS = ("name", "about", "module", "cases")
 DATA_FILES = (".toml", ".json")
 FILES = (*DATA_FILES, ".xosc")
+FILE_KIND = "suite or scenario file"
+MAX_LISTED = 10  # cases that a message lists
+Source = str | Scenario | tuple[str | Scenario, ...]
+"""What `get_suite` reads: a name, a path, a scenario, or several paths and scenarios."""
 
 
-def is_file(suite: str | tuple[str, ...]) -> bool:
-    """Return whether a suite is given by files or a folder instead of a name."""
+def is_file(suite: Source) -> bool:
+    """Return whether a suite is given by files, a folder or scenarios instead of a name."""
     if not isinstance(suite, str) or suite.endswith(FILES):
         return True
     try:
@@ -63,37 +69,74 @@ def is_file(suite: str | tuple[str, ...]) -> bool:
         return False
 
 
-def get_suite(text: str | tuple[str, ...], modules: tuple[str, ...] = ()) -> Suite:
+def get_suite(source: Source, modules: tuple[str, ...] = ()) -> Suite:
     """Return a suite.
 
     Args:
-        text: Name of a suite; path of a suite file (".toml" or ".json") or of an OpenSCENARIO file (".xosc");
-            path of a folder with OpenSCENARIO files; or several paths of OpenSCENARIO files and folders.
+        source: Name of a suite; path of a suite file or scenario file (".toml" or ".json") or of an
+            OpenSCENARIO file (".xosc"); path of a folder with OpenSCENARIO files; a `Scenario`; or several
+            paths and scenarios.
         modules: Modules with scenario families of the user, see `import_families`; code from outside this
             package runs only if it is named here.
 
     Raises:
-        ValueError: If the name is unknown, a file is not a valid suite, or a module cannot be imported.
+        ValueError: If the name is unknown, a file is not a valid suite or scenario, or a module cannot be
+            imported.
     """
     import_families(modules)
-    if isinstance(text, tuple):
-        return read_all(_scenario_files(text))
-    if check_text("suite", text).endswith(DATA_FILES):
-        return load_suite(check_path("suite", text), modules)
-    if text.endswith(".xosc"):
-        return read(check_path("suite", text))
-    return read_all([text]) if is_file(text) else find_suite(text)
+    if isinstance(source, tuple):
+        return _combine(source, modules)
+    if isinstance(source, Scenario):
+        return _combine((source,), modules)
+    if check_text("suite", source).endswith(DATA_FILES):
+        return load_suite(check_path("suite", source), modules)
+    if source.endswith(".xosc"):
+        return read(check_path("suite", source))
+    return read_all([source]) if is_file(source) else find_suite(source)
 
 
-def _scenario_files(paths: tuple[str, ...]) -> tuple[str, ...]:
-    for path in check_items("suite", paths, str, "strings"):
-        if not path.endswith(".xosc") and not check_path("suite", path).is_dir():
-            raise ValueError(f"of several suites each must be a .xosc file or a folder, got {path!r}")
-    return paths
+def find_own_case(source: Source, name: str | None = None, modules: tuple[str, ...] = ()) -> Case:
+    """Return one case of a suite that is given by files or scenarios.
+
+    Args:
+        source: See `get_suite`.
+        name: Name of the case, with or without the name of the suite; None if there is only one.
+        modules: See `get_suite`.
+
+    Raises:
+        ValueError: See `get_suite`; or if the name is unknown, or missing although there are several cases.
+    """
+    suite = get_suite(source, modules)
+    cases = {case.name: case for case in suite.cases}
+    if name is not None:
+        full = name if name in cases else f"{suite.name}/{name}"
+        return cases[check_known("case", full, cases)]
+    if len(cases) > 1:
+        listed = ", ".join([*cases][:MAX_LISTED]) + (", ..." if len(cases) > MAX_LISTED else "")
+        raise ValueError(f"{suite.name!r} has {len(cases)} cases; choose one with --case NAME: {listed}")
+    return suite.cases[0]
+
+
+def _combine(sources: tuple[str | Scenario, ...], modules: tuple[str, ...]) -> Suite:
+    """Return the suite of several files, folders and scenarios."""
+    for source in sources:
+        if not isinstance(source, Scenario) and not is_file(check_text("suite", source)):
+            raise ValueError(
+                f"of several suites each must be a file {FILES}, a folder or a Scenario, got {source!r}"
+            )
+    texts = [source for source in sources if isinstance(source, str) and not source.endswith(DATA_FILES)]
+    if sources and len(texts) == len(sources):
+        return read_all(texts)
+    cases: list[Case] = []
+    for source in sources:
+        cases += [own_case(source)] if isinstance(source, Scenario) else get_suite(source, modules).cases
+    if not cases:
+        raise ValueError("suite must contain at least one scenario or file, got none")
+    return Suite(OWN, distinct(cases), f"{len(cases)} scenarios")
 
 
 def declared_modules(suite: str) -> tuple[str, ...]:
-    """Return the modules that a suite file names; none for other suites. They are not imported.
+    """Return the modules that a suite or scenario file names; none for others. They are not imported.
 
     Raises:
         ValueError: If the file cannot be read, or `module` is not a string or a list of strings.
@@ -101,7 +144,7 @@ def declared_modules(suite: str) -> tuple[str, ...]:
     if not suite.endswith(DATA_FILES):
         return ()
     path = check_path("suite", suite)
-    return _modules_of(path, read_data(path, "suite file"))
+    return _modules_of(path, read_data(path, FILE_KIND))
 
 
 def _modules_of(path: Path, values: dict[str, Any]) -> tuple[str, ...]:
@@ -109,25 +152,30 @@ def _modules_of(path: Path, values: dict[str, Any]) -> tuple[str, ...]:
     try:
         return check_items("module", [given] if isinstance(given, str) else given, str, "strings")
     except ValueError as error:
-        raise ValueError(f"suite file {str(path)!r}: {error}") from None
+        raise ValueError(f"{FILE_KIND} {str(path)!r}: {error}") from None
 
 
 def load_suite(path: Path, modules: tuple[str, ...] = ()) -> Suite:
-    """Read a suite and build every case once, to find invalid values before the first episode.
+    """Read a suite or scenario file and build every case once, to find invalid values before an episode.
 
     Args:
-        path: Suite file.
+        path: Suite file or scenario file.
         modules: See `get_suite`; they must include those that the file names.
 
     Raises:
         ValueError: If the file cannot be read, a key, family or argument is unknown, a value is out of
             range, a case is defined twice, or the file names another module.
     """
-    values = read_data(path, "suite file")
+    values = read_data(path, FILE_KIND)
     declared = _modules_of(path, values)
     check_named(declared, modules, path)
     import_families(declared)
+    kind = "scenario file" if is_scenario(values) else "suite file"
     try:
+        if is_scenario(values):
+            case = read_scenario(path, values)
+            _check_cases((case,))
+            return Suite(case.suite, (case,), f"scenario file {path.name}")
         check_keys("key of a suite", values, SUITE_KEYS)
         name = read_name(values, "name")
         if name in SUITES or name == TRAFFIC:
@@ -138,7 +186,7 @@ def load_suite(path: Path, modules: tuple[str, ...] = ()) -> Suite:
         cases = tuple(case for table in tables for case in read_cases(name, table))
         _check_cases(cases)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"suite file {str(path)!r}: {error}") from None
+        raise ValueError(f"{kind} {str(path)!r}: {error}") from None
     return Suite(name, cases, str(values.get("about", "user suite")))
 
 
@@ -155,13 +203,13 @@ def _check_cases(cases: tuple[Case, ...]) -> None:
             raise ValueError(f"case {case.name!r}: {error}") from None
 
 
-def copy_suite(source: str | Path | tuple[str, ...], target: Path, modules: tuple[str, ...] = ()) -> None:
-    """Write a suite given by files to a suite file, with one table per case.
+def copy_suite(source: Source, target: Path, modules: tuple[str, ...] = ()) -> None:
+    """Write a suite given by files or scenarios to a suite file, with one table per case.
 
     The scenarios of OpenSCENARIO files and of the user's families become data, so that neither a run nor its
     worker processes need their sources again.
     """
-    suite = get_suite(source if isinstance(source, tuple) else str(source), modules)
+    suite = get_suite(source, modules)
     tables = []
     for case in map(_with_data, suite.cases):
         _, family, variant = case.name.split("/", 2)

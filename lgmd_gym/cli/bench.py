@@ -125,8 +125,7 @@ def _new(options: "Bench", executor: "Executor") -> "Run":
     else:
         config = RunConfig.load(options.config)
         check_trust(config.agents, options.config, options.trust)
-    first = config.suite if isinstance(config.suite, str) else config.suite[0]
-    default = Path("runs") / f"{Path(first).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+    default = Path("runs") / f"{config.label}-{time.strftime('%Y%m%d-%H%M%S')}"
     run = Run.new(config, options.out or default, executor)
     if options.params is not None:
         note_unused_params(options.params, map(make_agent, config.agents))

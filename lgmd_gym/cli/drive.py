@@ -5,21 +5,19 @@ from typing import Any
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.cli.modules import chosen_modules
+from lgmd_gym.cli.modules import find_target
 from lgmd_gym.cli.options import Drive
 from lgmd_gym.cli.params import note_unused_params, read_params
-from lgmd_gym.envs import import_families
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.rendering.playback import play_episode
 
 
 def run(options: Drive) -> int:
     """Run one episode and print how it ended."""
-    import_families(chosen_modules((options.target,), options.module, options.trust))
     agent = make_agent(options.agent)
     note_unused_params(options.params, [agent])
     result = play_episode(
-        options.target,
+        find_target(options.target, options.case, options.module, options.trust),
         agent,
         options.seed,
         _parse_arguments(options.set),

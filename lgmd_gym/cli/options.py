@@ -42,8 +42,8 @@ class Bench:
     """
 
     suite: Names = None
-    """Suite name (see `lgmd-gym list suites`), path of a suite file, NAME.toml, or paths of OpenSCENARIO
-    files, NAME.xosc, and of folders with such files. Default: quick."""
+    """Suite name (see `lgmd-gym list suites`), or paths: suite or scenario files (.toml, .json), OpenSCENARIO
+    files (.xosc), folders with such files. Default: quick."""
     agents: Names = None
     """Agents with options, for example spike-threshold:threshold=45,frames=2; MODULE:CLASS for an agent of
     your own. Default: no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""
@@ -116,8 +116,11 @@ class Drive:
     Every picture shows the camera frame, the neuron's layers and spikes, and the road from above.
     """
 
-    target: Annotated[Positional[str], arg(metavar="ENV|CASE|TRAFFIC")]
-    """Environment id (LGMD/CCRs-v0), case (quick/CCRs/v30) or kind of traffic (traffic/merge)."""
+    target: Annotated[Positional[str], arg(metavar="ENV|CASE|TRAFFIC|FILE")]
+    """Environment id (LGMD/CCRs-v0), case (quick/CCRs/v30), kind of traffic (traffic/merge), or path of a
+    scenario file, suite file or OpenSCENARIO file."""
+    case: Name = None
+    """Case of a file with several, for example CutIn/v70/gap8m."""
     agent: str = "spike-threshold"
     """Agent, with options as in spike-threshold:threshold=45."""
     video: File = None

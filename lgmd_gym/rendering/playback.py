@@ -10,6 +10,7 @@ import gymnasium as gym
 
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import Agent
+from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, find_case
 from lgmd_gym.envs import env_id
@@ -45,17 +46,21 @@ class PlaybackResult:
     stopped: bool = False
 
 
-def make_target(target: str, arguments: dict[str, Any], **options: Any) -> gym.Env:
+def make_target(target: str | Case, arguments: dict[str, Any], **options: Any) -> gym.Env:
     """Return the environment of an id, a benchmark case or a kind of traffic.
 
     Args:
-        target: For example "LGMD/CCRs-v0", "quick/CCRs/v30" or "traffic/merge".
+        target: For example "LGMD/CCRs-v0", "quick/CCRs/v30" or "traffic/merge"; or a case, such as that of a
+            file, see `find_own_case`.
         arguments: Scenario arguments, which override those of the case; not for traffic.
         **options: Further arguments of `gym.make`, for example `camera`, `params` or `render_mode`.
 
     Raises:
         ValueError: For an unknown target or argument.
     """
+    if isinstance(target, Case):
+        chosen = {**dict(target.arguments), **arguments}
+        return gym.make(env_id(target.family), **options, **chosen)
     traffic = {f"{TRAFFIC}/{kind}": traffic_id(kind) for kind in KINDS}
     target = traffic.get(target, target)
     if target in traffic.values() and arguments:
@@ -67,12 +72,11 @@ def make_target(target: str, arguments: dict[str, Any], **options: Any) -> gym.E
     if target not in cases:
         hint = "lgmd-gym list envs and lgmd-gym list cases print all names"
         raise unknown_name("environment or case", target, [*ids, *cases, *traffic], hint)
-    case = find_case(target)
-    return gym.make(env_id(case.family), **options, **{**dict(case.arguments), **arguments})
+    return make_target(find_case(target), arguments, **options)
 
 
 def play_episode(
-    target: str,
+    target: str | Case,
     agent: Agent,
     seed: int,
     arguments: dict[str, Any],
@@ -105,10 +109,11 @@ def play_episode(
         stack.callback(env.close)
         if video is None and not live:
             return _play(env, agent, seed, lambda: True)
-        view = LGMDView(env, title=f"{target}   {agent.name}   seed {seed}", overlays=overlays)
+        name = target.name if isinstance(target, Case) else target
+        view = LGMDView(env, title=f"{name}   {agent.name}   seed {seed}", overlays=overlays)
         rate = float(view.metadata["render_fps"])
         writer = stack.enter_context(VideoWriter(video, rate)) if video is not None else None
-        window = stack.enter_context(closing(Window(target, SIZE, rate))) if live else None
+        window = stack.enter_context(closing(Window(name, SIZE, rate))) if live else None
 
         def show() -> bool:
             view.agent_alert = agent.alert

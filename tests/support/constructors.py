@@ -262,7 +262,7 @@ def _add_runs(add):
     add("run", lambda config: benchmark.run(config), {"config": None}, {"config": "int"})
     add("Case", case, {"name": "a/b", "family": "CCRs", "arguments": ()}, signature_of(Case))
     add("find_suite", find_suite, {"name": "quick"}, {"name": "str"})
-    add("get_suite", get_suite, {"text": "quick"})
+    add("get_suite", get_suite, {"source": "quick"})
     add(
         "TrainConfig", TrainConfig, {"algo": "ppo", "demands": (0.0, -1.0)}, None, lambda made: made.to_dict()
     )
