@@ -188,7 +188,7 @@ def _suite(value: Any) -> Source:
     if items is None or not all(isinstance(item, str | Scenario) for item in items):
         raise ValueError(f"suite must be a name, paths or scenarios, got {shown(value)}")
     if not items:
-        raise ValueError("suite must contain at least one name, path or scenario, got none")
+        raise ValueError("suite must contain at least one name or path, or a scenario, got none")
     return items[0] if len(items) == 1 else items
 
 

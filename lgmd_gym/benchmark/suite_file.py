@@ -125,13 +125,11 @@ def _combine(sources: tuple[str | Scenario, ...], modules: tuple[str, ...]) -> S
                 f"of several suites each must be a file {FILES}, a folder or a Scenario, got {source!r}"
             )
     texts = [source for source in sources if isinstance(source, str) and not source.endswith(DATA_FILES)]
-    if sources and len(texts) == len(sources):
+    if len(texts) == len(sources):
         return read_all(texts)
     cases: list[Case] = []
     for source in sources:
         cases += [own_case(source)] if isinstance(source, Scenario) else get_suite(source, modules).cases
-    if not cases:
-        raise ValueError("suite must contain at least one scenario or file, got none")
     return Suite(OWN, distinct(cases), f"{len(cases)} scenarios")
 
 
@@ -203,13 +201,13 @@ def _check_cases(cases: tuple[Case, ...]) -> None:
             raise ValueError(f"case {case.name!r}: {error}") from None
 
 
-def copy_suite(source: Source, target: Path, modules: tuple[str, ...] = ()) -> None:
+def copy_suite(source: Source | Path, target: Path, modules: tuple[str, ...] = ()) -> None:
     """Write a suite given by files or scenarios to a suite file, with one table per case.
 
     The scenarios of OpenSCENARIO files and of the user's families become data, so that neither a run nor its
     worker processes need their sources again.
     """
-    suite = get_suite(source, modules)
+    suite = get_suite(str(source) if isinstance(source, Path) else source, modules)
     tables = []
     for case in map(_with_data, suite.cases):
         _, family, variant = case.name.split("/", 2)

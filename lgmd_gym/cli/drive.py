@@ -1,13 +1,12 @@
 """The `drive` command."""
 
 from math import isfinite
-from typing import Any
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.cli.modules import find_target
 from lgmd_gym.cli.options import Drive
-from lgmd_gym.cli.params import note_unused_params, read_params
+from lgmd_gym.cli.params import note_unused_params, parse_arguments, read_params
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.rendering.playback import play_episode
 
@@ -20,7 +19,7 @@ def run(options: Drive) -> int:
         find_target(options.target, options.case, options.module, options.trust),
         agent,
         options.seed,
-        _parse_arguments(options.set),
+        parse_arguments(options.set),
         video=options.video,
         live=options.live,
         overlays=options.overlays,
@@ -36,15 +35,3 @@ def run(options: Drive) -> int:
     if options.video is not None:
         print(f"video: {options.video}")
     return 0
-
-
-def _parse_arguments(pairs: tuple[str, ...]) -> dict[str, Any]:
-    """Return NAME=NUMBER pairs as a dict."""
-    arguments: dict[str, Any] = {}
-    for pair in pairs:
-        name, _, value = pair.partition("=")
-        try:
-            arguments[name] = int(value) if name == "shade" else float(value)
-        except ValueError:
-            raise ValueError(f"--set must be NAME=NUMBER, for example ego_speed=8.3, got {pair!r}") from None
-    return arguments

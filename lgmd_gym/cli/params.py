@@ -32,3 +32,15 @@ def note_unused_params(path: Path | None, agents: Iterable[Agent]) -> None:
             "depend on the neuron",
             file=sys.stderr,
         )
+
+
+def parse_arguments(pairs: tuple[str, ...]) -> dict[str, Any]:
+    """Return NAME=NUMBER pairs as a dict."""
+    arguments: dict[str, Any] = {}
+    for pair in pairs:
+        name, _, value = pair.partition("=")
+        try:
+            arguments[name] = int(value) if name == "shade" else float(value)
+        except ValueError:
+            raise ValueError(f"--set must be NAME=NUMBER, for example ego_speed=8.3, got {pair!r}") from None
+    return arguments

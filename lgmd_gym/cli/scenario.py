@@ -1,4 +1,4 @@
-"""The `scenario` command: compare OpenSCENARIO files with their intent, export cases."""
+"""The `scenario` command: write templates, draw scenarios, check OpenSCENARIO files, export cases."""
 
 import time
 from math import isnan
@@ -7,21 +7,67 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
+from lgmd_gym.benchmark.openscenario.names import file_name
 from lgmd_gym.cli.console import make_console
 
 if TYPE_CHECKING:
     from lgmd_gym.benchmark.openscenario.check import CheckedFile
     from lgmd_gym.cli.options import Scenario
 
+NEEDED = {
+    "show": "a file, an environment id or a case",
+    "check": "a file or folder",
+    "export": "the name of a case",
+}
 COLUMNS = ("file", "cells", "contacts", "location [cm]", "speed [km/h]", "time [s]")
 
 
 def run(options: "Scenario") -> int:
     """Run one action; return the exit code."""
+    if options.action == "new":
+        return _new(options)
     if not options.targets:
-        needed = "a file or folder" if options.action == "check" else "the name of a case"
-        raise ValueError(f"scenario {options.action} needs {needed}")
-    return _check(options) if options.action == "check" else _export(options)
+        raise ValueError(f"scenario {options.action} needs {NEEDED[options.action]}")
+    actions = {"show": _show, "check": _check, "export": _export}
+    return actions[options.action](options)
+
+
+def _new(options: "Scenario") -> int:
+    from lgmd_gym.benchmark.scenario_template import write_template
+
+    if len(options.targets) > 1:
+        raise ValueError(f"scenario new writes one file, got {len(options.targets)}: {options.targets}")
+    path = write_template((options.targets or ("scenario.toml",))[0], options.force)
+    make_console().print(f"{path}: edit it, then lgmd-gym scenario show {path}", soft_wrap=True)
+    return 0
+
+
+def _show(options: "Scenario") -> int:
+    from lgmd_gym.benchmark.case import Case
+    from lgmd_gym.cli.modules import find_target
+    from lgmd_gym.cli.params import parse_arguments
+    from lgmd_gym.envs.motion import record_motion
+    from lgmd_gym.plotting.scenario_figure import scenario_figure
+    from lgmd_gym.rendering.playback import make_target
+    from lgmd_gym.system.files import check_output_file
+
+    if len(options.targets) != 1:
+        raise ValueError(f"scenario show draws one scenario, got {len(options.targets)}: {options.targets}")
+    given = options.targets[0]
+    target = find_target(given, options.case, options.module, options.trust)
+    env = make_target(target, parse_arguments(options.set), camera=None).unwrapped
+    scenario = getattr(env, "scenario", None)
+    if scenario is None:
+        raise ValueError(f"{given} has no scenario to draw; traffic is drawn by lgmd-gym drive")
+    name = target.name if isinstance(target, Case) else target
+    stem = Path(given).stem if isinstance(target, Case) and options.case is None else name.replace("/", "_")
+    path = options.to or Path(f"{file_name(stem)}.png")
+    check_output_file(path, "picture", options.force)
+    motion = record_motion(scenario)
+    scenario_figure(path, name, motion)
+    end = "contact" if motion.contact else "no contact"
+    make_console().print(f"{path}: {end} after {motion.times[-1]:.2f} s without braking", soft_wrap=True)
+    return 0
 
 
 def _check(options: "Scenario") -> int:

@@ -123,6 +123,23 @@ def check_new_file(path: Path, name: str) -> None:
     path.unlink()
 
 
+def check_output_file(path: Path, name: str, force: bool) -> None:
+    """Check that a file can be written, and does not exist unless `force` is set.
+
+    Args:
+        path: File to write later.
+        name: Name of the file in the message.
+        force: Whether an existing file may be replaced.
+
+    Raises:
+        ValueError: If the file exists or cannot be created.
+    """
+    if not path.is_file():
+        check_new_file(path, name)
+    elif not force:
+        raise ValueError(f"{name} {str(path)!r} exists; choose another file, or replace it with --force")
+
+
 def is_intact_zip(path: Path, member: str) -> bool:
     """Return whether a zip file (.zip or .npz) contains a member and every checksum in it is right."""
     try:

@@ -1,0 +1,74 @@
+"""Motion of a scenario whose ego does not brake, for figures and checks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from highway_env.road.road import RoadNetwork
+
+from lgmd_gym.camera.worlds import LABORATORY
+from lgmd_gym.envs.braking import BrakingEnv
+from lgmd_gym.envs.registration import SCENARIO, SCENARIO_ARGUMENT, make_source
+from lgmd_gym.envs.scenarios.scenario import Scenario
+
+_NO_DEMAND = np.zeros(1, np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Positions and speeds of the ego and all actors; the ego is the first body.
+
+    Attributes:
+        scenario: The scenario.
+        times: Time after the start, float64, shape (T,) [s].
+        positions: Centres in highway-env's axes, x along the ego's first heading and y to its right, relative
+            to the ego's first position, float64, shape (T, bodies, 2) [m].
+        headings: Headings, + right, float64, shape (T, bodies) [rad].
+        speeds: Speeds, float64, shape (T, bodies) [m/s].
+        sizes: Length and width of every body, float64, shape (bodies, 2) [m].
+        contact: Whether the last time is that of a contact of the ego.
+        network: Lanes, in highway-env's own position.
+        origin: Ego's first position there, float64, shape (2,) [m].
+    """
+
+    scenario: Scenario
+    times: np.ndarray
+    positions: np.ndarray
+    headings: np.ndarray
+    speeds: np.ndarray
+    sizes: np.ndarray
+    contact: bool
+    network: RoadNetwork
+    origin: np.ndarray
+
+    @property
+    def names(self) -> list[str]:
+        """A name for every body, such as "1: car", with the number of its actor."""
+        actors = enumerate(self.scenario.actors, start=1)
+        return ["ego", *(f"{number}: {actor.kind.replace('_', ' ')}" for number, actor in actors)]
+
+
+def record_motion(scenario: Scenario) -> Motion:
+    """Return the motion of a scenario without braking, 30 times per second up to the end of the episode."""
+    source = make_source(SCENARIO, {SCENARIO_ARGUMENT: scenario, "world": LABORATORY})
+    env = BrakingEnv(source)
+    _, info = env.reset(seed=0)
+    origin = np.array(env.road.ego.position, np.float64)
+    rows, done = [], False
+    while True:
+        rows.append([(*(item.position - origin), item.heading, item.speed) for item in env.road.items])
+        if done:
+            break
+        _, _, terminated, truncated, info = env.step(_NO_DEMAND)
+        done = terminated or truncated
+    values = np.array(rows, np.float64)
+    return Motion(
+        scenario=scenario,
+        times=np.arange(len(values)) / env.config["policy_frequency"],
+        positions=values[..., :2],
+        headings=values[..., 2],
+        speeds=values[..., 3],
+        sizes=np.array([(item.LENGTH, item.WIDTH) for item in env.road.items]),
+        contact=bool(info["collision"]),
+        network=env.road.network,
+        origin=origin,
+    )
