@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from joblib.externals.loky import get_reusable_executor
+from support.own_families import forget_families
 
 from lgmd_gym.agents import AGENTS
 from lgmd_gym.benchmark.rows import KEYS
@@ -33,7 +34,7 @@ ELSEWHERE = (
     "python docs/examples/",
 )
 # Pages whose blocks take under a second; the others run with -m slow.
-QUICK = {"README", "neuron", "own_scenario"}
+QUICK = {"README", "neuron"}
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
@@ -60,9 +61,10 @@ def test_code_blocks_run(path, tmp_path, monkeypatch):
         assert kind in ("python", "bash", "text", "toml", "yaml"), (
             f"{path.name}: unexpected code block of kind {kind!r}"
         )
+        if write_file(path, block, tmp_path):
+            continue
         if kind == "python":
             exec(compile(block, path.name, "exec"), space)
-            write_module(path, block, tmp_path)
         elif kind == "bash":
             for line in block.strip().splitlines():
                 run_line(line)
@@ -74,6 +76,7 @@ def test_code_blocks_run(path, tmp_path, monkeypatch):
             file = tmp_path / "hyper.yml"
             check_config(TrainConfig.from_hyperparams("offline", file=file, inputs=("frame",)))
     sys.modules.pop("my_agent", None)
+    forget_families()
 
 
 def make_clip(path):
@@ -85,12 +88,13 @@ def make_clip(path):
             writer.write(picture)
 
 
-def write_module(path, block, folder):
-    """Write a block to a file if the page introduces it with "Write `name.py`:"."""
+def write_file(path, block, folder):
+    """Write a block to a file if the page introduces it with "Write `name.py`:"; return whether it does."""
     before = path.read_text().split(block)[0]
-    named = re.search(r"Write `(\w+\.py)`:\s*```python\n$", before)
+    named = re.search(r"Write `(\w+\.(py|toml))`:\s*```\w+\n$", before)
     if named:
         (folder / named[1]).write_text(block)
+    return bool(named)
 
 
 def run_line(line):
