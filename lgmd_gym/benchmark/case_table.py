@@ -1,11 +1,14 @@
 """Tables of suite files as cases: one case, one per speed, or one per combination of a sweep."""
 
 import re
+from collections.abc import Collection
+from inspect import signature
 from typing import Any
 
 from lgmd_gym.benchmark.case import Case, scenario_case, to_mps
 from lgmd_gym.benchmark.sweep import SPEED, Axis, combine, make_axis, read_values
 from lgmd_gym.envs.registration import APPEARANCE
+from lgmd_gym.envs.scenarios import FAMILIES
 from lgmd_gym.envs.scenarios.data import scenario_from_data
 from lgmd_gym.errors import check_flag, check_keys, check_type, is_number
 
@@ -21,7 +24,7 @@ def read_cases(suite: str, table: Any) -> list[Case]:
     """
     if not isinstance(table, dict):
         raise ValueError(f"cases must be [[cases]] tables, got {table!r}")
-    check_keys("key of a case", table, CASE_KEYS)
+    check_table("a case", table, CASE_KEYS)
     family = read_name(table, "family")
     arguments = check_type("arguments", table.get("arguments", {}), dict)
     fcw_driver = check_flag("fcw_driver", table.get("fcw_driver", False))
@@ -34,6 +37,19 @@ def read_cases(suite: str, table: Any) -> list[Case]:
         parts = [suite, family, *filter(None, (variant, name))]
         cases.append(Case("/".join(parts), family, tuple((arguments | swept).items()), fcw_driver))
     return cases
+
+
+def check_table(kind: str, table: dict[str, Any], known: Collection[str]) -> None:
+    """Raise ValueError for an unknown key; for an argument of the family, the message states its place."""
+    family = table.get("family")
+    is_family = isinstance(family, str) and family in FAMILIES
+    arguments = signature(FAMILIES[family]).parameters if is_family else ()
+    for key in table:
+        if key not in known and key in arguments:
+            place = f"arguments = {{ {key} = ... }}"
+            place += f", or sweep = {{ {key} = [...] }}" if "sweep" in known else ""
+            raise ValueError(f"{key} is an argument of {family}, no key of {kind}; write {place}")
+    check_keys(f"key of {kind}", table, known)
 
 
 def read_name(table: dict[str, Any], key: str) -> str:

@@ -19,11 +19,10 @@ from pathlib import Path
 from typing import Any
 
 from lgmd_gym.benchmark.case import Case, scenario_case
-from lgmd_gym.benchmark.case_table import read_cases
+from lgmd_gym.benchmark.case_table import check_table, read_cases
 from lgmd_gym.benchmark.openscenario.names import file_name
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.scenarios.scenario import Scenario
-from lgmd_gym.errors import check_keys
 
 SCENARIO_KEYS = ("name", "module", "family", "arguments", "scenario", "fcw_driver")
 OWN = "scenarios"  # name of a suite of scenarios without a file
@@ -45,7 +44,7 @@ def read_scenario(path: Path, values: dict[str, Any]) -> Case:
             raise ValueError(
                 f"a scenario file has one scenario; write {key} in a [[cases]] table of a suite file"
             )
-    check_keys("key of a scenario file", values, SCENARIO_KEYS)
+    check_table("a scenario file", values, SCENARIO_KEYS)
     suite, given = file_name(path.stem), values.get("scenario")
     table = {key: value for key, value in values.items() if key != "module"}
     if "family" not in table:

@@ -45,7 +45,7 @@ from lgmd_gym.benchmark.scenario_file import OWN, distinct, is_scenario, own_cas
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, Suite, find_suite
 from lgmd_gym.benchmark.trust import check_named
 from lgmd_gym.envs.own_families import import_families, is_own
-from lgmd_gym.envs.registration import APPEARANCE, SCENARIO, SCENARIO_ARGUMENT, make_source
+from lgmd_gym.envs.registration import APPEARANCE, RANDOM, SCENARIO, SCENARIO_ARGUMENT, make_source
 from lgmd_gym.envs.scenarios import FAMILIES
 from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.errors import check_items, check_keys, check_known, check_path, check_text
@@ -198,7 +198,13 @@ def _check_cases(cases: tuple[Case, ...]) -> None:
         try:
             make_source(case.family, dict(case.arguments))
         except (TypeError, ValueError) as error:
-            raise ValueError(f"case {case.name!r}: {error}") from None
+            known = case.family in (*FAMILIES, RANDOM, SCENARIO)
+            hint = (
+                ""
+                if known
+                else "; a family of your own needs its module, module = 'my_scenarios' in the file"
+            )
+            raise ValueError(f"case {case.name!r}: {error}{hint}") from None
 
 
 def copy_suite(source: Source | Path, target: Path, modules: tuple[str, ...] = ()) -> None:
