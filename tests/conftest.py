@@ -1,5 +1,7 @@
 """Fixtures of several test files."""
 
+import os
+
 import pytest
 from hypothesis import settings
 from support import moviepy_stand_in
@@ -8,6 +10,8 @@ from support.clips import write_lossless
 from lgmd_gym.paper.backgrounds import Plain, Screen
 from lgmd_gym.paper.stimuli import Looming, stimulus_frames
 
+# Without the progress of compilation, which tests of messages would count.
+os.environ.setdefault("LGMD_GYM_QUIET", "1")
 # A first example may include the compilation of a kernel.
 settings.register_profile("compiled", deadline=None)
 settings.load_profile("compiled")

@@ -325,7 +325,7 @@ class Scenario:
 
     action: Positional[Literal["new", "show", "check", "export"]]
     """Write a template, draw a scenario, compare files, or export a case."""
-    targets: Annotated[Positional[tuple[str, ...]], arg(metavar="FILE|PATH|CASE [PATH ...]")] = ()
+    targets: Annotated[Positional[tuple[str, ...]], arg(metavar="FILE|PATH|CASE [PATH ...]")]
     """File to write (default: scenario.toml); scenario to draw; files and folders to compare; or the name of
     a case, for example quick/CCRs/v30."""
     to: File = None

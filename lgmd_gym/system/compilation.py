@@ -5,7 +5,6 @@ worker processes one prints its progress. There is no thread, because the proces
 """
 
 import contextlib
-import fcntl
 import os
 import sys
 import tempfile
@@ -14,6 +13,11 @@ from multiprocessing import current_process
 from typing import Any
 
 from numba.core import event
+
+try:
+    import fcntl
+except ImportError:  # Windows, where only the main process prints
+    fcntl = None  # type: ignore[assignment]
 
 VARIABLE = "LGMD_GYM_QUIET"
 DELAY_S = 2.0  # compilation without a line
@@ -102,6 +106,8 @@ def _is_first_worker() -> bool:
     global _lock
     if _is_main():
         return True
+    if fcntl is None:
+        return False
     path = os.path.join(tempfile.gettempdir(), f"lgmd-gym-compiling-{os.getuid()}")
     try:
         _lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)

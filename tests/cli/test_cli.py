@@ -159,7 +159,7 @@ def test_version(capsys):
         (["train", "--sead", "3"], "unknown option --sead; did you mean --seed?"),
         (["scenario", "chek", "x"], "unknown value of action 'chek'; did you mean 'check'?"),
         (["bench", "--backend", "dusk"], "unknown value of --backend 'dusk'; did you mean 'dask'?"),
-        (["drive"], "drive requires ENV|CASE|TRAFFIC; see lgmd-gym drive --help"),
+        (["drive"], "drive requires ENV|CASE|TRAFFIC|FILE; see lgmd-gym drive --help"),
         (["bench", "--seeds"], "--seeds requires a value; see lgmd-gym bench --help"),
         (["drive", "nix"], " lgmd-gym list envs and lgmd-gym list cases print all names"),
         (["scenario", "export", "quick/nix", "--to", "x.xosc"], "? lgmd-gym list cases prints all names"),
