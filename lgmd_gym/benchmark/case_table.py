@@ -41,9 +41,8 @@ def read_cases(suite: str, table: Any) -> list[Case]:
 
 def check_table(kind: str, table: dict[str, Any], known: Collection[str]) -> None:
     """Raise ValueError for an unknown key; for an argument of the family, the message states its place."""
-    family = table.get("family")
-    is_family = isinstance(family, str) and family in FAMILIES
-    arguments = signature(FAMILIES[family]).parameters if is_family else ()
+    family = str(table.get("family"))
+    arguments = signature(FAMILIES[family]).parameters if family in FAMILIES else ()
     for key in table:
         if key not in known and key in arguments:
             place = f"arguments = {{ {key} = ... }}"

@@ -182,13 +182,12 @@ class RunConfig:
 
 def _suite(value: Any) -> Source:
     """Return the name or path of a suite, a scenario, or several paths and scenarios; one is no tuple."""
-    if isinstance(value, str | Scenario):
-        return value
-    items = as_tuple(value)
-    if items is None or not all(isinstance(item, str | Scenario) for item in items):
+    items = (value,) if isinstance(value, str | Path | Scenario) else as_tuple(value)
+    if items is None or not all(isinstance(item, str | Path | Scenario) for item in items):
         raise ValueError(f"suite must be a name, paths or scenarios, got {shown(value)}")
     if not items:
         raise ValueError("suite must contain at least one name or path, or a scenario, got none")
+    items = tuple(str(item) if isinstance(item, Path) else item for item in items)
     return items[0] if len(items) == 1 else items
 
 

@@ -157,6 +157,8 @@ def test_run_accepts_scenarios_and_refuses_agents_in_the_place_of_the_folder(mon
             benchmark.run(source)
     assert chosen == [RunConfig(suite=PARKED), RunConfig(suite=(PARKED, CUT_IN))]
     assert [config.label for config in chosen] == ["scenarios", "scenarios"]
+    assert RunConfig(suite=[PARKED, Path("near.toml")]).suite == (PARKED, "near.toml")
+    assert RunConfig(suite=Path("near.toml")).suite == "near.toml"
     for suite in ([], [3], {}):
         with pytest.raises(ValueError, match="suite must"):
             RunConfig(suite=suite)
