@@ -74,6 +74,8 @@ def test_contact_and_headings_are_drawn(tmp_path):
         ego_path=(Bend(np.pi * 5, 0.1),),
     )  # fmt: skip
     figure = scenario_figure(tmp_path / "turn.png", "turn", record_motion(turning))
+    first, second = np.diff(figure.axes[2].patches[-1].get_xy()[:3], axis=0)  # edges, halfway at 45 degrees
+    assert first @ second == pytest.approx(0.0, abs=1e-9)
     ego = figure.axes[4].patches[-1].get_xy()
     # A quarter of a circle of 10 m to the left, up to the decision before pi seconds.
     assert ego.mean(axis=0) == pytest.approx([10.0, 10.0], abs=0.6)
