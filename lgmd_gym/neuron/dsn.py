@@ -1,5 +1,6 @@
 """DSN: a neuron that is selective to the direction of horizontal motion."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from lgmd_gym.neuron import dsn_kernels
 from lgmd_gym.neuron.frame_neuron import FrameNeuron
-from lgmd_gym.neuron.motion_params import MotionParams, MotionSpec
+from lgmd_gym.neuron.motion_params import MotionParams
 from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
 
@@ -54,7 +55,7 @@ class DSN(FrameNeuron):
         self,
         shape: tuple[int, int],
         fps: float = 30.0,
-        params: MotionSpec = None,
+        params: DSNParams | Mapping[str, Any] | None = None,
         num: int | None = None,
         *,
         spikes: NeuronSpec = None,

@@ -1,5 +1,6 @@
 """LPLC2: a looming detector of the fly, which compares motion along four directions."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,6 @@ from numpy.typing import NDArray
 from lgmd_gym.neuron import lplc2_kernels
 from lgmd_gym.neuron.frame_neuron import FrameNeuron
 from lgmd_gym.neuron.lplc2_params import LPLC2Params
-from lgmd_gym.neuron.motion_params import MotionSpec
 from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
 
@@ -59,7 +59,7 @@ class LPLC2(FrameNeuron):
         self,
         shape: tuple[int, int],
         fps: float = 30.0,
-        params: MotionSpec = None,
+        params: LPLC2Params | Mapping[str, Any] | None = None,
         num: int | None = None,
         *,
         spikes: NeuronSpec = None,

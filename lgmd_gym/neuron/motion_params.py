@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Self, TypeAlias
+from typing import Any, Self
 
 from lgmd_gym.errors import check_keys, check_positive, shown
 
@@ -50,7 +50,3 @@ class MotionParams:
             check_keys(f"{cls.__name__.removesuffix('Params')} parameter", spec, known)
             return cls(**spec)
         raise ValueError(f"params must be {cls.__name__}, a mapping or None, got {shown(spec)}")
-
-
-MotionSpec: TypeAlias = MotionParams | Mapping[str, Any] | None
-"""The `params` argument of models of motion detectors; None for the default parameters."""

@@ -105,14 +105,20 @@ class Variants:
     def _build(self, fields: dict[str, Any]) -> Variant:
         params = tuple(None if base is None else CameraParams.make(base, **fields) for base in self._base)
         for base, changed in zip(self._base, params, strict=True):
-            for name in ("shape", "detector"):
-                kept, given = getattr(base, name, None), getattr(changed, name, None)
-                if kept != given:
-                    raise ValueError(
-                        f"camera_fields must keep the {name} {kept} of camera {base.name!r}, got {given}; "
-                        f"set the {name} in the camera argument"
-                    )
+            if base is not None:
+                _check_kept(base, changed)
         known = [p for p in params if p is not None]
         placeholder = road_key(known[0]) if known else (0.0, 0, False, False, None)
         keys = tuple(placeholder if p is None else road_key(p) for p in params)
         return Variant(params, keys, view_of(known))
+
+
+def _check_kept(base: CameraParams, changed: CameraParams | None) -> None:
+    """Raise ValueError if fields that determine the arrays of the sensors are changed."""
+    for name in ("shape", "detector"):
+        kept, given = getattr(base, name), getattr(changed, name)
+        if kept != given:
+            raise ValueError(
+                f"camera_fields must keep the {name} {kept} of camera {base.name!r}, got {given}; "
+                f"set the {name} in the camera argument"
+            )
