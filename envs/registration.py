@@ -56,12 +56,6 @@ def register_family(name: str) -> Callable[[Family], Family]:
 
     Raises:
         ValueError: If the name is taken, or contains other characters than letters, digits, ".", "_", "-".
-
-    Example:
-        >>> @register_family("Slowcoach")
-        ... def follow_slowly(ego_speed: float = 10.0) -> Scenario:
-        ...     lead = Actor(gap=5 * ego_speed, speed=1.0)
-        ...     return Scenario(family="Slowcoach", ego_speed=ego_speed, duration=9.0, actors=(lead,))
     """
     add = add_family(name)
 
