@@ -6,12 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.policies.zone_features import (
-    NUM_ZONE_FEATURES,
-    ZONE_INPUTS,
-    ZoneFeatures,
-    check_zone_shape,
-)
+from lgmd_gym.agents.policies.zone_features import ZONE_INPUTS, ZoneFeatures, check_zone_shape
 from lgmd_gym.errors import check_flag, check_items, check_keys, check_known, check_positive, check_whole
 
 # Offset and scale of each observation: (value - offset) / scale is near [-1, 1].
@@ -42,10 +37,11 @@ class FeatureConfig:
 
     Attributes:
         inputs: Observation keys and inputs derived from them: `speed_change`, the change since the last
-            decision; `spike_peak`, the decaying peak of the spike frequency; and, with the cameras of
-            `stopping-zone`, `zones`, `zones_spikes` and `zones_ffi` (see `ZoneFeatures`).
-        history: Number of decisions in the history, including the present one, >= 1; `zones` and its variants
-            contain averages over time and have no history.
+            decision; `spike_peak`, the decaying peak of the spike frequency; with the cameras of
+            `stopping-zone`, `zones`, `zones_spikes` and `zones_ffi`; and with those of `all-round` also
+            `sides` and `sides_ffi` (see `ZoneFeatures`).
+        history: Number of decisions in the history, including the present one, >= 1; inputs of zones and
+            sides contain averages over time and have no history.
         repeat: Number of environment decisions per decision of the policy, >= 1. At 30 Hz, 3 gives 10 Hz.
         shrink: Side of the pixel blocks that frames are averaged over, >= 1 [px].
         latch: Whether the first demand of -0.5 or less is held until the episode ends.
@@ -105,7 +101,7 @@ class FeatureConfig:
             size = shape[0]
             if name in ZONE_INPUTS:
                 check_zone_shape(name, shape)
-                size = NUM_ZONE_FEATURES
+                size = ZONE_INPUTS[name].size
             boxes[name] = (-CLIP, CLIP, (self.history_of(name) * size,), np.float32)
         return boxes
 
@@ -116,8 +112,9 @@ class FeatureConfig:
 
 def source_observation(name: str) -> str:
     """Return the observation that an input is computed from."""
-    derived = DERIVED_INPUTS | ZONE_INPUTS
-    return derived[name][0] if name in derived else name
+    if name in ZONE_INPUTS:
+        return ZONE_INPUTS[name].source
+    return DERIVED_INPUTS[name][0] if name in DERIVED_INPUTS else name
 
 
 class FeatureHistory:

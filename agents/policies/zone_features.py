@@ -1,48 +1,81 @@
-"""Policy inputs from the cameras of `stopping-zone`: levels of all fields and their averages over time."""
+"""Policy inputs from the fields of `stopping-zone` and of the sides: levels and their averages over time."""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from lgmd_gym.agents.base import FPS
-from lgmd_gym.agents.rule import excitation
+from lgmd_gym.agents.sides import NUM_ALL_ROUND
 from lgmd_gym.agents.zones import NUM_FIELDS
 
 TIME_CONSTANTS_S = (0.1, 0.4, 1.2)
-NUM_ZONE_FEATURES = (1 + len(TIME_CONSTANTS_S)) * NUM_FIELDS
-# Input: the observation it is computed from, and the factor of its values before the logarithm.
-ZONE_INPUTS = {
-    "zones": ("membrane_potential", 2.0),  # as excitation k/(n σ3), at most 15
-    "zones_spikes": ("spike_frequency", 0.1),  # [spikes/s]; ten spikes per frame at 30 Hz are 300
-    "zones_ffi": ("ffi", 2.0),  # [grey levels]
-}
+NUM_LEVELS = 1 + len(TIME_CONSTANTS_S)  # features per field
 _NORM = 3.4  # log(1 + 2 · 15), so that the features of `zones` are in [0, 1]
 _GAINS = 1.0 / (1.0 + FPS * np.array(TIME_CONSTANTS_S)[:, None])
+_MARGIN = 3e-7  # of K to 0 and 1, so that responses are at most 15
+
+
+class FieldInput(NamedTuple):
+    """Definition of a policy input.
+
+    Attributes:
+        source: Observation that it is computed from.
+        factor: Factor of the values before the logarithm.
+        first: First camera.
+        last: Last camera + 1.
+    """
+
+    source: str
+    factor: float
+    first: int = 0
+    last: int = NUM_FIELDS
+
+    @property
+    def size(self) -> int:
+        """Number of features."""
+        return NUM_LEVELS * (self.last - self.first)
+
+
+ZONE_INPUTS = {
+    "zones": FieldInput("membrane_potential", 2.0),  # as response k/(n σ3), at most 15
+    "zones_spikes": FieldInput("spike_frequency", 0.1),  # [spikes/s]; ten spikes per frame at 30 Hz are 300
+    "zones_ffi": FieldInput("ffi", 2.0),  # [grey levels]
+    "sides": FieldInput("membrane_potential", 2.0, NUM_FIELDS, NUM_ALL_ROUND),
+    "sides_ffi": FieldInput("ffi", 2.0, NUM_FIELDS, NUM_ALL_ROUND),
+}
 
 
 class ZoneFeatures:
     """Levels of the fields and their low-pass filtered values, on a logarithmic scale.
 
+    Membrane potentials K are converted to responses log(K / (1 - K)). The response of a direction-selective
+    neuron is negative for motion to the left, and so is its level.
+
     Args:
-        name: "zones", "zones_spikes" or "zones_ffi".
+        name: A key of `ZONE_INPUTS`.
     """
 
     def __init__(self, name: str) -> None:
-        self.source, self._factor = ZONE_INPUTS[name]
-        self._name = name
-        self._level = self._last = np.zeros(NUM_FIELDS)
-        self._averages = np.zeros((len(TIME_CONSTANTS_S), NUM_FIELDS))
+        self._name, self._input = name, ZONE_INPUTS[name]
+        self.source = self._input.source
+        fields = self._input.last - self._input.first
+        self._level = self._last = np.zeros(fields)
+        self._averages = np.zeros((len(TIME_CONSTANTS_S), fields))
         self._started = False
 
     def update(self, signal: np.ndarray) -> None:
-        """Process one frame: observation of the neurons, shape (17,)."""
+        """Process one frame: observation of the neurons, shape (cameras,)."""
         check_zone_shape(self._name, signal.shape)
-        values = excitation(signal) if self._name == "zones" else np.asarray(signal, np.float64)
-        level = np.log1p(self._factor * values) / _NORM
+        values = np.asarray(signal[self._input.first : self._input.last], np.float64)
+        if self.source == "membrane_potential":
+            values = _response(values)
+        level = np.copysign(np.log1p(self._input.factor * np.abs(values)), values) / _NORM
         self._last, self._level = (self._level if self._started else level), level
         self._averages += _GAINS * (level - self._averages)
         self._started = True
 
     def collect(self) -> np.ndarray:
-        """Return the features, shape (68,).
+        """Return the features, shape (4 · fields,).
 
         For all fields in turn: the smaller level of the last two frames, then the averages of the level with
         time constants of 0.1, 0.4 and 1.2 s, which begin at 0.
@@ -50,10 +83,18 @@ class ZoneFeatures:
         return np.concatenate([np.minimum(self._level, self._last), self._averages.ravel()])
 
 
+def _response(potential: np.ndarray) -> np.ndarray:
+    """Return log(K / (1 - K)), the inverse of eq. 10, in [-15, 15]."""
+    k = np.clip(potential, _MARGIN, 1.0 - _MARGIN)
+    return np.log(k / (1.0 - k))
+
+
 def check_zone_shape(name: str, shape: tuple[int, ...]) -> None:
-    """Raise ValueError unless an observation comes from the cameras of `stopping-zone`."""
-    if shape != (NUM_FIELDS,):
+    """Raise ValueError unless an observation comes from the cameras that an input requires."""
+    allowed = (NUM_FIELDS, NUM_ALL_ROUND) if ZONE_INPUTS[name].last == NUM_FIELDS else (NUM_ALL_ROUND,)
+    if shape not in [(count,) for count in allowed]:
+        agent = "stopping-zone" if len(allowed) == 2 else "all-round"
         raise ValueError(
-            f"policy input {name!r} requires the {NUM_FIELDS} cameras of stopping-zone, got {shape[0]}; "
-            "train with --sensors-of stopping-zone"
+            f"policy input {name!r} requires the {allowed[0]} cameras of {agent}, got {shape[0]}; "
+            f"train with --sensors-of {agent}"
         )

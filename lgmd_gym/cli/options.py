@@ -230,7 +230,7 @@ class Train:
     camera: Names = None
     """Camera presets, one neuron each. Default: fovea tele wide."""
     sensors_of: Name = None
-    """Agent whose cameras are used instead, for example stopping-zone."""
+    """Agent whose cameras are used instead, for example stopping-zone; all-round adds fields at the sides."""
     inputs: Names = None
     """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change and
     ego_yaw_rate; also frame; with the cameras of stopping-zone, also zones, zones_spikes and zones_ffi.

@@ -10,6 +10,7 @@ import gymnasium as gym
 
 from lgmd_gym.agents import HOLD, make_agent
 from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
+from lgmd_gym.agents.sides import all_round_cameras
 from lgmd_gym.camera import CameraSpec
 from lgmd_gym.camera.spec import check_camera
 from lgmd_gym.errors import (
@@ -25,6 +26,7 @@ from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
 
 RANDOM_ID = "LGMD/RandomBraking-v0"
+ALL_ROUND = "all-round"  # value of `sensors_of` for the cameras of `all_round_cameras`
 CAMERAS = ("fovea", "tele", "wide")
 SEED_STRIDE = 1_000_000  # distance between the environment seeds of neighbouring training seeds
 VALIDATION_SEED = 10_000  # first environment seed of an evaluation
@@ -134,7 +136,8 @@ class TrainConfig:
             env_id: Environment id; the entry `default` is used for an id without an entry.
             file: YAML file in rl-zoo's format; None for the file of this package.
             inputs: Inputs of the policy in place of those in the file.
-            sensors_of: Name of an agent whose cameras are used, such as "stopping-zone".
+            sensors_of: Name of an agent whose cameras are used, such as "stopping-zone"; or "all-round" for
+                those of "stopping-zone" and fields at the sides.
             **options: Attributes of `TrainConfig` that replace those in the file; None keeps the default.
 
         Raises:
@@ -196,6 +199,8 @@ class TrainConfig:
 
 
 def _cameras_of(agent: str) -> CameraSpec:
+    if agent == ALL_ROUND:
+        return all_round_cameras()
     camera = make_agent(agent).camera
     if camera is None:
         raise ValueError(f"agent {agent!r} has no cameras of its own; use camera, or 'stopping-zone'")

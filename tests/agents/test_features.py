@@ -5,7 +5,8 @@ import pytest
 from support.agents import to_potential, zone_levels
 
 from lgmd_gym.agents.policies.features import CLIP, PEAK_DECAY, FeatureConfig, FeatureHistory, shrink_frame
-from lgmd_gym.agents.policies.zone_features import NUM_ZONE_FEATURES, TIME_CONSTANTS_S, ZONE_INPUTS
+from lgmd_gym.agents.policies.zone_features import TIME_CONSTANTS_S, ZONE_INPUTS
+from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_SIDE_FIELDS, all_round_cameras
 from lgmd_gym.agents.zones import NUM_FIELDS, NUM_ZONES, REACHES
 
 
@@ -56,11 +57,11 @@ def zone_history(name="zones"):
 def zone_features(history, *levels, name="zones"):
     """Return the features after frames with these excitations: levels, then averages, (4, fields)."""
     features = stack(history, *(observe_zones(level) for level in levels))[name]
-    assert features.shape == (NUM_ZONE_FEATURES,)
+    assert features.shape == (4 * NUM_FIELDS,)
     return features.reshape(-1, NUM_FIELDS)
 
 
-@pytest.mark.parametrize("name", ZONE_INPUTS)
+@pytest.mark.parametrize("name", ["zones", "zones_spikes", "zones_ffi"])
 def test_zone_features_are_the_logarithm_of_the_signal(name):
     """Each input has the same scale here: 20 spikes/s count as an excitation or an F̂ of 1."""
     levels = zone_levels(ground=7.0, upright=1.0, low={1.35: 3.0})
@@ -74,7 +75,7 @@ def test_zone_features_have_no_history():
     history, observation = FeatureHistory(features), observe_zones(zone_levels()) | observe(0.0)
     stacked = stack(history, observation)
     sizes = features.box_arguments({name: value.shape for name, value in observation.items()})
-    for name, size in (("zones", NUM_ZONE_FEATURES), ("ego_speed", 3)):
+    for name, size in (("zones", 4 * NUM_FIELDS), ("ego_speed", 3)):
         assert stacked[name].shape == sizes[name][2] == (size,)
 
 
@@ -98,10 +99,48 @@ def test_averages_approach_the_level_with_their_time_constants():
     assert np.all(zone_features(history, np.zeros(NUM_FIELDS)) == 0.0)
 
 
+def observe_sides(responses):
+    """Return an observation of the cameras of `all-round`: responses of those at the sides, shape (12,)."""
+    responses = np.concatenate([np.full(NUM_FIELDS, 5.0), responses])
+    potential = (1.0 / (1.0 + np.exp(-responses))).astype(np.float32)
+    return {"membrane_potential": potential, "ffi": np.abs(responses)}
+
+
+def test_side_features_have_the_sign_of_the_motion():
+    responses = np.linspace(-6.0, 5.0, NUM_SIDE_FIELDS)
+    for name, sign in (("sides", np.sign(responses)), ("sides_ffi", 1.0)):
+        features = stack(zone_history(name), observe_sides(responses))[name].reshape(-1, NUM_SIDE_FIELDS)
+        assert features.shape[0] == 4
+        assert features[0] == pytest.approx(sign * np.log1p(2.0 * np.abs(responses)) / 3.4, abs=1e-5)
+        assert features[1] == pytest.approx(features[0] / (1.0 + 30.0 * TIME_CONSTANTS_S[0]), abs=1e-6)
+
+
+def test_zone_features_of_all_round_cameras_are_those_of_stopping_zone():
+    history, levels = zone_history(), zone_levels(ground=7.0, upright=1.0)
+    alone = stack(history, observe_zones(levels))["zones"]
+    history.reset()
+    observation = observe_sides(np.zeros(NUM_SIDE_FIELDS))
+    observation["membrane_potential"][:NUM_FIELDS] = to_potential(levels)
+    assert stack(history, observation)["zones"] == pytest.approx(alone, abs=1e-6)
+
+
+def test_cameras_of_all_round_are_in_the_order_of_the_features():
+    names = [camera["name"] for camera in all_round_cameras()]
+    assert len(set(names)) == NUM_ALL_ROUND
+    assert names[NUM_FIELDS : NUM_FIELDS + 3] == ["near_left_lgmd", "near_right_lgmd", "middle_left_lgmd"]
+    cameras = all_round_cameras()[NUM_FIELDS:]
+    half = NUM_SIDE_FIELDS // 2
+    for lgmd, dsn in zip(cameras[:half], cameras[half:], strict=True):
+        assert lgmd | {"name": "", "detector": ""} == dsn | {"name": "", "detector": ""}
+    assert ZONE_INPUTS["sides"].size == 4 * NUM_SIDE_FIELDS
+
+
 def test_missing_or_other_observations_are_rejected():
     two_cameras = observe(1.0) | {"membrane_potential": np.array([0.5, 0.6]), "ego_yaw_rate": np.zeros(1)}
     with pytest.raises(ValueError, match="requires the 17 cameras of stopping-zone, got 2; train with"):
         zone_history().update(two_cameras)
+    with pytest.raises(ValueError, match="'sides' requires the 29 cameras of all-round, got 17; train with"):
+        zone_history("sides").update(observe_zones(zone_levels()))
     with pytest.raises(ValueError, match="requires the observation 'ffi', got"):
         FeatureHistory(FeatureConfig(inputs=("ffi",))).update(observe(1.0))
 
