@@ -90,7 +90,7 @@ def load_normalizer(path: Path) -> Any:
         normalizer: Any = pickle.loads(path.read_bytes())
     except OSError as error:
         raise ValueError(f"vec_normalize {shown(str(path))} cannot be read: {error.strerror}") from None
-    except Exception as error:  # whatever the pickle raises
+    except Exception as error:  # any exception of the unpickled code
         raise ValueError(f"vec_normalize {shown(str(path))} cannot be loaded ({error})") from None
     if not isinstance(normalizer, Mapping) and hasattr(normalizer, "normalize_obs"):
         normalizer.training = False

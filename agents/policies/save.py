@@ -119,5 +119,5 @@ def _demands(env: Any, config: dict[str, Any]) -> tuple[float, ...] | None:
     default = inspect.signature(DiscreteDemand).parameters["demands"].default
     demands = tuple(action.get("demands", default))
     if action.get("type") != "DiscreteDemand" or len(demands) != space.n:
-        raise ValueError(f"the actions of {space} are no demands; use the action type DiscreteDemand")
+        raise ValueError(f"the actions of {space} are not demands; use the action type DiscreteDemand")
     return demands

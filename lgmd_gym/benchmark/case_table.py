@@ -47,7 +47,7 @@ def check_table(kind: str, table: dict[str, Any], known: Collection[str]) -> Non
         if key not in known and key in arguments:
             place = f"arguments = {{ {key} = ... }}"
             place += f", or sweep = {{ {key} = [...] }}" if "sweep" in known else ""
-            raise ValueError(f"{key} is an argument of {family}, no key of {kind}; write {place}")
+            raise ValueError(f"{key} is an argument of {family}, not a key of {kind}; write {place}")
     check_keys(f"key of {kind}", table, known)
 
 

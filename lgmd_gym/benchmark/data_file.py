@@ -30,7 +30,7 @@ def read_data(path: Path, kind: str) -> dict[str, Any]:
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object; the JSON module keeps the last of several values of a key without a word."""
+    """Return an object; the JSON module silently keeps the last of several values of a key."""
     values: dict[str, Any] = {}
     for key, value in pairs:
         if key in values:

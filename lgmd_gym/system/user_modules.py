@@ -14,7 +14,7 @@ def import_user_module(name: str, kind: str) -> ModuleType:
         kind: What it is, for the message.
 
     Raises:
-        ValueError: If it cannot be imported, whatever its code raises.
+        ValueError: If it cannot be imported, or its code raises an exception.
     """
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())

@@ -139,7 +139,7 @@ def test_cards_of_other_environments(tmp_path):
 @pytest.mark.parametrize(("make", "words"), [
     (lambda: gym.make("LGMD/CCRs-v0", config={"policy_frequency": 10}), r"PolicyWrapper\(env, repeat=3\)"),
     (lambda: VecFrameStack(SB3VecEnv(ID), 2), r"PolicyWrapper\(env, history=N\)"),
-    (lambda: gym.make("highway-v0"), "the actions of Discrete.* are no demands"),
+    (lambda: gym.make("highway-v0"), "the actions of Discrete.* are not demands"),
 ])  # fmt: skip
 def test_an_environment_that_is_not_that_of_an_agent_is_refused(make, words, tmp_path):
     with pytest.raises(ValueError, match=words):

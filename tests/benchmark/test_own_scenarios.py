@@ -96,7 +96,7 @@ def test_numbers_of_numpy_are_stored(folder):
         ({"scenario": {"ego_speed": 8.0}}, "scenario must have the key 'duration'; add it"),
         (
             FAMILY | {"gap": 8},
-            "gap is an argument of CutIn, no key of a scenario file; write arguments = { gap = ... }",
+            "gap is an argument of CutIn, not a key of a scenario file; write arguments = { gap = ... }",
         ),
         ({"scenario": 3}, "scenario must be dict, got 3"),
     ],
