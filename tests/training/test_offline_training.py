@@ -71,3 +71,20 @@ def test_training_with_traffic_and_reuse_of_its_recordings(tmp_path, monkeypatch
     assert set(columns) == expected | {"best_return"}
     config = offline_config(tmp_path, n_timesteps=3, traffic_episodes=1, recordings=str(first))
     assert len(load_or_record(config, "train", tmp_path)) == 3 + len(by_seed[0])
+
+
+@pytest.mark.slow
+def test_policy_with_fields_at_the_sides(tmp_path):
+    options = ["--sensors-of", "all-round", "--inputs", "zones", "sides", "sides_ffi", "ego_speed"]
+    command = arguments(tmp_path, tmp_path / "run", *options, "--eval-episodes", "4")
+    command.remove("--camera")
+    command.remove("fovea")
+    assert cli.run(command) == 0
+    agent = make_agent(f"policy:{tmp_path / 'run' / 'policy.zip'}")
+    env = gym.make("LGMD/CPNA-v0", ego_speed=8.0, camera=agent.camera)
+    observation, info = env.reset(seed=0)
+    assert observation["membrane_potential"].shape == (29,)
+    agent.reset(0)
+    for _ in range(10):
+        observation, _, _, _, info = env.step(agent.act(observation, info))
+    assert observation["membrane_potential"][23:].min() < 0.5  # motion to the left
