@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lgmd_gym.neuron import dsn_kernels
-from lgmd_gym.neuron.frame_neuron import FrameNeuron
+from lgmd_gym.neuron.motion_neuron import MotionNeuron
 from lgmd_gym.neuron.motion_params import MotionParams
-from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
-from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
+from lgmd_gym.neuron.params import NeuronSpec
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,7 +18,7 @@ class DSNParams(MotionParams):
     """Parameters of the direction-selective neuron, those of `MotionParams`."""
 
 
-class DSN(FrameNeuron):
+class DSN(MotionNeuron):
     """One or N direction-selective neurons, stepped frame by frame.
 
     The neuron is excited by motion to the right and inhibited by motion to the left, as direction-selective
@@ -61,14 +60,8 @@ class DSN(FrameNeuron):
         spikes: NeuronSpec = None,
         threads: int | None = None,
     ) -> None:
-        super().__init__(shape, fps, num, threads)
         self.params = DSNParams.make(params)
-        stage = LGMDParams.make(spikes)
-        self._initial = initial_scalars(stage)
-        self._scalars = np.tile(self._initial, (self._count, 1))
-        constants = LGMDParams.make({**stage.to_dict(), "sigma_3": self.params.sigma})
-        self._const = pack_constants(constants, self.fps, n_pixels=1)
-        self._gains = np.array(self.params.gains(self.fps), np.float32)
+        super().__init__(shape, fps, num, threads, self.params, spikes)
         self._maps = tuple(np.zeros((self._count, *self.shape), np.float32) for _ in range(6))
 
     def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:

@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lgmd_gym.neuron import lplc2_kernels
-from lgmd_gym.neuron.frame_neuron import FrameNeuron
 from lgmd_gym.neuron.lplc2_params import LPLC2Params
-from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
-from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
+from lgmd_gym.neuron.motion_neuron import MotionNeuron
+from lgmd_gym.neuron.params import NeuronSpec
 
 
-class LPLC2(FrameNeuron):
+class LPLC2(MotionNeuron):
     """One or N arrays of radial motion detectors, stepped frame by frame.
 
     LPLC2 neurons of the fly respond to motion outwards along all four arms of their dendrites, and are
@@ -65,19 +64,13 @@ class LPLC2(FrameNeuron):
         spikes: NeuronSpec = None,
         threads: int | None = None,
     ) -> None:
-        super().__init__(shape, fps, num, threads)
         self.params = p = LPLC2Params.make(params)
+        super().__init__(shape, fps, num, threads, p, spikes)
         if 2 * p.radius_px > min(self.shape):
             raise ValueError(
                 f"radius_px must be at most half of the smaller side of the frame {self.shape}, got "
                 f"{p.radius_px}; use a radius of {min(self.shape) // 2} or larger frames"
             )
-        stage = LGMDParams.make(spikes)
-        self._initial = initial_scalars(stage)
-        self._scalars = np.tile(self._initial, (self._count, 1))
-        constants = LGMDParams.make({**stage.to_dict(), "sigma_3": p.sigma})
-        self._const = pack_constants(constants, self.fps, n_pixels=1)
-        self._gains = np.array(p.gains(self.fps), np.float32)
         self._sizes = np.array([p.radius_px, p.stride_px, p.vertical], np.int64)
         height, width = self.shape
         grid = tuple((side - 2 * p.radius_px) // p.stride_px + 1 for side in self.shape)
