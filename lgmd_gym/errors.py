@@ -1,7 +1,7 @@
 """Checks of arguments, and error messages of one line that state the offending value and suggest a fix."""
 
 from collections.abc import Collection, Iterable
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from math import inf, isinf, isnan
 from numbers import Integral, Real
 from pathlib import Path
@@ -11,6 +11,7 @@ import numpy as np
 
 MAX_LISTED = 20  # names that a message lists in full
 MAX_CLOSEST = 3  # names that it suggests from a longer list
+SIMILARITY_MARGIN = 0.1  # of names that are suggested beside the closest one
 MAX_SHOWN = 160  # characters of a value in a message
 
 
@@ -178,7 +179,7 @@ def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") 
     names, text = sorted(known), name[:MAX_SHOWN] if isinstance(name, str) else shown(name)
     count = MAX_CLOSEST if len(names) > MAX_LISTED else 1
     if closest := get_close_matches(text, names, n=count, cutoff=0.5):
-        *others, last = map(repr, closest)
+        *others, last = map(repr, _as_close_as_the_first(text, closest))
         fix = f"did you mean {', '.join(others)}{' or ' if others else ''}{last}?"
     elif len(names) > MAX_LISTED:
         closest = get_close_matches(text, names, n=count, cutoff=0.0)
@@ -187,6 +188,12 @@ def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") 
         fix = f"known: {', '.join(names) or 'none'}"
     separator = " " if fix.endswith("?") else "; "
     return ValueError(f"unknown {kind} {shown(name)}; {fix}{separator if hint else ''}{hint}")
+
+
+def _as_close_as_the_first(text: str, names: list[str]) -> list[str]:
+    """Return those of some names, the closest first, that are almost as similar to a text as the first."""
+    ratios = [SequenceMatcher(None, name, text).ratio() for name in names]
+    return [name for name, ratio in zip(names, ratios, strict=True) if ratio >= ratios[0] - SIMILARITY_MARGIN]
 
 
 def check_keys(kind: str, given: Iterable[str], known: Iterable[str]) -> None:
