@@ -1,6 +1,8 @@
 """SensorArray: the cameras and neurons of one or more environments."""
 
 from collections.abc import Mapping
+from dataclasses import replace
+from threading import Lock
 from typing import Any
 
 import gymnasium as gym
@@ -11,9 +13,11 @@ from lgmd_gym.camera.road_pool import RoadPool
 from lgmd_gym.camera.scene_table import SceneTable
 from lgmd_gym.neuron import LGMDParams, Response
 from lgmd_gym.neuron.threads import Threads
-from lgmd_gym.sensing.cameras import Variants, make_cameras
+from lgmd_gym.sensing.cameras import Variant, Variants, make_cameras
 from lgmd_gym.sensing.kernels import NUMBERS, SIGNALS
 from lgmd_gym.sensing.sensor_group import SensorGroup, make_neurons
+
+_separation = Lock()
 
 
 class SensorArray:
@@ -99,6 +103,7 @@ class SensorArray:
             )
             for (shape, detector), members in by_kind.items()
         ]
+        self._shares = self._share_frames(unchanged)
         # Index of each camera's group, and of the camera in that group.
         self._locations = [
             next((g, group.members.index(k)) for g, group in enumerate(self._groups) if k in group.members)
@@ -183,6 +188,8 @@ class SensorArray:
                 others keep their frames and outputs.
         """
         active = self._all if active is None else active
+        if self._shares and not self.enabled.all():
+            self._separate()
         for group in self._groups:
             group.process(first, last, active, self._scene_table.bundle, self._roads.bundle)
 
@@ -232,6 +239,26 @@ class SensorArray:
         for top_views in self._top_views:
             for top_view in top_views.values():
                 top_view.close()
+
+    def _share_frames(self, unchanged: Variant) -> bool:
+        """Let groups with equal views, such as two detectors on one lens, draw their frames once."""
+        drawn: dict[Any, SensorGroup] = {}
+        for group in self._groups:
+            params = [unchanged.params[member] for member in group.members]
+            views = tuple(None if p is None else replace(p, name="view", detector="lgmd") for p in params)
+            if None not in views and views in drawn:
+                group.share(drawn[views])
+            else:
+                drawn[views] = group
+        return len(drawn) < len(self._groups)
+
+    def _separate(self) -> None:
+        """Draw the frames of all groups on their own: cameras that pause keep their exposure."""
+        with _separation:
+            for group in self._groups:
+                group.separate()
+            self._shares = False
+            self.frames = [group.frames for group in self._groups]
 
     def _camera(self, camera: int, index: int) -> EgoCamera | BirdsEye:
         p, texture = self._used_variants[index].params[camera], self._textures[index]

@@ -1,6 +1,7 @@
 """SensorGroup: the cameras of a sensor array with one frame shape and one detector, and their neurons."""
 
 from collections.abc import Sequence
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -65,10 +66,20 @@ class SensorGroup:
         self.batch = CameraBatch([params[k] for k in members], shape, members, num_envs)
         self.frames = np.zeros((*size, *shape), np.uint8)
         cameras = np.array(members, dtype=np.int64)
+        self._shares = False
         self._selected, self._fresh = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
         self._selection = Bundle(cameras, enabled, stale, self._selected, self._fresh)
         self._neurons = Bundle(cameras, self.neuron.outputs, *outputs)
         self._workspaces: list[Workspace] = []
+
+    def share(self, other: "SensorGroup") -> None:
+        """Use the frames of a group with the same views, which is processed before this one."""
+        self.batch, self.frames, self._shares = other.batch, other.frames, True
+
+    def separate(self) -> None:
+        """Draw own frames from now on, from the state of the shared cameras."""
+        if self._shares:
+            self.batch, self.frames, self._shares = deepcopy(self.batch), self.frames.copy(), False
 
     def process(self, first: int, last: int, active: np.ndarray, scene_table: Bundle, roads: Bundle) -> None:
         """Draw and process a frame of every enabled camera of active environments among first..last-1.
@@ -87,16 +98,20 @@ class SensorGroup:
             fresh = np.zeros_like(self._fresh)
             fresh[first:last] = self._fresh[first:last]
             self.neuron.reset(fresh.ravel())
+        if not self._shares:
+            self._draw(first, last, scene_table, roads)
+        count = len(self.members)
+        frames = self.frames.reshape(-1, *self.batch.shape)
+        self.neuron.step_range(first * count, last * count, frames, self._selected.reshape(-1))
+        collect_outputs(first, last, self._selected, self._neurons.native)
+
+    def _draw(self, first: int, last: int, scene_table: Bundle, roads: Bundle) -> None:
         try:  # threads take and return workspaces; both list operations are atomic
             workspace = self._workspaces.pop()
         except IndexError:
             workspace = Workspace(self.batch.shape)
         self.batch.draw(first, last, scene_table, roads, self.frames, self._selected, workspace)
         self._workspaces.append(workspace)
-        count = len(self.members)
-        frames = self.frames.reshape(-1, *self.batch.shape)
-        self.neuron.step_range(first * count, last * count, frames, self._selected.reshape(-1))
-        collect_outputs(first, last, self._selected, self._neurons.native)
 
     def reset(self, mask: np.ndarray) -> None:
         """Reset the neurons of selected environments, bool, shape (num_envs,)."""

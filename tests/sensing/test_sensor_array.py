@@ -24,7 +24,8 @@ CAMERAS = [
     {"name": "path", "shape": (45, 80), "gaze": "path", "panorama": "natural", "mount_left": 0.4},
     {"name": "driver", "shape": (45, 80), "gaze": "path", "bonnet": True, "windscreen": 0.1},
     {"name": "side", "shape": (45, 80), "yaw_deg": 30.0, "detector": "lplc2"},
-    {"name": "flow", "shape": (30, 40), "yaw_deg": -30.0, "detector": "dsn"},
+    {"name": "small flow", "shape": (30, 40), "yaw_deg": 20.0, "seed": 3, "detector": "dsn"},
+    {"name": "back flow", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box", "detector": "dsn"},
 ]
 MODELS = {"lgmd": LGMD, "lplc2": LPLC2, "dsn": DSN}
 FIELDS = [
@@ -136,6 +137,29 @@ def test_inactive_environments_keep_frames_and_outputs():
     for new, old in zip(sensors.responses, before[1], strict=True):
         np.testing.assert_array_equal(new[[1, 3]], old[[1, 3]])
     assert (sensors.responses.ffi != before[1].ffi)[[0, 2]].all()
+
+
+def test_detectors_on_the_same_views_share_frames_until_a_camera_pauses():
+    """A camera that pauses keeps the exposure of its last frame, while its twin adapts further."""
+    lgmds, dsns = [CAMERAS[1], CAMERAS[3]], CAMERAS[-2:]
+    envs, together = scenes(), make_array([*lgmds, *dsns])
+    apart = make_array(lgmds), make_array(dsns)
+    assert together.frames[0] is together.frames[1]
+    for step in range(9):
+        move(envs, step)
+        together.enabled[1:3, 0] = apart[0].enabled[1:3, 0] = not 4 <= step < 7
+        for sensors in (together, *apart):
+            for index, env in enumerate(envs):
+                sensors.read(env, index)
+            sensors.step()
+        for camera in range(4):
+            own = apart[camera // 2]
+            for index in range(len(envs)):
+                frame = own.frame_of(camera % 2, index)
+                np.testing.assert_array_equal(together.frame_of(camera, index), frame)
+                expected = own.response_of(index).membrane_potential[camera % 2]
+                assert together.response_of(index).membrane_potential[camera] == expected
+    assert together.frames[0] is not together.frames[1]
 
 
 def test_a_disabled_camera_pauses_and_starts_anew():
