@@ -10,6 +10,11 @@ from typing import TYPE_CHECKING, Any
 from lgmd_gym.system import signals  # noqa: F401  # pyright: ignore[reportUnusedImport]  (before slow imports)
 
 # isort: split
+from lgmd_gym.system.source_links import linked_folders
+
+__path__ += linked_folders(Path(__file__).parent)  # before the first import from them
+
+# isort: split
 from lgmd_gym._version import __version__
 from lgmd_gym.envs.registration import register_envs
 from lgmd_gym.envs.traffic.registration import register_traffic
