@@ -1,6 +1,7 @@
 """A clone works without symbolic links, which git writes as text files on Windows."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -25,9 +26,10 @@ def test_folders_in_the_package_need_nothing(tmp_path):
     assert linked_folders(ROOT / "lgmd_gym") == []
 
 
-@pytest.mark.parametrize("text_files", [("envs", "agents"), ("agents",), ()])
-def test_folders_beside_the_package_are_found(text_files, tmp_path):
+@pytest.mark.parametrize(("text_files", "links"), [(LINKS, ()), (("agents",), ("envs",)), ((), ())])
+def test_folders_beside_the_package_are_found(text_files, links, tmp_path):
     make(tmp_path, "lgmd_gym", *LINKS)
+    make(tmp_path / "lgmd_gym", *links)
     for name in text_files:
         (tmp_path / "lgmd_gym" / name).write_text(f"../{name}")
     assert linked_folders(tmp_path / "lgmd_gym") == [str(tmp_path)]
@@ -52,6 +54,9 @@ def test_a_clone_without_links_imports(tmp_path):
     clone = tmp_path / "clone"
     git = ["git", "-c", "core.symlinks=false", "clone", "-q", "--depth=1", ROOT.as_uri(), str(clone)]
     subprocess.run(git, check=True)
+    # Changes that are not committed yet are tested, too.
+    without = shutil.ignore_patterns(*LINKS, "__pycache__")
+    shutil.copytree(ROOT / "lgmd_gym", clone / "lgmd_gym", ignore=without, dirs_exist_ok=True)
     assert (clone / "lgmd_gym" / "envs").read_text() == "../envs"
 
     env = {**os.environ, "PYTHONPATH": str(clone)}
@@ -60,6 +65,6 @@ def test_a_clone_without_links_imports(tmp_path):
         run.stderr
     )
     with pytest.raises(ImportError) as error:
-        linked_folders(clone / "docs")
+        linked_folders(clone / "docs" / "howto")
     subprocess.run(["bash", "-c", str(error.value).partition("run: ")[2]], cwd=clone, check=True)
     assert [os.readlink(clone / "lgmd_gym" / name) for name in LINKS] == ["../envs", "../agents"]

@@ -32,19 +32,8 @@ def zoo_python(tmp_path):
 @pytest.mark.slow
 def test_rl_zoo3_trains_a_policy(zoo_python, tmp_path):
     (tmp_path / "ppo.yml").write_text(yaml.safe_dump({ENV: HYPERPARAMETERS}))
-    train = [
-        "-m",
-        "rl_zoo3.train",
-        "--algo",
-        "ppo",
-        "--conf-file",
-        "ppo.yml",
-        "--log-folder",
-        "logs",
-        "--eval-freq",
-        "-1",
-    ]
-    command = [zoo_python, *train, "--env", ENV, "--gym-packages", "lgmd_gym", "--seed", "0"]
+    command = [zoo_python, "-m", "rl_zoo3.train", "--algo", "ppo", "--env", ENV, "--gym-packages", "lgmd_gym"]
+    command += ["--conf-file", "ppo.yml", "--log-folder", "logs", "--eval-freq", "-1", "--seed", "0"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     folder = tmp_path / "logs" / "ppo" / "LGMD-RandomBraking-v0_1"
