@@ -181,11 +181,14 @@ def test_the_package_list_matches_the_folders():
 def test_a_wheel_built_from_the_sdist_is_complete_and_has_one_top_level_package(tmp_path):
     """Build the sdist, build a wheel from it, and import the wheel from another folder."""
     subprocess.run(["git", "clone", "-q", str(ROOT), str(tmp_path / "clone")], check=True)
+    links = [".github/absolute_links.py", "https://example.org/owner/name", "v1"]  # as publish.yml does
+    subprocess.run([sys.executable, *links], cwd=tmp_path / "clone", check=True)
     build = "import setuptools.build_meta as b; print(b.build_sdist(r'{out}'))"
     source = run(build.format(out=tmp_path), cwd=tmp_path / "clone").splitlines()[-1]
     subprocess.run(["tar", "-xzf", str(tmp_path / source), "-C", str(tmp_path)], check=True)
     folder = tmp_path / source.removesuffix(".tar.gz")
     wheel = run(build.replace("sdist", "wheel").format(out=tmp_path), cwd=folder).splitlines()[-1]
+    check_descriptions(tmp_path / source, tmp_path / wheel)
     names = zipfile.ZipFile(tmp_path / wheel).namelist()
     tops = {name.split("/")[0] for name in names}
     assert {top for top in tops if not top.endswith(".dist-info")} == {"lgmd_gym"}
@@ -201,6 +204,23 @@ def test_a_wheel_built_from_the_sdist_is_complete_and_has_one_top_level_package(
     code = "import gymnasium, lgmd_gym.envs as e; gymnasium.make('LGMD/CCRs-v0').reset(); print(e.__file__)"
     env = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
     assert run(code, cwd=tmp_path, env=env).startswith(str(tmp_path / "site"))
+    env["PYTHONPATH"] = str(folder)  # an unpacked sdist, which lacks the links to envs and agents
+    code = "import lgmd_gym.envs as e; print(e.__file__)"
+    assert run(code, cwd=tmp_path, env=env).startswith(str(folder / "envs"))
+
+
+def check_descriptions(source, wheel):
+    """Check that a package index renders the descriptions, and that their links are absolute."""
+    check = [sys.executable, "-m", "twine", "check", "--strict", str(source), str(wheel)]
+    done = subprocess.run(check, capture_output=True, text=True)
+    assert (done.returncode, done.stdout.count("PASSED")) == (0, 2), done.stdout
+    archive = zipfile.ZipFile(wheel)
+    (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+    metadata = archive.read(name).decode()
+    assert "\nProject-URL: Repository, https://example.org/owner/name\n" in metadata
+    targets = re.findall(r"\]\(([^)]+)\)", metadata)
+    assert targets
+    assert [target for target in targets if not target.startswith("https://")] == []
 
 
 def test_ci_runs_the_test_command_of_the_readme():
