@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from joblib.externals.loky import get_reusable_executor
 from support.own_families import forget_families
 
+from lgmd_gym import __version__
 from lgmd_gym.agents import AGENTS
 from lgmd_gym.benchmark.rows import KEYS
 from lgmd_gym.benchmark.suite_file import load_suite
@@ -134,6 +136,25 @@ def test_the_citation_file_matches_the_project():
     assert re.search(r"^cff-version: 1\.2\.0$", text, re.MULTILINE)
     assert f"title: {project['name']}" in text
     assert f"license: {project['license']}" in text
+    assert re.search(rf"^version: {re.escape(__version__)}$", text, re.MULTILINE)
+
+
+def test_the_version_is_stated_once_and_cited():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    assert "version" not in project["project"]
+    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "lgmd_gym._version.__version__"}
+    assert "\nrelease = __version__\n" in (DOCS / "conf.py").read_text()
+    assert f"version = {{{__version__}}}," in (DOCS / "citing.md").read_text()
+
+
+def test_the_page_cites_the_paper_of_the_citation_file():
+    (paper,) = yaml.safe_load((ROOT / "CITATION.cff").read_text())["references"]
+    page = (DOCS / "citing.md").read_text()
+    authors = [f"{author['family-names']}, {author['given-names']}" for author in paper["authors"]]
+    assert f"author    = {{{' and '.join(authors)}}}," in page
+    assert f"title     = {{{paper['title']}}}," in page
+    assert f"booktitle = {{{paper['collection-title']}}}," in page
+    assert f"year      = {{{paper['year']}}}," in page
 
 
 def test_the_readme_is_short():
