@@ -37,6 +37,7 @@ ELSEWHERE = (
 )
 # Pages whose blocks take under a second; the others run with -m slow.
 QUICK = {"README", "neuron"}
+GROUPS = ("Added", "Changed", "Deprecated", "Removed", "Fixed", "Security")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
 
@@ -155,6 +156,20 @@ def test_the_page_cites_the_paper_of_the_citation_file():
     assert f"title     = {{{paper['title']}}}," in page
     assert f"booktitle = {{{paper['collection-title']}}}," in page
     assert f"year      = {{{paper['year']}}}," in page
+
+
+def test_the_changelog_has_the_groups_of_keep_a_changelog():
+    text = (ROOT / "CHANGELOG.md").read_text()
+    title, unreleased, *versions = re.split(r"^## ", text, flags=re.MULTILINE)
+    assert title.startswith("# Changelog\n")
+    assert unreleased.startswith("[Unreleased]\n")
+    for version in versions:
+        assert re.match(r"\[\d+\.\d+\.\d+\] - \d{4}-\d{2}-\d{2}\n", version)
+    for section in (unreleased, *versions):
+        groups = re.findall(r"^### (.*)$", section, re.MULTILINE)
+        assert groups == [group for group in GROUPS if group in groups]
+        entries = re.findall(r"^- (.{60})", section, re.MULTILINE)
+        assert [entry for entry in entries if entries.count(entry) > 1] == []
 
 
 def test_the_readme_is_short():
