@@ -37,8 +37,9 @@ def refuse_unused(options: Any, flag: str, used: Collection[str]) -> None:
 class Bench:
     """Run agents on a suite, print the scores and write a run folder.
 
-    The folder contains episodes.jsonl (one row per episode, written as it finishes), summary.csv,
-    report.html, run.toml, run.json, time series and one PNG per case. Ctrl-C keeps the finished episodes.
+    The folder contains episodes.jsonl (one row per episode, written as it finishes), episodes.csv,
+    summary.csv, report.html with its figures, run.toml, run.json, time series and one PNG per case. Ctrl-C
+    keeps the finished episodes.
     """
 
     suite: Names = None

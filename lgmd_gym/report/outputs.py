@@ -4,6 +4,7 @@ from pathlib import Path
 
 from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, load_traces, write_froc
 from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.episode_table import FILE, write_episodes
 from lgmd_gym.benchmark.file_names import case_name, series_name
 from lgmd_gym.benchmark.stored_run import read_run, read_series, rows_file
 from lgmd_gym.benchmark.suite_file import get_suite
@@ -17,14 +18,16 @@ from lgmd_gym.system.lock import FolderLock
 
 
 def write_outputs(path: Path, plots: bool = True, report: bool = True, trust: bool = False) -> list[Path]:
-    """Write summary.csv, and for a suite of cases plots/, froc.csv and report.html, into a run folder.
+    """Write episodes.csv and summary.csv into a run folder, and for a suite of cases its plots and report.
+
+    A suite of cases also gets plots/, froc.csv, figures/ and report.html. Files of an earlier call are replaced.
 
     The folder is locked meanwhile: an older state of the run does not replace the outputs of a newer one.
 
     Args:
         path: Run folder; a run without rows gets no files.
         plots: Whether to draw one PNG per case.
-        report: Whether to write report.html.
+        report: Whether to write report.html and its figures/.
         trust: See `write_report`.
 
     Returns:
@@ -45,11 +48,12 @@ def _write(path: Path, plots: bool, report: bool, trust: bool) -> list[Path]:
     config, rows, _ = read_run(path)
     if not rows:
         return []
-    files = [path / "summary.csv"]
+    files = [path / FILE, path / "summary.csv"]
+    write_episodes(rows, files[0])
     if config.suite == TRAFFIC:
-        write_traffic_summary(rows, files[0])
+        write_traffic_summary(rows, files[1])
         return files
-    write_summary(rows, files[0])
+    write_summary(rows, files[1])
     if plots:
         files += _plot_cases(path, config)
     traces = load_traces(path)

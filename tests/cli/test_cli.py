@@ -189,6 +189,9 @@ def test_bench_runs_the_traffic_suite(tmp_path):
     kinds = ["highway", "intersection", "merge", "roundabout", "two-way"]
     assert sorted(row["case"] for row in rows) == [f"traffic/{kind}/s0" for kind in kinds]
     assert len((out / "summary.csv").read_text().splitlines()) == 1 + 1 + len(kinds)
+    table = (out / "episodes.csv").read_text().splitlines()
+    assert len(table) == 1 + len(kinds)
+    assert "moving_time_s" in table[0].split(",")
 
 
 def test_a_failed_episode_gives_exit_code_one(tmp_path, monkeypatch, capsys):
