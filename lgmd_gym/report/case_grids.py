@@ -25,6 +25,10 @@ class GridCell(NamedTuple):
     colour: str  # CSS class: of the Euro NCAP colour, "contact" or "premature"
     text: str  # highest relative impact speed [km/h]; "*" marks premature braking
     tooltip: str
+    impact_kmh: float  # highest relative impact speed; 0 without contact
+    contacts: int  # runs with contact
+    premature: int  # runs with premature braking
+    runs: int
 
 
 class CaseGrid(NamedTuple):
@@ -34,6 +38,8 @@ class CaseGrid(NamedTuple):
     axis: str  # quantity of the columns
     columns: list[int]
     lines: list[tuple[str, list[GridCell | None]]]
+    agent: str
+    family: str
 
 
 def case_grids(rows: list[Row], agent: str, suite: str) -> list[CaseGrid]:
@@ -69,7 +75,7 @@ def _grid(
     if axis == "overlap":
         columns.sort(key=OVERLAPS.index)
     lines = [(head, [_cell(cells.get((head, column)), suite) for column in columns]) for head in heads]
-    return CaseGrid(f"{family}: {agent}", AXES[axis], columns, lines)
+    return CaseGrid(f"{family}: {agent}", AXES[axis], columns, lines, agent, family)
 
 
 def _cell(rows: list[Row] | None, suite: str) -> GridCell | None:
@@ -81,9 +87,11 @@ def _cell(rows: list[Row] | None, suite: str) -> GridCell | None:
     colour = min(colours, key=colour_weight)
     contacts = sum(bool(row["collision"]) for row in rows)
     premature = sum(bool(row["premature_brake"]) for row in rows)
-    text = f"{relative_impact(worst) / KMH:.0f}" if contacts else "0" + ("*" if premature else "")
-    tooltip = f"{worst['case']}: contact in {contacts} of {len(rows)} seeds, premature braking in {premature}"
-    return GridCell(colour, text, tooltip)
+    impact = relative_impact(worst) / KMH
+    text = f"{impact:.0f}" if contacts else "0" + ("*" if premature else "")
+    counts = f"contact in {contacts} of {len(rows)} runs, premature braking in {premature}"
+    tooltip = f"{worst['case']}: {colour}, {counts}"
+    return GridCell(colour, text, tooltip, impact, contacts, premature, len(rows))
 
 
 def _head_speed(head: str) -> int:

@@ -44,6 +44,11 @@ class ReportData:
         return cls(path, config, read_settings(path), suite.name, run.rows, agents, cases, trust)
 
     @property
+    def figures(self) -> Path:
+        """Folder of the figures and their data."""
+        return self.path / "figures"
+
+    @property
     def agents_not_loaded(self) -> list[str]:
         """Agents whose code is outside this package and not trusted."""
         return [] if self.trust else [agent for agent in self.agents if outside_code(agent)]

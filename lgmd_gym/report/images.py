@@ -3,6 +3,7 @@
 import base64
 import io
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.episode import make_env, rollout
 from lgmd_gym.benchmark.metrics import brake_onset
 from lgmd_gym.benchmark.task import Task
+from lgmd_gym.system.files import complete_file
 
 
 class CapturedFrame(NamedTuple):
@@ -20,9 +22,13 @@ class CapturedFrame(NamedTuple):
     caption: str
 
 
-def figure_uri(draw: Callable[[BinaryIO], Any]) -> str:
-    """Return the SVG that a function writes to a file, as a data URI."""
-    return _data_uri("image/svg+xml", draw)
+def save_figure(file: Path, draw: Callable[[BinaryIO], Any]) -> str:
+    """Write the SVG that a function draws to a file, and return it as a data URI."""
+    drawn = io.BytesIO()
+    draw(drawn)
+    with complete_file(file) as part:
+        part.write_bytes(drawn.getvalue())
+    return _data_uri("image/svg+xml", lambda copy: copy.write(drawn.getvalue()))
 
 
 def frame_uri(frame: np.ndarray) -> str:

@@ -20,7 +20,8 @@ from lgmd_gym.system.lock import FolderLock
 def write_outputs(path: Path, plots: bool = True, report: bool = True, trust: bool = False) -> list[Path]:
     """Write episodes.csv and summary.csv into a run folder, and for a suite of cases its plots and report.
 
-    A suite of cases also gets plots/, froc.csv, figures/ and report.html. Files of an earlier call are replaced.
+    A suite of cases also gets plots/, froc.csv, figures/ and report.html. Files of an earlier call are
+    replaced.
 
     The folder is locked meanwhile: an older state of the run does not replace the outputs of a newer one.
 

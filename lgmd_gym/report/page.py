@@ -1,14 +1,10 @@
 """The report page: its sections, rendered with `page.html`."""
 
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from lgmd_gym.benchmark.analysis.compare import compare_runs
-from lgmd_gym.benchmark.analysis.compare_tables import change_text
-from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, load_traces
+from lgmd_gym.benchmark.analysis.froc import LEAD_TIME
 from lgmd_gym.benchmark.analysis.ncap_points import SUITE_POINTS
-from lgmd_gym.benchmark.analysis.plots import difference_figure, froc_figure, trace_figure
 from lgmd_gym.benchmark.analysis.protocol_limits import R152_SUITES, meets_r152
 from lgmd_gym.benchmark.analysis.tables import (
     agent_summaries,
@@ -22,19 +18,30 @@ from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import INTERVAL_TEXT, Sample, by_condition, without_fcw_driver
 from lgmd_gym.benchmark.task import NO_BRAKE
-from lgmd_gym.neuron import LGMDParams
+from lgmd_gym.report.agent_notes import agent_note
 from lgmd_gym.report.case_grids import case_grids
+from lgmd_gym.report.conclusion import conclusion
 from lgmd_gym.report.data import ReportData
-from lgmd_gym.report.images import CapturedFrame, figure_uri, key_decisions
-from lgmd_gym.report.selection import extreme_episodes, hardest_false_activations, illustrated_agent
+from lgmd_gym.report.figures import MAX_PANELS, ReportFigure, avoidance_figure, impact_figure
+from lgmd_gym.report.grid_figure import CELL_COLOURS, DARK_CELLS, grid_figure
+from lgmd_gym.report.sections import (
+    comparison_section,
+    episode_section,
+    false_activation_section,
+    froc_section,
+)
+from lgmd_gym.report.selection import illustrated_agent
+from lgmd_gym.report.svg import DARK_CSS, legend_mark, to_text
 
 BANDS = ("red", "brown", "orange", "yellow", "green")
 
 
 def write_report(path: Path, trust: bool = False) -> Path:
-    """Write `report.html` into a run folder and return its path.
+    """Write `report.html` and its `figures/` into a run folder and return the path of the page.
 
-    Only the episodes whose camera frames are shown are simulated again.
+    The page contains all of its figures. Each is also a file with its data, `figures/<name>.svg` and `.csv`;
+    files of an earlier report are replaced. Only the episodes whose camera frames are shown are simulated
+    again.
 
     Args:
         path: Run folder.
@@ -44,28 +51,42 @@ def write_report(path: Path, trust: bool = False) -> Path:
     Raises:
         ValueError: If the folder contains no run or a damaged one.
     """
+    data = ReportData.load(path, trust)
+    file = path / "report.html"
+    replace_file(file, _render(data))
+    return file
+
+
+def _render(data: ReportData) -> str:
+    """Return the page; the figures are written to files meanwhile."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    data = ReportData.load(path, trust)
     environment = Environment(
         loader=PackageLoader("lgmd_gym.report", "."), autoescape=True, undefined=StrictUndefined
     )
     environment.filters |= {"band": band, "rate_band": rate_band, "rate": rate_text, "kmh": mean_kmh}
-    text = environment.get_template("page.html").render(
+    environment.filters["svg"] = to_text
+    families = {case.name: case.family for case in data.cases.values()}
+    return environment.get_template("page.html").render(
         data=data,
         interval=INTERVAL_TEXT,
+        conclusion=conclusion(data.rows, data.agents, data.suite),
+        notes=[(agent, agent_note(agent, agent not in data.agents_not_loaded)) for agent in data.agents],
+        legend=[(agent, legend_mark(series)) for series, agent in enumerate(data.agents)],
+        families=families,
+        max_panels=MAX_PANELS,
+        cell_colours=CELL_COLOURS,
+        dark_cells=DARK_CELLS,
+        dark_css=DARK_CSS,
         failed=sum(row["error"] is not None for row in data.rows),
-        conditions=[_condition(data, name, rows) for name, rows in by_condition(data.rows).items()],
-        froc=_froc(data),
+        conditions=[_condition(data, name, rows, families) for name, rows in by_condition(data.rows).items()],
+        froc=froc_section(data),
         lead_time=LEAD_TIME,
-        comparisons=_comparisons(data),
+        comparisons=comparison_section(data),
         illustrated=illustrated_agent(data.agents),
-        episodes=_episodes(data),
-        false_activations=_false_activations(data),
+        episodes=episode_section(data),
+        false_activations=false_activation_section(data),
     )
-    file = path / "report.html"
-    replace_file(file, text)
-    return file
 
 
 def band(share: float | None) -> str:
@@ -81,12 +102,13 @@ def rate_band(rate: Rate, lower_is_better: bool = False) -> str:
     return band(1.0 - share if lower_is_better else share)
 
 
-def _condition(data: ReportData, name: str, rows: list[Row]) -> dict[str, Any]:
-    """Return the tables of one camera condition."""
+def _condition(data: ReportData, name: str, rows: list[Row], families: dict[str, str]) -> dict[str, Any]:
+    """Return the tables and figures of one camera condition."""
     braking = [agent for agent in data.agents if agent != NO_BRAKE]
     points = SUITE_POINTS.get(data.suite)
     judged = data.agents if data.suite in R152_SUITES else None
     met = judged and [agent for agent in judged if meets_r152(rows, agent)]
+    grids = [grid for agent in braking for grid in case_grids(rows, agent, data.suite)]
     return {
         "name": name,
         "sample": Sample.of(rows),
@@ -94,50 +116,15 @@ def _condition(data: ReportData, name: str, rows: list[Row]) -> dict[str, Any]:
         "limits": limit_lines(rows, data.agents, data.suite),
         "meet_r152": met,
         "points": [(agent, points(rows, agent)) for agent in braking] if points else [],
-        "grids": [grids for agent in braking if (grids := case_grids(rows, agent, data.suite))],
+        "avoidance": _saved(data, avoidance_figure(rows, data.agents, name)),
+        "impacts": _saved(data, impact_figure(rows, data.agents, families, name)),
+        "grids": _saved(data, grid_figure(grids, name)),
         "cases": success_lines(rows, data.agents),
     }
 
 
-def _froc(data: ReportData) -> str | None:
-    """Return the figure of the detection curves; None without a threat."""
-    curves = froc_curves(load_traces(data.path))
-    if not any(curve.points[0].detected.n for of_condition in curves.values() for curve in of_condition):
-        return None
-    return figure_uri(partial(froc_figure, curves=curves, lead_time=LEAD_TIME))
-
-
-def _comparisons(data: ReportData) -> dict[str, Any] | None:
-    """Return the paired differences and their figure; None for fewer than two agents with rows."""
-    if len({row["agent"] for row in data.rows} - {NO_BRAKE}) < 2:
-        return None
-    comparisons = compare_runs(data.path, None)
-    lines = [(item, [(line, change_text(line)) for line in item.differences]) for item in comparisons]
-    return {"figure": figure_uri(partial(difference_figure, comparisons=comparisons)), "lines": lines}
-
-
-def _episodes(data: ReportData) -> list[dict[str, Any]]:
-    """Return the illustrated episodes: time series of all agents, and camera frames of one."""
-    alert_level = LGMDParams.make(data.config.params).t_sf
-    agent, episodes = illustrated_agent(data.agents), []
-    for rows in by_condition(without_fcw_driver(data.rows)).values():
-        for description, row in extreme_episodes(rows, agent, data.config.first_seed).items():
-            by_agent = {name: data.series(row | {"agent": name}) for name in data.agents}
-            stored = {name: series for name, series in by_agent.items() if series is not None}
-            if agent in stored:
-                figure = figure_uri(partial(trace_figure, episodes=stored, alert_level=alert_level))
-                frames = data.frames(row, key_decisions(stored[agent]))
-                episodes.append({"description": description, "row": row, "figure": figure, "frames": frames})
-    return episodes
-
-
-def _false_activations(data: ReportData) -> list[tuple[Row, CapturedFrame | None]]:
-    """Return false activations with the camera frame at which braking begins, if it may be drawn."""
-    rows = hardest_false_activations(without_fcw_driver(data.rows), data.agents, data.config.first_seed)
-    captured: list[tuple[Row, CapturedFrame | None]] = []
-    for row in rows:
-        if (series := data.series(row)) is not None:
-            decisions = key_decisions(series)
-            onset = {"braking begins": decisions.get("braking begins", decisions["end"])}
-            captured += [(row, frame) for frame in data.frames(row, onset) or [None]]
-    return captured
+def _saved(data: ReportData, figure: ReportFigure | None) -> ReportFigure | None:
+    """Write the files of a figure and return it."""
+    if figure is not None:
+        figure.write(data.figures)
+    return figure

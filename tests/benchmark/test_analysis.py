@@ -309,11 +309,16 @@ def test_open_loop_alarms_match_the_alerts_in_the_rows(run_folder):
 
 def test_report_is_one_page_without_external_files(run_folder):
     page = (run_folder / "report.html").read_text()
-    assert re.findall(r'(?:src|href)="(?!data:)[^"]*"', page) == []
+    links = set(re.findall(r'(?:src|href)="((?!data:)[^"]*)"', page))
+    assert all((run_folder / link).is_file() for link in links)
+    assert {"episodes.csv", "figures/froc.svg", "figures/froc.csv", "figures/avoidance-rain.svg"} < links
+    assert any(re.fullmatch(r"figures/episode-(clear|rain)-[a-z-]+\.csv", link) for link in links)
     assert "url(" not in page
     assert "{{" not in page
     assert re.findall(r"<h2>(.*?)</h2>", page) == [
+        "Conclusion",
         "Scores",
+        "Figures",
         "Open-loop detection",
         "Paired differences",
         "Selected episodes",
@@ -321,11 +326,11 @@ def test_report_is_one_page_without_external_files(run_folder):
         "Results per case",
         "Configuration",
     ]
-    scores = page.split("<h2>")[1]
+    scores = page.split("<h2>")[2]
     headings = [f"{condition}: 3 cases × 1 world" for condition in ("clear", "rain")]
     assert re.findall(r"<h3>(.*?)</h3>", scores) == headings
     assert "k/n [95 % interval, clustered by case and world, in %]" in scores
-    assert scores.count("<tr><td>ttc-oracle</td>") == 2
+    assert scores.count('<tr data-agent="ttc-oracle"><td>ttc-oracle</td>') == 2
     assert "<h3>smallest stopping margin: three-cases/CCRs/v" in page
     assert page.count("data:image/png") >= 4
 

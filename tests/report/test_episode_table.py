@@ -3,10 +3,11 @@
 import csv
 import re
 
+from support.rows import threat_row
+
 from lgmd_gym.benchmark.episode_table import UNITS, column_name, write_episodes
 from lgmd_gym.benchmark.rows import KEYS
 from lgmd_gym.benchmark.traffic.rows import KEYS as TRAFFIC_KEYS
-from support.rows import threat_row
 
 # Names, flags, counts, values with their unit in the key, and grey levels or returns without a unit.
 WITHOUT_UNIT = {
