@@ -14,7 +14,7 @@ from lgmd_gym.benchmark.summary import (
 from lgmd_gym.benchmark.task import NO_BRAKE
 
 CAVEAT = (
-    "These are results of one simulation with the cases of this suite. They are no rating and do not show "
+    "These are results of one simulation with the cases of this suite. They are not a rating and do not show "
     "how a real car would perform."
 )
 

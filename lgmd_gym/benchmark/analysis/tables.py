@@ -28,7 +28,7 @@ SCORE_CAPTION = (
 )
 LIMIT_CAPTION = (
     "runs that meet the limit, of n (highest relative impact speed in km/h); premature braking fails; "
-    "derived from the protocol, no rating"
+    "derived from the protocol, not a rating"
 )
 
 
