@@ -1,4 +1,4 @@
-"""The shipped policy `zones`, and errors for policy files."""
+"""The shipped policies, and errors for policy files."""
 
 import re
 import zipfile
@@ -10,8 +10,12 @@ import pytest
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.card import read_card
 from lgmd_gym.agents.policies.policy import find_policy
+from lgmd_gym.agents.sides import all_round_cameras
+from lgmd_gym.agents.zones import zone_cameras
 from lgmd_gym.training import TrainConfig
 from lgmd_gym.training.hyperparams import read_hyperparams
+
+CAMERAS = {"zones": zone_cameras, "all-round": all_round_cameras}
 
 
 @pytest.mark.parametrize(
@@ -28,23 +32,26 @@ def test_invalid_policy_names_are_rejected(text, message):
         make_agent(text)
 
 
-def test_file_is_small_and_contains_no_local_path():
-    path = find_policy("zones")
+@pytest.mark.parametrize("name", CAMERAS)
+def test_file_is_small_and_contains_no_local_path(name):
+    path = find_policy(name)
     assert path.stat().st_size < 1_000_000
     with zipfile.ZipFile(path) as archive:
-        for name in archive.namelist():
-            assert not re.search(rb"/(tmp|home|root|work)/", archive.read(name)), name
+        for member in archive.namelist():
+            assert not re.search(rb"/(tmp|home|root|work)/", archive.read(member)), member
 
 
-def test_card_matches_the_packaged_hyperparameters_and_cameras():
-    config = TrainConfig.from_dict(read_card(find_policy("zones"))["config"])
-    assert config.camera == make_agent("stopping-zone").camera
+@pytest.mark.parametrize("name", CAMERAS)
+def test_card_matches_the_packaged_hyperparameters_and_cameras(name):
+    config = TrainConfig.from_dict(read_card(find_policy(name))["config"])
+    assert config.camera == CAMERAS[name]()
     assert config.algo_kwargs == read_hyperparams("offline", config.env_id)["algo_kwargs"]
 
 
+@pytest.mark.parametrize("name", CAMERAS)
 @pytest.mark.parametrize("scenario", ["CCRs", "EmptyRoad"])
-def test_policy_brakes_for_a_car_and_not_on_an_empty_road(scenario):
-    agent = make_agent("policy:zones")
+def test_policy_brakes_for_a_car_and_not_on_an_empty_road(scenario, name):
+    agent = make_agent(f"policy:{name}")
     env = gym.make(f"LGMD/{scenario}-v0", ego_speed=11.0, camera=agent.camera, world="laboratory")
     observation, info = env.reset(seed=1)
     agent.reset(1)
@@ -59,14 +66,16 @@ def test_policy_brakes_for_a_car_and_not_on_an_empty_road(scenario):
     assert not info["collision"]
 
 
+@pytest.mark.parametrize("name", CAMERAS)
 @pytest.mark.parametrize("acceleration", [3.0, 0.5, -3.0])
-def test_policy_does_not_react_to_own_acceleration(acceleration):
+def test_policy_does_not_react_to_own_acceleration(acceleration, name):
     """Recorded levels contain no acceleration, so that a policy with the input `speed_change` braked here."""
-    agent = make_agent("policy:zones")
+    agent, cameras = make_agent(f"policy:{name}"), len(CAMERAS[name]())
     times = np.arange(0.0, 8.0, 1 / 30)
     for speed in (0.0 if acceleration > 0 else 24.0) + acceleration * times:
         observation = {
-            "membrane_potential": np.full(17, 0.55, np.float32),
+            "membrane_potential": np.full(cameras, 0.55, np.float32),
+            "ffi": np.ones(cameras, np.float32),
             "ego_speed": np.array([speed], np.float32),
             "ego_yaw_rate": np.zeros(1, np.float32),
         }
