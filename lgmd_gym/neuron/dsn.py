@@ -29,7 +29,8 @@ class DSN(MotionNeuron):
     6. K = 1 / (1 + exp(-r / `sigma`)), in (0, 1); adaptation, spikes and spike frequency are those of the
        LGMD (`LGMDParams`, eq. 11 and 12), so that the neuron only spikes for motion to the right.
 
-    In `Response`, `ffi` is the mean of |m| [grey levels]; `inhibition_weight` and `excitation_latency` are 0.
+    In `Response`, `ffi` is the mean of `|m|` [grey levels]; `inhibition_weight` and `excitation_latency` are
+    0.
 
     Args:
         shape: (height, width) of the frames [px].

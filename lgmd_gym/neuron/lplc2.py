@@ -25,14 +25,14 @@ class LPLC2(MotionNeuron):
     2. A = max(h, 0), B = max(-h, 0): ON and OFF.
     3. A'(t) = A'(t-1) + α (A(t) - A'(t-1)), α = dt / (dt + `tau_delay_ms`), and B' likewise: delayed.
     4. c = A'₁(t-1) A₂(t) - A₁(t) A'₂(t-1) + B'₁(t-1) B₂(t) - B₁(t) B'₂(t-1) for a pixel 1 and the next one 2,
-       to the right or below: the correlator of Hassenstein and Reichardt. Motion m = sign(c) √|c|.
+       to the right or below: the correlator of Hassenstein and Reichardt. Motion m = sign(c) `√|c|`.
     5. For a unit: means of m over the 2 R × R pixels on its left, right, upper and lower side, R =
        `radius_px`, with the sign that makes motion outwards positive, rectified: l, r, u, d.
     6. Response (l r u d)^¼, or (l r)^½ without `vertical` arms. The output is that of the strongest unit.
     7. K = 1 / (1 + exp(-response / `sigma`)); adaptation, spikes and spike frequency are those of the LGMD
        (`LGMDParams`, eq. 11 and 12), so that both models have the same outputs.
 
-    In `Response`, `ffi` is the mean of |m| to the left and right [grey levels]; `inhibition_weight` and
+    In `Response`, `ffi` is the mean of `|m|` to the left and right [grey levels]; `inhibition_weight` and
     `excitation_latency` are 0.
 
     Args:

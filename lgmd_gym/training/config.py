@@ -8,7 +8,7 @@ from typing import Any
 
 import gymnasium as gym
 
-from lgmd_gym.agents import HOLD, make_agent
+from lgmd_gym.agents import AGENTS, HOLD, make_agent
 from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
 from lgmd_gym.camera import CameraSpec
@@ -201,6 +201,8 @@ class TrainConfig:
 def _cameras_of(agent: str) -> CameraSpec:
     if agent == ALL_ROUND:
         return all_round_cameras()
+    if ":" not in agent:
+        check_known("agent", agent, [*AGENTS, ALL_ROUND])
     camera = make_agent(agent).camera
     if camera is None:
         raise ValueError(f"agent {agent!r} has no cameras of its own; use camera, or 'stopping-zone'")

@@ -70,6 +70,9 @@ def test_cameras_are_presets_or_those_of_an_agent():
     assert camera[0]["name"] == "ground0.28"
     with pytest.raises(ValueError, match="agent 'spike-threshold' has no cameras of its own"):
         TrainConfig.from_hyperparams("sac", sensors_of="spike-threshold")
+    with pytest.raises(ValueError, match="unknown agent 'allround'; did you mean 'all-round'"):
+        TrainConfig.from_hyperparams("sac", sensors_of="allround")
+    assert len(TrainConfig.from_hyperparams("sac", sensors_of="all-round").camera) == 29
 
 
 @pytest.mark.parametrize("demands", [(0.0, -0.4), (0.0, -0.5, -1.0), (-1.0,), (), (0.3, -1.0)])
