@@ -90,7 +90,7 @@ def read_card(path: Path) -> dict[str, Any]:
     A card of `lgmd-gym train` also has the configuration of the training.
 
     Raises:
-        ValueError: If the file does not exist, is no zip file or has no card.
+        ValueError: If the file does not exist, is not a zip file or has no card.
     """
     try:
         with zipfile.ZipFile(path) as file:

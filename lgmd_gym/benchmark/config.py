@@ -181,7 +181,7 @@ class RunConfig:
 
 
 def _suite(value: Any) -> Source:
-    """Return the name or path of a suite, a scenario, or several paths and scenarios; one is no tuple."""
+    """Return the name or path of a suite, a scenario, or several; a single one is not a tuple."""
     items = (value,) if isinstance(value, str | Path | Scenario) else as_tuple(value)
     if items is None or not all(isinstance(item, str | Path | Scenario) for item in items):
         raise ValueError(f"suite must be a name, paths or scenarios, got {shown(value)}")

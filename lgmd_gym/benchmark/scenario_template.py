@@ -1,4 +1,4 @@
-"""A commented scenario file, as a start for an own one."""
+"""A commented scenario file to start from."""
 
 from pathlib import Path
 
