@@ -1,9 +1,12 @@
-"""Types and bounds of the fields of `LGMDParams`."""
+"""Arguments of neurons: parameters from a `params` argument, types and bounds of `LGMDParams`."""
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, TypeVar
 
 from lgmd_gym.errors import check_flag, check_number, shown
+
+P = TypeVar("P")
 
 
 class _Bound(NamedTuple):
@@ -46,6 +49,26 @@ _CHOICES = {
     "latency": ("clamp", "jump"),
     "spikes_from": ("adapted", "membrane"),
 }
+
+
+def made_params(cls: type[P], spec: Any, from_mapping: Callable[[Mapping[str, Any]], P]) -> P:
+    """Return the parameters of a class for a `params` argument.
+
+    Args:
+        cls: Class of the parameters; without arguments it has the defaults.
+        spec: An instance of the class, a mapping, or None for the defaults.
+        from_mapping: Builds the parameters from a mapping.
+
+    Raises:
+        ValueError: For another type, or a mapping that `from_mapping` refuses.
+    """
+    if spec is None:
+        return cls()
+    if isinstance(spec, cls):
+        return spec
+    if isinstance(spec, Mapping):
+        return from_mapping(spec)
+    raise ValueError(f"params must be {cls.__name__}, a mapping or None, got {shown(spec)}")
 
 
 def checked_field(name: str, default: Any, value: Any) -> Any:

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
-from lgmd_gym.errors import check_keys, check_positive, shown
+from lgmd_gym.errors import check_keys, check_positive
+from lgmd_gym.neuron.bounds import made_params
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,12 +42,10 @@ class MotionParams:
         Raises:
             ValueError: For an unknown key, a value out of range, or another type.
         """
-        if spec is None:
-            return cls()
-        if isinstance(spec, cls):
-            return spec
-        if isinstance(spec, Mapping):
-            known = (field.name for field in dataclasses.fields(cls))
-            check_keys(f"{cls.__name__.removesuffix('Params')} parameter", spec, known)
-            return cls(**spec)
-        raise ValueError(f"params must be {cls.__name__}, a mapping or None, got {shown(spec)}")
+        return made_params(cls, spec, cls._from_dict)
+
+    @classmethod
+    def _from_dict(cls, values: Mapping[str, Any]) -> Self:
+        known = (field.name for field in dataclasses.fields(cls))
+        check_keys(f"{cls.__name__.removesuffix('Params')} parameter", values, known)
+        return cls(**values)

@@ -10,8 +10,8 @@ from typing import Any, Literal, Self, TypeAlias
 
 import tomli_w
 
-from lgmd_gym.errors import check_keys, check_path, shown
-from lgmd_gym.neuron.bounds import checked_field
+from lgmd_gym.errors import check_keys, check_path
+from lgmd_gym.neuron.bounds import checked_field, made_params
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,13 +210,7 @@ class LGMDParams:
         Raises:
             ValueError: For an unknown key, a value out of range, or another type.
         """
-        if spec is None:
-            return cls()
-        if isinstance(spec, cls):
-            return spec
-        if isinstance(spec, Mapping):
-            return cls.from_dict(spec)
-        raise ValueError(f"params must be LGMDParams, a mapping or None, got {shown(spec)}")
+        return made_params(cls, spec, cls.from_dict)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
