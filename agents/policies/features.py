@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.agents.policies.zone_features import ZONE_INPUTS, ZoneFeatures, check_zone_shape
+from lgmd_gym.agents.zones import NUM_FIELDS
 from lgmd_gym.errors import check_flag, check_items, check_keys, check_known, check_positive, check_whole
 
 # Offset and scale of each observation: (value - offset) / scale is near [-1, 1].
@@ -76,6 +77,14 @@ class FeatureConfig:
     def to_dict(self) -> dict[str, Any]:
         """Return the configuration as plain values."""
         return asdict(self) | {"inputs": list(self.inputs)}
+
+    @property
+    def cameras_of(self) -> str | None:
+        """Agent whose cameras the inputs require: "stopping-zone" or "all-round"; None for any cameras."""
+        required = [ZONE_INPUTS[name].last for name in self.inputs if name in ZONE_INPUTS]
+        if not required:
+            return None
+        return "stopping-zone" if max(required) == NUM_FIELDS else "all-round"
 
     def latches(self, demand: float) -> bool:
         """Return whether a demand in [-1, 1] is held until the episode ends."""

@@ -224,7 +224,7 @@ class Train:
     with the best mean return in them. Ctrl-C keeps the checkpoints; --resume continues from the last one.
     """
 
-    algo: str = "sac"
+    algo: str = "dqn"
     """Algorithm: sac, ppo, dqn, or offline (trained on recorded episodes in minutes)."""
     env: str = "LGMD/RandomBraking-v0"
     """Environment id; RandomBraking is trained on its split train and evaluated on its split validation."""
@@ -246,7 +246,7 @@ class Train:
     """Seed of the network and the environments."""
     hyperparams: File = None
     """YAML file in rl-zoo's format. Default: the file of this package."""
-    eval_freq: int = 20_000
+    eval_freq: int = 16_000
     """Number of decisions between two evaluations; offline evaluates after every epoch."""
     eval_episodes: Count = None
     """Number of episodes per evaluation. Default: 60; for offline, 600."""

@@ -6,6 +6,7 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from lgmd_gym.system.extras import missing_extra
@@ -20,84 +21,25 @@ Indices = int | Iterable[int] | None
 _FINAL = ("final_obs", "final_info")
 
 
-class SB3VecEnv(VecEnv):
-    """The engine as a `VecEnv` of stable-baselines3.
-
-    Steps return what `VecMonitor(DummyVecEnv([…]))` of single environments returns for the same seeds and
-    actions: float32 rewards, a list of infos, and for an ended episode the first observation of the next one.
-    The info of an ended episode has ``terminal_observation``, ``TimeLimit.truncated`` and ``episode``: the
-    sum of rewards `r`, the number of steps `l` and the time since the construction `t` [s]. Its other keys
-    are those of the last step; `reset_infos` has those of the reset.
+class EngineVecEnv(VecEnv):
+    """Base of the `VecEnv`s of a vector environment: attributes, images and the statistics of episodes.
 
     Args:
-        env: An environment id such as "LGMD/RandomBraking-v0", or a Gymnasium vector environment in autoreset
-            mode "SameStep".
-        num_envs: Number of environments; only with an id.
-        **arguments: Arguments of `gym.make_vec`, for example `threads`; only with an id.
-
-    Raises:
-        ValueError: If the vector environment has another autoreset mode or does not copy its observations, or
-            an argument is given with it.
-
-    Example:
-        >>> from stable_baselines3 import PPO
-        >>> from lgmd_gym.engine import SB3VecEnv
-        >>> envs = SB3VecEnv("LGMD/RandomBraking-v0", num_envs=4)
-        >>> PPO("MultiInputPolicy", envs, n_steps=16, batch_size=64).learn(64).num_timesteps
-        64
+        envs: The vector environment.
+        observation_space: Observation space of one environment.
     """
 
-    def __init__(self, env: str | VectorEnv, num_envs: int | None = None, **arguments: Any) -> None:
-        if isinstance(env, str):
-            env = _make(env, 1 if num_envs is None else num_envs, arguments)
-        elif num_envs is not None or arguments:
-            names = ", ".join((["num_envs"] if num_envs is not None else []) + list(arguments))
-            raise ValueError(
-                f"arguments of a vector environment cannot change, got {names}; pass an id instead"
-            )
-        self.envs = _checked(env)
-        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
-        self.metadata = dict(env.metadata)
+    def __init__(self, envs: VectorEnv, observation_space: spaces.Space) -> None:
+        self.envs = envs
+        super().__init__(envs.num_envs, observation_space, envs.single_action_space)
+        self.metadata = dict(envs.metadata)
         self._actions: Any = None
         self._start_s = time.time()
         self._clear_statistics()
 
-    def reset(self) -> Any:
-        """Reset all environments with the seeds of `seed`, if any; return their observations.
-
-        Raises:
-            ValueError: If options were set; the environments have none.
-        """
-        if any(self._options):
-            raise ValueError(f"the environments have no options, got {self._options}; call set_options()")
-        seeds: Any = list(self._seeds)
-        observations, infos = self.envs.reset(seed=seeds)
-        self.reset_infos = _rows(infos, range(self.num_envs))
-        self._reset_seeds()
-        self._clear_statistics()
-        return observations
-
     def step_async(self, actions: np.ndarray) -> None:
         """Set the actions of the next `step_wait`."""
         self._actions = actions
-
-    def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Step all environments; return observations, rewards, ends and infos."""
-        observations, rewards, terminated, truncated, arrays = self.envs.step(self._actions)
-        rewards, done = rewards.astype(np.float32), terminated | truncated
-        infos = _rows(arrays, range(self.num_envs))
-        self._returns += rewards
-        self._lengths += 1
-        ended = np.flatnonzero(done).tolist()
-        if ended:
-            finals = _rows(arrays["final_info"], ended)
-            for index, final in zip(ended, finals, strict=True):
-                self.reset_infos[index], infos[index] = infos[index], final
-                final["terminal_observation"] = arrays["final_obs"][index]
-                final["episode"] = self._statistics(index)
-        for info, value in zip(infos, (truncated & ~terminated).tolist(), strict=True):
-            info["TimeLimit.truncated"] = value
-        return observations, rewards, done, infos
 
     def close(self) -> None:
         """Close the environments."""
@@ -154,6 +96,11 @@ class SB3VecEnv(VecEnv):
         """Return True for `Monitor`, since infos have ``episode``; False for other wrappers."""
         return [issubclass(Monitor, wrapper_class) for _ in self._get_indices(indices)]
 
+    def _count(self, rewards: np.ndarray) -> None:
+        """Add a step of all environments to the statistics."""
+        self._returns += rewards
+        self._lengths += 1
+
     def _statistics(self, index: int) -> dict[str, Any]:
         """Return the statistics of an ended episode, and start those of the next."""
         total, length = self._returns[index], self._lengths[index]
@@ -163,6 +110,76 @@ class SB3VecEnv(VecEnv):
     def _clear_statistics(self) -> None:
         self._returns = np.zeros(self.num_envs, np.float32)
         self._lengths = np.zeros(self.num_envs, np.int32)
+
+
+class SB3VecEnv(EngineVecEnv):
+    """The engine as a `VecEnv` of stable-baselines3.
+
+    Steps return what `VecMonitor(DummyVecEnv([…]))` of single environments returns for the same seeds and
+    actions: float32 rewards, a list of infos, and for an ended episode the first observation of the next one.
+    The info of an ended episode has ``terminal_observation``, ``TimeLimit.truncated`` and ``episode``: the
+    sum of rewards `r`, the number of steps `l` and the time since the construction `t` [s]. Its other keys
+    are those of the last step; `reset_infos` has those of the reset.
+
+    Args:
+        env: An environment id such as "LGMD/RandomBraking-v0", or a Gymnasium vector environment in autoreset
+            mode "SameStep".
+        num_envs: Number of environments; only with an id.
+        **arguments: Arguments of `gym.make_vec`, for example `threads`; only with an id.
+
+    Raises:
+        ValueError: If the vector environment has another autoreset mode or does not copy its observations, or
+            an argument is given with it.
+
+    Example:
+        >>> from stable_baselines3 import PPO
+        >>> from lgmd_gym.engine import SB3VecEnv
+        >>> envs = SB3VecEnv("LGMD/RandomBraking-v0", num_envs=4)
+        >>> PPO("MultiInputPolicy", envs, n_steps=16, batch_size=64).learn(64).num_timesteps
+        64
+    """
+
+    def __init__(self, env: str | VectorEnv, num_envs: int | None = None, **arguments: Any) -> None:
+        if isinstance(env, str):
+            env = _make(env, 1 if num_envs is None else num_envs, arguments)
+        elif num_envs is not None or arguments:
+            names = ", ".join((["num_envs"] if num_envs is not None else []) + list(arguments))
+            raise ValueError(
+                f"arguments of a vector environment cannot change, got {names}; pass an id instead"
+            )
+        super().__init__(_checked(env), env.single_observation_space)
+
+    def reset(self) -> Any:
+        """Reset all environments with the seeds of `seed`, if any; return their observations.
+
+        Raises:
+            ValueError: If options were set; the environments have none.
+        """
+        if any(self._options):
+            raise ValueError(f"the environments have no options, got {self._options}; call set_options()")
+        seeds: Any = list(self._seeds)
+        observations, infos = self.envs.reset(seed=seeds)
+        self.reset_infos = _rows(infos, range(self.num_envs))
+        self._reset_seeds()
+        self._clear_statistics()
+        return observations
+
+    def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Step all environments; return observations, rewards, ends and infos."""
+        observations, rewards, terminated, truncated, arrays = self.envs.step(self._actions)
+        rewards, done = rewards.astype(np.float32), terminated | truncated
+        infos = _rows(arrays, range(self.num_envs))
+        self._count(rewards)
+        ended = np.flatnonzero(done).tolist()
+        if ended:
+            finals = _rows(arrays["final_info"], ended)
+            for index, final in zip(ended, finals, strict=True):
+                self.reset_infos[index], infos[index] = infos[index], final
+                final["terminal_observation"] = arrays["final_obs"][index]
+                final["episode"] = self._statistics(index)
+        for info, value in zip(infos, (truncated & ~terminated).tolist(), strict=True):
+            info["TimeLimit.truncated"] = value
+        return observations, rewards, done, infos
 
 
 def _make(env_id: str, num_envs: int, arguments: dict[str, Any]) -> VectorEnv:

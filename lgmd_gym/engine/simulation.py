@@ -113,16 +113,17 @@ class Simulation:
             self.sensors.reset(selected)
         self._run(self._start_part, selected)
 
-    def step(self, demands: np.ndarray, active: np.ndarray) -> None:
+    def step(self, demands: np.ndarray, active: np.ndarray, rendering: bool = True) -> None:
         """Advance the active environments by one decision.
 
         Args:
             demands: Longitudinal demands in [-1, 1], float64, shape (N,).
             active: Selection of the environments, bool, shape (N,).
+            rendering: Whether the cameras and neurons process their frames.
         """
         self.clock.demands[:] = demands
         self.clock.remaining[:] = np.where(active, 0, -1)
-        self._run(self._step_part)
+        self._run(self._step_part, rendering)
 
     def _run(self, part: Callable[..., None], *arguments: Any) -> None:
         if self._threads.count == 1:
@@ -135,11 +136,12 @@ class Simulation:
         show_episodes(first, last, self.rates.simulation, selected, self.physics, self._scenes)
         self._process(first, last, selected)
 
-    def _step_part(self, first: int, last: int) -> None:
+    def _step_part(self, first: int, last: int, rendering: bool) -> None:
         rates, physics, clock = self.rates, self.physics, self._clock
         start_decisions(first, last, rates.steps, physics, clock)
         while advance(first, last, rates.stride, rates.simulation, physics, clock, self._scenes):
-            self._process(first, last, self.clock.due)
+            if rendering:
+                self._process(first, last, self.clock.due)
         finish_decisions(first, last, rates.policy, physics, clock, self._results)
 
     def _process(self, first: int, last: int, due: np.ndarray) -> None:

@@ -162,7 +162,7 @@ class BrakingVectorEnv(VectorEnv):
                 "call reset(options={'reset_mask': terminated | truncated}) before step()"
             )
         restart = ended if mode == AutoresetMode.NEXT_STEP else np.zeros_like(ended)
-        self.simulation.step(self._demands.read(actions, self.num_envs), ~restart)
+        self.simulation.step(self.read_demands(actions), ~restart)
         if restart.any():
             self._start(restart)
         outcome = self.simulation.outcome
@@ -173,6 +173,25 @@ class BrakingVectorEnv(VectorEnv):
             extra = self._end_episodes(self._ended)
         infos = self._infos.read(np.ones(self.num_envs, np.bool_))
         return self._observations.read(), *result, infos | extra
+
+    def read_demands(self, actions: Any) -> np.ndarray:
+        """Return the longitudinal demands of actions, in [-1, 1], float64, shape (num_envs,).
+
+        With `simulation.step`, `read_observations`, `read_infos` and `reset`, a loop can advance some
+        environments for several decisions, as `lgmd_gym.training.PolicyVecEnv` does.
+
+        Raises:
+            ValueError: If an action is out of range.
+        """
+        return self._demands.read(actions, self.num_envs)
+
+    def read_observations(self) -> Any:
+        """Return the present observations of all environments."""
+        return self._observations.read()
+
+    def read_infos(self, selected: np.ndarray) -> dict[str, Any]:
+        """Return the infos of the selected environments, bool, shape (num_envs,)."""
+        return self._infos.read(selected)
 
     def render(self) -> tuple[Any, ...] | None:
         """Return highway-env's top view of every environment, uint8, (height, width, 3), or None.

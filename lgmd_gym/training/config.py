@@ -1,7 +1,7 @@
 """`TrainConfig`: the options of a training run, from the command line, a YAML file or Python."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from lgmd_gym.errors import (
     check_type,
     check_whole,
     check_within,
+    shown,
 )
 from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
@@ -30,7 +31,7 @@ ALL_ROUND = "all-round"  # value of `sensors_of` for the cameras of `all_round_c
 CAMERAS = ("fovea", "tele", "wide")
 SEED_STRIDE = 1_000_000  # distance between the environment seeds of neighbouring training seeds
 VALIDATION_SEED = 10_000  # first environment seed of an evaluation
-DEMANDS = {"ppo": (0.0, -0.4, -1.0), "dqn": (0.0, -0.4, -1.0), "sac": (), OFFLINE: (0.0, -1.0)}
+DEMANDS = {"ppo": (0.0, -1.0), "dqn": (0.0, -1.0), "sac": (), OFFLINE: (0.0, -1.0)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,8 +75,8 @@ class TrainConfig:
     policy: str = "MultiInputPolicy"
     algo_kwargs: dict[str, Any] = field(default_factory=dict)
     seed: int = 0
-    eval_freq: int = 20_000
-    eval_episodes: int = 60
+    eval_freq: int = 16_000
+    eval_episodes: int = 96
     recordings: str | None = None
     traffic_episodes: int = 0
 
@@ -88,6 +89,10 @@ class TrainConfig:
         check_text("policy", self.policy)
         check_camera(self.camera)
         check_type("env_kwargs", self.env_kwargs, dict)
+        if "camera" in self.env_kwargs:
+            raise ValueError(
+                f"env_kwargs contains the camera {shown(self.env_kwargs['camera'])}; use the option camera"
+            )
         check_type("algo_kwargs", self.algo_kwargs, dict)
         check_type("features", self.features, FeatureConfig)
         check_type("recordings", self.recordings, str, type(None))
@@ -121,7 +126,7 @@ class TrainConfig:
     @classmethod
     def from_hyperparams(
         cls,
-        algo: str = "sac",
+        algo: str = "dqn",
         env_id: str = RANDOM_ID,
         file: Path | None = None,
         *,
@@ -137,7 +142,8 @@ class TrainConfig:
             file: YAML file in rl-zoo's format; None for the file of this package.
             inputs: Inputs of the policy in place of those in the file.
             sensors_of: Name of an agent whose cameras are used, such as "stopping-zone"; or "all-round" for
-                those of "stopping-zone" and fields at the sides.
+                those of "stopping-zone" and fields at the sides. None for the option `camera`, or the cameras
+                that the inputs require.
             **options: Attributes of `TrainConfig` that replace those in the file; None keeps the default.
 
         Raises:
@@ -154,8 +160,11 @@ class TrainConfig:
         values = read_hyperparams(algo, env_id, file)
         if check_items("inputs", inputs, str, "names"):
             values["features"] |= {"inputs": inputs}
-        values["features"] = FeatureConfig.from_dict(values["features"])
-        defaults = {"demands": DEMANDS[algo], "eval_episodes": 600 if algo == OFFLINE else 60}
+        features = values["features"] = FeatureConfig.from_dict(values["features"])
+        defaults = {"demands": DEMANDS[algo], "eval_episodes": 600 if algo == OFFLINE else 96}
+        agent = features.cameras_of
+        if agent is not None:
+            defaults["camera"] = _cameras_of(agent)
         return cls(**{**defaults, **values, "algo": algo, "env_id": env_id, **given})
 
     @classmethod
@@ -175,7 +184,17 @@ class TrainConfig:
             split: "train", "validation" or "test"; ignored by environments without splits.
             camera: Cameras in place of the configured ones.
         """
-        arguments = dict(self.env_kwargs)
+        arguments = self.env_arguments(split)
+        try:
+            return gym.make(self.env_id, **(arguments | ({"camera": camera} if camera else {})))
+        except gym.error.Error as error:
+            raise ValueError(
+                f"env {self.env_id!r} cannot be made ({error}); see lgmd-gym list envs"
+            ) from None
+
+    def env_arguments(self, split: str) -> dict[str, Any]:
+        """Return the arguments of `gym.make` and `gym.make_vec` for a split."""
+        arguments = self.env_kwargs | {"camera": self.camera}
         if self.env_id == RANDOM_ID:
             arguments.setdefault("split", split)
         if self.demands:
@@ -183,19 +202,15 @@ class TrainConfig:
             arguments["config"] = {**(arguments.get("config") or {}), "action": action}
         if FRAME in self.features.inputs:
             arguments["include_frame"] = True
-        try:
-            return gym.make(self.env_id, camera=camera or self.camera, **arguments)
-        except gym.error.Error as error:
-            raise ValueError(
-                f"env {self.env_id!r} cannot be made ({error}); see lgmd-gym list envs"
-            ) from None
+        return arguments
+
+    def features_of(self, split: str) -> FeatureConfig:
+        """Return the inputs and timing of the policy; rewards are scaled on "train" only."""
+        return self.features if split == "train" else replace(self.features, reward_scale=1.0)
 
     def make_policy_env(self, split: str) -> PolicyWrapper:
-        """Return an environment with the policy's observations; rewards are scaled on "train" only."""
-        features = self.features.to_dict()
-        if split != "train":
-            features["reward_scale"] = 1.0
-        return PolicyWrapper(self.make_env(split), **features)
+        """Return an environment with the policy's observations."""
+        return PolicyWrapper(self.make_env(split), **self.features_of(split).to_dict())
 
 
 def _cameras_of(agent: str) -> CameraSpec:

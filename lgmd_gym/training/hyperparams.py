@@ -4,7 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from lgmd_gym.errors import check_finite, check_known, check_path, check_text, unknown_name
+from lgmd_gym.errors import check_finite, check_known, check_path, check_text, check_type, unknown_name
 
 OFFLINE = "offline"  # the algorithm of `lgmd_gym.training.offline.learner`
 ALGORITHMS = ("ppo", "sac", "dqn", OFFLINE)
@@ -36,6 +36,8 @@ def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> dict[s
     values: dict[str, Any] = {"features": _features(algo_kwargs.pop("env_wrapper", None))}
     if "policy" in algo_kwargs:
         values["policy"] = algo_kwargs.pop("policy")
+    if "env_kwargs" in algo_kwargs:
+        values["env_kwargs"] = check_type("env_kwargs", algo_kwargs.pop("env_kwargs"), dict)
     for name in ("n_timesteps", "n_envs"):
         if name in algo_kwargs:
             values[name] = int(check_finite(name, algo_kwargs.pop(name)))

@@ -14,13 +14,11 @@ if TYPE_CHECKING:
 def train_online(config: TrainConfig, folder: Path, progress: bool) -> "BaseAlgorithm":
     """Train from the last checkpoint in the folder, if any; return the best model on the validation split."""
     import torch
-    from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
     from lgmd_gym.training.checkpoints import best_model, save_model
 
     torch.set_num_threads(1)
-    envs = VecMonitor(DummyVecEnv([lambda: config.make_policy_env("train")] * config.n_envs))
-    eval_envs = VecMonitor(DummyVecEnv([lambda: config.make_policy_env("validation")]))
+    envs, eval_envs = make_envs(config, "train"), make_envs(config, "validation")
     try:
         model = _make_model(config, folder, envs)
         # The constructor seeds environment i with seed + i. Training runs with neighbouring seeds would then
@@ -40,6 +38,31 @@ def train_online(config: TrainConfig, folder: Path, progress: bool) -> "BaseAlgo
         envs.close()
         eval_envs.close()
     return best_model(algorithm_class(config.algo), folder)
+
+
+def make_envs(config: TrainConfig, split: str) -> "VecEnv":
+    """Return the environments of a training run: the engine, or single environments where it has no id.
+
+    Args:
+        config: Configuration of the training.
+        split: "train" or "validation".
+    """
+    import gymnasium as gym
+    from joblib import cpu_count
+    from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
+
+    from lgmd_gym.training.policy_vec_env import PolicyVecEnv
+
+    if gym.spec(config.env_id).vector_entry_point is None:
+        return VecMonitor(DummyVecEnv([lambda: config.make_policy_env(split)] * config.n_envs))
+    envs: Any = gym.make_vec(
+        config.env_id,
+        num_envs=config.n_envs,
+        threads=min(cpu_count(), config.n_envs),
+        autoreset_mode="Disabled",
+        **config.env_arguments(split),
+    )
+    return PolicyVecEnv(envs.unwrapped, config.features_of(split))
 
 
 def algorithm_class(algo: str) -> "type[BaseAlgorithm]":

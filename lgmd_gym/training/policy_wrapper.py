@@ -31,24 +31,7 @@ class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
         gym.Wrapper.__init__(self, env)
         self.features = FeatureConfig.from_dict(features)
         self._history = FeatureHistory(self.features)
-        observation_space = env.observation_space
-        if not isinstance(observation_space, spaces.Dict):
-            raise ValueError(
-                f"PolicyWrapper requires the Dict observation of LGMDObservation, got {observation_space}"
-            )
-        shapes = {name: space.shape or () for name, space in observation_space.spaces.items()}
-        for name in self.features.inputs:
-            if source_observation(name) not in shapes:
-                raise ValueError(
-                    f"policy input {name!r} is not in the observation; "
-                    f"make the environment with include_{name}=True"
-                )
-        self.observation_space = spaces.Dict(
-            {
-                name: spaces.Box(low, high, shape, dtype)
-                for name, (low, high, shape, dtype) in self.features.box_arguments(shapes).items()
-            }
-        )
+        self.observation_space = policy_space(env.observation_space, self.features)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -80,3 +63,30 @@ class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
         """Return the longitudinal demand of an action."""
         demands = getattr(getattr(self.env.unwrapped, "action_type", None), "demands", None)
         return float(np.reshape(action, -1)[0]) if demands is None else demands[int(action)]
+
+
+def policy_space(observation_space: spaces.Space, features: FeatureConfig) -> spaces.Dict:
+    """Return the space of a policy's inputs.
+
+    Args:
+        observation_space: Observation space of the environment.
+        features: Inputs of the policy.
+
+    Raises:
+        ValueError: If an input is not in the observation.
+    """
+    if not isinstance(observation_space, spaces.Dict):
+        raise ValueError(
+            f"PolicyWrapper requires the Dict observation of LGMDObservation, got {observation_space}"
+        )
+    shapes = {name: space.shape or () for name, space in observation_space.spaces.items()}
+    for name in features.inputs:
+        if source_observation(name) not in shapes:
+            raise ValueError(
+                f"policy input {name!r} is not in the observation; "
+                f"make the environment with include_{name}=True"
+            )
+    boxes = features.box_arguments(shapes).items()
+    return spaces.Dict(
+        {name: spaces.Box(low, high, shape, dtype) for name, (low, high, shape, dtype) in boxes}
+    )

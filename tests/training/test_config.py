@@ -18,9 +18,9 @@ RANDOM_ID = "LGMD/RandomBraking-v0"
 @pytest.mark.parametrize("algo", ["ppo", "sac", "dqn"])
 def test_packaged_hyperparameters(algo):
     config = TrainConfig.from_hyperparams(algo)
-    assert config.n_timesteps >= 100_000
-    assert (config.features.history, config.features.repeat) == (6, 3)
-    assert config.features.latch is (algo == "dqn")
+    assert config.n_timesteps >= 96_000
+    expected = (6, 3, False) if algo == "sac" else (1, 8, True)
+    assert (config.features.history, config.features.repeat, config.features.latch) == expected
     assert config.features == TrainConfig.from_hyperparams(algo, "LGMD/CCRs-v0").features
     check_config(config)
 
@@ -123,7 +123,7 @@ def test_offline_requires_a_latching_brake(tmp_path):
     ],
 )
 def test_invalid_algorithm_arguments_are_rejected(tmp_path, algo, algo_kwargs, message):
-    config = TrainConfig.from_hyperparams(algo, camera="fovea", algo_kwargs=algo_kwargs)
+    config = TrainConfig.from_hyperparams(algo, inputs=("ffi",), camera="fovea", algo_kwargs=algo_kwargs)
     with pytest.raises(ValueError, match=message):
         train(config, tmp_path / "run")
     assert not (tmp_path / "run").exists()
@@ -137,7 +137,7 @@ def test_invalid_algorithm_arguments_are_rejected(tmp_path, algo, algo_kwargs, m
         (["--camera", "fovae"], "did you mean 'fovea'?"),
         (["--hyperparams", "missing.yml"], "hyperparameters 'missing.yml' cannot be read"),
         (["--resume", "missing"], "'missing' contains no training to resume"),
-        (["--inputs", "zones"], "train with --sensors-of stopping-zone"),
+        (["--inputs", "zones", "--camera", "wide"], "train with --sensors-of stopping-zone"),
         (["--sensors-of", "stopping-zone", "--camera", "wide"], "use either camera or sensors_of"),
         (["--n-timesteps", "0"], "n_timesteps must be a whole number >= 1, got 0"),
         (["--jobs", "0"], "jobs must be a whole number >= 1, got 0"),

@@ -71,11 +71,11 @@ def test_trained_policy_acts_as_the_model_predicts(tmp_path, demands, latch):
 
 def test_neighbouring_seeds_share_no_environment_seeds(tmp_path, monkeypatch):
     """The constructor of stable-baselines3 seeds environment i with seed + i; the last seeding counts."""
-    from stable_baselines3.common.vec_env import DummyVecEnv
+    from lgmd_gym.training.policy_vec_env import PolicyVecEnv
 
-    seeds, seed_envs = [], DummyVecEnv.seed
+    seeds, seed_envs = [], PolicyVecEnv.seed
     monkeypatch.setattr(
-        DummyVecEnv, "seed", lambda self, seed: (seeds.append(seed), seed_envs(self, seed))[1]
+        PolicyVecEnv, "seed", lambda self, seed: (seeds.append(seed), seed_envs(self, seed))[1]
     )
     for seed in (0, 1):
         seeds.clear()

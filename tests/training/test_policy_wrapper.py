@@ -71,13 +71,13 @@ def test_no_frame_is_rendered_after_the_brake_latches(monkeypatch):
 
 def test_rewards_are_scaled_on_the_train_split_only():
     config = TrainConfig.from_hyperparams("dqn", "LGMD/CCRs-v0", demands=(0.0, -1.0))
-    assert config.features.reward_scale == 0.05
+    assert config.features.reward_scale == 0.1
     rewards = []
     for split in ("train", "validation"):
         env = config.make_policy_env(split)
         env.reset(seed=1)
         rewards.append(env.step(1)[1])
-    assert rewards[0] == pytest.approx(0.05 * rewards[1])
+    assert rewards[0] == pytest.approx(0.1 * rewards[1])
     assert abs(rewards[1]) > 1.0
 
 
