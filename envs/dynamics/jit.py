@@ -4,11 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-from numba import njit
-
-from lgmd_gym.system.compilation import report_compilation
-
-report_compilation()
+from lgmd_gym.system.kernel import kernel
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -40,7 +36,7 @@ def compiled_with_arrays(function: _F) -> _F:
 
 
 def _compile(function: _F, **options: Any) -> _F:
-    dispatcher: Any = njit(cache=True, nogil=True, **options)(function)
+    dispatcher: Any = kernel(function, **options)
     index: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):
         index._source_stamp = (index._source_stamp, _STAMP)

@@ -12,9 +12,10 @@ from lgmd_gym.neuron.motion_kernels import (
     update_delay,
 )
 from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
+from lgmd_gym.system.kernel import kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _integrate(image, table):
     """Write the sums of all rectangles from the top left corner, shape (height + 1, width + 1)."""
     for y in range(image.shape[0]):
@@ -30,7 +31,7 @@ def _box(table, y0, x0, y1, x1):
     return table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _strongest_unit(across, along, radius, stride, vertical, units):
     """Write the response of every unit (eq. 5 and 6) and return the largest one."""
     area, best = 2.0 * radius * radius, 0.0
@@ -50,7 +51,7 @@ def _strongest_unit(across, along, radius, stride, vertical, units):
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def step(
     first, last, frames, active, scalars, const, gains, sizes, mean, on, off, late_on, late_off, right, down,
     units, tables,

@@ -9,13 +9,10 @@ numba's cache tracks only the file of a kernel: delete __pycache__/*.nbi after a
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from lgmd_gym.neuron.params import LGMDParams
-from lgmd_gym.system.compilation import report_compilation
-
-report_compilation()
+from lgmd_gym.system.kernel import kernel
 
 # Indices of the scalar state: Response, internal state, then a ring buffer of the spikes of `window` frames.
 FREQUENCY, SPIKES, K, K_HAT, F, W, LATENCY, ALERT = range(8)
@@ -59,7 +56,7 @@ def initial_scalars(params: LGMDParams) -> NDArray[np.float64]:
     return row
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def feed_forward(row: NDArray, const: NDArray, sum_p: float | np.floating) -> None:
     """Update F, w and the latency of G from the sum of |P| (eq. 2 and 9)."""
     f_now, f_before = sum_p / const[N_PIXELS], row[F_HAT]
@@ -73,7 +70,7 @@ def feed_forward(row: NDArray, const: NDArray, sum_p: float | np.floating) -> No
     row[GAIN_G] = const[DT] / (const[DT] + latency)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fire(row: NDArray, const: NDArray, sum_g: float | np.floating) -> None:
     """Update K, its adaptation, spikes, frequency and alert from the sum of g (eq. 9 to 12).
 

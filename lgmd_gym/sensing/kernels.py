@@ -1,8 +1,7 @@
 """Kernels that select the cameras to process, and collect the outputs of their neurons."""
 
-from numba import njit
-
 from lgmd_gym.neuron.scalars import ALERT, FREQUENCY, K_HAT, LATENCY, SPIKES, F, K, W
+from lgmd_gym.system.kernel import kernel
 
 SIGNALS = ("spike_frequency", "membrane_potential", "ffi")
 """The fields of `Response` in observations and infos."""
@@ -11,7 +10,7 @@ NUMBERS = (*SIGNALS, "adapted_potential", "inhibition_weight", "excitation_laten
 _COLUMNS = (FREQUENCY, K, F, K_HAT, W, LATENCY)  # of `NUMBERS` in the state of a neuron
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def select_cameras(first, last, active, group):
     """Select the enabled cameras of the active environments first..last-1.
 
@@ -42,7 +41,7 @@ def select_cameras(first, last, active, group):
     return num_selected, num_fresh
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def collect_outputs(first, last, selected, neurons):
     """Copy the outputs of the selected cameras' neurons into arrays of all cameras.
 

@@ -4,12 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numba as nb
-
 from lgmd_gym import simd
-from lgmd_gym.system.compilation import report_compilation
-
-report_compilation()
+from lgmd_gym.system.kernel import kernel as system_kernel
 
 # Name, mtime and size of every file of the camera, and of the vectors that it uses.
 _STAMP = tuple(
@@ -54,7 +50,7 @@ def exact_kernel(function: Callable[..., Any]) -> Any:
 
 
 def _compile(function: Callable[..., Any], **options: Any) -> Any:
-    compiled = nb.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+    compiled = system_kernel(function, error_model="numpy", **options)
     index: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if hasattr(index, "_source_stamp"):
         index._source_stamp = _STAMP

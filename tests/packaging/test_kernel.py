@@ -1,0 +1,106 @@
+"""Functions that are compiled without machine code and wrapper until Python calls them."""
+
+import gc
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+from lgmd_gym.system import kernel as kernel_module
+
+SOURCE = """
+from lgmd_gym.system.kernel import kernel
+
+@kernel
+def square(x):
+    if x < 0:
+        raise ValueError("negative")
+    return x * x
+
+@kernel
+def square_sum(x, y):
+    return square(x) + square(y)
+
+@kernel
+def tripled(x):
+    return square_sum(x, x) + square(x)
+"""
+CALLS = "import squares as s; print(s.{}, len(s.square_sum.stats.cache_hits), len(s.square.stats.cache_hits))"
+
+pytestmark = pytest.mark.skipif(not kernel_module._KNOWN, reason="numba.njit with this version of numba")
+
+
+@pytest.fixture
+def squares(tmp_path, monkeypatch):
+    """A module with three kernels, new in this process."""
+    (tmp_path / "squares.py").write_text(SOURCE)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "squares", raising=False)
+    return importlib.import_module("squares")
+
+
+def has_machine_code(kernel):
+    """Return whether each overload of a kernel has a wrapper for Python and a compiled object."""
+    return [
+        cres.fndesc.llvm_cpython_wrapper_name in {f.name for f in cres.library.get_defined_functions()}
+        and bool(getattr(cres.library, "_compiled_object", None))
+        for cres in kernel.overloads.values()
+    ]
+
+
+def test_only_the_function_that_python_calls_has_machine_code(squares):
+    assert squares.tripled(3) == 27
+    assert [has_machine_code(each) for each in (squares.tripled, squares.square_sum, squares.square)] == [
+        [True], [False], [False],
+    ]  # fmt: skip
+    assert squares.square_sum(2, 3) == 13
+    assert has_machine_code(squares.square_sum) == [True]
+    assert has_machine_code(squares.square) == [False]
+    assert squares.square(4) == 16
+    assert squares.square(1.5) == 2.25
+    assert has_machine_code(squares.square) == [True, True]
+    assert squares.tripled(2) == 12
+
+
+def test_exceptions_of_a_called_function_reach_python(squares):
+    for _ in range(2):
+        with pytest.raises(ValueError, match="negative"):
+            squares.tripled(-1)
+
+
+def test_another_process_loads_both_kinds_from_the_cache(squares, tmp_path):
+    squares.tripled(3)
+    squares.square_sum(3, 3)
+
+    def call(expression):
+        result = subprocess.run(
+            [sys.executable, "-c", CALLS.format(expression)], cwd=tmp_path, capture_output=True, text=True
+        )
+        assert result.returncode == 0, result.stderr
+        return [int(word) for word in result.stdout.split()]
+
+    assert call("tripled(3)") == [27, 0, 0]
+    assert call("square_sum(3, 3)") == [18, 1, 0]
+    assert call("square(3)") == [9, 0, 0]  # was compiled for its callers only
+    assert call("square(3)") == [9, 0, 1]
+
+
+@pytest.mark.parametrize("collecting", [True, False])
+def test_garbage_collection_is_as_before(squares, collecting):
+    (gc.enable if collecting else gc.disable)()
+    try:
+        squares.square(1)
+        assert gc.isenabled() is collecting
+        with pytest.raises(Exception, match="No implementation"):
+            squares.square("text")
+        assert gc.isenabled() is collecting
+    finally:
+        gc.enable()
+
+
+def test_an_unknown_version_of_numba_compiles_as_usual(squares, monkeypatch):
+    monkeypatch.setattr(kernel_module, "_KNOWN", False)
+    usual = kernel_module.kernel(squares.square.py_func)
+    assert not isinstance(usual, kernel_module.Kernel)
+    assert usual(3) == squares.square(3) == 9
