@@ -24,7 +24,7 @@ DELAY_S = 2.0  # compilation without a line
 REPEAT_S = 10.0  # compilation between two lines in a file, a pipe or a worker process
 REFRESH_S = 0.2  # time between two updates of the line in a terminal
 PAUSE_S = 30.0  # time without compilation after which the next one counts as new
-START = "compiling kernels for their first use, which takes about a minute; later runs load them"
+START = "compiling kernels for their first use, which takes about half a minute; later runs load them"
 
 
 class CompilationReporter(event.Listener):

@@ -8,7 +8,6 @@ have none of the three until Python calls them.
 import gc
 from collections.abc import Callable
 from contextlib import contextmanager
-from types import SimpleNamespace
 from typing import Any
 
 import numba
@@ -26,7 +25,7 @@ from lgmd_gym.system.compilation import report_compilation
 report_compilation()
 
 # Versions of numba with the internals that `Kernel` uses; with any other, `kernel` is `numba.njit`.
-_KNOWN = (0, 62) <= numba.version_info.short <= (0, 68)
+_KNOWN = (0, 61) <= numba.version_info.short <= (0, 68)
 
 
 def kernel(function: Callable[..., Any], **options: Any) -> Any:
@@ -34,7 +33,7 @@ def kernel(function: Callable[..., Any], **options: Any) -> Any:
 
     Args:
         function: Function that numba can compile.
-        options: Further options of `numba.njit`.
+        options: Further options of `numba.njit`, but not `parallel`.
     """
     options |= {"nogil": True, "no_cfunc_wrapper": True}
     if config.DISABLE_JIT or not _KNOWN:
@@ -110,16 +109,7 @@ class _Cache(FunctionCache):
         return *super()._index_key(sig, codegen), _is_inner()
 
 
-class _Library(JITCodeLibrary):
-    """LLVM module of a function; numba spends 2 ms on each declaration in it, here 0."""
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        ll_module.data_layout = self._codegen._data_layout
-        definitions = [function for function in ll_module.functions if not function.is_declaration]
-        super()._optimize_functions(SimpleNamespace(functions=definitions))
-
-
-class _InnerLibrary(_Library):
+class _InnerLibrary(JITCodeLibrary):
     """LLVM module of a function without machine code, for the modules of the functions that call it."""
 
     def _finalize_final_module(self) -> None:
@@ -138,18 +128,14 @@ class _Lowering(NativeLowering):
     _name = "kernel_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        codegen, name = state.targetctx.codegen(), state.func_id.func_qualname
         if not _is_inner():
-            state.library = _Library(codegen, name)
-            state.library.enable_object_caching()
             return super().run_pass(state)
         state.flags.no_compile = state.flags.no_cpython_wrapper = True
-        state.library = _InnerLibrary(codegen, name)
+        state.library = _InnerLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         super().run_pass(state)
         state.library.finalize()
         entry_point = object()
         state.targetctx.insert_user_function(entry_point, state.cr.fndesc, [state.library])
-        state.reload_init.extend(state.library._reload_init)
         state.cr = state.cr._replace(cfunc=entry_point)
         return True
 
