@@ -36,7 +36,7 @@ def kernel(function: Callable[..., Any], **options: Any) -> Any:
         options: Further options of `numba.njit`, but not `parallel`.
     """
     options |= {"nogil": True, "no_cfunc_wrapper": True}
-    if config.DISABLE_JIT or not _KNOWN:
+    if config.DISABLE_JIT or not _KNOWN:  # pyright: ignore[reportAttributeAccessIssue]
         return numba.njit(cache=True, **options)(function)
     compiled = Kernel(function, targetoptions={**options, "nopython": True}, pipeline_class=_Compiler)
     compiled.enable_caching()
@@ -127,7 +127,7 @@ class _Lowering(NativeLowering):
 
     _name = "kernel_lowering"
 
-    def run_pass(self, state: Any) -> bool:
+    def run_pass(self, state: Any) -> Any:
         if not _is_inner():
             return super().run_pass(state)
         state.flags.no_compile = state.flags.no_cpython_wrapper = True
