@@ -56,7 +56,7 @@ class Kernel(CPUDispatcher):
         self._inner: set[Any] = set()
 
     def enable_caching(self) -> None:
-        """Cache on disk, with separate entries for the two kinds of overloads."""
+        """Cache on disk."""
         self._cache = _Cache(self.py_func)
 
     def compile(self, sig: Any) -> Any:
@@ -103,7 +103,7 @@ def _without_garbage_collection() -> Any:
 
 
 class _Cache(FunctionCache):
-    """Cache whose index tells the two kinds of overloads apart."""
+    """Cache with separate entries for the two kinds of overloads."""
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return *super()._index_key(sig, codegen), _is_inner()

@@ -69,7 +69,7 @@ def test_other_processes_use_the_compilation_cache_and_get_equal_outputs():
     assert len({run.split(maxsplit=2)[2] for run in runs}) == 1
 
 
-def test_neuron_imports_only_vectors_errors_and_the_progress_of_compilation():
+def test_neuron_imports_only_vectors_errors_and_the_decorator_of_kernels():
     allowed = {"numpy", "numba", "llvmlite", "tomli_w", *sys.stdlib_module_names}
     imported = set()
     for path in Path(lgmd_gym.neuron.__file__).parent.glob("*.py"):
@@ -78,6 +78,6 @@ def test_neuron_imports_only_vectors_errors_and_the_progress_of_compilation():
                 imported |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 imported.add(node.module or "")
-    below = ("lgmd_gym.errors", "lgmd_gym.simd", "lgmd_gym.system.compilation")
+    below = ("lgmd_gym.errors", "lgmd_gym.simd", "lgmd_gym.system.kernel")
     own = {name for name in imported if name.startswith("lgmd_gym.neuron") or name in below}
     assert {name for name in imported - own if name.split(".")[0] not in allowed} == set()
