@@ -5,16 +5,16 @@
 Existing videos are reused; delete docs/_generated to record them again.
 """
 
-import inspect
-import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import figures
+from docstring_markdown import as_markdown
+from environment_pages import VIDEO_AGENT, all_cards, environment_page, id_of, overview_tables
+from reference_returns import read_returns
 
 from lgmd_gym.benchmark.analysis.tables import mean_kmh
 from lgmd_gym.benchmark.config import RunConfig
@@ -24,13 +24,8 @@ from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import INTERVAL_TEXT, Sample, summaries
 from lgmd_gym.cli.main import COMMANDS
 from lgmd_gym.envs.braking import BrakingEnv
-from lgmd_gym.envs.episode_source import RandomLevels
 from lgmd_gym.envs.traffic.env import TrafficEnv
-from lgmd_gym.envs.traffic.registration import traffic_id
-from lgmd_gym.gallery.cards import ScenarioCard, record_video, scenario_cards
-from lgmd_gym.gallery.docstrings import ParsedDocstring
-
-AGENT = "spike-threshold"
+from lgmd_gym.gallery.cards import ScenarioCard, record_video
 
 
 def main(out: Path) -> None:
@@ -38,12 +33,16 @@ def main(out: Path) -> None:
     static, pages = out / "static", out / "environments"
     for folder in (static, pages):
         folder.mkdir(parents=True, exist_ok=True)
-    for card in scenario_cards():
+    returns = read_returns(Path(__file__).parent / "returns.csv")
+    for card in all_cards():
         if not (static / f"{card.name}.mp4").exists():
             _record(card, static)
-        (pages / f"{card.name}.md").write_text(environment_page(card), encoding="utf-8")
-    for cls in (BrakingEnv, RandomLevels, TrafficEnv):
-        (pages / f"{cls.__name__}.md").write_text(class_page(cls), encoding="utf-8")
+        page = environment_page(card, returns[id_of(card)])
+        (pages / f"{card.name}.md").write_text(page, encoding="utf-8")
+    for cls in (BrakingEnv, TrafficEnv):
+        page = f"# {cls.__name__}\n\n{as_markdown(cls)}\n"
+        (pages / f"{cls.__name__}.md").write_text(page, encoding="utf-8")
+    (out / "environments.md").write_text(overview_tables(returns), encoding="utf-8")
     (out / "commands.md").write_text(commands_page(), encoding="utf-8")
     (out / "benchmark.md").write_text(benchmark_table(), encoding="utf-8")
     figures.main(static)
@@ -51,67 +50,9 @@ def main(out: Path) -> None:
 
 def _record(card: ScenarioCard, static: Path) -> None:
     """Record a video under a temporary name, so that an interrupted build leaves no incomplete video."""
-    record_video(card, AGENT, static / f"incomplete-{card.name}")
+    record_video(card, VIDEO_AGENT, static / f"incomplete-{card.name}")
     for suffix in (".jpg", ".mp4"):
         shutil.move(static / f"incomplete-{card.name}{suffix}", static / f"{card.name}{suffix}")
-
-
-def environment_page(card: ScenarioCard) -> str:
-    """Return the page of one scenario family or kind of traffic."""
-    base = "TrafficEnv" if card.traffic else "BrakingEnv"
-    video_tag = (
-        f'<video src="../../_static/{card.name}.mp4" poster="../../_static/{card.name}.jpg" '
-        'controls muted loop preload="none" width="100%"></video>'
-    )
-    env_id = traffic_id(card.name) if card.traffic else card.target
-    parts = [
-        f"# {card.target}",
-        card.docstring.summary,
-        f"```{{raw}} html\n{video_tag}\n```",
-        f'`gym.make("lgmd_gym:{env_id}")`, or `lgmd-gym drive {card.target} --live`. '
-        f"The agent in the video is `{AGENT}`.",
-        _without_headings(card.docstring.text),
-        arguments_table(card.docstring),
-        f"Actions, observations, rewards, termination and info are those of [{base}]({base}.md).",
-    ]
-    return "\n\n".join(part for part in parts if part) + "\n"
-
-
-def arguments_table(docstring: ParsedDocstring) -> str:
-    """Return the arguments in a docstring as a Markdown table; empty without arguments."""
-    if not docstring.arguments:
-        return ""
-    rows = [f"| `{name}` | `{default or '–'}` | {text} |" for name, default, text in docstring.arguments]
-    return "\n".join(["| argument | default | |", "|---|---|---|", *rows])
-
-
-def class_page(cls: Any) -> str:
-    """Return the page of an environment class, from its docstring in Markdown."""
-    doc = inspect.getdoc(cls) or ""
-    return f"# {cls.__name__}\n\n" + _lists(doc) + "\n"
-
-
-def _lists(doc: str) -> str:
-    """Return a docstring with its Args, Raises and Attributes as Markdown lists."""
-    lines: list[str] = []
-    in_section = False
-    for line in doc.splitlines():
-        if re.match(r"^(Args|Raises|Attributes):$", line):
-            in_section = True
-            lines += ["", "" if line == "Args:" else f"**{line}**", ""]
-        elif in_section and (item := re.match(r"^    (\w+): (.*)", line)):
-            lines.append(f"- `{item[1]}`: {item[2]}")
-        elif in_section and line.startswith("     "):
-            lines.append(f"  {line.strip()}")
-        else:
-            in_section = in_section and not line.strip()
-            lines.append(line)
-    return "\n".join(lines)
-
-
-def _without_headings(text: str) -> str:
-    """Return the text of a docstring without its headings."""
-    return "\n\n".join(part for part in text.split("\n\n") if not part.startswith("#"))
 
 
 def benchmark_table() -> str:

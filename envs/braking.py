@@ -94,6 +94,9 @@ class BrakingEnv(EgoBrakeEnv):
     | `collision`, `crashed` | whether the ego has had contact | |
     | `impact_speed` | ego speed at contact [m/s] | no contact |
     | `relative_impact_speed` | the same minus the other's speed along the ego's heading [m/s] | no contact |
+    | `world` | number of the world, −1 for the laboratory | |
+    | `level` | number of the level; only with random levels | |
+    | `condition` | camera condition; only with random levels | |
 
     ## Arguments
 

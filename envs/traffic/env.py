@@ -106,6 +106,10 @@ class TrafficEnv(EgoBrakeEnv):
 
     Raises:
         ValueError: If a configuration key is unknown or a value is out of range.
+
+    ## Version History
+
+    v0: may change until release 0.1.0.
     """
 
     road: TrafficRoad

@@ -1,8 +1,9 @@
 """The scenarios of the gallery and their videos."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from PIL import Image
@@ -33,12 +34,14 @@ class ScenarioCard:
         target: Argument of `lgmd-gym drive`.
         docstring: Docstring of the scenario.
         traffic: Whether it is a kind of traffic, in which single episodes are not evaluated.
+        arguments: Arguments of the environment.
     """
 
     name: str
     target: str
     docstring: ParsedDocstring
     traffic: bool = False
+    arguments: Mapping[str, Any] = field(default_factory=dict)
 
 
 def scenario_cards(names: tuple[str, ...] = ()) -> list[ScenarioCard]:
@@ -59,7 +62,7 @@ def scenario_cards(names: tuple[str, ...] = ()) -> list[ScenarioCard]:
 def record_video(card: ScenarioCard, agent_name: str, stem: Path) -> None:
     """Record an episode with seed 0 as `stem`.mp4, and its frame of highest spike frequency as `stem`.jpg."""
     agent = make_agent(agent_name)
-    env = LGMDView(make_target(card.target, {}), title=f"{card.target}   {agent.name}")
+    env = LGMDView(make_target(card.target, dict(card.arguments)), title=f"{card.target}   {agent.name}")
     rate = env.metadata["render_fps"]
     max_decisions = round(TRAFFIC_SECONDS * rate) if card.traffic else None
     observation, info = env.reset(seed=0)

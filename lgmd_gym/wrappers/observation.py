@@ -55,9 +55,17 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     ``base``                as in the environment       its own observation, with `include_base`
     ======================  ==========================  =================================================
 
-    **Info**: the floats ``lgmd/<camera>/spike_frequency``, ``lgmd/<camera>/membrane_potential`` and
-    ``lgmd/<camera>/ffi`` per camera; the bool ``lgmd/alert``, whether the spike frequency of any camera is
-    >= t_sf; with `trace`, the list ``lgmd/trace`` of a `TraceFrame` per camera frame of the step.
+    **Info**: the keys of the environment and these.
+
+    ====================================  ===============================================================
+    key                                   meaning
+    ====================================  ===============================================================
+    ``lgmd/<camera>/spike_frequency``     as in the observation, for one camera [spikes/s]
+    ``lgmd/<camera>/membrane_potential``  as in the observation, for one camera
+    ``lgmd/<camera>/ffi``                 as in the observation, for one camera [grey levels]
+    ``lgmd/alert``                        whether the spike frequency of any camera is >= t_sf
+    ``lgmd/trace``                        a `TraceFrame` per camera frame of the step, with `trace`
+    ====================================  ===============================================================
 
     An environment can change the cameras at each reset through an attribute ``camera_fields``: a dict of
     `CameraParams` fields, and optionally ``condition``.
