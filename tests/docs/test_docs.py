@@ -177,9 +177,9 @@ def test_the_readme_is_short():
 
 
 def test_pictures_are_small():
-    """All pictures in the repository are under 3 MB together."""
-    kinds = {".png", ".gif", ".jpg", ".mp4", ".svg"}
+    """All pictures in the repository are under 4.5 MB together."""
+    kinds = {".png", ".gif", ".jpg", ".mp4", ".svg", ".webp"}
     ours = [path for path in DOCS.rglob("*") if path.suffix in kinds]
     kept = [path for path in ours if not {"_generated", "_build"} & set(path.relative_to(DOCS).parts)]
     assert kept
-    assert sum(path.stat().st_size for path in kept) < 3_000_000
+    assert sum(path.stat().st_size for path in kept) < 4_500_000
