@@ -23,7 +23,7 @@ from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
 
 AGENTS = ("random", "no-brake", "spike-threshold", "ttc-oracle")
 """Agents in the order of the tables; "random" draws every action from the action space."""
-EPISODES, TRAFFIC_EPISODES = 3, 2
+EPISODES, TRAFFIC_EPISODES = 10, 4
 EXAMPLE = {"family": "example", "ego_speed": 12.0, "duration": 9.0, "actors": [{"gap": 45.0, "speed": 3.0}]}
 """The scenario of the reference returns of `LGMD/Scenario-v0`: a slower car ahead."""
 
