@@ -24,6 +24,16 @@ def shown(value: object) -> str:
     return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 20]}… ({len(text)} characters)"
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number with a noun that has a regular plural.
+
+    Example:
+        >>> counted(1, "seed"), counted(20, "world")
+        ('1 seed', '20 worlds')
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def check_number(name: str, value: Any) -> float:
     """Return `value` as float, which may be infinite.
 

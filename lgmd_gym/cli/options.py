@@ -149,7 +149,7 @@ class Video:
     """Run the neuron on video clips: spike traces, figures, overlay videos, a detection table.
 
     For each clip the run folder contains trace.csv (one row per frame), trace.png and, with --overlay,
-    overlay.mp4.
+    overlay.mp4. With --events it contains scores.csv and clip_scores.csv.
     """
 
     clips: Annotated[Positional[tuple[str, ...]], arg(metavar="CLIP [CLIP ...]")]
@@ -161,6 +161,11 @@ class Video:
     """CSV file with the columns clip,crash_frame (empty for no crash); prints the detection table."""
     crash_frame: Count = None
     """Crash frame of a single clip, 0-based; prints the detection table."""
+    events: File = None
+    """CSV file with the columns file,event_s (seconds; empty for no event), optionally start_s,end_s; prints
+    recall and average precision 0.5, 1.0 and 1.5 s before the event, and the time to accident."""
+    false_alarm_cap: float = 0.1
+    """With --events: highest share of 1.5 s windows in alarm in clips without an event."""
     out: File = None
     """Run folder; must not exist. Default: runs/video-DATE-TIME."""
     params: File = None
@@ -181,6 +186,8 @@ class Video:
     """Region of interest of the neuron [px]. Default: the whole frame."""
     overlay: bool = False
     """Write the overlay video: frame, excitation, spikes and alert indicator."""
+    mcap: bool = False
+    """Write an MCAP file for Foxglove: frames, layers and signals of the neuron (needs lgmd-gym[mcap])."""
     plots: bool = True
     """Draw one figure per clip."""
 

@@ -16,12 +16,23 @@ from lgmd_gym.benchmark.folder import provenance
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Video
 from lgmd_gym.cli.params import read_params
+from lgmd_gym.errors import check_within
 from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.system.files import complete_folder
 from lgmd_gym.video.clips import tables
-from lgmd_gym.video.clips.batch import ClipJob, ClipResult, detect_from_trace, make_jobs, process_clip
+from lgmd_gym.video.clips.anticipation import ScoredClip, anticipation
+from lgmd_gym.video.clips.batch import (
+    ClipJob,
+    ClipResult,
+    detect_from_trace,
+    make_jobs,
+    process_clip,
+    scored_from_trace,
+)
 from lgmd_gym.video.clips.detection import ClipDetection
+from lgmd_gym.video.clips.mcap_file import check_mcap
 from lgmd_gym.video.clips.playback import PLAYBACK_CONFIGS, ClipRun, PlaybackConfig, named_config
+from lgmd_gym.video.clips.score_tables import score_table, write_clip_scores, write_scores
 
 
 def run(options: Video) -> int:
@@ -29,8 +40,13 @@ def run(options: Video) -> int:
     if not options.clips:
         raise ValueError("a clip is required: pass video files or folders, as in lgmd-gym video CLIP.mp4")
     configs = _configs(options)
-    jobs = make_jobs(options.clips, options.crashes, options.crash_frame)
-    print_notes(jobs, options.crashes, options.fps)
+    check_within("--false-alarm-cap", options.false_alarm_cap, 0.0, 1.0)
+    if options.mcap:
+        check_mcap()
+    jobs = make_jobs(options.clips, options.crashes, options.crash_frame, options.events)
+    if options.events is not None and not any(job.event and job.event.event_s is not None for job in jobs):
+        raise ValueError(f"{options.events} has no clip with an event; the scores need at least one event_s")
+    print_notes(jobs, options.crashes or options.events, options.fps)
     for job in jobs:  # decode the first frame of each clip before creating the folder
         next(iter(ClipRun(job.clip, next(iter(configs.values())))))
     out = default_out(options.out, "video")
@@ -46,11 +62,13 @@ def _process_all(
     """Process the clips with every configuration, print the tables and return all results."""
     folders = make_clip_folders(folder, jobs)
     console, results, detections = make_console(), [], {}
+    scored: dict[str, list[ScoredClip]] = {}
     for name, config in configs.items():
         suffix = f"-{name}" if len(configs) > 1 else ""
         batch = process_clips(
-            jobs, folders, name, config, suffix, overlay=options.overlay, figure=options.plots
-        )
+            jobs, folders, name, config, suffix,
+            overlay=options.overlay, mcap=options.mcap, figure=options.plots,
+        )  # fmt: skip
         results += batch
         rates = sorted({result.summary.fps for result in batch})
         description = ", ".join(config.describe(rate) for rate in rates[:3])
@@ -59,19 +77,26 @@ def _process_all(
         detections[name] = detect_clips(jobs, batch)
         if detections[name]:
             console.print(tables.detection_table(f"{name}: {description}", detections[name]))
+        scored[name] = score_clips(jobs, batch)
     if len(configs) > 1 and all(detections.values()):
         descriptions = {name: config.describe() for name, config in configs.items()}
         console.print(tables.config_table(detections, descriptions))
+    if options.events is not None:
+        scores = {name: anticipation(clips, options.false_alarm_cap) for name, clips in scored.items()}
+        for name, result in scores.items():
+            console.print(score_table(name, result))
+        write_scores(folder / "scores.csv", scores)
+        write_clip_scores(folder / "clip_scores.csv", scored, scores)
     return results
 
 
-def print_notes(jobs: Sequence[ClipJob], crashes: Path | None, fps: float | None = None) -> None:
+def print_notes(jobs: Sequence[ClipJob], annotations: Path | None, fps: float | None = None) -> None:
     """Print which clips are resampled and which have no annotation."""
     for job in jobs:
         if job.info.variable and fps is None:
             _note(f"{job.clip.name} has a variable frame rate; resampled to {job.info.fps:g} Hz")
-        if crashes is not None and not job.annotated:
-            _note(f"{job.clip.name} has no row in {crashes}; it is not in the detection table")
+        if annotations is not None and not job.annotated and job.event is None:
+            _note(f"{job.clip.name} has no row in {annotations}; it is not in the table")
 
 
 def default_out(out: Path | None, command: str) -> Path:
@@ -103,7 +128,7 @@ def make_clip_folders(out: Path, jobs: Sequence[ClipJob]) -> list[Path]:
 
 def process_clips(
     jobs: Sequence[ClipJob], folders: Sequence[Path], name: str, config: PlaybackConfig, suffix: str,
-    *, overlay: bool = False, figure: bool = True,
+    *, overlay: bool = False, mcap: bool = False, figure: bool = True,
 ) -> list[ClipResult]:  # fmt: skip
     """Process every clip with one configuration into its folder and show a progress bar."""
     results, frames_before = [], 0
@@ -114,7 +139,8 @@ def process_clips(
                 set_progress(before + fraction * job.info.frames)
 
             results.append(process_clip(
-                job, config, folder, suffix=suffix, overlay=overlay, figure=figure, on_progress=on_progress
+                job, config, folder, suffix=suffix, overlay=overlay, mcap=mcap, figure=figure,
+                on_progress=on_progress,
             ))  # fmt: skip
             frames_before += job.info.frames
         set_progress(frames_before)
@@ -125,6 +151,15 @@ def detect_clips(jobs: Sequence[ClipJob], results: Sequence[ClipResult]) -> list
     """Return the detections of the annotated clips."""
     return [
         detect_from_trace(job, result) for job, result in zip(jobs, results, strict=True) if job.annotated
+    ]
+
+
+def score_clips(jobs: Sequence[ClipJob], results: Sequence[ClipResult]) -> list[ScoredClip]:
+    """Return the scores of the clips with a known event or none; truncated clips are left out."""
+    return [
+        scored_from_trace(job, job.event, result)
+        for job, result in zip(jobs, results, strict=True)
+        if job.event is not None and not result.error
     ]
 
 

@@ -12,6 +12,7 @@ from lgmd_gym.benchmark.summary import (
     without_fcw_driver,
 )
 from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.errors import counted
 
 CAVEAT = (
     "These are results of one simulation with the cases of this suite. They are not a rating and do not show "
@@ -35,7 +36,9 @@ def conclusion(rows: list[Row], agents: list[str], suite: str) -> str:
         sentences += ([f"Condition {condition}:"] if len(conditions) > 1 and found else []) + found
     failed = sum(row["error"] is not None for row in rows)
     if failed:
-        sentences.append(f"{_count(failed, 'episode')} failed and {'is' if failed == 1 else 'are'} left out.")
+        sentences.append(
+            f"{counted(failed, 'episode')} failed and {'is' if failed == 1 else 'are'} left out."
+        )
     return " ".join([*sentences, CAVEAT])
 
 
@@ -44,8 +47,8 @@ def _sample_sentence(rows: list[Row], suite: str) -> str:
     counted = [row for row in without_fcw_driver(rows) if row["error"] is None]
     base = [row for row in counted if row["agent"] == NO_BRAKE]
     threats = sum(bool(row["threat"]) for row in base)
-    start = f"The run contains {_count(len(rows), 'episode')} of suite {suite} ({Sample.of(rows)})."
-    contacts = f" Without braking, {threats} of {_count(len(base), 'episode')} end in contact (threats)."
+    start = f"The run contains {counted(len(rows), 'episode')} of suite {suite} ({Sample.of(rows)})."
+    contacts = f" Without braking, {threats} of {counted(len(base), 'episode')} end in contact (threats)."
     return f"{start}{contacts if base else ''} Brackets contain the {INTERVAL_TEXT}."
 
 
@@ -87,7 +90,7 @@ def _avoided_text(summary: AgentSummary) -> str:
 def _of(rate: Rate, noun: str) -> str:
     """Return k of n with the interval; a zero keeps its n."""
     bounds = f"{100 * rate.low:.0f} to {100 * rate.high:.0f} %"
-    return f"{rate.k} of {_count(rate.n, noun)} [{bounds}]"
+    return f"{rate.k} of {counted(rate.n, noun)} [{bounds}]"
 
 
 def _limit_sentences(rows: list[Row], agents: list[str], suite: str) -> list[str]:
@@ -107,7 +110,3 @@ def _limit_sentences(rows: list[Row], agents: list[str], suite: str) -> list[str
         names = ", ".join(agent for agent in tested if meets_r152(rows, agent)) or "none"
         sentences.append(f"Agents that meet the impact speed limits of UN R152 in simulation: {names}.")
     return sentences
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -61,6 +61,33 @@ def test_configurations_are_compared_on_a_folder_of_clips(tmp_path, clip, loomin
     assert not list(out.rglob("*.png"))
 
 
+def test_events_of_a_folder_are_scored(tmp_path, clip, looming, capsys):
+    folder = tmp_path / "clips"
+    folder.mkdir()
+    (folder / "loom.mkv").write_bytes(clip.read_bytes())
+    write_lossless(folder / "still.mkv", looming[:1] * 40)
+    write_lossless(folder / "other.mkv", looming[:1] * 40)
+    events = tmp_path / "events.csv"
+    events.write_text("file,event_s,start_s,end_s\nloom,1.9,,\nstill.mkv,,0.5,1.0\n")
+    out = tmp_path / "run"
+    assert run(folder, "--events", events, "--no-plots", "--out", out) == 0
+    printed = capsys.readouterr()
+    assert "other.mkv has no row in" in printed.err
+    assert "1 clips" not in printed.out
+    assert "1 clip with and 1 without an event, threshold" in " ".join(printed.out.split())
+    assert all(len(line) <= 80 for line in printed.out.splitlines() if str(out) not in line)
+    scores = {row["figure"]: row for row in rows_of(out / "scores.csv")}
+    trace = rows_of(out / "loom" / "trace.csv")
+    before = [float(row["spike_frequency"]) for row in trace[8:57]]
+    level = float(scores["recall at 0.5 s"]["threshold"])
+    assert level == min(value for value in before if value > 0)
+    first = next(number for number, value in enumerate(before) if value >= level)
+    assert float(scores["TTA at the cap"]["value"]) == pytest.approx((49 - first) / 30, abs=1e-5)
+    loom, still = rows_of(out / "clip_scores.csv")
+    assert float(loom["score_at_0.5_s"]) == max(before[:35])
+    assert (float(still["evaluated_s"]), still["score_at_0.5_s"]) == (0.5, "")
+
+
 def test_a_truncated_clip_keeps_its_trace_and_gives_exit_code_2(tmp_path, capsys):
     path = truncate(make_test_clip(tmp_path / "clip.mkv", "-c:v", "ffv1"), 0.6)
     assert run(path, "--no-plots", "--out", tmp_path / "run") == 2
@@ -95,6 +122,14 @@ def files(tmp_path, clip, monkeypatch):
         "word": "clip,crash_frame\ngood,soon\n",
         "beyond": "clip,crash_frame\ngood,60\n",
         "column": "file,crash\ngood,3\n",
+        "events": "file,event_s\ngood,1.4\n",
+        "late": "file,event_s\ngood,2.5\n",
+        "early": "file,event_s,start_s\ngood.mkv,1.0,1.2\n",
+        "backwards": "file,event_s,start_s,end_s\ngood.mkv,,1.5,1.2\n",
+        "header": "file,event_ms\ngood,3\n",
+        "missing": "file,event_s\ngod.mkv,1.0\n",
+        "none": "file,event_s\ngood.mkv,none\n",
+        "text": "file,event_s\ngood.mkv,1:20\n",
     }.items():
         (folder / f"{name}.csv").write_text(text)
     monkeypatch.chdir(folder)
@@ -109,13 +144,23 @@ INVALID = [  # (arguments, part of the message)
     (["LIST.m3u8"], "clip 'LIST.m3u8' is a playlist, not a video; pass the video files that it lists"),
     (["dot.mkv"], "clip 'dot.mkv' is 2×2 px; it must be at least 3×3"),
     (["headless.mp4"], "clip 'headless.mp4' is truncated"),
-    (["good.mkv", "--crashes", "unknown.csv"], "line 2: clip 'other' is not among the given clips"),
+    (["good.mkv", "--crashes", "unknown.csv"], "line 2: unknown clip 'other'; known: good.mkv"),
     (["good.mkv", "--crashes", "twice.csv"], "line 3: clip 'good.mkv' is listed twice"),
     (["good.mkv", "--crashes", "word.csv"], "a frame number, or empty for no crash, got 'soon'"),
     (["good.mkv", "--crashes", "beyond.csv"], "crash frame of good.mkv must be in 0 to 59, got 60"),
     (["good.mkv", "--crashes", "column.csv"], "lacks the column 'clip'"),
     (["good.mkv", "--crashes", "nowhere.csv"], "crash file 'nowhere.csv' cannot be read"),
     (["good.mkv", "dot.mkv", "--crash-frame", "3"], "--crash-frame 3 applies to a single clip"),
+    (["good.mkv", "--events", "late.csv"], "line 2: event_s must be in the clip, 0 to 2.00 s (60 frames"),
+    (["good.mkv", "--events", "early.csv"], "event_s 1 is outside the evaluated part, 1.2 to 2 s"),
+    (["good.mkv", "--events", "backwards.csv"], "start_s must be before end_s, got 1.5 and 1.2"),
+    (["good.mkv", "--events", "header.csv"], "unknown column 'event_ms'; did you mean 'event_s'?"),
+    (["good.mkv", "--events", "missing.csv"], "line 2: unknown clip 'god.mkv'; did you mean 'good.mkv'?"),
+    (["good.mkv", "--events", "none.csv"], "none.csv has no clip with an event"),
+    (["good.mkv", "--events", "text.csv"], "event_s must be a time in seconds, or empty, got '1:20'"),
+    (["good.mkv", "--events", "nowhere.csv"], "event file 'nowhere.csv' cannot be read"),
+    (["good.mkv", "--events", "events.csv", "--crash-frame", "3"], "remove one of them"),
+    (["good.mkv", "--events", "events.csv", "--false-alarm-cap", "10"], "alarm-cap must be in [0, 1]"),
     (["good.mkv", "--configs", "papr"], "did you mean 'paper'?"),
     (["good.mkv", "--fps", "0"], "fps must be in (0, 1000], got 0"),
     (["good.mkv", "--size", "2", "9"], "each 3 to 16384 px, got (2, 9)"),
