@@ -7,6 +7,7 @@ from pathlib import Path
 
 import lgmd_gym
 from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.errors import counted
 
 MAX_FAILURES = 5  # kinds of failure that are described
 EARLY = 8  # an agent whose first episodes all fail ends the run after this number
@@ -26,7 +27,7 @@ def failure_lines(rows: Iterable[Row]) -> list[str]:
     """
     kinds = Counter((row["agent"], _describe(row["error"])) for row in rows if row["error"] is not None)
     most = kinds.most_common(MAX_FAILURES)
-    lines = [f"{agent}: {text} ({count} episodes)" for (agent, text), count in most]
+    lines = [f"{agent}: {text} ({counted(count, 'episode')})" for (agent, text), count in most]
     if len(kinds) > MAX_FAILURES:
         lines.append(f"{len(kinds) - MAX_FAILURES} other failures")
     return lines

@@ -48,7 +48,7 @@ from lgmd_gym.envs.own_families import import_families, is_own
 from lgmd_gym.envs.registration import APPEARANCE, RANDOM, SCENARIO, SCENARIO_ARGUMENT, make_source
 from lgmd_gym.envs.scenarios import FAMILIES
 from lgmd_gym.envs.scenarios.scenario import Scenario
-from lgmd_gym.errors import check_items, check_keys, check_known, check_path, check_text
+from lgmd_gym.errors import check_items, check_keys, check_known, check_path, check_text, counted
 
 SUITE_KEYS = ("name", "about", "module", "cases")
 DATA_FILES = (".toml", ".json")
@@ -130,7 +130,7 @@ def _combine(sources: tuple[str | Scenario, ...], modules: tuple[str, ...]) -> S
     cases: list[Case] = []
     for source in sources:
         cases += [own_case(source)] if isinstance(source, Scenario) else get_suite(source, modules).cases
-    return Suite(OWN, distinct(cases), f"{len(cases)} scenarios")
+    return Suite(OWN, distinct(cases), counted(len(cases), "scenario"))
 
 
 def declared_modules(suite: str) -> tuple[str, ...]:

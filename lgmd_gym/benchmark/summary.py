@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import Mean, Rate, cluster_mean
+from lgmd_gym.errors import counted
 from lgmd_gym.system.files import complete_file
 
 COLUMNS = (
@@ -50,8 +51,7 @@ class Sample(NamedTuple):
         return cls(len({case for case, _ in pairs}), len({world for _, world in pairs}))
 
     def __str__(self) -> str:
-        words = ("case" if self.cases == 1 else "cases", "world" if self.worlds == 1 else "worlds")
-        return f"{self.cases} {words[0]} × {self.worlds} {words[1]}"
+        return f"{counted(self.cases, 'case')} × {counted(self.worlds, 'world')}"
 
 
 class AgentSummary(NamedTuple):

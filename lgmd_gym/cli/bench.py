@@ -12,6 +12,7 @@ from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.modules import chosen_modules
 from lgmd_gym.cli.options import refuse_unused
 from lgmd_gym.cli.params import note_unused_params, read_params
+from lgmd_gym.errors import counted
 
 if TYPE_CHECKING:
     from lgmd_gym.benchmark.executor import Executor
@@ -46,7 +47,9 @@ def run(options: "Bench") -> int:
         benchmark.stop_reason = benchmark.stop_reason or f"{error.strerror} while writing the outputs"
     failed = sum(row["error"] is not None for row in benchmark.rows)
     if failed:
-        console.print(f"{failed} episodes failed; their tracebacks are in {path / ROWS_FILE}:", style="red")
+        console.print(
+            f"{counted(failed, 'episode')} failed; the tracebacks are in {path / ROWS_FILE}:", style="red"
+        )
         for line in failure_lines(benchmark.rows):
             console.print(f"- {line}")
     if benchmark.stop_reason:
@@ -162,8 +165,8 @@ def _title(benchmark: "Run") -> str:
     fps = next((f"{row['fps']:g} Hz" for row in benchmark.rows if row["fps"]), "?")
     first = f" from {config.first_seed} on" if config.first_seed else ""
     camera = f"camera {config.sensor_config.label} at {fps}"
-    worlds = f"{config.worlds} worlds" if config.worlds else "the laboratory"
-    seeds = f"{config.seeds} seeds{first} in {worlds}"
+    worlds = counted(config.worlds, "world") if config.worlds else "the laboratory"
+    seeds = f"{counted(config.seeds, 'seed')}{first} in {worlds}"
     return f"{benchmark.plan.suite}: {camera}, T_sf = {level:g} spikes/s, {seeds}"
 
 

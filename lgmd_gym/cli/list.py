@@ -15,13 +15,14 @@ from lgmd_gym.benchmark.suites import SUITES, TRAFFIC
 from lgmd_gym.camera.params import PRESETS
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import List
-from lgmd_gym.envs import FAMILIES, env_id
+from lgmd_gym.envs import FAMILIES, env_id, import_families
 from lgmd_gym.envs.registration import RANDOM, SCENARIO, SCENARIO_ARGUMENT
 from lgmd_gym.envs.traffic.registration import KINDS
 
 
 def run(options: List) -> int:
     """Print one table, or all of them."""
+    import_families(options.module or ())
     console = make_console()
     with console.capture() as capture:
         for name, table in TABLES.items():

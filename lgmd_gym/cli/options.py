@@ -315,6 +315,8 @@ class List:
 
     what: Positional[Literal["all", "suites", "agents", "envs", "cameras", "cases"]] = "all"
     """Table to print; all has no cases."""
+    module: Names = None
+    """Modules with scenario families of your own to list: my_scenarios, or my_scenarios:MyFamily."""
     pager: bool = True
     """Use a pager in a terminal."""
 

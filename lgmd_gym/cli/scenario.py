@@ -9,6 +9,7 @@ from rich.table import Table
 
 from lgmd_gym.benchmark.openscenario.names import file_name
 from lgmd_gym.cli.console import make_console
+from lgmd_gym.errors import counted
 
 if TYPE_CHECKING:
     from lgmd_gym.benchmark.openscenario.check import CheckedFile
@@ -86,7 +87,10 @@ def _check(options: "Scenario") -> int:
     console.print(table)
     cells, contacts = sum(item.cells for item in checked), sum(item.contacts for item in checked)
     wall = time.perf_counter() - start
-    console.print(f"{len(checked)} files, {cells} cells, {contacts} contacts with the target, {wall:.0f} s")
+    console.print(
+        f"{counted(len(checked), 'file')}, {counted(cells, 'cell')}, "
+        f"{counted(contacts, 'contact')} with the target, {wall:.0f} s"
+    )
     return 0
 
 

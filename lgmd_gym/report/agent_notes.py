@@ -6,6 +6,7 @@ import re
 from lgmd_gym.agents.policies.card import policy_card
 from lgmd_gym.agents.policies.policy import Policy, find_policy
 from lgmd_gym.agents.registry import AGENTS, make_agent
+from lgmd_gym.errors import counted
 
 SENTENCE_END = re.compile(r"(?<=[^.].[.!?])(?=\s|$)")
 
@@ -51,5 +52,5 @@ def _policy_note(path: str) -> str:
         "the observations of the environment" if card.features is None else ", ".join(card.features.inputs)
     )
     demands = f"{len(card.demands)} levels of demand" if card.demands else "a continuous demand"
-    noun = "camera" if cameras == 1 else "cameras"
-    return f"Learned policy ({card.algo.upper()}) with {cameras} {noun}, the inputs {inputs}, and {demands}."
+    sensors = counted(cameras, "camera")
+    return f"Learned policy ({card.algo.upper()}) with {sensors}, the inputs {inputs}, and {demands}."

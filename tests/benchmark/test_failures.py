@@ -63,4 +63,4 @@ def test_the_place_is_in_the_code_of_the_user():
         f'Traceback:\n  File "{package}", line 1, in play\n    x\n  File "/home/me/agent.py", line 7, in a\n'
         '    x\n  File "/v/site-packages/numpy/core.py", line 9, in mean\n    x\nTypeError: no\n'
     )
-    assert failure_lines([row("a", trace)]) == ["a: TypeError: no at /home/me/agent.py:7 in a (1 episodes)"]
+    assert failure_lines([row("a", trace)]) == ["a: TypeError: no at /home/me/agent.py:7 in a (1 episode)"]

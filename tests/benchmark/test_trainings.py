@@ -197,5 +197,5 @@ def test_run_with_failed_episodes_is_rejected(run_folder, tmp_path):
     (tmp_path / "episodes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
     for name in ("run.toml", "suite.toml"):
         (tmp_path / name).write_text((run_folder / name).read_text())
-    with pytest.raises(ValueError, match="1 episodes failed; resume it with lgmd-gym bench --resume"):
+    with pytest.raises(ValueError, match="1 episode failed; resume it with lgmd-gym bench --resume"):
         compare_arms(tmp_path)

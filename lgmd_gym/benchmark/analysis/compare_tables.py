@@ -8,6 +8,7 @@ from lgmd_gym.benchmark.analysis.compare import Comparison, Difference
 from lgmd_gym.benchmark.analysis.trainings import ArmResult, Estimate
 from lgmd_gym.benchmark.statistics import Mean
 from lgmd_gym.benchmark.summary import INTERVAL_TEXT
+from lgmd_gym.errors import counted
 
 DIFFERENCE_CAPTION = (
     "B − A [95 % interval, bootstrap over cases and worlds]; number of pairs in which B is higher/lower, of n"
@@ -24,7 +25,8 @@ def comparison_table(comparison: Comparison) -> Table:
     """Return a table with one line per quantity: A, B, their difference, and how many pairs differ."""
     caption = f"{comparison.sample}; {DIFFERENCE_CAPTION}"
     if comparison.unpaired:
-        caption += f"; {comparison.unpaired} episodes without a pair (missing, failed, or threat to one only)"
+        episodes = counted(comparison.unpaired, "episode")
+        caption += f"; {episodes} without a pair (missing, failed, or threat to one only)"
     title = f"A = {comparison.name_a}   B = {comparison.name_b}   {comparison.pairs} pairs"
     table = Table(title=f"{title} {comparison.condition}".rstrip(), caption=caption)
     table.add_column("quantity")

@@ -21,6 +21,7 @@ from lgmd_gym.benchmark.summary import (
     without_fcw_driver,
 )
 from lgmd_gym.envs.dynamics.units import KMH
+from lgmd_gym.errors import counted
 
 SCORE_CAPTION = (
     f"k/n [{INTERVAL_TEXT}, in %]; mean speed reduction in km/h [95 %, bootstrap over cases and worlds]; "
@@ -106,7 +107,7 @@ def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
         table.add_column(heading, justify="right")
     for item in agent_summaries(rows, agents):
         table.add_row(
-            item.agent + (f" ({item.errors} errors)" if item.errors else ""),
+            item.agent + (f" ({counted(item.errors, 'error')})" if item.errors else ""),
             rate_text(item.avoided),
             mean_kmh(item.speed_reduction),
             "–" if item.ttc_at_brake is None else f"{item.ttc_at_brake:.2f}",

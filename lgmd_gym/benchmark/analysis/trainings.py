@@ -18,7 +18,7 @@ from lgmd_gym.benchmark.effective_size import effective_size
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import wilson
 from lgmd_gym.benchmark.summary import Sample, cases_and_worlds, without_fcw_driver
-from lgmd_gym.errors import unknown_name
+from lgmd_gym.errors import counted, unknown_name
 
 RETURN = "episode_return"
 SHARES = {
@@ -76,7 +76,7 @@ def compare_arms(path: Path, arms: Sequence[str] = ()) -> list[ArmResult]:
     rows = read_case_rows(path)
     failed = sum(row["error"] is not None for row in rows)
     if failed or not rows:
-        problem = f"{failed} episodes failed" if failed else "the run has no episode"
+        problem = f"{counted(failed, 'episode')} failed" if failed else "the run has no episode"
         raise ValueError(f"{problem}; resume it with lgmd-gym bench --resume {path}")
     agents = list(dict.fromkeys(row["agent"] for row in rows))
     parsed = [parse_arm(arm, agents) for arm in arms or agents]

@@ -12,7 +12,7 @@ from lgmd_gym.benchmark.openscenario.nodes import Element, Node, parse_file
 from lgmd_gym.benchmark.openscenario.parameters import Assignment, declare, variations
 from lgmd_gym.benchmark.suites import Suite
 from lgmd_gym.camera import CLEAR
-from lgmd_gym.errors import check_path
+from lgmd_gym.errors import check_path, counted
 
 SUFFIX = ".xosc"
 FAMILY = "Scenario_ID"  # parameter that names the family
@@ -83,7 +83,7 @@ def read_all(paths: Sequence[str | Path]) -> Suite:
     for file, parts in zip(files, stems, strict=True):
         inside = "/".join(file_name(part) for part in parts[common:])
         cases += [_case(suite, cell, f"{inside}/") for cell in read_cells(file)]
-    return Suite(suite, tuple(cases), f"OpenSCENARIO, {len(files)} files")
+    return Suite(suite, tuple(cases), f"OpenSCENARIO, {counted(len(files), 'file')}")
 
 
 def find_files(path: Path) -> list[Path]:

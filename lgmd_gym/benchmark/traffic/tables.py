@@ -6,6 +6,7 @@ from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.summary import Sample
 from lgmd_gym.benchmark.traffic.summary import TrafficSummary, traffic_summaries
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON
+from lgmd_gym.errors import counted
 
 CAPTION = (
     f"false: without it, no contact and no required deceleration of {EMERGENCY:g} m/s² within {HORIZON:g} s; "
@@ -51,7 +52,8 @@ def _cells(item: TrafficSummary, by_kind: bool) -> list[str]:
     if item.distance > 0.0:
         rate = f"{item.per_100km(item.false_activations):.1f} [{low:.1f}–{high:.1f}]"
     return [
-        (f"  {item.kind}" if by_kind else item.agent) + (f" ({item.errors} errors)" if item.errors else ""),
+        (f"  {item.kind}" if by_kind else item.agent)
+        + (f" ({counted(item.errors, 'error')})" if item.errors else ""),
         f"{item.distance / 1000:.1f}",
         rate,
         f"{item.false_activations}/{item.brakes}",
