@@ -46,7 +46,7 @@ class PolicyVecEnv(EngineVecEnv):
         return self._stack(self._restart(np.ones(self.num_envs, np.bool_), seeds))
 
     def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Advance each environment by one decision of the policy; return observations, rewards, ends, infos."""
+        """Advance each environment by one decision; return observations, rewards, ends and infos."""
         demands = self.envs.read_demands(self._actions)
         latched = np.array([self.features.latches(demand) for demand in demands.tolist()])
         self._rewards[:] = 0.0

@@ -73,11 +73,12 @@ def assert_same_info(expected, row):
 
 def test_no_frame_is_rendered_after_the_brake_latches(monkeypatch):
     selected, process = [], SensorArray.process
-    monkeypatch.setattr(
-        SensorArray,
-        "process",
-        lambda self, first, last, due: (selected.append(due[first:last].copy()), process(self, first, last, due)),
-    )
+
+    def record(self, first, last, due):
+        selected.append(due[first:last].copy())
+        return process(self, first, last, due)
+
+    monkeypatch.setattr(SensorArray, "process", record)
     config = make_config("discrete")
     envs = make_envs(replace(config, features=replace(config.features, latch=True, repeat=3)), "train")
     envs.envs.simulation._threads.count = 1
