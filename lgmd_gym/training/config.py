@@ -185,8 +185,9 @@ class TrainConfig:
             camera: Cameras in place of the configured ones.
         """
         arguments = self.env_arguments(split)
+        arguments["camera"] = camera or self.camera
         try:
-            return gym.make(self.env_id, **(arguments | ({"camera": camera} if camera else {})))
+            return gym.make(self.env_id, **arguments)
         except gym.error.Error as error:
             raise ValueError(
                 f"env {self.env_id!r} cannot be made ({error}); see lgmd-gym list envs"
@@ -194,7 +195,7 @@ class TrainConfig:
 
     def env_arguments(self, split: str) -> dict[str, Any]:
         """Return the arguments of `gym.make` and `gym.make_vec` for a split."""
-        arguments = self.env_kwargs | {"camera": self.camera}
+        arguments: dict[str, Any] = self.env_kwargs | {"camera": self.camera}
         if self.env_id == RANDOM_ID:
             arguments.setdefault("split", split)
         if self.demands:

@@ -86,19 +86,19 @@ def _make_model(config: TrainConfig, folder: Path, envs: "VecEnv") -> Any:
         seed=config.seed,
         device="cpu",
         tensorboard_log=str(folder / "tensorboard"),
-        **_with_schedules(config.algo_kwargs),
+        **algorithm_kwargs(config),
     )
 
 
-def _with_schedules(algo_kwargs: dict[str, Any]) -> dict[str, Any]:
-    """Return algorithm arguments with each "lin_x" replaced by a linear decay from x to 0."""
+def algorithm_kwargs(config: TrainConfig) -> dict[str, Any]:
+    """Return the arguments of the algorithm, each "lin_x" replaced by a linear decay from x to 0."""
     from stable_baselines3.common.utils import LinearSchedule
 
     return {
         name: LinearSchedule(float(value.removeprefix("lin_")), 0.0, 1.0)
         if isinstance(value, str) and value.startswith("lin_")
         else value
-        for name, value in algo_kwargs.items()
+        for name, value in config.algo_kwargs.items()
     }
 
 
