@@ -60,7 +60,6 @@ ARMS = {
     "exploration 0.3 in place of 0.03": Arm("dqn", {}, {"exploration_initial_eps": 0.3}),
     "two layers of 64 units": Arm("dqn", {}, {"policy_kwargs": {"net_arch": [64, 64]}}),
     "PPO": Arm("ppo"),
-    "PPO, 15 Hz": Arm("ppo", {"repeat": 2}),
     "spike frequencies": Arm("dqn", {"inputs": ("zones_spikes", *SPEEDS)}),
     "mean luminance change F̂": Arm("dqn", {"inputs": ("zones_ffi", *SPEEDS)}),
     "potentials and F̂": Arm("dqn", {"inputs": ("zones", "zones_ffi", *SPEEDS)}),

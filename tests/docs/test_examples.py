@@ -1,6 +1,5 @@
 """The scripts in docs/examples run and print plausible results."""
 
-import importlib.util
 import re
 from itertools import product
 from pathlib import Path
@@ -9,6 +8,7 @@ from types import SimpleNamespace
 import gymnasium as gym
 import numpy as np
 import pytest
+from support.examples import EXAMPLES, load
 from support.rows import threat_row
 
 from lgmd_gym.agents import make_agent
@@ -19,16 +19,6 @@ from lgmd_gym.benchmark.stored_run import StoredRun
 from lgmd_gym.benchmark.suites import Suite
 from lgmd_gym.camera import CameraParams
 from lgmd_gym.neuron import LGMDParams
-
-ROOT = Path(__file__).resolve().parents[2]
-EXAMPLES = ROOT / "docs" / "examples"
-
-
-def load(name):
-    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.mark.slow
@@ -48,19 +38,6 @@ def test_scenario_evaluation(capsys, tmp_path):
     assert 0.0 < wide < fovea < 4.0
     assert needed == pytest.approx(0.70, abs=0.01)  # 8.33 m/s / (2 · 9 m/s²) and 0.23 s
     assert (tmp_path / "picture.png").stat().st_size > 10_000
-
-
-@pytest.mark.slow
-def test_rl_training(capsys, tmp_path):
-    """PPO with MultiInputPolicy updates its parameters, which stay finite, in 2,000 steps."""
-    torch = pytest.importorskip("torch")
-    pytest.importorskip("stable_baselines3")
-    model = load("rl_training").main(2000, tmp_path / "picture.png")
-    assert model.num_timesteps >= 2000
-    assert model._n_updates > 0
-    assert all(bool(torch.isfinite(weight).all()) for weight in model.policy.parameters())
-    assert "2000 steps: contact in" in capsys.readouterr().out
-    assert (tmp_path / "picture.png").stat().st_size > 5_000
 
 
 def test_bodies(tmp_path):
@@ -149,7 +126,7 @@ def test_what_breaks_first(capsys):
 
 
 def test_every_example_has_a_test():
-    tested = Path(__file__).read_text()
+    tested = "".join(path.read_text() for path in Path(__file__).parent.glob("test_*examples.py"))
     assert all(f'load("{path.stem}")' in tested for path in EXAMPLES.glob("*.py"))
 
 

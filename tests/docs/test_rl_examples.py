@@ -1,0 +1,98 @@
+"""The scripts of docs/examples on reinforcement learning."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from support.examples import load
+from support.recordings import synthetic_episode
+
+from lgmd_gym.agents.policies.features import FeatureConfig
+
+
+@pytest.mark.slow
+def test_rl_training(capsys):
+    """DQN updates its parameters, which stay finite, after its 640 first decisions."""
+    torch = pytest.importorskip("torch")
+    pytest.importorskip("stable_baselines3")
+    model = load("rl_training").main(720, num_envs=4, episodes=4)
+    assert model.num_timesteps == 720
+    assert model._n_updates == 2 * (720 - 640) / 4
+    assert all(bool(torch.isfinite(weight).all()) for weight in model.policy.parameters())
+    assert "720 decisions: return" in capsys.readouterr().out
+
+
+def test_learning_curves(capsys, tmp_path):
+    for name, returns in (("dqn0", [[1.0, 2.0], [2.0, 4.0], [0.0, 1.0]]), ("dqn1", [[-1.0, 0.0]] * 3)):
+        (tmp_path / name / "best").mkdir(parents=True)
+        np.savez(tmp_path / name / "best" / "evaluations.npz", timesteps=[100, 200, 300], results=returns)
+    load("learning_curves").main(tmp_path / "curves.png", [tmp_path / "dqn0", tmp_path / "dqn1"])
+    assert capsys.readouterr().out.splitlines() == [
+        "dqn0: best return 3.00 at 200 decisions, n = 2",
+        "dqn1: best return -0.50 at 100 decisions, n = 2",
+    ]
+    assert (tmp_path / "curves.png").stat().st_size > 5_000
+
+
+def recorded_decisions(example, false_cost=1.0):
+    episodes = [synthetic_episode(length, seed=length, threat=length > 5) for length in (4, 5, 6, 9)]
+    features = FeatureConfig(inputs=("ego_speed",), history=1, repeat=2)
+    return episodes, example.Decisions(episodes, features, false_cost)
+
+
+def test_recorded_levels_replay_episodes():
+    """An episode pays its rewards until it ends or the policy brakes; then another one starts."""
+    pytest.importorskip("stable_baselines3")
+    example = load("rl_ablations")
+    episodes, table = recorded_decisions(example)
+    envs = example.RecordedLevels(table, num_envs=1, scale=0.5)
+    envs.seed(3)
+    envs.reset()
+    for brake_at in (None, 1):
+        index = int(np.flatnonzero(table.starts == envs._position[0])[0])
+        episode, rewards, done, decision = episodes[index], [], False, 0
+        while not done:
+            _, reward, ends, infos = envs.step(np.array([int(decision == brake_at)]))
+            rewards.append(reward[0])
+            done, decision = bool(ends[0]), decision + 1
+        expected = np.add.reduceat(episode.rewards, range(0, len(episode), 2))
+        if brake_at is not None:
+            expected = [expected[0], episode.braking_returns[2 * brake_at]]
+        assert rewards == pytest.approx([0.5 * value for value in expected])
+        assert infos[0]["terminal_observation"]["ego_speed"].shape == (1,)
+
+
+def test_results_of_recorded_levels():
+    example = load("rl_ablations")
+    episodes, table = recorded_decisions(example)
+    never = SimpleNamespace(predict=lambda inputs, deterministic: (np.zeros(len(table.hold), int), None))
+    returns, contacts, braked = example.evaluate(never, table)
+    assert returns == pytest.approx([episode.rewards.sum() for episode in episodes], abs=1e-6)
+    assert contacts.tolist() == [False, False, True, True]
+    assert not braked.any()
+    first = SimpleNamespace(predict=lambda inputs, deterministic: (np.ones(len(table.hold), int), None))
+    returns, contacts, braked = example.evaluate(first, table)
+    assert returns == pytest.approx([episode.braking_returns[0] for episode in episodes])
+    assert not contacts.any()
+    assert braked.all()
+
+
+def test_false_braking_costs_more_with_the_factor():
+    """The return of braking moves away from that of holding, in episodes without a threat only."""
+    example = load("rl_ablations")
+    episodes, table = recorded_decisions(example, false_cost=3.0)
+    for index, episode in enumerate(episodes):
+        hold, brake = episode.rewards.sum(), episode.braking_returns[0]
+        expected = brake if episode.threat else hold + 3.0 * (brake - hold)
+        assert table.cost[table.starts[index]] == pytest.approx(expected, abs=1e-5)
+
+
+def test_table_of_ablations_has_the_mean_over_seeds():
+    example = load("rl_ablations")
+    threats = np.array([True, True, False, False])
+    results = np.zeros((5, 3, 4))
+    results[:, 0] = 2.0
+    results[:, 1, 0] = 1.0  # one of two threats ends in a contact
+    results[2:, 2, 3] = 1.0  # three of five seeds brake in one of two non-threats
+    row = example.table_row("arm", results, threats)
+    assert row == "| arm | 2.00 [2.00, 2.00] | 50 (50–50) | 33 (0–50) |"
