@@ -12,12 +12,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from lgmd_gym.benchmark import get_suite
 from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.stored_run import StoredRun, read_run
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import Sample, summarise, without_fcw_driver
 from lgmd_gym.benchmark.traffic.summary import summarise_traffic
+from lgmd_gym.errors import counted
 
 
 def score(agent: str, rows: list[Row]) -> str:
@@ -44,8 +46,10 @@ def column(run: StoredRun) -> dict[str, str]:
     threats = any(row["threat"] for row in rows)
     what = "false activations" if not threats else "avoided"
     what = "false activations per 100 km" if traffic else what
-    where = str(Sample.of(rows)) if run.config.worlds else f"{Sample.of(rows).cases} cases in the laboratory"
-    cells = {"agent": f"{run.config.suite}: {what}, {where}, {'/'.join(run.config.conditions)}"}
+    suite = TRAFFIC if traffic else get_suite(run.config.suite).name
+    cases = counted(Sample.of(rows).cases, "case")
+    where = str(Sample.of(rows)) if run.config.worlds else f"{cases} in the laboratory"
+    cells = {"agent": f"{suite}: {what}, {where}, {'/'.join(run.config.conditions)}"}
     for agent in run.config.agents:
         of_agent = [row for row in rows if row["agent"] == agent]
         cells[agent] = traffic_score(agent, of_agent) if traffic else score(agent, of_agent)

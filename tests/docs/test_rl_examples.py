@@ -4,10 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.examples import load
+from support.examples import EXAMPLES, load
 from support.recordings import synthetic_episode
 
 from lgmd_gym.agents.policies.features import FeatureConfig
+from lgmd_gym.benchmark import get_suite
 
 
 @pytest.mark.slow
@@ -96,3 +97,25 @@ def test_table_of_ablations_has_the_mean_over_seeds():
     results[2:, 2, 3] = 1.0  # three of five seeds brake in one of two non-threats
     row = example.table_row("arm", results, threats)
     assert row == "| arm | 2.00 [2.00, 2.00] | 50 (50–50) | 33 (0–50) |"
+
+
+def test_leaderboard_prints_a_row_per_agent(monkeypatch, tmp_path, capsys):
+    """A run that exists is not repeated."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    example = load("leaderboard")
+    suite = tmp_path / "mine.toml"
+    suite.write_text('name = "mine"\n[[cases]]\nfamily = "CCRs"\nspeeds_kmh = [20]\n')
+    monkeypatch.setitem(example.RUNS, "levels", {"suite": str(suite), "seeds": 1, "worlds": 0})
+    for _ in range(2):
+        example.main(["ttc-oracle"], tmp_path / "board", ["levels"])
+        lines = capsys.readouterr().out.splitlines()[-3:]
+        assert lines[0] == "| agent | mine: avoided, 1 case in the laboratory, clear |"
+        assert lines[2].startswith("| ttc-oracle | 1/1 ")
+    assert [path.name for path in (tmp_path / "board").iterdir()] == ["levels"]
+
+
+def test_levels_of_the_leaderboard():
+    """Held-out levels: each case is one level of the split "test"."""
+    cases = [dict(case.arguments) for case in get_suite(str(EXAMPLES / "levels.toml")).cases]
+    assert [case["start_level"] for case in cases] == list(range(1000, 1400))
+    assert all(case["num_levels"] == 1 and case["split"] == "test" for case in cases)

@@ -1,0 +1,50 @@
+"""Add agents to the leaderboard: run all of its suites, and print a row per agent.
+
+    python docs/examples/leaderboard.py --agents my_module:MyAgent policy:my.zip --out runs/board --jobs 2
+
+The run folders are subfolders of `--out`. A suite whose folder exists is not run again; complete an
+interrupted one with `lgmd-gym bench --resume FOLDER`. The page "Leaderboard" states which levels, worlds and
+seeds an entry may be trained and tuned on.
+"""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from all_scores import table
+
+from lgmd_gym import benchmark
+from lgmd_gym.benchmark import RunConfig
+from lgmd_gym.benchmark.executor import Executor
+from lgmd_gym.benchmark.stored_run import read_run
+
+# Worlds 8,000 to 8,019 and the road "normal" are the defaults.
+MIXED = {"conditions": ("mixed",)}
+RUNS: dict[str, dict[str, Any]] = {
+    "levels": {"suite": str(Path(__file__).with_name("levels.toml")), "seeds": 1},
+    "r152": {"suite": "r152", "seeds": 20, **MIXED},
+    "fmvss127": {"suite": "fmvss127", "seeds": 5, **MIXED},
+    "ncap2023-vru": {"suite": "ncap2023-vru", "seeds": 1, **MIXED},
+    "false-reaction": {"suite": "false-reaction", "seeds": 5, **MIXED},
+    "near-miss": {"suite": "near-miss", "seeds": 5, **MIXED},
+    "traffic": {"suite": "traffic", "seeds": 8, "first_seed": 110, **MIXED},
+}
+
+
+def main(agents: list[str], out: Path, runs: list[str], jobs: int = 1) -> None:
+    """Run the suites that are missing and print the table."""
+    for name in runs:
+        if not (out / name).exists():
+            config = RunConfig(agents=tuple(agents), **RUNS[name])
+            benchmark.run(config, out / name, Executor(jobs=jobs), plots=False, report=False)
+    print(*table([read_run(out / name) for name in runs]), sep="\n")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--agents", nargs="+", required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--runs", nargs="+", choices=list(RUNS), default=list(RUNS))
+    parser.add_argument("--jobs", type=int, default=1)
+    options = parser.parse_args()
+    main(options.agents, options.out, options.runs, options.jobs)
