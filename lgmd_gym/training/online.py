@@ -106,8 +106,9 @@ def _callbacks(
     config: TrainConfig, folder: Path, eval_envs: "VecEnv", model: "BaseAlgorithm"
 ) -> "list[BaseCallback]":
     from lgmd_gym.training.checkpoints import CheckpointSaver, Evaluator
+    from lgmd_gym.training.episode_log import EpisodeLog
 
     frequency = max(config.eval_freq // config.n_envs, 1)
     evaluator = Evaluator(eval_envs, folder, frequency, config.eval_episodes)
     evaluator.restore(model)
-    return [CheckpointSaver(folder, frequency), evaluator]
+    return [CheckpointSaver(folder, frequency), evaluator, EpisodeLog(folder, config.env_id)]

@@ -13,6 +13,7 @@ from lgmd_gym.system.files import complete_file, new_folder
 from lgmd_gym.system.lock import FolderLock
 from lgmd_gym.training.config import TrainConfig
 from lgmd_gym.training.hyperparams import OFFLINE
+from lgmd_gym.training.model_card import write_model_card
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
 
 if TYPE_CHECKING:
@@ -35,8 +36,8 @@ EXCLUDED = (
 def train(config: TrainConfig, folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
     """Train a policy in a new folder, as `lgmd-gym train` does.
 
-    The folder gets the configuration, logs, checkpoints or recorded episodes, and policy.zip with the model
-    that has the best mean return on the validation split.
+    The folder gets the configuration, logs, checkpoints or recorded episodes, policy.zip with the model that
+    has the best mean return on the validation split, and README.md, its model card for the Hugging Face Hub.
 
     Args:
         config: Configuration of the training.
@@ -130,6 +131,7 @@ def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) 
     with complete_file(path) as part:
         model.save(part, exclude=EXCLUDED)
         write_card(part, card)
+    write_model_card(config, folder, lgmd_gym.__version__)
     return path
 
 

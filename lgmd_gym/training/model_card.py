@@ -1,0 +1,123 @@
+"""The model card of a training run: `README.md` in the format of the Hugging Face Hub."""
+
+import csv
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lgmd_gym.system.files import complete_file
+from lgmd_gym.training.config import TrainConfig
+
+FILE = "README.md"
+
+_PAGE = """# {algo} policy for {env_id}
+
+A policy that decides when a car brakes, trained with lgmd-gym {version} and stable-baselines3.
+Its inputs: {inputs}.
+
+## Evaluation
+
+{evaluation}
+
+## Use
+
+Loading the file unpickles it and can run any code: load only files from sources you trust.
+
+```bash
+lgmd-gym bench --suite r152 --agents policy:policy.zip
+```
+
+```python
+from lgmd_gym.agents import make_agent
+
+agent = make_agent("policy:policy.zip")
+print(agent.card)
+```
+
+## Training
+
+```yaml
+{config}```
+"""
+
+
+class Result(NamedTuple):
+    """The best evaluation of a training run on the validation split.
+
+    Attributes:
+        mean: Mean return.
+        std: Standard deviation over episodes; None if it was not recorded.
+        episodes: Number of episodes.
+    """
+
+    mean: float
+    std: float | None
+    episodes: int
+
+    def __str__(self) -> str:
+        return f"{self.mean:.2f}" if self.std is None else f"{self.mean:.2f} +/- {self.std:.2f}"
+
+
+def write_model_card(config: TrainConfig, folder: Path, version: str) -> None:
+    """Write the model card of a finished training run into its folder."""
+    import yaml
+
+    result = best_result(config, folder)
+    text = "The training had no evaluation."
+    if result is not None:
+        text = f"Best evaluation: mean return {result} over {result.episodes} episodes of the split `validation`."
+    page = _PAGE.format(
+        algo=config.algo.upper(),
+        env_id=config.env_id,
+        version=version,
+        inputs=", ".join(f"`{name}`" for name in config.features.inputs),
+        evaluation=text,
+        config=yaml.safe_dump(_shown(config), sort_keys=False),
+    )
+    metadata = yaml.safe_dump(_metadata(config, result), sort_keys=False)
+    with complete_file(folder / FILE) as part:
+        part.write_text(f"---\n{metadata}---\n\n{page}", encoding="utf-8")
+
+
+def best_result(config: TrainConfig, folder: Path) -> Result | None:
+    """Return the best evaluation in a training folder; None without one."""
+    online, offline = folder / "best" / "evaluations.npz", folder / "log" / "progress.csv"
+    if online.exists():
+        with np.load(online) as log:
+            results = log["results"]
+        best = results[results.mean(axis=1).argmax()]
+        return Result(float(best.mean()), float(best.std()), best.size)
+    if offline.exists():
+        with offline.open(encoding="utf-8") as file:
+            returns = [float(row["mean_return"]) for row in csv.DictReader(file)]
+        return Result(max(returns), None, config.eval_episodes) if returns else None
+    return None
+
+
+def _metadata(config: TrainConfig, result: Result | None) -> dict[str, Any]:
+    """Return the YAML metadata of the Hub."""
+    metadata: dict[str, Any] = {
+        "library_name": "stable-baselines3",
+        "tags": ["reinforcement-learning", "deep-reinforcement-learning", "stable-baselines3", config.env_id],
+    }
+    if result is not None:
+        entry = {
+            "task": {"type": "reinforcement-learning", "name": "reinforcement-learning"},
+            "dataset": {"name": config.env_id, "type": config.env_id},
+            "metrics": [
+                {"type": "mean_reward", "value": str(result), "name": "mean_reward", "verified": False}
+            ],
+        }
+        metadata["model-index"] = [{"name": config.algo.upper(), "results": [entry]}]
+    return metadata
+
+
+def _shown(config: TrainConfig) -> dict[str, Any]:
+    """Return the configuration without local paths and without the cameras, which the policy file contains."""
+    values = config.to_dict()
+    return {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in values.items()
+        if name not in ("camera", "recordings")
+    }

@@ -1,0 +1,90 @@
+"""Files of a training run for other tools: `monitor.csv` and the model card."""
+
+import numpy as np
+import pytest
+import yaml
+from stable_baselines3.common.monitor import load_results
+from support.recordings import offline_config, write_yaml
+
+from lgmd_gym.training import TrainConfig, train
+from lgmd_gym.training.episode_log import EpisodeLog
+from lgmd_gym.training.model_card import best_result, write_model_card
+
+YAML = """
+LGMD/CCRs-v0:
+  env_wrapper:
+    - lgmd_gym.training.PolicyWrapper: {history: 1, repeat: 10, latch: true}
+  n_envs: 2
+  n_timesteps: 32
+  n_steps: 8
+  batch_size: 8
+  policy_kwargs: {net_arch: [4]}
+"""
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("training")
+    config = TrainConfig.from_hyperparams(
+        "ppo",
+        "LGMD/CCRs-v0",
+        write_yaml(folder, YAML),
+        camera="fovea",
+        inputs=["ego_speed"],
+        eval_freq=16,
+        eval_episodes=3,
+    )
+    train(config, folder / "run")
+    return config, folder / "run"
+
+
+def test_episodes_are_in_the_format_of_stable_baselines3(finished):
+    config, folder = finished
+    table = load_results(str(folder))
+    assert list(table.columns[:3]) == ["index", "r", "l"]
+    assert len(table) >= 2
+    assert table["l"].sum() <= config.n_timesteps
+    assert (folder / "monitor.csv").read_text().startswith('#{"t_start": 0.0, "env_id": "LGMD/CCRs-v0"}')
+
+
+def test_a_resumed_run_appends_its_episodes(tmp_path):
+    for total in (1.5, -3.0):
+        log = EpisodeLog(tmp_path, "LGMD/CCRs-v0")
+        log.locals = {"infos": [{}, {"episode": {"r": total, "l": 4, "t": 0.5}}]}
+        log._on_training_start()
+        log._on_step()
+        log._on_training_end()
+    assert load_results(str(tmp_path))["r"].tolist() == [1.5, -3.0]
+
+
+def test_model_card_has_the_best_evaluation(finished):
+    config, folder = finished
+    text = (folder / "README.md").read_text()
+    metadata, page = yaml.safe_load(text.split("---\n")[1]), text.split("---\n", 2)[2]
+    with np.load(folder / "best" / "evaluations.npz") as log:
+        means = log["results"].mean(axis=1)
+    (entry,) = metadata["model-index"][0]["results"]
+    assert entry["metrics"][0]["value"].startswith(f"{means.max():.2f} +/- ")
+    assert entry["dataset"]["name"] == "LGMD/CCRs-v0"
+    assert "3 episodes of the split `validation`" in page
+    assert "Its inputs: `ego_speed`." in page
+    listed = yaml.safe_load(page.split("```yaml\n")[1].split("```")[0])
+    assert listed["algo_kwargs"]["n_steps"] == config.algo_kwargs["n_steps"]
+    assert "camera" not in listed
+
+
+def test_model_card_of_offline_training(tmp_path):
+    config = offline_config(tmp_path)
+    (tmp_path / "log").mkdir()
+    (tmp_path / "log" / "progress.csv").write_text("mean_return,avoided\n-1.0,0.1\n2.5,0.6\n2.0,0.5\n")
+    result = best_result(config, tmp_path)
+    assert (str(result), result.episodes) == ("2.50", 4)
+    write_model_card(config, tmp_path, "0.1")
+    assert "value: '2.50'" in (tmp_path / "README.md").read_text()
+
+
+def test_model_card_without_an_evaluation(tmp_path):
+    write_model_card(offline_config(tmp_path), tmp_path, "0.1")
+    text = (tmp_path / "README.md").read_text()
+    assert "model-index" not in text
+    assert "The training had no evaluation." in text
