@@ -66,7 +66,7 @@ def write_model_card(config: TrainConfig, folder: Path, version: str) -> None:
     result = best_result(config, folder)
     text = "The training had no evaluation."
     if result is not None:
-        text = f"Best evaluation: mean return {result} over {result.episodes} episodes of the split `validation`."
+        text = f"Best evaluation: mean return {result} over {result.episodes} episodes of `validation`."
     page = _PAGE.format(
         algo=config.algo.upper(),
         env_id=config.env_id,
@@ -114,7 +114,7 @@ def _metadata(config: TrainConfig, result: Result | None) -> dict[str, Any]:
 
 
 def _shown(config: TrainConfig) -> dict[str, Any]:
-    """Return the configuration without local paths and without the cameras, which the policy file contains."""
+    """Return the configuration without local paths, and without cameras, which the policy contains."""
     values = config.to_dict()
     return {
         name: list(value) if isinstance(value, tuple) else value

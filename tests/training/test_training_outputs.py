@@ -66,7 +66,7 @@ def test_model_card_has_the_best_evaluation(finished):
     (entry,) = metadata["model-index"][0]["results"]
     assert entry["metrics"][0]["value"].startswith(f"{means.max():.2f} +/- ")
     assert entry["dataset"]["name"] == "LGMD/CCRs-v0"
-    assert "3 episodes of the split `validation`" in page
+    assert "3 episodes of `validation`" in page
     assert "Its inputs: `ego_speed`." in page
     listed = yaml.safe_load(page.split("```yaml\n")[1].split("```")[0])
     assert listed["algo_kwargs"]["n_steps"] == config.algo_kwargs["n_steps"]
