@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from lgmd_gym.cli import video
+from lgmd_gym.cli import clips
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Paper
 from lgmd_gym.paper import experiments
@@ -35,18 +35,18 @@ def run(options: Paper) -> int:
     jobs = []
     if options.clips is not None:
         jobs = make_jobs([options.clips], options.crashes)
-        video.print_notes(jobs, options.crashes)
+        clips.print_notes(jobs, options.crashes)
     settings = {"clips": [job.clip for job in jobs], "picture": options.picture}
-    out = video.default_out(options.out, "paper")
-    with video.run_folder(out, settings) as folder:
+    out = clips.default_out(options.out, "paper")
+    with clips.run_folder(out, settings) as folder:
         clip_results = _experiments(options, jobs, folder)
     make_console().print(f"claims and figures: {out}", soft_wrap=True)
-    return video.print_errors(clip_results)
+    return clips.print_errors(clip_results)
 
 
 def _experiments(options: Paper, jobs: Sequence[ClipJob], folder: Path) -> list[ClipResult]:
     """Run the experiments, write the claims and figures, and return the results of the clips."""
-    with video.progress_bar("paper", experiments.STEPS) as set_progress:
+    with clips.progress_bar("paper", experiments.STEPS) as set_progress:
         steps = iter(range(1, experiments.STEPS + 1))
         results = experiments.run_experiments(lambda: set_progress(next(steps)), options.picture)
     console, clip_results, detections = make_console(), [], None
@@ -67,12 +67,12 @@ def _process_all_configs(
     Returns:
         Results of all configurations, and the detections of the configuration `paper`.
     """
-    folders = video.make_clip_folders(out, jobs)
+    folders = clips.make_clip_folders(out, jobs)
     results, detections = [], {}
     for name, config in PLAYBACK_CONFIGS.items():
-        batch = video.process_clips(jobs, folders, name, config, f"-{name}")
+        batch = clips.process_clips(jobs, folders, name, config, f"-{name}")
         results += batch
-        detections[name] = video.detect_clips(jobs, batch)
+        detections[name] = clips.detect_clips(jobs, batch)
     descriptions = {name: config.describe() for name, config in PLAYBACK_CONFIGS.items()}
     for name in ("paper", "conservative"):
         console.print(tables.detection_table(f"{name}: {descriptions[name]}", detections[name]))

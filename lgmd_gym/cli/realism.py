@@ -5,7 +5,7 @@ from itertools import count
 from pathlib import Path
 
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
-from lgmd_gym.cli import video
+from lgmd_gym.cli import clips
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Paper
 from lgmd_gym.errors import check_whole, check_within
@@ -25,12 +25,12 @@ def run(options: Paper) -> int:
     check_within("clip_hfov_deg", options.clip_hfov_deg, 10.0, 160.0, "degrees")
     check_within("ignore_bottom", options.ignore_bottom, 0.0, 0.5)
     jobs = make_jobs([options.clips], options.crashes)
-    video.print_notes(jobs, options.crashes)
+    clips.print_notes(jobs, options.crashes)
     optics = common_optics(jobs, options.clip_hfov_deg, options.ignore_bottom)
-    out = video.default_out(options.out, "realism")
+    out = clips.default_out(options.out, "realism")
     settings = {"clips": [job.clip for job in jobs], "optics": optics._asdict(), "seeds": len(seeds),
                 "worlds": len(worlds)}  # fmt: skip
-    with video.run_folder(out, settings) as folder:
+    with clips.run_folder(out, settings) as folder:
         drives = _all_values(jobs, optics, options.night, simulated_drives(worlds, seeds))
         _write(drives, folder)
     make_console().print(f"tables and figure: {out}", soft_wrap=True)
@@ -42,11 +42,11 @@ def _all_values(
 ) -> list[DriveValues]:
     """Return the statistics of the clips, and of the simulated drives of their groups."""
     steps = count(1)
-    with video.progress_bar("clips", len(jobs)) as set_progress:
+    with clips.progress_bar("clips", len(jobs)) as set_progress:
         real = clip_values(jobs, optics, night, lambda: set_progress(next(steps)))
     groups = {item.group for item in real}
     compared, steps = [item for item in drives if item.group in groups], count(1)
-    with video.progress_bar("simulated drives", sum(len(item.seeds) for item in compared)) as set_progress:
+    with clips.progress_bar("simulated drives", sum(len(item.seeds) for item in compared)) as set_progress:
         return real + simulated_values(compared, optics, lambda: set_progress(next(steps)))
 
 

@@ -159,3 +159,11 @@ def test_drive_plays_an_own_family(folder, capsys):
     options = ["--agent", "no-brake", "--module", "my_scenarios", "--set", "gap=6"]
     assert cli.run(["drive", "LGMD/Squeeze-v0", *options]) == 0
     assert "contact at" in capsys.readouterr().out
+
+
+def test_list_shows_own_families(capsys):
+    for command, own in ((["list", "envs"], False), (["list", "envs", "--module", "my_scenarios"], True)):
+        assert cli.run(command) == 0
+        out = capsys.readouterr().out
+        assert ("LGMD/Squeeze-v0" in out and "A slower car cuts in behind a truck." in out) == own
+        assert "LGMD/CCRs-v0" in out

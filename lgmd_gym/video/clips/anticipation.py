@@ -50,53 +50,10 @@ from lgmd_gym.video.clips.alarm_curves import (
     numbers_of_clips,
     window_shares,
 )
-from lgmd_gym.video.clips.detection import SETTLE_S
+from lgmd_gym.video.clips.scored_clip import ScoredClip
 
 PIECES = 2000  # random pieces of clips without an event
 CHANCE_DRAWS = 1000  # samples of the chance level
-
-
-class ScoredClip(NamedTuple):
-    """Scores of the frames of one clip.
-
-    Attributes:
-        name: Name of the clip.
-        scores: Score of each evaluated frame, float, shape (frames,). The event follows the last frame.
-        event: Whether the clip ends in an event.
-        fps: Frame rate [Hz].
-    """
-
-    name: str
-    scores: np.ndarray
-    event: bool
-    fps: float
-
-    @classmethod
-    def of(
-        cls, name: str, scores: np.ndarray, fps: float, event_s: float | None, start_s: float = 0.0,
-        end_s: float | None = None,
-    ) -> "ScoredClip":  # fmt: skip
-        """Return the evaluated frames of a whole clip.
-
-        Args:
-            name: Name of the clip.
-            scores: Score of each frame of the clip, shape (frames,).
-            fps: Frame rate [Hz].
-            event_s: Time of the event from the first frame [s]; None without one.
-            start_s: Start of the evaluation [s].
-            end_s: End of the evaluation of a clip without an event [s]; None for the end of the clip.
-        """
-        last = event_s if event_s is not None else end_s
-        stop = len(scores) if last is None else round(last * fps)
-        first = max(round(start_s * fps), round(SETTLE_S * fps))
-        return cls(name, np.asarray(scores, float)[first:stop], event_s is not None, fps)
-
-    def time_to_event(self, threshold: float | None) -> float | None:
-        """Return the time from the first frame in alarm to the event [s]; None without alarm or event."""
-        if not self.event or threshold is None:
-            return None
-        frames = np.flatnonzero(self.scores >= threshold)
-        return float(len(self.scores) - frames[0]) / self.fps if len(frames) else None
 
 
 class Score(NamedTuple):
@@ -155,22 +112,12 @@ def anticipation(clips: Sequence[ScoredClip], cap: float = 0.1) -> Anticipation:
     negatives = [clip for clip in clips if not clip.event and len(clip.scores)]
     if not events:
         raise ValueError("no clip has an evaluated frame before an event; the scores need at least one")
-    levels = np.unique(np.concatenate([clip.scores for clip in (*events, *negatives)]))
-    levels = levels[levels > 0.0] if levels[-1] > 0.0 else np.array([np.inf])
-    false = np.zeros((len(negatives), len(levels)))
-    for row, clip in enumerate(negatives):
-        false[row] = window_shares(clip.scores, clip.fps, levels)
+    levels = _levels((*events, *negatives))
+    alarms, false = _alarms(events, levels), _false_alarms(negatives, levels)
     rng = np.random.default_rng(0)
-    ones = np.ones((1, len(events))), np.ones((1, len(negatives)))
-    drawn = _drawn(rng, len(events)), _drawn(rng, len(negatives))
-    alarms = _alarms(events, levels)
-    values, samples = figures(alarms, false, cap, *ones)[:, 0], figures(alarms, false, cap, *drawn)
-    chance = np.full((len(FIGURES), 0), np.nan)
-    if negatives:
-        pieces = _random_pieces(rng, events, negatives)
-        weights = rng.multinomial(len(events), np.full(PIECES, 1.0 / PIECES), CHANCE_DRAWS)
-        every = np.ones((CHANCE_DRAWS, len(negatives)))
-        chance = figures(_alarms(pieces, levels), false, cap, weights, every)
+    values = figures(alarms, false, cap, np.ones((1, len(events))), np.ones((1, len(negatives))))[:, 0]
+    samples = figures(alarms, false, cap, _drawn(rng, len(events)), _drawn(rng, len(negatives)))
+    chance = _chance(rng, events, negatives, levels, false, cap)
     clips_of = numbers_of_clips(alarms, false, cap)
     scores = [
         _score(name, *row, clips_of[name], min(len(events), len(negatives)))
@@ -179,6 +126,33 @@ def anticipation(clips: Sequence[ScoredClip], cap: float = 0.1) -> Anticipation:
     level = int(cap_level(false.sum(axis=0, keepdims=True), len(negatives), cap)[0])
     threshold = float(levels[level]) if level < len(levels) else np.inf
     return Anticipation(threshold if negatives else None, cap, len(events), len(negatives), tuple(scores))
+
+
+def _levels(clips: Sequence[ScoredClip]) -> np.ndarray:
+    """Return all thresholds, ascending: the scores above 0, or infinity if no score is above 0."""
+    levels = np.unique(np.concatenate([clip.scores for clip in clips]))
+    return levels[levels > 0.0] if levels[-1] > 0.0 else np.array([np.inf])
+
+
+def _false_alarms(negatives: Sequence[ScoredClip], levels: np.ndarray) -> np.ndarray:
+    """Return the share of windows in alarm, shape (clips, thresholds)."""
+    false = np.zeros((len(negatives), len(levels)))
+    for row, clip in enumerate(negatives):
+        false[row] = window_shares(clip.scores, clip.fps, levels)
+    return false
+
+
+def _chance(
+    rng: np.random.Generator, events: Sequence[ScoredClip], negatives: Sequence[ScoredClip],
+    levels: np.ndarray, false: np.ndarray, cap: float,
+) -> np.ndarray:  # fmt: skip
+    """Return the figures of events at random times, shape (figures, draws); no draws without negatives."""
+    if not negatives:
+        return np.full((len(FIGURES), 0), np.nan)
+    pieces = _random_pieces(rng, events, negatives)
+    weights = rng.multinomial(len(events), np.full(PIECES, 1.0 / PIECES), CHANCE_DRAWS)
+    every = np.ones((CHANCE_DRAWS, len(negatives)))
+    return figures(_alarms(pieces, levels), false, cap, weights, every)
 
 
 def _alarms(events: Sequence[ScoredClip], levels: np.ndarray) -> EventAlarms:

@@ -12,9 +12,9 @@ import numpy as np
 
 from lgmd_gym.video import TruncatedVideoError, find_clips
 from lgmd_gym.video.clips.annotations import ClipEvent, read_crashes, read_events
-from lgmd_gym.video.clips.anticipation import ScoredClip
 from lgmd_gym.video.clips.detection import ClipDetection, detect
 from lgmd_gym.video.clips.playback import TRACE_COLUMNS, ClipRun, PlaybackConfig
+from lgmd_gym.video.clips.scored_clip import ScoredClip
 from lgmd_gym.video.clips.summary import ClipSummary
 from lgmd_gym.video.probe import VideoInfo, probe
 

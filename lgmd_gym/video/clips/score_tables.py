@@ -9,7 +9,8 @@ from rich.table import Table
 
 from lgmd_gym.errors import counted
 from lgmd_gym.video.clips.alarm_curves import FIGURES, HORIZONS_S, TTA_CAP, window_score
-from lgmd_gym.video.clips.anticipation import CHANCE_DRAWS, Anticipation, Score, ScoredClip
+from lgmd_gym.video.clips.anticipation import CHANCE_DRAWS, Anticipation, Score
+from lgmd_gym.video.clips.scored_clip import ScoredClip
 
 CAPTION = (
     "threshold: the lowest at which at most the cap of all 1.5 s windows in clips without an event is in "
