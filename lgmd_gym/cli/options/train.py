@@ -1,0 +1,54 @@
+"""Options of `train`; attribute docstrings are the help texts."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from tyro.conf import arg
+
+from lgmd_gym.cli.options.values import Count, File, Name, Names
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train:
+    """Train a policy with stable-baselines3; run it with --agents policy:FOLDER/policy.zip.
+
+    The folder contains TensorBoard logs, checkpoints, the evaluations on the validation split and the policy
+    with the best mean return in them. Ctrl-C keeps the checkpoints; --resume continues from the last one.
+    """
+
+    algo: str = "dqn"
+    """Algorithm: sac, ppo, dqn, or offline (trained on recorded episodes in minutes)."""
+    env: str = "LGMD/RandomBraking-v0"
+    """Environment id; RandomBraking is trained on its split train and evaluated on its split validation."""
+    camera: Names = None
+    """Camera presets, one neuron each. Default: fovea tele wide."""
+    sensors_of: Name = None
+    """Agent whose cameras are used instead, for example stopping-zone; all-round adds fields at the sides."""
+    inputs: Names = None
+    """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change and
+    ego_yaw_rate; also frame; with the cameras of stopping-zone, also zones, zones_spikes and zones_ffi; with
+    those of all-round, also sides and sides_ffi.
+    Default: from the hyperparameters."""
+    demands: Annotated[tuple[float, ...] | None, arg(metavar="[X ...]")] = None
+    """Demands that the policy chooses from, from -1 (full braking) to 1; --demands alone for a continuous
+    demand. Default: 0 -0.4 -1 for ppo and dqn, continuous for sac, 0 -1 for offline."""
+    n_timesteps: Count = None
+    """Number of policy decisions (offline: of recorded episodes). Default: from the hyperparameters."""
+    seed: int = 0
+    """Seed of the network and the environments."""
+    hyperparams: File = None
+    """YAML file in rl-zoo's format. Default: the file of this package."""
+    eval_freq: int = 16_000
+    """Number of decisions between two evaluations; offline evaluates after every epoch."""
+    eval_episodes: Count = None
+    """Number of episodes per evaluation. Default: 60; for offline, 600."""
+    recordings: File = None
+    """Folder of an offline training run with the same cameras, to reuse its recorded episodes."""
+    traffic_episodes: int = 0
+    """Number of traffic episodes, in which braking is false, that offline trains on in addition."""
+    jobs: int = 2
+    """Number of processes that record episodes."""
+    out: File = None
+    """Training folder; must not exist. Default: runs/train-ALGO-DATE-TIME."""
+    resume: File = None
+    """Folder of an interrupted training run, to continue it with its own options."""
