@@ -44,8 +44,8 @@ def conclusion(rows: list[Row], agents: list[str], suite: str) -> str:
 
 def _sample_sentence(rows: list[Row], suite: str) -> str:
     """Return the sizes of the run, and in how many episodes `no-brake` has contact."""
-    counted = [row for row in without_fcw_driver(rows) if row["error"] is None]
-    base = [row for row in counted if row["agent"] == NO_BRAKE]
+    complete = [row for row in without_fcw_driver(rows) if row["error"] is None]
+    base = [row for row in complete if row["agent"] == NO_BRAKE]
     threats = sum(bool(row["threat"]) for row in base)
     start = f"The run contains {counted(len(rows), 'episode')} of suite {suite} ({Sample.of(rows)})."
     contacts = f" Without braking, {threats} of {counted(len(base), 'episode')} end in contact (threats)."
@@ -54,9 +54,9 @@ def _sample_sentence(rows: list[Row], suite: str) -> str:
 
 def _agent_sentences(rows: list[Row], agents: list[str]) -> list[str]:
     """Return the avoided threats and the false activations of each agent."""
-    counted = [row for row in without_fcw_driver(rows) if row["error"] is None]
-    kinds = {bool(row["threat"]) for row in counted}
-    sentences = [_agent_sentence(counted, agent, kinds) for agent in agents]
+    complete = [row for row in without_fcw_driver(rows) if row["error"] is None]
+    kinds = {bool(row["threat"]) for row in complete}
+    sentences = [_agent_sentence(complete, agent, kinds) for agent in agents]
     if kinds == {True}:
         sentences.append("No episode is without a threat: false activations were not measured.")
     if kinds == {False}:

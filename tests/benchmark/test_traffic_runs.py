@@ -67,7 +67,7 @@ def test_table_shows_rates_with_intervals(summary_rows):
     console.print(traffic_table(summary_rows, ["a", "b"], "title"))
     text = console.export_text()
     assert "0.3 [0.0–1.9]" in text
-    assert "b (1 errors)" in text
+    assert "b (1 error)" in text
     assert "clustered by drive" in text
 
 
