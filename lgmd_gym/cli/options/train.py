@@ -17,11 +17,11 @@ class Train:
     """
 
     algo: str = "dqn"
-    """Algorithm: sac, ppo, dqn, or offline (trained on recorded episodes in minutes)."""
+    """Algorithm: dqn, ppo, sac, or offline (trained on recorded episodes)."""
     env: str = "LGMD/RandomBraking-v0"
     """Environment id; RandomBraking is trained on its split train and evaluated on its split validation."""
     camera: Names = None
-    """Camera presets, one neuron each. Default: fovea tele wide."""
+    """Camera presets, one neuron each. Default: those that the inputs require, else fovea tele wide."""
     sensors_of: Name = None
     """Agent whose cameras are used instead, for example stopping-zone; all-round adds fields at the sides."""
     inputs: Names = None
@@ -31,7 +31,7 @@ class Train:
     Default: from the hyperparameters."""
     demands: Annotated[tuple[float, ...] | None, arg(metavar="[X ...]")] = None
     """Demands that the policy chooses from, from -1 (full braking) to 1; --demands alone for a continuous
-    demand. Default: 0 -0.4 -1 for ppo and dqn, continuous for sac, 0 -1 for offline."""
+    demand. Default: 0 -1; continuous for sac."""
     n_timesteps: Count = None
     """Number of policy decisions (offline: of recorded episodes). Default: from the hyperparameters."""
     seed: int = 0
@@ -41,7 +41,7 @@ class Train:
     eval_freq: int = 16_000
     """Number of decisions between two evaluations; offline evaluates after every epoch."""
     eval_episodes: Count = None
-    """Number of episodes per evaluation. Default: 60; for offline, 600."""
+    """Number of episodes per evaluation. Default: 96; for offline, 600."""
     recordings: File = None
     """Folder of an offline training run with the same cameras, to reuse its recorded episodes."""
     traffic_episodes: int = 0
