@@ -1,7 +1,6 @@
 """Suites from OpenSCENARIO files: names, conditions, catalogs, roads, errors, runs."""
 
 import json
-import tomllib
 from dataclasses import replace
 
 import gymnasium as gym
@@ -10,8 +9,10 @@ from support.openscenario import (
     CORNER,
     HEADER,
     LANES,
+    SPEED,
     START,
     STRAIGHT,
+    SUN,
     compiled,
     event,
     lane_position,
@@ -24,30 +25,15 @@ from support.openscenario import (
     story,
     teleport,
     values,
-    variation,
+    varied,
     vehicle,
+    weather,
     write,
 )
 
-from lgmd_gym.benchmark import Executor, RunConfig, run
 from lgmd_gym.benchmark.openscenario import read, read_all
 from lgmd_gym.benchmark.openscenario.names import variants
-from lgmd_gym.benchmark.suite_file import copy_suite, get_suite
 from lgmd_gym.envs import Actor, RoadPlan, Scenario
-from lgmd_gym.envs.scenarios.data import scenario_to_data
-
-FAST = private("Ego", f"<TeleportAction><Position>{lane_position(100)}</Position></TeleportAction>",
-               speed("${$Ego_speed_kph / 3.6}"))  # fmt: skip
-SPEED = parameter("Ego_speed_kph", "36")
-
-
-def varied(folder, *items, name="vary", parameters=SPEED, init=None):
-    """Write a scenario and a file that varies it; return the path of the second."""
-    init = FAST + teleport("Target", lane_position(160)) if init is None else init
-    write(folder, scenario(init, parameters=parameters))
-    path = folder / f"{name}.xosc"
-    path.write_text(variation("".join(items)))
-    return path
 
 
 def test_a_scenario_is_a_suite_of_one_case(tmp_path):
@@ -110,17 +96,6 @@ def test_fcw_cells_have_the_driver(tmp_path):
     named = SPEED + parameter("Scenario_ID", "CCRs_FCW", "string")
     assert read(varied(tmp_path, values("Ego_speed_kph", 50), parameters=named)).cases[0].fcw_driver
     assert not read(varied(tmp_path, values("Ego_speed_kph", 50))).cases[0].fcw_driver
-
-
-def weather(inside):
-    return (
-        '<GlobalAction><EnvironmentAction><Environment name="e"><Weather fractionalCloudCover="zeroOktas">'
-        f"{inside}"
-        "</Weather></Environment></EnvironmentAction></GlobalAction>"
-    )
-
-
-SUN = '<Sun azimuth="0" elevation="1" illuminance="{}"/>'
 
 
 @pytest.mark.parametrize(
@@ -325,118 +300,6 @@ def test_known_elements_without_effect(tmp_path):
         "<CatalogLocations>", "<VariableDeclarations><X/></VariableDeclarations><CatalogLocations>"
     )
     assert len(read(write(tmp_path, text)).cases) == 1
-
-
-def test_several_files_and_folders_are_one_suite(tmp_path):
-    folder = tmp_path / "set"
-    (folder / "a").mkdir(parents=True)
-    (folder / "b").mkdir()
-    one = varied(folder / "a", values("Ego_speed_kph", 30, 50))
-    two = varied(folder / "b", values("Ego_speed_kph", 40))
-    expected = ["set/case/a/vary/v30", "set/case/a/vary/v50", "set/case/b/vary/v40"]
-    for paths in ([one, two], [folder], [folder / "a", folder / "b"], [one, folder]):
-        assert [case.name for case in read_all(paths).cases] == expected
-    assert [case.name for case in read_all([one]).cases] == ["vary/case/v30", "vary/case/v50"]
-    assert [case.name for case in get_suite(str(folder)).cases] == expected
-    assert [case.name for case in get_suite((str(one), str(two))).cases] == expected
-    with pytest.raises(ValueError, match=r"each must be a file .*, a folder or a Scenario, got 'quick'"):
-        get_suite((str(one), "quick"))
-
-
-@pytest.mark.parametrize(
-    ("suite", "message"),
-    [
-        ((3.5,), "suite must be a string, got 3.5"),
-        (3.5, "suite must be a string, got 3.5"),
-        ((), "suite must contain at least one file or folder, got none"),
-        ("x" * 5000, "unknown suite 'xxx"),
-        ("", "unknown suite ''"),
-    ],
-)
-def test_suites_that_are_no_names_or_paths(suite, message):
-    with pytest.raises(ValueError, match=message):
-        get_suite(suite)
-
-
-def test_suite_files_hold_scenarios(tmp_path):
-    night = weather(SUN.format(0))
-    suite = read(write(tmp_path, scenario(START, globals_=night), "dark_FCW.xosc"))
-    copy_suite(str(tmp_path / "dark_FCW.xosc"), tmp_path / "suite.toml")
-    table = tomllib.loads((tmp_path / "suite.toml").read_text())["cases"][0]
-    assert table["scenario"] == scenario_to_data(suite.cases[0].scenario)
-    assert get_suite(str(tmp_path / "suite.toml")).cases == suite.cases
-
-
-OWN = """name = "mine"
-[[cases]]
-family = "parked"
-name = "v30"
-arguments = { condition = "night" }
-[cases.scenario]
-ego_speed = 8.33
-duration = 9.0
-actors = [{ gap = 40.0, lateral_offset = 1.0 }]
-"""
-
-
-def test_own_scenarios_in_suite_files(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(OWN)
-    (case,) = get_suite(str(path)).cases
-    assert case.name == "mine/parked/v30"
-    assert case.scenario == Scenario(
-        family="parked", ego_speed=8.33, duration=9.0, actors=(Actor(gap=40.0, lateral_offset=1.0),)
-    )
-    assert dict(case.arguments)["condition"] == "night"
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("gap", "gaps"), r"unknown key of scenario.actors\[0\] 'gaps'; did you mean 'gap'"),
-        (
-            ("condition", "conditions"),
-            "unknown argument of a case with a scenario 'conditions'; did you mean",
-        ),
-        (
-            ("duration = 9.0", 'duration = 9.0\nfamily = "x"'),
-            "family 'parked' and scenario.family 'x' differ",
-        ),
-        (('name = "v30"', 'name = "v30"\nspeeds_kmh = [30]'), "speeds_kmh and scenario exclude each other"),
-    ],
-)
-def test_invalid_own_scenarios(tmp_path, change, message):
-    path = tmp_path / "mine.toml"
-    path.write_text(OWN.replace(*change))
-    with pytest.raises(ValueError, match=rf"suite file '.*mine\.toml': {message}"):
-        get_suite(str(path))
-
-
-def test_runs_play_and_resume_cells(tmp_path):
-    path = varied(tmp_path, values("Ego_speed_kph", 30, 50))
-    config = RunConfig(suite=str(path), agents=("ttc-oracle",), seeds=1, worlds=0)
-    table = run(config, tmp_path / "run", Executor(jobs=1), plots=False, report=True)
-    assert sorted(set(table["case"])) == ["vary/case/v30", "vary/case/v50"]
-    assert table[table["agent"] == "no-brake"]["threat"].all()
-    assert table[table["agent"] == "ttc-oracle"]["avoided"].all()
-    path.unlink()  # the run folder holds the scenarios
-    again = RunConfig.load(tmp_path / "run" / "run.toml")
-    assert len(get_suite(again.suite).cases) == 2
-
-
-def test_several_suites_in_a_configuration(tmp_path):
-    one = str(varied(tmp_path, values("Ego_speed_kph", 30), name="one"))
-    two = str(varied(tmp_path, values("Ego_speed_kph", 50), name="two"))
-    config = RunConfig(suite=(one, two), agents=("no-brake",))
-    assert config.suite == (one, two)
-    assert RunConfig(suite=(one,)).suite == one
-    (tmp_path / "run").mkdir()
-    loaded = RunConfig.load(config.save(tmp_path / "run"))
-    assert [case.name.split("/", 1)[1] for case in get_suite(loaded.suite).cases] == [
-        "case/one/v30", "case/two/v50"
-    ]  # fmt: skip
-    with pytest.raises(ValueError, match="suite must contain at least one name or path"):
-        RunConfig(suite=())
 
 
 def test_corner_roads_are_read(tmp_path):

@@ -184,3 +184,33 @@ def element(folder, text):
     path.write_text(text)
     root = Element(parse_file(path), {})
     return Element(root.node, declare(root, {}))
+
+
+AWAY = speed(6, "rate", "linear", 2)
+FAST = private("Ego", f"<TeleportAction><Position>{lane_position(100)}</Position></TeleportAction>",
+               speed("${$Ego_speed_kph / 3.6}"))  # fmt: skip
+SPEED = parameter("Ego_speed_kph", "36")
+SUN = '<Sun azimuth="0" elevation="1" illuminance="{}"/>'
+
+
+def segments(folder, stories, init=START, name="Target", **kwargs):
+    """Return the compiled speed segments of an entity."""
+    return compiled(folder, scenario(init, stories, **kwargs)).world.movers[name].timeline.segments
+
+
+def varied(folder, *items, name="vary", parameters=SPEED, init=None):
+    """Write a scenario and a file that varies it; return the path of the second."""
+    init = FAST + teleport("Target", lane_position(160)) if init is None else init
+    write(folder, scenario(init, parameters=parameters))
+    path = folder / f"{name}.xosc"
+    path.write_text(variation("".join(items)))
+    return path
+
+
+def weather(inside):
+    """Return the global action of an environment with this weather."""
+    return (
+        '<GlobalAction><EnvironmentAction><Environment name="e"><Weather fractionalCloudCover="zeroOktas">'
+        f"{inside}"
+        "</Weather></Environment></EnvironmentAction></GlobalAction>"
+    )
