@@ -14,6 +14,7 @@ levels for the return. It is in Markdown.
 
 import argparse
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -55,14 +56,11 @@ SPEEDS = ("ego_speed", "ego_yaw_rate")
 ARMS = {
     "recipe: DQN, 3.75 Hz, potentials": Arm("dqn"),
     "7.5 Hz": Arm("dqn", {"repeat": 4}),
-    "15 Hz": Arm("dqn", {"repeat": 2}),
     "reward of the environment": Arm("dqn", false_cost=1.0),
     "exploration 0.3 in place of 0.03": Arm("dqn", {}, {"exploration_initial_eps": 0.3}),
-    "two layers of 64 units": Arm("dqn", {}, {"policy_kwargs": {"net_arch": [64, 64]}}),
     "PPO": Arm("ppo"),
     "spike frequencies": Arm("dqn", {"inputs": ("zones_spikes", *SPEEDS)}),
     "mean luminance change F̂": Arm("dqn", {"inputs": ("zones_ffi", *SPEEDS)}),
-    "potentials and F̂": Arm("dqn", {"inputs": ("zones", "zones_ffi", *SPEEDS)}),
     "speed and yaw rate only": Arm("dqn", {"inputs": SPEEDS}),
 }
 
@@ -161,14 +159,20 @@ def train_arm(arm: Arm, seed: int, folder: Path, share: float = 1.0) -> np.ndarr
     torch.set_num_threads(1)
     config = TrainConfig.from_hyperparams(arm.algo)
     features = replace(config.features, **arm.features)
-    table = Decisions(read_levels(folder, "train"), features, arm.false_cost)
+    table = read_decisions(folder, "train", features, arm.false_cost)
     envs = RecordedLevels(table, config.n_envs, features.reward_scale)
     envs.seed(seed)
     kwargs = algorithm_kwargs(config) | arm.algo_kwargs
     model = algorithm_class(arm.algo)(config.policy, envs, seed=seed, device="cpu", **kwargs)
     frames = share * config.n_timesteps * config.features.repeat
     model.learn(round(frames / features.repeat))
-    return evaluate(model, Decisions(read_levels(folder, "validation"), features, 1.0))
+    return evaluate(model, read_decisions(folder, "validation", features, 1.0))
+
+
+@lru_cache(maxsize=2)  # the training and validation levels of an arm
+def read_decisions(folder: Path, split: str, features: FeatureConfig, false_cost: float) -> Decisions:
+    """Return the decisions of the recorded levels of a split."""
+    return Decisions(read_levels(folder, split), features, false_cost)
 
 
 def evaluate(model: Any, table: Decisions) -> np.ndarray:
