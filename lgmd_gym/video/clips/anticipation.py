@@ -120,8 +120,8 @@ def anticipation(clips: Sequence[ScoredClip], cap: float = 0.1) -> Anticipation:
     chance = _chance(rng, events, negatives, levels, false, cap)
     clips_of = numbers_of_clips(alarms, false, cap)
     scores = [
-        _score(name, *row, clips_of[name], min(len(events), len(negatives)))
-        for name, *row in zip(FIGURES, values, samples, chance, strict=True)
+        _score(name, value, drawn, random, clips_of[name], min(len(events), len(negatives)))
+        for name, value, drawn, random in zip(FIGURES, values, samples, chance, strict=True)
     ]
     level = int(cap_level(false.sum(axis=0, keepdims=True), len(negatives), cap)[0])
     threshold = float(levels[level]) if level < len(levels) else np.inf
@@ -170,7 +170,7 @@ def _random_pieces(
     """Return pieces of random clips without an event, each as long as the evaluated part of an event."""
     pieces = []
     for _ in range(PIECES):
-        event, clip = events[rng.integers(len(events))], negatives[rng.integers(len(negatives))]
+        event, clip = events[int(rng.integers(len(events)))], negatives[int(rng.integers(len(negatives)))]
         length = min(round(len(event.scores) / event.fps * clip.fps), len(clip.scores))
         start = rng.integers(len(clip.scores) - length + 1)
         pieces.append(clip._replace(scores=clip.scores[start : start + length]))

@@ -69,7 +69,9 @@ class McapWriter:
         for name, layer in neuron.layers.items():
             pixels = np.minimum(np.rint(np.abs(layer)), 255.0).astype(np.uint8)
             self._image(f"/layer/{name}", frame.time, pixels, "png", compress_level=1)
-        row = dict(zip(TRACE_COLUMNS, map(float, frame.row()), strict=True))
+        row: dict[str, float] = {
+            name: float(value) for name, value in zip(TRACE_COLUMNS, frame.row(), strict=True)
+        }
         self._message("/neuron", frame.time, row)
         if frame.onset:
             self._log(frame.time, "alarm begins")
