@@ -56,11 +56,10 @@ def column(run: StoredRun) -> dict[str, str]:
     return cells
 
 
-def table(runs: Sequence[StoredRun]) -> list[str]:
-    """Return the lines of the table."""
-    columns = [column(run) for run in runs]
-    agents = dict.fromkeys(agent for run in runs for agent in run.config.agents)
-    lines = [[name, *(cells.get(name, "–") for cells in columns)] for name in ("agent", *agents)]
+def table(columns: Sequence[dict[str, str]]) -> list[str]:
+    """Return the lines of the table of several columns."""
+    names = dict.fromkeys(name for cells in columns for name in cells)  # "agent" is the first
+    lines = [[name, *(cells.get(name, "–") for cells in columns)] for name in names]
     lines.insert(1, ["---"] * len(lines[0]))
     return ["| " + " | ".join(line) + " |" for line in lines]
 
@@ -72,4 +71,4 @@ if __name__ == "__main__":
         stored = [read_run(Path(folder)) for folder in sys.argv[1:]]
     except ValueError as error:
         sys.exit(str(error))
-    print(*table(stored), sep="\n")
+    print(*table([column(run) for run in stored]), sep="\n")

@@ -11,12 +11,14 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from all_scores import table
+from all_scores import column, table
 
 from lgmd_gym import benchmark
 from lgmd_gym.benchmark import RunConfig
+from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.executor import Executor
-from lgmd_gym.benchmark.stored_run import read_run
+from lgmd_gym.benchmark.stored_run import StoredRun, read_run
+from lgmd_gym.benchmark.summary import summarise
 
 # Worlds 8,000 to 8,019 and the road "normal" are the defaults.
 MIXED = {"conditions": ("mixed",)}
@@ -37,7 +39,22 @@ def main(agents: list[str], out: Path, runs: list[str], jobs: int = 1) -> None:
         if not (out / name).exists():
             config = RunConfig(agents=tuple(agents), **RUNS[name])
             benchmark.run(config, out / name, Executor(jobs=jobs), plots=False, report=False)
-    print(*table([read_run(out / name) for name in runs]), sep="\n")
+    columns = []
+    for name in runs:
+        run = read_run(out / name)
+        columns.append(column(run))
+        if name == "levels":  # has both threats and other episodes
+            columns.append(false_activations(run))
+    print(*table(columns), sep="\n")
+
+
+def false_activations(run: StoredRun) -> dict[str, str]:
+    """Return a column with the false activations of a run."""
+    rates = {
+        agent: summarise(agent, "", [row for row in run.rows if row["agent"] == agent]).false_activations
+        for agent in run.config.agents
+    }
+    return {"agent": "levels: false activations"} | {agent: rate_text(rate) for agent, rate in rates.items()}
 
 
 if __name__ == "__main__":

@@ -179,7 +179,8 @@ def test_all_scores():
     traffic = RunConfig(suite="traffic", agents=("a",), seeds=1, conditions=("mixed",))
     runs = [StoredRun(config, rows, False), StoredRun(quiet, false, False)]
     runs.append(StoredRun(traffic, [rows[0] | drive | {"threat": False}], False))
-    heading, _, none, a = load("all_scores").table(runs)
+    example = load("all_scores")
+    heading, _, none, a = example.table([example.column(run) for run in runs])
     assert "r152: avoided, 2 cases × 2 worlds, clear" in heading
     assert "false-reaction: false activations, 2 cases in the laboratory, clear" in heading
     assert "traffic: false activations per 100 km, 1 case × 1 world, mixed" in heading
