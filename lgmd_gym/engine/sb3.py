@@ -41,6 +41,15 @@ class EngineVecEnv(VecEnv):
         """Set the actions of the next `step_wait`."""
         self._actions = actions
 
+    def _take_seeds(self) -> Any:
+        """Return the seeds of a reset of all environments, and start new statistics."""
+        if any(self._options):
+            raise ValueError(f"the environments have no options, got {self._options}; call set_options()")
+        seeds: Any = list(self._seeds)
+        self._reset_seeds()
+        self._clear_statistics()
+        return seeds
+
     def close(self) -> None:
         """Close the environments."""
         self.envs.close()
@@ -155,13 +164,8 @@ class SB3VecEnv(EngineVecEnv):
         Raises:
             ValueError: If options were set; the environments have none.
         """
-        if any(self._options):
-            raise ValueError(f"the environments have no options, got {self._options}; call set_options()")
-        seeds: Any = list(self._seeds)
-        observations, infos = self.envs.reset(seed=seeds)
+        observations, infos = self.envs.reset(seed=self._take_seeds())
         self.reset_infos = _rows(infos, range(self.num_envs))
-        self._reset_seeds()
-        self._clear_statistics()
         return observations
 
     def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:

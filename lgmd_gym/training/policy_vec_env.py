@@ -39,11 +39,12 @@ class PolicyVecEnv(EngineVecEnv):
         self._rewards = np.zeros(envs.num_envs)
 
     def reset(self) -> dict[str, np.ndarray]:
-        """Reset all environments with the seeds of `seed`, if any; return their first observations."""
-        self._clear_statistics()
-        seeds: Any = list(self._seeds)
-        self._reset_seeds()
-        return self._stack(self._restart(np.ones(self.num_envs, np.bool_), seeds))
+        """Reset all environments with the seeds of `seed`, if any; return their first observations.
+
+        Raises:
+            ValueError: If options were set; the environments have none.
+        """
+        return self._stack(self._restart(np.ones(self.num_envs, np.bool_), self._take_seeds()))
 
     def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Advance each environment by one decision; return observations, rewards, ends and infos."""
