@@ -1,5 +1,6 @@
 """The scripts of docs/examples on reinforcement learning."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +10,7 @@ from support.recordings import synthetic_episode
 
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.benchmark import get_suite
+from lgmd_gym.training.offline.storage import save
 
 
 @pytest.mark.slow
@@ -38,13 +40,13 @@ def test_learning_curves(capsys, tmp_path):
 def recorded_decisions(example, false_cost=1.0):
     episodes = [synthetic_episode(length, seed=length, threat=length > 5) for length in (4, 5, 6, 9)]
     features = FeatureConfig(inputs=("ego_speed",), history=1, repeat=2)
-    return episodes, example.Decisions(episodes, features, false_cost)
+    return episodes, example.Decisions([episodes[:3], episodes[3:]], features, false_cost)
 
 
 def test_recorded_levels_replay_episodes():
     """An episode pays its rewards until it ends or the policy brakes; then another one starts."""
     pytest.importorskip("stable_baselines3")
-    example = load("rl_ablations")
+    example = load("recorded_levels")
     episodes, table = recorded_decisions(example)
     envs = example.RecordedLevels(table, num_envs=1, scale=0.5)
     envs.seed(3)
@@ -64,7 +66,7 @@ def test_recorded_levels_replay_episodes():
 
 
 def test_results_of_recorded_levels():
-    example = load("rl_ablations")
+    example = load("recorded_levels")
     episodes, table = recorded_decisions(example)
     never = SimpleNamespace(predict=lambda inputs, deterministic: (np.zeros(len(table.hold), int), None))
     returns, contacts, braked = example.evaluate(never, table)
@@ -80,12 +82,38 @@ def test_results_of_recorded_levels():
 
 def test_false_braking_costs_more_with_the_factor():
     """The return of braking moves away from that of holding, in episodes without a threat only."""
-    example = load("rl_ablations")
+    example = load("recorded_levels")
     episodes, table = recorded_decisions(example, false_cost=3.0)
     for index, episode in enumerate(episodes):
         hold, brake = episode.rewards.sum(), episode.braking_returns[0]
         expected = brake if episode.threat else hold + 3.0 * (brake - hold)
         assert table.cost[table.starts[index]] == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["offline", "frames"])
+def test_arms_are_trained_on_recorded_levels(name, tmp_path, monkeypatch, capsys):
+    """The offline arm uses the first levels only; the other arms share their tables with the workers."""
+    pytest.importorskip("stable_baselines3")
+    example = load("rl_ablations")
+    features = {"inputs": ("ego_speed",) if name == "offline" else ("frame", "ego_speed"), "repeat": 2}
+    few = {"buffer_size": 200, "learning_starts": 64, "batch_size": 16}
+    arm = replace(example.ARMS[name], features=features, algo_kwargs=few, budget=0.002)
+    monkeypatch.setitem(example.ARMS, name, arm)
+    for split, lengths in (("train", range(4, 24)), ("validation", range(4, 8))):
+        (tmp_path / "episodes" / split).mkdir(parents=True)
+        episodes = [[synthetic_episode(n, seed=n, threat=n % 2 == 0, frames=True)] for n in lengths]
+        save(episodes, tmp_path / "episodes" / split / "000000.npz", {})
+    trained = []
+    offline = example.OfflineDataset
+    monkeypatch.setattr(
+        example, "OfflineDataset", lambda *args: trained.append(len(args[0])) or offline(*args)
+    )
+    example.main(tmp_path, [name], seeds=1, levels=10)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "n = 1 seeds, 2 threats and 2 other validation levels"
+    assert lines[-1].startswith(f"| {arm.title} | ")
+    assert "nan" not in lines[-1]
+    assert trained == ([9, 1] if name == "offline" else [])
 
 
 def test_table_of_ablations_has_the_mean_over_seeds():
@@ -101,7 +129,6 @@ def test_table_of_ablations_has_the_mean_over_seeds():
 
 def test_leaderboard_prints_a_row_per_agent(monkeypatch, tmp_path, capsys):
     """A run that exists is not repeated."""
-    monkeypatch.syspath_prepend(str(EXAMPLES))
     example = load("leaderboard")
     suite = tmp_path / "mine.toml"
     suite.write_text('name = "mine"\n[[cases]]\nfamily = "CCRs"\nspeeds_kmh = [20]\n')

@@ -12,7 +12,6 @@ sampled and no value function is estimated. The gradient is the expectation of R
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import gymnasium as gym
 import numpy as np
 import torch
 from torch.nn.functional import logsigmoid
@@ -23,6 +22,7 @@ from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
+    from stable_baselines3.common.type_aliases import GymEnv
 
 EVAL_BATCH_SIZE = 64  # [episodes]
 RETURN_SCALE = 0.1  # factor of the loss
@@ -49,7 +49,7 @@ class OfflineLearner:
 
     Args:
         policy: stable-baselines3's name of the network.
-        env: Environment with the spaces of the policy.
+        env: Environment with the spaces of the policy, `gym.Env` or `VecEnv`; it is not stepped.
         demands: Demand of each action: `HOLD`, and a lower one that brakes.
         seed: Seed of the network and of the order of episodes.
         n_epochs: Number of passes over the training episodes.
@@ -71,7 +71,7 @@ class OfflineLearner:
     def __init__(
         self,
         policy: str,
-        env: gym.Env,
+        env: "GymEnv",
         demands: Sequence[float],
         *,
         seed: int = 0,
@@ -186,7 +186,7 @@ class OfflineLearner:
         return returns, brakes, contacts
 
 
-def _make_model(policy: str, env: gym.Env, seed: int, policy_kwargs: dict[str, Any]) -> "PPO":
+def _make_model(policy: str, env: "GymEnv", seed: int, policy_kwargs: dict[str, Any]) -> "PPO":
     """Return a PPO model; only its network and its file format are used."""
     from stable_baselines3 import PPO
 
