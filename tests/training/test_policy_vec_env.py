@@ -91,6 +91,38 @@ def test_no_frame_is_rendered_after_the_brake_latches(monkeypatch):
     assert rendered[:, 1].sum() == 1  # the first frame of the next episode
 
 
+def test_a_latched_brake_at_the_time_limit_is_a_termination():
+    """A policy with a latched brake decides nothing more, so its episode has no value beyond its end."""
+    config = replace(make_config("discrete"), env_id="LGMD/EmptyRoad-v0", env_kwargs={})
+    envs = make_envs(replace(config, features=replace(config.features, latch=True, repeat=3)), "train")
+    truncated, decisions = [], 0
+    for last in (HOLD, BRAKE):
+        envs.seed(0)
+        envs.reset()
+        for _ in range(decisions - 1):
+            envs.step(np.full(NUM_ENVS, HOLD))
+        action, done = last, np.array([False])
+        while not done.any():
+            _, _, done, infos = envs.step(np.full(NUM_ENVS, action))
+            decisions += last == HOLD
+        truncated.append(infos[0]["TimeLimit.truncated"])
+        assert not infos[0]["collision"]
+        assert (infos[0]["ego_speed"] > 0.0).all()
+    assert truncated == [True, False]
+
+
+def test_a_reset_uses_a_seed_once_and_refuses_options():
+    envs = make_envs(make_config("discrete"), "train")
+    envs.seed(1)
+    first, second = envs.reset()["ego_speed"], envs.reset()["ego_speed"]
+    assert not np.array_equal(first, second)
+    envs.seed(1)
+    np.testing.assert_array_equal(envs.reset()["ego_speed"], first)
+    envs.set_options({"level": 3})
+    with pytest.raises(ValueError, match=r"the environments have no options, got .*level"):
+        envs.reset()
+
+
 def test_training_and_evaluation_rewards_have_their_scales():
     config = make_config("discrete", env_kwargs={"start_level": 3, "num_levels": 1})
     config = replace(config, features=replace(config.features, latch=True, reward_scale=0.25))

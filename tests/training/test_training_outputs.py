@@ -73,6 +73,13 @@ def test_model_card_has_the_best_evaluation(finished):
     assert "camera" not in listed
 
 
+def test_the_best_evaluation_has_the_highest_mean_return(tmp_path):
+    (tmp_path / "best").mkdir()
+    results = [[1.0, 1.0], [3.0, 1.0], [9.0, -9.0]]
+    np.savez(tmp_path / "best" / "evaluations.npz", timesteps=[16, 32, 48], results=results)
+    assert str(best_result(offline_config(tmp_path), tmp_path)) == "2.00 +/- 1.00"
+
+
 def test_model_card_of_offline_training(tmp_path):
     config = offline_config(tmp_path)
     (tmp_path / "log").mkdir()
