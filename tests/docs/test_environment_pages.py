@@ -47,6 +47,8 @@ def test_a_page_states_what_the_environment_is(name, entries):
     assert "| `spike_frequency` | `(1,)` | `float32` | 0 to " in page
     assert "| `frame` | `(90, 160, 1)` | `uint8` | 0 to 255 | " in page
     assert "| `lgmd/fovea/ffi` | `float` | as in the observation" in page
+    for heading, text in (("Action space", "demand"), ("Rewards", "contact"), ("Episode end", "runcat")):
+        assert text in page.split(f"\n## {heading}\n")[1].split("\n## ")[0], heading
     assert "See `" not in page
     lines = page.splitlines()
     for line, following in pairwise(lines):
