@@ -10,7 +10,7 @@ from reference_returns import AGENTS, EXAMPLE, Returns, arguments_of
 
 from lgmd_gym.envs import env_id
 from lgmd_gym.envs.braking import BrakingEnv
-from lgmd_gym.envs.registration import RANDOM, SCENARIO
+from lgmd_gym.envs.registration import RANDOM_TASKS, SCENARIO
 from lgmd_gym.envs.scenarios.data import scenario_from_data
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.envs.traffic.registration import traffic_id
@@ -49,7 +49,7 @@ def environment_page(card: ScenarioCard, returns: Sequence[Returns]) -> str:
     parts = sections(cls)
     observation = env.observation_space
     end = parts["Episode End"]
-    if not card.traffic and card.name != RANDOM:
+    if not card.traffic and card.name not in RANDOM_TASKS:
         end += f"\n\nWith the default arguments, the duration is {env.unwrapped.scenario.duration:.1f} s."
     text = [
         f"# {name}",
@@ -133,7 +133,7 @@ def overview_tables(returns: Mapping[str, Sequence[Returns]]) -> str:
     for card in all_cards():
         if card.traffic:
             group = "Traffic"
-        elif card.name in (RANDOM, SCENARIO):
+        elif card.name in (*RANDOM_TASKS, SCENARIO):
             group = "Random and own scenarios"
         else:
             group = "Non-threats" if card.docstring.summary.endswith(_NO_THREAT) else "Threats"

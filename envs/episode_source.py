@@ -12,6 +12,7 @@ from lgmd_gym.envs.appearance import Appearance, brake_of, world_number
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.scenarios.distribution import (
     LEVELS,
+    check_families,
     check_levels,
     draw_camera_fields,
     draw_scenario,
@@ -85,7 +86,8 @@ class RandomLevels:
 
     A level is a random scenario with a number. Half of the levels are threats: the car-to-car, motorcycle,
     pedestrian and bicycle families of the protocols, see `lgmd_gym.envs.scenarios.distribution`. Half are
-    non-threats: all other families. A level fixes the family and its arguments, the grey levels,
+    non-threats: all other families. `families` restricts both halves; levels of other families have other
+    scenarios, in the same worlds. A level fixes the family and its arguments, the grey levels,
     the world, the camera condition (night, fog, …) and the contrast of the road texture, in every process.
     The splits are disjoint, and so are their worlds: training never uses a level or a world of validation or
     test. The environment's seed selects the levels; `info` adds `level` (the number), `world` (its number, or
@@ -99,9 +101,12 @@ class RandomLevels:
             "fog", "rain", "low_sun".
         world: Number of the world of all levels, or "laboratory"; None for the world of each level.
         road: See `Appearance`.
+        families: Names of the scenario families in use, None for all. Half of the levels are threats if both
+            threats and non-threats are among them.
 
     Raises:
-        ValueError: If the split, a condition or the world is unknown, or levels are outside the split.
+        ValueError: If the split, a condition, the world or a family is unknown, or levels are outside the
+            split.
     """
 
     def __init__(
@@ -112,18 +117,20 @@ class RandomLevels:
         conditions: Sequence[str] = tuple(CONDITIONS),
         world: int | str | None = None,
         road: str | None = None,
+        families: Sequence[str] | None = None,
     ) -> None:
         start_level, num_levels = check_levels(split, start_level, num_levels, conditions)
         self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
         self.num_levels = num_levels or LEVELS - start_level
+        self.families = check_families(families)
         self.appearance = Appearance(world=world, road=road, split=split)
-        self.first = draw_scenario(level_generator(split, start_level))
+        self.first = draw_scenario(level_generator(split, start_level), self.families)
 
     def draw(self, rng: np.random.Generator) -> Draw:
         """Return the next episode."""
         level = self.start_level + int(rng.integers(self.num_levels))
         generator = level_generator(self.split, level)
-        scenario = draw_scenario(generator)
+        scenario = draw_scenario(generator, self.families)
         placement = place(scenario, generator)
         world = self.appearance.draw(level_generator(self.split, level, part=2))
         fields = world | draw_camera_fields(self.split, level, self.conditions)

@@ -2,7 +2,7 @@
 
 import inspect
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium as gym
 
@@ -22,10 +22,38 @@ RANDOM = "RandomBraking"
 SCENARIO = "Scenario"
 """The id `LGMD/Scenario-v0`, whose argument `scenario` is a scenario as data."""
 _OTHERS = ("camera", "params", "fps", "include_frame", "include_base", "trace", "config", "render_mode")
-_LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions", "world", "road")
+LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions", "world", "road", "families")
+"""Arguments of `RandomLevels`."""
 APPEARANCE = ("world", "condition", "road")
 """Arguments that set how a scenario looks."""
 SCENARIO_ARGUMENT = "scenario"
+
+
+class RandomTask(NamedTuple):
+    """An id of random levels.
+
+    Attributes:
+        summary: One sentence on its levels.
+        arguments: Default arguments that differ from those of `RandomLevels`.
+    """
+
+    summary: str
+    arguments: dict[str, Any]
+
+
+# The non-threats have cars ahead, beside or none: no pedestrian, no mark on the road, no object at the path.
+_EASY_FAMILIES = (
+    *("CCRs", "CCRm", "CCRb"),
+    *("EmptyRoad", "Following", "AdjacentPass", "Overtaken", "CutOut"),
+)
+RANDOM_TASKS = {
+    RANDOM: RandomTask("A random level per episode: all families, worlds and camera conditions.", {}),
+    "RandomBrakingEasy": RandomTask(
+        "A random level per episode, for first trainings: cars on a straight and even road in clear weather.",
+        {"families": _EASY_FAMILIES, "conditions": ("clear",), "road": "smooth"},
+    ),
+}
+"""Ids `LGMD/<name>-v0` of random levels."""
 
 
 def env_id(family: str) -> str:
@@ -34,17 +62,20 @@ def env_id(family: str) -> str:
 
 
 def register_envs() -> None:
-    """Register `LGMD/<family>-v0` for every scenario family, `LGMD/RandomBraking-v0` and `LGMD/Scenario-v0`.
+    """Register `LGMD/<name>-v0` for every scenario family and random task, and `LGMD/Scenario-v0`.
 
     A second call has no effect.
     """
-    for family in (*FAMILIES, RANDOM, SCENARIO):
-        if env_id(family) not in gym.registry:
+    arguments: dict[str, dict[str, Any]] = {name: {"family": name} for name in (*FAMILIES, SCENARIO)}
+    for name, task in RANDOM_TASKS.items():
+        arguments[name] = {"family": RANDOM, "split": "train", **task.arguments}
+    for name, defaults in arguments.items():
+        if env_id(name) not in gym.registry:
             gym.register(
-                env_id(family),
+                env_id(name),
                 entry_point=f"{__name__}:make_braking",
                 vector_entry_point="lgmd_gym.engine:BrakingVectorEnv",
-                kwargs={"family": family},
+                kwargs=defaults,
             )
 
 
@@ -141,7 +172,7 @@ def _scenario(family: str, arguments: dict[str, Any]) -> "Scenario":
 
 def _argument_names(family: str) -> Iterable[str]:
     if check_text("family", family) == RANDOM:
-        return _LEVEL_ARGUMENTS
+        return LEVEL_ARGUMENTS
     if family == SCENARIO:
         return SCENARIO_ARGUMENT, *APPEARANCE
     check_known("scenario", family, (*FAMILIES, RANDOM, SCENARIO))

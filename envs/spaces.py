@@ -1,6 +1,6 @@
-"""Action and observation types of `BrakingEnv`."""
+"""Action and observation types of `BrakingEnv`, which those of `TrafficEnv` extend."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from typing import TYPE_CHECKING, Any, cast
 
@@ -14,7 +14,7 @@ from lgmd_gym.envs.simulation.vehicles import EgoCar
 from lgmd_gym.errors import check_items, check_keys, check_known, check_within
 
 if TYPE_CHECKING:
-    from lgmd_gym.envs.braking import BrakingEnv
+    from lgmd_gym.envs.base import EgoBrakeEnv
 
 
 class ContinuousDemand(ActionType):
@@ -49,7 +49,7 @@ class DiscreteDemand(ContinuousDemand):
         demands: Demands in [-1, 1], one per action.
     """
 
-    def __init__(self, env: "BrakingEnv", demands: Sequence[float] = (0.0, -0.5, -1.0)) -> None:
+    def __init__(self, env: "EgoBrakeEnv", demands: Sequence[float] = (0.0, -0.5, -1.0)) -> None:
         super().__init__(env)
         if not check_items("demands", demands, Real, "numbers"):
             raise ValueError("demands must contain at least one number in [-1, 1], got none")
@@ -90,15 +90,22 @@ class EgoState(ObservationType):
 ACTIONS = {"ContinuousDemand": ContinuousDemand, "DiscreteDemand": DiscreteDemand}
 
 
-def make_action(env: "BrakingEnv", config: dict[str, Any]) -> ActionType:
+def make_action(
+    env: "EgoBrakeEnv", config: dict[str, Any], types: Mapping[str, type[ContinuousDemand]] = ACTIONS
+) -> ActionType:
     """Return the action type for `config["action"]`.
+
+    Args:
+        env: The environment.
+        config: `type`, a key of `types`, and for "DiscreteDemand" optionally `demands`.
+        types: Action types of the environment.
 
     Raises:
         ValueError: If the type or a key is unknown, or a value is out of range.
     """
     arguments = dict(config)
     name = arguments.pop("type", None)
-    check_known("action type", name, ACTIONS)
+    check_known("action type", name, types)
     known = {"demands"} if name == "DiscreteDemand" else set()
     check_keys(f"key of config['action'] for {name}", arguments, known)
-    return ACTIONS[name](env, **arguments)
+    return types[name](env, **arguments)

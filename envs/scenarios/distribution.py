@@ -1,6 +1,6 @@
 """Random distribution over the scenario families, divided into numbered levels for training and tuning."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from lgmd_gym.errors import check_items, check_known, check_whole
 SPLITS = ("train", "validation", "test")
 LEVELS = 1_000_000  # per split
 THREAT_SHARE = 0.5
+ALL_FAMILIES = (*THREATS, *NON_THREATS)
 
 
 def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> tuple[int, int]:
@@ -36,6 +37,21 @@ def check_conditions(conditions: Sequence[str]) -> None:
         check_known("condition", condition, CONDITIONS)
 
 
+def check_families(families: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the names of scenario families, or those of all families for None.
+
+    Raises:
+        ValueError: For an unknown family or an empty sequence.
+    """
+    if families is None:
+        return ALL_FAMILIES
+    if not check_items("families", families, str):
+        raise ValueError("families needs at least one name, got none")
+    for name in families:
+        check_known("family of random levels", name, ALL_FAMILIES)
+    return tuple(families)
+
+
 def level_generator(split: str, level: int, part: int = 0) -> np.random.Generator:
     """Return the random generator of a level; `part` selects one of its independent streams."""
     return np.random.default_rng([SPLITS.index(split), level, *([part] if part else [])])
@@ -51,9 +67,17 @@ def draw_camera_fields(split: str, level: int, conditions: Sequence[str]) -> dic
     return {"condition": conditions[int(rng.integers(len(conditions)))], "texture": texture}
 
 
-def draw_scenario(rng: np.random.Generator) -> Scenario:
-    """Return a random scenario: a threat with probability `THREAT_SHARE`, otherwise a non-threat."""
-    families = THREATS if rng.random() < THREAT_SHARE else NON_THREATS
-    weights = np.cumsum([family.weight for family in families.values()])
-    name = list(families)[int(np.searchsorted(weights, rng.random() * weights[-1], side="right"))]
-    return make_scenario(name, **families[name].draw(rng))
+def draw_scenario(rng: np.random.Generator, families: Collection[str] = ALL_FAMILIES) -> Scenario:
+    """Return a random scenario: a threat with probability `THREAT_SHARE`, otherwise a non-threat.
+
+    Args:
+        rng: Random generator of the level.
+        families: Families to draw from, with the frequencies that they have among all. Without a threat, or
+            without a non-threat, all scenarios are of the other kind.
+    """
+    kinds = (THREATS, NON_THREATS) if rng.random() < THREAT_SHARE else (NON_THREATS, THREATS)
+    first, second = ({name: kind[name] for name in kind if name in families} for kind in kinds)
+    drawn = first or second
+    weights = np.cumsum([family.weight for family in drawn.values()])
+    name = list(drawn)[int(np.searchsorted(weights, rng.random() * weights[-1], side="right"))]
+    return make_scenario(name, **drawn[name].draw(rng))

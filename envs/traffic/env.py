@@ -13,7 +13,7 @@ from highway_env.envs.common.abstract import AbstractEnv
 from lgmd_gym.envs import surrogate_safety
 from lgmd_gym.envs.appearance import Appearance, brake_of, world_number
 from lgmd_gym.envs.base import EgoBrakeEnv
-from lgmd_gym.envs.spaces import ContinuousDemand, EgoState
+from lgmd_gym.envs.spaces import ContinuousDemand, DiscreteDemand, EgoState, make_action
 from lgmd_gym.envs.traffic.ego import TrafficEgo
 from lgmd_gym.envs.traffic.need import required_deceleration
 from lgmd_gym.envs.traffic.road import TrafficRoad
@@ -34,6 +34,13 @@ class TrafficDemand(ContinuousDemand):
     def vehicle_class(self) -> Any:
         """Factory of the controlled car."""
         return partial(TrafficEgo, brake=cast(TrafficEnv, self.env).brake)
+
+
+class DiscreteTrafficDemand(DiscreteDemand, TrafficDemand):
+    """An index into a list of longitudinal demands; those above 0 have the effect of 0."""
+
+
+ACTIONS = {"TrafficDemand": TrafficDemand, "DiscreteDemand": DiscreteTrafficDemand}
 
 
 class TrafficState(EgoState):
@@ -66,6 +73,8 @@ class TrafficEnv(EgoBrakeEnv):
     ## Action Space
 
     `Box(-1, 0, (1,), float32)`, a longitudinal demand: −1 full brake, 0 no braking beyond the driver's.
+    `Discrete` with `config["action"]` = `{"type": "DiscreteDemand", "demands": [...]}`: an index into a list
+    of demands.
 
     ## Observation Space
 
@@ -140,7 +149,8 @@ class TrafficEnv(EgoBrakeEnv):
 
     def define_spaces(self) -> None:
         """Set the action and observation types and their spaces."""
-        self.observation_type, self.action_type = TrafficState(self), TrafficDemand(self)
+        self.observation_type = TrafficState(self)
+        self.action_type = make_action(self, self.config["action"], ACTIONS)
         self.observation_space = self.observation_type.space()
         self.action_space = self.action_type.space()
 

@@ -32,7 +32,8 @@ def register_traffic() -> None:
     """Register the id of every kind of traffic; idempotent."""
     for kind in KINDS:
         if traffic_id(kind) not in gym.registry:
-            gym.register(traffic_id(kind), entry_point=f"{__name__}:make_traffic", kwargs={"kind": kind})
+            arguments = {"kind": kind, "split": "train"}
+            gym.register(traffic_id(kind), entry_point=f"{__name__}:make_traffic", kwargs=arguments)
 
 
 def find_kind(kind: str) -> "type[TrafficEnv]":
@@ -58,6 +59,7 @@ def make_traffic(
     world: int | str | None = None,
     condition: str = "clear",
     road: str | None = None,
+    split: str = "train",
 ) -> gym.Env:
     """Return a traffic environment inside `LGMDObservation`, or without it for `camera=None`.
 
@@ -73,9 +75,10 @@ def make_traffic(
         trace: See `LGMDObservation`.
         config: Configuration of `TrafficEnv`.
         render_mode: None, "rgb_array" or "human".
-        world: Number of the world, 0 to 9,999, or "laboratory"; None to draw a training world at each reset.
+        world: Number of the world, 0 to 9,999, or "laboratory"; None to draw one of the split at each reset.
         condition: Camera condition, see `lgmd_gym.camera.CONDITIONS`, or "mixed" for that of the world.
         road: See `lgmd_gym.envs.appearance.Appearance`.
+        split: See `lgmd_gym.envs.appearance.Appearance`.
 
     Raises:
         ValueError: If a kind, key or name is unknown, or a value is out of range.
@@ -83,5 +86,5 @@ def make_traffic(
     from lgmd_gym.envs.appearance import Appearance
 
     env = find_kind(kind)(config=config, render_mode=render_mode)
-    env.appearance = Appearance(world=world, condition=condition, road=road)
+    env.appearance = Appearance(world=world, condition=condition, road=road, split=split)
     return with_camera(env, camera, params, fps, include_frame, include_base, trace)

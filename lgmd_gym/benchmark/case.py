@@ -6,7 +6,7 @@ from typing import Any
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.registration import APPEARANCE, RANDOM, SCENARIO, SCENARIO_ARGUMENT
 from lgmd_gym.envs.scenarios.data import scenario_from_data, scenario_to_data
-from lgmd_gym.envs.scenarios.distribution import draw_scenario, level_generator
+from lgmd_gym.envs.scenarios.distribution import check_families, draw_scenario, level_generator
 from lgmd_gym.envs.scenarios.registry import make_scenario
 from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.errors import check_flag, check_items, check_text
@@ -51,7 +51,8 @@ class Case:
         """
         arguments = {name: value for name, value in self.arguments if name not in APPEARANCE}
         if self.family == RANDOM:
-            return draw_scenario(level_generator(arguments["split"], arguments["start_level"]))
+            families = check_families(arguments.get("families"))
+            return draw_scenario(level_generator(arguments["split"], arguments["start_level"]), families)
         if self.family == SCENARIO:
             return scenario_from_data(arguments[SCENARIO_ARGUMENT])
         return make_scenario(self.family, **arguments)

@@ -16,7 +16,7 @@ from lgmd_gym.camera.params import PRESETS
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import List
 from lgmd_gym.envs import FAMILIES, env_id, import_families
-from lgmd_gym.envs.registration import RANDOM, SCENARIO, SCENARIO_ARGUMENT
+from lgmd_gym.envs.registration import LEVEL_ARGUMENTS, RANDOM_TASKS, SCENARIO, SCENARIO_ARGUMENT
 from lgmd_gym.envs.traffic.registration import KINDS
 
 
@@ -73,8 +73,8 @@ def envs() -> Table:
         table.add_row(env_id(family), _entry(_summary(function), "arguments", arguments))
     about = "A scenario given as data, as in `Scenario`."
     table.add_row(env_id(SCENARIO), _entry(about, "argument", SCENARIO_ARGUMENT))
-    about = "Draw a new scenario of these families at every reset."
-    table.add_row(env_id(RANDOM), _entry(about, "arguments", "split, start_level, num_levels, conditions"))
+    for name, task in RANDOM_TASKS.items():
+        table.add_row(env_id(name), _entry(task.summary, "arguments", ", ".join(LEVEL_ARGUMENTS)))
     return table
 
 

@@ -11,7 +11,7 @@ from PIL import Image
 from lgmd_gym.agents import make_agent
 from lgmd_gym.envs import FAMILIES, env_id
 from lgmd_gym.envs.episode_source import RandomLevels
-from lgmd_gym.envs.registration import RANDOM
+from lgmd_gym.envs.registration import RANDOM_TASKS, RandomTask
 from lgmd_gym.envs.traffic.registration import KINDS, find_kind
 from lgmd_gym.errors import check_known
 from lgmd_gym.gallery.docstrings import ParsedDocstring, parse_docstring
@@ -30,7 +30,7 @@ class ScenarioCard:
     """One scenario or kind of traffic in the gallery.
 
     Attributes:
-        name: Scenario family, "RandomBraking" or kind of traffic.
+        name: Scenario family, name in `RANDOM_TASKS` or kind of traffic.
         target: Argument of `lgmd-gym drive`.
         docstring: Docstring of the scenario.
         traffic: Whether it is a kind of traffic, in which single episodes are not evaluated.
@@ -51,12 +51,23 @@ def scenario_cards(names: tuple[str, ...] = ()) -> list[ScenarioCard]:
         ValueError: For an unknown name, with the nearest known one.
     """
     cards = {name: ScenarioCard(name, env_id(name), parse_docstring(FAMILIES[name])) for name in FAMILIES}
-    cards[RANDOM] = ScenarioCard(RANDOM, env_id(RANDOM), parse_docstring(RandomLevels))
+    for name, task in RANDOM_TASKS.items():
+        cards[name] = ScenarioCard(name, env_id(name), _docstring_of(task))
     for kind in KINDS:
         cards[kind] = ScenarioCard(kind, f"traffic/{kind}", parse_docstring(find_kind(kind)), traffic=True)
     for name in names:
         check_known("scenario family or kind of traffic", name, cards)
     return [card for name, card in cards.items() if not names or name in names]
+
+
+def _docstring_of(task: RandomTask) -> ParsedDocstring:
+    """Return the docstring of `RandomLevels` with the summary and the default arguments of a task."""
+    docstring = parse_docstring(RandomLevels)
+    arguments = (
+        item._replace(default=repr(task.arguments[item.name])) if item.name in task.arguments else item
+        for item in docstring.arguments
+    )
+    return docstring._replace(summary=task.summary, arguments=tuple(arguments))
 
 
 def record_video(card: ScenarioCard, agent_name: str, stem: Path) -> None:

@@ -8,6 +8,7 @@ from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
+from lgmd_gym.envs.registration import RANDOM, RANDOM_TASKS
 from lgmd_gym.gallery.cards import ScenarioCard
 
 
@@ -55,7 +56,8 @@ def evaluate_agents(card: ScenarioCard, agents: Sequence[str], seeds: int) -> di
     """Return the outcome of each agent and of no-brake; empty for traffic."""
     if card.traffic:
         return {}
-    case = Case(f"gallery/{card.name}/default", card.name, ())
+    name, task = f"gallery/{card.name}/default", RANDOM_TASKS.get(card.name)
+    case = Case(name, RANDOM, tuple(task.arguments.items())) if task else Case(name, card.name)
     results = [run_task(Task(NO_BRAKE, case, seed, SensorConfig())) for seed in range(seeds)]
     outcomes = {NO_BRAKE: AgentOutcome.of([result.row for result in results])}
     for agent in agents:

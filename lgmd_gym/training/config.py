@@ -13,6 +13,7 @@ from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
 from lgmd_gym.camera import CameraSpec
 from lgmd_gym.camera.spec import check_camera
+from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
 from lgmd_gym.errors import (
     check_items,
     check_keys,
@@ -42,8 +43,8 @@ class TrainConfig:
 
     Attributes:
         algo: "ppo", "sac", "dqn" or "offline".
-        env_id: Environment id. `LGMD/RandomBraking-v0` is trained on its split "train" and evaluated on its
-            split "validation".
+        env_id: Environment id. An id that is registered with the argument `split`, as those of random levels
+            and traffic, is trained on the split "train" and evaluated on the split "validation".
         env_kwargs: Further arguments of `gym.make`.
         camera: Camera or cameras, see `LGMDObservation`.
         demands: Demands that the policy chooses from, in [-1, 1]; empty for a continuous demand.
@@ -184,9 +185,9 @@ class TrainConfig:
             split: "train", "validation" or "test"; ignored by environments without splits.
             camera: Cameras in place of the configured ones.
         """
-        arguments = self.env_arguments(split)
-        arguments["camera"] = camera or self.camera
         try:
+            arguments = self.env_arguments(split)
+            arguments["camera"] = camera or self.camera
             return gym.make(self.env_id, **arguments)
         except gym.error.Error as error:
             raise ValueError(
@@ -196,7 +197,7 @@ class TrainConfig:
     def env_arguments(self, split: str) -> dict[str, Any]:
         """Return the arguments of `gym.make` and `gym.make_vec` for a split."""
         arguments: dict[str, Any] = self.env_kwargs | {"camera": self.camera}
-        if self.env_id == RANDOM_ID:
+        if "split" in gym.spec(self.env_id).kwargs:
             arguments.setdefault("split", split)
         if self.demands:
             action = {"type": "DiscreteDemand", "demands": list(self.demands)}
@@ -204,6 +205,16 @@ class TrainConfig:
         if FRAME in self.features.inputs:
             arguments["include_frame"] = True
         return arguments
+
+    @property
+    def first_seed(self) -> int:
+        """First seed of the training environments; that of an evaluation is `VALIDATION_SEED`.
+
+        A level is the same for every seed, and its split sets the levels. Traffic follows from the seed, and
+        the seeds below `SEED_STRIDE` are those of validation and test.
+        """
+        is_traffic = self.env_id in map(traffic_id, KINDS)
+        return SEED_STRIDE * (self.seed + is_traffic)
 
     def features_of(self, split: str) -> FeatureConfig:
         """Return the inputs and timing of the policy; rewards are scaled on "train" only."""

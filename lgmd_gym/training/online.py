@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lgmd_gym.training.config import SEED_STRIDE, TrainConfig
+from lgmd_gym.training.config import TrainConfig
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -23,7 +23,7 @@ def train_online(config: TrainConfig, folder: Path, progress: bool) -> "BaseAlgo
         model = _make_model(config, folder, envs)
         # The constructor seeds environment i with seed + i. Training runs with neighbouring seeds would then
         # share the levels of most environments.
-        envs.seed(SEED_STRIDE * config.seed + model.num_timesteps)
+        envs.seed(config.first_seed + model.num_timesteps)
         remaining = config.n_timesteps - model.num_timesteps
         if remaining > 0:
             model.learn(

@@ -43,7 +43,7 @@ def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
     """Return the recordings that a training run requires for "train" or "validation"."""
     train = split == "train"
     shrink = _frame_shrink(config)
-    first = SEED_STRIDE * config.seed if train else VALIDATION_SEED
+    first = config.first_seed if train else VALIDATION_SEED
     count = config.n_timesteps if train else config.eval_episodes
     levels = EpisodeRecorder(
         partial(config.make_env, split),

@@ -13,7 +13,8 @@ from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs import FAMILIES
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.episode_source import RandomLevels
-from lgmd_gym.envs.scenarios.distribution import LEVELS, draw_scenario, level_generator
+from lgmd_gym.envs.registration import RANDOM_TASKS, env_id
+from lgmd_gym.envs.scenarios.distribution import ALL_FAMILIES, LEVELS, draw_scenario, level_generator
 from lgmd_gym.envs.scenarios.free_lanes import free_lane
 from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS
 from lgmd_gym.wrappers.vector import LGMDObservation as LGMDVector
@@ -127,6 +128,80 @@ def test_the_scenario_does_not_depend_on_the_conditions():
         assert clear.camera_fields["texture"] == mixed.camera_fields["texture"]
 
 
+def test_levels_of_all_families_are_those_of_before():
+    """A level keeps its number, family and arguments in every version with the id v0."""
+    levels = [draw_scenario(level_generator("train", level)) for level in range(6)]
+    assert [(scenario.family, round(scenario.ego_speed, 6)) for scenario in levels] == [
+        ("Oncoming", 8.90241),
+        ("CurveGuardRail", 21.497453),
+        ("CCRb", 16.684572),
+        ("BicyclePass", 8.233679),
+        ("Oncoming", 14.036758),
+        ("CCFhos", 14.047752),
+    ]
+    for families in (None, ALL_FAMILIES[::-1]):
+        chosen = [RandomLevels(start_level=level, num_levels=1, families=families) for level in range(6)]
+        assert [source.first for source in chosen] == levels
+        assert [source.draw(np.random.default_rng(0)).placement.scenario for source in chosen] == levels
+
+
+@pytest.mark.parametrize(
+    ("families", "threats"),
+    [
+        (["CCRs", "Following", "CutOut"], 0.5),
+        (["CCRs", "CCRb"], 1.0),
+        (["Following", "CutOut"], 0.0),
+        (["CPFA"], 1.0),
+    ],
+)
+def test_families_restrict_the_levels(families, threats):
+    drawn = [draw_scenario(level_generator("train", level), families).family for level in range(400)]
+    assert set(drawn) == set(families)
+    assert np.mean([family in THREATS for family in drawn]) == pytest.approx(threats, abs=0.07)
+
+
+def test_families_keep_their_relative_frequencies():
+    drawn = [draw_scenario(level_generator("train", level), ["CCRs", "CPRA"]).family for level in range(400)]
+    assert drawn.count("CPRA") == pytest.approx(400 / 16, abs=12)
+
+
+def test_the_easy_task_has_cars_on_a_straight_and_even_road():
+    name, defaults = env_id("RandomBrakingEasy"), RANDOM_TASKS["RandomBrakingEasy"].arguments
+    env = gym.make(name, camera=None)
+    families, worlds = set(), set()
+    for seed in range(60):
+        info = env.reset(seed=seed)[1]
+        scenario, fields = env.unwrapped.scenario, env.unwrapped.camera_fields
+        assert (scenario.road.kind, info["condition"], fields["road"]) == ("straight", "clear", "smooth")
+        families.add(scenario.family)
+        worlds.add(info["world"])
+    assert families == set(defaults["families"])
+    assert len(worlds) > 30
+    assert worlds < set(SPLIT_WORLDS["train"])
+    changed = gym.make(name, camera=None, families=["CMRs"], conditions=["fog"], split="validation")
+    assert changed.reset(seed=0)[1]["condition"] == "fog"
+    assert changed.unwrapped.scenario.family == "CMRs"
+    same = gym.make("LGMD/RandomBraking-v0", camera=None, **defaults)
+    for seed in range(5):
+        assert same.reset(seed=seed)[1] == env.reset(seed=seed)[1]
+        assert same.unwrapped.scenario == env.unwrapped.scenario
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"), [("RandomBrakingEasy", {}), ("RandomBraking", {"families": ["CCRs", "CutOut"]})]
+)
+def test_the_engine_draws_the_same_families(name, arguments):
+    envs = gym.make_vec(env_id(name), num_envs=6, camera=None, **arguments)
+    single = gym.make(env_id(name), camera=None, **arguments)
+    _, infos = envs.reset(seed=3)
+    for index in range(6):
+        info = single.reset(seed=3 + index)[1]
+        assert {key: infos[key][index] for key in ("level", "world", "gap", "ego_speed")} == {
+            key: info[key] for key in ("level", "world", "gap", "ego_speed")
+        }
+    envs.close()
+
+
 def test_vector_environment_equals_single_environments():
     kind, count = "LGMD/RandomBraking-v0", 6
     vector = LGMDVector(gym.make_vec(kind, num_envs=count, vectorization_mode="sync", camera=None))
@@ -153,6 +228,9 @@ def test_vector_environment_equals_single_environments():
         ({"conditions": []}, "conditions needs at least one name"),
         ({"condition": "night"}, "unknown argument of RandomBraking 'condition'; did you mean 'conditions'"),
         ({"ego_speed": 3.0}, "unknown argument of RandomBraking 'ego_speed'"),
+        ({"families": ["CCRs", "Folowing"]}, "family of random levels 'Folowing'; did you mean 'Following'"),
+        ({"families": []}, "families needs at least one name, got none"),
+        ({"families": "CCRs"}, "families must be a list of str, got 'CCRs'"),
     ],
 )
 def test_errors_state_the_value_and_suggest_a_fix(arguments, words):

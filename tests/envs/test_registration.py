@@ -26,7 +26,8 @@ TRAFFIC_IDS = {
 
 def test_registered_ids():
     ids = {name for name in gym.registry if name.startswith("LGMD/")}
-    assert ids == {*map(env_id, FAMILIES), "LGMD/RandomBraking-v0", "LGMD/Scenario-v0"} | TRAFFIC_IDS
+    random = {"LGMD/RandomBraking-v0", "LGMD/RandomBrakingEasy-v0"}
+    assert ids == {*map(env_id, FAMILIES), "LGMD/Scenario-v0"} | random | TRAFFIC_IDS
     assert {traffic_id(kind) for kind in KINDS} == TRAFFIC_IDS
 
 

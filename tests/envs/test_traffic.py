@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from gymnasium import spaces
 from highway_env.envs.intersection_env import IntersectionEnv
 from highway_env.road.regulation import RegulatedRoad
 from highway_env.road.road import Road, RoadNetwork
@@ -210,6 +211,21 @@ def test_driver_accelerates_after_the_brake_is_released():
     assert infos[-1]["deceleration"] == 0.0
 
 
+def test_discrete_actions_are_indices_into_the_demands():
+    """Index 1 brakes as the demand -0.5 does; a demand above 0 has the effect of 0."""
+    config = {"action": {"type": "DiscreteDemand", "demands": [0.5, -0.5]}}
+    discrete, continuous = find_kind("merge")(config=config), find_kind("merge")()
+    assert discrete.action_space == spaces.Discrete(2)
+    for env in (discrete, continuous):
+        env.reset(seed=0)
+    for index, demand in [(0, 0.0)] * 3 + [(1, -0.5)] * 30:
+        one, other = discrete.step(index), continuous.step([demand])
+        np.testing.assert_equal(one, other)
+    assert other[-1]["deceleration"] > 1.0
+    with pytest.raises(ValueError, match=r"action must be an index in \[0, 1\], got 2"):
+        discrete.step(2)
+
+
 def test_demands_above_zero_have_no_effect():
     hold, throttle = EmptyHighway(), EmptyHighway()
     hold.reset(seed=0)
@@ -278,3 +294,7 @@ def test_errors_state_the_value_and_suggest_a_fix():
         make_traffic("highway", camera=None, config={"policy_frequency": 7})
     with pytest.raises(ValueError, match="dead_time"):
         make_traffic("highway", camera=None, config={"dead_time": -1.0})
+    with pytest.raises(ValueError, match="'DiscreteDemnd'; did you mean 'DiscreteDemand'"):
+        make_traffic("highway", camera=None, config={"action": {"type": "DiscreteDemnd"}})
+    with pytest.raises(ValueError, match="unknown split of worlds 'tain'; did you mean 'train'"):
+        make_traffic("highway", camera=None, split="tain")

@@ -8,13 +8,15 @@ import pytest
 from PIL import Image
 
 from lgmd_gym.benchmark.rows import KEYS
+from lgmd_gym.benchmark.task import Result
 from lgmd_gym.cli import main as cli
 from lgmd_gym.envs import FAMILIES
+from lgmd_gym.envs.registration import RANDOM_TASKS
 from lgmd_gym.envs.traffic.registration import KINDS
 from lgmd_gym.gallery.build import make_gallery
 from lgmd_gym.gallery.cards import scenario_cards
 from lgmd_gym.gallery.docstrings import parse_docstring
-from lgmd_gym.gallery.outcomes import AgentOutcome
+from lgmd_gym.gallery.outcomes import AgentOutcome, evaluate_agents
 from lgmd_gym.gallery.page import render_page
 from lgmd_gym.gallery.stills import ROADS, lens_sheet, road_sheet
 from lgmd_gym.video import VideoReader
@@ -72,12 +74,27 @@ def test_outcome_of_rows(rows, text, passed):
 
 def test_every_family_and_kind_of_traffic_has_a_card():
     cards = {card.name: card for card in scenario_cards()}
-    assert set(cards) == {*FAMILIES, "RandomBraking", *KINDS}
+    assert set(cards) == {*FAMILIES, "RandomBraking", "RandomBrakingEasy", *KINDS}
     assert {name for name, card in cards.items() if card.traffic} == set(KINDS)
     docstring = cards["CCRs"].docstring
     assert "(Car-to-Car Rear stationary)" in docstring.summary
     assert [argument.name for argument in docstring.arguments][:2] == ["ego_speed", "lateral_offset"]
     assert docstring.arguments[0].default == "13.89"
+    easy = cards["RandomBrakingEasy"].docstring
+    assert "first trainings" in easy.summary
+    defaults = {argument.name: argument.default for argument in easy.arguments}
+    assert (defaults["conditions"], defaults["road"]) == ("('clear',)", "'smooth'")
+    assert defaults["families"].startswith("('CCRs', ")
+
+
+def test_outcomes_of_the_easy_task_are_of_its_levels(monkeypatch):
+    cases = []
+    monkeypatch.setattr(
+        "lgmd_gym.gallery.outcomes.run_task", lambda task: cases.append(task.case) or Result(row())
+    )
+    evaluate_agents(scenario_cards(("RandomBrakingEasy",))[0], ["no-brake"], seeds=2)
+    assert [case.family for case in cases] == ["RandomBraking"] * 2
+    assert dict(cases[0].arguments) == RANDOM_TASKS["RandomBrakingEasy"].arguments
 
 
 def test_the_page_groups_the_cards_and_links_every_section():

@@ -171,7 +171,10 @@ def _add_environments(add):
     """Add the functions of environments and wrappers."""
     for name, types in (
         ("CCRs", {"lateral_offset": "float | None", "condition": "str"}),
-        ("RandomBraking", {"split": "str", "start_level": "int", "num_levels": "int", "conditions": ""}),
+        (
+            "RandomBraking",
+            {"split": "str", "start_level": "int", "num_levels": "int", "conditions": "", "families": ""},
+        ),
     ):
         add(f"gym.make {name}", partial(gym.make, envs.env_id(name)), ENV, ENV_TYPES | types, made)
         more = {"num_envs": "int", "threads": "int", "autoreset_mode": "", "copy": "bool", "config": ""}

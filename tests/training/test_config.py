@@ -9,7 +9,9 @@ from support.recordings import OFFLINE_YAML, offline_config, write_yaml
 from lgmd_gym.camera import PRESETS
 from lgmd_gym.cli import main as cli
 from lgmd_gym.training import TrainConfig, train
+from lgmd_gym.training.config import VALIDATION_SEED
 from lgmd_gym.training.hyperparams import read_hyperparams
+from lgmd_gym.training.recordings import recording_sets
 from lgmd_gym.training.trainer import check_config
 
 RANDOM_ID = "LGMD/RandomBraking-v0"
@@ -97,6 +99,35 @@ def test_offline_requires_holding_and_hard_braking(demands):
 def test_invalid_options_are_rejected(algo, options, message):
     with pytest.raises(ValueError, match=message):
         TrainConfig.from_hyperparams(algo, **options)
+
+
+@pytest.mark.parametrize(
+    ("env_id", "expected"),
+    [
+        (RANDOM_ID, {"split": "validation"}),
+        ("LGMD/RandomBrakingEasy-v0", {"split": "validation"}),
+        ("LGMD/Traffic-Highway-v0", {"split": "validation"}),
+        ("LGMD/CCRs-v0", {}),
+    ],
+)
+def test_ids_with_splits_are_evaluated_on_validation(env_id, expected):
+    config = TrainConfig.from_hyperparams("dqn", env_id, env_kwargs={}, inputs=("ffi",), camera="fovea")
+    arguments = config.env_arguments("validation")
+    assert {key: value for key, value in arguments.items() if key not in ("camera", "config")} == expected
+    given = replace(config, env_kwargs={"split": "test"})
+    assert given.env_arguments("train")["split"] == "test"
+    config.make_env("validation").close()
+
+
+@pytest.mark.parametrize(("env_id", "first"), [(RANDOM_ID, 2_000_000), ("LGMD/Traffic-Merge-v0", 3_000_000)])
+def test_training_in_traffic_leaves_out_the_seeds_of_validation_and_test(env_id, first):
+    config = TrainConfig.from_hyperparams("ppo", env_id, inputs=("ffi",), camera="fovea", seed=2)
+    assert config.first_seed == first
+    assert replace(config, seed=0).first_seed == first - 2_000_000
+    recordings = TrainConfig.from_hyperparams("offline", env_id, inputs=("ffi",), camera="fovea", seed=2)
+    assert [recording_sets(recordings, split)[0].seeds[0] for split in ("train", "validation")] == [
+        first, VALIDATION_SEED,
+    ]  # fmt: skip
 
 
 def test_unknown_keys_in_a_stored_config_are_rejected():

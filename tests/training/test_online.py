@@ -11,10 +11,13 @@ from support.recordings import write_yaml
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.card import read_card
+from lgmd_gym.camera.worlds import SPLIT_WORLDS
+from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.training import TrainConfig, resume, train
 from lgmd_gym.training.checkpoints import checkpoints_of, load_checkpoint, save_model
 
 DEMANDS = (0.0, -0.4, -1.0)
+TINY = {"name": "wide", "shape": [9, 16]}
 YAML = """
 LGMD/CCRs-v0:
   env_wrapper:
@@ -81,6 +84,29 @@ def test_neighbouring_seeds_share_no_environment_seeds(tmp_path, monkeypatch):
         seeds.clear()
         train(online_config(tmp_path, n_timesteps=32, eval_freq=10_000, seed=seed), tmp_path / f"{seed}")
         assert seeds[-1] == 1_000_000 * seed
+
+
+def test_traffic_trains_in_training_worlds_and_is_evaluated_in_those_of_validation(tmp_path, monkeypatch):
+    """The first seeds follow the rules of the leaderboard, and so do the worlds."""
+    resets, reset = [], EgoBrakeEnv.reset
+
+    def noted_reset(self, *, seed=None, options=None):
+        observation, info = reset(self, seed=seed, options=options)
+        resets.append((self.appearance.split, seed, info["world"]))
+        return observation, info
+
+    monkeypatch.setattr(EgoBrakeEnv, "reset", noted_reset)
+    text = YAML.replace("LGMD/CCRs-v0", "default").replace("n_steps: 16", "n_steps: 4")
+    config = TrainConfig.from_hyperparams(
+        "ppo", "LGMD/Traffic-Merge-v0", write_yaml(tmp_path, text), camera=TINY, n_timesteps=8,
+        env_kwargs={"config": {"duration": 2}}, eval_freq=8, eval_episodes=1,
+    )  # fmt: skip
+    train(config, tmp_path / "run")
+    for split, first in (("train", 1_000_000), ("validation", 10_000)):
+        chosen = [item for item in resets if item[0] == split]
+        assert {seed for _, seed, _ in chosen if seed is not None} == {first, first + 1}
+        assert {world for *_, world in chosen} <= set(SPLIT_WORLDS[split])
+    assert len(resets) > 4
 
 
 def test_resume_continues_from_the_newest_checkpoint(tmp_path):

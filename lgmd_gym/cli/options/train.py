@@ -19,7 +19,7 @@ class Train:
     algo: str = "dqn"
     """Algorithm: dqn, ppo, sac, or offline (trained on recorded episodes)."""
     env: str = "LGMD/RandomBraking-v0"
-    """Environment id; RandomBraking is trained on its split train and evaluated on its split validation."""
+    """Environment id; random levels and traffic are trained on the split train, evaluated on validation."""
     camera: Names = None
     """Camera presets, one neuron each. Default: those that the inputs require, else fovea tele wide."""
     sensors_of: Name = None

@@ -16,7 +16,6 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.episode import rollout
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.camera import CONDITIONS, CameraSpec
-from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.scenarios.distribution import draw_camera_fields
@@ -49,9 +48,8 @@ class TrafficRecorder:
 
     def _record_segments(self, seed: int) -> list[RecordedEpisode]:
         kind = list(KINDS)[seed % len(KINDS)]
-        env = make_traffic(kind, camera=self.camera, include_frame=self.shrink is not None)
+        env = make_traffic(kind, camera=self.camera, include_frame=self.shrink is not None, split=self.split)
         base: Any = env.unwrapped
-        base.appearance = Appearance(split=self.split)
         base.camera_overrides = draw_camera_fields(self.split, seed, tuple(CONDITIONS))
         try:
             observations, emergencies = run_episode(env, seed, self.shrink)
