@@ -35,8 +35,12 @@ def test_every_registered_id_has_a_page_and_returns():
     [
         ("LGMD/CutIn-v0", ["| `excess` | ", "| `world` | `None` | "]),
         ("LGMD/RandomBraking-v0", ["| `split` | `'train'` | ", "| `level` | `int` | ", "### Reward, in"]),
+        (
+            "LGMD/RandomBrakingEasy-v0",
+            ["| `families` | `('CCRs', ", "| `conditions` | `('clear',)` | ", "| `road` | `'smooth'` | "],
+        ),
         ("LGMD/Scenario-v0", ["| `scenario` | – | ", "### Segment", "| `lateral_offset` | `0` | "]),
-        ("LGMD/Traffic-TwoWay-v0", ["| `driver_acceleration` | `float` | ", "| `world` | `None` | "]),
+        ("LGMD/Traffic-TwoWay-v0", ["| `driver_acceleration` | `float` | ", "| `split` | `'train'` | "]),
     ],
 )
 def test_a_page_states_what_the_environment_is(name, entries):

@@ -10,6 +10,7 @@ from support.recordings import synthetic_episode
 
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.benchmark import get_suite
+from lgmd_gym.envs.registration import RANDOM, RANDOM_TASKS, make_source
 from lgmd_gym.training.offline.storage import save
 
 
@@ -140,6 +141,20 @@ def test_leaderboard_prints_a_row_per_agent(monkeypatch, tmp_path, capsys):
         assert lines[0] == f"| agent | {heading} |"
         assert lines[2].startswith("| ttc-oracle | 1/1 ")
     assert [path.name for path in (tmp_path / "board").iterdir()] == ["levels"]
+
+
+def test_easy_levels_are_those_of_the_easy_task():
+    """Each case is one validation level, with the default arguments of the id, and is drawn as such."""
+    cases = get_suite(str(EXAMPLES / "easy_levels.toml")).cases
+    task = RANDOM_TASKS["RandomBrakingEasy"].arguments
+    for number, case in enumerate(cases):
+        level = {"split": "validation", "start_level": number, "num_levels": 1}
+        expected = task | {name: list(task[name]) for name in ("families", "conditions")} | level
+        given = dict(case.arguments)
+        assert given | {name: list(given[name]) for name in ("families", "conditions")} == expected
+        assert case.scenario == make_source(RANDOM, given).first
+    assert {case.scenario.family for case in cases} == set(task["families"])
+    assert len(cases) == 200
 
 
 def test_levels_of_the_leaderboard():
