@@ -13,7 +13,7 @@ from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.dynamics.bend import Bend
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.registration import APPEARANCE, SCENARIO, make_braking
+from lgmd_gym.envs.registration import APPEARANCE, RANDOM_TASKS, SCENARIO, make_braking
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
 from lgmd_gym.envs.traffic.registration import make_traffic
@@ -81,7 +81,7 @@ def _arguments(card: ScenarioCard) -> list[DocumentedArgument]:
         text = "A `Scenario`, or a dict of its fields, with the types of the tables below."
         own = [DocumentedArgument("scenario", "", text)]
     common = list(parse_docstring(make_traffic if card.traffic else make_braking).arguments[1:])
-    if not card.traffic:
+    if not card.traffic and card.name not in RANDOM_TASKS:
         for name in reversed(APPEARANCE):
             if name not in {item.name for item in own}:
                 common.insert(

@@ -86,9 +86,9 @@ class RandomLevels:
 
     A level is a random scenario with a number. Half of the levels are threats: the car-to-car, motorcycle,
     pedestrian and bicycle families of the protocols, see `lgmd_gym.envs.scenarios.distribution`. Half are
-    non-threats: all other families. `families` restricts both halves; levels of other families have other
-    scenarios, in the same worlds. A level fixes the family and its arguments, the grey levels,
-    the world, the camera condition (night, fog, …) and the contrast of the road texture, in every process.
+    non-threats: all other families. With `families`, a level has a scenario of one of them, in the same world
+    as without. A level fixes the family and its arguments, the grey levels, the world, the camera condition
+    (night, fog, …) and the contrast of the road texture, in every process.
     The splits are disjoint, and so are their worlds: training never uses a level or a world of validation or
     test. The environment's seed selects the levels; `info` adds `level` (the number), `world` (its number, or
     -1 in the laboratory) and `condition` (the camera condition).
