@@ -50,8 +50,8 @@ def make_agent(text: str) -> Agent:
     Args:
         text: "NAME[:OPTION=VALUE,…]" for a registered agent, as in "spike-threshold:threshold=45,frames=2";
             "RULE:toml=FILE" for a rule with options from a TOML file; "MODULE:CLASS[:OPTION=VALUE,…]" for a
-            user's class with a method `act`; "policy:NAME" or "policy:FILE.zip" for a learned policy, whose
-            file is unpickled and can run arbitrary code.
+            user's class with a method `act`; "policy:NAME" or "policy:FILE.zip" for a learned policy; a file
+            whose card does not describe the network is unpickled and can run arbitrary code.
 
     Raises:
         ValueError: For an unknown agent or option, or a value out of bounds.

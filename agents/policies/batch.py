@@ -63,7 +63,7 @@ class PolicyBatch(BatchAgent):
         if not demands or len(inputs) == 1:
             return [policy.decide(item) for item in inputs]
         values = action_values(
-            policy.model, {key: np.stack([item[key] for item in inputs]) for key in inputs[0]}
+            policy.network, {key: np.stack([item[key] for item in inputs]) for key in inputs[0]}
         )
         if values is None or values.shape[1] < 2:
             return [policy.decide(item) for item in inputs]
@@ -76,20 +76,19 @@ class PolicyBatch(BatchAgent):
         ]
 
 
-def action_values(model: Any, inputs: dict[str, np.ndarray]) -> np.ndarray | None:
-    """Return the values that a stable-baselines3 model maximises over its discrete actions.
+def action_values(network: Any, inputs: dict[str, np.ndarray]) -> np.ndarray | None:
+    """Return the values that a stable-baselines3 policy maximises over its discrete actions.
 
     Args:
-        model: A model with discrete actions.
+        network: A policy with discrete actions.
         inputs: Batch of observations.
 
     Returns:
-        Logits or Q values, shape (N, actions), or None if the model has neither.
+        Logits or Q values, shape (N, actions), or None if the policy has neither.
     """
     import torch
 
     with torch.no_grad():
-        network = model.policy
         network.set_training_mode(False)
         tensors, _ = network.obs_to_tensor(inputs)
         if hasattr(network, "q_net"):

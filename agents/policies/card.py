@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lgmd_gym.agents.policies.features import FeatureConfig
+from lgmd_gym.agents.policies.network import WEIGHTS, NetworkSpec
 from lgmd_gym.errors import check_items, check_keys, check_text, check_type, check_within, shown
 
 if TYPE_CHECKING:
@@ -29,7 +30,9 @@ class PolicyCard:
         features: Arguments of `PolicyWrapper` in the training; None without it, for observations as the
             environment returns them.
         demands: Demand of each discrete action, in [-1, 1]; None for a continuous demand.
-        vec_normalize: File of `VecNormalize.save`, beside the card; None for a training without it.
+        vec_normalize: Statistics of a `VecNormalize`, beside the card: a file .npz of `save_card`, or one of
+            `VecNormalize.save`, which is unpickled; None for a training without it.
+        network: Network, with which loading executes no code of the file; None to unpickle the file.
 
     Raises:
         ValueError: For a value of another type or out of range.
@@ -41,6 +44,7 @@ class PolicyCard:
     features: FeatureConfig | None = None
     demands: tuple[float, ...] | None = None
     vec_normalize: str | None = None
+    network: NetworkSpec | None = None
 
     def __post_init__(self) -> None:
         from lgmd_gym.neuron import LGMDParams
@@ -71,7 +75,10 @@ class PolicyCard:
         features = values.get("features")
         if features is not None:
             features = FeatureConfig.from_dict(check_type("features", features, dict))
-        return cls(**{**values, "features": features})
+        network = values.get("network")
+        if network is not None:
+            network = NetworkSpec.from_dict(check_type("network", network, dict))
+        return cls(**{**values, "features": features, "network": network})
 
     def to_dict(self) -> dict[str, Any]:
         """Return the card as plain values."""
@@ -96,7 +103,7 @@ def read_card(path: Path) -> dict[str, Any]:
         with zipfile.ZipFile(path) as file:
             if CARD in file.namelist():
                 return check_type("card", json.loads(file.read(CARD)), dict)
-            if "policy.pth" not in file.namelist():  # a truncated file may look like a zip file
+            if WEIGHTS not in file.namelist():  # a truncated file may look like a zip file
                 raise zipfile.BadZipFile
     except OSError as error:
         raise ValueError(f"policy {shown(str(path))} cannot be read: {error.strerror or error}") from None

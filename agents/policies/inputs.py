@@ -1,7 +1,10 @@
 """Inputs of a policy at each decision: features, raw observations, and the normalisation of the training."""
 
 import pickle
+import sys
 from collections.abc import Mapping
+from functools import cache
+from multiprocessing import current_process
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -9,6 +12,9 @@ import numpy as np
 
 from lgmd_gym.agents.policies.features import FeatureConfig, FeatureHistory
 from lgmd_gym.errors import shown
+from lgmd_gym.system.files import complete_file
+
+NORMALIZER_SUFFIX = ".npz"
 
 
 class PolicyInputs(Protocol):
@@ -56,7 +62,7 @@ class NormalizedInputs:
 
     Args:
         inputs: Inputs of the training environment within the `VecNormalize`.
-        normalizer: A `VecNormalize`.
+        normalizer: A `Normalizer` or `VecNormalize`.
     """
 
     def __init__(self, inputs: PolicyInputs, normalizer: Any) -> None:
@@ -74,19 +80,61 @@ def make_inputs(features: FeatureConfig | None, names: tuple[str, ...], normaliz
     Args:
         features: Features of the policy; None for raw observations.
         names: Names of the raw observations.
-        normalizer: A `VecNormalize`, or None.
+        normalizer: A `Normalizer` or `VecNormalize`, or None.
     """
     inputs = RawInputs(names) if features is None else FeatureHistory(features)
     return inputs if normalizer is None else NormalizedInputs(inputs, normalizer)
 
 
+@cache
+def announce_pickle(path: Path) -> None:
+    """Print once that loading a file executes code in it; worker processes leave it to their parent."""
+    if current_process().name == "MainProcess":
+        print(f"lgmd-gym: loading {shown(str(path))} executes the pickled code in this file", file=sys.stderr)
+
+
+class Normalizer:
+    """Statistics of a `VecNormalize` as arrays, in a NumPy file.
+
+    Args:
+        arrays: `epsilon`, `clip`, and `mean/NAME` and `var/NAME` of each normalised observation.
+    """
+
+    def __init__(self, arrays: Mapping[str, np.ndarray]) -> None:
+        self._epsilon, self._clip = float(arrays["epsilon"]), float(arrays["clip"])
+        self._means = {key[5:]: arrays[key] for key in arrays if key.startswith("mean/")}
+        self._variances = {name: arrays[f"var/{name}"] for name in self._means}
+
+    def normalize_obs(self, inputs: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Return the inputs as `VecNormalize.normalize_obs` does."""
+        normalized = dict(inputs)
+        for name, mean in self._means.items():
+            values = (inputs[name] - mean) / np.sqrt(self._variances[name] + self._epsilon)
+            normalized[name] = np.clip(values, -self._clip, self._clip).astype(np.float32)
+        return normalized
+
+
+def save_normalizer(normalizer: Any, path: Path) -> None:
+    """Write the statistics of a `VecNormalize` with a `Dict` observation to a NumPy file."""
+    arrays: dict[str, Any] = {"epsilon": normalizer.epsilon, "clip": normalizer.clip_obs}
+    for name in normalizer.norm_obs_keys if normalizer.norm_obs else ():
+        statistics = normalizer.obs_rms[name]
+        arrays |= {f"mean/{name}": statistics.mean, f"var/{name}": statistics.var}
+    with complete_file(path) as part, part.open("wb") as file:
+        np.savez(file, allow_pickle=False, **arrays)
+
+
 def load_normalizer(path: Path) -> Any:
-    """Return the `VecNormalize` in a file, which is unpickled.
+    """Return the statistics in a file of `save_normalizer`; a file of `VecNormalize.save` is unpickled.
 
     Raises:
         ValueError: If the file cannot be read or holds something else.
     """
     try:
+        if path.suffix == NORMALIZER_SUFFIX:
+            with np.load(path, allow_pickle=False) as arrays:
+                return Normalizer(dict(arrays))
+        announce_pickle(path)
         normalizer: Any = pickle.loads(path.read_bytes())
     except OSError as error:
         raise ValueError(f"vec_normalize {shown(str(path))} cannot be read: {error.strerror}") from None

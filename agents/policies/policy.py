@@ -1,8 +1,5 @@
 """`Policy`: a stable-baselines3 model as an agent."""
 
-import sys
-from functools import cache
-from multiprocessing import current_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +8,9 @@ import numpy as np
 from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.batch import BatchAgent
 from lgmd_gym.agents.policies.batch import PolicyBatch
-from lgmd_gym.agents.policies.card import policy_card
+from lgmd_gym.agents.policies.card import PolicyCard, policy_card
 from lgmd_gym.agents.policies.features import FRAME, SCALES, FeatureConfig
-from lgmd_gym.agents.policies.inputs import PolicyInputs, load_normalizer, make_inputs
+from lgmd_gym.agents.policies.inputs import PolicyInputs, announce_pickle, load_normalizer, make_inputs
 from lgmd_gym.errors import check_path, check_text, shown, unknown_name
 from lgmd_gym.system.extras import missing_extra
 
@@ -30,8 +27,8 @@ class Policy(Agent):
     """Agent that acts with a trained stable-baselines3 model, without exploration.
 
     The file is a model of stable-baselines3 with a card (`PolicyCard`), inside it or beside it: the cameras,
-    features and demands. Loading a policy unpickles its file and can run arbitrary code, as with all
-    stable-baselines3 files. Load only files from sources you trust.
+    features and demands. With a card that describes the network, as of `lgmd-gym train`, loading reads the
+    weights only. Other files are unpickled, which can execute any code: load only those that you trust.
 
     Args:
         path: Zip file, or name of a policy in this package.
@@ -39,7 +36,7 @@ class Policy(Agent):
     Attributes:
         card: The card.
         features: Inputs of the policy and its decision rate.
-        model: The stable-baselines3 model.
+        network: The policy of stable-baselines3, a `BasePolicy`.
 
     Raises:
         ValueError: If the file cannot be read or has no card, or if stable-baselines3 is not installed.
@@ -51,11 +48,9 @@ class Policy(Agent):
         self.name = f"policy:{check_text('path', path)}"
         file = find_policy(path)
         self.card = policy_card(file)
-        if file.parent != SHIPPED:
-            _announce(file)
-        self.model = _load_model(file, self.card.algo)
-        names = tuple(getattr(self.model.observation_space, "spaces", ()))
-        self._check_model(file, names)
+        self.network = _load_network(file, self.card)
+        names = tuple(getattr(self.network.observation_space, "spaces", ()))
+        self._check_network(file, names)
         raw = FeatureConfig(inputs=names, history=1, repeat=1, shrink=1)
         self.features = raw if self.card.features is None else self.card.features
         name = self.card.vec_normalize
@@ -63,11 +58,11 @@ class Policy(Agent):
         self._inputs = self.make_inputs()
         self.reset()
 
-    def _check_model(self, file: Path, names: tuple[str, ...]) -> None:
-        """Raise ValueError unless the inputs, cameras and actions of the model are those of the card."""
-        card, space = self.card, self.model.observation_space
+    def _check_network(self, file: Path, names: tuple[str, ...]) -> None:
+        """Raise ValueError unless the inputs, cameras and actions of the network are those of the card."""
+        card, space = self.card, self.network.observation_space
         expected = set(names) & set(RAW_INPUTS) if card.features is None else set(card.features.inputs)
-        actions, demands = getattr(self.model.action_space, "n", None), card.demands
+        actions, demands = getattr(self.network.action_space, "n", None), card.demands
         faults: list[str] = []
         if set(names) != expected or not names:
             faults.append(f"inputs {', '.join(names) or space} instead of {', '.join(sorted(expected))}")
@@ -86,7 +81,7 @@ class Policy(Agent):
 
     def make_inputs(self) -> PolicyInputs:
         """Return the inputs of the policy in one environment."""
-        names = tuple(self.model.observation_space.spaces)
+        names = tuple(self.network.observation_space.spaces)
         return make_inputs(self.card.features, names, self._normalizer)
 
     @property
@@ -133,7 +128,7 @@ class Policy(Agent):
 
     def decide(self, inputs: dict[str, np.ndarray]) -> float:
         """Return the demand for the inputs of one decision."""
-        action, _ = self.model.predict(inputs, deterministic=True)
+        action, _ = self.network.predict(inputs, deterministic=True)
         demands = self.card.demands
         return demands[int(action)] if demands else float(np.reshape(action, -1)[0])
 
@@ -168,14 +163,7 @@ def _count(camera: "CameraSpec") -> int:
     return len(camera) if isinstance(camera, list | tuple) else 1
 
 
-@cache
-def _announce(path: Path) -> None:
-    """Print once that a file is unpickled; worker processes leave it to their parent."""
-    if current_process().name == "MainProcess":
-        print(f"lgmd-gym: unpickling policy {shown(str(path))}, which can run any code", file=sys.stderr)
-
-
-def _load_model(path: Path, algo: str) -> Any:
+def _load_network(path: Path, card: PolicyCard) -> Any:
     try:
         import stable_baselines3
         import torch
@@ -183,7 +171,12 @@ def _load_model(path: Path, algo: str) -> Any:
         raise missing_extra("a policy", "train") from None
     torch.set_num_threads(1)  # small network; episodes run in parallel processes
     try:
-        return getattr(stable_baselines3, str(algo).upper()).load(path, device="cpu")
+        if card.network is not None:
+            return card.network.load(path, card.algo, len(card.demands) if card.demands else None)
+        announce_pickle(path)
+        return getattr(stable_baselines3, card.algo.upper()).load(path, device="cpu").policy
     except Exception as error:  # of the archive, pickle, PyTorch or stable-baselines3
         reason = (str(error) or type(error).__name__).splitlines()[0]
-        raise ValueError(f"policy {shown(str(path))} cannot be loaded ({reason}); train it again") from None
+        raise ValueError(
+            f"policy {shown(str(path))} cannot be loaded ({reason}); correct its card, or train it again"
+        ) from None

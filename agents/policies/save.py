@@ -2,12 +2,15 @@
 
 import inspect
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lgmd_gym.agents.base import FPS
 from lgmd_gym.agents.policies.card import PolicyCard, card_file
 from lgmd_gym.agents.policies.features import FeatureConfig
+from lgmd_gym.agents.policies.inputs import NORMALIZER_SUFFIX, save_normalizer
+from lgmd_gym.agents.policies.network import describe_network
 from lgmd_gym.errors import check_mapping, check_path, shown
 from lgmd_gym.system.extras import missing_extra
 from lgmd_gym.system.files import complete_file
@@ -15,7 +18,7 @@ from lgmd_gym.system.files import complete_file
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
-NORMALIZER = "-vecnormalize.pkl"  # end of the name of the file with the statistics
+NORMALIZER = f"-vecnormalize{NORMALIZER_SUFFIX}"  # end of the name of the file with the statistics
 
 
 def save_policy(model: "BaseAlgorithm", file: str | Path, env: Any = None) -> Path:
@@ -39,7 +42,8 @@ def save_policy(model: "BaseAlgorithm", file: str | Path, env: Any = None) -> Pa
     env = model.get_env() if env is None else env
     if env is None:
         raise ValueError("the model has no environment; pass the training environment as env")
-    save_card(path, env, type(model).__name__.lower())
+    card = replace(save_card(path, env, type(model).__name__.lower()), network=describe_network(model))
+    _write(path, card)
     model.save(path)
     return path
 
@@ -50,7 +54,7 @@ def save_card(file: str | Path, env: Any, algo: str, vec_normalize: str | None =
     Args:
         file: Zip file of the model, which need not exist yet.
         env: Environment like that of the training: one of Gymnasium, or a `VecEnv` of stable-baselines3. The
-            statistics of a `VecNormalize` around it are written to FILE-vecnormalize.pkl.
+            statistics of a `VecNormalize` around it are written to FILE-vecnormalize.npz.
         algo: Class of stable-baselines3 that reads the model, such as "ppo".
         vec_normalize: Name of an existing file of `VecNormalize.save` in the folder of the card.
 
@@ -61,11 +65,15 @@ def save_card(file: str | Path, env: Any, algo: str, vec_normalize: str | None =
     normalizer = _normalizer(env)
     if normalizer is not None and vec_normalize is None:
         vec_normalize = f"{path.stem}{NORMALIZER}"
-        normalizer.save(str(path.with_name(vec_normalize)))
+        save_normalizer(normalizer, path.with_name(vec_normalize))
     card = PolicyCard(algo=algo, vec_normalize=vec_normalize, **_values(env))
+    _write(path, card)
+    return card
+
+
+def _write(path: Path, card: PolicyCard) -> None:
     with complete_file(card_file(path)) as part:
         part.write_text(json.dumps(card.to_dict(), indent=1) + "\n", "utf-8")
-    return card
 
 
 def _normalizer(env: Any) -> Any:

@@ -60,7 +60,7 @@ def agents() -> Table:
         table.add_row(name, _entry(_summary(cls), "options", options))
     for name in shipped_policies():
         algo = read_card(find_policy(name))["algo"].upper()
-        description = f'Policy trained with {algo}; requires the extra "train". Loading it unpickles code.'
+        description = f'Policy trained with {algo}; requires the extra "train".'
         table.add_row(f"policy:{name}", description)
     return table
 

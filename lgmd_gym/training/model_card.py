@@ -22,7 +22,8 @@ Its inputs: {inputs}.
 
 ## Use
 
-Loading the file unpickles it and can run any code: load only files from sources you trust.
+lgmd-gym reads the weights and unpickles nothing. stable-baselines3 (`load`) unpickles the file, which can run
+any code: use it only with files from sources you trust.
 
 ```bash
 lgmd-gym bench --suite r152 --agents policy:policy.zip

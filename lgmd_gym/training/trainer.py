@@ -3,11 +3,13 @@
 import inspect
 import json
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import lgmd_gym
 from lgmd_gym.agents.policies.card import write_card
+from lgmd_gym.agents.policies.network import describe_network
 from lgmd_gym.errors import check_keys, check_whole
 from lgmd_gym.system.files import complete_file, new_folder
 from lgmd_gym.system.lock import FolderLock
@@ -118,6 +120,7 @@ def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) 
 
         model = train_online(config, folder, progress)
     path = folder / "policy.zip"
+    network = describe_network(model)
     values = config.to_dict() | {"recordings": None}  # a path on the machine that ran the training
     card = {
         "lgmd_gym": lgmd_gym.__version__,
@@ -125,6 +128,7 @@ def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) 
         "camera": values["camera"],
         "features": values["features"],
         "demands": values["demands"] or None,
+        "network": None if network is None else asdict(network),
         "config": values,
         "wall_time": round(time.perf_counter() - start, 1),
     }

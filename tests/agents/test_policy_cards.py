@@ -47,10 +47,11 @@ def saved(request, tmp_path_factory):
     return model, envs, save_policy(model, tmp_path_factory.mktemp(request.param) / "model")
 
 
-def test_the_agent_acts_as_the_model_in_its_environment(saved):
+def test_the_agent_acts_as_the_model_in_its_environment(saved, capsys):
     """The model acts in its own environment, and the agent in one without wrappers, with the same seed."""
     model, envs, path = saved
     agent = make_agent(f"policy:{path}")
+    assert capsys.readouterr().err == ""  # nothing is unpickled
     config = {"config": DISCRETE} if agent.card.demands else {}
     own = gym.make("LGMD/CCRs-v0", ego_speed=8.0, camera=agent.camera, **config)
     own = own if agent.card.features is None else PolicyWrapper(own, **agent.card.features.to_dict())
@@ -112,6 +113,7 @@ def test_a_file_without_card_names_the_remedy(model, tmp_path):
     ({"demands": [0.0, -1.0]}, "the model has continuous actions instead of 2"),
     ({"features": {"history": 2}}, "the model has inputs ego_speed, .* instead of"),
     ({"vec_normalize": "nix.pkl"}, "vec_normalize .*nix.pkl' cannot be read: No such file"),
+    ({"vec_normalize": "nix.npz"}, "vec_normalize .*nix.npz' cannot be read: No such file"),
     ({"vec_normalize": "model.json"}, "vec_normalize .* cannot be loaded"),
     ({"cameras": "fovea"}, "unknown key of the card 'cameras'; did you mean 'camera'?"),
     ({"demands": [2.0]}, r"demand must be in \[-1, 1\], got 2.0"),

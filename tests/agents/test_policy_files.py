@@ -31,7 +31,11 @@ def copy_with_card(path, **values):
         ({"camera": 7}, "the card is damaged"),
         ({"features": {"inputs": ["zone"]}}, "did you mean 'zones'"),
         ({"demands": [0.0, -1.5]}, r"demand must be in \[-1, 1\], got -1.5"),
-        ({"demands": [0.0]}, "model and card do not belong together"),
+        (
+            {"demands": [0.0]},
+            r"the weights action_net.weight have the shape \(2, 64\), those of the card \(1, 64\)",
+        ),
+        ({"demands": [0.0], "network": None}, "model and card do not belong together"),
         ({"algo": "nix"}, "cannot be loaded"),
     ],
 )

@@ -1,15 +1,9 @@
 """Code from outside the package: loaded only if the user names or trusts it."""
 
-import json
 import sys
-import zipfile
-from types import SimpleNamespace
 
 import pytest
 
-from lgmd_gym.agents.policies import policy
-from lgmd_gym.agents.policies.card import CARD
-from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.agents.registry import outside_code
 from lgmd_gym.cli import main as cli
 
@@ -100,23 +94,3 @@ def test_config_file_loads_its_agents_only_if_trusted(folder, tmp_path, capsys):
 )
 def test_code_from_outside_the_package_is_known_by_its_name(agent, code):
     assert outside_code(agent) == code
-
-
-def test_a_line_precedes_the_unpickling_of_a_policy_file(tmp_path, monkeypatch, capsys):
-    file = tmp_path / "p.zip"
-    card = {"features": FeatureConfig().to_dict(), "algo": "ppo", "camera": "fovea", "demands": None}
-    with zipfile.ZipFile(file, "w") as archive:
-        archive.writestr(CARD, json.dumps(card))
-    lines, space = [], SimpleNamespace(spaces=dict.fromkeys(FeatureConfig().inputs))
-
-    def load(*_):
-        lines.append(capsys.readouterr().err)
-        return SimpleNamespace(observation_space=space)
-
-    monkeypatch.setattr(policy, "_load_model", load)
-    monkeypatch.setattr(policy.Policy, "_check_model", lambda *_: None)
-    for _ in range(2):
-        policy.Policy(str(file))
-    assert lines == [f"lgmd-gym: unpickling policy {str(file)!r}, which can run any code\n", ""]
-    policy.Policy("zones")
-    assert lines[2] == ""

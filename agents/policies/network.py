@@ -1,0 +1,167 @@
+"""`NetworkSpec`: the network of a policy as plain values, so that loading it executes no code of the file."""
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from gymnasium import spaces
+
+from lgmd_gym.agents.policies.features import FRAME
+from lgmd_gym.errors import check_items, check_keys, check_known, check_text, check_type, check_whole
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.base_class import BaseAlgorithm
+    from stable_baselines3.common.policies import BasePolicy
+
+WEIGHTS = "policy.pth"  # member of every model file of stable-baselines3
+MAX_UNITS = 10_000  # of a layer or an input, so that a damaged card does not fill the memory
+PLAIN_KWARGS = (
+    "net_arch", "activation_fn", "ortho_init", "use_sde", "log_std_init", "full_std", "use_expln",
+    "clip_mean", "squash_output", "features_extractor_kwargs", "share_features_extractor", "normalize_images",
+    "n_critics",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NetworkSpec:
+    """Description of a network of stable-baselines3.
+
+    Attributes:
+        policy: stable-baselines3's name of the policy class, such as "MultiInputPolicy".
+        inputs: Shape of each input. The input `frame` is uint8, others are float32.
+        policy_kwargs: Arguments of the policy class; the activation function by its name in `torch.nn`.
+
+    Raises:
+        ValueError: For a value of another type or out of range.
+    """
+
+    policy: str
+    inputs: dict[str, tuple[int, ...]]
+    policy_kwargs: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_text("policy", self.policy)
+        inputs = {
+            name: tuple(check_whole(f"shape of {name}", side, 1, MAX_UNITS) for side in _items(name, shape))
+            for name, shape in check_type("inputs", self.inputs, dict).items()
+        }
+        object.__setattr__(self, "inputs", inputs)
+        check_keys(
+            "key of policy_kwargs", check_type("policy_kwargs", self.policy_kwargs, dict), PLAIN_KWARGS
+        )
+        _check_units(self.policy_kwargs)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "NetworkSpec":
+        """Return the description for plain values; unknown keys raise ValueError."""
+        check_keys("key of network", values, cls.__dataclass_fields__)
+        return cls(**values)
+
+    @property
+    def observation_space(self) -> spaces.Dict:
+        """Space of the inputs."""
+        return spaces.Dict({name: _box(name, shape) for name, shape in self.inputs.items()})
+
+    def build(self, algo: str, num_actions: int | None) -> "BasePolicy":
+        """Return the network with random weights.
+
+        Args:
+            algo: Algorithm of stable-baselines3, such as "ppo".
+            num_actions: Number of discrete actions; None for one continuous demand.
+
+        Raises:
+            ValueError: For an unknown algorithm, policy or activation function.
+        """
+        import stable_baselines3
+        from torch import nn, random
+
+        algorithm = getattr(stable_baselines3, algo.upper(), None)
+        aliases = getattr(algorithm, "policy_aliases", {})
+        check_known(f"policy of {algo}", self.policy, aliases)
+        kwargs = dict(self.policy_kwargs)
+        if "activation_fn" in kwargs:
+            known = nn.modules.activation.__all__
+            kwargs["activation_fn"] = getattr(nn, check_known("activation", kwargs["activation_fn"], known))
+        with random.fork_rng(devices=[]):  # a training that saves its policy draws the same numbers after it
+            return aliases[self.policy](
+                self.observation_space, _actions(num_actions), lambda _: 0.0, **kwargs
+            )
+
+    def load(self, path: Path, algo: str, num_actions: int | None) -> "BasePolicy":
+        """Return the network with the weights in a model file; no code of the file is executed.
+
+        Raises:
+            ValueError: If the weights do not fit the network. Errors of zipfile and PyTorch pass through.
+        """
+        import torch
+
+        with zipfile.ZipFile(path) as file:
+            data = io.BytesIO(file.read(WEIGHTS))
+        weights = torch.load(data, map_location="cpu", weights_only=True)
+        network = self.build(algo, num_actions)
+        expected, given = _shapes(network.state_dict()), _shapes(weights)
+        for name in [*expected, *given]:
+            there, here = given.get(name), expected.get(name)
+            if there != here:
+                raise ValueError(f"the weights {name} have the shape {there}, those of the card {here}")
+        network.load_state_dict(weights)
+        network.set_training_mode(False)
+        return network
+
+
+def describe_network(model: "BaseAlgorithm") -> NetworkSpec | None:
+    """Return the description of a model's network.
+
+    None for a network that it cannot describe, for example one with a feature extractor of one's own.
+    """
+    from torch import nn
+
+    kwargs = {key: value for key, value in model.policy_kwargs.items() if not key.startswith("optimizer_")}
+    kwargs |= {"use_sde": True} if model.use_sde else {}
+    names = {getattr(nn, name): name for name in nn.modules.activation.__all__ if hasattr(nn, name)}
+    if "activation_fn" in kwargs:
+        kwargs["activation_fn"] = names.get(kwargs["activation_fn"], kwargs["activation_fn"])
+    policies = {policy: name for name, policy in model.policy_aliases.items()}
+    inputs = getattr(model.observation_space, "spaces", {})
+    num_actions = getattr(model.action_space, "n", None)
+    try:
+        shapes = {name: tuple(map(int, space.shape or ())) for name, space in inputs.items()}
+        plain = json.loads(json.dumps(kwargs))
+        spec = NetworkSpec(policy=policies[type(model.policy)], inputs=shapes, policy_kwargs=plain)
+        built = spec.build(type(model).__name__, num_actions)
+    except (KeyError, TypeError, ValueError):  # an own class of policy, or values that are not plain
+        return None
+    same_types = all(space.dtype == inputs[name].dtype for name, space in spec.observation_space.items())
+    same_actions = num_actions is not None or model.action_space == _actions(None)
+    same_weights = _shapes(built.state_dict()) == _shapes(model.policy.state_dict())
+    return spec if same_types and same_actions and same_weights else None
+
+
+def _box(name: str, shape: tuple[int, ...]) -> spaces.Box:
+    return spaces.Box(0, 255, shape, np.uint8) if name == FRAME else spaces.Box(-np.inf, np.inf, shape)
+
+
+def _actions(count: int | None) -> spaces.Space:
+    return spaces.Box(-1.0, 1.0, (1,)) if count is None else spaces.Discrete(count)
+
+
+def _items(name: str, shape: Any) -> tuple[Any, ...]:
+    return check_items(f"shape of {name}", shape, object, "whole numbers")
+
+
+def _check_units(value: Any) -> None:
+    """Raise ValueError if a number in nested values exceeds the limit of layers."""
+    if isinstance(value, dict | list | tuple):
+        for item in value.values() if isinstance(value, dict) else value:
+            _check_units(item)
+    elif isinstance(value, int | float) and not abs(value) <= MAX_UNITS:
+        raise ValueError(f"numbers of policy_kwargs must be at most {MAX_UNITS}, got {value}")
+
+
+def _shapes(weights: Mapping[str, Any]) -> dict[str, tuple[int, ...]]:
+    return {name: tuple(value.shape) for name, value in weights.items()}
