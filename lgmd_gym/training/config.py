@@ -60,6 +60,8 @@ class TrainConfig:
         recordings: Folder of an offline training run, to reuse its recorded episodes; None to record anew.
         traffic_episodes: Number of traffic episodes that "offline" trains on in addition; a quarter as many
             are added to its evaluations.
+        videos: Number of validation episodes in videos at each evaluation; not for "offline".
+        wandb: Project of Weights & Biases that the training is logged to; None for no log there.
 
     Raises:
         ValueError: If a value is invalid or does not fit the algorithm.
@@ -80,12 +82,15 @@ class TrainConfig:
     eval_episodes: int = 96
     recordings: str | None = None
     traffic_episodes: int = 0
+    videos: int = 0
+    wandb: str | None = None
 
     def __post_init__(self) -> None:
         check_known("algorithm", self.algo, ALGORITHMS)
-        for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes", "traffic_episodes", "seed"):
-            low = 0 if name in ("traffic_episodes", "seed") else 1
-            object.__setattr__(self, name, check_whole(name, getattr(self, name), low))
+        for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes"):
+            object.__setattr__(self, name, check_whole(name, getattr(self, name), 1))
+        for name in ("traffic_episodes", "seed", "videos"):
+            object.__setattr__(self, name, check_whole(name, getattr(self, name), 0))
         check_text("env_id", self.env_id)
         check_text("policy", self.policy)
         check_camera(self.camera)
@@ -97,6 +102,7 @@ class TrainConfig:
         check_type("algo_kwargs", self.algo_kwargs, dict)
         check_type("features", self.features, FeatureConfig)
         check_type("recordings", self.recordings, str, type(None))
+        check_type("wandb", self.wandb, str, type(None))
         for demand in check_items("demands", self.demands, Real, "numbers"):
             check_within("demands", demand, -1.0, 1.0)
         if self.algo == "dqn" and not self.demands:
@@ -117,6 +123,8 @@ class TrainConfig:
             )
         if not self.features.latch:
             raise ValueError("algo 'offline' requires latch: true in its hyperparameters")
+        if self.videos:
+            raise ValueError("videos requires algo 'dqn', 'ppo' or 'sac', got 'offline'; omit it")
         if "speed_change" in self.features.inputs:
             # A policy with this input braked in traffic whenever the driver accelerated.
             raise ValueError(

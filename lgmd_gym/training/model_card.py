@@ -120,5 +120,5 @@ def _shown(config: TrainConfig) -> dict[str, Any]:
     return {
         name: list(value) if isinstance(value, tuple) else value
         for name, value in values.items()
-        if name not in ("camera", "recordings")
+        if name not in ("camera", "recordings", "wandb")
     }

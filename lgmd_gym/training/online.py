@@ -111,4 +111,9 @@ def _callbacks(
     frequency = max(config.eval_freq // config.n_envs, 1)
     evaluator = Evaluator(eval_envs, folder, frequency, config.eval_episodes)
     evaluator.restore(model)
-    return [CheckpointSaver(folder, frequency), evaluator, EpisodeLog(folder, config.env_id)]
+    callbacks = [CheckpointSaver(folder, frequency), evaluator, EpisodeLog(folder, config.env_id)]
+    if config.videos:
+        from lgmd_gym.training.videos import VideoRecorder
+
+        callbacks.insert(0, VideoRecorder(config, folder, frequency))
+    return callbacks

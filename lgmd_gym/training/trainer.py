@@ -17,6 +17,7 @@ from lgmd_gym.training.config import TrainConfig
 from lgmd_gym.training.hyperparams import OFFLINE
 from lgmd_gym.training.model_card import write_model_card
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
+from lgmd_gym.training.tracking import wandb_module, wandb_run
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
@@ -86,6 +87,8 @@ def check_config(config: TrainConfig) -> None:
     Raises:
         ValueError: For the first problem found.
     """
+    if config.wandb is not None:
+        wandb_module()
     env = config.make_policy_env("train")
     try:
         if config.algo == OFFLINE:
@@ -106,7 +109,8 @@ def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path
     """Train in a locked folder; a second process would mix its checkpoints and logs with these."""
     lock = FolderLock(folder, "training folder")
     try:
-        return _write_policy(config, folder, progress, jobs)
+        with wandb_run(config, folder):
+            return _write_policy(config, folder, progress, jobs)
     finally:
         lock.release()
 
@@ -121,7 +125,7 @@ def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) 
         model = train_online(config, folder, progress)
     path = folder / "policy.zip"
     network = describe_network(model)
-    values = config.to_dict() | {"recordings": None}  # a path on the machine that ran the training
+    values = config.to_dict() | {"recordings": None, "wandb": None}  # those of the machine and its user
     card = {
         "lgmd_gym": lgmd_gym.__version__,
         "algo": type(model).__name__.lower(),  # stable-baselines3 class that reads the file

@@ -46,6 +46,10 @@ class Train:
     """Folder of an offline training run with the same cameras, to reuse its recorded episodes."""
     traffic_episodes: int = 0
     """Number of traffic episodes, in which braking is false, that offline trains on in addition."""
+    videos: int = 0
+    """Number of validation episodes that are filmed at each evaluation, in FOLDER/videos and TensorBoard."""
+    wandb: Name = None
+    """Project of Weights & Biases to log to; requires the package wandb."""
     jobs: int = 2
     """Number of processes that record episodes."""
     out: File = None
