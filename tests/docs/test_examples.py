@@ -156,13 +156,6 @@ def test_vector_sb3(capsys):
     assert "512 steps: return " in capsys.readouterr().out
 
 
-def test_vector_cleanrl(capsys):
-    returns = load("vector_cleanrl").main(iterations=6, num_envs=8, steps=32)
-    assert len(returns) >= 2
-    assert all(-30.0 < value < 15.0 for value in returns)
-    assert "mean return" in capsys.readouterr().out
-
-
 def test_all_scores():
     """One column per run; cases with an FCW driver are left out."""
     config = RunConfig(suite="r152", agents=("no-brake", "a"), seeds=1)
