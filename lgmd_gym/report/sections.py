@@ -2,9 +2,10 @@
 
 import re
 from functools import partial
+from itertools import combinations
 from typing import Any
 
-from lgmd_gym.benchmark.analysis.compare import Comparison, compare_runs
+from lgmd_gym.benchmark.analysis.compare import Comparison, compare_agents
 from lgmd_gym.benchmark.analysis.compare_tables import change_text
 from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, load_traces, write_froc
 from lgmd_gym.benchmark.analysis.plots import difference_figure, froc_figure, trace_figure
@@ -34,10 +35,11 @@ def froc_section(data: ReportData) -> str | None:
 
 
 def comparison_section(data: ReportData) -> dict[str, Any] | None:
-    """Return the paired differences and their figure; None for fewer than two agents with rows."""
-    if len({row["agent"] for row in data.rows} - {NO_BRAKE}) < 2:
+    """Return the paired differences and their figure; None if no two agents completed the same episode."""
+    pairs = combinations([agent for agent in data.agents if agent != NO_BRAKE], 2)
+    comparisons = [item for item in compare_agents(data.rows, data.rows, pairs) if item.pairs]
+    if not comparisons:
         return None
-    comparisons = compare_runs(data.path, None)
     write_csv(data.figures / "differences.csv", DIFFERENCE_COLUMNS, _difference_lines(comparisons))
     draw = partial(difference_figure, comparisons=comparisons)
     lines = [(item, [(line, change_text(line)) for line in item.differences]) for item in comparisons]

@@ -206,6 +206,7 @@ def test_a_failed_episode_gives_exit_code_one(tmp_path, monkeypatch, capsys):
     options = ["--jobs", "1", "--seeds", "1", "--agents", "no-brake", "--out", str(tmp_path / "run")]
     assert cli.run(["bench", *options]) == 1
     printed = " ".join(capsys.readouterr().out.split())
+    assert "quick: camera each agent's own, T_sf" in printed
     assert "8 episodes failed" in printed
     assert "- no-brake: RuntimeError: no road today at " in printed
     assert "every episode of no-brake failed, 8 so far: 8 of 19 episodes kept; correct the agent" in printed

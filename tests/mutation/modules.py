@@ -47,7 +47,7 @@ MODULES = {
     "statistics": Module(
         ("lgmd_gym/benchmark/statistics.py", *_under("lgmd_gym/benchmark/analysis", "bootstrap", "compare")),
         ("tests/benchmark/test_formulas.py", "tests/benchmark/test_statistics.py"),
-        ("compare_runs", "read_case_rows", "_agent_pairs"),
+        ("compare_runs", "compare_agents", "read_case_rows", "_agent_pairs"),
     ),
     "neuron": Module(("lgmd_gym/neuron/scalars.py",), ("tests/neuron/test_boundaries.py",)),
     "camera": Module(

@@ -1,6 +1,7 @@
 """The report page and its figures, from hand-made rows."""
 
 import csv
+import json
 import re
 from html.parser import HTMLParser
 from xml.etree import ElementTree
@@ -118,6 +119,17 @@ def test_a_second_report_replaces_the_first(report_folder, page):
     write_report(report_folder)
     assert {file.name: file.read_bytes() for file in (report_folder / "figures").glob("*.csv")} == before
     assert list(report_folder.rglob("*.part")) == []
+
+
+def test_report_without_a_common_episode_of_two_agents(report_folder, user_agent, tmp_path):
+    """The only other agent failed in every episode: no paired differences, but the page exists."""
+    rows = [json.loads(line) for line in (report_folder / "episodes.jsonl").read_text().splitlines()]
+    failed = [row | {"error": "KeyError: 'x'"} if row["agent"] == user_agent else row for row in rows]
+    for name in ("run.toml", "run.json"):
+        (tmp_path / name).write_text((report_folder / name).read_text())
+    (tmp_path / "episodes.jsonl").write_text("".join(json.dumps(row) + "\n" for row in failed))
+    assert "Paired differences" in (report_folder / "report.html").read_text()
+    assert "Paired differences" not in write_report(tmp_path).read_text()
 
 
 def test_impact_points_of_many_speeds_are_grouped():

@@ -1,6 +1,6 @@
 """Paired differences between two agents on the same episodes, with cluster bootstrap intervals."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
@@ -79,8 +79,27 @@ def compare_runs(run_a: Path, run_b: Path | None, agents: Sequence[str] | None =
     rows_b = rows_a if run_b is None else read_case_rows(run_b)
     pairs = _agent_pairs(rows_a, rows_b, agents, run_b is None)
     prefixes = ("", "") if run_b is None else (f"{run_a.name}: ", f"{run_b.name}: ")
+    comparisons = compare_agents(rows_a, rows_b, pairs, prefixes)
+    if not any(item.pairs for item in comparisons):
+        raise ValueError(
+            f"the agents of {str(run_a)!r} and {str(run_b or run_a)!r} share no completed episode"
+        )
+    return comparisons
+
+
+def compare_agents(
+    rows_a: list[Row], rows_b: list[Row], pairs: Iterable[tuple[str, str]], prefixes: tuple[str, str] = ("", "")
+) -> list[Comparison]:
+    """Compare pairs of agents in each condition of `rows_a`; those without a common episode have no pairs.
+
+    Args:
+        rows_a: Rows of A.
+        rows_b: Rows of B.
+        pairs: Agent of A and agent of B of each comparison.
+        prefixes: Texts before the names of the agents of A and of B.
+    """
     conditions = list(dict.fromkeys(row["condition"] for row in rows_a))
-    comparisons = [
+    return [
         compare_rows(
             [row for row in rows_a if row["agent"] == a and row["condition"] == condition],
             [row for row in rows_b if row["agent"] == b and row["condition"] == condition],
@@ -90,11 +109,6 @@ def compare_runs(run_a: Path, run_b: Path | None, agents: Sequence[str] | None =
         for a, b in pairs
         for condition in conditions
     ]
-    if not any(item.pairs for item in comparisons):
-        raise ValueError(
-            f"the agents of {str(run_a)!r} and {str(run_b or run_a)!r} share no completed episode"
-        )
-    return comparisons
 
 
 def compare_rows(
