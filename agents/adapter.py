@@ -1,5 +1,6 @@
 """User-defined agents: classes with a method `act`, given as "module:Class"."""
 
+import inspect
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.options import check_options, parse_agent
 from lgmd_gym.errors import shown, unknown_name
-from lgmd_gym.system.user_modules import import_user_module
+from lgmd_gym.system.user_modules import error_reason, import_user_module
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -56,12 +57,19 @@ class AgentAdapter(Agent):
         """Return the object's action as an array of shape (1,), float32.
 
         Raises:
-            ValueError: If the action is not one finite number.
+            ValueError: If the action is not one finite number; a bool is none.
         """
         self._alert = bool(info.get("lgmd/alert", False))
-        action = np.asarray(self.agent.act(observation, info), dtype=np.float32).reshape(-1)
-        if action.size != 1 or not np.isfinite(action[0]):
-            raise ValueError(f"agent {self.name!r} must return one finite number, got {action.tolist()}")
+        returned = self.agent.act(observation, info)
+        wanted = f"agent {self.name!r} must return one finite number"
+        try:
+            action = np.asarray(returned)
+            is_bool = action.dtype == bool  # True, meant as an alarm, would be the demand 1 and never brake
+            action = action.astype(np.float32).reshape(-1)
+        except (TypeError, ValueError, RuntimeError) as error:
+            raise ValueError(f"{wanted}, got {shown(returned)} ({error})") from None
+        if is_bool or action.size != 1 or not np.isfinite(action[0]):
+            raise ValueError(f"{wanted}, got {shown(returned)}; return -1.0 for full braking, 0.0 for none")
         return action
 
 
@@ -82,4 +90,23 @@ def make_user_agent(text: str) -> AgentAdapter:
         raise ValueError(f"agent {shown(name)} has no method act(observation, info)")
     options = parse_agent(f"{module}:{''.join(rest)}")[1]
     check_options(name, agent_class, options)
-    return AgentAdapter(name, agent_class(**options))
+    try:
+        agent = agent_class(**options)
+    except Exception as error:  # of the class's own code
+        raise ValueError(f"agent {shown(name)} cannot be created ({error_reason(error)})") from error
+    _check_signature(name, agent.act)
+    return AgentAdapter(name, agent)
+
+
+def _check_signature(name: str, act: Any) -> None:
+    """Raise ValueError if a method cannot be called with an observation and an info."""
+    try:
+        signature = inspect.signature(act)
+    except (TypeError, ValueError):  # compiled code without a signature
+        return
+    try:
+        signature.bind({}, {})
+    except TypeError:
+        raise ValueError(
+            f"agent {shown(name)} must have the method act(self, observation, info), got act{signature}"
+        ) from None

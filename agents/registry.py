@@ -66,7 +66,7 @@ def make_agent(text: str) -> Agent:
     if _is_user_class(name, rest):
         return make_user_agent(text)
     name, options = parse_agent(text)
-    check_known("agent", name, AGENTS)
+    check_known("agent", name, AGENTS, "an agent of your own is MODULE:CLASS")
     agent: Any = AGENTS[name]
     if not issubclass(agent, Rule):  # the parameters of a rule check their own names
         check_options(name, agent, options)

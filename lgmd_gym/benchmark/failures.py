@@ -25,7 +25,8 @@ def failure_lines(rows: Iterable[Row]) -> list[str]:
     Args:
         rows: Rows of a run; those without error are skipped.
     """
-    kinds = Counter((row["agent"], _describe(row["error"])) for row in rows if row["error"] is not None)
+    failed = [row for row in rows if row["error"] is not None]
+    kinds = Counter((row["agent"], describe_failure(row["error"])) for row in failed)
     most = kinds.most_common(MAX_FAILURES)
     lines = [f"{agent}: {text} ({counted(count, 'episode')})" for (agent, text), count in most]
     if len(kinds) > MAX_FAILURES:
@@ -44,7 +45,7 @@ def failing_agent(rows: Iterable[Row]) -> str:
     return next((agent for agent, n in failed.items() if n >= EARLY and agent not in succeeded), "")
 
 
-def _describe(error: str) -> str:
+def describe_failure(error: str) -> str:
     """Return the exception of a traceback, its place in code outside this package, and a remedy if known."""
     exception = error.strip().splitlines()[-1].strip()
     frames = _FRAME.findall(error)

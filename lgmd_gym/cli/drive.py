@@ -1,8 +1,12 @@
 """The `drive` command."""
 
+import sys
 from math import isfinite
+from traceback import format_exc, walk_tb
 
-from lgmd_gym.agents import make_agent
+from lgmd_gym.agents import Agent, make_agent
+from lgmd_gym.agents.adapter import AgentAdapter
+from lgmd_gym.benchmark.failures import describe_failure
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.cli.modules import find_target
 from lgmd_gym.cli.options import Drive
@@ -15,16 +19,25 @@ def run(options: Drive) -> int:
     """Run one episode and print how it ended."""
     agent = make_agent(options.agent)
     note_unused_params(options.params, [agent])
-    result = play_episode(
-        find_target(options.target, options.case, options.module, options.trust),
-        agent,
-        options.seed,
-        parse_arguments(options.set),
-        video=options.video,
-        live=options.live,
-        overlays=options.overlays,
-        sensors=SensorConfig(options.camera, read_params(options.params)),
-    )
+    target = find_target(options.target, options.case, options.module, options.trust)
+    arguments = parse_arguments(options.set)
+    sensors = SensorConfig(options.camera, read_params(options.params))
+    try:
+        result = play_episode(
+            target,
+            agent,
+            options.seed,
+            arguments,
+            video=options.video,
+            live=options.live,
+            overlays=options.overlays,
+            sensors=sensors,
+        )
+    except Exception as error:
+        if not _is_of_agent(agent, error):
+            raise
+        failure = describe_failure(format_exc())
+        raise ValueError(f"agent {agent.name!r} failed: {failure}") from error
     if result.stopped:
         print(f"window closed after {result.duration:.2f} s")
     elif result.collision:
@@ -35,3 +48,11 @@ def run(options: Drive) -> int:
     if options.video is not None:
         print(f"video: {options.video}")
     return 0
+
+
+def _is_of_agent(agent: Agent, error: Exception) -> bool:
+    """Return whether an exception passed through the module of a user's agent."""
+    if not isinstance(agent, AgentAdapter):
+        return False
+    module = getattr(sys.modules[type(agent.agent).__module__], "__file__", None)
+    return any(frame.f_code.co_filename == module for frame, _ in walk_tb(error.__traceback__))

@@ -16,6 +16,8 @@ def import_user_module(name: str, kind: str) -> ModuleType:
     Raises:
         ValueError: If it cannot be imported, or its code raises an exception.
     """
+    if name.endswith(".py"):
+        raise ValueError(f"{kind} cannot be imported; write the name of its module without .py")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
     try:
@@ -25,10 +27,10 @@ def import_user_module(name: str, kind: str) -> ModuleType:
         place = "" if found else "; run the command in the folder of the module"
         raise ValueError(f"{kind} cannot be imported ({error}){place}") from None
     except Exception as error:  # of the module's own code
-        raise ValueError(f"{kind} cannot be imported ({_reason(error)})") from error
+        raise ValueError(f"{kind} cannot be imported ({error_reason(error)})") from error
 
 
-def _reason(error: Exception) -> str:
+def error_reason(error: Exception) -> str:
     """Return the message of an error, and where it occurred unless the message states that."""
     text = f"{error}" if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
     if isinstance(error, ImportError | SyntaxError) or error.__traceback__ is None:

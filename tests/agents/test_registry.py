@@ -1,5 +1,6 @@
 """Agent strings, the registry, and agents of the user."""
 
+import numpy as np
 import pytest
 from support.agents import make_step, run_agent
 
@@ -70,6 +71,10 @@ def test_a_duplicate_name_is_rejected():
         ("random-brake:rate=0", "rate must be a number > 0, got 0"),
         ("no-brake:x=1", "unknown option of agent no-brake 'x'"),
         ("nowhere.at_all:Agent", "cannot be imported"),
+        ("my_detector", "; an agent of your own is MODULE:CLASS$"),
+        ("my_detector.py:Agent", "write the name of its module without .py$"),
+        (f"{__name__}:OnlyObservation", r"act\(self, observation, info\), got act\(observation\)$"),
+        (f"{__name__}:WithoutWeights", r"cannot be created \(FileNotFoundError: weights.npy, test_reg"),
         ("math:Agent", "unknown agent class 'math:Agent'; known: none"),
         ("collections:OrderedDict", "has no method act"),
         (f"{USER_AGENT}:levle=3", "did you mean 'level'"),
@@ -78,6 +83,27 @@ def test_a_duplicate_name_is_rejected():
 def test_an_invalid_string_is_rejected(text, message):
     with pytest.raises(ValueError, match=message):
         make_agent(text)
+
+
+class OnlyObservation:
+    def act(self, observation):
+        return 0.0
+
+
+class WithoutWeights:
+    def __init__(self):
+        raise FileNotFoundError("weights.npy")
+
+    def act(self, observation, info):
+        return 0.0
+
+
+@pytest.mark.parametrize("action", [True, np.array([False]), None, "brake", [0.0, 0.0], float("nan")])
+def test_an_action_that_is_not_one_number_is_rejected(action):
+    agent = make_agent(USER_AGENT)
+    agent.agent.act = lambda observation, info: action
+    with pytest.raises(ValueError, match="must return one finite number, got "):
+        run_agent(agent, make_step(30.0))
 
 
 def test_a_user_agent_acts_with_its_options_and_the_alert_of_the_neuron():

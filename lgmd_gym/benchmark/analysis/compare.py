@@ -88,7 +88,10 @@ def compare_runs(run_a: Path, run_b: Path | None, agents: Sequence[str] | None =
 
 
 def compare_agents(
-    rows_a: list[Row], rows_b: list[Row], pairs: Iterable[tuple[str, str]], prefixes: tuple[str, str] = ("", "")
+    rows_a: list[Row],
+    rows_b: list[Row],
+    pairs: Iterable[tuple[str, str]],
+    prefixes: tuple[str, str] = ("", ""),
 ) -> list[Comparison]:
     """Compare pairs of agents in each condition of `rows_a`; those without a common episode have no pairs.
 
