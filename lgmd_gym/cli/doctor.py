@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ PACKAGE = "lgmd-gym"
 SELF_TEST_S = 2.0  # Wall time of the self-test [s].
 SPEED = 8.0  # Ego speed of the self-test's approach to a standing car [m/s].
 REINSTALL = "in a clone of the repository and a fresh virtual environment: pip install -c constraints.txt ."
+INDENT = 18  # columns before a message
 OK, NOTE, FAULT = "ok", "note", "fault"
 
 
@@ -67,12 +69,19 @@ def print_findings(findings: Iterable[Finding], console: Console) -> int:
     faults = 0
     for item in findings:
         head = (f"{item.state:5}", colours[item.state])
-        line = Text.assemble(head, f" {item.check:11} {item.message}")
+        line = Text.assemble(head, f" {item.check:11} {_indented(item.message, console)}")
         console.print(line, soft_wrap=True, highlight=False)
         if item.fix:
-            console.print(Text(f"{'':18}→ {item.fix}", "bold"), soft_wrap=True, highlight=False)
+            fix = _indented(f"→ {item.fix}", console)
+            console.print(Text(f"{'':{INDENT}}{fix}", "bold"), soft_wrap=True, highlight=False)
         faults += item.state == FAULT
     return faults
+
+
+def _indented(text: str, console: Console) -> str:
+    """Return a text in lines of the console's width after `INDENT` columns; paths are not broken."""
+    lines = wrap(text, console.width - INDENT, break_long_words=False, break_on_hyphens=False)
+    return f"\n{'':{INDENT}}".join(lines)
 
 
 def check_versions() -> list[Finding]:

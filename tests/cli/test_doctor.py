@@ -5,6 +5,7 @@ from av.codec.codec import UnknownCodecError
 
 from lgmd_gym.cli import doctor
 from lgmd_gym.cli import main as cli
+from lgmd_gym.cli.console import make_console
 
 
 def faults(findings):
@@ -14,10 +15,21 @@ def faults(findings):
 def test_a_working_installation_has_no_fault(capsys, monkeypatch):
     monkeypatch.setattr(doctor, "SELF_TEST_S", 0.2)
     assert cli.run(["doctor"]) == 0
-    output = capsys.readouterr().out
+    output = " ".join(capsys.readouterr().out.split())
     for words in ("numba 0", "__pycache__", "ffmpeg", "m before the target", "camera frames/s"):
         assert words in output
     assert "fault" not in output
+
+
+def test_messages_are_wrapped_and_paths_are_not(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    path = "/" + "folder/" * 15
+    finding = doctor.Finding("check", doctor.NOTE, "name 1.0, " * 20, f"write to {path} " + "or so " * 20)
+    doctor.print_findings([finding], make_console())
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) > 6
+    assert all(len(line) <= 80 or line.strip() == path for line in lines)
+    assert path in "".join(lines)
 
 
 @pytest.mark.parametrize(
