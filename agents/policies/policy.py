@@ -178,5 +178,6 @@ def _load_network(path: Path, card: PolicyCard) -> Any:
     except Exception as error:  # of the archive, pickle, PyTorch or stable-baselines3
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise ValueError(
-            f"policy {shown(str(path))} cannot be loaded ({reason}); correct its card, or train it again"
+            f"policy {shown(str(path))} cannot be loaded with algo {shown(card.algo)} ({reason}); "
+            "correct its card, or train it again"
         ) from None

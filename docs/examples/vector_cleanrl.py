@@ -99,7 +99,7 @@ def collect(envs: VectorEnv, network: Network, inputs: Tensor, args: Args) -> tu
         actions = distribution.sample()
         observations, rewards, terminated, truncated, infos = envs.step(actions.numpy())
         rewards = args.reward_scale * torch.from_numpy(rewards).float()
-        if truncated.any():  # an episode that is cut off would have gone on with the value of its last state
+        if truncated.any():  # the return of a truncated episode includes the value of its last state
             cut = np.flatnonzero(truncated)
             last = {k: np.stack([infos["final_obs"][i][k] for i in cut]) for k in SCALES}
             rewards[cut] += args.gamma * network(features(last))[1]

@@ -36,7 +36,7 @@ def copy_with_card(path, **values):
             r"the weights action_net.weight have the shape \(2, 64\), those of the card \(1, 64\)",
         ),
         ({"demands": [0.0], "network": None}, "model and card do not belong together"),
-        ({"algo": "nix"}, "cannot be loaded"),
+        ({"algo": "nix"}, "cannot be loaded with algo 'nix' .*; correct its card"),
     ],
 )
 def test_damaged_card(tmp_path, values, words):
