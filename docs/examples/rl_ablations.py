@@ -5,8 +5,8 @@
     python docs/examples/rl_ablations.py runs/zones0 --seeds 5 --jobs 2
 
 Each arm changes one property of the recipe of `lgmd-gym train`, and is trained on recorded levels (see
-`recorded_levels.py`), which takes about a minute. All arms see the same number of camera frames, apart from
-those with another `budget`. The offline method trains on nine of ten levels and selects its best epoch on the
+`recorded_levels.py`), which takes about a minute. All arms see the same number of camera frames;
+`--budget` multiplies it. The offline method trains on nine of ten levels and selects its best epoch on the
 others; `--levels` limits both. The table has results on the validation levels: interquartile means over
 training seeds, with 95 % intervals of a bootstrap over seeds and levels for the return. It is in Markdown.
 
@@ -50,7 +50,6 @@ class Arm:
         features: Changes of the inputs and timing.
         algo_kwargs: Changes of the arguments of the algorithm.
         false_cost: Factor on the cost of braking without a threat.
-        budget: Factor on the number of decisions.
     """
 
     title: str
@@ -58,7 +57,6 @@ class Arm:
     features: dict[str, Any] = field(default_factory=dict)
     algo_kwargs: dict[str, Any] = field(default_factory=dict)
     false_cost: float = FALSE_COST
-    budget: float = 1.0
 
 
 SPEEDS = ("ego_speed", "ego_yaw_rate")
@@ -72,16 +70,17 @@ ARMS = {
     "ffi": Arm("mean luminance change F̂", features={"inputs": ("zones_ffi", *SPEEDS)}),
     "speeds": Arm("speed and yaw rate only", features={"inputs": SPEEDS}),
     "frames": Arm(
-        "camera frames, CNN, four times the decisions",
+        "camera frames, CNN",
         features={"inputs": ("frame", *SPEEDS), "history": 2},
-        algo_kwargs={"learning_rate": 3e-4, "batch_size": 64, "buffer_size": 48_000},
-        budget=4.0,
+        algo_kwargs={"learning_rate": 1e-4, "batch_size": 64, "buffer_size": 48_000},
     ),
     "offline": Arm("offline training, 15 Hz, potentials", OFFLINE, {"repeat": 2}),
 }
 
 
-def train_online(arm: Arm, seed: int, train: Decisions, validation: Decisions) -> np.ndarray:
+def train_online(
+    arm: Arm, seed: int, train: Decisions, validation: Decisions, budget: float = 1.0
+) -> np.ndarray:
     """Train with stable-baselines3; return what `evaluate` returns for the validation levels."""
     torch.set_num_threads(1)
     config = TrainConfig.from_hyperparams(arm.algo)
@@ -90,7 +89,7 @@ def train_online(arm: Arm, seed: int, train: Decisions, validation: Decisions) -
     envs.seed(seed)
     kwargs = algorithm_kwargs(config) | arm.algo_kwargs
     model = algorithm_class(arm.algo)(config.policy, envs, seed=seed, device="cpu", **kwargs)
-    model.learn(round(arm.budget * config.n_timesteps * config.features.repeat / features.repeat))
+    model.learn(round(budget * config.n_timesteps * config.features.repeat / features.repeat))
     return evaluate(model, validation)
 
 
@@ -111,14 +110,14 @@ def features_of(arm: Arm) -> FeatureConfig:
     return replace(TrainConfig.from_hyperparams("dqn").features, **arm.features)
 
 
-def tasks_of(arm: Arm, folder: Path, seeds: int, levels: int | None) -> Iterator[Any]:
+def tasks_of(arm: Arm, folder: Path, seeds: int, levels: int | None, budget: float) -> Iterator[Any]:
     """Yield a delayed training for each seed; joblib shares the tables of the levels between processes."""
     if arm.algo == OFFLINE:
         yield from (delayed(train_offline)(arm, seed, folder, levels) for seed in range(seeds))
         return
     train = Decisions(level_files(folder, "train"), features_of(arm), arm.false_cost)
     validation = Decisions(level_files(folder, "validation"), features_of(arm), 1.0)
-    yield from (delayed(train_online)(arm, seed, train, validation) for seed in range(seeds))
+    yield from (delayed(train_online)(arm, seed, train, validation, budget) for seed in range(seeds))
 
 
 def table_row(name: str, results: np.ndarray, threats: np.ndarray) -> str:
@@ -135,14 +134,21 @@ def table_row(name: str, results: np.ndarray, threats: np.ndarray) -> str:
     )
 
 
-def main(folder: Path, names: list[str], seeds: int = 5, jobs: int = 1, levels: int | None = None) -> None:
+def main(
+    folder: Path,
+    names: list[str],
+    seeds: int = 5,
+    jobs: int = 1,
+    levels: int | None = None,
+    budget: float = 1.0,
+) -> None:
     """Train the arms and print the table."""
     episodes = chain.from_iterable(level_files(folder, "validation"))
     threats = np.array([episode.threat for episode in episodes])
     print(f"n = {seeds} seeds, {threats.sum()} threats and {(~threats).sum()} other validation levels\n")
     print("| arm | return | avoided [%] | false activations [%] |\n|---|---|---|---|")
     for name in names:
-        results: Any = Parallel(n_jobs=jobs)(tasks_of(ARMS[name], folder, seeds, levels))
+        results: Any = Parallel(n_jobs=jobs)(tasks_of(ARMS[name], folder, seeds, levels, budget))
         print(table_row(ARMS[name].title, np.stack(results), threats), flush=True)
 
 
@@ -155,5 +161,6 @@ if __name__ == "__main__":
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--levels", type=int, help="number of training levels of the offline arm")
+    parser.add_argument("--budget", type=float, default=1.0, help="factor on the number of decisions")
     options = parser.parse_args()
-    main(options.folder, options.arms, options.seeds, options.jobs, options.levels)
+    main(options.folder, options.arms, options.seeds, options.jobs, options.levels, options.budget)

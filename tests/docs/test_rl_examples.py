@@ -98,7 +98,7 @@ def test_arms_are_trained_on_recorded_levels(name, tmp_path, monkeypatch, capsys
     example = load("rl_ablations")
     features = {"inputs": ("ego_speed",) if name == "offline" else ("frame", "ego_speed"), "repeat": 2}
     few = {"buffer_size": 200, "learning_starts": 64, "batch_size": 16}
-    arm = replace(example.ARMS[name], features=features, algo_kwargs=few, budget=0.002)
+    arm = replace(example.ARMS[name], features=features, algo_kwargs=few)
     monkeypatch.setitem(example.ARMS, name, arm)
     for split, lengths in (("train", range(4, 24)), ("validation", range(4, 8))):
         (tmp_path / "episodes" / split).mkdir(parents=True)
@@ -109,7 +109,7 @@ def test_arms_are_trained_on_recorded_levels(name, tmp_path, monkeypatch, capsys
     monkeypatch.setattr(
         example, "OfflineDataset", lambda *args: trained.append(len(args[0])) or offline(*args)
     )
-    example.main(tmp_path, [name], seeds=1, levels=10)
+    example.main(tmp_path, [name], seeds=1, levels=10, budget=0.002)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "n = 1 seeds, 2 threats and 2 other validation levels"
     assert lines[-1].startswith(f"| {arm.title} | ")
