@@ -126,6 +126,7 @@ def test_intervals_and_chance():
     assert everything["TTA at the cap"].chance == pytest.approx(4.0)  # the length of the clips
 
 
+@pytest.mark.slow
 def test_a_random_score_has_the_chance_level():
     rng = np.random.default_rng(0)
     # Clips with an event are shorter, so that their random replacements come from many positions.
