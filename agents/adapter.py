@@ -15,6 +15,20 @@ if TYPE_CHECKING:
     from lgmd_gym.neuron import NeuronSpec
 
 
+TOLERANCE = 1e-6  # of rounding in actions beyond ±1
+
+
+class _Named(dict[str, Any]):
+    """A dict whose KeyError suggests the closest key."""
+
+    def __init__(self, kind: str, values: dict[str, Any]) -> None:
+        super().__init__(values)
+        self._kind = kind
+
+    def __missing__(self, key: object) -> Any:
+        raise KeyError(str(unknown_name(self._kind, key, self)))
+
+
 class AgentAdapter(Agent):
     """Adapt a user's object to the interface of `Agent`.
 
@@ -57,20 +71,20 @@ class AgentAdapter(Agent):
         """Return the object's action as an array of shape (1,), float32.
 
         Raises:
-            ValueError: If the action is not one finite number; a bool is none.
+            ValueError: If the action is not one number in [-1, 1]; a bool is none.
         """
         self._alert = bool(info.get("lgmd/alert", False))
-        returned = self.agent.act(observation, info)
-        wanted = f"agent {self.name!r} must return one finite number"
+        returned = self.agent.act(_Named("observation key", observation), _Named("info key", info))
+        wanted = f"agent {self.name!r} must return one number in [-1, 1]"
         try:
             action = np.asarray(returned)
             is_bool = action.dtype == bool  # True, meant as an alarm, would be the demand 1 and never brake
             action = action.astype(np.float32).reshape(-1)
         except (TypeError, ValueError, RuntimeError) as error:
             raise ValueError(f"{wanted}, got {shown(returned)} ({error})") from None
-        if is_bool or action.size != 1 or not np.isfinite(action[0]):
+        if is_bool or action.size != 1 or not abs(action[0]) <= 1.0 + TOLERANCE:
             raise ValueError(f"{wanted}, got {shown(returned)}; return -1.0 for full braking, 0.0 for none")
-        return action
+        return action.clip(-1.0, 1.0)
 
 
 def make_user_agent(text: str) -> AgentAdapter:

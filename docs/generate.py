@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 import figures
 from docstring_markdown import as_markdown
 from environment_pages import VIDEO_AGENT, all_cards, environment_page, id_of, overview_tables
+from joblib import Parallel, delayed
 from reference_returns import read_returns
 
 from lgmd_gym.benchmark.analysis.tables import mean_kmh
@@ -34,9 +35,10 @@ def main(out: Path) -> None:
     for folder in (static, pages):
         folder.mkdir(parents=True, exist_ok=True)
     returns = read_returns(Path(__file__).parent / "returns.csv")
-    for card in all_cards():
-        if not (static / f"{card.name}.mp4").exists():
-            _record(card, static)
+    cards = all_cards()
+    missing = [card for card in cards if not (static / f"{card.name}.mp4").exists()]
+    Parallel(n_jobs=2)(delayed(_record)(card, static) for card in missing)
+    for card in cards:
         page = environment_page(card, returns[id_of(card)])
         (pages / f"{card.name}.md").write_text(page, encoding="utf-8")
     for cls in (BrakingEnv, TrafficEnv):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from lgmd_gym.cli.console import make_console
+from lgmd_gym.cli.console import activity, make_console
 from lgmd_gym.cli.modules import chosen_modules
 from lgmd_gym.cli.options import refuse_unused
 from lgmd_gym.cli.params import note_unused_params, read_params
@@ -40,7 +40,9 @@ def run(options: "Bench") -> int:
     try:
         if benchmark.rows:
             _print_tables(benchmark, console)
-        for file in write_outputs(path, options.plots, options.report, _trust(options)):
+        with activity("drawing the figures of the run"):
+            files = write_outputs(path, options.plots, options.report, _trust(options))
+        for file in files:
             if file.name == "report.html":
                 console.print(f"report: {file}", soft_wrap=True)
     except OSError as error:

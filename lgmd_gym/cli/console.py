@@ -2,6 +2,8 @@
 
 import os
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from rich.console import Console
 
@@ -21,6 +23,24 @@ def make_console() -> Console:
         console = Console(markup=False, emoji=False, width=WIDTH)
     console.push_render_hook(FittedTables(console))
     return console
+
+
+@contextmanager
+def activity(text: str) -> Iterator[Callable[[str], None]]:
+    """Show a text with a spinner if stderr is a terminal; yield the function that replaces the text.
+
+    The text is erased in the end. Output to stdout that is not a terminal stays there.
+    """
+    from rich.progress import Progress, SpinnerColumn, TextColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False))
+    console, redirect = Console(stderr=True), sys.stdout.isatty()
+    if not console.is_terminal:
+        yield lambda new: None
+        return
+    with Progress(*columns, console=console, transient=True, redirect_stdout=redirect) as progress:
+        task = progress.add_task(text)
+        yield lambda new: progress.update(task, description=new)
 
 
 def io_reason(error: OSError) -> str:

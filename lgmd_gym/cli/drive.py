@@ -8,6 +8,7 @@ from lgmd_gym.agents import Agent, make_agent
 from lgmd_gym.agents.adapter import AgentAdapter
 from lgmd_gym.benchmark.failures import describe_failure
 from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.cli.console import activity
 from lgmd_gym.cli.modules import find_target
 from lgmd_gym.cli.options import Drive
 from lgmd_gym.cli.params import note_unused_params, parse_arguments, read_params
@@ -23,16 +24,18 @@ def run(options: Drive) -> int:
     arguments = parse_arguments(options.set)
     sensors = SensorConfig(options.camera, read_params(options.params))
     try:
-        result = play_episode(
-            target,
-            agent,
-            options.seed,
-            arguments,
-            video=options.video,
-            live=options.live,
-            overlays=options.overlays,
-            sensors=sensors,
-        )
+        with activity("preparing the episode") as show:
+            result = play_episode(
+                target,
+                agent,
+                options.seed,
+                arguments,
+                video=options.video,
+                live=options.live,
+                overlays=options.overlays,
+                sensors=sensors,
+                progress=lambda time: show(f"{time:.1f} s simulated"),
+            )
     except Exception as error:
         if not _is_of_agent(agent, error):
             raise

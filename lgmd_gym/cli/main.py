@@ -11,7 +11,7 @@ from tyro.conf import subcommand
 
 from lgmd_gym._version import __version__
 from lgmd_gym.cli import options
-from lgmd_gym.cli.console import drop_output, io_reason
+from lgmd_gym.cli.console import activity, drop_output, io_reason
 from lgmd_gym.cli.help import description, documented, summary, wrapped_output
 from lgmd_gym.cli.parser_errors import one_line
 from lgmd_gym.errors import unknown_name
@@ -67,7 +67,9 @@ def _run(argv: list[str] | None) -> int:
     try:
         command = _parse(arguments)
         name = next(name for name, cls in COMMANDS.items() if isinstance(command, cls))
-        code = import_module(f"lgmd_gym.cli.{name}").run(command)
+        with activity("loading"):
+            module = import_module(f"lgmd_gym.cli.{name}")
+        code = module.run(command)
         sys.stdout.flush()
         return code
     except (ValueError, TypeError, OverflowError) as error:

@@ -84,6 +84,7 @@ def play_episode(
     live: bool = False,
     overlays: tuple[str, ...] = (),
     sensors: SensorConfig | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> PlaybackResult:
     """Run one episode, and optionally show or record the dashboard.
 
@@ -96,6 +97,7 @@ def play_episode(
         live: Whether to open a window, in real time.
         overlays: See `LGMDView`.
         sensors: Cameras and neurons; None for those of the agent.
+        progress: Called after every decision with the simulated time [s].
 
     Raises:
         ValueError: For an unknown name, a video that cannot be written, or a missing display.
@@ -108,7 +110,7 @@ def play_episode(
         env = make_target(target, arguments, **sensors.arguments)
         stack.callback(env.close)
         if video is None and not live:
-            return _play(env, agent, seed, lambda: True)
+            return _play(env, agent, seed, lambda: True, progress)
         name = target.name if isinstance(target, Case) else target
         view = LGMDView(env, title=f"{name}   {agent.name}   seed {seed}", overlays=overlays)
         rate = float(view.metadata["render_fps"])
@@ -123,17 +125,24 @@ def play_episode(
                 writer.write(picture)
             return window is None or window.show(picture)
 
-        result = _play(view, agent, seed, show)
+        result = _play(view, agent, seed, show, progress)
         if not result.stopped:
             any(not show() for _ in range(round(FINAL_SECONDS * rate)))
         return result
 
 
-def _play(env: gym.Env, agent: Agent, seed: int, show: Callable[[], bool]) -> PlaybackResult:
-    """Run one episode until it ends, or until `show` returns False."""
+def _play(
+    env: gym.Env,
+    agent: Agent,
+    seed: int,
+    show: Callable[[], bool],
+    progress: Callable[[float], None] | None,
+) -> PlaybackResult:
+    """Run one episode until it ends, or until `show` returns False; see `play_episode`."""
     observation, info = env.reset(seed=seed)
     agent.reset(seed)
     done, decisions = False, 0
+    rate = env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
     while True:
         # The agent acts before the picture is drawn, because the picture shows its alert.
         action = agent.act(observation, info)
@@ -143,11 +152,13 @@ def _play(env: gym.Env, agent: Agent, seed: int, show: Callable[[], bool]) -> Pl
         observation, _, terminated, truncated, info = env.step(action)
         done = terminated or truncated
         decisions += 1
+        if progress is not None:
+            progress(decisions / rate)
     return PlaybackResult(
         collision=bool(info["collision"]),
         impact_speed=info["relative_impact_speed"],
         ego_speed=info["ego_speed"],
         gap=info["gap"],
-        duration=decisions / env.unwrapped.config["policy_frequency"],  # type: ignore[attr-defined]
+        duration=decisions / rate,
         stopped=not done,
     )

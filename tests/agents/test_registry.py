@@ -98,11 +98,13 @@ class WithoutWeights:
         return 0.0
 
 
-@pytest.mark.parametrize("action", [True, np.array([False]), None, "brake", [0.0, 0.0], float("nan")])
+@pytest.mark.parametrize(
+    "action", [True, np.array([False]), None, "brake", [0.0, 0.0], float("nan"), -7.0, 1.1]
+)
 def test_an_action_that_is_not_one_number_is_rejected(action):
     agent = make_agent(USER_AGENT)
     agent.agent.act = lambda observation, info: action
-    with pytest.raises(ValueError, match="must return one finite number, got "):
+    with pytest.raises(ValueError, match=r"must return one number in .*, got "):
         run_agent(agent, make_step(30.0))
 
 
@@ -119,5 +121,20 @@ def test_a_user_agent_acts_with_its_options_and_the_alert_of_the_neuron():
 def test_a_user_agent_with_an_invalid_action_is_rejected(action):
     agent = make_agent(USER_AGENT)
     agent.agent.act = lambda observation, info: action
-    with pytest.raises(ValueError, match="must return one finite number"):
+    with pytest.raises(ValueError, match="must return one number in"):
         agent.act(*make_step(0.0))
+
+
+def test_rounding_beyond_full_braking_is_accepted():
+    agent = make_agent(USER_AGENT)
+    agent.agent.act = lambda observation, info: -1.0 - 1e-7
+    assert agent.act(*make_step(0.0)) == -1.0
+
+
+@pytest.mark.parametrize("name", ["observation", "info"])
+def test_a_key_that_is_not_in_the_observation_or_info_suggests_the_closest(name):
+    agent = make_agent(USER_AGENT)
+    agent.agent.act = lambda observation, info: {"observation": observation, "info": info}[name]["spike_freq"]
+    expected = f"unknown {name} key 'spike_freq'; did you mean 'spike_frequency'"
+    with pytest.raises(KeyError, match=expected):
+        agent.act({"spike_frequency": np.zeros(1)}, {"spike_frequency": 0.0})

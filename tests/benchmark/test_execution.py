@@ -181,9 +181,9 @@ def test_faulty_agents_become_error_rows(short_suite, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     words = {
         "Raises": "internal failure",
-        "NotANumber": "one finite number, got nan",
-        "TwoNumbers": "one finite number, got [0.0, -1.0]",
-        "Nothing": "one finite number, got None",
+        "NotANumber": "one number in [-1, 1], got nan",
+        "TwoNumbers": "one number in [-1, 1], got [0.0, -1.0]",
+        "Nothing": "one number in [-1, 1], got None",
         "Exits": "SystemExit: 3",
     }
     agents = [f"bad_agents:{name}" for name in words]

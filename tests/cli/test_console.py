@@ -1,5 +1,8 @@
 """The console prints names of users as they are, also those that look like rich's markup or emoji codes."""
 
+import sys
+from io import StringIO
+
 import pytest
 from rich.table import Table
 from support.rows import threat_row
@@ -7,7 +10,7 @@ from support.rows import threat_row
 from lgmd_gym.benchmark.analysis.tables import case_table, score_tables
 from lgmd_gym.benchmark.traffic.rows import KEYS
 from lgmd_gym.benchmark.traffic.tables import traffic_table
-from lgmd_gym.cli.console import make_console
+from lgmd_gym.cli.console import activity, make_console
 from lgmd_gym.cli.doctor import FAULT, Finding, print_findings
 
 NAMES = ["[red]a", "b[/]", ":x:"]
@@ -42,3 +45,31 @@ def test_tables_show_names_literally(tables, capsys):
 def test_findings_show_messages_literally(capsys):
     print_findings([Finding("check", FAULT, NAMES[0], NAMES[1])], make_console())
     assert capsys.readouterr().out.splitlines() == ["fault check       [red]a", f"{'':18}→ b[/]"]
+
+
+class Terminal(StringIO):
+    def isatty(self):
+        return True
+
+
+def test_an_activity_is_shown_in_a_terminal_and_erased(monkeypatch):
+    monkeypatch.setattr("sys.stderr", Terminal())
+    with activity("loading [b]") as show:
+        show("1.0 s :x:")
+    written = sys.stderr.getvalue()
+    assert "loading [b]" in written or "1.0 s :x:" in written
+    assert written.endswith("\x1b[2K")  # the line is erased
+
+
+def test_an_activity_writes_nothing_to_a_file_and_leaves_stdout_alone(monkeypatch, capsys):
+    with activity("loading") as show:
+        show("still loading")
+        print("output")
+    assert capsys.readouterr() == ("output\n", "")
+
+
+def test_output_to_a_file_stays_there_during_an_activity_in_a_terminal(monkeypatch, capsys):
+    monkeypatch.setattr("sys.stderr", Terminal())
+    with activity("loading"):
+        print("output")
+    assert capsys.readouterr().out == "output\n"
