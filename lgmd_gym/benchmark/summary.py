@@ -51,7 +51,7 @@ class Sample(NamedTuple):
         return cls(len({case for case, _ in pairs}), len({world for _, world in pairs}))
 
     def __str__(self) -> str:
-        return f"{counted(self.cases, 'case')} × {counted(self.worlds, 'world')}"
+        return f"{counted(self.cases, 'case')} in {counted(self.worlds, 'world')}"
 
 
 class AgentSummary(NamedTuple):

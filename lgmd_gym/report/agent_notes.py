@@ -3,7 +3,7 @@
 import inspect
 import re
 
-from lgmd_gym.agents.policies.card import policy_card
+from lgmd_gym.agents.policies.card import policy_card, read_card
 from lgmd_gym.agents.policies.policy import Policy, find_policy
 from lgmd_gym.agents.registry import AGENTS, make_agent
 from lgmd_gym.errors import counted
@@ -44,7 +44,8 @@ def _first_sentence(kind: type) -> str:
 def _policy_note(path: str) -> str:
     """Return the algorithm, cameras, inputs and demands of a policy."""
     try:
-        card = policy_card(find_policy(path))
+        file = find_policy(path)
+        card, training = policy_card(file), read_card(file).get("config")
     except ValueError:
         return "A learned policy, whose card cannot be read."
     cameras = len(card.camera) if isinstance(card.camera, list | tuple) else 1
@@ -53,4 +54,6 @@ def _policy_note(path: str) -> str:
     )
     demands = f"{len(card.demands)} levels of demand" if card.demands else "a continuous demand"
     sensors = counted(cameras, "camera")
-    return f"Learned policy ({card.algo.upper()}) with {sensors}, the inputs {inputs}, and {demands}."
+    algo = training.get("algo") if isinstance(training, dict) else card.algo
+    method = "offline training" if algo == "offline" else str(algo).upper()
+    return f"Learned policy ({method}) with {sensors}, the inputs {inputs}, and {demands}."

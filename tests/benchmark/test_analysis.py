@@ -64,7 +64,7 @@ def test_pairs_of_several_worlds_cluster_by_world():
         (avoided,) = comparison.differences
         bounds[str(comparison.sample)] = avoided.deviating_high
         assert str(comparison.sample) in comparison_table(comparison).caption
-    assert bounds == {"2 cases × 1 world": wilson(0, 2)[1], "2 cases × 10 worlds": wilson(0, 20)[1]}
+    assert bounds == {"2 cases in 1 world": wilson(0, 2)[1], "2 cases in 10 worlds": wilson(0, 20)[1]}
 
 
 def test_one_case_has_no_interval():
@@ -232,7 +232,7 @@ def test_report_is_one_page_without_external_files(run_folder):
         "Configuration",
     ]
     scores = page.split("<h2>")[2]
-    headings = [f"{condition}: 3 cases × 1 world" for condition in ("clear", "rain")]
+    headings = [f"{condition}: 3 cases in 1 world" for condition in ("clear", "rain")]
     assert re.findall(r"<h3>(.*?)</h3>", scores) == headings
     assert "k/n [95 % interval, clustered by case and world, in %]" in scores
     assert scores.count('<tr data-agent="ttc-oracle"><td>ttc-oracle</td>') == 2

@@ -138,7 +138,7 @@ def test_summary_orders_cases_by_number(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("worlds", "trials", "text"), [(1, 2, "2 cases × 1 world"), (4, 8, "2 cases × 4 worlds")]
+    ("worlds", "trials", "text"), [(1, 2, "2 cases in 1 world"), (4, 8, "2 cases in 4 worlds")]
 )
 def test_rates_cluster_by_case_and_world(worlds, trials, text):
     """Repeats of a case in a world are one trial."""
@@ -166,9 +166,9 @@ def impact():
 def test_sample_has_singular_and_plural():
     rows = [threat_row(case="a", world=1), threat_row(case="a", world=2)]
     assert [str(Sample.of(part)) for part in (rows, rows[:1], [])] == [
-        "1 case × 2 worlds",
-        "1 case × 1 world",
-        "0 cases × 0 worlds",
+        "1 case in 2 worlds",
+        "1 case in 1 world",
+        "0 cases in 0 worlds",
     ]
     without = {key: value for key, value in rows[0].items() if key != "world"}  # rows of an earlier version
     assert Sample.of([without, without | {"case": "b"}]) == (2, 1)

@@ -116,11 +116,11 @@ def test_what_breaks_first(capsys):
     example.first_table("stopping-zone", 1, 1, ("clear", "camera pitched up 20°"), every=14)
     clear, sky = capsys.readouterr().out.splitlines()[2:]
     assert clear.startswith("| clear | 2/2 [34–100] | 0/2 [0–66] | 1/3 ")
-    assert clear.endswith("| 2 cases × 1 world, 3 cases × 1 world |")  # threats, non-threats
+    assert clear.endswith("| 2 cases in 1 world, 3 cases in 1 world |")  # threats, non-threats
     assert sky.startswith("| camera pitched up 20° | 0/2 ")
     example.second_table("stopping-zone", 1, 1, every=6)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "| target, texture: 1 case × 1 world | day | night | fog |"
+    assert lines[0] == "| target, texture: 1 case in 1 world | day | night | fog |"
     assert len(lines) == 2 + 9
     assert "| light (220), texture 1.6 | 1/1 " in "".join(lines)
 
@@ -174,9 +174,9 @@ def test_all_scores():
     runs.append(StoredRun(traffic, [rows[0] | drive | {"threat": False}], False))
     example = load("all_scores")
     heading, _, none, a = example.table([example.column(run) for run in runs])
-    assert "r152: avoided, 2 cases × 2 worlds, clear" in heading
+    assert "r152: avoided, 2 cases in 2 worlds, clear" in heading
     assert "false-reaction: false activations, 2 cases in the laboratory, clear" in heading
-    assert "traffic: false activations per 100 km, 1 case × 1 world, mixed" in heading
+    assert "traffic: false activations per 100 km, 1 case in 1 world, mixed" in heading
     assert a.startswith("| a | 2/2 [")
     assert "| 1/2 [" in a
     assert "| 2.0 [" in a

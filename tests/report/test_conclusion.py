@@ -70,7 +70,8 @@ def test_avoided_and_false_activations_have_their_n_and_interval(numbers, senten
     assert sentence in text
     total = numbers["threats"] + numbers["non_threats"]
     assert f"Without braking, {numbers['threats']} of {total} episode" in text
-    assert text.startswith(f"The run contains {2 * total} episodes of suite suite ({total} cases × 1 world).")
+    contents = f"{2 * total} episodes of suite suite ({total} cases in 1 world)"
+    assert text.startswith(f"The run contains {contents}.")
     assert "Brackets contain the 95 % interval, clustered by case and world." in text
     assert text.endswith(CAVEAT)
     assert "\n" not in text
@@ -136,7 +137,7 @@ def test_limits_of_the_protocol():
     [
         ("no-brake", "Never brakes."),
         ("spike-threshold:threshold=45", "Brakes fully when the spike frequency reaches a threshold."),
-        ("policy:zones", "Learned policy (PPO) with 17 cameras, the inputs zones, ego_speed, ego_yaw_rate"),
+        ("policy:zones", "Learned policy (offline training) with 17 cameras, the inputs zones, ego_speed"),
         ("policy:missing.zip", "A learned policy, whose card cannot be read."),
         ("no_such_module:Agent", "A class from outside this package, which cannot be loaded."),
     ],
