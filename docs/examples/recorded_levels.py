@@ -68,21 +68,32 @@ class RecordedLevels(VecEnv):
         decisions: The recorded decisions.
         num_envs: Number of environments N.
         scale: Factor on the rewards.
+        threat_share: Share of threats among the levels; None for that of the recordings.
     """
 
-    def __init__(self, decisions: Decisions, num_envs: int, scale: float) -> None:
+    def __init__(
+        self, decisions: Decisions, num_envs: int, scale: float, threat_share: float | None = None
+    ) -> None:
         boxes: dict[str, Any] = {name: _box(name, table) for name, table in decisions.inputs.items()}
         super().__init__(num_envs, spaces.Dict(boxes), spaces.Discrete(2))
         self._decisions, self._scale = decisions, scale
         self._rng = np.random.default_rng()
+        threats, self._weights = decisions.threats, None
+        if threat_share is not None:
+            self._weights = np.where(
+                threats, threat_share / threats.sum(), (1.0 - threat_share) / (~threats).sum()
+            )
 
     def seed(self, seed: int | None = None) -> list[None]:
         self._rng = np.random.default_rng(seed)
         return [None] * self.num_envs
 
     def reset(self) -> dict[str, np.ndarray]:
-        self._position = self._rng.choice(self._decisions.starts, self.num_envs)
+        self._position = self._draw(self.num_envs)
         return self._observe()
+
+    def _draw(self, count: int) -> np.ndarray:
+        return self._rng.choice(self._decisions.starts, count, p=self._weights)
 
     def step_async(self, actions: np.ndarray) -> None:
         self._actions = actions
@@ -96,7 +107,7 @@ class RecordedLevels(VecEnv):
         for index in ended:
             infos[index]["terminal_observation"] = {name: values[index] for name, values in final.items()}
         self._position = self._position + ~done
-        self._position[ended] = self._rng.choice(table.starts, len(ended))
+        self._position[ended] = self._draw(len(ended))
         return self._observe(), (self._scale * rewards).astype(np.float32), done, infos
 
     def _observe(self) -> dict[str, np.ndarray]:

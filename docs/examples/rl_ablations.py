@@ -50,6 +50,7 @@ class Arm:
         features: Changes of the inputs and timing.
         algo_kwargs: Changes of the arguments of the algorithm.
         false_cost: Factor on the cost of braking without a threat.
+        threat_share: Share of threats in training; None for that of the recordings, about a half.
     """
 
     title: str
@@ -57,6 +58,7 @@ class Arm:
     features: dict[str, Any] = field(default_factory=dict)
     algo_kwargs: dict[str, Any] = field(default_factory=dict)
     false_cost: float = FALSE_COST
+    threat_share: float | None = None
 
 
 SPEEDS = ("ego_speed", "ego_yaw_rate")
@@ -65,6 +67,11 @@ ARMS = {
     "rate": Arm("7.5 Hz", features={"repeat": 4}),
     "reward": Arm("reward of the environment", false_cost=1.0),
     "exploration": Arm("exploration 0.3 in place of 0.03", algo_kwargs={"exploration_initial_eps": 0.3}),
+    "scale": Arm("rewards not scaled", features={"reward_scale": 1.0}),
+    "horizon": Arm("discount factor 0.9 per decision", algo_kwargs={"gamma": 0.9}),
+    "few": Arm("25 % threats in training", threat_share=0.25),
+    "many": Arm("75 % threats in training", threat_share=0.75),
+    "memory": Arm("potentials of the last frame only", features={"inputs": ("membrane_potential", *SPEEDS)}),
     "ppo": Arm("PPO", "ppo"),
     "spikes": Arm("spike frequencies", features={"inputs": ("zones_spikes", *SPEEDS)}),
     "ffi": Arm("mean luminance change F̂", features={"inputs": ("zones_ffi", *SPEEDS)}),
@@ -85,7 +92,7 @@ def train_online(
     torch.set_num_threads(1)
     config = TrainConfig.from_hyperparams(arm.algo)
     features = features_of(arm)
-    envs = RecordedLevels(train, config.n_envs, features.reward_scale)
+    envs = RecordedLevels(train, config.n_envs, features.reward_scale, arm.threat_share)
     envs.seed(seed)
     kwargs = algorithm_kwargs(config) | arm.algo_kwargs
     model = algorithm_class(arm.algo)(config.policy, envs, seed=seed, device="cpu", **kwargs)

@@ -66,6 +66,18 @@ def test_recorded_levels_replay_episodes():
         assert infos[0]["terminal_observation"]["ego_speed"].shape == (1,)
 
 
+@pytest.mark.parametrize(("share", "expected"), [(None, 0.5), (0.25, 0.25), (1.0, 1.0)])
+def test_share_of_threats_in_recorded_levels(share, expected):
+    pytest.importorskip("stable_baselines3")
+    example = load("recorded_levels")
+    _, table = recorded_decisions(example)  # two of four levels are threats
+    envs = example.RecordedLevels(table, num_envs=4000, scale=1.0, threat_share=share)
+    envs.seed(0)
+    envs.reset()
+    starts = np.searchsorted(table.starts, envs._position)
+    assert np.mean(table.threats[starts]) == pytest.approx(expected, abs=0.03)
+
+
 def test_results_of_recorded_levels():
     example = load("recorded_levels")
     episodes, table = recorded_decisions(example)
