@@ -9,6 +9,7 @@ from support.examples import EXAMPLES, load
 from support.recordings import synthetic_episode
 
 from lgmd_gym.agents.policies.features import FeatureConfig
+from lgmd_gym.agents.sides import NUM_ALL_ROUND
 from lgmd_gym.benchmark import get_suite
 from lgmd_gym.envs.registration import RANDOM, RANDOM_TASKS, make_source
 from lgmd_gym.training.offline.storage import save
@@ -174,3 +175,36 @@ def test_levels_of_the_leaderboard():
     cases = [dict(case.arguments) for case in get_suite(str(EXAMPLES / "levels.toml")).cases]
     assert [case["start_level"] for case in cases] == list(range(1000, 1400))
     assert all(case["num_levels"] == 1 and case["split"] == "test" for case in cases)
+
+
+def test_frontier_of_a_policy():
+    """Braking at decision 2 of 8 avoids the contact, at 6 it does not; lead times are 6 and 2 decisions."""
+    pytest.importorskip("stable_baselines3")
+    example = load("policy_frontier")
+    odds = np.array([-1.0, 0.5, 2.0, 3.0])
+    assert [example.first_braking(odds, margin, repeat=2) for margin in (0.0, 1.0, 3.0)] == [2, 4, None]
+    threats = [synthetic_episode(8, seed=seed) for seed in range(3)]
+    others = [synthetic_episode(5, threat=False), synthetic_episode(5, threat=False, traffic=True)]
+    row = example.frontier_row(1.0, threats + others, [2, 6, None, 0, None], rate_hz=10.0)
+    assert [cell.split(" [")[0] for cell in row.strip("| ").split(" | ")] == [
+        "1",
+        "1/3",
+        "0.40",
+        "1/1",
+        "0/1",
+    ]
+
+
+def test_frontier_of_the_shipped_policy(tmp_path, capsys):
+    """A margin that every log odds exceed brakes at once, and one that none exceeds never."""
+    pytest.importorskip("stable_baselines3")
+    shapes = dict.fromkeys(("spike_frequency", "membrane_potential", "ffi"), NUM_ALL_ROUND)
+    shapes |= {"ego_speed": 1, "ego_yaw_rate": 1}
+    observations = {name: np.full((8, size), 0.5, np.float32) for name, size in shapes.items()}
+    folder = tmp_path / "episodes" / "validation"
+    folder.mkdir(parents=True)
+    episode = replace(synthetic_episode(8), observations=observations)
+    save([[episode]], folder / "000000.npz", {})
+    load("policy_frontier").main(tmp_path, "policy:all-round", margins=(-1000.0, 1000.0))
+    rows = capsys.readouterr().out.splitlines()[2:]
+    assert [row.split(" | ")[1].split(" ")[0] for row in rows] == ["1/1", "0/1"]
