@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 
 TOLERANCE = 1e-6  # of rounding in actions beyond ±1
+OBSERVATION_KEY = "observation key"
 
 
 class _Named(dict[str, Any]):
@@ -26,7 +27,9 @@ class _Named(dict[str, Any]):
         self._kind = kind
 
     def __missing__(self, key: object) -> Any:
-        raise KeyError(str(unknown_name(self._kind, key, self)))
+        is_frame = self._kind == OBSERVATION_KEY and str(key).startswith("frame")
+        hint = "set include_frame = True in the class for camera frames" if is_frame else ""
+        raise KeyError(str(unknown_name(self._kind, key, self, hint)))
 
 
 class AgentAdapter(Agent):
@@ -74,7 +77,7 @@ class AgentAdapter(Agent):
             ValueError: If the action is not one number in [-1, 1]; a bool is none.
         """
         self._alert = bool(info.get("lgmd/alert", False))
-        returned = self.agent.act(_Named("observation key", observation), _Named("info key", info))
+        returned = self.agent.act(_Named(OBSERVATION_KEY, observation), _Named("info key", info))
         wanted = f"agent {self.name!r} must return one number in [-1, 1]"
         try:
             action = np.asarray(returned)

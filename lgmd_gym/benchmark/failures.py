@@ -14,13 +14,10 @@ EARLY = 8  # an agent whose first episodes all fail ends the run after this numb
 
 _PACKAGE = str(Path(lgmd_gym.__file__).parent)
 _FRAME = re.compile(r'^  File "(.+)", line (\d+), in (.+)$', re.MULTILINE)
-_REMEDIES = {
-    "KeyError: 'frame'": "set include_frame = True in the class for observations with frames",
-}
 
 
 def failure_lines(rows: Iterable[Row]) -> list[str]:
-    """Return a line for each agent and exception: the number of episodes, the exception, its place, a remedy.
+    """Return a line for each agent and exception: the number of episodes, the exception and its place.
 
     Args:
         rows: Rows of a run; those without error are skipped.
@@ -46,7 +43,7 @@ def failing_agent(rows: Iterable[Row]) -> str:
 
 
 def describe_failure(error: str) -> str:
-    """Return the exception of a traceback, its place in code outside this package, and a remedy if known."""
+    """Return the exception of a traceback and its place in code outside this package."""
     exception = error.strip().splitlines()[-1].strip()
     frames = _FRAME.findall(error)
     own = [frame for frame in frames if not frame[0].startswith(_PACKAGE) and "site-packages" not in frame[0]]
@@ -54,8 +51,7 @@ def describe_failure(error: str) -> str:
     if frames:
         file, line, function = (own or frames)[-1]
         place = f" at {_short(file)}:{line} in {function}"
-    remedy = _REMEDIES.get(exception)
-    return f"{exception}{place}{f'; {remedy}' if remedy else ''}"
+    return f"{exception}{place}"
 
 
 def _short(file: str) -> str:

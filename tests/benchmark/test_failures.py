@@ -33,9 +33,9 @@ def test_a_run_ends_early_if_every_episode_of_an_agent_fails(module, tmp_path, c
     assert cli.run(["bench", "--agents", *agents, "--seeds", "1", "--jobs", "1", *out]) == 1
     printed = " ".join(capsys.readouterr().out.split())
     assert f"{EARLY} episodes failed" in printed
+    assert "- broken_agents:Broken: KeyError: \"unknown observation key 'frame'; " in printed
     assert (
-        "- broken_agents:Broken: KeyError: 'frame' at broken_agents.py:7 in helper; set include_frame = True"
-        in printed
+        'set include_frame = True in the class for camera frames" at broken_agents.py:7 in helper' in printed
     )
     assert f"every episode of broken_agents:Broken failed, {EARLY} so far: {19 + EARLY} of 57" in printed
     assert "start a new run" in printed

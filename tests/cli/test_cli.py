@@ -63,12 +63,13 @@ def test_drive_prints_the_result_of_a_case(capsys):
 
 
 def test_drive_prints_the_line_of_an_agent_that_fails(tmp_path, monkeypatch, capsys):
-    text = "class Wrong:\n    def act(self, observation, info):\n        return observation['frames']\n"
+    text = "class Wrong:\n    def act(self, observation, info):\n        return observation['ego_sped']\n"
     (tmp_path / "wrong_key_agent.py").write_text(text)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     assert cli.run(["drive", "quick/CCRs/v30", "--agent", "wrong_key_agent:Wrong"]) == 2
-    message = "agent 'wrong_key_agent:Wrong' failed: KeyError: 'frames' at wrong_key_agent.py:3 in act"
+    error = "KeyError: \"unknown observation key 'ego_sped'; did you mean 'ego_speed'?\""
+    message = f"agent 'wrong_key_agent:Wrong' failed: {error} at wrong_key_agent.py:3 in act"
     assert capsys.readouterr().err == f"lgmd-gym: {message}\n"
 
 
