@@ -198,13 +198,10 @@ def _check_cases(cases: tuple[Case, ...]) -> None:
         try:
             make_source(case.family, dict(case.arguments))
         except (TypeError, ValueError) as error:
-            known = case.family in (*FAMILIES, RANDOM, SCENARIO)
-            hint = (
-                ""
-                if known
-                else "; a family of your own needs its module, module = 'my_scenarios' in the file"
-            )
-            raise ValueError(f"case {case.name!r}: {error}{hint}") from None
+            text = str(error)
+            if case.family not in (*FAMILIES, RANDOM, SCENARIO) and not text.endswith("?"):
+                text += "; a family of your own requires module = 'my_scenarios' in the file"
+            raise ValueError(f"case {case.name!r}: {text}") from None
 
 
 def copy_suite(source: Source | Path, target: Path, modules: tuple[str, ...] = ()) -> None:

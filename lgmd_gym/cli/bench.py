@@ -167,7 +167,7 @@ def _title(benchmark: "Run") -> str:
     rate = next((f" at {row['fps']:g} Hz" for row in benchmark.rows if row["fps"]), "")  # none in failed rows
     first = f" from {config.first_seed} on" if config.first_seed else ""
     camera = f"camera {config.sensor_config.label}{rate}"
-    worlds = counted(config.worlds, "world") if config.worlds else "the laboratory"
+    worlds = f"up to {counted(config.worlds, 'world')}" if config.worlds else "the laboratory"
     seeds = f"{counted(config.seeds, 'seed')}{first} in {worlds}"
     return f"{benchmark.plan.suite}: {camera}, T_sf = {level:g} spikes/s, {seeds}"
 

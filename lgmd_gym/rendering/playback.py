@@ -70,7 +70,10 @@ def make_target(target: str | Case, arguments: dict[str, Any], **options: Any) -
         return gym.make(target, **options, **arguments)
     cases = [case.name for suite in SUITES.values() for case in suite.cases]
     if target not in cases:
-        hint = "lgmd-gym list envs and lgmd-gym list cases print all names"
+        hint = (
+            "lgmd-gym list envs and lgmd-gym list cases print all names; "
+            "a family of your own requires --module"
+        )
         raise unknown_name("environment or case", target, [*ids, *cases, *traffic], hint)
     return make_target(find_case(target), arguments, **options)
 

@@ -13,11 +13,13 @@ from lgmd_gym.benchmark.analysis.tables import (
     rate_text,
     success_lines,
 )
+from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.folder import replace_file
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import INTERVAL_TEXT, Sample, by_condition, without_fcw_driver
 from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.envs.registration import SCENARIO
 from lgmd_gym.report.agent_notes import agent_note
 from lgmd_gym.report.case_grids import case_grids
 from lgmd_gym.report.conclusion import conclusion
@@ -66,7 +68,7 @@ def _render(data: ReportData) -> str:
     )
     environment.filters |= {"band": band, "rate_band": rate_band, "rate": rate_text, "kmh": mean_kmh}
     environment.filters["svg"] = to_text
-    families = {case.name: case.family for case in data.cases.values()}
+    families = {case.name: _family(case) for case in data.cases.values()}
     return environment.get_template("page.html").render(
         data=data,
         interval=INTERVAL_TEXT,
@@ -100,6 +102,11 @@ def rate_band(rate: Rate, lower_is_better: bool = False) -> str:
         return ""
     share = rate.k / rate.n
     return band(1.0 - share if lower_is_better else share)
+
+
+def _family(case: Case) -> str:
+    """Return the family of a case; that of a case with a given scenario is in its name."""
+    return case.name.split("/")[1] if case.family == SCENARIO else case.family
 
 
 def _condition(data: ReportData, name: str, rows: list[Row], families: dict[str, str]) -> dict[str, Any]:

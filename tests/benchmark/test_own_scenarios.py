@@ -1,6 +1,7 @@
 """Scenario objects, scenario files and OpenSCENARIO files are read by one loader, driven and benchmarked."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -208,3 +209,11 @@ def test_scenario_file_with_a_module(folder, monkeypatch, capsys):
         assert result.collision
     finally:
         forget_families()
+
+
+def test_figures_name_the_family_of_a_scenario(folder):
+    suite = (replace(CUT_IN, family="squeeze"),)
+    config = RunConfig(suite=suite, agents=("always-brake",), seeds=1, worlds=0)
+    benchmark.run(config, folder / "run", plots=False)
+    table = pd.read_csv(folder / "run" / "figures" / "impact-speed-clear.csv")
+    assert set(table["family"]) == {"squeeze"}

@@ -124,7 +124,7 @@ def test_copy_of_a_sweep_is_equal(load, tmp_path):
         ({"sweep": {"ego_speed": [6]}, "speeds_kmh": [30]}, "speeds_kmh and sweep.ego_speed exclude"),
         ({"sweep": {"condition": ["nigth"]}}, "did you mean 'night'?"),
         ({"gap": [6]}, "write arguments = { gap = ... }, or sweep = { gap = [...] }"),
-        ({"family": "Own", "sweep": {"gap": [6]}}, "a family of your own needs its module, module = "),
+        ({"family": "Own", "sweep": {"gap": [6]}}, "a family of your own requires module = "),
         ({"family": ["CutIn"]}, "family must consist of letters, digits"),
         ({"swep": {"gap": [6]}}, "unknown key of a case 'swep'; did you mean 'sweep'?"),
         ({"sweep": {"gap": [6]}, "scenario": {}}, "sweep and scenario exclude each other"),

@@ -172,7 +172,7 @@ def test_version(capsys):
         (["bench", "--backend", "dusk"], "unknown value of --backend 'dusk'; did you mean 'dask'?"),
         (["drive"], "drive requires ENV|CASE|TRAFFIC|FILE; see lgmd-gym drive --help"),
         (["bench", "--seeds"], "--seeds requires a value; see lgmd-gym bench --help"),
-        (["drive", "nix"], " lgmd-gym list envs and lgmd-gym list cases print all names"),
+        (["drive", "nix"], " print all names; a family of your own requires --module"),
         (["scenario", "export", "quick/nix", "--to", "x.xosc"], "? lgmd-gym list cases prints all names"),
         (["bench", "--agents", "json:JSONDecodr"], "did you mean 'json:JSONDecoder'?"),
         (["bench", "--agents", "nix:Nix"], "(No module named 'nix')"),
