@@ -64,7 +64,7 @@ def is_file(suite: Source) -> bool:
     if not isinstance(suite, str) or suite.endswith(FILES):
         return True
     try:
-        return bool(suite) and suite not in SUITES and Path(suite).is_dir()
+        return bool(suite) and suite not in (*SUITES, TRAFFIC) and Path(suite).is_dir()
     except (OSError, ValueError):  # no path, such as a very long name
         return False
 

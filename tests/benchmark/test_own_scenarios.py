@@ -55,6 +55,15 @@ def test_scenario_files():
         assert names("parked.json") == ["parked/lot/v28.8"]
 
 
+@pytest.mark.parametrize("suite", ["quick", "traffic"])
+def test_a_shipped_suite_takes_precedence_over_a_folder_of_its_name(folder, suite):
+    (folder / suite).mkdir()
+    config = RunConfig(suite=suite, agents=("no-brake",), seeds=1)
+    assert not config.own_suite
+    config.save(folder / suite)
+    assert RunConfig.load(folder / suite / "run.toml").suite == suite
+
+
 def test_objects_and_files_are_one_suite(folder):
     assert (names(PARKED), scenarios(PARKED)) == (["scenarios/parked/v28.8"], [PARKED])
     export_case(find_case("quick/CCRs/v30"), folder / "approach.xosc")
