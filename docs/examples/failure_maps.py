@@ -11,7 +11,8 @@ the brake of that world. A run counts as avoided if it has neither contact nor p
 - `width`: width of the target, a box as long and as high as a car, and ego speed;
 - `brake`: deceleration of full braking, in place of that of the world, and ego speed; a car;
 - `curve`: radius of the road and ego speed; a car in the ego's lane. The whole approach is on the curve, to
-  the right in even worlds and to the left in odd ones. Lateral accelerations above 4 m/s² are left out.
+  the right in even worlds and to the left in odd ones; an infinite radius is a straight road. Lateral
+  accelerations above 4 m/s² are left out.
 
 Tables in Markdown list k/n with a 95 % interval. In the figure, a line separates the cells with at least 90 %
 from the others; the dashed line is that of `--bound`, an agent that uses no camera. No value is interpolated
@@ -32,7 +33,7 @@ from joblib import delayed
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.batch import play_unit
-from lgmd_gym.benchmark.case import Case, make_case, scenario_case, to_mps
+from lgmd_gym.benchmark.case import Case, make_case, to_mps
 from lgmd_gym.benchmark.rows import Row, key_of
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.statistics import Rate
@@ -43,24 +44,12 @@ from lgmd_gym.benchmark.worker_processes import run_parallel
 from lgmd_gym.camera.params import ROADS
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.appearance import MIXED
-from lgmd_gym.envs.dynamics.bend import Bend, Pose
-from lgmd_gym.envs.dynamics.path import Path as CarPath
-from lgmd_gym.envs.scenarios.manoeuvres import MAX_LATERAL
-from lgmd_gym.envs.scenarios.scenario import (
-    AFTERMATH,
-    EGO_LENGTH,
-    START_TTC,
-    TARGET_LENGTH,
-    Actor,
-    RoadPlan,
-    Scenario,
-)
+from lgmd_gym.envs.scenarios.curves import MAX_LATERAL
 from lgmd_gym.plotting.style import COLOURS, saved_figure
 
 SUITE = "failure-maps"
 NO_VIEW = SensorConfig({"name": "wide", "shape": [8, 8]})  # no-brake and oracles need no useful image
 LEVEL = 0.9  # of the contour
-BEYOND_TARGET = 60.0  # [m] of the curve
 
 PLANES = ("vibration", "width", "brake", "curve")
 GRIDS = {
@@ -116,12 +105,8 @@ def vibration_cell(road: str, texture: float, world: int) -> Cell:
 
 def width_cell(width: float, speed_kmh: float, world: int) -> Cell:
     """Return the cell of a target width [m]."""
-    speed = to_mps(speed_kmh)
-    target = Actor(gap=START_TTC * speed, kind="box", width=width)
-    scenario = Scenario(
-        family="StandingBox", ego_speed=speed, duration=START_TTC + AFTERMATH, actors=(target,)
-    )
-    return Cell(scenario_case(SUITE, f"width-{width:g}-v{speed_kmh:g}", scenario))
+    name = f"width-{width:g}-v{speed_kmh:g}"
+    return Cell(make_case(SUITE, "StandingBox", name, ego_speed=to_mps(speed_kmh), width=width))
 
 
 def brake_cell(deceleration: float, speed_kmh: float, world: int) -> Cell:
@@ -133,22 +118,13 @@ def brake_cell(deceleration: float, speed_kmh: float, world: int) -> Cell:
 
 def curve_cell(radius: float, speed_kmh: float, world: int) -> Cell | None:
     """Return the cell of a radius [m], infinite for a straight; None with too much lateral acceleration."""
-    speed, side = to_mps(speed_kmh), 1.0 if world % 2 else -1.0
+    speed, name = to_mps(speed_kmh), f"radius-{radius:g}-v{speed_kmh:g}"
+    if math.isinf(radius):
+        return Cell(make_case(SUITE, "CCRs", name, ego_speed=speed))
     if speed**2 / radius > MAX_LATERAL:
         return None
-    station = (EGO_LENGTH + TARGET_LENGTH) / 2 + START_TTC * speed
-    curve = (Bend(station + BEYOND_TARGET, side / radius),)
-    pose = CarPath(Pose(0.0, 0.0, 0.0), curve).pose(station)
-    gap = pose.x - (EGO_LENGTH + TARGET_LENGTH) / 2
-    scenario = Scenario(
-        family="CurveStandingTarget",
-        ego_speed=speed,
-        duration=START_TTC + AFTERMATH,
-        actors=(Actor(gap=gap, lateral_offset=-pose.y, heading=-pose.heading),),
-        ego_path=curve,
-        road=RoadPlan(kind="curve", bends=curve),
-    )
-    return Cell(scenario_case(SUITE, f"radius-{radius:g}-v{speed_kmh:g}", scenario))
+    left = bool(world % 2)
+    return Cell(make_case(SUITE, "CCRsCurve", name, ego_speed=speed, radius=radius, left=left))
 
 
 def make_planes(chosen: argparse.Namespace) -> dict[str, Plane]:

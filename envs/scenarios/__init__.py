@@ -14,6 +14,8 @@ from lgmd_gym.envs.scenarios import (  # noqa: F401, I001
     obstacles,
     turning,
     manoeuvres,
+    curves,
+    boxes,
 )
 from lgmd_gym.envs.scenarios.registry import FAMILIES, make_scenario
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.camera import CONDITIONS
+from lgmd_gym.envs.scenarios.extra_arguments import EXTRA_NON_THREATS, EXTRA_THREATS
 from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS
 from lgmd_gym.envs.scenarios.registry import make_scenario
 from lgmd_gym.envs.scenarios.scenario import Scenario
@@ -15,6 +16,8 @@ SPLITS = ("train", "validation", "test")
 LEVELS = 1_000_000  # per split
 THREAT_SHARE = 0.5
 ALL_FAMILIES = (*THREATS, *NON_THREATS)
+EXTRA_FAMILIES = (*EXTRA_THREATS, *EXTRA_NON_THREATS)
+"""Families that levels contain only where they are named."""
 
 
 def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> tuple[int, int]:
@@ -38,7 +41,7 @@ def check_conditions(conditions: Sequence[str]) -> None:
 
 
 def check_families(families: Sequence[str] | None) -> tuple[str, ...]:
-    """Return the names of scenario families, or those of all families for None.
+    """Return the names of scenario families, or `ALL_FAMILIES` for None.
 
     Raises:
         ValueError: For an unknown family or an empty sequence.
@@ -48,7 +51,7 @@ def check_families(families: Sequence[str] | None) -> tuple[str, ...]:
     if not check_items("families", families, str):
         raise ValueError("families needs at least one name, got none")
     for name in families:
-        check_known("family of random levels", name, ALL_FAMILIES)
+        check_known("family of random levels", name, (*ALL_FAMILIES, *EXTRA_FAMILIES))
     return tuple(families)
 
 
@@ -75,7 +78,8 @@ def draw_scenario(rng: np.random.Generator, families: Collection[str] = ALL_FAMI
         families: Families to draw from, with the frequencies that they have among all. Without a threat, or
             without a non-threat, all scenarios are of the other kind.
     """
-    kinds = (THREATS, NON_THREATS) if rng.random() < THREAT_SHARE else (NON_THREATS, THREATS)
+    threats, non_threats = THREATS | EXTRA_THREATS, NON_THREATS | EXTRA_NON_THREATS
+    kinds = (threats, non_threats) if rng.random() < THREAT_SHARE else (non_threats, threats)
     first, second = ({name: kind[name] for name in kind if name in families} for kind in kinds)
     drawn = first or second
     weights = np.cumsum([family.weight for family in drawn.values()])

@@ -13,6 +13,7 @@ from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
 from lgmd_gym.camera import CameraSpec
 from lgmd_gym.camera.spec import check_camera
+from lgmd_gym.envs.scenarios.distribution import EXTRA_FAMILIES, check_families
 from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
 from lgmd_gym.errors import (
     check_items,
@@ -60,6 +61,9 @@ class TrainConfig:
         recordings: Folder of an offline training run, to reuse its recorded episodes; None to record anew.
         traffic_episodes: Number of traffic episodes that "offline" trains on in addition; a quarter as many
             are added to its evaluations.
+        extra_levels: Number of levels of `extra_families` that "offline" trains on in addition; a twentieth
+            as many are added to its evaluations.
+        extra_families: Scenario families of the extra levels.
         videos: Number of validation episodes in videos at each evaluation; not for "offline".
         wandb: Project of Weights & Biases that the training is logged to; None for no log there.
 
@@ -82,6 +86,8 @@ class TrainConfig:
     eval_episodes: int = 96
     recordings: str | None = None
     traffic_episodes: int = 0
+    extra_levels: int = 0
+    extra_families: Sequence[str] = ()
     videos: int = 0
     wandb: str | None = None
 
@@ -89,7 +95,7 @@ class TrainConfig:
         check_known("algorithm", self.algo, ALGORITHMS)
         for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes"):
             object.__setattr__(self, name, check_whole(name, getattr(self, name), 1))
-        for name in ("traffic_episodes", "seed", "videos"):
+        for name in ("traffic_episodes", "extra_levels", "seed", "videos"):
             object.__setattr__(self, name, check_whole(name, getattr(self, name), 0))
         check_text("env_id", self.env_id)
         check_text("policy", self.policy)
@@ -111,9 +117,21 @@ class TrainConfig:
             raise ValueError(f"sac requires a continuous demand, got demands {list(self.demands)}; omit them")
         if self.algo == OFFLINE:
             self._check_offline()
-        elif self.recordings is not None or self.traffic_episodes:
-            name = "traffic_episodes" if self.traffic_episodes else "recordings"
-            raise ValueError(f"{name} requires algo 'offline', got {self.algo!r}; omit it")
+        for name in ("recordings", "traffic_episodes", "extra_levels"):
+            if getattr(self, name) and self.algo != OFFLINE:
+                raise ValueError(f"{name} requires algo 'offline', got {self.algo!r}; omit it")
+        self._check_extra_levels()
+
+    def _check_extra_levels(self) -> None:
+        families = check_items("extra_families", self.extra_families, str, "names")
+        object.__setattr__(self, "extra_families", check_families(families) if families else ())
+        if bool(self.extra_levels) != bool(families):
+            raise ValueError(
+                f"extra_levels and extra_families require each other, got {self.extra_levels} and "
+                f"{list(families)}; use for example --extra-levels 400 --extra-families {EXTRA_FAMILIES[0]}"
+            )
+        if self.extra_levels and self.env_id != RANDOM_ID:
+            raise ValueError(f"extra_levels requires env {RANDOM_ID!r}, got {self.env_id!r}; omit it")
 
     def _check_offline(self) -> None:
         if sorted(self.demands)[1:] != [HOLD] or min(self.demands) > LATCH_DEMAND:

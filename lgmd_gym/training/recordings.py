@@ -1,6 +1,6 @@
 """Recorded episodes of an offline training run: newly recorded, or reused from another run."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from json import dumps, loads
 from pathlib import Path
@@ -21,6 +21,7 @@ from lgmd_gym.training.offline.traffic import TrafficRecorder
 
 FILE_SIZE = 100  # largest number of seeds in one file
 TRAFFIC_RATIO = 4  # training episodes in traffic per validation episode in traffic
+EXTRA_RATIO = 20  # extra levels for training per extra level for validation
 FORMAT = 5  # of the files; recordings of another format are rejected
 
 
@@ -29,14 +30,18 @@ class RecordingSet:
     """Recorded episodes of one kind.
 
     Attributes:
-        name: Name of the folder: "train", "validation", "traffic-train" or "traffic-validation".
+        name: Name of the folder: "train" or "validation", also with "extra-" or "traffic-" before it.
         seeds: Seeds of the environment.
         record: Returns the episodes of each seed.
+        option: Options of the command line that record these episodes.
+        settings: Settings that only these episodes depend on.
     """
 
     name: str
     seeds: range
     record: RecordFunction
+    option: str = ""
+    settings: dict[str, Any] = field(default_factory=dict)
 
 
 def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
@@ -45,20 +50,33 @@ def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
     shrink = _frame_shrink(config)
     first = config.first_seed if train else VALIDATION_SEED
     count = config.n_timesteps if train else config.eval_episodes
-    levels = EpisodeRecorder(
-        partial(config.make_env, split),
-        hold=config.demands.index(HOLD),
-        brake=config.demands.index(min(config.demands)),
-        shrink=shrink,
-    )
+    levels = _level_recorder(config, split)
     sets = [RecordingSet(split, range(first, first + count), levels.record)]
+    if config.extra_levels:
+        families = list(config.extra_families)
+        extra = replace(config, env_kwargs=config.env_kwargs | {"families": families})
+        count = config.extra_levels if train else -(-config.extra_levels // EXTRA_RATIO)
+        option = f" --extra-levels {config.extra_levels} --extra-families {' '.join(families)}"
+        record = _level_recorder(extra, split).record
+        seeds = range(first, first + count)
+        sets.append(RecordingSet(f"extra-{split}", seeds, record, option, {"families": families}))
     if config.traffic_episodes:
         # The traffic suite of the benchmark uses the seeds from 0 on.
         first = SEED_STRIDE * (config.seed + 1) if train else VALIDATION_SEED
         count = config.traffic_episodes if train else -(-config.traffic_episodes // TRAFFIC_RATIO)
         traffic = TrafficRecorder(split, config.camera, shrink)
-        sets.append(RecordingSet(f"traffic-{split}", range(first, first + count), traffic.record))
+        option = f" --traffic-episodes {config.traffic_episodes}"
+        sets.append(RecordingSet(f"traffic-{split}", range(first, first + count), traffic.record, option))
     return sets
+
+
+def _level_recorder(config: TrainConfig, split: str) -> EpisodeRecorder:
+    return EpisodeRecorder(
+        partial(config.make_env, split),
+        hold=config.demands.index(HOLD),
+        brake=config.demands.index(min(config.demands)),
+        shrink=_frame_shrink(config),
+    )
 
 
 def _frame_shrink(config: TrainConfig) -> int | None:
@@ -84,7 +102,7 @@ def load_or_record(
     for recordings in recording_sets(config, split):
         files = _folder_of(recordings, config.recordings or folder)
         if config.recordings is None:
-            _record_missing(recordings, files, origin_of(config), progress, jobs)
+            _record_missing(recordings, files, origin_of(config) | recordings.settings, progress, jobs)
         by_seed: list[list[RecordedEpisode]] = []
         for file in sorted(files.glob("*.npz")):
             if len(by_seed) < len(recordings.seeds):
@@ -104,12 +122,12 @@ def check_recordings(config: TrainConfig) -> None:
     for split in ("train", "validation"):
         for recordings in recording_sets(config, split):
             files = _folder_of(recordings, config.recordings)
-            count = sum(check_file(file, origin_of(config)) for file in sorted(files.glob("*.npz")))
+            origin = origin_of(config) | recordings.settings
+            count = sum(check_file(file, origin) for file in sorted(files.glob("*.npz")))
             if count == 0:
-                option = "" if recordings.name == split else f" --traffic-episodes {config.traffic_episodes}"
                 raise ValueError(
                     f"no recorded episodes in {str(files)!r}; "
-                    f"train once with --algo offline{option}, without --recordings"
+                    f"train once with --algo offline{recordings.option}, without --recordings"
                 )
             if count < len(recordings.seeds):
                 raise ValueError(

@@ -14,7 +14,14 @@ from lgmd_gym.envs import FAMILIES
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.episode_source import RandomLevels
 from lgmd_gym.envs.registration import RANDOM_TASKS, env_id
-from lgmd_gym.envs.scenarios.distribution import ALL_FAMILIES, LEVELS, draw_scenario, level_generator
+from lgmd_gym.envs.scenarios.distribution import (
+    ALL_FAMILIES,
+    EXTRA_FAMILIES,
+    LEVELS,
+    draw_scenario,
+    level_generator,
+)
+from lgmd_gym.envs.scenarios.extra_arguments import EXTRA_NON_THREATS, EXTRA_THREATS
 from lgmd_gym.envs.scenarios.free_lanes import free_lane
 from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS
 from lgmd_gym.wrappers.vector import LGMDObservation as LGMDVector
@@ -38,10 +45,10 @@ def run_episode(env, seed=None):
 
 
 def test_every_family_is_drawn():
-    assert set(THREATS) | set(NON_THREATS) == set(FAMILIES)
-    assert not set(THREATS) & set(NON_THREATS)
+    assert {*THREATS, *NON_THREATS, *EXTRA_THREATS, *EXTRA_NON_THREATS} == set(FAMILIES)
+    assert len(THREATS) + len(NON_THREATS) + len(EXTRA_FAMILIES) == len(FAMILIES)
     drawn = [draw_scenario(level_generator("train", level)).family for level in range(600)]
-    assert set(drawn) == set(FAMILIES)
+    assert set(drawn) == set(ALL_FAMILIES)
     share = np.mean([family in THREATS for family in drawn])
     assert share == pytest.approx(0.5, abs=0.07)
 
@@ -51,6 +58,18 @@ def test_levels_are_valid():
     for split in ("train", "validation", "test"):
         for level in range(1500):
             draw_scenario(level_generator(split, level))
+            draw_scenario(level_generator(split, level), EXTRA_FAMILIES)
+
+
+def test_extra_families_are_drawn_where_they_are_named():
+    """A standing target is a threat in every level, and no car next to the lane is."""
+    env = random_env(split="validation", families=EXTRA_FAMILIES)
+    families = set()
+    for seed in range(60):
+        _, scenario, _, collision, _ = run_episode(env, seed)
+        assert collision is (scenario.family in EXTRA_THREATS), scenario
+        families.add(scenario.family)
+    assert families == set(EXTRA_FAMILIES)
 
 
 def test_levels_include_the_headways_of_fmvss127():

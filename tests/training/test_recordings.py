@@ -104,6 +104,28 @@ def test_traffic_recordings_are_required_in_addition(tmp_path):
     check_recordings(replace(config, traffic_episodes=3))
 
 
+def test_extra_levels_are_of_the_chosen_families(tmp_path):
+    options = {"extra_levels": 41, "extra_families": ["CurvePass"], "eval_episodes": 2, "n_timesteps": 3}
+    config = offline_config(tmp_path, **options)
+    sets = [*recording_sets(config, "train"), *recording_sets(config, "validation")]
+    assert [item.name for item in sets] == ["train", "extra-train", "validation", "extra-validation"]
+    assert [len(item.seeds) for item in sets] == [3, 41, 2, 3]
+    ((episode,),) = sets[1].record(range(1))
+    assert not episode.threat
+    assert len(episode) == pytest.approx(7.3 * 30, abs=9)  # the third car is met after 7 s
+    reused = replace(config, recordings=str(tmp_path), extra_levels=1, eval_episodes=1, n_timesteps=1)
+    for name in ("train", "validation"):
+        write_episodes(tmp_path / "episodes" / name, config, [[synthetic_episode()]])
+    with pytest.raises(ValueError, match="offline --extra-levels 1 --extra-families CurvePass, without"):
+        check_recordings(reused)
+    for name in ("extra-train", "extra-validation"):
+        folder = tmp_path / "episodes" / name
+        folder.mkdir()
+        save([[synthetic_episode()]], folder / "0.npz", origin_of(config) | {"families": ["CCRsCurve"]})
+    with pytest.raises(ValueError, match="recorded with another families"):
+        check_recordings(reused)
+
+
 def test_a_damaged_file_is_recorded_again(tmp_path, monkeypatch):
     def record(self, seeds):
         return [[synthetic_episode(seed=seed)] for seed in seeds]
