@@ -1,4 +1,4 @@
-"""Ablations of a sensor: scores of an agent with one property of its cameras removed at a time.
+"""Ablations of a sensor: scores of an agent with one property of its cameras changed at a time.
 
     python docs/examples/ablations.py stopping-zone --worlds 20 --jobs 2 --to docs/ablations.png
 
@@ -41,17 +41,19 @@ def halved(camera: Camera) -> dict[str, Any]:
     return {**camera, "shape": [side // 2 for side in camera["shape"]]}
 
 
-def without(**fields: Any) -> Callable[[Camera], dict[str, Any]]:
+def replaced(**fields: Any) -> Callable[[Camera], dict[str, Any]]:
     """Return a change of a camera that replaces fields."""
     return lambda camera: {**camera, **fields}
 
 
 ARMS: dict[str, Callable[[Camera], dict[str, Any]]] = {
     "complete sensor": dict,
-    "no stabilisation": without(stabilised=False),
-    "no calibration": without(calibrated=False),
-    "no contrast control": without(contrast_s=0.0),
+    "no stabilisation": replaced(stabilised=False),
+    "no calibration": replaced(calibrated=False),
+    "no contrast control": replaced(contrast_s=0.0),
     "half the pixels per row and column": halved,
+    "lens 1.0 m high": replaced(mount_height=1.0),
+    "lens 1.5 m high": replaced(mount_height=1.5),
 }
 
 
@@ -82,7 +84,7 @@ def play(agent: str, arm: str, suite: str, worlds: range, seeds: int, jobs: int,
 
 def draw(file: Path, agent: str, rates: Mapping[str, Mapping[str, Rate]]) -> None:
     """Draw the rates of all arms with their intervals, one panel per suite."""
-    with saved_figure(file, 1, len(SUITES), sharey=True, figsize=(9.0, 2.4)) as (figure, panels):
+    with saved_figure(file, 1, len(SUITES), sharey=True, figsize=(9.0, 3.0)) as (figure, panels):
         for axes, suite in zip(panels, SUITES, strict=True):
             values = [rates[arm][suite] for arm in rates]
             shares = np.array([100.0 * rate.k / rate.n for rate in values])
@@ -94,7 +96,7 @@ def draw(file: Path, agent: str, rates: Mapping[str, Mapping[str, Rate]]) -> Non
             axes.set_yticks(places, list(rates))
             axes.set(xlim=(0, 100), title=TITLES[suite])
             axes.grid(axis="y", visible=False)
-        figure.suptitle(f"{agent}: one property of the sensor removed at a time")
+        figure.suptitle(f"{agent}: one property of the sensor changed at a time")
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, Rate]]:
