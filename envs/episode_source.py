@@ -13,6 +13,7 @@ from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.scenarios.distribution import (
     LEVELS,
     check_families,
+    check_heights,
     check_levels,
     draw_camera_fields,
     draw_scenario,
@@ -103,10 +104,12 @@ class RandomLevels:
         road: See `Appearance`.
         families: Names of the scenario families in use, None for all. Half of the levels are threats if both
             threats and non-threats are among them.
+        mount_heights: Lowest and highest height of the lens above the ground, drawn evenly for each level
+            [m]; None for the height of each camera.
 
     Raises:
-        ValueError: If the split, a condition, the world or a family is unknown, or levels are outside the
-            split.
+        ValueError: If the split, a condition, the world or a family is unknown, levels are outside the
+            split, or the heights are not two numbers above 0 in ascending order.
     """
 
     def __init__(
@@ -118,11 +121,13 @@ class RandomLevels:
         world: int | str | None = None,
         road: str | None = None,
         families: Sequence[str] | None = None,
+        mount_heights: Sequence[float] | None = None,
     ) -> None:
         start_level, num_levels = check_levels(split, start_level, num_levels, conditions)
         self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
         self.num_levels = num_levels or LEVELS - start_level
         self.families = check_families(families)
+        self.mount_heights = None if mount_heights is None else check_heights(mount_heights)
         self.appearance = Appearance(world=world, road=road, split=split)
         self.first = draw_scenario(level_generator(split, start_level), self.families)
 
@@ -135,5 +140,8 @@ class RandomLevels:
         world = self.appearance.draw(level_generator(self.split, level, part=2))
         fields = world | draw_camera_fields(self.split, level, self.conditions)
         fields["queue_lane"] = free_lane(scenario)
+        if self.mount_heights is not None:
+            rng_height = level_generator(self.split, level, part=3)
+            fields["mount_height"] = float(rng_height.uniform(*self.mount_heights))
         info = {"level": level, "condition": fields["condition"], "world": world_number(fields)}
         return Draw(placement, fields, info, brake_of(fields))

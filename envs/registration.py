@@ -22,7 +22,16 @@ RANDOM = "RandomBraking"
 SCENARIO = "Scenario"
 """The id `LGMD/Scenario-v0`, whose argument `scenario` is a scenario as data."""
 _OTHERS = ("camera", "params", "fps", "include_frame", "include_base", "trace", "config", "render_mode")
-LEVEL_ARGUMENTS = ("split", "start_level", "num_levels", "conditions", "world", "road", "families")
+LEVEL_ARGUMENTS = (
+    "split",
+    "start_level",
+    "num_levels",
+    "conditions",
+    "world",
+    "road",
+    "families",
+    "mount_heights",
+)
 """Arguments of `RandomLevels`."""
 APPEARANCE = ("world", "condition", "road")
 """Arguments that set how a scenario looks."""

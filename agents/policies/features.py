@@ -40,7 +40,7 @@ class FeatureConfig:
         inputs: Observation keys and inputs derived from them: `speed_change`, the change since the last
             decision; `spike_peak`, the decaying peak of the spike frequency; with the cameras of
             `stopping-zone`, `zones`, `zones_spikes` and `zones_ffi`; and with those of `all-round` also
-            `sides` and `sides_ffi` (see `ZoneFeatures`).
+            `sides`, `sides_ffi` and `columns` (see `ZoneFeatures`).
         history: Number of decisions in the history, including the present one, >= 1; inputs of zones and
             sides contain averages over time and have no history.
         repeat: Number of environment decisions per decision of the policy, >= 1. At 30 Hz, 3 gives 10 Hz.
@@ -101,7 +101,7 @@ class FeatureConfig:
         """
         boxes = {}
         for name in self.inputs:
-            shape = shapes[source_observation(name)]
+            shape = shapes.get(source_observation(name), (0,))
             if name == FRAME:
                 height, width, channels = shape
                 shape = (height // self.shrink, width // self.shrink, channels * self.history)

@@ -1,15 +1,16 @@
-"""Policy inputs from the fields of `stopping-zone` and of the sides: levels and their averages over time."""
+"""Policy inputs from the fields of `stopping-zone` and `all-round`: levels and their averages over time."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from lgmd_gym.agents.base import FPS
-from lgmd_gym.agents.sides import NUM_ALL_ROUND
+from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, NUM_MOTION_FIELDS
 from lgmd_gym.agents.zones import NUM_FIELDS
 
 TIME_CONSTANTS_S = (0.1, 0.4, 1.2)
 NUM_LEVELS = 1 + len(TIME_CONSTANTS_S)  # features per field
+POTENTIALS = ("membrane_potential", "column_potential")  # converted to responses
 _NORM = 3.4  # log(1 + 2 · 15), so that the features of `zones` are in [0, 1]
 _GAINS = 1.0 / (1.0 + FPS * np.array(TIME_CONSTANTS_S)[:, None])
 _MARGIN = 3e-7  # of K to 0 and 1, so that responses are at most 15
@@ -21,8 +22,8 @@ class FieldInput(NamedTuple):
     Attributes:
         source: Observation that it is computed from.
         factor: Factor of the values before the logarithm.
-        first: First camera.
-        last: Last camera + 1.
+        first: First of its values: a camera, or a column of `column_potential`.
+        last: Last one + 1.
     """
 
     source: str
@@ -40,9 +41,13 @@ ZONE_INPUTS = {
     "zones": FieldInput("membrane_potential", 2.0),  # as response k/(n σ3), at most 15
     "zones_spikes": FieldInput("spike_frequency", 0.1),  # [spikes/s]; ten spikes per frame at 30 Hz are 300
     "zones_ffi": FieldInput("ffi", 2.0),  # [grey levels]
-    "sides": FieldInput("membrane_potential", 2.0, NUM_FIELDS, NUM_ALL_ROUND),
-    "sides_ffi": FieldInput("ffi", 2.0, NUM_FIELDS, NUM_ALL_ROUND),
+    "sides": FieldInput("membrane_potential", 2.0, NUM_FIELDS, NUM_MOTION_FIELDS),  # LGMD and DSN
+    "sides_ffi": FieldInput("ffi", 2.0, NUM_FIELDS, NUM_MOTION_FIELDS),
+    "columns": FieldInput("column_potential", 2.0, 0, NUM_COLUMNS),
 }
+
+CAMERA_COUNTS = (NUM_FIELDS, NUM_MOTION_FIELDS, NUM_ALL_ROUND)
+"""Numbers of cameras of `stopping-zone`, and of `all-round` without and with detectors of edges."""
 
 
 class ZoneFeatures:
@@ -67,7 +72,7 @@ class ZoneFeatures:
         """Process one frame: observation of the neurons, shape (cameras,)."""
         check_zone_shape(self._name, signal.shape)
         values = np.asarray(signal[self._input.first : self._input.last], np.float64)
-        if self.source == "membrane_potential":
+        if self.source in POTENTIALS:
             values = _response(values)
         level = np.copysign(np.log1p(self._input.factor * np.abs(values)), values) / _NORM
         self._last, self._level = (self._level if self._started else level), level
@@ -91,10 +96,12 @@ def _response(potential: np.ndarray) -> np.ndarray:
 
 def check_zone_shape(name: str, shape: tuple[int, ...]) -> None:
     """Raise ValueError unless an observation comes from the cameras that an input requires."""
-    allowed = (NUM_FIELDS, NUM_ALL_ROUND) if ZONE_INPUTS[name].last == NUM_FIELDS else (NUM_ALL_ROUND,)
-    if shape not in [(count,) for count in allowed]:
-        agent = "stopping-zone" if len(allowed) == 2 else "all-round"
+    source, last = ZONE_INPUTS[name].source, ZONE_INPUTS[name].last
+    counts = (NUM_COLUMNS,) if source == "column_potential" else CAMERA_COUNTS
+    if shape not in [(count,) for count in counts if count >= last]:
+        agent = "stopping-zone" if last == NUM_FIELDS else "all-round"
+        required = f"{NUM_COLUMNS} columns" if source == "column_potential" else f"{last} cameras"
         raise ValueError(
-            f"policy input {name!r} requires the {allowed[0]} cameras of {agent}, got {shape[0]}; "
+            f"policy input {name!r} requires the {required} of {agent}, got {shape[0]}; "
             f"train with --sensors-of {agent}"
         )

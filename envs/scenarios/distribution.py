@@ -1,6 +1,7 @@
 """Random distribution over the scenario families, divided into numbered levels for training and tuning."""
 
 from collections.abc import Collection, Sequence
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from lgmd_gym.envs.scenarios.extra_arguments import EXTRA_NON_THREATS, EXTRA_THR
 from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS
 from lgmd_gym.envs.scenarios.registry import make_scenario
 from lgmd_gym.envs.scenarios.scenario import Scenario
-from lgmd_gym.errors import check_items, check_known, check_whole
+from lgmd_gym.errors import check_items, check_known, check_positive, check_whole
 
 SPLITS = ("train", "validation", "test")
 LEVELS = 1_000_000  # per split
@@ -53,6 +54,18 @@ def check_families(families: Sequence[str] | None) -> tuple[str, ...]:
     for name in families:
         check_known("family of random levels", name, (*ALL_FAMILIES, *EXTRA_FAMILIES))
     return tuple(families)
+
+
+def check_heights(heights: Sequence[float]) -> tuple[float, float]:
+    """Return the lowest and the highest height of a lens [m].
+
+    Raises:
+        ValueError: Unless they are two numbers above 0 in ascending order.
+    """
+    values = [check_positive("mount_heights", value) for value in check_items("mount_heights", heights, Real)]
+    if len(values) != 2 or values[0] > values[1]:
+        raise ValueError(f"mount_heights must be the lowest and the highest height [m], got {values}")
+    return values[0], values[1]
 
 
 def level_generator(split: str, level: int, part: int = 0) -> np.random.Generator:

@@ -35,7 +35,7 @@ ROADS = {"still": 0.0, "smooth": 0.5, "normal": 1.0, "rough": 2.0}
 before.
 """
 _CHOICES = {
-    "detector": ("lgmd", "lplc2", "dsn"),
+    "detector": ("lgmd", "lplc2", "dsn", "edges"),
     "gaze": ("fixed", "path", "stopping"),
     "vehicles": ("car", "box"),
     "light": ("day", "night", "low_sun"),
@@ -55,7 +55,11 @@ class CameraParams:
         name: Label of the camera; its results are stored under this key.
         shape: `(height, width)` of the frame [px].
         detector: Model that processes the frames: `"lgmd"` (`LGMD`), `"lplc2"` (`LPLC2`, for frames of at
-            least 16 × 16 px) or `"dsn"` (`DSN`), the last two with their default parameters.
+            least 16 × 16 px), `"dsn"` (`DSN`) or `"edges"` (`SustainedEdges`), the last three with their
+            default parameters.
+        columns: Number of vertical strips of equal width whose potentials are the observation
+            `column_potential` (`FrameNeuron.column_potentials`); 0 for none. Divides the width; not for
+            `detector="lplc2"`.
         hfov_deg: Horizontal field of view, in (1, 170) [degrees].
         mount_height: Height of the lens above the ground [m].
         mount_setback: Distance of the lens behind the front bumper [m].
@@ -128,6 +132,7 @@ class CameraParams:
     name: str = "custom"
     shape: tuple[int, int] = (90, 160)
     detector: str = "lgmd"
+    columns: int = 0
     hfov_deg: float = 60.0
     mount_height: float = 1.2
     mount_setback: float = 1.7
@@ -184,6 +189,7 @@ class CameraParams:
                 f"camera shape must be at least {MIN_LPLC2} × {MIN_LPLC2} px with detector='lplc2', got "
                 f"{self.shape}; use a larger shape"
             )
+        _check_columns(self)
         if self.gaze == "stopping":
             _check_zoom(self)
         if self.bonnet:
@@ -262,6 +268,17 @@ def _check_surroundings(p: CameraParams) -> None:
     flags = ("guard_rail", "upper_beam", "wet", "linear_light", "bonnet", "stabilised", "calibrated")
     for name in flags:
         object.__setattr__(p, name, check_flag(f"camera {name}", getattr(p, name)))
+
+
+def _check_columns(p: CameraParams) -> None:
+    columns, width = check_whole("camera columns", p.columns, 0, p.shape[1]), p.shape[1]
+    object.__setattr__(p, "columns", columns)
+    if columns and width % columns:
+        raise ValueError(f"camera columns must divide the width of {width} px, got {columns}")
+    if columns and p.detector == "lplc2":
+        raise ValueError(
+            f"camera columns must be 0 with detector='lplc2', got {columns}; use 'lgmd' or 'dsn'"
+        )
 
 
 def _check_zoom(p: CameraParams) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,6 +47,18 @@ class Rates:
     def stride(self) -> int:
         """Simulation steps per camera frame."""
         return round(self.simulation / self.camera)
+
+
+class Snapshot(NamedTuple):
+    """State of an episode between two decisions, without its cameras and neurons.
+
+    Attributes:
+        state: See `PhysicsState.save`.
+        brake: `BRAKE` record.
+    """
+
+    state: dict[str, np.ndarray]
+    brake: np.ndarray
 
 
 class Simulation:
@@ -124,6 +136,21 @@ class Simulation:
         self.clock.demands[:] = demands
         self.clock.remaining[:] = np.where(active, 0, -1)
         self._run(self._step_part, rendering)
+
+    def save(self, index: int) -> Snapshot:
+        """Return the state of environment `index`."""
+        return Snapshot(self.state.save(index), self.brakes[index].copy())
+
+    def restore(self, index: int, snapshot: Snapshot) -> None:
+        """Set the state of environment `index`.
+
+        Args:
+            index: Index of the environment.
+            snapshot: State from `save` of this simulation, or of another one with the same rates and weights.
+        """
+        if self.state.restore(index, snapshot.state):
+            self._link()
+        self.brakes[index] = snapshot.brake
 
     def _run(self, part: Callable[..., None], *arguments: Any) -> None:
         if self._threads.count == 1:

@@ -18,6 +18,7 @@ from lgmd_gym.engine.simulation import Rates, Simulation
 from lgmd_gym.engine.top_view import TopViews
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.registration import make_source
+from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.errors import check_flags, check_keys, check_mapping, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.validation import MAX_THREADS
@@ -192,6 +193,17 @@ class BrakingVectorEnv(VectorEnv):
     def read_infos(self, selected: np.ndarray) -> dict[str, Any]:
         """Return the infos of the selected environments, bool, shape (num_envs,)."""
         return self._infos.read(selected)
+
+    def scenario_of(self, index: int) -> Scenario:
+        """Return the scenario of environment `index`.
+
+        Raises:
+            RuntimeError: Before its first reset.
+        """
+        prepared = self._episodes[index]
+        if prepared is None:
+            raise RuntimeError("the environments have no episodes: call reset() before scenario_of()")
+        return prepared.draw.placement.scenario
 
     def render(self) -> tuple[Any, ...] | None:
         """Return highway-env's top view of every environment, uint8, (height, width, 3), or None.

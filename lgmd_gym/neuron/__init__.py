@@ -1,4 +1,4 @@
-"""Neurons: the LGMD with its reference model and danger zone, LPLC2, and a direction-selective neuron."""
+"""Neurons: the LGMD with its reference model and danger zone, LPLC2, and detectors of motion and edges."""
 
 from lgmd_gym.neuron.danger_zone import danger_zone
 from lgmd_gym.neuron.dsn import DSN, DSNParams
@@ -7,6 +7,7 @@ from lgmd_gym.neuron.lplc2_params import LPLC2Params
 from lgmd_gym.neuron.model import LGMD
 from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.response import Response
+from lgmd_gym.neuron.sustained_edges import SustainedEdges, SustainedEdgesParams
 
 __all__ = ["DSN", "LGMD", "LPLC2", "DSNParams", "LGMDParams", "LPLC2Params", "NeuronSpec", "Response"]
-__all__ += ["danger_zone"]
+__all__ += ["SustainedEdges", "SustainedEdgesParams", "danger_zone"]

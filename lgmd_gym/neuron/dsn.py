@@ -69,6 +69,9 @@ class DSN(MotionNeuron):
         """Step the active neurons among first..last-1; see `FrameNeuron.step_range`."""
         dsn_kernels.step(first, last, frames, active, self._scalars, self._const, self._gains, *self._maps)
 
+    def _column_maps(self) -> tuple[NDArray[np.float32], float]:
+        return self._maps[5], self.params.sigma
+
     @property
     def layers(self) -> dict[str, NDArray[np.float32]]:
         """Map `right` of the last frame, the motion m [grey levels]; new array, (H, W) or (N, H, W)."""

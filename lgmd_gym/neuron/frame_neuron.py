@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lgmd_gym.errors import check_whole
+from lgmd_gym.neuron.column_kernels import column_potentials
 from lgmd_gym.neuron.response import Response
 from lgmd_gym.neuron.scalars import RESPONSE
 from lgmd_gym.neuron.threads import Threads
@@ -89,6 +91,46 @@ class FrameNeuron:
             active: Selection of the neurons to step, bool, shape (N,).
         """
         raise NotImplementedError
+
+    def column_potentials(self, columns: int) -> NDArray[np.float64]:
+        """Return the potentials of vertical strips of the last frame, `columns` of equal width.
+
+        A column has the excitation of its own pixels only, as means over its pixels: G in an LGMD (eq. 9 and
+        10), the motion m in a `DSN`. The mean excitation of all columns is that of the neuron.
+
+        Args:
+            columns: Number of columns; divides the width of the frames.
+
+        Returns:
+            K of each column in [0, 1], left to right; 0.5 before the first change. New array, shape
+            (columns,), or (N, columns) for N neurons.
+
+        Raises:
+            ValueError: If the columns do not divide the width, or the model has none, or has a mask.
+        """
+        if self.shape[1] % check_whole("columns", columns, 1, self.shape[1]):
+            raise ValueError(f"columns must divide the width of {self.shape[1]} px, got {columns}")
+        out = np.empty((self._count, columns))
+        self.read_columns(0, self._count, self._all_active, out)
+        return out[0] if self.num is None else out
+
+    def read_columns(
+        self, first: int, last: int, active: NDArray[np.bool_], out: NDArray[np.float64]
+    ) -> None:
+        """Write `column_potentials` of the active neurons among first..last-1, without a check.
+
+        Args:
+            first: First neuron.
+            last: Last neuron + 1.
+            active: Selection of the neurons, bool, shape (N,).
+            out: Output, float64, shape (N, columns).
+        """
+        maps, sigma = self._column_maps()
+        column_potentials(first, last, active, maps, self.shape[1], sigma, out)
+
+    def _column_maps(self) -> tuple[NDArray[np.float32], float]:
+        """Return the maps of the columns, shape (N, H, at least W), and the mean at which K is 0.73."""
+        raise ValueError(f"{type(self).__name__} has no columns; use LGMD or DSN")
 
     @property
     def outputs(self) -> NDArray[np.float64]:

@@ -101,6 +101,12 @@ class LGMD(FrameNeuron):
             images[name] = image[0] if self.num is None else image
         return images
 
+    def _column_maps(self) -> tuple[NDArray[np.float32], float]:
+        if self._weight.size > 0 or self._previous.shape[1:] != self.shape:
+            raise ValueError("columns require a neuron without mask and roi; leave both out")
+        g: NDArray[np.float32] = self._maps[4] if self._fast else self._maps[5]
+        return g.reshape(self._count, self.shape[0], -1), self.params.sigma_3
+
     def _use_floats(self) -> None:
         super()._use_floats()
         self._previous = self._previous.astype(np.float32, copy=False)

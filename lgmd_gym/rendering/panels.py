@@ -29,6 +29,10 @@ LAYERS = {
         ("down", "motion downwards", 32.0, True),
         ("units", "responses of the units", 8.0, False),
     ),
+    "edges": (
+        ("light", "low-passed light", 255.0, False),
+        ("edges", "sustained edges", 32.0, False),
+    ),
     "dsn": (("right", "motion to the right", 32.0, True),),
 }
 LAYER_BOXES: tuple[Box, ...] = (

@@ -88,7 +88,8 @@ class Variants:
             fields: Fields of `CameraParams`, and optionally `condition`.
 
         Raises:
-            ValueError: If a field is unknown or out of range, or changes the shape or detector of a camera.
+            ValueError: If a field is unknown or out of range, or changes the shape, detector or columns of a
+                camera.
         """
         others = {name: value for name, value in fields.items() if name != "texture"}
         texture = fields.get("texture")
@@ -115,7 +116,7 @@ class Variants:
 
 def _check_kept(base: CameraParams, changed: CameraParams | None) -> None:
     """Raise ValueError if fields that determine the arrays of the sensors are changed."""
-    for name in ("shape", "detector"):
+    for name in ("shape", "detector", "columns"):
         kept, given = getattr(base, name), getattr(changed, name)
         if kept != given:
             raise ValueError(

@@ -40,6 +40,7 @@ class SensorArray:
         names: Names of the cameras.
         shapes: Frame shapes (height, width) of the cameras [px].
         detectors: Detectors of the cameras, see `CameraParams`.
+        columns: Numbers of columns of the cameras, see `CameraParams`.
         scenes: `SCENE` records, shape (num_envs,).
         objects: `OBJECT` records, shape (num_envs, 512): vehicles, obstacles and marks of each environment in
             the order of `road.vehicles`, then `road.objects`, without the ego and the roadside. Vehicles of
@@ -49,8 +50,8 @@ class SensorArray:
         enabled: Cameras in use, bool, shape (num_envs, cameras), initially all. A camera that is not enabled
             is neither drawn nor stepped and keeps its last outputs. Its neuron is reset before the first
             frame after a pause.
-        frames: The last frames, one array per frame shape and detector, uint8, shape (num_envs, cameras of
-            that kind, height, width); see `frame_of` and `stacked_frames`.
+        frames: The last frames, one array per frame shape, detector and number of columns, uint8, shape
+            (num_envs, cameras of that kind, height, width); see `frame_of` and `stacked_frames`.
         responses: The last outputs of the neurons, arrays of shape (num_envs, cameras), updated in place.
         signals: The `SIGNALS` among them, float64, shape (num_envs, 3, cameras).
     """
@@ -72,6 +73,7 @@ class SensorArray:
         self.detectors = [
             item.detector if isinstance(item, CameraParams) else "lgmd" for item in cameras.values()
         ]
+        self.columns = [item.columns if isinstance(item, CameraParams) else 0 for item in cameras.values()]
         self._top_views = [
             {k: item for k, item in enumerate(made.values()) if isinstance(item, BirdsEye)}
             for made in (cameras, *(make_cameras(camera) for _ in range(num_envs - 1)))
@@ -89,8 +91,8 @@ class SensorArray:
         numbers = np.zeros((num_envs, len(NUMBERS), len(self.names)))
         self._outputs = numbers, np.zeros(size, np.int64), np.zeros(size, np.bool_)
         self._threads = Threads(threads or 1)
-        by_kind: dict[tuple[tuple[int, int], str], list[int]] = {}
-        for index, kind in enumerate(zip(self.shapes, self.detectors, strict=True)):
+        by_kind: dict[tuple[tuple[int, int], str, int], list[int]] = {}
+        for index, kind in enumerate(zip(self.shapes, self.detectors, self.columns, strict=True)):
             by_kind.setdefault(kind, []).append(index)
         self._groups = [
             SensorGroup(
@@ -100,8 +102,9 @@ class SensorArray:
                 self.enabled,
                 self._stale,
                 self._outputs,
+                columns,
             )
-            for (shape, detector), members in by_kind.items()
+            for (shape, detector, columns), members in by_kind.items()
         ]
         self._shares = self._share_frames(unchanged)
         # Index of each camera's group, and of the camera in that group.
@@ -164,7 +167,8 @@ class SensorArray:
             fields: Fields of `CameraParams`, and optionally `condition`; None or empty for no change.
 
         Raises:
-            ValueError: If a field is unknown or out of range, or changes the shape or detector of a camera.
+            ValueError: If a field is unknown or out of range, or changes the shape, detector or columns of a
+                camera.
         """
         fields = fields or {}
         if fields == self._fields[index]:
@@ -225,6 +229,11 @@ class SensorArray:
         frames = [self.frames[group][:, row] for group, row in self._locations]
         return np.stack(frames, axis=1)
 
+    def column_potentials(self) -> np.ndarray:
+        """Return the last potentials of the columns of all cameras, new array, (num_envs, sum of columns)."""
+        parts = [self._groups[group].columns[:, row] for group, row in self._locations]
+        return np.concatenate(parts, axis=1)
+
     def response_of(self, index: int = 0) -> Response:
         """Return a copy of the last outputs of environment `index`, arrays of shape (cameras,)."""
         return Response(*(field[index].copy() for field in self.responses))
@@ -245,7 +254,9 @@ class SensorArray:
         drawn: dict[Any, SensorGroup] = {}
         for group in self._groups:
             params = [unchanged.params[member] for member in group.members]
-            views = tuple(None if p is None else replace(p, name="view", detector="lgmd") for p in params)
+            views = tuple(
+                None if p is None else replace(p, name="view", detector="lgmd", columns=0) for p in params
+            )
             if None not in views and views in drawn:
                 group.share(drawn[views])
             else:

@@ -10,9 +10,12 @@ from lgmd_gym.camera import CameraParams
 from lgmd_gym.camera.batch import CameraBatch
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.context import Workspace
-from lgmd_gym.neuron import DSN, LGMD, LPLC2, LGMDParams
+from lgmd_gym.neuron import DSN, LGMD, LPLC2, LGMDParams, SustainedEdges
 from lgmd_gym.neuron.frame_neuron import FrameNeuron
 from lgmd_gym.sensing.kernels import collect_outputs, select_cameras
+
+MODELS = {"lplc2": LPLC2, "dsn": DSN, "edges": SustainedEdges}
+"""Models beside the LGMD, by the `detector` of `CameraParams`."""
 
 
 def make_neurons(
@@ -29,12 +32,11 @@ def make_neurons(
     """
     if detector == "lgmd":
         return LGMD(shape, fps, params, num)
-    model = LPLC2 if detector == "lplc2" else DSN
-    return model(shape, fps, num=num, spikes=params)
+    return MODELS[detector](shape, fps, num=num, spikes=params)
 
 
 class SensorGroup:
-    """Cameras with one frame shape and one detector, and their neurons.
+    """Cameras with one frame shape, one detector and one number of columns, and their neurons.
 
     Args:
         neuron: num_envs * len(members) neurons, ordered by environment, then by camera.
@@ -43,12 +45,14 @@ class SensorGroup:
         enabled: Cameras in use, bool, shape (num_envs, cameras).
         stale: Cameras that have missed a frame, bool, shape (num_envs, cameras).
         outputs: Outputs of all neurons, see `collect_outputs`.
+        columns: Number of columns of each camera; 0 for none.
 
     Attributes:
         members: Indices of the cameras.
         batch: The cameras.
         neuron: The neurons.
         frames: The last frames, uint8, shape (num_envs, members, height, width).
+        columns: The last potentials of the columns, float64, shape (num_envs, members, columns).
     """
 
     def __init__(
@@ -59,12 +63,14 @@ class SensorGroup:
         enabled: np.ndarray,
         stale: np.ndarray,
         outputs: tuple[np.ndarray, np.ndarray, np.ndarray],
+        columns: int = 0,
     ) -> None:
         self.members = members
         size = num_envs, _ = len(enabled), len(members)
         self.neuron, shape = neuron, neuron.shape
         self.batch = CameraBatch([params[k] for k in members], shape, members, num_envs)
         self.frames = np.zeros((*size, *shape), np.uint8)
+        self.columns = np.full((*size, columns), 0.5)
         cameras = np.array(members, dtype=np.int64)
         self._shares = False
         self._selected, self._fresh = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
@@ -104,6 +110,13 @@ class SensorGroup:
         frames = self.frames.reshape(-1, *self.batch.shape)
         self.neuron.step_range(first * count, last * count, frames, self._selected.reshape(-1))
         collect_outputs(first, last, self._selected, self._neurons.native)
+        self._read_columns(first, last, self._selected)
+
+    def _read_columns(self, first: int, last: int, selected: np.ndarray) -> None:
+        count, columns = self.columns.shape[1:]
+        if columns:
+            rows = self.columns.reshape(-1, columns)
+            self.neuron.read_columns(first * count, last * count, selected.reshape(-1), rows)
 
     def _draw(self, first: int, last: int, scene_table: Bundle, roads: Bundle) -> None:
         try:  # threads take and return workspaces; both list operations are atomic
@@ -118,6 +131,7 @@ class SensorGroup:
         selected = np.repeat(mask[:, None], len(self.members), axis=1)
         self.neuron.reset(selected.ravel())
         collect_outputs(0, len(mask), selected, self._neurons.native)
+        self._read_columns(0, len(mask), selected)
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_workspaces": []}

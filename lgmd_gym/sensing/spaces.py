@@ -46,6 +46,8 @@ def make_space(
         # The heading changes by at most half a turn per simulation step.
         "ego_yaw_rate": spaces.Box(-pi * simulation_frequency, pi * simulation_frequency, (1,), np.float32),
     }
+    if any(sensors.columns):
+        parts["column_potential"] = spaces.Box(0.0, 1.0, (sum(sensors.columns),), np.float32)
     if include_frame:
         if len(set(sensors.shapes)) > 1:
             shapes = dict(zip(sensors.names, sensors.shapes, strict=True))
@@ -79,6 +81,8 @@ def make_observation(
         "ego_speed": np.array([speed], dtype=np.float32),
         "ego_yaw_rate": np.array([yaw_rate], dtype=np.float32),
     }
+    if any(sensors.columns):
+        observation["column_potential"] = sensors.column_potentials()[index].astype(np.float32)
     if include_frame:
         observation["frame"] = sensors.stacked_frames()[index].transpose(1, 2, 0).copy()
     return observation

@@ -1,28 +1,37 @@
 """Recorded episodes of an offline training run: newly recorded, or reused from another run."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from json import dumps, loads
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
+
 import lgmd_gym
 from lgmd_gym.agents import HOLD
 from lgmd_gym.agents.policies.features import FRAME
+from lgmd_gym.camera import BirdsEye
+from lgmd_gym.sensing.cameras import make_cameras
 from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
 from lgmd_gym.training.offline.episodes import (
+    CHUNK_SIZE,
     EpisodeRecorder,
     RecordedEpisode,
     RecordFunction,
     record_parallel,
 )
+from lgmd_gym.training.offline.level_recorder import LevelRecorder
 from lgmd_gym.training.offline.storage import check_file, is_complete, load, save
 from lgmd_gym.training.offline.traffic import TrafficRecorder
 
+LEVEL_CHUNK_SIZE = 25  # levels recorded by one task of a process, for the environments of the engine
 FILE_SIZE = 100  # largest number of seeds in one file
 TRAFFIC_RATIO = 4  # training episodes in traffic per validation episode in traffic
 EXTRA_RATIO = 20  # extra levels for training per extra level for validation
-FORMAT = 5  # of the files; recordings of another format are rejected
+FORMAT = 6  # of the files; recordings of another format are rejected
 
 
 @dataclass(frozen=True)
@@ -35,6 +44,7 @@ class RecordingSet:
         record: Returns the episodes of each seed.
         option: Options of the command line that record these episodes.
         settings: Settings that only these episodes depend on.
+        chunk_size: Largest number of seeds recorded by one task of a process.
     """
 
     name: str
@@ -42,6 +52,7 @@ class RecordingSet:
     record: RecordFunction
     option: str = ""
     settings: dict[str, Any] = field(default_factory=dict)
+    chunk_size: int = LEVEL_CHUNK_SIZE
 
 
 def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
@@ -66,17 +77,32 @@ def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
         count = config.traffic_episodes if train else -(-config.traffic_episodes // TRAFFIC_RATIO)
         traffic = TrafficRecorder(split, config.camera, shrink)
         option = f" --traffic-episodes {config.traffic_episodes}"
-        sets.append(RecordingSet(f"traffic-{split}", range(first, first + count), traffic.record, option))
+        seeds = range(first, first + count)
+        name = f"traffic-{split}"
+        sets.append(RecordingSet(name, seeds, traffic.record, option, chunk_size=CHUNK_SIZE))
     return sets
 
 
-def _level_recorder(config: TrainConfig, split: str) -> EpisodeRecorder:
+def _level_recorder(config: TrainConfig, split: str) -> LevelRecorder | EpisodeRecorder:
+    """Return the recorder of the engine, or that of single environments where the engine has no id."""
+    if _is_in_engine(config):
+        return LevelRecorder(
+            config.env_id,
+            config.env_arguments(split),
+            brake=min(config.demands),
+            shrink=_frame_shrink(config),
+        )
     return EpisodeRecorder(
         partial(config.make_env, split),
         hold=config.demands.index(HOLD),
         brake=config.demands.index(min(config.demands)),
         shrink=_frame_shrink(config),
     )
+
+
+def _is_in_engine(config: TrainConfig) -> bool:
+    top_view = any(isinstance(camera, BirdsEye) for camera in make_cameras(config.camera).values())
+    return gym.spec(config.env_id).vector_entry_point is not None and not top_view
 
 
 def _frame_shrink(config: TrainConfig) -> int | None:
@@ -93,22 +119,29 @@ def origin_of(config: TrainConfig) -> dict[str, Any]:
 
 def load_or_record(
     config: TrainConfig, split: str, folder: Path, progress: bool = False, jobs: int = 1
-) -> list[RecordedEpisode]:
+) -> Iterator[RecordedEpisode]:
     """Return the episodes of a split: reused if `config.recordings` is set, else recorded in the folder.
 
+    Missing episodes are recorded at once; the files are loaded one by one as the episodes are consumed.
     Complete files are kept, so that an interrupted recording resumes at the first missing or damaged one.
     """
-    episodes: list[RecordedEpisode] = []
-    for recordings in recording_sets(config, split):
-        files = _folder_of(recordings, config.recordings or folder)
-        if config.recordings is None:
+    sets = recording_sets(config, split)
+    if config.recordings is None:
+        for recordings in sets:
+            files = _folder_of(recordings, folder)
             _record_missing(recordings, files, origin_of(config) | recordings.settings, progress, jobs)
-        by_seed: list[list[RecordedEpisode]] = []
-        for file in sorted(files.glob("*.npz")):
-            if len(by_seed) < len(recordings.seeds):
-                by_seed += load(file)
-        episodes += [episode for group in by_seed[: len(recordings.seeds)] for episode in group]
-    return episodes
+    training = config.recordings or folder
+    return chain.from_iterable(_load(item, _folder_of(item, training)) for item in sets)
+
+
+def _load(recordings: RecordingSet, files: Path) -> Iterator[RecordedEpisode]:
+    """Yield the episodes of the seeds of a set, one file in memory at a time."""
+    remaining = len(recordings.seeds)
+    for file in sorted(files.glob("*.npz")):
+        if remaining > 0:
+            by_seed = load(file)[:remaining]
+            remaining -= len(by_seed)
+            yield from chain.from_iterable(by_seed)
 
 
 def check_recordings(config: TrainConfig) -> None:
@@ -155,7 +188,7 @@ def _record_missing(
                 bar.update(len(part))
                 continue
             by_seed = []
-            for episodes in record_parallel(recordings.record, part, jobs):
+            for episodes in record_parallel(recordings.record, part, jobs, recordings.chunk_size):
                 by_seed.append(episodes)
                 bar.update()
             save(by_seed, file, origin)

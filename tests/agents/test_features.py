@@ -6,7 +6,13 @@ from support.agents import to_potential, zone_levels
 
 from lgmd_gym.agents.policies.features import CLIP, PEAK_DECAY, FeatureConfig, FeatureHistory, shrink_frame
 from lgmd_gym.agents.policies.zone_features import TIME_CONSTANTS_S, ZONE_INPUTS
-from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_SIDE_FIELDS, all_round_cameras
+from lgmd_gym.agents.sides import (
+    NUM_ALL_ROUND,
+    NUM_COLUMNS,
+    NUM_FORWARD_COLUMNS,
+    NUM_SIDE_FIELDS,
+    all_round_cameras,
+)
 from lgmd_gym.agents.zones import NUM_FIELDS, NUM_ZONES, REACHES
 
 
@@ -100,26 +106,33 @@ def test_averages_approach_the_level_with_their_time_constants():
 
 
 def observe_sides(responses):
-    """Return an observation of the cameras of `all-round`: responses of those at the sides, shape (12,)."""
+    """Return an observation of the cameras of `all-round`: responses of those at the sides, shape (18,)."""
     responses = np.concatenate([np.full(NUM_FIELDS, 5.0), responses])
     potential = (1.0 / (1.0 + np.exp(-responses))).astype(np.float32)
     return {"membrane_potential": potential, "ffi": np.abs(responses)}
 
 
-def test_side_features_have_the_sign_of_the_motion():
-    responses = np.linspace(-6.0, 5.0, NUM_SIDE_FIELDS)
-    for name, sign in (("sides", np.sign(responses)), ("sides_ffi", 1.0)):
-        features = stack(zone_history(name), observe_sides(responses))[name].reshape(-1, NUM_SIDE_FIELDS)
-        assert features.shape[0] == 4
-        assert features[0] == pytest.approx(sign * np.log1p(2.0 * np.abs(responses)) / 3.4, abs=1e-5)
-        assert features[1] == pytest.approx(features[0] / (1.0 + 30.0 * TIME_CONSTANTS_S[0]), abs=1e-6)
+def test_features_of_columns_have_the_sign_of_the_motion():
+    responses = np.linspace(-6.0, 5.0, NUM_COLUMNS)
+    observation = {"column_potential": (1.0 / (1.0 + np.exp(-responses))).astype(np.float32)}
+    features = stack(zone_history("columns"), observation)["columns"].reshape(4, NUM_COLUMNS)
+    expected = np.sign(responses) * np.log1p(2.0 * np.abs(responses)) / 3.4
+    assert features[0] == pytest.approx(expected, abs=1e-5)
+    assert features[1] == pytest.approx(features[0] / (1.0 + 30.0 * TIME_CONSTANTS_S[0]), abs=1e-6)
+
+
+def test_features_of_mean_strengths_at_the_sides():
+    strengths = np.linspace(0.0, 9.0, NUM_ALL_ROUND - NUM_FIELDS)
+    features = stack(zone_history("sides_ffi"), observe_sides(strengths))["sides_ffi"].reshape(4, -1)
+    expected = np.log1p(2.0 * strengths[: 2 * NUM_SIDE_FIELDS]) / 3.4
+    assert features[0] == pytest.approx(expected, abs=1e-5)
 
 
 def test_zone_features_of_all_round_cameras_are_those_of_stopping_zone():
     history, levels = zone_history(), zone_levels(ground=7.0, upright=1.0)
     alone = stack(history, observe_zones(levels))["zones"]
     history.reset()
-    observation = observe_sides(np.zeros(NUM_SIDE_FIELDS))
+    observation = observe_sides(np.zeros(NUM_ALL_ROUND - NUM_FIELDS))
     observation["membrane_potential"][:NUM_FIELDS] = to_potential(levels)
     assert stack(history, observation)["zones"] == pytest.approx(alone, abs=1e-6)
 
@@ -129,18 +142,22 @@ def test_cameras_of_all_round_are_in_the_order_of_the_features():
     assert len(set(names)) == NUM_ALL_ROUND
     assert names[NUM_FIELDS : NUM_FIELDS + 3] == ["near_left_lgmd", "near_right_lgmd", "middle_left_lgmd"]
     cameras = all_round_cameras()[NUM_FIELDS:]
-    half = NUM_SIDE_FIELDS // 2
-    for lgmd, dsn in zip(cameras[:half], cameras[half:], strict=True):
-        assert lgmd | {"name": "", "detector": ""} == dsn | {"name": "", "detector": ""}
-    assert ZONE_INPUTS["sides"].size == 4 * NUM_SIDE_FIELDS
+    for first, others in ((cameras[k], cameras[k::NUM_SIDE_FIELDS]) for k in range(NUM_SIDE_FIELDS)):
+        assert [camera["detector"] for camera in others] == ["lgmd", "dsn", "edges"]
+        for other in others:
+            assert first | {"name": "", "detector": ""} == other | {"name": "", "detector": ""}
+    columns = [camera["columns"] for camera in all_round_cameras()]
+    assert sum(columns[:NUM_FIELDS]) == NUM_FORWARD_COLUMNS
+    assert sum(columns) == NUM_COLUMNS
+    assert ZONE_INPUTS["columns"].size == 4 * NUM_COLUMNS
 
 
 def test_missing_or_other_observations_are_rejected():
     two_cameras = observe(1.0) | {"membrane_potential": np.array([0.5, 0.6]), "ego_yaw_rate": np.zeros(1)}
     with pytest.raises(ValueError, match="requires the 17 cameras of stopping-zone, got 2; train with"):
         zone_history().update(two_cameras)
-    with pytest.raises(ValueError, match="'sides' requires the 29 cameras of all-round, got 17; train with"):
-        zone_history("sides").update(observe_zones(zone_levels()))
+    with pytest.raises(ValueError, match="'sides_ffi' requires the 29 cameras of all-round, got 17; train"):
+        zone_history("sides_ffi").update(observe_zones(zone_levels()))
     with pytest.raises(ValueError, match="requires the observation 'ffi', got"):
         FeatureHistory(FeatureConfig(inputs=("ffi",))).update(observe(1.0))
 

@@ -12,7 +12,7 @@ from support.roads import add_car, straight_env
 from lgmd_gym import LGMD, BirdsEye, CameraParams, EgoCamera, LGMDParams
 from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.camera.objects import OBJECT
-from lgmd_gym.neuron import DSN, LPLC2
+from lgmd_gym.neuron import DSN, LPLC2, SustainedEdges
 from lgmd_gym.sensing.sensor_array import SensorArray
 
 SMALL = {"shape": (45, 80)}
@@ -23,11 +23,14 @@ CAMERAS = [
     {"name": "back", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box"},
     {"name": "path", "shape": (45, 80), "gaze": "path", "panorama": "natural", "mount_left": 0.4},
     {"name": "driver", "shape": (45, 80), "gaze": "path", "bonnet": True, "windscreen": 0.1},
+    {"name": "back edges", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box", "detector": "edges"},
+    {"name": "columns", "shape": (30, 40), "yaw_deg": 20.0, "seed": 3, "columns": 4},
+    {"name": "flow columns", "shape": (30, 40), "yaw_deg": 20.0, "detector": "dsn", "columns": 2},
     {"name": "side", "shape": (45, 80), "yaw_deg": 30.0, "detector": "lplc2"},
     {"name": "small flow", "shape": (30, 40), "yaw_deg": 20.0, "seed": 3, "detector": "dsn"},
     {"name": "back flow", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box", "detector": "dsn"},
 ]
-MODELS = {"lgmd": LGMD, "lplc2": LPLC2, "dsn": DSN}
+MODELS = {"lgmd": LGMD, "lplc2": LPLC2, "dsn": DSN, "edges": SustainedEdges}
 FIELDS = [
     {},
     {"condition": "night", "texture": 0.7, "visibility_m": 40.0},
@@ -68,6 +71,10 @@ def reference(camera, fields):
     return own, MODELS[own.params.detector](own.shape, 30.0)
 
 
+def column_potentials(p, neuron):
+    return neuron.column_potentials(p.columns) if p.columns else []
+
+
 @pytest.mark.parametrize("threads", [None, 3])
 def test_frames_and_outputs_equal_those_of_single_cameras_and_neurons(threads):
     envs, sensors = scenes(), make_array(threads=threads)
@@ -83,6 +90,8 @@ def test_frames_and_outputs_equal_those_of_single_cameras_and_neurons(threads):
                 np.testing.assert_array_equal(sensors.frame_of(k, index), frame)
                 expected = neuron.step(frame)
                 assert [field[index, k].item() for field in sensors.responses] == list(expected)
+            expected = [column_potentials(camera.params, neuron) for camera, neuron in singles[index]]
+            np.testing.assert_array_equal(sensors.column_potentials()[index], np.concatenate(expected))
     assert sensors.responses.spikes.dtype == np.int64
     assert sensors.responses.alert.dtype == np.bool_
 
@@ -280,8 +289,8 @@ def test_invalid_camera_fields_raise():
         sensors.set_camera_fields(0, {"texture": 9.0})
     with pytest.raises(ValueError, match=r"must keep the shape \(45, 80\) of camera 'wide', got \(20, 20\)"):
         sensors.set_camera_fields(0, {"shape": (20, 20)})
-    with pytest.raises(ValueError, match="must keep the detector lgmd of camera 'wide', got lplc2"):
-        sensors.set_camera_fields(0, {"detector": "lplc2"})
+    with pytest.raises(ValueError, match="must keep the detector lgmd of camera 'wide', got dsn"):
+        sensors.set_camera_fields(0, {"detector": "dsn"})
 
 
 def test_conditions_are_covered():

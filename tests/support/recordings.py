@@ -43,4 +43,5 @@ def synthetic_episode(length=4, seed=0, threat=True, traffic=False, frames=False
         observations["frame"] = rng.integers(0, 255, (length, 40, 40, 2), dtype=np.uint8)
     contacts = np.arange(length) > length // 2 if threat else np.zeros(length, bool)
     rewards, braking_returns = rng.normal(size=(2, length)).astype(np.float32)
-    return RecordedEpisode(observations, rewards, braking_returns, contacts, threat, traffic)
+    family = "traffic" if traffic else "CCRs" if threat else "EmptyRoad"
+    return RecordedEpisode(observations, rewards, braking_returns, contacts, threat, traffic, family)

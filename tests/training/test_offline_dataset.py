@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from support.recordings import offline_config, synthetic_episode
 
-from lgmd_gym.agents.policies.features import FeatureConfig
+from lgmd_gym.agents.policies.features import SCALES, FeatureConfig, FeatureHistory
+from lgmd_gym.agents.policies.zone_features import ZONE_INPUTS
 from lgmd_gym.training.offline.dataset import OfflineDataset
 from lgmd_gym.training.offline.episodes import EpisodeRecorder
+from lgmd_gym.training.offline.policy_inputs import policy_inputs
 
 
 def test_batches_equal_the_observations_of_the_policy_wrapper(tmp_path):
@@ -68,3 +70,37 @@ def test_frames_have_their_history_in_the_channels():
     assert frames.shape == (4, 6, 40, 40)
     expected = np.concatenate([episodes[1].observations["frame"][index] for index in (1, 2, 3)], axis=-1)
     assert np.array_equal(frames[3].numpy(), np.moveaxis(expected, -1, 0))
+
+
+@pytest.mark.parametrize("repeat", [1, 3])
+def test_inputs_of_an_episode_equal_those_of_a_feature_history(repeat):
+    rng = np.random.default_rng(0)
+    sizes = dict.fromkeys(SCALES, 1)
+    for field in ZONE_INPUTS.values():
+        sizes[field.source] = max(sizes.get(field.source, 1), field.last)
+    observations = {name: rng.random((40, size), np.float32) for name, size in sizes.items()}
+    inputs = (*SCALES, "speed_change", "spike_peak", *(name for name in ZONE_INPUTS if name != "zones"))
+    features = FeatureConfig(inputs=inputs, history=1, repeat=repeat)
+    found, history = policy_inputs(observations, features, np.float32), FeatureHistory(features)
+    assert set(found) == set(inputs)
+    for time in range(40):
+        history.update({name: values[time] for name, values in observations.items()})
+        if time % repeat == 0:
+            for name, expected in history.stack().items():
+                assert found[name][time // repeat] == pytest.approx(expected, abs=1e-6)
+    for name, rounded in policy_inputs(observations, features).items():
+        assert rounded.dtype == (np.float16 if name in ZONE_INPUTS else np.float32)
+        assert rounded == pytest.approx(found[name], abs=5e-4)
+
+
+def test_dataset_drops_observations_of_episodes_that_it_reads_once():
+    episodes = [synthetic_episode(length, seed=length, threat=length == 4) for length in (4, 7)]
+    features = FeatureConfig(inputs=("ego_speed",), history=2, repeat=1)
+    dataset = OfflineDataset(iter(episodes), features)
+    assert [len(episode) for episode in dataset.episodes] == [4, 7]
+    assert [episode.family for episode in dataset.episodes] == ["CCRs", "EmptyRoad"]
+    assert all(episode.observations == {} for episode in dataset.episodes)
+    inputs = dataset.batch([1, 0, 1]).inputs["ego_speed"].numpy()
+    assert inputs.dtype == np.float32
+    assert np.array_equal(inputs[:7], inputs[11:])
+    assert np.array_equal(inputs[7:11], OfflineDataset(episodes[:1], features).batch([0]).inputs["ego_speed"])

@@ -13,7 +13,7 @@ from lgmd_gym.agents.policies.card import read_card
 from lgmd_gym.cli import main as cli
 from lgmd_gym.system.lock import FolderLock
 from lgmd_gym.training.offline import traffic
-from lgmd_gym.training.offline.episodes import EpisodeRecorder
+from lgmd_gym.training.offline.level_recorder import LevelRecorder
 from lgmd_gym.training.offline.storage import load
 from lgmd_gym.training.recordings import load_or_record
 
@@ -27,7 +27,7 @@ def arguments(folder, out, *options):
 def test_second_training_reuses_the_recordings_of_the_first(tmp_path, monkeypatch):
     first, second = tmp_path / "first", tmp_path / "second"
     assert cli.run(arguments(tmp_path, first, "--eval-episodes", "4")) == 0
-    monkeypatch.setattr(EpisodeRecorder, "record", None)  # any recording raises
+    monkeypatch.setattr(LevelRecorder, "record", None)  # any recording raises
     options = ["--eval-episodes", "3", "--n-timesteps", "5", "--inputs", "ffi", "ego_speed"]
     assert cli.run(arguments(tmp_path, second, *options, "--recordings", str(first))) == 0
     assert not (second / "episodes").exists()
@@ -70,7 +70,7 @@ def test_training_with_traffic_and_reuse_of_its_recordings(tmp_path, monkeypatch
     expected = {"train_return", "mean_return", "avoided", "false_activations", "traffic_activations"}
     assert set(columns) == expected | {"best_return"}
     config = offline_config(tmp_path, n_timesteps=3, traffic_episodes=1, recordings=str(first))
-    assert len(load_or_record(config, "train", tmp_path)) == 3 + len(by_seed[0])
+    assert len([*load_or_record(config, "train", tmp_path)]) == 3 + len(by_seed[0])
 
 
 @pytest.mark.slow

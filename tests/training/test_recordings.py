@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from support.recordings import offline_config, synthetic_episode
 
+from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
 from lgmd_gym.training import recordings, train
 from lgmd_gym.training.offline.episodes import EpisodeRecorder
+from lgmd_gym.training.offline.level_recorder import LevelRecorder
 from lgmd_gym.training.offline.storage import check_file, load, save
 from lgmd_gym.training.recordings import check_recordings, load_or_record, origin_of, recording_sets
 
@@ -26,6 +28,7 @@ def test_files_restore_every_episode(tmp_path):
     assert empty == []
     for left, right in zip((threat, segment), restored, strict=True):
         assert (left.threat, left.traffic) == (right.threat, right.traffic)
+        assert left.family == right.family != ""
         for name in ("rewards", "braking_returns", "braking_contacts"):
             assert np.array_equal(getattr(left, name), getattr(right, name))
         for name in left.observations:
@@ -71,7 +74,7 @@ def test_interrupted_recording_resumes_at_the_missing_file(tmp_path, monkeypatch
         return [[synthetic_episode(seed=seed)] for seed in seeds]
 
     monkeypatch.setattr(recordings, "FILE_SIZE", 2)
-    monkeypatch.setattr(EpisodeRecorder, "record", record)
+    monkeypatch.setattr(LevelRecorder, "record", record)
     config = offline_config(tmp_path, n_timesteps=5)
     with pytest.raises(KeyboardInterrupt):
         load_or_record(config, "train", tmp_path)
@@ -80,6 +83,17 @@ def test_interrupted_recording_resumes_at_the_missing_file(tmp_path, monkeypatch
     assert recorded == [range(2, 4), range(4, 5)]
     expected = [synthetic_episode(seed=seed).rewards[0] for seed in range(5)]
     assert [episode.rewards[0] for episode in episodes] == expected
+
+
+def test_recorder_is_that_of_the_engine_where_it_has_the_id(tmp_path):
+    engine, traffic = (
+        recording_sets(offline_config(tmp_path, env_id), "train")[0].record.__self__
+        for env_id in ("LGMD/RandomBraking-v0", traffic_id(next(iter(KINDS))))
+    )
+    assert isinstance(engine, LevelRecorder)
+    assert isinstance(traffic, EpisodeRecorder)
+    top_view = offline_config(tmp_path, camera="birdseye")
+    assert isinstance(recording_sets(top_view, "train")[0].record.__self__, EpisodeRecorder)
 
 
 def test_traffic_recordings_are_required_in_addition(tmp_path):
@@ -130,11 +144,11 @@ def test_a_damaged_file_is_recorded_again(tmp_path, monkeypatch):
     def record(self, seeds):
         return [[synthetic_episode(seed=seed)] for seed in seeds]
 
-    monkeypatch.setattr(EpisodeRecorder, "record", record)
+    monkeypatch.setattr(LevelRecorder, "record", record)
     config = offline_config(tmp_path, n_timesteps=2)
     load_or_record(config, "train", tmp_path)
     (file,) = (tmp_path / "episodes" / "train").iterdir()
     whole = file.read_bytes()
     file.write_bytes(whole[: len(whole) // 2])
-    assert len(load_or_record(config, "train", tmp_path)) == 2
+    assert len([*load_or_record(config, "train", tmp_path)]) == 2
     assert len(file.read_bytes()) == len(whole)

@@ -27,7 +27,7 @@ class Train:
     inputs: Names = None
     """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change and
     ego_yaw_rate; also frame; with the cameras of stopping-zone, also zones, zones_spikes and zones_ffi; with
-    those of all-round, also sides and sides_ffi.
+    those of all-round, also sides, sides_ffi and columns.
     Default: from the hyperparameters."""
     demands: Annotated[tuple[float, ...] | None, arg(metavar="[X ...]")] = None
     """Demands that the policy chooses from, from -1 (full braking) to 1; --demands alone for a continuous

@@ -1,14 +1,15 @@
 """`OfflineDataset`: batches of recorded episodes in the form that a policy is trained on."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import torch
 
-from lgmd_gym.agents.policies.features import FRAME, FeatureConfig, FeatureHistory
+from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
 from lgmd_gym.training.offline.episodes import RecordedEpisode
+from lgmd_gym.training.offline.policy_inputs import policy_inputs
 
 
 class EpisodeBatch(NamedTuple):
@@ -36,24 +37,25 @@ class EpisodeBatch(NamedTuple):
 class OfflineDataset:
     """Recorded episodes with the inputs and the decision rate of a policy.
 
+    It contains the inputs at each decision of the policy, those in `ZONE_INPUTS` as float16. Observations are
+    not kept.
+
     Args:
-        episodes: Recorded episodes, at least one.
+        episodes: Recorded episodes, at least one; they are processed one by one.
         features: Inputs and timing of the policy.
+
+    Attributes:
+        episodes: The episodes without their observations.
     """
 
-    def __init__(self, episodes: list[RecordedEpisode], features: FeatureConfig) -> None:
-        self.episodes, self._features = episodes, features
-        self._starts = np.cumsum([0, *map(self._count_decisions, episodes)])
-        self._inputs = {}
-        if FRAME in features.inputs:
-            frames = [episode.observations[FRAME][:: features.repeat] for episode in episodes]
-            self._inputs[FRAME] = np.concatenate(frames)
-        signals = tuple(name for name in features.inputs if name != FRAME)
-        if signals:
+    def __init__(self, episodes: Iterable[RecordedEpisode], features: FeatureConfig) -> None:
+        self.episodes: list[RecordedEpisode] = []
+        self._features = features
+        self._inputs: list[dict[str, np.ndarray]] = []  # of each episode
+        for episode in episodes:
             # Batches add the history. Stored here, it would multiply the memory by its length.
-            history = FeatureHistory(replace(features, inputs=signals, history=1))
-            rows = [row for episode in episodes for row in _policy_inputs(episode, history)]
-            self._inputs |= {name: np.stack([row[name] for row in rows]) for name in signals}
+            self._inputs.append(policy_inputs(episode.observations, features))
+            self.episodes.append(replace(episode, observations={}))
 
     def __len__(self) -> int:
         return len(self.episodes)
@@ -65,7 +67,7 @@ class OfflineDataset:
         lengths = np.array([self._count_decisions(episode) for episode in episodes])
         rows = np.repeat(np.arange(len(episodes)), lengths)
         columns = np.concatenate([np.arange(length) for length in lengths])
-        starts = self._starts[np.asarray(indices)][rows]
+        starts = (np.cumsum(lengths) - lengths)[rows]
 
         def padded(arrays: list[np.ndarray]) -> torch.Tensor:
             table = np.zeros((len(episodes), lengths.max()), arrays[0].dtype)
@@ -73,7 +75,9 @@ class OfflineDataset:
             return torch.from_numpy(table)
 
         return EpisodeBatch(
-            inputs={name: self._with_history(name, columns, starts) for name in self._inputs},
+            inputs={
+                name: self._with_history(name, indices, columns, starts) for name in self._features.inputs
+            },
             indices=(torch.from_numpy(rows), torch.from_numpy(columns)),
             rewards=padded([np.add.reduceat(item.rewards, range(0, len(item), repeat)) for item in episodes]),
             braking_returns=padded([item.braking_returns[::repeat] for item in episodes]),
@@ -86,18 +90,22 @@ class OfflineDataset:
         """Return the number of policy decisions in an episode."""
         return -(-len(episode) // self._features.repeat)
 
-    def _with_history(self, name: str, columns: np.ndarray, starts: np.ndarray) -> torch.Tensor:
-        """Return an input with its history, oldest first; the first decision fills missing ones."""
-        lags = range(self._features.history_of(name) - 1, -1, -1)
-        parts = [self._inputs[name][starts + np.maximum(columns - lag, 0)] for lag in lags]
-        joined = np.concatenate(parts, axis=-1)
-        return torch.from_numpy(np.moveaxis(joined, -1, 1).copy() if name == FRAME else joined)
+    def _with_history(
+        self, name: str, indices: Sequence[int] | np.ndarray, columns: np.ndarray, starts: np.ndarray
+    ) -> torch.Tensor:
+        """Return an input with its history, oldest first; the first decision fills missing ones.
 
-
-def _policy_inputs(episode: RecordedEpisode, history: FeatureHistory) -> Iterator[dict[str, np.ndarray]]:
-    """Yield the policy inputs at each policy decision."""
-    history.reset()
-    for decision in range(len(episode)):
-        history.update({name: array[decision] for name, array in episode.observations.items()})
-        if decision % history.features.repeat == 0:
-            yield history.stack()
+        Args:
+            name: Name of the input.
+            indices: Indices of the episodes.
+            columns: Decision of each row.
+            starts: First row of the episode of each row.
+        """
+        values = np.concatenate([self._inputs[index][name] for index in indices])
+        length = self._features.history_of(name)
+        if length > 1:
+            rows = [starts + np.maximum(columns - lag, 0) for lag in range(length - 1, -1, -1)]
+            values = np.concatenate([values[row] for row in rows], axis=-1)
+        if name == FRAME:
+            return torch.from_numpy(np.moveaxis(values, -1, 1).copy())
+        return torch.from_numpy(values.astype(np.float32, copy=False))

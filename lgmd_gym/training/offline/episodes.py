@@ -20,6 +20,8 @@ from lgmd_gym.training.offline.braking_outcomes import STRIDE, BrakingOutcome, b
 
 MINIMAL_CAMERA = {"name": "wide", "shape": (8, 8)}  # of the environment that is copied and replayed
 CHUNK_SIZE = 4  # seeds recorded by one task of a process
+OPTIONAL_SIGNALS = ("column_potential",)  # recorded in addition to the keys of SCALES, if present
+TRAFFIC = "traffic"  # `family` of episodes in traffic
 
 Observation: TypeAlias = dict[str, np.ndarray]
 
@@ -35,6 +37,7 @@ class RecordedEpisode:
         braking_contacts: Whether braking from each decision on ends in a contact, bool (T,).
         threat: Whether the episode without braking ends in a contact.
         traffic: Whether the episode is a segment of a traffic episode.
+        family: Scenario family of the level; "traffic" in traffic, empty if unknown.
     """
 
     observations: Observation
@@ -43,6 +46,7 @@ class RecordedEpisode:
     braking_contacts: np.ndarray
     threat: bool
     traffic: bool = False
+    family: str = ""
 
     def __len__(self) -> int:
         return len(self.rewards)
@@ -52,9 +56,19 @@ RecordFunction: TypeAlias = Callable[[range], list[list[RecordedEpisode]]]
 """Method `record` of `EpisodeRecorder` and `TrafficRecorder`: the episodes of each seed."""
 
 
-def record_parallel(record: RecordFunction, seeds: range, jobs: int = 1) -> Iterator[list[RecordedEpisode]]:
-    """Yield the episodes of each seed, recorded by `jobs` processes with the method of a recorder."""
-    chunks = [seeds[start : start + CHUNK_SIZE] for start in range(0, len(seeds), CHUNK_SIZE)]
+def record_parallel(
+    record: RecordFunction, seeds: range, jobs: int = 1, chunk_size: int = CHUNK_SIZE
+) -> Iterator[list[RecordedEpisode]]:
+    """Yield the episodes of each seed, recorded by several processes.
+
+    Args:
+        record: Method of a recorder.
+        seeds: Seeds of the environment.
+        jobs: Number of processes.
+        chunk_size: Largest number of seeds recorded by one task of a process.
+    """
+    size = max(min(chunk_size, -(-len(seeds) // jobs)), 1)
+    chunks = [seeds[start : start + size] for start in range(0, len(seeds), size)]
     for by_seed in run_parallel((delayed(record)(chunk) for chunk in chunks), jobs):
         yield from by_seed
 
@@ -66,7 +80,8 @@ def select_signals(observation: Observation, shrink: int | None) -> Observation:
         observation: Observation of `LGMDObservation`.
         shrink: Side of the pixel squares that become one pixel of the recorded frame [px]; None for no frame.
     """
-    signals = {name: observation[name] for name in SCALES}
+    names = (*SCALES, *(name for name in OPTIONAL_SIGNALS if name in observation))
+    signals = {name: observation[name] for name in names}
     return signals if shrink is None else signals | {FRAME: shrink_frame(observation[FRAME], shrink)}
 
 
@@ -128,7 +143,13 @@ class EpisodeRecorder:
             braking_returns=np.array([item.episode_return for item in outcomes], np.float32),
             braking_contacts=np.array([item.contact for item in outcomes]),
             threat=bool(info["collision"]),
+            family=_family_of(env),
         )
+
+
+def _family_of(env: gym.Env) -> str:
+    scenario = getattr(env.unwrapped, "scenario", None)
+    return TRAFFIC if scenario is None else scenario.family
 
 
 def _brake_to_end(env: Any, brake: int) -> BrakingOutcome:

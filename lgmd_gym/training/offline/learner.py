@@ -17,8 +17,9 @@ import torch
 from torch.nn.functional import logsigmoid
 
 from lgmd_gym.agents.base import HOLD
-from lgmd_gym.errors import check_positive, check_whole, check_within
+from lgmd_gym.errors import check_flag, check_positive, check_whole, check_within
 from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset
+from lgmd_gym.training.offline.mirror import mirror_episodes
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
@@ -62,6 +63,7 @@ class OfflineLearner:
         logit_decay: Weight of the squared log odds of braking, summed over the decisions of an episode.
             Without this penalty a network that learns slowly, for example on frames, saturates at never
             braking and its gradient vanishes.
+        mirror: Whether each training episode is mirrored, left to right, with probability 1/2 in each pass.
         policy_kwargs: Further arguments of the network.
 
     Raises:
@@ -82,6 +84,7 @@ class OfflineLearner:
         false_cost: float = 2.0,
         initial_brake_probability: float = 0.03,
         logit_decay: float = 0.0,
+        mirror: bool = False,
         policy_kwargs: dict[str, Any] | None = None,
     ) -> None:
         self.n_epochs = check_whole("n_epochs", n_epochs, 1)
@@ -90,6 +93,7 @@ class OfflineLearner:
         self.weight_decay = check_within("weight_decay", weight_decay, 0.0, 1.0)
         self.false_cost = check_positive("false_cost", false_cost)
         self.logit_decay = check_within("logit_decay", logit_decay, 0.0, 1.0)
+        self.mirror = check_flag("mirror", mirror)
         check_within("initial_brake_probability", initial_brake_probability, 1e-6, 0.999)
         self._seed = seed
         self._hold, self._brake = demands.index(HOLD), demands.index(min(demands))
@@ -126,6 +130,8 @@ class OfflineLearner:
             train_return = 0.0
             for indices in np.array_split(rng.permutation(len(train)), steps):
                 batch = scale_false_braking_cost(train.batch(indices), self.false_cost)
+                if self.mirror:
+                    batch = mirror_episodes(batch, rng.random(len(indices)) < 0.5)
                 optimizer.zero_grad()
                 loss, mean_return = self._loss(batch)
                 loss.backward()

@@ -30,6 +30,7 @@ def save(by_seed: list[list[RecordedEpisode]], file: Path, origin: dict[str, Any
         "lengths": np.array([len(episode) for episode in episodes]),
         "threats": np.array([episode.threat for episode in episodes], bool),
         "traffic": np.array([episode.traffic for episode in episodes], bool),
+        "families": np.array([episode.family for episode in episodes], str),
     }
     if episodes:
         for name in PER_DECISION:
@@ -99,6 +100,7 @@ def _episodes(archive: Any) -> Iterator[RecordedEpisode]:
         name.removeprefix(PREFIX): array for name, array in arrays.items() if name.startswith(PREFIX)
     }
     bounds = np.cumsum([0, *arrays["lengths"]])
+    families = arrays.get("families", np.full(len(arrays["lengths"]), ""))  # format 6 and later
     for index in range(len(arrays["lengths"])):
         part = slice(*bounds[index : index + 2])
         yield RecordedEpisode(
@@ -106,4 +108,5 @@ def _episodes(archive: Any) -> Iterator[RecordedEpisode]:
             *(arrays[name][part] for name in PER_DECISION),
             threat=bool(arrays["threats"][index]),
             traffic=bool(arrays["traffic"][index]),
+            family=str(families[index]),
         )

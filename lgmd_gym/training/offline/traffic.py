@@ -21,7 +21,13 @@ from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.scenarios.distribution import draw_camera_fields
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, Emergencies, simulate_driver
 from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
-from lgmd_gym.training.offline.episodes import Observation, RecordedEpisode, select_signals, stack
+from lgmd_gym.training.offline.episodes import (
+    TRAFFIC,
+    Observation,
+    RecordedEpisode,
+    select_signals,
+    stack,
+)
 
 MARGIN = 10.0  # segments end this time before an emergency [s]
 MAX_LENGTH = 10.0  # longest segment [s]; levels last 7 s in the median and 22 s at most
@@ -125,4 +131,5 @@ def non_threat_episode(observations: Observation, policy_hz: float) -> RecordedE
         braking_contacts=np.zeros(len(speed), bool),
         threat=False,
         traffic=True,
+        family=TRAFFIC,
     )

@@ -1,0 +1,52 @@
+"""Mirrored policy inputs: those of the mirrored fields, columns and motion."""
+
+import numpy as np
+import pytest
+
+from lgmd_gym.agents.sides import NUM_COLUMNS, NUM_MOTION_FIELDS, all_round_cameras
+from lgmd_gym.agents.zones import NUM_FIELDS
+from lgmd_gym.training.offline.mirror import mirror_of
+
+
+def mirrored(name, values):
+    """Return the mirror image of four equal groups of values."""
+    order, signs = mirror_of(name, 4 * len(values))
+    return (np.tile(values, 4)[order] * signs)[: len(values)]
+
+
+def opposite(name):
+    return name.replace("_left_", "_?_").replace("_right_", "_left_").replace("_?_", "_right_")
+
+
+def test_columns_of_the_mirror_image():
+    """Each column has a value of its own, at its place in the mirrored camera from right to left."""
+    cameras = all_round_cameras()
+    parts, start = {}, 0
+    for camera in cameras:
+        parts[camera["name"]] = np.arange(start, start + camera["columns"]) + 1.0
+        start += camera["columns"]
+    assert start == NUM_COLUMNS
+    expected = [
+        parts[opposite(camera["name"])][::-1] * (-1.0 if camera.get("detector") == "dsn" else 1.0)
+        for camera in cameras
+    ]
+    assert np.array_equal(mirrored("columns", np.concatenate(list(parts.values()))), np.concatenate(expected))
+
+
+@pytest.mark.parametrize(("name", "motion"), [("sides", -1.0), ("sides_ffi", 1.0)])
+def test_fields_of_the_mirror_image(name, motion):
+    cameras = all_round_cameras()[NUM_FIELDS:NUM_MOTION_FIELDS]
+    values = {camera["name"]: 1.0 + index for index, camera in enumerate(cameras)}
+    expected = [
+        values[opposite(camera["name"])] * (motion if camera["detector"] == "dsn" else 1.0)
+        for camera in cameras
+    ]
+    assert mirrored(name, np.array(list(values.values()))).tolist() == expected
+
+
+def test_ego_motion_and_forward_fields():
+    assert mirrored("zones", np.arange(17.0)).tolist() == list(range(17))
+    assert mirrored("ego_speed", np.array([2.0])).tolist() == [2.0]
+    assert mirrored("ego_yaw_rate", np.array([2.0])).tolist() == [-2.0]
+    with pytest.raises(ValueError, match="mirror does not support the input 'frame'; set mirror to false"):
+        mirror_of("frame", 4)
