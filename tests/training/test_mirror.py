@@ -5,13 +5,12 @@ import pytest
 
 from lgmd_gym.agents.sides import NUM_COLUMNS, NUM_MOTION_FIELDS, all_round_cameras
 from lgmd_gym.agents.zones import NUM_FIELDS
-from lgmd_gym.training.offline.mirror import mirror_of
+from lgmd_gym.training.offline.mirror import mirror_input
 
 
 def mirrored(name, values):
     """Return the mirror image of four equal groups of values."""
-    order, signs = mirror_of(name, 4 * len(values))
-    return (np.tile(values, 4)[order] * signs)[: len(values)]
+    return mirror_input(name, np.tile(values, 4)[None])[0, : len(values)]
 
 
 def opposite(name):
@@ -49,4 +48,4 @@ def test_ego_motion_and_forward_fields():
     assert mirrored("ego_speed", np.array([2.0])).tolist() == [2.0]
     assert mirrored("ego_yaw_rate", np.array([2.0])).tolist() == [-2.0]
     with pytest.raises(ValueError, match="mirror does not support the input 'frame'; set mirror to false"):
-        mirror_of("frame", 4)
+        mirror_input("frame", np.zeros((1, 4)))

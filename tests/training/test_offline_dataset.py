@@ -10,6 +10,7 @@ from lgmd_gym.agents.policies.features import SCALES, FeatureConfig, FeatureHist
 from lgmd_gym.agents.policies.zone_features import ZONE_INPUTS
 from lgmd_gym.training.offline.dataset import OfflineDataset
 from lgmd_gym.training.offline.episodes import EpisodeRecorder
+from lgmd_gym.training.offline.mirror import mirror_input
 from lgmd_gym.training.offline.policy_inputs import policy_inputs
 
 
@@ -104,3 +105,20 @@ def test_dataset_drops_observations_of_episodes_that_it_reads_once():
     assert inputs.dtype == np.float32
     assert np.array_equal(inputs[:7], inputs[11:])
     assert np.array_equal(inputs[7:11], OfflineDataset(episodes[:1], features).batch([0]).inputs["ego_speed"])
+
+
+def test_mirrored_episodes_of_a_batch():
+    """The yaw rate and the direction-selective neurons of one of two episodes change their sign."""
+    episodes = [synthetic_episode(4, seed=seed) for seed in (0, 1)]
+    for episode in episodes:
+        episode.observations["column_potential"] = np.random.default_rng(2).uniform(0.01, 0.99, (4, 260))
+        episode.observations["ego_yaw_rate"] = np.full((4, 1), 0.1)
+    features = FeatureConfig(inputs=("columns", "ego_yaw_rate"), history=2, repeat=1)
+    data = OfflineDataset(episodes, features)
+    plain, mirrored = data.batch([0, 1]).inputs, data.batch([0, 1], [False, True]).inputs
+    for name, values in plain.items():
+        assert np.array_equal(mirrored[name][:4], values[:4])
+    assert np.array_equal(mirrored["ego_yaw_rate"][4:], -plain["ego_yaw_rate"][4:])
+    expected = mirror_input("columns", plain["columns"][4:].numpy())
+    assert np.array_equal(mirrored["columns"][4:], expected)
+    assert not np.array_equal(expected, plain["columns"][4:])

@@ -9,6 +9,7 @@ import torch
 
 from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
 from lgmd_gym.training.offline.episodes import RecordedEpisode
+from lgmd_gym.training.offline.mirror import mirror_input
 from lgmd_gym.training.offline.policy_inputs import policy_inputs
 
 
@@ -60,8 +61,18 @@ class OfflineDataset:
     def __len__(self) -> int:
         return len(self.episodes)
 
-    def batch(self, indices: Sequence[int] | np.ndarray) -> EpisodeBatch:
-        """Return the episodes with these indices."""
+    def batch(
+        self, indices: Sequence[int] | np.ndarray, mirrored: Sequence[bool] | np.ndarray = ()
+    ) -> EpisodeBatch:
+        """Return the episodes with these indices.
+
+        Args:
+            indices: Indices of N episodes.
+            mirrored: Whether each of them is mirrored, left to right, bool, (N,); empty for none.
+
+        Raises:
+            ValueError: If an episode is mirrored and an input has no known mirror image.
+        """
         repeat = self._features.repeat
         episodes = [self.episodes[index] for index in indices]
         lengths = np.array([self._count_decisions(episode) for episode in episodes])
@@ -76,7 +87,8 @@ class OfflineDataset:
 
         return EpisodeBatch(
             inputs={
-                name: self._with_history(name, indices, columns, starts) for name in self._features.inputs
+                name: self._with_history(name, self._arrays(name, indices, mirrored), columns, starts)
+                for name in self._features.inputs
             },
             indices=(torch.from_numpy(rows), torch.from_numpy(columns)),
             rewards=padded([np.add.reduceat(item.rewards, range(0, len(item), repeat)) for item in episodes]),
@@ -90,22 +102,33 @@ class OfflineDataset:
         """Return the number of policy decisions in an episode."""
         return -(-len(episode) // self._features.repeat)
 
+    def _arrays(
+        self, name: str, indices: Sequence[int] | np.ndarray, mirrored: Sequence[bool] | np.ndarray
+    ) -> list[np.ndarray]:
+        """Return an input of some episodes, (decisions, ...) each."""
+        arrays = [self._inputs[index][name] for index in indices]
+        if not len(mirrored):
+            return arrays
+        return [
+            mirror_input(name, array) if flag else array for array, flag in zip(arrays, mirrored, strict=True)
+        ]
+
     def _with_history(
-        self, name: str, indices: Sequence[int] | np.ndarray, columns: np.ndarray, starts: np.ndarray
+        self, name: str, arrays: list[np.ndarray], columns: np.ndarray, starts: np.ndarray
     ) -> torch.Tensor:
         """Return an input with its history, oldest first; the first decision fills missing ones.
 
         Args:
             name: Name of the input.
-            indices: Indices of the episodes.
+            arrays: The input in each episode.
             columns: Decision of each row.
             starts: First row of the episode of each row.
         """
-        values = np.concatenate([self._inputs[index][name] for index in indices])
+        values = np.concatenate(arrays)
         length = self._features.history_of(name)
         if length > 1:
             rows = [starts + np.maximum(columns - lag, 0) for lag in range(length - 1, -1, -1)]
             values = np.concatenate([values[row] for row in rows], axis=-1)
         if name == FRAME:
             return torch.from_numpy(np.moveaxis(values, -1, 1).copy())
-        return torch.from_numpy(values.astype(np.float32, copy=False))
+        return torch.from_numpy(values).float()

@@ -19,7 +19,6 @@ from torch.nn.functional import logsigmoid
 from lgmd_gym.agents.base import HOLD
 from lgmd_gym.errors import check_flag, check_positive, check_whole, check_within
 from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset
-from lgmd_gym.training.offline.mirror import mirror_episodes
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
@@ -129,9 +128,8 @@ class OfflineLearner:
             policy.set_training_mode(True)
             train_return = 0.0
             for indices in np.array_split(rng.permutation(len(train)), steps):
-                batch = scale_false_braking_cost(train.batch(indices), self.false_cost)
-                if self.mirror:
-                    batch = mirror_episodes(batch, rng.random(len(indices)) < 0.5)
+                mirrored = rng.random(len(indices)) < 0.5 if self.mirror else ()
+                batch = scale_false_braking_cost(train.batch(indices, mirrored), self.false_cost)
                 optimizer.zero_grad()
                 loss, mean_return = self._loss(batch)
                 loss.backward()

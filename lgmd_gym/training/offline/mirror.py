@@ -8,7 +8,6 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-import torch
 
 from lgmd_gym.agents.policies.zone_features import NUM_LEVELS, ZONE_INPUTS
 from lgmd_gym.agents.sides import (
@@ -20,7 +19,6 @@ from lgmd_gym.agents.sides import (
     SIDE_COLUMNS,
 )
 from lgmd_gym.agents.zones import NUM_FIELDS
-from lgmd_gym.training.offline.dataset import EpisodeBatch
 
 EVEN = ("ego_speed", "zones", "zones_spikes", "zones_ffi")
 """Inputs that the mirror image does not change."""
@@ -38,23 +36,17 @@ class Mirror(NamedTuple):
     signs: np.ndarray
 
 
-def mirror_episodes(batch: EpisodeBatch, selected: np.ndarray) -> EpisodeBatch:
-    """Return a batch with some of its episodes mirrored.
-
-    Args:
-        batch: N episodes.
-        selected: Episodes to mirror, bool, shape (N,).
+def mirror_input(name: str, values: np.ndarray) -> np.ndarray:
+    """Return the mirror image of a policy input at each decision, new array, (decisions, elements).
 
     Raises:
         ValueError: For an input without a known mirror image.
     """
-    rows = torch.from_numpy(selected)[batch.indices[0]]
-    inputs = {}
-    for name, values in batch.inputs.items():
-        order, signs = mirror_of(name, values.shape[1])
-        inputs[name] = values.clone()
-        inputs[name][rows] = values[rows][:, order] * torch.from_numpy(signs)
-    return batch._replace(inputs=inputs)
+    order, signs = mirror_of(name, values.shape[1])
+    image = values[:, order]
+    negative = signs < 0.0
+    image[:, negative] = -image[:, negative]
+    return image
 
 
 @cache
