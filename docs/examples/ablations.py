@@ -5,11 +5,13 @@
 Each arm plays the suites r152 (contacts avoided without premature braking) and false-reaction (false
 activations) in test worlds, in the condition and with the brake of each world. In r152 every case is played
 once in every world, in false-reaction in `--seeds` of them. Thresholds and weights of the agent are those of
-the complete sensor. The table has 95 % intervals that cluster by case and world, and is in Markdown.
+the complete sensor at 30 frames per second. The table has 95 % intervals that cluster by case and world, and
+is in Markdown.
 """
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,13 +50,18 @@ def replaced(**fields: Any) -> Callable[[Camera], dict[str, Any]]:
 
 ARMS: dict[str, Callable[[Camera], dict[str, Any]]] = {
     "complete sensor": dict,
+    "stabilised by the image": replaced(stabilised="image"),
     "no stabilisation": replaced(stabilised=False),
     "no calibration": replaced(calibrated=False),
     "no contrast control": replaced(contrast_s=0.0),
     "half the pixels per row and column": halved,
     "lens 1.0 m high": replaced(mount_height=1.0),
     "lens 1.5 m high": replaced(mount_height=1.5),
+    "15 frames/s": dict,
+    "60 frames/s": dict,
 }
+FPS = {"15 frames/s": 15.0, "60 frames/s": 60.0}
+"""Frame rates of the arms with another one than 30 Hz."""
 
 
 def play(agent: str, arm: str, suite: str, worlds: range, seeds: int, jobs: int, every: int) -> list[Row]:
@@ -65,7 +72,8 @@ def play(agent: str, arm: str, suite: str, worlds: range, seeds: int, jobs: int,
         raise ValueError(f"agent {agent!r} has no cameras of its own; use for example stopping-zone")
     changed = SensorConfig([ARMS[arm](camera) for camera in cameras], own.params)
     schedule = RunConfig(suite=suite, seeds=seeds, worlds=len(worlds), first_world=worlds.start)
-    cases = find_suite(suite).cases[::every]
+    fps = (("fps", FPS[arm]),) if arm in FPS else ()
+    cases = [replace(case, arguments=case.arguments + fps) for case in find_suite(suite).cases[::every]]
 
     def row(index: int, seed: int) -> Row:
         world = schedule.world(seed, index)

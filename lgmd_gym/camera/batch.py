@@ -127,6 +127,17 @@ class CameraBatch:
         mount["yaw_deg"], mount["pitch_deg"] = mounted["yaw_deg"] + right, mounted["pitch_deg"] + up
         mount["gaze"] = GAZES[p.gaze] if gaze is None else FIXED
 
+    def set_measured_rotation(self, first: int, last: int, rotations: np.ndarray) -> None:
+        """Set the rotation of the body as measured in the image, for `stabilised="image"`.
+
+        Args:
+            first: First environment.
+            last: Last environment + 1.
+            rotations: Pitch, roll and yaw of every environment, float64, shape (num_envs, 3) [degrees].
+        """
+        for axis, name in enumerate(("image_pitch", "image_roll", "image_yaw")):
+            self._mounts[name][first:last] = rotations[first:last, axis, None]
+
     def draw(
         self,
         first: int,

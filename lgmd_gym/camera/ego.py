@@ -115,6 +115,11 @@ class _Stage:
     """What one camera needs to draw frames by itself."""
 
     def __init__(self, p: CameraParams) -> None:
+        if p.stabilised == "image":
+            raise ValueError(
+                f"camera {p.name!r} must not have stabilised='image' without a far-field lens; use "
+                f"LGMDObservation or SensorArray, or stabilised=True"
+            )
         self.batch = CameraBatch([p], p.shape)
         self.workspace = Workspace(p.shape)
         self._params, self._keys = p, (road_key(p),)

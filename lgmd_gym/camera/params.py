@@ -76,8 +76,9 @@ class CameraParams:
         stop_deceleration: Deceleration of the stopping distance on a dry road; two thirds of it on a wet one
             [m/s²]. The least of all worlds is 7.5.
         stop_reaction: Time from a demand to full braking [s].
-        stabilised: Whether the rotation of the body is compensated with a gyroscope, see
-            `body_motion.residual_motion`.
+        stabilised: Whether the rotation of the body is compensated: True with a gyroscope whose errors are
+            assumptions, see `body_motion.residual_motion`; `"image"` by the registration of a far-field
+            image, see `sensing.image_stabiliser`. `"image"` needs a `SensorArray`, as in `LGMDObservation`.
         calibrated: Whether the sensor knows the errors of its mount up to a tenth, see `pose.CALIBRATED`.
         texture: Contrast of asphalt and verge, as a multiple of the natural contrast.
         roadside: Density of posts and trees along the road, as a multiple of the natural density.
@@ -146,7 +147,7 @@ class CameraParams:
     lift: float = 0.0
     stop_deceleration: float = 7.5
     stop_reaction: float = 0.5
-    stabilised: bool = False
+    stabilised: bool | str = False
     calibrated: bool = False
     texture: float = 1.0
     roadside: float = 1.0
@@ -265,9 +266,19 @@ def _check_surroundings(p: CameraParams) -> None:
         raise ValueError(
             f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
         )
-    flags = ("guard_rail", "upper_beam", "wet", "linear_light", "bonnet", "stabilised", "calibrated")
+    flags = ("guard_rail", "upper_beam", "wet", "linear_light", "bonnet", "calibrated")
     for name in flags:
         object.__setattr__(p, name, check_flag(f"camera {name}", getattr(p, name)))
+    object.__setattr__(p, "stabilised", _checked_stabilisation(p.stabilised))
+
+
+def _checked_stabilisation(value: object) -> bool | str:
+    if isinstance(value, str) and value == "image":
+        return value
+    try:
+        return check_flag("camera stabilised", value)
+    except ValueError:
+        raise ValueError(f"camera stabilised must be True, False or 'image', got {shown(value)}") from None
 
 
 def _check_columns(p: CameraParams) -> None:

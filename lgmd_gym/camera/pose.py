@@ -37,14 +37,19 @@ MOUNT = np.dtype(
         *((name, np.float64) for name in ("road", "dive_deg", "shutter_s")),
         *((name, np.float64) for name in ("focal", "centre_u", "centre_v", "linear")),
         *((name, np.int64) for name in ("gaze", "stabilised", "noisy", "box", "drawn", "seed")),
+        *((name, np.float64) for name in ("image_pitch", "image_roll", "image_yaw")),
         ("aim", AIM),
     ]
 )
 """How a camera sits on the car and moves with it, as the kernels read it.
 
 The fields of `CameraParams`; amplitude of the road in `ROADS`; focal length and image centre [px]; gaze, see
-`camera.aim`; 1 for linear light, a stabilised lens, sensor noise, `vehicles="box"` and a numbered world.
+`camera.aim`; 1 for linear light, sensor noise, `vehicles="box"` and a numbered world; stabilisation, see
+`STABILISED`; pitch, roll and yaw of the body that the image stabilisation has measured [degrees].
 """
+GYROSCOPE, IMAGE = 1, 2
+STABILISED: dict[bool | str, int] = {False: 0, True: GYROSCOPE, "image": IMAGE}
+"""Number of each kind of stabilisation in a `MOUNT` record."""
 CALIBRATED = 0.1
 """Share of the errors of a calibrated mount that remains: 0.05° and 1 cm at most. An assumption: a car that
 drives for minutes measures the direction of its lens from the vanishing point of its own motion."""
@@ -60,10 +65,15 @@ def mount_of(p: CameraParams) -> np.ndarray:
     values = (
         *(p.mount_setback, p.mount_left, lens_height),
         *(p.yaw_deg + left * world.yaw_error_deg, p.pitch_deg + left * world.pitch_error_deg),
-        *(ROADS[p.road], p.dive_deg * (_GYRO_DIVE if p.stabilised else 1.0), p.shutter_s),
+        *(ROADS[p.road], p.dive_deg * (_GYRO_DIVE if p.stabilised is True else 1.0), p.shutter_s),
         *(p.focal_px, 0.5 * width, 0.5 * height, p.linear_light),
-        *(GAZES[p.gaze], p.stabilised, p.shot_noise > 0.0 or p.read_noise > 0.0, p.vehicles == "box"),
-        *(world.drawn, seed_of(p)),
+        *(
+            GAZES[p.gaze],
+            STABILISED[p.stabilised],
+            p.shot_noise > 0.0 or p.read_noise > 0.0,
+            p.vehicles == "box",
+        ),
+        *(world.drawn, seed_of(p), 0.0, 0.0, 0.0),
         aim_of(p, known_height),
     )
     return np.array(values, dtype=MOUNT)
@@ -82,7 +92,7 @@ def seed_of(p: CameraParams) -> int:
 @exact_kernel
 def _rotation(mount, axis, time_s):
     """Return the rotation of a lens about one axis due to the road, at `MEAN_SPEED` [degrees]."""
-    if mount.stabilised != 0:
+    if mount.stabilised == GYROSCOPE:
         return residual_motion(mount.seed, axis, time_s)
     return body_motion(mount.seed, axis, time_s)
 
@@ -106,6 +116,10 @@ def _tilt(mount, scene, time_s, turn, gain):
         pitch, roll = body_pitch * c - body_roll * s, body_roll * c + body_pitch * s
     if mount.dive_deg > 0.0:
         pitch += mount.dive_deg * max(-12.0, min(6.0, scene.acceleration))
+    if mount.stabilised == IMAGE:
+        c, s = math.cos(turn), math.sin(turn)
+        pitch -= mount.image_pitch * c - mount.image_roll * s
+        roll -= mount.image_roll * c + mount.image_pitch * s
     return math.radians(pitch), math.radians(roll)
 
 
@@ -157,6 +171,8 @@ def pose_lens(mount, scene, ago_s, lens):
         # Above the ground.
         z = max(z + gain * body_motion(mount.seed, HEAVE, time_s), 0.1 * z)
         yaw_deg += gain * _rotation(mount, YAW, time_s)
+    if mount.stabilised == IMAGE:
+        yaw_deg -= mount.image_yaw
     yaw = heading + math.radians(yaw_deg)
     pitch, focal = math.radians(mount.pitch_deg) + tilt, mount.focal
     lens.turn = 0.0

@@ -10,6 +10,7 @@ from lgmd_gym.camera.road_pool import RoadKey, road_key
 from lgmd_gym.camera.scene_table import view_of
 from lgmd_gym.camera.spec import is_top_view
 from lgmd_gym.errors import check_keys
+from lgmd_gym.sensing.image_stabiliser import far_lens
 
 _MAX_KNOWN = 256  # distinct fields that are remembered
 
@@ -53,13 +54,15 @@ class Variant(NamedTuple):
 
     Attributes:
         params: Parameters of every camera; None for a top view.
-        road_keys: `road_key` of every camera, with a placeholder for a top view.
+        road_keys: `road_key` of every camera, with a placeholder for a top view, then that of `far`.
         view: Directions that the cameras look in, see `read_objects`.
+        far: Far-field lens that stabilises the cameras, see `far_lens`; None for no such lens.
     """
 
     params: tuple[CameraParams | None, ...]
     road_keys: tuple[RoadKey, ...]
     view: View | None
+    far: CameraParams | None
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Variant":
         return self
@@ -88,8 +91,8 @@ class Variants:
             fields: Fields of `CameraParams`, and optionally `condition`.
 
         Raises:
-            ValueError: If a field is unknown or out of range, or changes the shape, detector or columns of a
-                camera.
+            ValueError: If a field is unknown or out of range, changes the shape, detector or columns of a
+                camera, or changes `stabilised` from or to `"image"`.
         """
         others = {name: value for name, value in fields.items() if name != "texture"}
         texture = fields.get("texture")
@@ -108,10 +111,11 @@ class Variants:
         for base, changed in zip(self._base, params, strict=True):
             if base is not None:
                 _check_kept(base, changed)
-        known = [p for p in params if p is not None]
+        far = far_lens(params)
+        known = [p for p in (*params, far) if p is not None]
         placeholder = road_key(known[0]) if known else (0.0, 0, False, False, None)
         keys = tuple(placeholder if p is None else road_key(p) for p in params)
-        return Variant(params, keys, view_of(known))
+        return Variant(params, keys if far is None else (*keys, road_key(far)), view_of(known), far)
 
 
 def _check_kept(base: CameraParams, changed: CameraParams | None) -> None:
@@ -123,3 +127,8 @@ def _check_kept(base: CameraParams, changed: CameraParams | None) -> None:
                 f"camera_fields must keep the {name} {kept} of camera {base.name!r}, got {given}; "
                 f"set the {name} in the camera argument"
             )
+    if changed is not None and (base.stabilised == "image") != (changed.stabilised == "image"):
+        raise ValueError(
+            f"camera_fields must keep stabilised={base.stabilised!r} of camera {base.name!r}, got "
+            f"{changed.stabilised!r}; set 'image' in the camera argument"
+        )

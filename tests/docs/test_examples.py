@@ -57,11 +57,11 @@ def test_contact_sheet(tmp_path):
 def test_ablations(tmp_path, capsys):
     example = load("ablations")
     arguments = ["--worlds", "2", "--seeds", "1", "--every", "14", "--to", str(tmp_path / "arms.png")]
-    arms = ["complete sensor", "half the pixels per row and column"]
+    arms = ["complete sensor", "half the pixels per row and column", "60 frames/s"]
     rates = example.main(["stopping-zone", *arguments, "--arms", *arms])
     assert list(rates) == arms
     assert {suite: rate.n for suite, rate in rates[arms[1]].items()} == {"r152": 2, "false-reaction": 3}
-    assert capsys.readouterr().out.count("\n") == 4
+    assert capsys.readouterr().out.count("\n") == 5
     assert (tmp_path / "arms.png").stat().st_size > 5_000
     camera = make_agent("stopping-zone").camera[0]
     assert example.ARMS[arms[1]](camera) == camera | {"shape": [9, 40]}

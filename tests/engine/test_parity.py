@@ -36,6 +36,7 @@ ARGUMENTS = {
     "own car": {"camera": {"name": "wide", "bonnet": True, "windscreen": 0.05, "gaze": "path"}, **FRAMES},
     "night fog": {"camera": {"name": "wide", "light": "night", "visibility_m": 30.0}, **FRAMES},
     "automatic exposure": {"camera": {"name": "wide", "auto_exposure_s": 0.3}, "include_frame": True},
+    "image stabilisation": {"camera": {"name": "wide", "stabilised": "image"}, "world": 6003, **FRAMES},
 }
 
 
