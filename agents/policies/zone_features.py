@@ -11,8 +11,8 @@ from lgmd_gym.agents.zones import NUM_FIELDS
 TIME_CONSTANTS_S = (0.1, 0.4, 1.2)
 NUM_LEVELS = 1 + len(TIME_CONSTANTS_S)  # features per field
 POTENTIALS = ("membrane_potential", "column_potential")  # converted to responses
-_NORM = 3.4  # log(1 + 2 · 15), so that the features of `zones` are in [0, 1]
-_GAINS = 1.0 / (1.0 + FPS * np.array(TIME_CONSTANTS_S)[:, None])
+NORM = 3.4  # log(1 + 2 · 15), so that the features of `zones` are in [0, 1]
+GAINS = 1.0 / (1.0 + FPS * np.array(TIME_CONSTANTS_S)[:, None])
 _MARGIN = 3e-7  # of K to 0 and 1, so that responses are at most 15
 
 
@@ -46,9 +46,6 @@ ZONE_INPUTS = {
     "columns": FieldInput("column_potential", 2.0, 0, NUM_COLUMNS),
 }
 
-CAMERA_COUNTS = (NUM_FIELDS, NUM_MOTION_FIELDS, NUM_ALL_ROUND)
-"""Numbers of cameras of `stopping-zone`, and of `all-round` without and with detectors of edges."""
-
 
 class ZoneFeatures:
     """Levels of the fields and their low-pass filtered values, on a logarithmic scale.
@@ -73,10 +70,10 @@ class ZoneFeatures:
         check_zone_shape(self._name, signal.shape)
         values = np.asarray(signal[self._input.first : self._input.last], np.float64)
         if self.source in POTENTIALS:
-            values = _response(values)
-        level = np.copysign(np.log1p(self._input.factor * np.abs(values)), values) / _NORM
+            values = response_of(values)
+        level = np.copysign(np.log1p(self._input.factor * np.abs(values)), values) / NORM
         self._last, self._level = (self._level if self._started else level), level
-        self._averages += _GAINS * (level - self._averages)
+        self._averages += GAINS * (level - self._averages)
         self._started = True
 
     def collect(self) -> np.ndarray:
@@ -88,7 +85,7 @@ class ZoneFeatures:
         return np.concatenate([np.minimum(self._level, self._last), self._averages.ravel()])
 
 
-def _response(potential: np.ndarray) -> np.ndarray:
+def response_of(potential: np.ndarray) -> np.ndarray:
     """Return log(K / (1 - K)), the inverse of eq. 10, in [-15, 15]."""
     k = np.clip(potential, _MARGIN, 1.0 - _MARGIN)
     return np.log(k / (1.0 - k))
@@ -96,12 +93,14 @@ def _response(potential: np.ndarray) -> np.ndarray:
 
 def check_zone_shape(name: str, shape: tuple[int, ...]) -> None:
     """Raise ValueError unless an observation comes from the cameras that an input requires."""
-    source, last = ZONE_INPUTS[name].source, ZONE_INPUTS[name].last
-    counts = (NUM_COLUMNS,) if source == "column_potential" else CAMERA_COUNTS
-    if shape not in [(count,) for count in counts if count >= last]:
-        agent = "stopping-zone" if last == NUM_FIELDS else "all-round"
-        required = f"{NUM_COLUMNS} columns" if source == "column_potential" else f"{last} cameras"
+    if ZONE_INPUTS[name].source == "column_potential":
+        agent, allowed, kind = "all-round", (NUM_COLUMNS,), "columns"
+    elif ZONE_INPUTS[name].last == NUM_FIELDS:
+        agent, allowed, kind = "stopping-zone", (NUM_FIELDS, NUM_ALL_ROUND), "cameras"
+    else:
+        agent, allowed, kind = "all-round", (NUM_ALL_ROUND,), "cameras"
+    if shape not in [(count,) for count in allowed]:
         raise ValueError(
-            f"policy input {name!r} requires the {required} of {agent}, got {shape[0]}; "
+            f"policy input {name!r} requires the {allowed[0]} {kind} of {agent}, got {shape[0]}; "
             f"train with --sensors-of {agent}"
         )

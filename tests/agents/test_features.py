@@ -156,7 +156,7 @@ def test_missing_or_other_observations_are_rejected():
     two_cameras = observe(1.0) | {"membrane_potential": np.array([0.5, 0.6]), "ego_yaw_rate": np.zeros(1)}
     with pytest.raises(ValueError, match="requires the 17 cameras of stopping-zone, got 2; train with"):
         zone_history().update(two_cameras)
-    with pytest.raises(ValueError, match="'sides_ffi' requires the 29 cameras of all-round, got 17; train"):
+    with pytest.raises(ValueError, match="'sides_ffi' requires the 35 cameras of all-round, got 17; train"):
         zone_history("sides_ffi").update(observe_zones(zone_levels()))
     with pytest.raises(ValueError, match="requires the observation 'ffi', got"):
         FeatureHistory(FeatureConfig(inputs=("ffi",))).update(observe(1.0))

@@ -8,6 +8,8 @@ from support.recordings import offline_config, synthetic_episode
 
 from lgmd_gym.agents.policies.features import SCALES, FeatureConfig, FeatureHistory
 from lgmd_gym.agents.policies.zone_features import ZONE_INPUTS
+from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS
+from lgmd_gym.agents.zones import NUM_FIELDS
 from lgmd_gym.training.offline.dataset import OfflineDataset
 from lgmd_gym.training.offline.episodes import EpisodeRecorder
 from lgmd_gym.training.offline.mirror import mirror_input
@@ -76,9 +78,8 @@ def test_frames_have_their_history_in_the_channels():
 @pytest.mark.parametrize("repeat", [1, 3])
 def test_inputs_of_an_episode_equal_those_of_a_feature_history(repeat):
     rng = np.random.default_rng(0)
-    sizes = dict.fromkeys(SCALES, 1)
-    for field in ZONE_INPUTS.values():
-        sizes[field.source] = max(sizes.get(field.source, 1), field.last)
+    sizes = dict.fromkeys(SCALES, 1) | dict.fromkeys(("membrane_potential", "ffi"), NUM_ALL_ROUND)
+    sizes |= {"spike_frequency": NUM_FIELDS, "column_potential": NUM_COLUMNS}
     observations = {name: rng.random((40, size), np.float32) for name, size in sizes.items()}
     inputs = (*SCALES, "speed_change", "spike_peak", *(name for name in ZONE_INPUTS if name != "zones"))
     features = FeatureConfig(inputs=inputs, history=1, repeat=repeat)

@@ -13,13 +13,13 @@ from lgmd_gym.agents.policies.features import (
     source_observation,
 )
 from lgmd_gym.agents.policies.zone_features import (
-    _GAINS,
-    _NORM,
+    GAINS,
+    NORM,
     NUM_LEVELS,
     POTENTIALS,
     ZONE_INPUTS,
-    _response,
     check_zone_shape,
+    response_of,
 )
 from lgmd_gym.training.offline.episodes import Observation
 
@@ -70,7 +70,7 @@ def _zone_inputs(
     change = np.empty_like(averages)
     for time, level in enumerate(levels):
         np.subtract(level, averages, out=change)
-        change *= _GAINS
+        change *= GAINS
         averages += change
         if time % features.repeat == 0:
             table[time // features.repeat, 1:] = averages
@@ -85,8 +85,8 @@ def _levels(name: str, signals: np.ndarray) -> np.ndarray:
     field = ZONE_INPUTS[name]
     values = signals[:, field.first : field.last].astype(np.float64)
     if field.source in POTENTIALS:
-        values = _response(values)
-    return np.copysign(np.log1p(field.factor * np.abs(values)), values) / _NORM
+        values = response_of(values)
+    return np.copysign(np.log1p(field.factor * np.abs(values)), values) / NORM
 
 
 def _other_inputs(
