@@ -16,7 +16,13 @@ from lgmd_gym.training import TrainConfig
 from lgmd_gym.training.hyperparams import read_hyperparams
 
 CAMERAS = {"zones": zone_cameras, "all-round": all_round_cameras}
-OTHER_HYPERPARAMETERS = {"all-round": {"n_epochs": 16, "mirror": True}}  # as in its card
+OTHER_HYPERPARAMETERS = {  # as in its card
+    "all-round": {
+        "n_epochs": 16,
+        "mirror": True,
+        "policy_kwargs": {"net_arch": {"pi": [128, 64], "vf": []}},
+    }
+}
 
 
 @pytest.mark.parametrize(
