@@ -126,7 +126,7 @@ def test_what_breaks_first(capsys):
 
 
 def test_every_example_has_a_test():
-    tested = "".join(path.read_text() for path in Path(__file__).parent.glob("test_*examples.py"))
+    tested = "".join(path.read_text() for path in Path(__file__).parent.glob("test_*.py"))
     assert all(f'load("{path.stem}")' in tested for path in EXAMPLES.glob("*.py"))
 
 

@@ -74,7 +74,7 @@ def test_cameras_are_presets_or_those_of_an_agent():
         TrainConfig.from_hyperparams("sac", sensors_of="spike-threshold")
     with pytest.raises(ValueError, match="unknown agent 'allround'; did you mean 'all-round'"):
         TrainConfig.from_hyperparams("sac", sensors_of="allround")
-    assert len(TrainConfig.from_hyperparams("sac", sensors_of="all-round").camera) == 29
+    assert len(TrainConfig.from_hyperparams("sac", sensors_of="all-round").camera) == 35
 
 
 @pytest.mark.parametrize("demands", [(0.0, -0.4), (0.0, -0.5, -1.0), (-1.0,), (), (0.3, -1.0)])

@@ -75,7 +75,7 @@ def test_training_with_traffic_and_reuse_of_its_recordings(tmp_path, monkeypatch
 
 @pytest.mark.slow
 def test_policy_with_fields_at_the_sides(tmp_path):
-    options = ["--sensors-of", "all-round", "--inputs", "zones", "sides", "sides_ffi", "ego_speed"]
+    options = ["--sensors-of", "all-round", "--inputs", "columns", "sides", "sides_ffi", "ego_speed"]
     command = arguments(tmp_path, tmp_path / "run", *options, "--eval-episodes", "4")
     command.remove("--camera")
     command.remove("fovea")
@@ -83,8 +83,9 @@ def test_policy_with_fields_at_the_sides(tmp_path):
     agent = make_agent(f"policy:{tmp_path / 'run' / 'policy.zip'}")
     env = gym.make("LGMD/CPNA-v0", ego_speed=8.0, camera=agent.camera)
     observation, info = env.reset(seed=0)
-    assert observation["membrane_potential"].shape == (29,)
+    assert observation["membrane_potential"].shape == (35,)
+    assert observation["column_potential"].shape == (260,)
     agent.reset(0)
     for _ in range(10):
         observation, _, _, _, info = env.step(agent.act(observation, info))
-    assert observation["membrane_potential"][23:].min() < 0.5  # motion to the left
+    assert observation["membrane_potential"][23:29].min() < 0.5  # motion to the left
