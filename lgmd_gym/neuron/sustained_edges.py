@@ -59,7 +59,7 @@ class SustainedEdges(FrameNeuron):
     of cells with a sustained (tonic) response:
 
     1. M(t) = M(t-1) + β (L(t) - M(t-1)), β = dt / (dt + `tau_ms`): low-passed light.
-    2. e = |M(x + 1) - M(x)| of horizontal neighbours: vertical edges of the low-passed light.
+    2. e = abs(M(x + 1) - M(x)) of horizontal neighbours: vertical edges of the low-passed light.
     3. K = 1 / (1 + exp(-mean of e / `sigma`)), in [0.5, 1); adaptation, spikes and spike frequency are those
        of the LGMD (`LGMDParams`, eq. 11 and 12).
 

@@ -8,6 +8,7 @@ from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
 from lgmd_gym.agents.policies.features import FeatureConfig, FeatureHistory, source_observation
+from lgmd_gym.agents.policies.zone_features import ZONE_INPUTS
 
 
 class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
@@ -81,7 +82,7 @@ def policy_space(observation_space: spaces.Space, features: FeatureConfig) -> sp
         )
     shapes = {name: space.shape or () for name, space in observation_space.spaces.items()}
     for name in features.inputs:
-        if source_observation(name) not in shapes:
+        if source_observation(name) not in shapes and name not in ZONE_INPUTS:
             raise ValueError(
                 f"policy input {name!r} is not in the observation; "
                 f"make the environment with include_{name}=True"
