@@ -192,7 +192,5 @@ def test_invalid_features_are_rejected(values, message):
 
 def test_columns_require_the_cameras_of_all_round():
     features = FeatureConfig(inputs=("columns",), history=1)
-    with pytest.raises(
-        ValueError, match="requires the 260 columns of all-round, got 0; train with"
-    ):
+    with pytest.raises(ValueError, match="requires the 260 columns of all-round, got 0; train with"):
         features.box_arguments({"membrane_potential": (17,)})
