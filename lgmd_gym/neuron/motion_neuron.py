@@ -1,15 +1,15 @@
-"""MotionNeuron: base class of the models of motion detectors."""
+"""MotionNeuron: base class of the models beside the LGMD."""
 
 import numpy as np
 
 from lgmd_gym.neuron.frame_neuron import FrameNeuron
-from lgmd_gym.neuron.motion_params import MotionParams
+from lgmd_gym.neuron.motion_params import ModelParams
 from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
 
 
 class MotionNeuron(FrameNeuron):
-    """One or N neurons on motion detectors, with the membrane potential and the spikes of the LGMD.
+    """One or N neurons of a model of its own, with the membrane potential and the spikes of the LGMD.
 
     Args:
         shape: (height, width) of the frames [px].
@@ -26,7 +26,7 @@ class MotionNeuron(FrameNeuron):
         fps: float,
         num: int | None,
         threads: int | None,
-        params: MotionParams,
+        params: ModelParams,
         spikes: NeuronSpec,
     ) -> None:
         super().__init__(shape, fps, num, threads)

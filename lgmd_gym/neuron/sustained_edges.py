@@ -1,6 +1,5 @@
 """SustainedEdges: a detector of edges that stand still in the frame."""
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -8,16 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lgmd_gym.errors import check_keys, check_positive
+from lgmd_gym.errors import check_positive
 from lgmd_gym.neuron import sustained_edges_kernels
-from lgmd_gym.neuron.bounds import made_params
-from lgmd_gym.neuron.frame_neuron import FrameNeuron
-from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
-from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
+from lgmd_gym.neuron.motion_neuron import MotionNeuron
+from lgmd_gym.neuron.motion_params import ModelParams
+from lgmd_gym.neuron.params import NeuronSpec
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SustainedEdgesParams:
+class SustainedEdgesParams(ModelParams):
     """Parameters of `SustainedEdges`.
 
     Attributes:
@@ -35,23 +33,13 @@ class SustainedEdgesParams:
         for name in ("tau_ms", "sigma"):
             object.__setattr__(self, name, check_positive(name, getattr(self, name)))
 
-    @classmethod
-    def make(cls, spec: "SustainedEdgesParams | Mapping[str, Any] | None") -> "SustainedEdgesParams":
-        """Return the parameters for a `params` argument: an instance, a mapping, or None for the defaults.
-
-        Raises:
-            ValueError: For an unknown key, a value out of range, or another type.
-        """
-        return made_params(cls, spec, cls._from_dict)
-
-    @classmethod
-    def _from_dict(cls, values: Mapping[str, Any]) -> "SustainedEdgesParams":
-        known = (field.name for field in dataclasses.fields(cls))
-        check_keys("SustainedEdges parameter", values, known)
-        return cls(**values)
+    def gains(self, fps: float) -> tuple[float]:
+        """Return the gain dt / (dt + τ) of the low-passed light at a frame rate [Hz]."""
+        dt = 1000.0 / fps
+        return (dt / (dt + self.tau_ms),)
 
 
-class SustainedEdges(FrameNeuron):
+class SustainedEdges(MotionNeuron):
     """One or N detectors of edges that stand still in the frame, stepped frame by frame.
 
     An object on collision course keeps its bearing. Seen from a moving car, its edges therefore stand still
@@ -94,21 +82,14 @@ class SustainedEdges(FrameNeuron):
         spikes: NeuronSpec = None,
         threads: int | None = None,
     ) -> None:
-        super().__init__(shape, fps, num, threads)
         self.params = SustainedEdgesParams.make(params)
-        stage = LGMDParams.make(spikes)
-        self._initial = initial_scalars(stage)
-        self._scalars = np.tile(self._initial, (self._count, 1))
-        constants = LGMDParams.make({**stage.to_dict(), "sigma_3": self.params.sigma})
-        self._const = pack_constants(constants, self.fps, n_pixels=1)
-        dt_ms = 1000.0 / self.fps
-        self._gain = np.float32(dt_ms / (dt_ms + self.params.tau_ms))
+        super().__init__(shape, fps, num, threads, self.params, spikes)
         self._maps = tuple(np.zeros((self._count, *self.shape), np.float32) for _ in range(2))
 
     def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
         """Step the active detectors among first..last-1; see `FrameNeuron.step_range`."""
         sustained_edges_kernels.step(
-            first, last, frames, active, self._scalars, self._const, self._gain, *self._maps
+            first, last, frames, active, self._scalars, self._const, self._gains[0], *self._maps
         )
 
     @property
