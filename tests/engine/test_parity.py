@@ -37,6 +37,9 @@ ARGUMENTS = {
     "night fog": {"camera": {"name": "wide", "light": "night", "visibility_m": 30.0}, **FRAMES},
     "automatic exposure": {"camera": {"name": "wide", "auto_exposure_s": 0.3}, "include_frame": True},
     "image stabilisation": {"camera": {"name": "wide", "stabilised": "image"}, "world": 6003, **FRAMES},
+    "columns": {
+        "camera": ["fovea", {"name": "wide", "columns": 5}, {"name": "tele", "detector": "dsn", "columns": 4}]
+    },
 }
 
 
