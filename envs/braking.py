@@ -236,6 +236,7 @@ class BrakingEnv(EgoBrakeEnv):
         self.scenario, self._episode_info = placement.scenario, draw.info
         self.camera_fields = self.camera_fields | draw.camera_fields
         self.brake = self.episode_brake(draw.brake)
+        self.camera_fields["max_deceleration"] = self.brake.max_deceleration
         brakes = self.brake.record(self.config["throttle"])[None]
         self._state.load(0, placement, self.brake.max_demands(self.config["policy_frequency"]))
         physics = tuple(make_physics(self._state, brakes, self.weights))

@@ -1,6 +1,7 @@
 """Sources of episodes: a fixed scenario, or random levels."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -13,8 +14,8 @@ from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.scenarios.distribution import (
     LEVELS,
     check_families,
-    check_heights,
     check_levels,
+    check_range,
     draw_camera_fields,
     draw_scenario,
     level_generator,
@@ -106,10 +107,12 @@ class RandomLevels:
             threats and non-threats are among them.
         mount_heights: Lowest and highest height of the lens above the ground, drawn evenly for each level
             [m]; None for the height of each camera.
+        decelerations: Lowest and highest full braking, drawn evenly for each level in place of that of its
+            world, on dry and wet roads alike [m/s²]; None for that of the world.
 
     Raises:
         ValueError: If the split, a condition, the world or a family is unknown, levels are outside the
-            split, or the heights are not two numbers above 0 in ascending order.
+            split, or the heights or decelerations are not two numbers above 0 in ascending order.
     """
 
     def __init__(
@@ -122,12 +125,19 @@ class RandomLevels:
         road: str | None = None,
         families: Sequence[str] | None = None,
         mount_heights: Sequence[float] | None = None,
+        decelerations: Sequence[float] | None = None,
     ) -> None:
         start_level, num_levels = check_levels(split, start_level, num_levels, conditions)
         self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
         self.num_levels = num_levels or LEVELS - start_level
         self.families = check_families(families)
-        self.mount_heights = None if mount_heights is None else check_heights(mount_heights)
+        self.mount_heights, self.decelerations = (
+            None if limits is None else check_range(name, limits, unit)
+            for name, limits, unit in (
+                ("mount_heights", mount_heights, "m"),
+                ("decelerations", decelerations, "m/s²"),
+            )
+        )
         self.appearance = Appearance(world=world, road=road, split=split)
         self.first = draw_scenario(level_generator(split, start_level), self.families)
 
@@ -144,4 +154,12 @@ class RandomLevels:
             rng_height = level_generator(self.split, level, part=3)
             fields["mount_height"] = float(rng_height.uniform(*self.mount_heights))
         info = {"level": level, "condition": fields["condition"], "world": world_number(fields)}
-        return Draw(placement, fields, info, brake_of(fields))
+        return Draw(placement, fields, info, self._brake(level, fields))
+
+    def _brake(self, level: int, fields: dict[str, Any]) -> BrakeParams | None:
+        """Return the brake of the level's world, with the deceleration of the level."""
+        brake = brake_of(fields)
+        if self.decelerations is None:
+            return brake
+        drawn = float(level_generator(self.split, level, part=4).uniform(*self.decelerations))
+        return replace(brake or BrakeParams(), max_deceleration=drawn)

@@ -31,6 +31,7 @@ LEVEL_ARGUMENTS = (
     "road",
     "families",
     "mount_heights",
+    "decelerations",
 )
 """Arguments of `RandomLevels`."""
 APPEARANCE = ("world", "condition", "road")

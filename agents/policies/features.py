@@ -17,6 +17,7 @@ SCALES = {
     "ffi": (0.0, 20.0),  # [grey levels]; roads give 1 to 9
     "ego_speed": (0.0, 20.0),  # [m/s]
     "ego_yaw_rate": (0.0, 0.5),  # [rad/s]
+    "known_deceleration": (7.5, 2.5),  # [m/s²]; wet and dry roads give 5 to 9.5
 }
 # Inputs computed over time: the observation they are computed from, and their scale.
 DERIVED_INPUTS = {
@@ -28,6 +29,7 @@ LATCH_DEMAND = -0.5  # demands up to this value may latch
 CLIP = 5.0  # limit of scaled values
 FRAME = "frame"  # not scaled; reduced by `shrink`
 INPUTS = (*SCALES, *DERIVED_INPUTS, *ZONE_INPUTS, FRAME)
+DEFAULT_INPUTS = tuple(name for name in (*SCALES, *DERIVED_INPUTS) if name != "known_deceleration")
 
 MAX_HISTORY = 1000  # decisions; also the limit of `repeat` and `shrink`
 
@@ -50,7 +52,7 @@ class FeatureConfig:
             beyond 1.
     """
 
-    inputs: tuple[str, ...] = (*SCALES, *DERIVED_INPUTS)
+    inputs: tuple[str, ...] = DEFAULT_INPUTS
     history: int = 6
     repeat: int = 3
     shrink: int = 2

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
     from lgmd_gym.neuron import NeuronSpec
 
-NOT_NEURONS = (FRAME, "ego_speed", "speed_change", "ego_yaw_rate")
+NOT_NEURONS = (FRAME, "ego_speed", "speed_change", "ego_yaw_rate", "known_deceleration")
 RAW_INPUTS = (*SCALES, FRAME)  # observations of `LGMDObservation`
 SHIPPED = Path(__file__).parent  # folder of the policies in this package
 

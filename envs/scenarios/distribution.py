@@ -18,7 +18,7 @@ LEVELS = 1_000_000  # per split
 THREAT_SHARE = 0.5
 ALL_FAMILIES = (*THREATS, *NON_THREATS)
 EXTRA_FAMILIES = (*EXTRA_THREATS, *EXTRA_NON_THREATS)
-"""Families that levels contain only where they are named."""
+"""Families, and those at high speed, that levels contain only where they are named."""
 
 
 def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> tuple[int, int]:
@@ -56,15 +56,15 @@ def check_families(families: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(families)
 
 
-def check_heights(heights: Sequence[float]) -> tuple[float, float]:
-    """Return the lowest and the highest height of a lens [m].
+def check_range(name: str, limits: Sequence[float], unit: str) -> tuple[float, float]:
+    """Return the lowest and the highest value of a quantity.
 
     Raises:
         ValueError: Unless they are two numbers above 0 in ascending order.
     """
-    values = [check_positive("mount_heights", value) for value in check_items("mount_heights", heights, Real)]
+    values = [check_positive(name, value) for value in check_items(name, limits, Real)]
     if len(values) != 2 or values[0] > values[1]:
-        raise ValueError(f"mount_heights must be the lowest and the highest height [m], got {values}")
+        raise ValueError(f"{name} must be the lowest and the highest value [{unit}], got {values}")
     return values[0], values[1]
 
 
@@ -97,4 +97,4 @@ def draw_scenario(rng: np.random.Generator, families: Collection[str] = ALL_FAMI
     drawn = first or second
     weights = np.cumsum([family.weight for family in drawn.values()])
     name = list(drawn)[int(np.searchsorted(weights, rng.random() * weights[-1], side="right"))]
-    return make_scenario(name, **drawn[name].draw(rng))
+    return make_scenario(drawn[name].family or name, **drawn[name].draw(rng))

@@ -1,9 +1,11 @@
 """Scenario families that random levels contain on request only, and how their arguments are drawn.
 
 The levels of the id v0 keep their numbers, families and arguments. Families that were added later are
-therefore drawn only where `families` names them.
+therefore drawn only where `families` names them, as are usual families at the speeds of a motorway: their
+names begin with "Fast".
 """
 
+from functools import partial
 from math import exp, log
 from typing import Any
 
@@ -11,10 +13,12 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.scenarios.curves import MAX_LATERAL
-from lgmd_gym.envs.scenarios.random_arguments import Draw
+from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS, Draw
 
 SPEED_KMH = (20.0, 100.0)
 RADIUS = (50.0, 1500.0)  # [m]
+FAST_KMH = (80.0, 130.0)
+TOP_KMH = 140.0  # of other cars
 
 
 def _uniform(rng: np.random.Generator, low: float, high: float) -> float:
@@ -57,5 +61,33 @@ def _box(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-EXTRA_THREATS = {"CCRsCurve": Draw(3.0, _standing), "StandingBox": Draw(2.0, _box)}
-EXTRA_NON_THREATS = {"CurvePass": Draw(1.0, _pass)}
+def _fast(usual: Draw, rng: np.random.Generator) -> dict[str, Any]:
+    """Return the arguments of a usual draw with a high ego speed."""
+    return usual.draw(rng) | {"ego_speed": _uniform(rng, *FAST_KMH) * KMH}
+
+
+def _overtaken(rng: np.random.Generator) -> dict[str, Any]:
+    speed = _uniform(rng, *FAST_KMH) * KMH
+    return {"ego_speed": speed, "excess": _uniform(rng, 10.0 * KMH, max(TOP_KMH * KMH - speed, 11.0 * KMH))}
+
+
+def _fast_draws(usual: dict[str, Draw], weights: dict[str, float]) -> dict[str, Draw]:
+    """Return draws of usual families at high speed, by the names "Fast" + family."""
+    return {
+        f"Fast{name}": Draw(weight, partial(_fast, usual[name]), name) for name, weight in weights.items()
+    }
+
+
+EXTRA_THREATS = {
+    "CCRsCurve": Draw(3.0, _standing),
+    "StandingBox": Draw(2.0, _box),
+    **_fast_draws(THREATS, {"CCRs": 3.0, "CCRm": 2.0, "CCRb": 2.0}),
+}
+EXTRA_NON_THREATS = {
+    "CurvePass": Draw(1.0, _pass),
+    "FastOvertaken": Draw(0.5, _overtaken, "Overtaken"),
+    **_fast_draws(
+        NON_THREATS,
+        {"EmptyRoad": 0.5, "Following": 0.5, "BrakeRelease": 0.5, "AdjacentPass": 0.3, "BridgeShadow": 0.2},
+    ),
+}

@@ -17,10 +17,12 @@ class Draw(NamedTuple):
     Attributes:
         weight: Relative frequency among the threats or the non-threats.
         draw: Function that draws the arguments of the family.
+        family: Name of the scenario family; empty if it is the key of the draw.
     """
 
     weight: float
     draw: Callable[[np.random.Generator], dict[str, Any]]
+    family: str = ""
 
 
 def _speed(rng: np.random.Generator, low: float = SPEED_KMH[0], high: float = SPEED_KMH[1]) -> float:

@@ -197,6 +197,7 @@ class TrafficEnv(EgoBrakeEnv):
         # A generator of its own: the draws of the traffic are the same in every world.
         self.camera_fields = {**self.appearance.draw(self.np_random.spawn(1)[0]), **self.camera_overrides}
         self.brake = self.episode_brake(brake_of(self.camera_fields))
+        self.camera_fields["max_deceleration"] = self.brake.max_deceleration
         while True:
             self._jam_steps = 0
             self._build()

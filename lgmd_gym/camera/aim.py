@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from lgmd_gym.camera.brake_estimate import known_deceleration
 from lgmd_gym.camera.params import MIN_STOP, CameraParams
 from lgmd_gym.camera.render.jit import exact_kernel
 
@@ -17,6 +18,7 @@ GAZES = {"fixed": FIXED, "path": PATH, "stopping": STOPPING}
 MAX_TURN = math.radians(40.0)
 """Bound of the turn towards the path [rad]."""
 _PATH_S = 1.0  # look-ahead time of the gaze "path" [s]
+_USUAL_BRAKE = CameraParams().max_deceleration
 _WET = 2.0 / 3.0  # deceleration on a wet road over that on a dry one
 
 AIM = np.dtype(
@@ -36,9 +38,15 @@ def aim_of(p: CameraParams, known_height: float) -> np.ndarray:
         p: Its parameters.
         known_height: Height of the lens above the ground as far as the sensor knows it [m].
     """
-    deceleration = p.stop_deceleration * (_WET if p.wet else 1.0)
-    values = (p.reach, p.span_m, p.offset_m, p.lift, deceleration, p.stop_reaction)
+    values = (p.reach, p.span_m, p.offset_m, p.lift, _stop_deceleration(p), p.stop_reaction)
     return np.array((*values, p.mount_setback, known_height, p.shape[1]), dtype=AIM)
+
+
+def _stop_deceleration(p: CameraParams) -> float:
+    """Return the deceleration of the stopping distance, on the present road or with the present brake [m/s²]."""
+    if p.brake_known:
+        return p.stop_deceleration * known_deceleration(p) / _USUAL_BRAKE
+    return p.stop_deceleration * (_WET if p.wet else 1.0)
 
 
 @exact_kernel

@@ -76,6 +76,10 @@ class CameraParams:
         stop_deceleration: Deceleration of the stopping distance on a dry road; two thirds of it on a wet one
             [m/s²]. The least of all worlds is 7.5.
         stop_reaction: Time from a demand to full braking [s].
+        brake_known: Whether the stopping distance follows the car's estimate of its full braking: its
+            deceleration is then `stop_deceleration` times that estimate over 9 m/s², on any road. See
+            `brake_estimate.known_deceleration`, also the observation `known_deceleration`.
+        max_deceleration: Full braking of the car; braking environments set it to that of their brake [m/s²].
         stabilised: Whether the rotation of the body is compensated: True with a gyroscope whose errors are
             assumptions, see `body_motion.residual_motion`; `"image"` by the registration of a far-field
             image, see `sensing.image_stabiliser`. `"image"` needs a `SensorArray`, as in `LGMDObservation`.
@@ -147,6 +151,8 @@ class CameraParams:
     lift: float = 0.0
     stop_deceleration: float = 7.5
     stop_reaction: float = 0.5
+    brake_known: bool = False
+    max_deceleration: float = 9.0
     stabilised: bool | str = False
     calibrated: bool = False
     texture: float = 1.0

@@ -40,6 +40,8 @@ class Observations:
             arrays[name][:] = getattr(sensors.responses, name)
         arrays["ego_speed"][:, 0] = egos["speed"]
         arrays["ego_yaw_rate"][:, 0] = self._yaw_rates(egos["heading"])
+        if sensors.known_decelerations is not None:
+            arrays["known_deceleration"][:] = sensors.known_decelerations
         if "column_potential" in arrays:
             arrays["column_potential"][:] = sensors.column_potentials()
         if self._include_frame:

@@ -116,7 +116,8 @@ class Simulation:
             self._link()
         self.brakes[index] = brake.record(self._throttle)
         if self.sensors is not None:
-            self.sensors.set_camera_fields(index, draw.camera_fields)
+            fields = draw.camera_fields | {"max_deceleration": brake.max_deceleration}
+            self.sensors.set_camera_fields(index, fields)
             self.sensors.set_road(index, network)
 
     def start(self, selected: np.ndarray) -> None:

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from lgmd_gym.camera import BIRDSEYE, BirdsEye, CameraItem, CameraParams, CameraSpec
 from lgmd_gym.camera.bounds import checked_number
+from lgmd_gym.camera.brake_estimate import known_deceleration
 from lgmd_gym.camera.objects import View
 from lgmd_gym.camera.road_pool import RoadKey, road_key
 from lgmd_gym.camera.scene_table import view_of
@@ -57,12 +58,15 @@ class Variant(NamedTuple):
         road_keys: `road_key` of every camera, with a placeholder for a top view, then that of `far`.
         view: Directions that the cameras look in, see `read_objects`.
         far: Far-field lens that stabilises the cameras, see `far_lens`; None for no such lens.
+        known_deceleration: The car's estimate of its full braking [m/s²]; None unless a camera has
+            `brake_known`.
     """
 
     params: tuple[CameraParams | None, ...]
     road_keys: tuple[RoadKey, ...]
     view: View | None
     far: CameraParams | None
+    known_deceleration: float | None
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Variant":
         return self
@@ -92,7 +96,7 @@ class Variants:
 
         Raises:
             ValueError: If a field is unknown or out of range, changes the shape, detector or columns of a
-                camera, or changes `stabilised` from or to `"image"`.
+                camera, `brake_known`, or `stabilised` from or to `"image"`.
         """
         others = {name: value for name, value in fields.items() if name != "texture"}
         texture = fields.get("texture")
@@ -115,12 +119,14 @@ class Variants:
         known = [p for p in (*params, far) if p is not None]
         placeholder = road_key(known[0]) if known else (0.0, 0, False, False, None)
         keys = tuple(placeholder if p is None else road_key(p) for p in params)
-        return Variant(params, keys if far is None else (*keys, road_key(far)), view_of(known), far)
+        keys = keys if far is None else (*keys, road_key(far))
+        estimates = [known_deceleration(p) for p in known if p.brake_known]
+        return Variant(params, keys, view_of(known), far, estimates[0] if estimates else None)
 
 
 def _check_kept(base: CameraParams, changed: CameraParams | None) -> None:
     """Raise ValueError if fields that determine the arrays of the sensors are changed."""
-    for name in ("shape", "detector", "columns"):
+    for name in ("shape", "detector", "columns", "brake_known"):
         kept, given = getattr(base, name), getattr(changed, name)
         if kept != given:
             raise ValueError(

@@ -42,6 +42,8 @@ class SensorArray:
         shapes: Frame shapes (height, width) of the cameras [px].
         detectors: Detectors of the cameras, see `CameraParams`.
         columns: Numbers of columns of the cameras, see `CameraParams`.
+        known_decelerations: The car's estimate of its full braking in each environment, float64, shape
+            (num_envs, 1) [m/s²]; None unless a camera has `brake_known`.
         scenes: `SCENE` records, shape (num_envs,).
         objects: `OBJECT` records, shape (num_envs, 512): vehicles, obstacles and marks of each environment in
             the order of `road.vehicles`, then `road.objects`, without the ego and the roadside. Vehicles of
@@ -84,6 +86,8 @@ class SensorArray:
         self._used_variants = [unchanged] * num_envs
         self._textures: list[float | None] = [None] * num_envs
         self._fields: list[dict[str, Any]] = [{}] * num_envs
+        known = unchanged.known_deceleration
+        self.known_decelerations = None if known is None else np.full((num_envs, 1), known)
         size = num_envs, len(self.names)
         self._scene_table = SceneTable(num_envs)
         self._roads = RoadPool(num_envs, len(unchanged.road_keys))
@@ -173,7 +177,7 @@ class SensorArray:
 
         Raises:
             ValueError: If a field is unknown or out of range, changes the shape, detector or columns of a
-                camera, or changes `stabilised` from or to `"image"`.
+                camera, `brake_known`, or `stabilised` from or to `"image"`.
         """
         fields = fields or {}
         if fields == self._fields[index]:
@@ -184,6 +188,8 @@ class SensorArray:
                 self._groups[group].batch.set_params(index, member, p, texture)
         if self._stabiliser is not None and variant.far is not None:
             self._stabiliser.set_params(index, variant.far, texture)
+        if self.known_decelerations is not None:
+            self.known_decelerations[index] = variant.known_deceleration
         self._used_variants[index], self._textures[index] = variant, texture
         self._fields[index] = dict(fields)
 

@@ -11,6 +11,7 @@ from lgmd_gym.sensing.kernels import SIGNALS
 from lgmd_gym.sensing.sensor_array import SensorArray
 
 SPEED_BOUND = 100.0  # [m/s], above highway-env's limit of 40 m/s
+DECELERATION_BOUND = 15.0  # [m/s²], above 12 m/s² with the largest error of an estimate
 
 
 def make_space(
@@ -46,6 +47,8 @@ def make_space(
         # The heading changes by at most half a turn per simulation step.
         "ego_yaw_rate": spaces.Box(-pi * simulation_frequency, pi * simulation_frequency, (1,), np.float32),
     }
+    if sensors.known_decelerations is not None:
+        parts["known_deceleration"] = spaces.Box(0.0, DECELERATION_BOUND, (1,), np.float32)
     if any(sensors.columns):
         parts["column_potential"] = spaces.Box(0.0, 1.0, (sum(sensors.columns),), np.float32)
     if include_frame:
@@ -81,6 +84,8 @@ def make_observation(
         "ego_speed": np.array([speed], dtype=np.float32),
         "ego_yaw_rate": np.array([yaw_rate], dtype=np.float32),
     }
+    if sensors.known_decelerations is not None:
+        observation["known_deceleration"] = sensors.known_decelerations[index].astype(np.float32)
     if any(sensors.columns):
         observation["column_potential"] = sensors.column_potentials()[index].astype(np.float32)
     if include_frame:

@@ -51,6 +51,8 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     ``ego_speed``           (1,)                        ego speed [m/s], −100 to 100
     ``ego_yaw_rate``        (1,)                        mean yaw rate of the decision [rad/s], positive
                                                         to the right as in highway-env
+    ``known_deceleration``  (1,)                        the car's estimate of its full braking [m/s²], of
+                                                        cameras with ``brake_known`` only
     ``column_potential``    (columns,)                  K of each column of each camera in turn, 0 to 1, of
                                                         cameras with ``columns`` only
     ``frame``               (height, width, cameras)    grey frames, uint8, with `include_frame`

@@ -113,6 +113,8 @@ class LGMDObservation(VectorWrapper):
         observation: dict[str, Any] = {name: signals[:, row].copy() for row, name in enumerate(SIGNALS)}
         motions = np.array([recorder.motion for recorder in self._recorders], dtype=np.float32)
         observation["ego_speed"], observation["ego_yaw_rate"] = motions[:, :1].copy(), motions[:, 1:].copy()
+        if self.sensors.known_decelerations is not None:
+            observation["known_deceleration"] = self.sensors.known_decelerations.astype(np.float32)
         if any(self.sensors.columns):
             observation["column_potential"] = self.sensors.column_potentials().astype(np.float32)
         if self.include_frame:  # all cameras have the same shape

@@ -20,7 +20,7 @@ from lgmd_gym.training.offline.braking_outcomes import STRIDE, BrakingOutcome, b
 
 MINIMAL_CAMERA = {"name": "wide", "shape": (8, 8)}  # of the environment that is copied and replayed
 CHUNK_SIZE = 4  # seeds recorded by one task of a process
-OPTIONAL_SIGNALS = ("column_potential",)  # recorded in addition to the keys of SCALES, if present
+SIGNALS = (*SCALES, "column_potential")  # recorded if present
 TRAFFIC = "traffic"  # `family` of episodes in traffic
 
 Observation: TypeAlias = dict[str, np.ndarray]
@@ -80,8 +80,7 @@ def select_signals(observation: Observation, shrink: int | None) -> Observation:
         observation: Observation of `LGMDObservation`.
         shrink: Side of the pixel squares that become one pixel of the recorded frame [px]; None for no frame.
     """
-    names = (*SCALES, *(name for name in OPTIONAL_SIGNALS if name in observation))
-    signals = {name: observation[name] for name in names}
+    signals = {name: observation[name] for name in SIGNALS if name in observation}
     return signals if shrink is None else signals | {FRAME: shrink_frame(observation[FRAME], shrink)}
 
 

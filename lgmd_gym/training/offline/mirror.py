@@ -20,7 +20,7 @@ from lgmd_gym.agents.sides import (
 )
 from lgmd_gym.agents.zones import NUM_FIELDS
 
-EVEN = ("ego_speed", "zones", "zones_spikes", "zones_ffi")
+EVEN = ("ego_speed", "known_deceleration", "zones", "zones_spikes", "zones_ffi")
 """Inputs that the mirror image does not change."""
 
 
