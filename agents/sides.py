@@ -21,13 +21,17 @@ NUM_COLUMNS = NUM_FORWARD_COLUMNS + NUM_SIDE_FIELDS * len(DETECTORS) * SIDE_COLU
 
 
 def forward_cameras() -> list[dict[str, Any]]:
-    """Return the cameras of `stopping-zone` at twice the width, with ten columns of 0.48 m at the far end."""
+    """Return the cameras of `stopping-zone` at twice the width, with ten columns of 0.48 m at the far end.
+
+    Their stopping distance follows the car's estimate of its full braking.
+    """
     return [
         camera
         | {
             "shape": [camera["shape"][0], FORWARD_WIDTH_PX],
             "span_m": FORWARD_SPAN_M,
             "columns": FORWARD_COLUMNS,
+            "brake_known": True,
         }
         for camera in zone_cameras()
     ]

@@ -73,7 +73,6 @@ def zone_camera(kind: str, reach: float, deceleration: float, reaction: float) -
         "lift": lift,
         "stop_deceleration": deceleration,
         "stop_reaction": reaction,
-        "brake_known": True,
         "stabilised": True,
         "calibrated": True,
         "contrast_s": CONTRAST_S,

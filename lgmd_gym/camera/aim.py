@@ -43,7 +43,7 @@ def aim_of(p: CameraParams, known_height: float) -> np.ndarray:
 
 
 def _stop_deceleration(p: CameraParams) -> float:
-    """Return the deceleration of the stopping distance, on the present road or with the present brake [m/s²]."""
+    """Return the deceleration of the stopping distance: of the present road or the present brake [m/s²]."""
     if p.brake_known:
         return p.stop_deceleration * known_deceleration(p) / _USUAL_BRAKE
     return p.stop_deceleration * (_WET if p.wet else 1.0)

@@ -7,8 +7,9 @@ import numpy as np
 from lgmd_gym.camera.params import CameraParams
 
 ERROR = 0.07
-"""Standard deviation of the estimate in numbered worlds, as a share of the true deceleration; errors are at most
-twice as large. An assumption for an estimate of the friction from wheel slip, rain sensor and temperature."""
+"""Standard deviation of the estimate in numbered worlds, as a share of the true deceleration; errors are at
+most twice as large. An assumption for an estimate of the friction from wheel slip, rain sensor and
+temperature."""
 _STREAM = 13  # second part of the seed, which separates the error from other draws of the same world
 
 

@@ -18,6 +18,7 @@ from lgmd_gym.camera.body_motion import (
     body_motion,
     residual_motion,
 )
+from lgmd_gym.camera.brake_estimate import ERROR, known_deceleration
 from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.pose import CALIBRATED, mount_of, pose_lens
 from lgmd_gym.camera.scene import SCENE
@@ -61,6 +62,34 @@ def test_the_stopping_distance_has_a_least_value_and_grows_on_a_wet_road():
     assert depth(20.0, wet=True) == pytest.approx(stopping_distance(20.0, 5.0))
     changed = depth(20.0, stop_deceleration=9.0, stop_reaction=0.2, reach=2.0)
     assert changed == pytest.approx(2.0 * stopping_distance(20.0, 9.0, 0.2))
+
+
+def test_a_known_brake_scales_the_stopping_distance():
+    def depth(**fields):
+        p = CameraParams(gaze="stopping", brake_known=True, **fields)
+        return aim_depth(aim_of(p, HEIGHT).view(np.recarray)[()], 20.0) - SETBACK
+
+    assert depth() == depth(wet=True) == pytest.approx(stopping_distance(20.0))
+    assert depth(max_deceleration=6.0) == pytest.approx(stopping_distance(20.0, 5.0))
+    assert depth(max_deceleration=6.0, stop_deceleration=9.0) == pytest.approx(stopping_distance(20.0, 6.0))
+    known = known_deceleration(CameraParams(max_deceleration=6.0, world=8003))
+    assert known != 6.0
+    assert depth(max_deceleration=6.0, world=8003) == pytest.approx(
+        stopping_distance(20.0, 7.5 * known / 9.0)
+    )
+
+
+def test_the_estimate_of_the_brake_has_an_error_per_world():
+    def errors(worlds, deceleration=8.0):
+        params = [CameraParams(max_deceleration=deceleration, world=world) for world in worlds]
+        return np.array([known_deceleration(p) / deceleration - 1.0 for p in params])
+
+    drawn = errors(range(2000))
+    assert drawn.mean() == pytest.approx(0.0, abs=0.005)
+    assert drawn.std() == pytest.approx(0.96 * ERROR, rel=0.05)  # of a clipped normal distribution
+    assert abs(drawn).max() == pytest.approx(2.0 * ERROR)
+    np.testing.assert_allclose(errors(range(20), 5.0), drawn[:20], atol=1e-12)
+    assert errors([None]) == 0.0
 
 
 def position_on_path(steering, way):

@@ -31,6 +31,12 @@ ARGUMENTS = {
     "throttle": {"config": {"throttle": True, "max_acceleration": 4.0}},
     "reward": {"config": {"reward": {"contact": 3.0, "brake": 0.5}}},
     "brake": {"config": {"max_deceleration": 5.0, "dead_time": 0.3}},
+    "known brake": {
+        "camera": {"name": "zone", "shape": [20, 80], "gaze": "stopping", "brake_known": True},
+        "config": {"max_deceleration": 5.0},
+        "world": 6003,
+        "include_frame": True,
+    },
     "condition": {"condition": "night", "include_frame": True},
     "neuron": {"params": {"t_sf": 10.0}},
     "own car": {"camera": {"name": "wide", "bonnet": True, "windscreen": 0.05, "gaze": "path"}, **FRAMES},

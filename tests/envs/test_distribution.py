@@ -45,8 +45,10 @@ def run_episode(env, seed=None):
 
 
 def test_every_family_is_drawn():
-    assert {*THREATS, *NON_THREATS, *EXTRA_THREATS, *EXTRA_NON_THREATS} == set(FAMILIES)
-    assert len(THREATS) + len(NON_THREATS) + len(EXTRA_FAMILIES) == len(FAMILIES)
+    draws = (*THREATS.items(), *NON_THREATS.items(), *EXTRA_THREATS.items(), *EXTRA_NON_THREATS.items())
+    own = [name for name, draw in draws if not draw.family]
+    assert sorted(own) == sorted(FAMILIES)
+    assert all(name == f"Fast{draw.family}" for name, draw in draws if draw.family)
     drawn = [draw_scenario(level_generator("train", level)).family for level in range(600)]
     assert set(drawn) == set(ALL_FAMILIES)
     share = np.mean([family in THREATS for family in drawn])
@@ -64,12 +66,37 @@ def test_levels_are_valid():
 def test_extra_families_are_drawn_where_they_are_named():
     """A standing target is a threat in every level, and no car next to the lane is."""
     env = random_env(split="validation", families=EXTRA_FAMILIES)
-    families = set()
-    for seed in range(60):
+    families, threats = set(), {*THREATS, *EXTRA_THREATS}
+    for seed in range(120):
         _, scenario, _, collision, _ = run_episode(env, seed)
-        assert collision is (scenario.family in EXTRA_THREATS), scenario
+        assert collision is (scenario.family in threats), scenario
         families.add(scenario.family)
-    assert families == set(EXTRA_FAMILIES)
+    draws = EXTRA_THREATS | EXTRA_NON_THREATS
+    assert families == {draws[name].family or name for name in EXTRA_FAMILIES}
+
+
+@pytest.mark.parametrize("name", [name for name in EXTRA_FAMILIES if name.startswith("Fast")])
+def test_fast_families_have_the_speeds_of_a_motorway(name):
+    drawn = [draw_scenario(level_generator("train", level), [name]) for level in range(200)]
+    assert {scenario.family for scenario in drawn} == {name.removeprefix("Fast")}
+    speeds = [scenario.ego_speed * 3.6 for scenario in drawn]
+    assert 80.0 <= min(speeds) < 85.0
+    assert 125.0 < max(speeds) <= 130.0
+
+
+def test_decelerations_replace_those_of_the_worlds():
+    usual, drawn = random_env(split="validation"), random_env(split="validation", decelerations=(4.5, 10.0))
+    decelerations = []
+    for seed in range(100):
+        (_, info), (_, other) = usual.reset(seed=seed), drawn.reset(seed=seed)
+        assert info == other
+        assert replace(drawn.brake, max_deceleration=usual.brake.max_deceleration) == usual.brake
+        decelerations.append(drawn.brake.max_deceleration)
+        assert drawn.camera_fields["max_deceleration"] == decelerations[-1]
+    assert 4.5 <= min(decelerations) < 5.0
+    assert 9.5 < max(decelerations) <= 10.0
+    wet = [drawn.reset(seed=seed)[1]["condition"] == "rain" for seed in range(100)]
+    assert max(np.array(decelerations)[wet]) > 8.0  # a wet road does not limit them
 
 
 def test_levels_include_the_headways_of_fmvss127():
@@ -127,6 +154,7 @@ def test_levels_set_condition_and_texture_of_the_camera():
         used = env.get_wrapper_attr("sensors").cameras[0]["fovea"]
         bare = CameraParams.preset("fovea").with_condition(info["condition"])
         changed = {"texture": used.params.texture, "world": info["world"], "road": "normal"}
+        changed["max_deceleration"] = env.unwrapped.brake.max_deceleration
         assert used.params == replace(bare, **changed, queue_lane=free_lane(env.unwrapped.scenario))
         assert info["world"] in SPLIT_WORLDS["validation"]
         assert np.array_equal(env.get_wrapper_attr("frames")["fovea"], EgoCamera(used.params).render(env))

@@ -291,6 +291,8 @@ def test_invalid_camera_fields_raise():
         sensors.set_camera_fields(0, {"shape": (20, 20)})
     with pytest.raises(ValueError, match="must keep the detector lgmd of camera 'wide', got dsn"):
         sensors.set_camera_fields(0, {"detector": "dsn"})
+    with pytest.raises(ValueError, match="must keep the brake_known False of camera 'wide', got True"):
+        sensors.set_camera_fields(0, {"brake_known": True})
 
 
 def test_conditions_are_covered():

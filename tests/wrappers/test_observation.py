@@ -10,6 +10,7 @@ import pytest
 from support.rollouts import BRAKE, HOLD, rollout
 
 from lgmd_gym import LGMD, BirdsEye, CameraParams, EgoCamera, LGMDObservation
+from lgmd_gym.camera.brake_estimate import ERROR, known_deceleration
 
 SMALL = {"vehicles_count": 3, "simulation_frequency": 30}
 
@@ -148,3 +149,19 @@ def test_step_before_reset_raises():
     env = LGMDObservation(gym.make("highway-v0", config=SMALL).unwrapped)
     with pytest.raises(RuntimeError, match="reset must be called before step"):
         env.step(1)
+
+
+@pytest.mark.parametrize("env_id", ["LGMD/CCRs-v0", "LGMD/Traffic-Highway-v0"])
+def test_known_deceleration_is_the_estimate_of_the_brake(env_id):
+    zone = {"name": "zone", "gaze": "stopping", "brake_known": True}
+    env = gym.make(env_id, camera=["wide", zone], world=8003)
+    observation, _ = env.reset(seed=1)
+    brake = env.unwrapped.brake.max_deceleration
+    p = CameraParams(world=8003, max_deceleration=brake)
+    assert observation["known_deceleration"] == np.float32(known_deceleration(p))
+    assert abs(observation["known_deceleration"] / brake - 1.0) < 2.01 * ERROR
+    assert observation in env.observation_space
+    env.close()
+    plain = gym.make(env_id)
+    assert "known_deceleration" not in plain.observation_space.spaces
+    plain.close()

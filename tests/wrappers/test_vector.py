@@ -11,8 +11,12 @@ from lgmd_gym import LGMDObservation as Single
 from lgmd_gym.wrappers.vector import LGMDObservation
 
 SPEEDS = (4.0, 30.0, 12.0)
-SENSORS = {"camera": ["wide", {"name": "fovea", "shape": [60, 100]}], "include_base": True}
-KEYS = {"spike_frequency", "membrane_potential", "ffi", "ego_speed", "ego_yaw_rate", "base"}
+ZONE = {"name": "zone", "shape": [20, 80], "gaze": "stopping", "brake_known": True}
+SENSORS = {"camera": ["wide", {"name": "fovea", "shape": [60, 100]}, ZONE], "include_base": True}
+KEYS = {
+    *("spike_frequency", "membrane_potential", "ffi", "ego_speed", "ego_yaw_rate", "known_deceleration"),
+    "base",
+}
 
 
 def bare(speed):

@@ -27,7 +27,7 @@ class Train:
     inputs: Names = None
     """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change and
     ego_yaw_rate; also frame; with the cameras of stopping-zone, also zones, zones_spikes and zones_ffi; with
-    those of all-round, also sides, sides_ffi and columns.
+    those of all-round, also sides, sides_ffi, columns and known_deceleration.
     Default: from the hyperparameters."""
     demands: Annotated[tuple[float, ...] | None, arg(metavar="[X ...]")] = None
     """Demands that the policy chooses from, from -1 (full braking) to 1; --demands alone for a continuous
@@ -49,7 +49,7 @@ class Train:
     extra_levels: int = 0
     """Number of levels of --extra-families that offline trains on in addition."""
     extra_families: Names = None
-    """Scenario families of the extra levels, for example CCRsCurve StandingBox CurvePass."""
+    """Scenario families of the extra levels, for example CCRsCurve FastCCRs FastEmptyRoad."""
     videos: int = 0
     """Number of validation episodes that are filmed at each evaluation, in FOLDER/videos and TensorBoard."""
     wandb: Name = None
