@@ -11,12 +11,10 @@ from support.recordings import offline_config, synthetic_episode
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.training.offline.braking_outcomes import TOLERANCE
 from lgmd_gym.training.offline.dataset import OfflineDataset
+from lgmd_gym.training.offline.ensemble import check_mergeable
 from lgmd_gym.training.offline.episodes import EpisodeRecorder, RecordedEpisode
-from lgmd_gym.training.offline.learner import (
-    OfflineLearner,
-    expected_return,
-    scale_false_braking_cost,
-)
+from lgmd_gym.training.offline.learner import SEED_STEP, OfflineLearner
+from lgmd_gym.training.offline.objective import expected_return, scale_false_braking_cost
 
 FEATURES = FeatureConfig(inputs=("spike_frequency", "ego_speed"), history=3, repeat=1, latch=True)
 NETWORK = {"net_arch": {"pi": [8], "vf": []}}
@@ -28,9 +26,9 @@ def dataset(episodes, features=FEATURES):
 
 def learner(folder, features=FEATURES, **algo_kwargs):
     config = replace(offline_config(folder), features=features)
-    algo_kwargs = {"n_epochs": 60, "batch_size": 8, "learning_rate": 0.03} | algo_kwargs
+    defaults = {"n_epochs": 60, "batch_size": 8, "learning_rate": 0.03, "policy_kwargs": NETWORK}
     env = config.make_policy_env("train")
-    return OfflineLearner("MultiInputPolicy", env, config.demands, policy_kwargs=NETWORK, **algo_kwargs)
+    return OfflineLearner("MultiInputPolicy", env, config.demands, **(defaults | algo_kwargs))
 
 
 def spike_episodes(count, seed):
@@ -183,3 +181,47 @@ def test_same_seed_gives_the_same_weights(tmp_path):
         )
         weights.append([value.numpy().tobytes() for value in model.policy.state_dict().values()])
     assert weights[0] == weights[1]
+
+
+@pytest.mark.parametrize("layers", [[], [8], [8, 6]])
+def test_an_ensemble_is_merged_into_one_network_with_the_mean_of_the_log_odds(tmp_path, layers):
+    train, validation = dataset(spike_episodes(24, 0)), dataset(spike_episodes(12, 1))
+    kwargs = {"n_networks": 3, "n_epochs": 4, "policy_kwargs": {"net_arch": {"pi": layers, "vf": []}}}
+    offline = learner(tmp_path, **kwargs)
+    model = offline.learn(train, validation)
+    batch = validation.batch(range(12))
+    separate = torch.stack([offline._logits_of(network, batch) for network in offline.networks])
+    assert (separate.std(0)[batch.mask > 0] > 1e-4).all()  # the networks differ
+    merged = offline._logits_of(model.policy, batch)
+    torch.testing.assert_close(merged, separate.mean(0), atol=1e-5, rtol=1e-4)
+    torch.testing.assert_close(offline.logits(batch), separate.mean(0))
+
+
+def test_each_network_of_an_ensemble_learns_for_itself(tmp_path):
+    """The first network learns as without the others, and the next one as with its seed."""
+    train, validation = dataset(spike_episodes(24, 0)), dataset(spike_episodes(12, 1))
+    ensemble = learner(tmp_path, n_networks=2, n_epochs=1)
+    ensemble.learn(train, validation)
+    alone = learner(tmp_path, n_epochs=1)
+    model = alone.learn(train, validation)
+    for name, value in model.policy.state_dict().items():
+        torch.testing.assert_close(ensemble.networks[0].state_dict()[name], value)
+    fresh, second = learner(tmp_path, seed=SEED_STEP), learner(tmp_path, n_networks=2)
+    for name, value in fresh.networks[0].state_dict().items():
+        assert torch.equal(second.networks[1].state_dict()[name], value)
+
+
+def test_an_ensemble_converges(tmp_path):
+    validation = dataset(spike_episodes(20, 1))
+    offline = learner(tmp_path, n_networks=3)
+    offline.learn(dataset(spike_episodes(40, 0)), validation)
+    after = offline.evaluate(validation)
+    assert (after.avoided, after.false_activations) == (1.0, 0.0)
+
+
+def test_a_network_on_frames_is_not_mergeable():
+    class OnFrames:
+        features_extractor = torch.nn.Conv2d(1, 1, 3)
+
+    with pytest.raises(ValueError, match="n_networks must be 1 for a policy on frames"):
+        check_mergeable(OnFrames())

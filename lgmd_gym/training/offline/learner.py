@@ -1,30 +1,23 @@
-"""`OfflineLearner`: gradient ascent on the expected return over recorded episodes.
-
-With a latching brake, a policy is a probability p_t of braking at each decision, and the return of every
-choice is recorded. The expected return of an episode is therefore a sum over its decisions,
-
-    J = Σ_t s_t (p_t B_t + (1 - p_t) r_t),  s_t = Π_{u<t} (1 - p_u),
-
-of the return B of braking and the reward r of holding the speed until the next decision. No episode is
-sampled and no value function is estimated. The gradient is the expectation of REINFORCE's (Williams 1992).
-"""
+"""`OfflineLearner`: gradient ascent on the expected return over recorded episodes, see `objective`."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import torch
-from torch.nn.functional import logsigmoid
 
 from lgmd_gym.agents.base import HOLD
 from lgmd_gym.errors import check_flag, check_positive, check_whole, check_within
 from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset
+from lgmd_gym.training.offline.ensemble import check_mergeable, merge_networks, merged_layers
+from lgmd_gym.training.offline.objective import expected_return, scale_false_braking_cost
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
     from stable_baselines3.common.type_aliases import GymEnv
 
 EVAL_BATCH_SIZE = 64  # [episodes]
+SEED_STEP = 1000  # between the seeds of the networks of an ensemble
 RETURN_SCALE = 0.1  # factor of the loss
 
 
@@ -44,6 +37,22 @@ class Evaluation(NamedTuple):
     traffic_activations: float
 
 
+class _Optimizer(NamedTuple):
+    """Trained parameters of a network, their optimizer and the schedule of its learning rate."""
+
+    trained: list[torch.nn.Parameter]
+    optimizer: torch.optim.Optimizer
+    schedule: torch.optim.lr_scheduler.LRScheduler
+
+    def step(self, loss: torch.Tensor) -> None:
+        """Take one step down the gradient of a loss."""
+        self.optimizer.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.trained, 1.0)
+        self.optimizer.step()
+        self.schedule.step()
+
+
 class OfflineLearner:
     """Trains a stable-baselines3 policy on recorded episodes.
 
@@ -52,6 +61,9 @@ class OfflineLearner:
         env: Environment with the spaces of the policy, `gym.Env` or `VecEnv`; it is not stepped.
         demands: Demand of each action: `HOLD`, and a lower one that brakes.
         seed: Seed of the network and of the order of episodes.
+        n_networks: Number of networks of an ensemble, which differ in their initial weights. They learn on
+            the same batches, each for itself, and are merged into one network whose log odds are the mean.
+            Not for frames.
         n_epochs: Number of passes over the training episodes.
         batch_size: Number of episodes per gradient step.
         learning_rate: Maximum of the one-cycle schedule (Smith & Topin 2018).
@@ -76,6 +88,7 @@ class OfflineLearner:
         demands: Sequence[float],
         *,
         seed: int = 0,
+        n_networks: int = 1,
         n_epochs: int = 100,
         batch_size: int = 64,
         learning_rate: float = 0.006,
@@ -96,11 +109,19 @@ class OfflineLearner:
         check_within("initial_brake_probability", initial_brake_probability, 1e-6, 0.999)
         self._seed = seed
         self._hold, self._brake = demands.index(HOLD), demands.index(min(demands))
-        self.model = _make_model(policy, env, seed, policy_kwargs or {})
+        kwargs = _policy_kwargs(policy_kwargs or {})
+        seeds = [seed + SEED_STEP * index for index in range(check_whole("n_networks", n_networks, 1))]
+        models = [_make_model(policy, env, item, kwargs) for item in seeds]
+        self.networks: list[Any] = [model.policy for model in models]
+        self.model = models[0]
+        if n_networks > 1:
+            check_mergeable(self.networks[0])
+            self.model = _make_model(policy, env, seed, merged_layers(kwargs, n_networks))
         odds = initial_brake_probability / (1.0 - initial_brake_probability)
-        bias: Any = self.model.policy.action_net.bias
-        with torch.no_grad():
-            bias[self._brake], bias[self._hold] = float(np.log(odds)), 0.0
+        for network in self.networks:
+            with torch.no_grad():
+                bias = network.action_net.bias
+                bias[self._brake], bias[self._hold] = float(np.log(odds)), 0.0
 
     def learn(
         self,
@@ -115,55 +136,59 @@ class OfflineLearner:
             validation: Episodes evaluated after each epoch.
             log: Called after each epoch with its number and its metrics.
         """
-        policy = self.model.policy
-        trained = [value for name, value in policy.named_parameters() if "value" not in name]
         steps = -(-len(train) // self.batch_size)
-        optimizer = torch.optim.AdamW(trained, self.learning_rate, weight_decay=self.weight_decay)
-        schedule = torch.optim.lr_scheduler.OneCycleLR(
-            optimizer, self.learning_rate, total_steps=self.n_epochs * steps
-        )
+        optimizers = [self._make_optimizer(network, self.n_epochs * steps) for network in self.networks]
         rng = np.random.default_rng(self._seed)
-        best_return, best_weights = -np.inf, _copy_weights(policy)
+        best_return, best_weights = -np.inf, [_copy_weights(network) for network in self.networks]
         for epoch in range(1, self.n_epochs + 1):
-            policy.set_training_mode(True)
             train_return = 0.0
             for indices in np.array_split(rng.permutation(len(train)), steps):
                 mirrored = rng.random(len(indices)) < 0.5 if self.mirror else ()
                 batch = scale_false_braking_cost(train.batch(indices, mirrored), self.false_cost)
-                optimizer.zero_grad()
-                loss, mean_return = self._loss(batch)
-                loss.backward()
-                torch.nn.utils.clip_grad_norm_(trained, 1.0)
-                optimizer.step()
-                schedule.step()
-                train_return += mean_return * len(indices) / len(train)
+                returns = [self._update(*pair, batch) for pair in zip(self.networks, optimizers, strict=True)]
+                train_return += float(np.mean(returns)) * len(indices) / len(train)
             evaluation = self.evaluate(validation)
             if evaluation.mean_return > best_return:
                 best_return = evaluation.mean_return
-                best_weights = _copy_weights(policy)
+                best_weights = [_copy_weights(network) for network in self.networks]
             metrics = {"train_return": train_return, **evaluation._asdict(), "best_return": best_return}
             log(epoch, {name: value for name, value in metrics.items() if not np.isnan(value)})
-        policy.load_state_dict(best_weights)
+        for network, weights in zip(self.networks, best_weights, strict=True):
+            network.load_state_dict(weights)
+        if len(self.networks) > 1:
+            merge_networks(self.networks, self.model.policy)
         return self.model
 
-    def _loss(self, batch: EpisodeBatch) -> tuple[torch.Tensor, float]:
-        """Return the loss and the mean expected return."""
-        logits = self.logits(batch)
+    def _make_optimizer(self, network: Any, steps: int) -> _Optimizer:
+        trained = [value for name, value in network.named_parameters() if "value" not in name]
+        optimizer = torch.optim.AdamW(trained, self.learning_rate, weight_decay=self.weight_decay)
+        schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, self.learning_rate, total_steps=steps)
+        return _Optimizer(trained, optimizer, schedule)
+
+    def _update(self, network: Any, optimizer: _Optimizer, batch: EpisodeBatch) -> float:
+        """Take one gradient step of a network and return its mean expected return before it."""
+        network.set_training_mode(True)
+        logits = self._logits_of(network, batch)
         mean_return = expected_return(logits, batch).mean()
         penalty = (logits * batch.mask).square().sum(1).mean()
-        return -RETURN_SCALE * (mean_return - self.logit_decay * penalty), float(mean_return.detach())
+        optimizer.step(-RETURN_SCALE * (mean_return - self.logit_decay * penalty))
+        return float(mean_return.detach())
 
-    def logits(self, batch: EpisodeBatch) -> torch.Tensor:
-        """Return the log odds of braking at each decision, (N, T)."""
-        distribution: Any = self.model.policy.get_distribution(batch.inputs).distribution
-        action_logits = distribution.logits
+    def _logits_of(self, network: Any, batch: EpisodeBatch) -> torch.Tensor:
+        """Return a network's log odds of braking at each decision, (N, T)."""
+        action_logits = network.get_distribution(batch.inputs).distribution.logits
         logits = torch.zeros_like(batch.mask)
         logits[batch.indices] = action_logits[:, self._brake] - action_logits[:, self._hold]
         return logits
 
+    def logits(self, batch: EpisodeBatch) -> torch.Tensor:
+        """Return the log odds of braking at each decision, the mean of all networks, (N, T)."""
+        return torch.stack([self._logits_of(network, batch) for network in self.networks]).mean(0)
+
     def evaluate(self, dataset: OfflineDataset) -> Evaluation:
         """Return the results of the deterministic policy on recorded episodes."""
-        self.model.policy.set_training_mode(False)
+        for network in self.networks:
+            network.set_training_mode(False)
         parts = [
             self._evaluate_batch(dataset.batch(range(len(dataset))[start : start + EVAL_BATCH_SIZE]))
             for start in range(0, len(dataset), EVAL_BATCH_SIZE)
@@ -195,31 +220,15 @@ def _make_model(policy: str, env: "GymEnv", seed: int, policy_kwargs: dict[str, 
     from stable_baselines3 import PPO
 
     torch.set_num_threads(1)
-    kwargs = {"activation_fn": torch.nn.ReLU, "net_arch": {"pi": [64, 64], "vf": []}} | policy_kwargs
-    return PPO(policy, env, 2e-3, 2, 2, seed=seed, device="cpu", policy_kwargs=kwargs)
+    return PPO(policy, env, 2e-3, 2, 2, seed=seed, device="cpu", policy_kwargs=policy_kwargs)
+
+
+def _policy_kwargs(changes: dict[str, Any]) -> dict[str, Any]:
+    return {"activation_fn": torch.nn.ReLU, "net_arch": {"pi": [64, 64], "vf": []}} | changes
 
 
 def _copy_weights(network: torch.nn.Module) -> dict[str, torch.Tensor]:
     return {name: value.clone() for name, value in network.state_dict().items()}
-
-
-def scale_false_braking_cost(batch: EpisodeBatch, factor: float) -> EpisodeBatch:
-    """Return a batch in which braking without a threat costs `factor` times as much, relative to holding."""
-    holding_returns = torch.flip(torch.cumsum(torch.flip(batch.rewards, [1]), 1), [1])
-    scaled = holding_returns + factor * (batch.braking_returns - holding_returns)
-    non_threat = ~batch.threats[:, None] & (batch.mask > 0.0)
-    return batch._replace(braking_returns=torch.where(non_threat, scaled, batch.braking_returns))
-
-
-def expected_return(logits: torch.Tensor, batch: EpisodeBatch) -> torch.Tensor:
-    """Return the expected return of each episode, (N,), for the log odds of braking, (N, T)."""
-    log_brake = logsigmoid(logits)
-    log_hold = logsigmoid(-logits) * batch.mask
-    log_reached = torch.cumsum(log_hold, 1) - log_hold
-    return (
-        torch.exp(log_reached + log_brake) * batch.braking_returns
-        + torch.exp(log_reached + log_hold) * batch.rewards
-    ).sum(1)
 
 
 def _mean(flags: np.ndarray) -> float:

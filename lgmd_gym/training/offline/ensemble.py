@@ -1,0 +1,45 @@
+"""Ensembles of networks, merged into one network whose log odds are their mean."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+
+
+def check_mergeable(network: Any) -> None:
+    """Raise ValueError for a network that processes frames: only its layers for vectors can be merged."""
+    if any(True for _ in network.features_extractor.parameters()):
+        raise ValueError("n_networks must be 1 for a policy on frames; set n_networks: 1")
+
+
+def merged_layers(policy_kwargs: dict[str, Any], count: int) -> dict[str, Any]:
+    """Return the arguments of a network that is as wide as `count` networks together."""
+    layers = policy_kwargs["net_arch"]
+    units = layers["pi"] if isinstance(layers, dict) else layers
+    return policy_kwargs | {"net_arch": {"pi": [count * size for size in units], "vf": []}}
+
+
+@torch.no_grad()
+def merge_networks(networks: Sequence[Any], merged: Any) -> None:
+    """Write networks into one with the arguments of `merged_layers`.
+
+    Each layer contains the layers of the networks side by side: hidden layers are block diagonal, and the
+    outputs are the means of those of the networks.
+    """
+    layers = [_linear_layers(network) for network in networks]
+    targets = _linear_layers(merged)
+    for depth, (target, *parts) in enumerate(zip(targets, *layers, strict=True)):
+        weights, biases = [part.weight for part in parts], [part.bias for part in parts]
+        if depth == len(targets) - 1:
+            joined = torch.cat(weights, 1) if depth else torch.stack(weights).sum(0)
+            target.weight.copy_(joined / len(parts))
+            target.bias.copy_(torch.stack(biases).mean(0))
+        else:
+            target.weight.copy_(torch.block_diag(*weights) if depth else torch.cat(weights))
+            target.bias.copy_(torch.cat(biases))
+
+
+def _linear_layers(network: Any) -> list[torch.nn.Linear]:
+    """Return the layers from the inputs to the outputs of the actions."""
+    hidden = [item for item in network.mlp_extractor.policy_net if isinstance(item, torch.nn.Linear)]
+    return [*hidden, network.action_net]
