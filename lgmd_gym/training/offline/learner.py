@@ -145,7 +145,11 @@ class OfflineLearner:
             for indices in np.array_split(rng.permutation(len(train)), steps):
                 mirrored = rng.random(len(indices)) < 0.5 if self.mirror else ()
                 batch = scale_false_braking_cost(train.batch(indices, mirrored), self.false_cost)
-                returns = [self._update(*pair, batch) for pair in zip(self.networks, optimizers, strict=True)]
+                features = self._shared_features(batch)
+                returns = [
+                    self._update(network, optimizer, batch, features)
+                    for network, optimizer in zip(self.networks, optimizers, strict=True)
+                ]
                 train_return += float(np.mean(returns)) * len(indices) / len(train)
             evaluation = self.evaluate(validation)
             if evaluation.mean_return > best_return:
@@ -165,25 +169,36 @@ class OfflineLearner:
         schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, self.learning_rate, total_steps=steps)
         return _Optimizer(trained, optimizer, schedule)
 
-    def _update(self, network: Any, optimizer: _Optimizer, batch: EpisodeBatch) -> float:
+    def _update(
+        self, network: Any, optimizer: _Optimizer, batch: EpisodeBatch, features: torch.Tensor | None
+    ) -> float:
         """Take one gradient step of a network and return its mean expected return before it."""
         network.set_training_mode(True)
-        logits = self._logits_of(network, batch)
+        logits = self._logits_of(network, batch, features)
         mean_return = expected_return(logits, batch).mean()
         penalty = (logits * batch.mask).square().sum(1).mean()
         optimizer.step(-RETURN_SCALE * (mean_return - self.logit_decay * penalty))
         return float(mean_return.detach())
 
-    def _logits_of(self, network: Any, batch: EpisodeBatch) -> torch.Tensor:
+    def _shared_features(self, batch: EpisodeBatch) -> torch.Tensor | None:
+        """Return the features of all networks, which have no weights; None for a single network."""
+        return self.networks[0].extract_features(batch.inputs) if len(self.networks) > 1 else None
+
+    def _logits_of(
+        self, network: Any, batch: EpisodeBatch, features: torch.Tensor | None = None
+    ) -> torch.Tensor:
         """Return a network's log odds of braking at each decision, (N, T)."""
-        action_logits = network.get_distribution(batch.inputs).distribution.logits
+        features = network.extract_features(batch.inputs) if features is None else features
+        action_logits = network.action_net(network.mlp_extractor.forward_actor(features))
         logits = torch.zeros_like(batch.mask)
         logits[batch.indices] = action_logits[:, self._brake] - action_logits[:, self._hold]
         return logits
 
     def logits(self, batch: EpisodeBatch) -> torch.Tensor:
         """Return the log odds of braking at each decision, the mean of all networks, (N, T)."""
-        return torch.stack([self._logits_of(network, batch) for network in self.networks]).mean(0)
+        features = self._shared_features(batch)
+        parts = [self._logits_of(network, batch, features) for network in self.networks]
+        return torch.stack(parts).mean(0)
 
     def evaluate(self, dataset: OfflineDataset) -> Evaluation:
         """Return the results of the deterministic policy on recorded episodes."""
