@@ -199,7 +199,7 @@ def test_frontier_of_the_shipped_policy(tmp_path, capsys):
     """A margin that every log odds exceed brakes at once, and one that none exceeds never."""
     pytest.importorskip("stable_baselines3")
     shapes = dict.fromkeys(("spike_frequency", "membrane_potential", "ffi"), NUM_ALL_ROUND)
-    shapes |= {"ego_speed": 1, "ego_yaw_rate": 1, "column_potential": NUM_COLUMNS}
+    shapes |= {"ego_speed": 1, "ego_yaw_rate": 1, "known_deceleration": 1, "column_potential": NUM_COLUMNS}
     observations = {name: np.full((8, size), 0.5, np.float32) for name, size in shapes.items()}
     folder = tmp_path / "episodes" / "validation"
     folder.mkdir(parents=True)
