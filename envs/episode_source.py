@@ -112,7 +112,8 @@ class RandomLevels:
 
     Raises:
         ValueError: If the split, a condition, the world or a family is unknown, levels are outside the
-            split, or the heights or decelerations are not two numbers above 0 in ascending order.
+            split, the heights or decelerations are not two numbers above 0 in ascending order, or a
+            deceleration is above 12 m/s².
     """
 
     def __init__(
@@ -131,13 +132,13 @@ class RandomLevels:
         self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
         self.num_levels = num_levels or LEVELS - start_level
         self.families = check_families(families)
-        self.mount_heights, self.decelerations = (
-            None if limits is None else check_range(name, limits, unit)
-            for name, limits, unit in (
-                ("mount_heights", mount_heights, "m"),
-                ("decelerations", decelerations, "m/s²"),
-            )
-        )
+        self.mount_heights = self.decelerations = None
+        if mount_heights is not None:
+            self.mount_heights = check_range("mount_heights", mount_heights, "m")
+        if decelerations is not None:
+            self.decelerations = check_range("decelerations", decelerations, "m/s²")
+            for limit in self.decelerations:
+                BrakeParams(max_deceleration=limit)  # raises an error if it is out of range
         self.appearance = Appearance(world=world, road=road, split=split)
         self.first = draw_scenario(level_generator(split, start_level), self.families)
 

@@ -10,6 +10,12 @@ from gymnasium.utils import RecordConstructorArgs
 from lgmd_gym.agents.policies.features import FeatureConfig, FeatureHistory, source_observation
 from lgmd_gym.agents.policies.zone_features import ZONE_INPUTS
 
+REMEDIES = {
+    "frame": "make the environment with include_frame=True",
+    "known_deceleration": "use cameras with brake_known, for example --sensors-of all-round",
+}
+"""How to add an observation that environments do not have by default."""
+
 
 class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
     """Turns observations into policy inputs and repeats each action for `repeat` environment steps.
@@ -83,10 +89,8 @@ def policy_space(observation_space: spaces.Space, features: FeatureConfig) -> sp
     shapes = {name: space.shape or () for name, space in observation_space.spaces.items()}
     for name in features.inputs:
         if source_observation(name) not in shapes and name not in ZONE_INPUTS:
-            raise ValueError(
-                f"policy input {name!r} is not in the observation; "
-                f"make the environment with include_{name}=True"
-            )
+            remedy = REMEDIES.get(name, "wrap the environment in LGMDObservation")
+            raise ValueError(f"policy input {name!r} is not in the observation; {remedy}")
     boxes = features.box_arguments(shapes).items()
     return spaces.Dict(
         {name: spaces.Box(low, high, shape, dtype) for name, (low, high, shape, dtype) in boxes}

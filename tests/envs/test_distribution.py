@@ -75,6 +75,19 @@ def test_extra_families_are_drawn_where_they_are_named():
     assert families == {draws[name].family or name for name in EXTRA_FAMILIES}
 
 
+@pytest.mark.parametrize(
+    ("decelerations", "message"),
+    [
+        ((9.0, 4.0), r"decelerations must be the lowest and the highest value \[m/s²\], got \[9.0, 4.0\]"),
+        ((5.0,), "decelerations must be the lowest and the highest value"),
+        ((5.0, 20.0), r"max_deceleration must be in \[0.1, 12\] m/s², got 20"),
+    ],
+)
+def test_invalid_decelerations_raise(decelerations, message):
+    with pytest.raises(ValueError, match=message):
+        RandomLevels(decelerations=decelerations)
+
+
 @pytest.mark.parametrize("name", [name for name in EXTRA_FAMILIES if name.startswith("Fast")])
 def test_fast_families_have_the_speeds_of_a_motorway(name):
     drawn = [draw_scenario(level_generator("train", level), [name]) for level in range(200)]

@@ -82,5 +82,7 @@ def test_rewards_are_scaled_on_the_train_split_only():
 
 
 def test_missing_frame_raises_with_a_suggested_fix():
+    with pytest.raises(ValueError, match="'known_deceleration' is not in the observation; use cameras with"):
+        PolicyWrapper(gym.make("LGMD/CCRs-v0"), inputs=["known_deceleration"])
     with pytest.raises(ValueError, match=r"'frame' is not in the observation; .* include_frame=True"):
         PolicyWrapper(gym.make("LGMD/CCRs-v0"), inputs=["frame"])
