@@ -1,8 +1,8 @@
 """Scenario families that random levels contain on request only, and how their arguments are drawn.
 
 The levels of the id v0 keep their numbers, families and arguments. Families that were added later are
-therefore drawn only where `families` names them, as are usual families at the speeds of a motorway: their
-names begin with "Fast".
+therefore drawn only where `families` names them, as are usual families at the speeds of a motorway, whose
+names begin with "Fast", and those with narrower limits: `NarrowBox` and `CloseBrakeRelease`.
 """
 
 from functools import partial
@@ -14,6 +14,7 @@ import numpy as np
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.scenarios.curves import MAX_LATERAL
 from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS, Draw
+from lgmd_gym.envs.scenarios.rear import RELEASE
 
 SPEED_KMH = (20.0, 100.0)
 RADIUS = (50.0, 1500.0)  # [m]
@@ -51,14 +52,22 @@ def _pass(rng: np.random.Generator) -> dict[str, Any]:
     return _curve(rng) | {"lateral_offset": offset, "oncoming_speed": oncoming}
 
 
-def _box(rng: np.random.Generator) -> dict[str, Any]:
+def _box(rng: np.random.Generator, widest: float = 2.5) -> dict[str, Any]:
     return {
         "ego_speed": _uniform(rng, *SPEED_KMH) * KMH,
-        "width": _uniform(rng, 0.3, 2.5),
+        "width": _uniform(rng, 0.3, widest),
         "height": _uniform(rng, 0.6, 2.5),
         "length": _uniform(rng, 0.3, 5.0),
         "lateral_offset": _uniform(rng, -0.5, 0.5),
     }
+
+
+def _close_release(rng: np.random.Generator) -> dict[str, Any]:
+    """Return a short headway, and a brake tap that takes 10 to 60 % of it."""
+    speed, headway = _uniform(rng, 40.0, 100.0) * KMH, _uniform(rng, 1.0, 2.0)
+    lost = _uniform(rng, 0.1, 0.6) * speed * headway
+    drop = min((RELEASE * lost) ** 0.5, 6.0)
+    return {"ego_speed": speed, "headway": headway, "speed_drop": drop}
 
 
 def _fast(usual: Draw, rng: np.random.Generator) -> dict[str, Any]:
@@ -81,10 +90,12 @@ def _fast_draws(usual: dict[str, Draw], weights: dict[str, float]) -> dict[str, 
 EXTRA_THREATS = {
     "CCRsCurve": Draw(3.0, _standing),
     "StandingBox": Draw(2.0, _box),
+    "NarrowBox": Draw(2.0, partial(_box, widest=1.2), "StandingBox"),
     **_fast_draws(THREATS, {"CCRs": 3.0, "CCRm": 2.0, "CCRb": 2.0}),
 }
 EXTRA_NON_THREATS = {
     "CurvePass": Draw(1.0, _pass),
+    "CloseBrakeRelease": Draw(1.0, _close_release, "BrakeRelease"),
     "FastOvertaken": Draw(0.5, _overtaken, "Overtaken"),
     **_fast_draws(
         NON_THREATS,

@@ -24,6 +24,7 @@ from lgmd_gym.envs.scenarios.distribution import (
 from lgmd_gym.envs.scenarios.extra_arguments import EXTRA_NON_THREATS, EXTRA_THREATS
 from lgmd_gym.envs.scenarios.free_lanes import free_lane
 from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS
+from lgmd_gym.envs.scenarios.rear import RELEASE
 from lgmd_gym.wrappers.vector import LGMDObservation as LGMDVector
 
 HOLD = np.zeros(1, np.float32)
@@ -48,7 +49,7 @@ def test_every_family_is_drawn():
     draws = (*THREATS.items(), *NON_THREATS.items(), *EXTRA_THREATS.items(), *EXTRA_NON_THREATS.items())
     own = [name for name, draw in draws if not draw.family]
     assert sorted(own) == sorted(FAMILIES)
-    assert all(name == f"Fast{draw.family}" for name, draw in draws if draw.family)
+    assert all(draw.family in FAMILIES for _, draw in draws if draw.family)
     drawn = [draw_scenario(level_generator("train", level)).family for level in range(600)]
     assert set(drawn) == set(ALL_FAMILIES)
     share = np.mean([family in THREATS for family in drawn])
@@ -95,6 +96,23 @@ def test_fast_families_have_the_speeds_of_a_motorway(name):
     speeds = [scenario.ego_speed * 3.6 for scenario in drawn]
     assert 80.0 <= min(speeds) < 85.0
     assert 125.0 < max(speeds) <= 130.0
+
+
+def test_close_brake_releases_leave_room():
+    """The lead car takes at most 60 % of a headway of 1 to 2 s before it regains its speed."""
+    for level in range(300):
+        scenario = draw_scenario(level_generator("train", level), ["CloseBrakeRelease"])
+        lead = scenario.actors[0]
+        assert 1.0 <= lead.gap / scenario.ego_speed <= 2.0
+        drop = lead.speed - lead.profile[0].final_speed
+        assert 1.0 < drop <= 6.0
+        assert drop**2 / RELEASE < 0.61 * lead.gap
+
+
+def test_narrow_boxes_are_narrow():
+    for level in range(300):
+        (box,) = draw_scenario(level_generator("train", level), ["NarrowBox"]).actors
+        assert (box.kind, 0.3 <= box.width <= 1.2) == ("box", True)
 
 
 def test_decelerations_replace_those_of_the_worlds():
