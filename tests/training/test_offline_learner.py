@@ -11,10 +11,12 @@ from support.recordings import offline_config, synthetic_episode
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.training.offline.braking_outcomes import TOLERANCE
 from lgmd_gym.training.offline.dataset import OfflineDataset
-from lgmd_gym.training.offline.ensemble import check_mergeable
+from lgmd_gym.training.offline.ensemble import check_without_frames
 from lgmd_gym.training.offline.episodes import EpisodeRecorder, RecordedEpisode
+from lgmd_gym.training.offline.evaluation import evaluate
 from lgmd_gym.training.offline.learner import SEED_STEP, OfflineLearner
 from lgmd_gym.training.offline.objective import expected_return, scale_false_braking_cost
+from lgmd_gym.training.offline.standardisation import measure
 
 FEATURES = FeatureConfig(inputs=("spike_frequency", "ego_speed"), history=3, repeat=1, latch=True)
 NETWORK = {"net_arch": {"pi": [8], "vf": []}}
@@ -88,13 +90,13 @@ def test_learner_converges_to_the_optimum(tmp_path):
     validation_episodes = spike_episodes(20, 1)
     train, validation = dataset(spike_episodes(40, 0)), dataset(validation_episodes)
     offline = learner(tmp_path)
-    before = offline.evaluate(validation)
+    before = evaluate(offline.logits, validation)
     assert (before.avoided, before.false_activations) == (0.0, 0.0)  # the untrained policy never brakes
     epochs = []
     offline.learn(train, validation, lambda epoch, metrics: epochs.append((epoch, metrics)))
     assert [epoch for epoch, _ in epochs] == list(range(1, 61))
     assert set(epochs[0][1]) == {"train_return", "mean_return", "avoided", "false_activations", "best_return"}
-    after = offline.evaluate(validation)
+    after = evaluate(offline.logits, validation)
     assert (after.avoided, after.false_activations) == (1.0, 0.0)
     assert after.mean_return == pytest.approx(epochs[-1][1]["best_return"])
     threats = [episode for episode in validation_episodes if episode.threat]
@@ -128,7 +130,7 @@ def test_evaluation_ends_each_episode_at_the_first_braking_decision(tmp_path):
     offline = learner(tmp_path)
     logits = torch.tensor([[-1.0, 2, -1, 3, 0], [-1, -1, -1, 9, 9], [-1, -1, -1, 1, -1]])
     offline.logits = lambda batch: logits
-    evaluation = offline.evaluate(dataset(episodes))
+    evaluation = evaluate(offline.logits, dataset(episodes))
     returns = [
         episodes[0].rewards[0] + episodes[0].braking_returns[1],
         episodes[1].rewards.sum(),  # the logits after its end are padding
@@ -144,7 +146,7 @@ def test_evaluation_separates_levels_and_traffic(tmp_path):
     offline = learner(tmp_path)
     logits = torch.tensor([[-1.0] * 4, [-1.0] * 4, [-1.0, 1, -1, -1], [-1.0] * 4])
     offline.logits = lambda batch: logits
-    evaluation = offline.evaluate(dataset(levels + segments))
+    evaluation = evaluate(offline.logits, dataset(levels + segments))
     assert evaluation[1:] == (0.0, 0.0, 0.5)
     returns = [episode.rewards.sum() for episode in (*levels, segments[1])]
     returns.append(segments[0].rewards[0] + segments[0].braking_returns[1])
@@ -170,7 +172,9 @@ def test_evaluation_equals_closed_loop_returns(tmp_path):
         returns.append(total)
         onsets.append(onset)
     assert len(set(onsets)) > 3
-    assert offline.evaluate(recorded).mean_return == pytest.approx(np.mean(returns), abs=3 * TOLERANCE)
+    assert evaluate(offline.logits, recorded).mean_return == pytest.approx(
+        np.mean(returns), abs=3 * TOLERANCE
+    )
 
 
 def test_same_seed_gives_the_same_weights(tmp_path):
@@ -215,13 +219,50 @@ def test_an_ensemble_converges(tmp_path):
     validation = dataset(spike_episodes(20, 1))
     offline = learner(tmp_path, n_networks=3)
     offline.learn(dataset(spike_episodes(40, 0)), validation)
-    after = offline.evaluate(validation)
+    after = evaluate(offline.logits, validation)
     assert (after.avoided, after.false_activations) == (1.0, 0.0)
 
 
-def test_a_network_on_frames_is_not_mergeable():
+@pytest.mark.parametrize(("name", "required"), [("n_networks", 1), ("standardise", False)])
+def test_a_network_on_frames_does_not_share_its_features(name, required):
     class OnFrames:
         features_extractor = torch.nn.Conv2d(1, 1, 3)
 
-    with pytest.raises(ValueError, match="n_networks must be 1 for a policy on frames"):
-        check_mergeable(OnFrames())
+    message = f"{name} must be {str(required).lower()} for a policy on frames; set {name}: "
+    with pytest.raises(ValueError, match=message):
+        check_without_frames(OnFrames(), name, required)
+
+
+def test_standardised_features_have_mean_zero_and_deviation_one():
+    rng = np.random.default_rng(0)
+    features = torch.from_numpy(rng.normal([3.0, -1.0, 5.0], [0.5, 20.0, 0.0], (4000, 3))).float()
+    standardisation = measure([features[:1000], features[1000:]])
+    values = standardisation.apply(features)
+    torch.testing.assert_close(values.mean(0), torch.zeros(3), atol=1e-4, rtol=0.0)
+    torch.testing.assert_close(values.std(0), torch.tensor([1.0, 1.0, 0.0]), atol=3e-3, rtol=0.0)
+
+
+@pytest.mark.parametrize("n_networks", [1, 2])
+def test_the_saved_policy_reads_features_that_are_not_standardised(tmp_path, n_networks):
+    train, validation = dataset(spike_episodes(40, 0)), dataset(spike_episodes(20, 1))
+    offline = learner(tmp_path, n_networks=n_networks, standardise=True)
+    returns = []
+    model = offline.learn(train, validation, lambda epoch, metrics: returns.append(metrics["mean_return"]))
+    batch = validation.batch(range(20))
+    torch.testing.assert_close(
+        offline._logits_of(model.policy, batch), offline.logits(batch), atol=1e-3, rtol=1e-3
+    )
+    after = evaluate(offline.logits, validation)
+    assert after.mean_return == pytest.approx(max(returns))
+    assert (after.avoided, after.false_activations) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_standardisation_includes_mirror_images(tmp_path, mirror):
+    """The yaw rates of episodes and their mirror images have mean 0."""
+    features = replace(FEATURES, inputs=("ego_yaw_rate",))
+    offline = learner(tmp_path, features, mirror=mirror, standardise=True)
+    standardisation = offline._measure(
+        dataset([synthetic_episode(5, seed=seed) for seed in range(4)], features)
+    )
+    assert (standardisation.mean.abs() < 1e-6).all() == mirror

@@ -6,10 +6,16 @@ from typing import Any
 import torch
 
 
-def check_mergeable(network: Any) -> None:
-    """Raise ValueError for a network that processes frames: only its layers for vectors can be merged."""
-    if any(True for _ in network.features_extractor.parameters()):
-        raise ValueError("n_networks must be 1 for a policy on frames; set n_networks: 1")
+def extracts_features(network: Any) -> bool:
+    """Return whether a network computes its features with weights of its own, as from frames."""
+    return any(True for _ in network.features_extractor.parameters())
+
+
+def check_without_frames(network: Any, name: str, required: object) -> None:
+    """Raise ValueError for a network that processes frames, where a hyperparameter requires vectors."""
+    if extracts_features(network):
+        value = str(required).lower()
+        raise ValueError(f"{name} must be {value} for a policy on frames; set {name}: {value}")
 
 
 def merged_layers(policy_kwargs: dict[str, Any], count: int) -> dict[str, Any]:
@@ -26,8 +32,8 @@ def merge_networks(networks: Sequence[Any], merged: Any) -> None:
     Each layer contains the layers of the networks side by side: hidden layers are block diagonal, and the
     outputs are the means of those of the networks.
     """
-    layers = [_linear_layers(network) for network in networks]
-    targets = _linear_layers(merged)
+    layers = [linear_layers(network) for network in networks]
+    targets = linear_layers(merged)
     for depth, (target, *parts) in enumerate(zip(targets, *layers, strict=True)):
         weights, biases = [part.weight for part in parts], [part.bias for part in parts]
         if depth == len(targets) - 1:
@@ -39,7 +45,7 @@ def merge_networks(networks: Sequence[Any], merged: Any) -> None:
             target.bias.copy_(torch.cat(biases))
 
 
-def _linear_layers(network: Any) -> list[torch.nn.Linear]:
+def linear_layers(network: Any) -> list[torch.nn.Linear]:
     """Return the layers from the inputs to the outputs of the actions."""
     hidden = [item for item in network.mlp_extractor.policy_net if isinstance(item, torch.nn.Linear)]
     return [*hidden, network.action_net]

@@ -1,0 +1,67 @@
+"""Evaluation of a deterministic policy on recorded episodes."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset
+
+BATCH_SIZE = 64  # [episodes]
+
+
+class Evaluation(NamedTuple):
+    """Results of the deterministic policy, which brakes where its probability exceeds one half.
+
+    Attributes:
+        mean_return: Mean return over levels and traffic segments.
+        avoided: Share of threats that end without contact.
+        false_activations: Share of levels without a threat in which the policy brakes.
+        traffic_activations: Share of traffic segments in which the policy brakes; NaN without any.
+    """
+
+    mean_return: float
+    avoided: float
+    false_activations: float
+    traffic_activations: float
+
+
+def evaluate(logits: Callable[[EpisodeBatch], torch.Tensor], dataset: OfflineDataset) -> Evaluation:
+    """Return the results of a policy on recorded episodes.
+
+    Args:
+        logits: Returns the log odds of braking at each decision of a batch, (N, T).
+        dataset: Recorded episodes.
+    """
+    parts = [
+        _evaluate_batch(logits, dataset.batch(range(len(dataset))[start : start + BATCH_SIZE]))
+        for start in range(0, len(dataset), BATCH_SIZE)
+    ]
+    returns, brakes, contacts = (torch.cat(values).numpy() for values in zip(*parts, strict=True))
+    threats = np.array([episode.threat for episode in dataset.episodes])
+    traffic = np.array([episode.traffic for episode in dataset.episodes])
+    return Evaluation(
+        mean_return=float(returns.mean()),
+        avoided=_mean(~contacts[threats]),
+        false_activations=_mean(brakes[~traffic & ~threats]),
+        traffic_activations=_mean(brakes[traffic]),
+    )
+
+
+@torch.no_grad()
+def _evaluate_batch(
+    logits: Callable[[EpisodeBatch], torch.Tensor], batch: EpisodeBatch
+) -> tuple[torch.Tensor, ...]:
+    """Return for each episode its return, whether the policy brakes, and whether it ends in a contact."""
+    wants_brake = (logits(batch) > 0.0) & (batch.mask > 0.0)
+    brakes = wants_brake.any(1)
+    count = torch.cumsum(wants_brake, 1)
+    before, onset = count == 0, wants_brake & (count == 1)
+    returns = (batch.rewards * before).sum(1) + (batch.braking_returns * onset).sum(1)
+    contacts = torch.where(brakes, (batch.braking_contacts & onset).any(1), batch.threats)
+    return returns, brakes, contacts
+
+
+def _mean(flags: np.ndarray) -> float:
+    return float(flags.mean()) if len(flags) else float("nan")
