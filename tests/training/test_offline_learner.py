@@ -121,16 +121,14 @@ def test_logit_decay_keeps_the_braking_probability_above_zero(tmp_path):
     assert returns[119] < optimum - 0.5
 
 
-def test_evaluation_ends_each_episode_at_the_first_braking_decision(tmp_path):
+def test_evaluation_ends_each_episode_at_the_first_braking_decision():
     episodes = [
         synthetic_episode(4),
         synthetic_episode(3, seed=1, threat=False),
         synthetic_episode(5, seed=2),
     ]
-    offline = learner(tmp_path)
     logits = torch.tensor([[-1.0, 2, -1, 3, 0], [-1, -1, -1, 9, 9], [-1, -1, -1, 1, -1]])
-    offline.logits = lambda batch: logits
-    evaluation = evaluate(offline.logits, dataset(episodes))
+    evaluation = evaluate(lambda batch: logits, dataset(episodes))
     returns = [
         episodes[0].rewards[0] + episodes[0].braking_returns[1],
         episodes[1].rewards.sum(),  # the logits after its end are padding
@@ -140,13 +138,11 @@ def test_evaluation_ends_each_episode_at_the_first_braking_decision(tmp_path):
     assert (evaluation.avoided, evaluation.false_activations) == (0.5, 0.0)
 
 
-def test_evaluation_separates_levels_and_traffic(tmp_path):
+def test_evaluation_separates_levels_and_traffic():
     levels = [synthetic_episode(4), synthetic_episode(3, seed=1, threat=False)]
     segments = [synthetic_episode(3, seed=seed, threat=False, traffic=True) for seed in (2, 3)]
-    offline = learner(tmp_path)
     logits = torch.tensor([[-1.0] * 4, [-1.0] * 4, [-1.0, 1, -1, -1], [-1.0] * 4])
-    offline.logits = lambda batch: logits
-    evaluation = evaluate(offline.logits, dataset(levels + segments))
+    evaluation = evaluate(lambda batch: logits, dataset(levels + segments))
     assert evaluation[1:] == (0.0, 0.0, 0.5)
     returns = [episode.rewards.sum() for episode in (*levels, segments[1])]
     returns.append(segments[0].rewards[0] + segments[0].braking_returns[1])
@@ -240,6 +236,10 @@ def test_standardised_features_have_mean_zero_and_deviation_one():
     values = standardisation.apply(features)
     torch.testing.assert_close(values.mean(0), torch.zeros(3), atol=1e-4, rtol=0.0)
     torch.testing.assert_close(values.std(0), torch.tensor([1.0, 1.0, 0.0]), atol=3e-3, rtol=0.0)
+    layer = torch.nn.Linear(3, 2)
+    expected = layer(values)
+    standardisation.fold(layer)
+    torch.testing.assert_close(layer(features), expected, atol=1e-3, rtol=1e-3)
 
 
 @pytest.mark.parametrize("n_networks", [1, 2])

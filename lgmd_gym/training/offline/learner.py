@@ -213,13 +213,11 @@ class OfflineLearner:
 
     def logits(self, batch: EpisodeBatch) -> torch.Tensor:
         """Return the log odds of braking at each decision, the mean of all networks, (N, T)."""
+        for network in self.networks:
+            network.set_training_mode(False)
         features = self._shared_features(batch)
-        parts = [self._evaluated(network, batch, features) for network in self.networks]
+        parts = [self._logits_of(network, batch, features) for network in self.networks]
         return torch.stack(parts).mean(0)
-
-    def _evaluated(self, network: Any, batch: EpisodeBatch, features: torch.Tensor | None) -> torch.Tensor:
-        network.set_training_mode(False)
-        return self._logits_of(network, batch, features)
 
 
 def _make_model(policy: str, env: "GymEnv", seed: int, policy_kwargs: dict[str, Any]) -> "PPO":
