@@ -2,7 +2,7 @@
 
 The levels of the id v0 keep their numbers, families and arguments. Families that were added later are
 therefore drawn only where `families` names them, as are usual families at the speeds of a motorway, whose
-names begin with "Fast", and those with narrower limits: `NarrowBox` and `CloseBrakeRelease`.
+names begin with "Fast", and those with other limits: `NarrowBox` and `CloseBrakeRelease`.
 """
 
 from functools import partial
