@@ -167,7 +167,7 @@ def _train_offline(config: TrainConfig, folder: Path, progress: bool, jobs: int)
                     logger.record(name, value)
                 logger.dump(epoch)
                 bar.set_postfix({name: f"{value:.2f}" for name, value in metrics.items()})
-                bar.update()
+                bar.update(epoch - bar.n)
 
             return learner.learn(train_data, validation_data, log)
     finally:

@@ -166,6 +166,7 @@ def test_offline_requires_a_latching_brake(tmp_path):
         ("offline", {"batch_size": 0}, "batch_size must be a whole number >= 1, got 0"),
         ("offline", {"logit_decay": -1.0}, r"logit_decay must be in \[0, 1\]"),
         ("offline", {"initial_brake_probability": 1.0}, "initial_brake_probability must be in"),
+        ("offline", {"select_margin": -1}, "select_margin must be true or false, got -1"),
         ("offline", {"false_cost": 0.0}, "false_cost must be a number > 0"),
     ],
 )

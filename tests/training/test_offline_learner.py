@@ -13,7 +13,7 @@ from lgmd_gym.training.offline.braking_outcomes import TOLERANCE
 from lgmd_gym.training.offline.dataset import OfflineDataset
 from lgmd_gym.training.offline.ensemble import check_without_frames
 from lgmd_gym.training.offline.episodes import EpisodeRecorder, RecordedEpisode
-from lgmd_gym.training.offline.evaluation import evaluate
+from lgmd_gym.training.offline.evaluation import evaluate, select_margin
 from lgmd_gym.training.offline.learner import SEED_STEP, OfflineLearner
 from lgmd_gym.training.offline.objective import expected_return, scale_false_braking_cost
 from lgmd_gym.training.offline.standardisation import measure
@@ -255,6 +255,42 @@ def test_the_saved_policy_reads_features_that_are_not_standardised(tmp_path, n_n
     after = evaluate(offline.logits, validation)
     assert after.mean_return == pytest.approx(max(returns))
     assert (after.avoided, after.false_activations) == (1.0, 0.0)
+
+
+def test_the_margin_with_the_highest_return_is_selected():
+    """Braking avoids the contact in the second of three decisions; at the first one it does not."""
+    contacts, rewards = np.array([True, False, True]), np.zeros(3, np.float32)
+    braking_returns = np.array([-5.0, 5.0, -5.0], np.float32)
+    threat = replace(
+        synthetic_episode(3), rewards=rewards, braking_returns=braking_returns, braking_contacts=contacts
+    )
+    log_odds = torch.tensor([[-3.2, -0.7, 2.0]])
+    margin, evaluation = select_margin(lambda batch: log_odds, dataset([threat]))
+    assert margin == -1.0  # the one closest to 0 of -3 to -1
+    assert (evaluation.mean_return, evaluation.avoided) == (5.0, 1.0)
+    assert evaluate(lambda batch: log_odds, dataset([threat])).avoided == 0.0
+
+
+@pytest.mark.parametrize("n_networks", [1, 2])
+def test_the_saved_policy_brakes_above_the_selected_margin(tmp_path, n_networks):
+    """A policy that brakes at the first decision has a higher return with a margin at which it holds."""
+    train, validation = dataset(spike_episodes(40, 0)), dataset(spike_episodes(20, 1))
+    batch, odds, logs = validation.batch(range(20)), {}, {}
+    arguments = {"n_networks": n_networks, "n_epochs": 2, "learning_rate": 1e-4}
+    for selects in (False, True):
+        logs[selects] = []
+        offline = learner(tmp_path, **arguments, initial_brake_probability=0.9, select_margin=selects)
+        model = offline.learn(
+            train, validation, lambda epoch, values, rows=logs[selects]: rows.append((epoch, values))
+        )
+        odds[selects] = offline._logits_of(model.policy, batch)[batch.mask > 0]
+    (epoch, selected), best = logs[True][-1], logs[False][-1][1]["best_return"]
+    assert logs[True][:-1] == logs[False]
+    assert epoch == 2
+    assert selected["margin"] > 1.0
+    assert selected["mean_return"] == selected["best_return"] > best
+    torch.testing.assert_close(odds[True], odds[False] - selected["margin"], atol=1e-4, rtol=1e-4)
+    assert evaluate(offline.logits, validation).mean_return == pytest.approx(selected["mean_return"])
 
 
 @pytest.mark.parametrize("mirror", [False, True])

@@ -1,6 +1,6 @@
 """Evaluation of a deterministic policy on recorded episodes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,10 +9,11 @@ import torch
 from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset
 
 BATCH_SIZE = 64  # [episodes]
+MARGINS = tuple(float(margin) for margin in np.arange(-4.0, 4.5, 0.5))  # of log odds
 
 
 class Evaluation(NamedTuple):
-    """Results of the deterministic policy, which brakes where its probability exceeds one half.
+    """Results of the deterministic policy, which brakes where its log odds of braking exceed a margin.
 
     Attributes:
         mean_return: Mean return over levels and traffic segments.
@@ -34,27 +35,56 @@ def evaluate(logits: Callable[[EpisodeBatch], torch.Tensor], dataset: OfflineDat
         logits: Returns the log odds of braking at each decision of a batch, (N, T).
         dataset: Recorded episodes.
     """
+    return evaluate_margins(logits, dataset, (0.0,))[0]
+
+
+def select_margin(
+    logits: Callable[[EpisodeBatch], torch.Tensor], dataset: OfflineDataset
+) -> tuple[float, Evaluation]:
+    """Return the margin of `MARGINS` with the highest mean return, and its results.
+
+    Of margins with the same mean return, the one closest to 0 is returned.
+    """
+    results = zip(MARGINS, evaluate_margins(logits, dataset, MARGINS), strict=True)
+    return max(results, key=lambda item: (item[1].mean_return, -abs(item[0])))
+
+
+def evaluate_margins(
+    logits: Callable[[EpisodeBatch], torch.Tensor], dataset: OfflineDataset, margins: Sequence[float]
+) -> list[Evaluation]:
+    """Return the results of a policy that brakes where its log odds exceed a margin, for each margin."""
     parts = [
-        _evaluate_batch(logits, dataset.batch(range(len(dataset))[start : start + BATCH_SIZE]))
+        _evaluate_batch(logits, dataset.batch(range(len(dataset))[start : start + BATCH_SIZE]), margins)
         for start in range(0, len(dataset), BATCH_SIZE)
     ]
-    returns, brakes, contacts = (torch.cat(values).numpy() for values in zip(*parts, strict=True))
     threats = np.array([episode.threat for episode in dataset.episodes])
     traffic = np.array([episode.traffic for episode in dataset.episodes])
-    return Evaluation(
-        mean_return=float(returns.mean()),
-        avoided=_mean(~contacts[threats]),
-        false_activations=_mean(brakes[~traffic & ~threats]),
-        traffic_activations=_mean(brakes[traffic]),
-    )
+    results = []
+    for by_batch in zip(*parts, strict=True):
+        returns, brakes, contacts = (torch.cat(values).numpy() for values in zip(*by_batch, strict=True))
+        results.append(
+            Evaluation(
+                mean_return=float(returns.mean()),
+                avoided=_mean(~contacts[threats]),
+                false_activations=_mean(brakes[~traffic & ~threats]),
+                traffic_activations=_mean(brakes[traffic]),
+            )
+        )
+    return results
 
 
 @torch.no_grad()
 def _evaluate_batch(
-    logits: Callable[[EpisodeBatch], torch.Tensor], batch: EpisodeBatch
-) -> tuple[torch.Tensor, ...]:
+    logits: Callable[[EpisodeBatch], torch.Tensor], batch: EpisodeBatch, margins: Sequence[float]
+) -> list[tuple[torch.Tensor, ...]]:
+    """Return for each margin the return of each episode, whether the policy brakes, and the contacts."""
+    log_odds = logits(batch)
+    return [_first_braking(log_odds > margin, batch) for margin in margins]
+
+
+def _first_braking(wants_brake: torch.Tensor, batch: EpisodeBatch) -> tuple[torch.Tensor, ...]:
     """Return for each episode its return, whether the policy brakes, and whether it ends in a contact."""
-    wants_brake = (logits(batch) > 0.0) & (batch.mask > 0.0)
+    wants_brake = wants_brake & (batch.mask > 0.0)
     brakes = wants_brake.any(1)
     count = torch.cumsum(wants_brake, 1)
     before, onset = count == 0, wants_brake & (count == 1)

@@ -16,7 +16,8 @@ from lgmd_gym.training.offline.ensemble import (
     merge_networks,
     merged_layers,
 )
-from lgmd_gym.training.offline.evaluation import evaluate
+from lgmd_gym.training.offline.evaluation import Evaluation, evaluate, select_margin
+from lgmd_gym.training.offline.models import make_model, network_arguments
 from lgmd_gym.training.offline.objective import expected_return, scale_false_braking_cost
 from lgmd_gym.training.offline.standardisation import Standardisation, measure
 
@@ -69,6 +70,9 @@ class OfflineLearner:
         standardise: Whether the network learns on features with mean 0 and standard deviation 1 over the
             training episodes, see `standardisation`. It learns in fewer epochs. Not for frames.
         mirror: Whether each training episode is mirrored, left to right, with probability 1/2 in each pass.
+        select_margin: Whether the policy brakes where its log odds exceed the margin, of -4, -3.5, ..., 4,
+            with the highest mean return on the validation episodes, in place of 0. The margin is selected
+            for the best epoch and subtracted from the bias: the saved policy brakes above 0.
         policy_kwargs: Further arguments of the network.
 
     Raises:
@@ -92,6 +96,7 @@ class OfflineLearner:
         logit_decay: float = 0.0,
         standardise: bool = False,
         mirror: bool = False,
+        select_margin: bool = False,
         policy_kwargs: dict[str, Any] | None = None,
     ) -> None:
         self.n_epochs = check_whole("n_epochs", n_epochs, 1)
@@ -102,18 +107,19 @@ class OfflineLearner:
         self.logit_decay = check_within("logit_decay", logit_decay, 0.0, 1.0)
         self.standardise = check_flag("standardise", standardise)
         self.mirror = check_flag("mirror", mirror)
+        self.select_margin = check_flag("select_margin", select_margin)
         check_within("initial_brake_probability", initial_brake_probability, 1e-6, 0.999)
         self._seed = seed
         self._hold, self._brake = demands.index(HOLD), demands.index(min(demands))
-        kwargs = _policy_kwargs(policy_kwargs or {})
+        kwargs = network_arguments(policy_kwargs or {})
         seeds = [seed + SEED_STEP * index for index in range(check_whole("n_networks", n_networks, 1))]
-        models = [_make_model(policy, env, item, kwargs) for item in seeds]
+        models = [make_model(policy, env, item, kwargs) for item in seeds]
         self._standardisation: Standardisation | None = None
         self.networks: list[Any] = [model.policy for model in models]
         self.model = models[0]
         if n_networks > 1:
             check_without_frames(self.networks[0], "n_networks", 1)
-            self.model = _make_model(policy, env, seed, merged_layers(kwargs, n_networks))
+            self.model = make_model(policy, env, seed, merged_layers(kwargs, n_networks))
         if self.standardise:
             check_without_frames(self.networks[0], "standardise", False)
         odds = initial_brake_probability / (1.0 - initial_brake_probability)
@@ -133,7 +139,8 @@ class OfflineLearner:
         Args:
             train: Training episodes.
             validation: Episodes evaluated after each epoch.
-            log: Called after each epoch with its number and its metrics.
+            log: Called after each epoch with its number and its metrics, and with `select_margin` once
+                more for the selected margin.
         """
         steps = -(-len(train) // self.batch_size)
         optimizers = [self._make_optimizer(network, self.n_epochs * steps) for network in self.networks]
@@ -156,16 +163,24 @@ class OfflineLearner:
             if evaluation.mean_return > best_return:
                 best_return = evaluation.mean_return
                 best_weights = [_copy_weights(network) for network in self.networks]
-            metrics = {"train_return": train_return, **evaluation._asdict(), "best_return": best_return}
-            log(epoch, {name: value for name, value in metrics.items() if not np.isnan(value)})
+            log(epoch, _metrics(evaluation, train_return=train_return, best_return=best_return))
         for network, weights in zip(self.networks, best_weights, strict=True):
             network.load_state_dict(weights)
             if self._standardisation is not None:
                 self._standardisation.fold(linear_layers(network)[0])
         self._standardisation = None
+        if self.select_margin:
+            margin, evaluation = select_margin(self.logits, validation)
+            self._subtract_margin(margin)
+            log(self.n_epochs, _metrics(evaluation, margin=margin, best_return=evaluation.mean_return))
         if len(self.networks) > 1:
             merge_networks(self.networks, self.model.policy)
         return self.model
+
+    @torch.no_grad()
+    def _subtract_margin(self, margin: float) -> None:
+        for network in self.networks:
+            network.action_net.bias[self._brake] -= margin
 
     def _measure(self, train: OfflineDataset) -> Standardisation:
         """Measure the features of some training episodes, and of their mirror images if those are used."""
@@ -220,17 +235,11 @@ class OfflineLearner:
         return torch.stack(parts).mean(0)
 
 
-def _make_model(policy: str, env: "GymEnv", seed: int, policy_kwargs: dict[str, Any]) -> "PPO":
-    """Return a PPO model; only its network and its file format are used."""
-    from stable_baselines3 import PPO
-
-    torch.set_num_threads(1)
-    return PPO(policy, env, 2e-3, 2, 2, seed=seed, device="cpu", policy_kwargs=policy_kwargs)
-
-
-def _policy_kwargs(changes: dict[str, Any]) -> dict[str, Any]:
-    return {"activation_fn": torch.nn.ReLU, "net_arch": {"pi": [64, 64], "vf": []}} | changes
-
-
 def _copy_weights(network: torch.nn.Module) -> dict[str, torch.Tensor]:
     return {name: value.clone() for name, value in network.state_dict().items()}
+
+
+def _metrics(evaluation: Evaluation, **others: float) -> dict[str, float]:
+    """Return the metrics of an evaluation and others, without NaN."""
+    metrics = others | evaluation._asdict()
+    return {name: value for name, value in metrics.items() if not np.isnan(value)}
