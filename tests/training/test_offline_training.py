@@ -1,12 +1,13 @@
 """Offline training with the command, from recording to the policy file."""
 
+import csv
 import json
 import os
 from functools import partial
 
 import gymnasium as gym
 import pytest
-from support.recordings import offline_config, write_yaml
+from support.recordings import OFFLINE_YAML, offline_config, write_yaml
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.card import read_card
@@ -29,9 +30,13 @@ def test_second_training_reuses_the_recordings_of_the_first(tmp_path, monkeypatc
     assert cli.run(arguments(tmp_path, first, "--eval-episodes", "4")) == 0
     monkeypatch.setattr(LevelRecorder, "record", None)  # any recording raises
     options = ["--eval-episodes", "3", "--n-timesteps", "5", "--inputs", "ffi", "ego_speed"]
-    assert cli.run(arguments(tmp_path, second, *options, "--recordings", str(first))) == 0
+    command = arguments(tmp_path, second, *options, "--recordings", str(first))
+    write_yaml(tmp_path, OFFLINE_YAML + "  select_margin: true\n")
+    assert cli.run(command) == 0
     assert not (second / "episodes").exists()
-    assert len((second / "log" / "progress.csv").read_text().splitlines()) == 1 + 3
+    rows = [*csv.DictReader((second / "log" / "progress.csv").open())]
+    assert [bool(row["margin"]) for row in rows] == [False] * 3 + [True]
+    assert f"mean return {float(rows[-1]['mean_return']):.2f}" in (second / "README.md").read_text()
     card = read_card(second / "policy.zip")
     assert card["algo"] == "ppo"
     assert card["config"]["algo"] == "offline"
