@@ -10,7 +10,7 @@ from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.envs.scenarios.extra_arguments import EXTRA_NON_THREATS, EXTRA_THREATS
 from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS
 from lgmd_gym.envs.scenarios.registry import make_scenario
-from lgmd_gym.envs.scenarios.scenario import Scenario
+from lgmd_gym.envs.scenarios.scenario import Scenario, without_target
 from lgmd_gym.errors import check_items, check_known, check_positive, check_whole
 
 SPLITS = ("train", "validation", "test")
@@ -97,4 +97,5 @@ def draw_scenario(rng: np.random.Generator, families: Collection[str] = ALL_FAMI
     drawn = first or second
     weights = np.cumsum([family.weight for family in drawn.values()])
     name = list(drawn)[int(np.searchsorted(weights, rng.random() * weights[-1], side="right"))]
-    return make_scenario(drawn[name].family or name, **drawn[name].draw(rng))
+    scenario = make_scenario(drawn[name].family or name, **drawn[name].draw(rng))
+    return scenario if drawn[name].has_target else without_target(scenario)

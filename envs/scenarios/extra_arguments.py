@@ -3,6 +3,9 @@
 The levels of the id v0 keep their numbers, families and arguments. Families that were added later are
 therefore drawn only where `families` names them, as are usual families at the speeds of a motorway, whose
 names begin with "Fast", and those with other limits: `NarrowBox` and `CloseBrakeRelease`.
+
+Names that end in "WithoutTarget" are threats without their target. A policy that was trained without them
+may brake for the situation of a threat, such as a turn at a low speed, whether or not there is a target.
 """
 
 from functools import partial
@@ -87,6 +90,11 @@ def _fast_draws(usual: dict[str, Draw], weights: dict[str, float]) -> dict[str, 
     }
 
 
+def _without_target(threats: dict[str, Draw], names: tuple[str, ...]) -> dict[str, Draw]:
+    """Return draws of threats without their target, by the names family + "WithoutTarget"."""
+    return {f"{name}WithoutTarget": Draw(1.0, threats[name].draw, name, False) for name in names}
+
+
 EXTRA_THREATS = {
     "CCRsCurve": Draw(3.0, _standing),
     "StandingBox": Draw(2.0, _box),
@@ -100,5 +108,10 @@ EXTRA_NON_THREATS = {
     **_fast_draws(
         NON_THREATS,
         {"EmptyRoad": 0.5, "Following": 0.5, "BrakeRelease": 0.5, "AdjacentPass": 0.3, "BridgeShadow": 0.2},
+    ),
+    # Other threats leave an empty road, as EmptyRoad.
+    **_without_target(
+        THREATS | EXTRA_THREATS,
+        ("CCCscp", "CCFtap", "CCFhol", "CPNCO", "CPTA", "CPRA", "CBNA", "CBNAO", "CBFA", "CCRsCurve"),
     ),
 }

@@ -18,11 +18,13 @@ class Draw(NamedTuple):
         weight: Relative frequency among the threats or the non-threats.
         draw: Function that draws the arguments of the family.
         family: Name of the scenario family; empty if it is the key of the draw.
+        has_target: Whether the scenario has its target, or is without it, see `without_target`.
     """
 
     weight: float
     draw: Callable[[np.random.Generator], dict[str, Any]]
     family: str = ""
+    has_target: bool = True
 
 
 def _speed(rng: np.random.Generator, low: float = SPEED_KMH[0], high: float = SPEED_KMH[1]) -> float:

@@ -1,6 +1,6 @@
 """Scenarios as plain data: the road, the ego's script, and the other actors."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from lgmd_gym.envs.dynamics.bend import Bend
 from lgmd_gym.envs.dynamics.segment import Segment, check_profile
@@ -187,3 +187,8 @@ class Scenario:
     def top_speed(self) -> float:
         """Highest scripted speed of the ego [m/s]."""
         return max(self.ego_speed, *(segment.final_speed for segment in self.ego_profile), 0.0)
+
+
+def without_target(scenario: Scenario) -> Scenario:
+    """Return a scenario without its first actor, which is the target: a threat without the threat."""
+    return replace(scenario, actors=scenario.actors[1:])

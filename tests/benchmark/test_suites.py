@@ -16,8 +16,8 @@ from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.scenarios.random_arguments import THREATS
 
-SLOW_SUITES = ("ncap2023", "ncap2023-vru", "ncap2026", "ncap2026-extended", "speeds")
-NO_THREAT_SUITES = ("false-reaction", "near-miss", "nhtsa-false-activation")
+SLOW_SUITES = ("ncap2023", "ncap2023-vru", "ncap2026", "ncap2026-extended", "speeds", "without-target")
+NO_THREAT_SUITES = ("false-reaction", "near-miss", "nhtsa-false-activation", "without-target")
 UNAVOIDABLE = ("CCFhos", "CCFhol")  # by braking: the oncoming car does not stop
 
 
@@ -58,7 +58,8 @@ def violations(case):
     """Return the expectations on the bounding agents that a case does not meet."""
     rows = bounding_rows(case)
     never, always, oracle = rows["no-brake"], rows["always-brake"], rows["ttc-oracle"]
-    threat, avoidable = case.scenario.family in THREATS, case.scenario.family not in UNAVOIDABLE
+    threat = case.scenario.family in THREATS and case.suite != "without-target"
+    avoidable = not threat or case.scenario.family not in UNAVOIDABLE
     fault = "premature_brake" if threat else "false_activation"
     expectations = {
         "no-brake has contact exactly in approaches": never["collision"] is threat,
@@ -67,7 +68,8 @@ def violations(case):
         "approaches start more than 4.5 s before contact": not threat or never["duration"] > 4.5,
         "always-brake avoids no contact validly": not always["avoided"],
         "always-brake has contact only with oncoming cars": not always["collision"] or not avoidable,
-        "always-brake brakes falsely or prematurely": always[fault],
+        "always-brake brakes falsely or prematurely": always[fault]
+        or not (threat or case.scenario.ego_speed),
         "the oracle avoids every threat": not (threat and avoidable) or oracle["avoided"],
         # In 2 s the brake takes 9 m/s² times 1.77 s: less latency, dead time and half the build-up.
         "the oracle brakes for oncoming cars": avoidable

@@ -18,10 +18,13 @@ from lgmd_gym.training.hyperparams import read_hyperparams
 CAMERAS = {"zones": zone_cameras, "all-round": all_round_cameras}
 OTHER_HYPERPARAMETERS = {  # as in its card
     "all-round": {
-        "n_networks": 2,
-        "n_epochs": 24,
+        "n_networks": 3,
+        "n_epochs": 28,
+        "weight_decay": 0.1,
+        "standardise": True,
         "mirror": True,
-        "policy_kwargs": {"net_arch": {"pi": [256, 64], "vf": []}},
+        "select_margin": True,
+        "policy_kwargs": {"net_arch": {"pi": [192, 64], "vf": []}},
     }
 }
 
