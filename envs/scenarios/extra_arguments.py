@@ -4,8 +4,8 @@ The levels of the id v0 keep their numbers, families and arguments. Families tha
 therefore drawn only where `families` names them, as are usual families at the speeds of a motorway, whose
 names begin with "Fast", and those with other limits: `NarrowBox` and `CloseBrakeRelease`.
 
-Names that end in "WithoutTarget" are threats without their target. A policy that was trained without them
-may brake for the situation of a threat, such as a turn at a low speed, whether or not there is a target.
+Names that end in "WithoutTarget" are threats without their target. The usual non-threats are rarely on a road
+with two lanes or at a crossing: a policy that is trained on them alone learns to brake for the road.
 """
 
 from functools import partial
@@ -91,7 +91,10 @@ def _fast_draws(usual: dict[str, Draw], weights: dict[str, float]) -> dict[str, 
 
 
 def _without_target(threats: dict[str, Draw], names: tuple[str, ...]) -> dict[str, Draw]:
-    """Return draws of threats without their target, by the names family + "WithoutTarget"."""
+    """Return draws of threats without their target, by the names family + "WithoutTarget".
+
+    They are not drawn for threats on a straight road with three lanes, which EmptyRoad has, too.
+    """
     return {f"{name}WithoutTarget": Draw(1.0, threats[name].draw, name, False) for name in names}
 
 
@@ -109,9 +112,11 @@ EXTRA_NON_THREATS = {
         NON_THREATS,
         {"EmptyRoad": 0.5, "Following": 0.5, "BrakeRelease": 0.5, "AdjacentPass": 0.3, "BridgeShadow": 0.2},
     ),
-    # Other threats leave an empty road, as EmptyRoad.
     **_without_target(
         THREATS | EXTRA_THREATS,
-        ("CCCscp", "CCFtap", "CCFhol", "CPNCO", "CPTA", "CPRA", "CBNA", "CBNAO", "CBFA", "CCRsCurve"),
+        (
+            *("CCCscp", "CCFtap", "CCFhos", "CCFhol", "CPNA", "CPFA", "CPNCO", "CPLA", "CPTA", "CPRA"),
+            *("CBNA", "CBNAO", "CBFA", "CBLA", "CCRsCurve"),
+        ),
     ),
 }

@@ -69,7 +69,7 @@ def test_extra_families_are_drawn_where_they_are_named(draws, threat):
     """A standing target is a threat in every level; a car next to the lane or a missing target is not."""
     env = random_env(split="validation", families=list(draws))
     families = set()
-    for seed in range(120):
+    for seed in range(200):
         _, scenario, _, collision, _ = run_episode(env, seed)
         assert collision is threat, scenario
         families.add(scenario.family)
