@@ -19,7 +19,7 @@ CAMERAS = {"zones": zone_cameras, "all-round": all_round_cameras}
 OTHER_HYPERPARAMETERS = {  # as in its card
     "all-round": {
         "n_networks": 3,
-        "n_epochs": 28,
+        "n_epochs": 24,
         "weight_decay": 0.1,
         "standardise": True,
         "mirror": True,
