@@ -190,5 +190,5 @@ class Scenario:
 
 
 def without_target(scenario: Scenario) -> Scenario:
-    """Return a scenario without its first actor, which is the target: a threat without the threat."""
+    """Return a scenario without its first actor, the target, so that a threat becomes a non-threat."""
     return replace(scenario, actors=scenario.actors[1:])
