@@ -93,9 +93,13 @@ def _fast_draws(usual: dict[str, Draw], weights: dict[str, float]) -> dict[str, 
 def _without_target(threats: dict[str, Draw], names: tuple[str, ...]) -> dict[str, Draw]:
     """Return draws of threats without their target, by the names family + "WithoutTarget".
 
-    They are not drawn for threats on a straight road with three lanes, which EmptyRoad has, too.
+    Each is drawn half as often as its threat, so that the road tells little about the threat. They are not
+    drawn for threats on a straight road with three lanes, which EmptyRoad has, too.
     """
-    return {f"{name}WithoutTarget": Draw(1.0, threats[name].draw, name, False) for name in names}
+    return {
+        f"{name}WithoutTarget": Draw(threats[name].weight / 2.0, threats[name].draw, name, False)
+        for name in names
+    }
 
 
 EXTRA_THREATS = {
@@ -115,8 +119,9 @@ EXTRA_NON_THREATS = {
     **_without_target(
         THREATS | EXTRA_THREATS,
         (
-            *("CCCscp", "CCFtap", "CCFhos", "CCFhol", "CPNA", "CPFA", "CPNCO", "CPLA", "CPTA", "CPRA"),
-            *("CBNA", "CBNAO", "CBFA", "CBLA", "CCRsCurve"),
+            *("CCCscp", "CCFtap", "CCFhos", "CCFhol", "CCRsCurve", "CMCscp", "CMFtap"),
+            *("CPNA", "CPFA", "CPNCO", "CPLA", "CPTA", "CPRA"),
+            *("CBNA", "CBNAO", "CBFA", "CBLA"),
         ),
     ),
 }
