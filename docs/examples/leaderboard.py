@@ -29,7 +29,7 @@ RUNS: dict[str, dict[str, Any]] = {
     "ncap2023-vru": {"suite": "ncap2023-vru", "seeds": 1, **MIXED},
     "false-reaction": {"suite": "false-reaction", "seeds": 5, **MIXED},
     "near-miss": {"suite": "near-miss", "seeds": 5, **MIXED},
-    "without-target": {"suite": "without-target", "seeds": 1, **MIXED},
+    "without-target": {"suite": "ncap2023-vru-without-target", "seeds": 1, **MIXED},
     "traffic": {"suite": "traffic", "seeds": 8, "first_seed": 110, **MIXED},
 }
 

@@ -13,7 +13,7 @@ from lgmd_gym.benchmark.protocols.regulations import (
     r152_vru,
 )
 from lgmd_gym.benchmark.protocols.vulnerable_2023 import ncap2023_vru
-from lgmd_gym.benchmark.protocols.without_target import without_targets
+from lgmd_gym.benchmark.protocols.without_target import SUFFIX, without_targets
 from lgmd_gym.errors import check_known, check_text, unknown_name
 
 TRAFFIC = "traffic"  # the suite without cases, see `lgmd_gym.benchmark.traffic`
@@ -142,10 +142,13 @@ _ALL = (
     ),
     Suite("false-reaction", _false_reaction(), "driving in which braking is a false activation"),
     Suite("near-miss", _near_miss(), "near misses that resolve without braking"),
-    Suite(
-        "without-target",
-        without_targets("without-target", (*ncap2023(), *ncap2023_vru())),
-        "scenarios of ncap2023 and ncap2023-vru without their targets; braking is a false activation",
+    *(
+        Suite(
+            name + SUFFIX,
+            without_targets(name, cases),
+            f"the cases of {name} without their targets, in the same worlds; braking is a false activation",
+        )
+        for name, cases in (("ncap2023", ncap2023()), ("ncap2023-vru", ncap2023_vru()))
     ),
     Suite(
         "random",

@@ -16,8 +16,9 @@ from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.scenarios.random_arguments import THREATS
 
-SLOW_SUITES = ("ncap2023", "ncap2023-vru", "ncap2026", "ncap2026-extended", "speeds", "without-target")
-NO_THREAT_SUITES = ("false-reaction", "near-miss", "nhtsa-false-activation", "without-target")
+WITHOUT_TARGET = ("ncap2023-without-target", "ncap2023-vru-without-target")
+SLOW_SUITES = ("ncap2023", "ncap2023-vru", "ncap2026", "ncap2026-extended", "speeds", *WITHOUT_TARGET)
+NO_THREAT_SUITES = ("false-reaction", "near-miss", "nhtsa-false-activation", *WITHOUT_TARGET)
 UNAVOIDABLE = ("CCFhos", "CCFhol")  # by braking: the oncoming car does not stop
 
 
@@ -58,7 +59,7 @@ def violations(case):
     """Return the expectations on the bounding agents that a case does not meet."""
     rows = bounding_rows(case)
     never, always, oracle = rows["no-brake"], rows["always-brake"], rows["ttc-oracle"]
-    threat = case.scenario.family in THREATS and case.suite != "without-target"
+    threat = case.scenario.family in THREATS and case.suite not in WITHOUT_TARGET
     avoidable = not threat or case.scenario.family not in UNAVOIDABLE
     fault = "premature_brake" if threat else "false_activation"
     expectations = {

@@ -1,28 +1,57 @@
-"""The suite without-target, and the draws of threats without their targets."""
+"""The suites without targets, detections, and the draws of threats without their targets."""
+
+from dataclasses import replace
 
 import pytest
+from support.rows import threat_row
 
+from lgmd_gym.benchmark import RunConfig
+from lgmd_gym.benchmark.analysis.detections import detected_rows
+from lgmd_gym.benchmark.stored_run import StoredRun
 from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.envs.scenarios.distribution import EXTRA_FAMILIES, draw_scenario, level_generator
+from lgmd_gym.envs.scenarios.scenario import without_target
 
-THREATS = {
-    case.name.split("/", 1)[1]: case
-    for suite in ("ncap2023", "ncap2023-vru")
-    for case in SUITES[suite].cases
-    if not case.fcw_driver
-}
+CONFIG = RunConfig(suite="ncap2023", agents=("a",), seeds=1)
 
 
-def test_each_case_is_a_threat_without_its_target():
-    cases = SUITES["without-target"].cases
-    assert len(cases) == 134
-    for case in cases:
-        threat = THREATS.pop(case.name.split("/", 1)[1]).scenario
-        assert case.scenario.actors == threat.actors[1:]
-        for name in ("family", "ego_speed", "ego_profile", "ego_path", "road", "duration"):
-            assert getattr(case.scenario, name) == getattr(threat, name)
-    kept = {(case.scenario.family, case.scenario.ego_speed) for case in cases}
-    assert {(case.scenario.family, case.scenario.ego_speed) for case in THREATS.values()} <= kept
+@pytest.mark.parametrize("suite", ["ncap2023", "ncap2023-vru"])
+def test_each_case_is_a_threat_without_its_target(suite):
+    cases, threats = SUITES[f"{suite}-without-target"].cases, SUITES[suite].cases
+    for case, with_target in zip(cases, threats, strict=True):
+        assert case.name.split("/")[1:] == with_target.name.split("/")[1:]
+        assert case.fcw_driver is with_target.fcw_driver
+        assert case.scenario == without_target(with_target.scenario)
+        assert case.scenario.actors == with_target.scenario.actors[1:]
+
+
+def stored_run(suite, outcomes, **values):
+    """Return a run of agent "a" with the given values of a key by variant."""
+    ((key, by_variant),) = outcomes.items()
+    rows = [
+        threat_row(case=f"{suite}/CCCscp/{name}", world=8000, **{key: value}, **values)
+        for name, value in by_variant.items()
+    ]
+    return StoredRun(replace(CONFIG, suite=suite), rows, False)
+
+
+def test_a_contact_is_detected_where_the_agent_is_quiet_without_the_target():
+    run = stored_run("ncap2023", {"avoided": {"v20": True, "v30": True, "v40": False, "v50": False}})
+    brakes = {"v20": False, "v30": True, "v40": False, "v50": True}
+    alone = stored_run("ncap2023-without-target", {"false_activation": brakes})
+    assert [row["avoided"] for row in detected_rows(run, alone)] == [True, False, False, False]
+    assert [row["avoided"] for row in run.rows] == [True, True, False, False]
+
+
+def test_runs_that_do_not_belong_together():
+    run = stored_run("ncap2023", {"avoided": {"v20": True, "v30": True}})
+    alone = stored_run("ncap2023-without-target", {"false_activation": {"v20": False}})
+    with pytest.raises(ValueError, match=r"lacks ncap2023/CCCscp/v30 of a, seed 0, world 8000; run both"):
+        detected_rows(run, alone)
+    with pytest.raises(
+        ValueError, match=r"a run of ncap2023-without-target is required .*, got one of ncap2023$"
+    ):
+        detected_rows(run, run)
 
 
 @pytest.mark.parametrize("name", [name for name in EXTRA_FAMILIES if name.endswith("WithoutTarget")])

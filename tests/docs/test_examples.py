@@ -1,6 +1,7 @@
 """The scripts in docs/examples run and print plausible results."""
 
 import re
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
@@ -295,3 +296,26 @@ def test_family_scores():
     assert standing.startswith("| r152 | CCRs | 1/2 [")
     with pytest.raises(ValueError, match="the run of r152 has no agent 'b'; it has no-brake, a"):
         script.table(["b"], [run])
+
+
+def test_detections():
+    config = RunConfig(suite="ncap2023", agents=("no-brake", "a"), seeds=1)
+    values = {"premature_brake": False, "speed_reduction": 5.0, "fcw_driver": False}
+    runs = []
+    for suite in ("ncap2023", "ncap2023-without-target"):
+        avoided = {"CCRs/v20": True, "CCRs/v40": False, "CCCscp/v20/target20": True}
+        rows = [threat_row(case=f"{suite}/{case}", avoided=avoided[case], **values) for case in avoided]
+        runs.append(StoredRun(replace(config, suite=suite), rows, False))
+    for row in runs[1].rows:
+        row["false_activation"] = "CCCscp" in row["case"]
+    script = load("detections")
+    crossing, standing, together = script.lines(["a"], *runs)
+    assert (crossing[1], standing[1], together[1]) == ("CCCscp", "CCRs", "all")
+    assert crossing[2].startswith("0/1 [")
+    assert crossing[2].endswith("] (1)")
+    assert standing[2].startswith("1/2 [")
+    assert standing[2].endswith("] (1)")
+    assert together[2].startswith("1/3 [")
+    assert together[2].endswith("] (2)")
+    with pytest.raises(ValueError, match="the run of ncap2023 has no agent 'b'; it has no-brake, a"):
+        script.lines(["b"], *runs)

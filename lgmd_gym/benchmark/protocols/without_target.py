@@ -1,23 +1,26 @@
 """Threats without their target: an agent that brakes there does not brake for the target."""
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 from lgmd_gym.benchmark.case import Case, scenario_case
-from lgmd_gym.envs.scenarios.scenario import Scenario, without_target
+from lgmd_gym.envs.scenarios.scenario import without_target
+
+SUFFIX = "-without-target"
+"""Ending of the names of these suites, after the name of the suite with targets."""
 
 
 def without_targets(suite: str, cases: Iterable[Case]) -> tuple[Case, ...]:
-    """Return cases with the scenarios of others without their targets, each scenario once per family.
+    """Return the cases of a suite without their targets, in the same order and with the same variants.
 
-    The name of a case is that of the first one with its scenario. Scenarios that differ only in their
-    duration, which depends on the target, are the same. Cases with a driver who brakes are omitted.
+    With the order, they also have the worlds of the cases with targets, see `RunConfig.world`.
+
+    Args:
+        suite: Name of the suite with targets; the names of the cases begin with it and `SUFFIX`.
+        cases: Its cases.
     """
-    scenarios: dict[Scenario, tuple[str, Scenario]] = {}
-    for case in cases:
-        if case.fcw_driver:
-            continue
-        scenario = without_target(case.scenario)
-        variant = case.name.split("/", 2)[2]
-        scenarios.setdefault(replace(scenario, duration=1.0), (variant, scenario))
-    return tuple(scenario_case(suite, variant, scenario) for variant, scenario in scenarios.values())
+    return tuple(
+        scenario_case(
+            suite + SUFFIX, case.name.split("/", 2)[2], without_target(case.scenario), case.fcw_driver
+        )
+        for case in cases
+    )

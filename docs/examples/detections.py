@@ -1,0 +1,70 @@
+"""Contacts avoided because of the target, in every scenario family of a suite.
+
+    python docs/examples/detections.py stopping-zone,ttc-oracle ncap2023 ncap2023-without-target
+
+The first argument names the agents; a run folder of `lgmd-gym bench` and one of the same suite without
+targets follow, and more of such pairs. A cell contains the contacts that the agent avoids and in which it
+does not brake without the target, in the same scenario and world, with an interval; in parentheses, all
+contacts avoided. Cases with an FCW driver are left out. The table is in Markdown.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from lgmd_gym.benchmark.analysis.detections import detected_rows
+from lgmd_gym.benchmark.analysis.tables import rate_text
+from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.stored_run import StoredRun, read_run
+from lgmd_gym.benchmark.summary import summarise, without_fcw_driver
+
+
+def lines(agents: Sequence[str], run: StoredRun, without_target: StoredRun) -> list[list[str]]:
+    """Return a line of cells for each family of a run, and one for all of them.
+
+    Raises:
+        ValueError: If a run does not contain one of the agents, or the runs do not belong together.
+    """
+    for agent in agents:
+        if agent not in run.config.agents:
+            known = ", ".join(run.config.agents)
+            raise ValueError(f"the run of {run.config.suite} has no agent {agent!r}; it has {known}")
+    pairs = list(zip(run.rows, detected_rows(run, without_target), strict=True))
+    pairs = [pair for pair in pairs if without_fcw_driver([pair[0]])]
+    families = sorted({_family(row) for row, _ in pairs})
+    groups = {name: [pair for pair in pairs if _family(pair[0]) == name] for name in families} | {
+        "all": pairs
+    }
+    return [
+        [run.config.suite, name, *(_cell(agent, group) for agent in agents)] for name, group in groups.items()
+    ]
+
+
+def _family(row: Row) -> str:
+    return row["case"].split("/")[1]
+
+
+def _cell(agent: str, pairs: Sequence[tuple[Row, Row]]) -> str:
+    avoided, detected = (
+        summarise(agent, "", [row for row in rows if row["agent"] == agent]).avoided
+        for rows in zip(*pairs, strict=True)
+    )
+    return f"{rate_text(detected)} ({avoided.k})"
+
+
+def main(agents: Sequence[str], folders: Sequence[Path]) -> None:
+    """Print the table of pairs of run folders."""
+    table = [["suite", "family", *(f"`{agent}`" for agent in agents)], ["---"] * (len(agents) + 2)]
+    runs = [read_run(folder) for folder in folders]
+    for run, without_target in zip(runs[::2], runs[1::2], strict=True):
+        table += lines(agents, run, without_target)
+    print(*(f"| {' | '.join(line)} |" for line in table), sep="\n")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 4 or len(sys.argv) % 2:
+        sys.exit(__doc__)
+    try:
+        main(sys.argv[1].split(","), [Path(item) for item in sys.argv[2:]])
+    except ValueError as error:
+        sys.exit(str(error))
