@@ -1,4 +1,4 @@
-"""Oracles: agents on ground truth, as upper bounds for any camera and for looming models."""
+"""Oracles: agents on ground truth, as references without errors of perception."""
 
 from math import exp, hypot, inf, isfinite
 from typing import Any

@@ -57,7 +57,9 @@ _EASY_FAMILIES = (
     *("EmptyRoad", "Following", "AdjacentPass", "Overtaken", "CutOut"),
 )
 RANDOM_TASKS = {
-    RANDOM: RandomTask("A random level per episode: all families, worlds and camera conditions.", {}),
+    RANDOM: RandomTask(
+        "A random level per episode: 43 families, all worlds of the split and all camera conditions.", {}
+    ),
     "RandomBrakingEasy": RandomTask(
         "A random level per episode, for first trainings: cars on a straight and even road in clear weather.",
         {"families": _EASY_FAMILIES, "conditions": ("clear",), "road": "smooth"},

@@ -11,6 +11,7 @@ from mcap.reader import make_reader
 from PIL import Image
 
 from lgmd_gym.cli import main as cli
+from lgmd_gym.system.extras import install_command
 from lgmd_gym.video.clips.playback import ClipRun, PlaybackConfig
 
 
@@ -59,7 +60,7 @@ def test_the_file_has_every_frame_layer_and_signal(tmp_path, clip):
 def test_a_missing_package_is_one_line(clip, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "mcap", None)
     assert cli.run(["video", str(clip), "--mcap", "--out", str(tmp_path / "run")]) == 2
-    assert capsys.readouterr().err == (
-        "lgmd-gym: --mcap needs the package mcap: pip install 'lgmd-gym[mcap]'\n"
+    assert (
+        capsys.readouterr().err == f'lgmd-gym: --mcap requires the extra "mcap": {install_command("mcap")}\n'
     )
     assert not (tmp_path / "run").exists()

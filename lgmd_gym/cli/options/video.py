@@ -51,6 +51,6 @@ class Video:
     overlay: bool = False
     """Write the overlay video: frame, excitation, spikes and alert indicator."""
     mcap: bool = False
-    """Write an MCAP file for Foxglove: frames, layers and signals of the neuron (needs lgmd-gym[mcap])."""
+    """Write an MCAP file for Foxglove: frames, layers and signals of the neuron (requires the extra mcap)."""
     plots: bool = True
     """Draw one figure per clip."""

@@ -17,6 +17,7 @@ from PIL import Image
 
 from lgmd_gym._version import __version__
 from lgmd_gym.neuron import LGMD
+from lgmd_gym.system.extras import missing_extra
 from lgmd_gym.system.files import check_new_file
 from lgmd_gym.video.clips.playback import TRACE_COLUMNS, ClipFrame
 
@@ -36,7 +37,7 @@ def check_mcap() -> None:
     try:
         import mcap  # noqa: F401
     except ImportError:
-        raise ValueError("--mcap needs the package mcap: pip install 'lgmd-gym[mcap]'") from None
+        raise missing_extra("--mcap", "mcap") from None
 
 
 class McapWriter:
