@@ -48,10 +48,7 @@ ZONE_INPUTS = {
 
 
 class ZoneFeatures:
-    """Levels of the fields and their low-pass filtered values, on a logarithmic scale.
-
-    Membrane potentials K are converted to responses log(K / (1 - K)). The response of a direction-selective
-    neuron is negative for motion to the left, and so is its level.
+    """Levels of the fields and their low-pass filtered values, see `levels_of`.
 
     Args:
         name: A key of `ZONE_INPUTS`.
@@ -67,11 +64,7 @@ class ZoneFeatures:
 
     def update(self, signal: np.ndarray) -> None:
         """Process one frame: observation of the neurons, shape (cameras,)."""
-        check_zone_shape(self._name, signal.shape)
-        values = np.asarray(signal[self._input.first : self._input.last], np.float64)
-        if self.source in POTENTIALS:
-            values = response_of(values)
-        level = np.copysign(np.log1p(self._input.factor * np.abs(values)), values) / NORM
+        level = levels_of(self._name, np.asarray(signal))
         self._last, self._level = (self._level if self._started else level), level
         self._averages += GAINS * (level - self._averages)
         self._started = True
@@ -79,10 +72,36 @@ class ZoneFeatures:
     def collect(self) -> np.ndarray:
         """Return the features, shape (4 · fields,).
 
-        For all fields in turn: the smaller level of the last two frames, then the averages of the level with
+        For all fields in turn: the weaker level of the last two frames, then the averages of the level with
         time constants of 0.1, 0.4 and 1.2 s, which begin at 0.
         """
-        return np.concatenate([np.minimum(self._level, self._last), self._averages.ravel()])
+        return np.concatenate([weaker(self._level, self._last), self._averages.ravel()])
+
+
+def levels_of(name: str, signal: np.ndarray) -> np.ndarray:
+    """Return the levels of the fields of an input: its signal on a logarithmic scale, float64, (..., fields).
+
+    Membrane potentials K are converted to responses log(K / (1 - K)). The response of a direction-selective
+    neuron is negative for motion to the left, and so is its level.
+
+    Args:
+        name: A key of `ZONE_INPUTS`.
+        signal: Observation of the neurons, shape (..., cameras) or (..., columns).
+
+    Raises:
+        ValueError: If the observation comes from other cameras than the input requires.
+    """
+    check_zone_shape(name, signal.shape[-1:])
+    field = ZONE_INPUTS[name]
+    values = signal[..., field.first : field.last].astype(np.float64)
+    if field.source in POTENTIALS:
+        values = response_of(values)
+    return np.copysign(np.log1p(field.factor * np.abs(values)), values) / NORM
+
+
+def weaker(level: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Return the level with the smaller magnitude, of two frames, so that a single frame is not enough."""
+    return np.where(np.abs(level) <= np.abs(last), level, last)
 
 
 def response_of(potential: np.ndarray) -> np.ndarray:

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from lgmd_gym.agents.sides import NUM_COLUMNS, NUM_MOTION_FIELDS, all_round_cameras
+from lgmd_gym.agents.policies.zone_features import NUM_LEVELS, ZONE_INPUTS, ZoneFeatures
+from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, NUM_MOTION_FIELDS, all_round_cameras
 from lgmd_gym.agents.zones import NUM_FIELDS
-from lgmd_gym.training.offline.mirror import mirror_input
+from lgmd_gym.training.offline.mirror import mirror_input, mirror_of
 
 
 def mirrored(name, values):
@@ -41,6 +42,29 @@ def test_fields_of_the_mirror_image(name, motion):
         for camera in cameras
     ]
     assert mirrored(name, np.array(list(values.values()))).tolist() == expected
+
+
+@pytest.mark.parametrize("name", ["columns", "sides", "sides_ffi"])
+def test_features_of_a_mirrored_sequence_are_the_mirrored_features(name):
+    """All four groups, of which the first one compares two frames, also if motion changes its direction."""
+    rng = np.random.default_rng(0)
+    field = ZONE_INPUTS[name]
+    single = mirror_of(name, field.size)
+    count = field.size // NUM_LEVELS
+    order, signs = single.order[:count], single.signs[:count]
+    length = NUM_COLUMNS if name == "columns" else NUM_ALL_ROUND
+    original, image = ZoneFeatures(name), ZoneFeatures(name)
+    for _ in range(20):
+        response = rng.normal(size=count) if name != "sides_ffi" else rng.uniform(0.0, 3.0, count)
+        response[signs > 0] = np.abs(response[signs > 0])
+        for features, values in ((original, response), (image, response[order] * signs)):
+            signal = np.full(length, 0.5)
+            signal[field.first : field.last] = (
+                values if name == "sides_ffi" else 1.0 / (1.0 + np.exp(-values))
+            )
+            features.update(signal)
+        expected = mirror_input(name, original.collect()[None])[0]
+        assert np.allclose(image.collect(), expected, atol=1e-6)
 
 
 def test_ego_motion_and_forward_fields():

@@ -14,12 +14,10 @@ from lgmd_gym.agents.policies.features import (
 )
 from lgmd_gym.agents.policies.zone_features import (
     GAINS,
-    NORM,
     NUM_LEVELS,
-    POTENTIALS,
     ZONE_INPUTS,
-    check_zone_shape,
-    response_of,
+    levels_of,
+    weaker,
 )
 from lgmd_gym.training.offline.episodes import Observation
 
@@ -61,11 +59,11 @@ def _zone_inputs(
     names = [name for name in features.inputs if name in ZONE_INPUTS]
     if not names:
         return {}
-    parts = [_levels(name, observations[ZONE_INPUTS[name].source]) for name in names]
+    parts = [levels_of(name, observations[ZONE_INPUTS[name].source]) for name in names]
     levels = np.concatenate(parts, axis=1)
     times = range(0, len(levels), features.repeat)
     table = np.empty((len(times), NUM_LEVELS, levels.shape[1]), zone_type)
-    table[:, 0] = np.minimum(levels, np.concatenate([levels[:1], levels[:-1]]))[:: features.repeat]
+    table[:, 0] = weaker(levels, np.concatenate([levels[:1], levels[:-1]]))[:: features.repeat]
     averages = np.zeros((NUM_LEVELS - 1, levels.shape[1]))
     change = np.empty_like(averages)
     for time, level in enumerate(levels):
@@ -77,16 +75,6 @@ def _zone_inputs(
     bounds = np.cumsum([part.shape[1] for part in parts])[:-1]
     tables = np.split(table, bounds, axis=2)
     return {name: values.reshape(len(times), -1).copy() for name, values in zip(names, tables, strict=True)}
-
-
-def _levels(name: str, signals: np.ndarray) -> np.ndarray:
-    """Return the levels of the fields of an input at each frame, float64."""
-    check_zone_shape(name, signals.shape[1:])
-    field = ZONE_INPUTS[name]
-    values = signals[:, field.first : field.last].astype(np.float64)
-    if field.source in POTENTIALS:
-        values = response_of(values)
-    return np.copysign(np.log1p(field.factor * np.abs(values)), values) / NORM
 
 
 def _other_inputs(
