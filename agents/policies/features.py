@@ -65,6 +65,8 @@ class FeatureConfig:
             raise ValueError("inputs must contain at least one policy input, got none")
         for name in self.inputs:
             check_known("policy input", name, INPUTS)
+            if self.inputs.count(name) > 1:
+                raise ValueError(f"inputs must contain each policy input once, got {name!r} twice")
         for name in ("history", "repeat", "shrink"):
             object.__setattr__(self, name, check_whole(name, getattr(self, name), 1, MAX_HISTORY))
         object.__setattr__(self, "latch", check_flag("latch", self.latch))

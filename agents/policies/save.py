@@ -121,7 +121,7 @@ def _demands(env: Any, config: dict[str, Any]) -> tuple[float, ...] | None:
     action = check_mapping("action", config.get("action"))
     space = env.action_space
     if not hasattr(space, "n"):
-        if space.shape != (1,):
+        if space.shape != (1,) or space.low[0] != -1.0 or space.high[0] != 1.0:
             raise ValueError(f"the action must be one demand in [-1, 1], got {space}")
         return None
     default = inspect.signature(DiscreteDemand).parameters["demands"].default

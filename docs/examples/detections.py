@@ -29,6 +29,7 @@ def lines(agents: Sequence[str], run: StoredRun, without_target: StoredRun) -> l
         if agent not in run.config.agents:
             known = ", ".join(run.config.agents)
             raise ValueError(f"the run of {run.config.suite} has no agent {agent!r}; it has {known}")
+    run = run._replace(rows=[row for row in run.rows if row["agent"] in agents])
     pairs = list(zip(run.rows, detected_rows(run, without_target), strict=True))
     pairs = [pair for pair in pairs if without_fcw_driver([pair[0]])]
     families = sorted({_family(row) for row, _ in pairs})

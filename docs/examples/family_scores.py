@@ -13,6 +13,7 @@ from pathlib import Path
 
 from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.stored_run import StoredRun, read_run
+from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import summarise, without_fcw_driver
 
 
@@ -20,11 +21,13 @@ def table(agents: Sequence[str], runs: Sequence[StoredRun]) -> list[str]:
     """Return the lines of the table.
 
     Raises:
-        ValueError: If a run does not contain one of the agents.
+        ValueError: If a run does not contain one of the agents, or is one of traffic.
     """
     lines = [["suite", "family", *(f"`{agent}`" for agent in agents)]]
     lines.append(["---"] * len(lines[0]))
     for run in runs:
+        if run.config.suite == TRAFFIC:
+            raise ValueError("a run of the suite traffic has no families; use all_scores.py for it")
         rows = without_fcw_driver(run.rows)
         where = run.config.suite + ("" if run.config.worlds else ", laboratory")
         for family in sorted({row["case"].split("/")[1] for row in rows}):

@@ -8,6 +8,7 @@ seeds an entry may be trained and tuned on.
 """
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,9 @@ from lgmd_gym import benchmark
 from lgmd_gym.benchmark import RunConfig
 from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.executor import Executor
-from lgmd_gym.benchmark.stored_run import StoredRun, read_run
+from lgmd_gym.benchmark.stored_run import StoredRun, make_plan, read_run
 from lgmd_gym.benchmark.summary import summarise
+from lgmd_gym.errors import counted
 
 # Worlds 8,000 to 8,019 and the road "normal" are the defaults.
 MIXED = {"conditions": ("mixed",)}
@@ -42,11 +44,30 @@ def main(agents: list[str], out: Path, runs: list[str], jobs: int = 1) -> None:
             benchmark.run(config, out / name, Executor(jobs=jobs), plots=False, report=False)
     columns = []
     for name in runs:
-        run = read_run(out / name)
+        run = check_run(read_run(out / name), agents, out / name)
         columns.append(column(run))
         if name == "levels":  # has both threats and other episodes
             columns.append(false_activations(run))
     print(*table(columns), sep="\n")
+
+
+def check_run(run: StoredRun, agents: list[str], folder: Path) -> StoredRun:
+    """Return a run that has all agents and all episodes.
+
+    Raises:
+        ValueError: If an agent or an episode is missing.
+    """
+    for agent in agents:
+        if agent not in run.config.agents:
+            known = ", ".join(run.config.agents)
+            raise ValueError(f"the run in {str(folder)!r} has {known}, not {agent}; choose another --out")
+    missing = make_plan(run.config).total - len(run.rows)
+    if missing:
+        raise ValueError(
+            f"the run in {str(folder)!r} lacks {counted(missing, 'episode')}; "
+            f"complete it with lgmd-gym bench --resume {folder}"
+        )
+    return run
 
 
 def false_activations(run: StoredRun) -> dict[str, str]:
@@ -65,4 +86,7 @@ if __name__ == "__main__":
     parser.add_argument("--runs", nargs="+", choices=list(RUNS), default=list(RUNS))
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args()
-    main(options.agents, options.out, options.runs, options.jobs)
+    try:
+        main(options.agents, options.out, options.runs, options.jobs)
+    except ValueError as error:
+        sys.exit(str(error))

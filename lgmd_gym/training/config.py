@@ -106,6 +106,7 @@ class TrainConfig:
                 f"env_kwargs contains the camera {shown(self.env_kwargs['camera'])}; use the option camera"
             )
         check_type("algo_kwargs", self.algo_kwargs, dict)
+        check_type("policy_kwargs", self.algo_kwargs.get("policy_kwargs"), dict, type(None))
         check_type("features", self.features, FeatureConfig)
         check_type("recordings", self.recordings, str, type(None))
         check_type("wandb", self.wandb, str, type(None))
@@ -236,11 +237,11 @@ class TrainConfig:
     def first_seed(self) -> int:
         """First seed of the training environments; that of an evaluation is `VALIDATION_SEED`.
 
-        A level is the same for every seed, and its split sets the levels. Traffic follows from the seed, and
-        the seeds below `SEED_STRIDE` are those of validation and test.
+        A level is the same for every seed, and its split sets the levels. Other environments, among them
+        traffic, follow from the seed; the seeds below `SEED_STRIDE` are those of validation and test.
         """
-        is_traffic = self.env_id in map(traffic_id, KINDS)
-        return SEED_STRIDE * (self.seed + is_traffic)
+        has_levels = "split" in gym.spec(self.env_id).kwargs and "split" not in self.env_kwargs
+        return SEED_STRIDE * (self.seed + (not has_levels or self.env_id in map(traffic_id, KINDS)))
 
     def features_of(self, split: str) -> FeatureConfig:
         """Return the inputs and timing of the policy; rewards are scaled on "train" only."""

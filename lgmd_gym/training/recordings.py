@@ -156,7 +156,13 @@ def check_recordings(config: TrainConfig) -> None:
         for recordings in recording_sets(config, split):
             files = _folder_of(recordings, config.recordings)
             origin = origin_of(config) | recordings.settings
-            count = sum(check_file(file, origin) for file in sorted(files.glob("*.npz")))
+            stored = sorted(files.glob("*.npz"))
+            for file in stored:
+                if not is_complete(file):
+                    raise ValueError(
+                        f"{str(file)!r} is damaged; delete it, and record it again with --resume"
+                    )
+            count = sum(check_file(file, origin) for file in stored)
             if count == 0:
                 raise ValueError(
                     f"no recorded episodes in {str(files)!r}; "
@@ -184,7 +190,7 @@ def _record_missing(
     with tqdm(total=len(seeds), desc=description, unit="episode", disable=not progress) as bar:
         for start in range(0, len(seeds), FILE_SIZE):
             part, file = seeds[start : start + FILE_SIZE], files / f"{start:06d}.npz"
-            if is_complete(file):
+            if is_complete(file) and check_file(file, origin) == len(part):
                 bar.update(len(part))
                 continue
             by_seed = []

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from lgmd_gym.training.offline.learner import OfflineLearner
 
 CONFIG_FILE = "config.json"
+SET_BY_TRAINER = {"policy", "env", "demands", "seed", "device", "tensorboard_log", "verbose", "self"}
+"""Arguments of algorithms that are not hyperparameters."""
 # Attributes of a saved model that describe its training only, such as paths.
 EXCLUDED = (
     "tensorboard_log",
@@ -69,7 +71,8 @@ def resume(folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
     return value are those of `train`.
 
     Raises:
-        ValueError: If the folder contains no training, or another process trains in it.
+        ValueError: If the folder contains no training, another process trains in it, or the recordings that
+            it reuses are missing or damaged.
     """
     check_whole("jobs", jobs, 1)
     try:
@@ -78,7 +81,12 @@ def resume(folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
         raise ValueError(
             f"{str(folder)!r} contains no training to resume (no readable {CONFIG_FILE})"
         ) from None
-    return _train(TrainConfig.from_dict(values), folder, progress, jobs)
+    config = TrainConfig.from_dict(values)
+    if config.algo == OFFLINE:
+        from lgmd_gym.training.recordings import check_recordings
+
+        check_recordings(config)
+    return _train(config, folder, progress, jobs)
 
 
 def check_config(config: TrainConfig) -> None:
@@ -100,7 +108,7 @@ def check_config(config: TrainConfig) -> None:
             from lgmd_gym.training.online import algorithm_class
 
             known = inspect.signature(algorithm_class(config.algo)).parameters
-            check_keys(f"hyperparameter of {config.algo}", config.algo_kwargs, known)
+            check_keys(f"hyperparameter of {config.algo}", config.algo_kwargs, {*known} - SET_BY_TRAINER)
     finally:
         env.close()
 
@@ -177,5 +185,6 @@ def _train_offline(config: TrainConfig, folder: Path, progress: bool, jobs: int)
 def _make_learner(config: TrainConfig, env: PolicyWrapper) -> "OfflineLearner":
     from lgmd_gym.training.offline.learner import OfflineLearner
 
-    check_keys("hyperparameter of offline", config.algo_kwargs, inspect.signature(OfflineLearner).parameters)
+    known = {*inspect.signature(OfflineLearner).parameters} - SET_BY_TRAINER
+    check_keys("hyperparameter of offline", config.algo_kwargs, known)
     return OfflineLearner(config.policy, env, config.demands, seed=config.seed, **config.algo_kwargs)

@@ -5,6 +5,7 @@ import json
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.wrappers import RescaleAction
 
 import lgmd_gym
 from lgmd_gym import benchmark
@@ -141,6 +142,7 @@ def test_cards_of_other_environments(tmp_path):
 @pytest.mark.parametrize(("make", "words"), [
     (lambda: gym.make("LGMD/CCRs-v0", config={"policy_frequency": 10}), r"PolicyWrapper\(env, repeat=3\)"),
     (lambda: VecFrameStack(SB3VecEnv(ID), 2), r"PolicyWrapper\(env, history=N\)"),
+    (lambda: RescaleAction(gym.make("LGMD/CCRs-v0"), 0.0, 1.0), r"one demand in \[-1, 1\], got Box\(0"),
     (lambda: gym.make("highway-v0"), "the actions of Discrete.* are not demands"),
 ])  # fmt: skip
 def test_an_environment_that_is_not_that_of_an_agent_is_refused(make, words, tmp_path):

@@ -12,7 +12,7 @@ from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.envs.scenarios.distribution import EXTRA_FAMILIES, draw_scenario, level_generator
 from lgmd_gym.envs.scenarios.scenario import without_target
 
-CONFIG = RunConfig(suite="ncap2023", agents=("a",), seeds=1)
+CONFIG = RunConfig(suite="ncap2023", agents=("no-brake",), seeds=1)
 
 
 @pytest.mark.parametrize("suite", ["ncap2023", "ncap2023-vru"])
@@ -41,13 +41,26 @@ def test_a_contact_is_detected_where_the_agent_is_quiet_without_the_target():
     alone = stored_run("ncap2023-without-target", {"false_activation": brakes})
     assert [row["avoided"] for row in detected_rows(run, alone)] == [True, False, False, False]
     assert [row["avoided"] for row in run.rows] == [True, True, False, False]
+    further = alone._replace(config=replace(alone.config, agents=("no-brake", "ttc-oracle")))
+    assert detected_rows(run, further) == detected_rows(run, alone)
+
+
+def test_a_failed_episode_is_no_detection():
+    run = stored_run("ncap2023", {"avoided": {"v20": True}})
+    alone = stored_run("ncap2023-without-target", {"false_activation": {"v20": None}})
+    assert [row["avoided"] for row in detected_rows(run, alone)] == [False]
 
 
 def test_runs_that_do_not_belong_together():
     run = stored_run("ncap2023", {"avoided": {"v20": True, "v30": True}})
     alone = stored_run("ncap2023-without-target", {"false_activation": {"v20": False}})
-    with pytest.raises(ValueError, match=r"lacks ncap2023/CCCscp/v30 of a, seed 0, world 8000; run both"):
+    with pytest.raises(ValueError, match=r"lacks ncap2023/CCCscp/v30 of a, seed 0; run both suites"):
         detected_rows(run, alone)
+    smooth = alone._replace(config=replace(alone.config, road="smooth"))
+    with pytest.raises(
+        ValueError, match="ncap2023-without-target have other settings; run both with the same"
+    ):
+        detected_rows(run, smooth)
     with pytest.raises(
         ValueError, match=r"a run of ncap2023-without-target is required .*, got one of ncap2023$"
     ):

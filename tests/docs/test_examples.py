@@ -296,6 +296,8 @@ def test_family_scores():
     assert standing.startswith("| r152 | CCRs | 1/2 [")
     with pytest.raises(ValueError, match="the run of r152 has no agent 'b'; it has no-brake, a"):
         script.table(["b"], [run])
+    with pytest.raises(ValueError, match="traffic has no families"):
+        script.table(["a"], [run._replace(config=replace(config, suite="traffic"))])
 
 
 def test_detections():
@@ -308,6 +310,7 @@ def test_detections():
         runs.append(StoredRun(replace(config, suite=suite), rows, False))
     for row in runs[1].rows:
         row["false_activation"] = "CCCscp" in row["case"]
+    runs[0].rows.append(threat_row("no-brake", f"{config.suite}/CCRs/v20", avoided=False, **values))
     script = load("detections")
     crossing, standing, together = script.lines(["a"], *runs)
     assert (crossing[1], standing[1], together[1]) == ("CCCscp", "CCRs", "all")

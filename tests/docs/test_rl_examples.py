@@ -154,6 +154,12 @@ def test_leaderboard_prints_a_row_per_agent(monkeypatch, tmp_path, capsys):
         assert lines[0] == f"| agent | {heading} |"
         assert lines[2].startswith("| ttc-oracle | 1/1 ")
     assert [path.name for path in (tmp_path / "board").iterdir()] == ["levels"]
+    with pytest.raises(ValueError, match="levels' has ttc-oracle, not no-brake; choose another --out"):
+        example.main(["no-brake"], tmp_path / "board", ["levels"])
+    rows = tmp_path / "board" / "levels" / "episodes.jsonl"
+    rows.write_text("".join(rows.read_text().splitlines(keepends=True)[:1]))
+    with pytest.raises(ValueError, match="lacks 1 episode; complete it with lgmd-gym bench --resume"):
+        example.main(["ttc-oracle"], tmp_path / "board", ["levels"])
 
 
 def test_easy_levels_are_those_of_the_easy_task():

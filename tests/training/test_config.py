@@ -107,6 +107,8 @@ def test_offline_requires_holding_and_hard_braking(demands):
         ("offline", {"traffic_episodes": -1}, "traffic_episodes must be a whole number >= 0, got -1"),
         ("offline", {"videos": 2}, "videos requires algo 'dqn', 'ppo' or 'sac', got 'offline'"),
         ("dqn", {"videos": -1}, "videos must be a whole number >= 0, got -1"),
+        ("ppo", {"algo_kwargs": {"policy_kwargs": "dict()"}}, "policy_kwargs must be dict or NoneType"),
+        ("ppo", {"inputs": ("ffi", "ego_speed", "ffi")}, "each policy input once, got 'ffi' twice"),
         ("dqn", {"wandb": 3}, "wandb must be str or NoneType, got 3"),
         ("offline", {"inputs": ("zones", "speed_change")}, "does not support the input 'speed_change'"),
         ("ppo", {"n_timestep": 3}, "unknown training option 'n_timestep'; did you mean 'n_timesteps'"),
@@ -135,8 +137,10 @@ def test_ids_with_splits_are_evaluated_on_validation(env_id, expected):
     config.make_env("validation").close()
 
 
-@pytest.mark.parametrize(("env_id", "first"), [(RANDOM_ID, 2_000_000), ("LGMD/Traffic-Merge-v0", 3_000_000)])
-def test_training_in_traffic_leaves_out_the_seeds_of_validation_and_test(env_id, first):
+@pytest.mark.parametrize(("env_id", "first"), [
+    (RANDOM_ID, 2_000_000), ("LGMD/Traffic-Merge-v0", 3_000_000), ("LGMD/CCRs-v0", 3_000_000),
+])  # fmt: skip
+def test_training_without_levels_leaves_out_the_seeds_of_validation_and_test(env_id, first):
     config = TrainConfig.from_hyperparams("ppo", env_id, inputs=("ffi",), camera="fovea", seed=2)
     assert config.first_seed == first
     assert replace(config, seed=0).first_seed == first - 2_000_000
@@ -161,6 +165,9 @@ def test_offline_requires_a_latching_brake(tmp_path):
 @pytest.mark.parametrize(
     ("algo", "algo_kwargs", "message"),
     [
+        ("ppo", {"seed": 3}, "unknown hyperparameter of ppo 'seed'"),
+        ("offline", {"seed": 3}, "unknown hyperparameter of offline 'seed'"),
+        ("offline", {"mirror": True}, "mirror does not support the input 'ffi'; set mirror to false"),
         ("ppo", {"learning_rat": 0.1}, "hyperparameter of ppo 'learning_rat'; did you mean 'learning_rate'"),
         ("offline", {"epochs": 3}, "unknown hyperparameter of offline 'epochs'; did you mean 'n_epochs'"),
         ("offline", {"batch_size": 0}, "batch_size must be a whole number >= 1, got 0"),

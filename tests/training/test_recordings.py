@@ -10,7 +10,7 @@ from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
 from lgmd_gym.training import recordings, train
 from lgmd_gym.training.offline.episodes import EpisodeRecorder
 from lgmd_gym.training.offline.level_recorder import LevelRecorder
-from lgmd_gym.training.offline.storage import check_file, load, save
+from lgmd_gym.training.offline.storage import _difference, check_file, load, save
 from lgmd_gym.training.recordings import check_recordings, load_or_record, origin_of, recording_sets
 
 
@@ -35,16 +35,40 @@ def test_files_restore_every_episode(tmp_path):
             assert np.array_equal(left.observations[name], right.observations[name])
 
 
-def test_file_without_episodes_is_rejected(tmp_path):
-    (tmp_path / "text.npz").write_text("text")
+@pytest.mark.parametrize("text", ["text", ""])
+def test_file_without_episodes_is_rejected(tmp_path, text):
+    (tmp_path / "text.npz").write_text(text)
     with pytest.raises(ValueError, match=r"text\.npz' contains no recorded episodes"):
         load(tmp_path / "text.npz")
+
+
+def test_a_damaged_file_is_rejected_before_training(tmp_path):
+    config = offline_config(tmp_path, recordings=str(tmp_path), eval_episodes=1, n_timesteps=1)
+    for name in ("train", "validation"):
+        write_episodes(tmp_path / "episodes" / name, config, [[synthetic_episode()]])
+    file = tmp_path / "episodes" / "train" / "0.npz"
+    content = bytearray(file.read_bytes())
+    content[100] ^= 255
+    file.write_bytes(content)
+    with pytest.raises(ValueError, match=r"0\.npz' is damaged; delete it, and record it again with --resume"):
+        check_recordings(config)
+
+
+def test_the_message_for_other_settings_shows_the_first_difference():
+    lenses = [{"name": "fovea", "reach": 1.0, "span_m": 2.4}, {"name": "wide", "reach": 1.0}]
+    others = [lenses[0], {"name": "wide", "reach": 2.0}]
+    assert _difference(lenses, others) == ({"reach": 1.0}, {"reach": 2.0})
+    assert _difference(lenses, lenses[:1]) == (lenses, lenses[:1])
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"camera": "wide"}, 'another camera \\("fovea", not "wide"\\); record new episodes'),
+        ({"camera": "wide"}, 'another camera \\("fovea", not "wide"\\); omit --recordings'),
+        (
+            {"camera": {"name": "fovea", "shape": (9, 16)}},
+            r'another camera \("fovea", not {"name": "fovea", "shape": \[9, 16\]}\)',
+        ),
         ({"n_timesteps": 9}, "holds 2 episodes, 9 are required; reduce the number"),
         ({"inputs": ("frame",), "n_timesteps": 2}, "recorded with another shrink"),
     ],
@@ -83,6 +107,11 @@ def test_interrupted_recording_resumes_at_the_missing_file(tmp_path, monkeypatch
     assert recorded == [range(2, 4), range(4, 5)]
     expected = [synthetic_episode(seed=seed).rewards[0] for seed in range(5)]
     assert [episode.rewards[0] for episode in episodes] == expected
+    del recorded[:]
+    load_or_record(replace(config, n_timesteps=6), "train", tmp_path)
+    assert recorded == [range(4, 6)]  # of the last file, which had one seed
+    with pytest.raises(ValueError, match="recorded with another env_kwargs"):
+        load_or_record(replace(config, env_kwargs={"world": 3}), "train", tmp_path)
 
 
 def test_recorder_is_that_of_the_engine_where_it_has_the_id(tmp_path):

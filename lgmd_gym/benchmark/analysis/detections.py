@@ -1,5 +1,7 @@
 """Contacts that an agent avoids because of the target, and not because of the road."""
 
+from dataclasses import replace
+
 from lgmd_gym.benchmark.protocols.without_target import SUFFIX
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.stored_run import StoredRun
@@ -10,11 +12,12 @@ def detected_rows(run: StoredRun, without_target: StoredRun) -> list[Row]:
 
     Args:
         run: Run of a suite, "ncap2023" for example.
-        without_target: Run of the same suite without targets, "ncap2023-without-target", with the same
-            agents, seeds, worlds, conditions and road. An agent brakes there where it has a false activation.
+        without_target: Run of the same suite without targets, "ncap2023-without-target", otherwise with the
+            same configuration; it may have further agents. An agent brakes where it has a false activation.
 
     Raises:
-        ValueError: If the second run is of another suite, or lacks an episode of the first one.
+        ValueError: If the second run is of another suite, has another configuration, or lacks an episode of
+            the first one.
     """
     expected = run.config.suite + SUFFIX
     if without_target.config.suite != expected:
@@ -22,12 +25,19 @@ def detected_rows(run: StoredRun, without_target: StoredRun) -> list[Row]:
             f"a run of {expected} is required beside one of {run.config.suite}, got one of "
             f"{without_target.config.suite}"
         )
-    quiet = {_key(row): not row["false_activation"] for row in without_target.rows}
+    same = {"suite": expected, "agents": without_target.config.agents}
+    if replace(run.config, **same) != without_target.config:
+        raise ValueError(
+            f"the runs of {run.config.suite} and {expected} have other settings; run both with the same "
+            "seeds, worlds, conditions, road, camera and params"
+        )
+    # A failed episode (false_activation is None) is no evidence.
+    quiet = {_key(row): row["false_activation"] is False for row in without_target.rows}
     for row in run.rows:
         if _key(row) not in quiet:
             raise ValueError(
-                f"the run of {expected} lacks {row['case']} of {row['agent']}, seed {row['seed']}, world "
-                f"{row['world']}; run both suites with the same agents, seeds, worlds, conditions and road"
+                f"the run of {expected} lacks {row['case']} of {row['agent']}, seed {row['seed']}; run both "
+                "suites with the same agents, and to the end"
             )
     return [row | {"avoided": row["avoided"] and quiet[_key(row)]} for row in run.rows]
 

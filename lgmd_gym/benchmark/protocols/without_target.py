@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from lgmd_gym.benchmark.case import Case, scenario_case
+from lgmd_gym.envs.registration import APPEARANCE
 from lgmd_gym.envs.scenarios.scenario import without_target
 
 SUFFIX = "-without-target"
@@ -12,7 +13,8 @@ SUFFIX = "-without-target"
 def without_targets(suite: str, cases: Iterable[Case]) -> tuple[Case, ...]:
     """Return the cases of a suite without their targets, in the same order and with the same variants.
 
-    With the order, they also have the worlds of the cases with targets, see `RunConfig.world`.
+    With the order, they also have the worlds of the cases with targets, see `RunConfig.world`. The grey
+    levels of the other actors may differ, because they are drawn in the order of the actors.
 
     Args:
         suite: Name of the suite with targets; the names of the cases begin with it and `SUFFIX`.
@@ -20,7 +22,11 @@ def without_targets(suite: str, cases: Iterable[Case]) -> tuple[Case, ...]:
     """
     return tuple(
         scenario_case(
-            suite + SUFFIX, case.name.split("/", 2)[2], without_target(case.scenario), case.fcw_driver
+            suite + SUFFIX,
+            case.name.split("/", 2)[2],
+            without_target(case.scenario),
+            case.fcw_driver,
+            **{name: value for name, value in case.arguments if name in APPEARANCE},
         )
         for case in cases
     )

@@ -17,6 +17,7 @@ from lgmd_gym.training.offline.ensemble import (
     merged_layers,
 )
 from lgmd_gym.training.offline.evaluation import Evaluation, evaluate, select_margin
+from lgmd_gym.training.offline.mirror import check_mirror
 from lgmd_gym.training.offline.models import make_model, network_arguments
 from lgmd_gym.training.offline.objective import expected_return, scale_false_braking_cost
 from lgmd_gym.training.offline.standardisation import Standardisation, measure
@@ -120,6 +121,8 @@ class OfflineLearner:
         if n_networks > 1:
             check_without_frames(self.networks[0], "n_networks", 1)
             self.model = make_model(policy, env, seed, merged_layers(kwargs, n_networks))
+        if self.mirror:
+            check_mirror(env.observation_space.spaces)
         if self.standardise:
             check_without_frames(self.networks[0], "standardise", False)
         odds = initial_brake_probability / (1.0 - initial_brake_probability)

@@ -4,6 +4,7 @@ A level and its mirror image have the same outcomes. Mirrored inputs are therefo
 roads with traffic on the left.
 """
 
+from collections.abc import Iterable
 from functools import cache
 from typing import NamedTuple
 
@@ -22,6 +23,8 @@ from lgmd_gym.agents.zones import NUM_FIELDS
 
 EVEN = ("ego_speed", "known_deceleration", "zones", "zones_spikes", "zones_ffi")
 """Inputs that the mirror image does not change."""
+EXCHANGED = ("columns", "sides", "sides_ffi")
+"""Inputs of which the mirror image exchanges left and right."""
 
 
 class Mirror(NamedTuple):
@@ -49,6 +52,13 @@ def mirror_input(name: str, values: np.ndarray) -> np.ndarray:
     return image
 
 
+def check_mirror(names: Iterable[str]) -> None:
+    """Raise ValueError for an input without a known mirror image."""
+    for name in names:
+        if name not in (*EVEN, *EXCHANGED, "ego_yaw_rate"):
+            raise ValueError(f"mirror does not support the input {name!r}; set mirror to false")
+
+
 @cache
 def mirror_of(name: str, size: int) -> Mirror:
     """Return the mirror image of a policy input.
@@ -64,8 +74,7 @@ def mirror_of(name: str, size: int) -> Mirror:
         return Mirror(np.arange(size), np.ones(size, np.float32))
     if name == "ego_yaw_rate":
         return Mirror(np.arange(size), np.full(size, -1.0, np.float32))
-    if name not in ("columns", "sides", "sides_ffi"):
-        raise ValueError(f"mirror does not support the input {name!r}; set mirror to false")
+    check_mirror([name])
     single = _columns() if name == "columns" else _fields(signed=name == "sides")
     count = len(single.order)
     assert size == NUM_LEVELS * count == ZONE_INPUTS[name].size

@@ -73,10 +73,26 @@ def check_file(file: Path, origin: dict[str, Any]) -> int:
             if recorded.get(key) != value and not (key == "shrink" and value is None):
                 raise ValueError(
                     f"the episodes in {str(file)!r} were recorded with another {key} "
-                    f"({_abbreviated(recorded.get(key))}, not {_abbreviated(value)}); "
-                    "record new episodes by omitting --recordings"
+                    f"({', not '.join(map(_abbreviated, _difference(recorded.get(key), value)))}); "
+                    "omit --recordings, or record in a new training folder"
                 )
         return len(archive["counts"])
+
+
+def _difference(recorded: Any, required: Any) -> tuple[Any, Any]:
+    """Return the first different elements of two lists or dicts, at any depth, or else the two values."""
+    pairs: list[tuple[Any, Any]] = []
+    if isinstance(recorded, list) and isinstance(required, list) and len(recorded) == len(required):
+        pairs = list(zip(recorded, required, strict=True))
+    elif isinstance(recorded, dict) and isinstance(required, dict):
+        keys = dict.fromkeys([*required, *recorded])
+        pairs = [({key: recorded.get(key)}, {key: required.get(key)}) for key in keys]
+        if len(keys) == 1:
+            return recorded, required
+    for pair in pairs:
+        if pair[0] != pair[1]:
+            return _difference(*pair)
+    return recorded, required
 
 
 def _abbreviated(value: Any) -> str:
@@ -87,9 +103,10 @@ def _abbreviated(value: Any) -> str:
 def _open(file: Path) -> Any:
     try:
         archive = np.load(file)
-        if "origin" not in archive:
-            raise ValueError("no entry 'origin'")
-    except (OSError, ValueError, BadZipFile) as error:
+        for name in ("origin", "counts"):
+            if name not in archive:
+                raise ValueError(f"no entry {name!r}")
+    except (OSError, EOFError, ValueError, BadZipFile) as error:
         raise ValueError(f"{str(file)!r} contains no recorded episodes ({error})") from None
     return archive
 
