@@ -37,7 +37,8 @@ def lines(agents: Sequence[str], run: StoredRun, without_target: StoredRun) -> l
         "all": pairs
     }
     return [
-        [run.config.suite, name, *(_cell(agent, group) for agent in agents)] for name, group in groups.items()
+        [str(run.config.suite), name, *(_cell(agent, group) for agent in agents)]
+        for name, group in groups.items()
     ]
 
 

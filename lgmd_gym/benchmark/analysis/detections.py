@@ -19,7 +19,7 @@ def detected_rows(run: StoredRun, without_target: StoredRun) -> list[Row]:
         ValueError: If the second run is of another suite, has another configuration, or lacks an episode of
             the first one.
     """
-    expected = run.config.suite + SUFFIX
+    expected = f"{run.config.suite}{SUFFIX}"
     if without_target.config.suite != expected:
         raise ValueError(
             f"a run of {expected} is required beside one of {run.config.suite}, got one of "

@@ -122,7 +122,7 @@ class OfflineLearner:
             check_without_frames(self.networks[0], "n_networks", 1)
             self.model = make_model(policy, env, seed, merged_layers(kwargs, n_networks))
         if self.mirror:
-            check_mirror(env.observation_space.spaces)
+            check_mirror(self.networks[0].observation_space.spaces)
         if self.standardise:
             check_without_frames(self.networks[0], "standardise", False)
         odds = initial_brake_probability / (1.0 - initial_brake_probability)
