@@ -142,6 +142,11 @@ class TrainConfig:
             )
         if not self.features.latch:
             raise ValueError("algo 'offline' requires latch: true in its hyperparameters")
+        if self.traffic_episodes and {"reward", "brake"} & set(self.env_kwargs.get("config") or {}):
+            raise ValueError(
+                "traffic_episodes have the default reward and brake, got others in env_kwargs; "
+                "omit one of the two"
+            )
         if self.videos:
             raise ValueError("videos requires algo 'dqn', 'ppo' or 'sac', got 'offline'; omit it")
         if "speed_change" in self.features.inputs:

@@ -105,6 +105,11 @@ def test_offline_requires_holding_and_hard_braking(demands):
             "extra_levels requires env 'LGMD/RandomBraking-v0', got 'LGMD/CCRs-v0'",
         ),
         ("offline", {"traffic_episodes": -1}, "traffic_episodes must be a whole number >= 0, got -1"),
+        (
+            "offline",
+            {"traffic_episodes": 3, "env_kwargs": {"config": {"reward": {"brake": 5.0}}}},
+            "traffic_episodes have the default reward and brake",
+        ),
         ("offline", {"videos": 2}, "videos requires algo 'dqn', 'ppo' or 'sac', got 'offline'"),
         ("dqn", {"videos": -1}, "videos must be a whole number >= 0, got -1"),
         ("ppo", {"algo_kwargs": {"policy_kwargs": "dict()"}}, "policy_kwargs must be dict or NoneType"),

@@ -31,8 +31,9 @@ def braking_outcomes(length: int, replay: Callable[[int], BrakingOutcome]) -> li
 
     Every twelfth decision is replayed, and the midpoint of each interval between two of them. If the return
     at the midpoint deviates from the linear interpolation by more than 0.05, or the three outcomes differ in
-    contact, both halves are refined in the same way. Otherwise the interval is interpolated. The first
-    decision from which braking no longer avoids a contact is exact.
+    contact, both halves are refined in the same way. Otherwise the interval is interpolated. Where contacts
+    change once with the decision, that decision is exact; two changes between neighbouring replays, at most
+    six decisions apart, are not noticed.
 
     Args:
         length: Number of decisions, >= 1.
@@ -56,11 +57,12 @@ def batch_outcomes(
     requests = {index: next(item) for index, item in enumerate(rounds)}
     while requests:
         pairs = [(index, onset) for index, onsets in requests.items() for onset in onsets]
-        found = iter(replay(pairs))
+        found = dict(zip(pairs, replay(pairs), strict=True))
         following: dict[int, list[int]] = {}
         for index, onsets in requests.items():
+            outcomes = [found[index, onset] for onset in onsets]
             try:
-                following[index] = rounds[index].send([next(found) for _ in onsets])
+                following[index] = rounds[index].send(outcomes)
             except StopIteration as stop:
                 results[index] = stop.value
         requests = following

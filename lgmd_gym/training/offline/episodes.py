@@ -51,9 +51,28 @@ class RecordedEpisode:
     def __len__(self) -> int:
         return len(self.rewards)
 
+    @classmethod
+    def from_outcomes(
+        cls,
+        observations: list[Observation],
+        rewards: list[float],
+        outcomes: list[BrakingOutcome],
+        threat: bool,
+        family: str,
+    ) -> "RecordedEpisode":
+        """Return the episode of observations, rewards and outcomes of braking, one each per decision."""
+        return cls(
+            stack(observations),
+            rewards=np.array(rewards, np.float32),
+            braking_returns=np.array([item.episode_return for item in outcomes], np.float32),
+            braking_contacts=np.array([item.contact for item in outcomes]),
+            threat=threat,
+            family=family,
+        )
+
 
 RecordFunction: TypeAlias = Callable[[range], list[list[RecordedEpisode]]]
-"""Method `record` of `EpisodeRecorder` and `TrafficRecorder`: the episodes of each seed."""
+"""Method `record` of `EpisodeRecorder`, `LevelRecorder` and `TrafficRecorder`: the episodes of each seed."""
 
 
 def record_parallel(
@@ -136,13 +155,8 @@ class EpisodeRecorder:
             return _brake_to_end(copy, self.brake)
 
         outcomes = braking_outcomes(len(observations), replay)
-        return RecordedEpisode(
-            stack(observations),
-            rewards=np.array(rewards, np.float32),
-            braking_returns=np.array([item.episode_return for item in outcomes], np.float32),
-            braking_contacts=np.array([item.contact for item in outcomes]),
-            threat=bool(info["collision"]),
-            family=_family_of(env),
+        return RecordedEpisode.from_outcomes(
+            observations, rewards, outcomes, bool(info["collision"]), _family_of(env)
         )
 
 

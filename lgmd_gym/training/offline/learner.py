@@ -145,23 +145,14 @@ class OfflineLearner:
             log: Called after each epoch with its number and its metrics, and with `select_margin` once
                 more for the selected margin.
         """
-        steps = -(-len(train) // self.batch_size)
-        optimizers = [self._make_optimizer(network, self.n_epochs * steps) for network in self.networks]
+        steps = self.n_epochs * -(-len(train) // self.batch_size)
+        optimizers = [self._make_optimizer(network, steps) for network in self.networks]
         rng = np.random.default_rng(self._seed)
         if self.standardise:
             self._standardisation = self._measure(train)
         best_return, best_weights = -np.inf, [_copy_weights(network) for network in self.networks]
         for epoch in range(1, self.n_epochs + 1):
-            train_return = 0.0
-            for indices in np.array_split(rng.permutation(len(train)), steps):
-                mirrored = rng.random(len(indices)) < 0.5 if self.mirror else ()
-                batch = scale_false_braking_cost(train.batch(indices, mirrored), self.false_cost)
-                features = self._shared_features(batch)
-                returns = [
-                    self._update(network, optimizer, batch, features)
-                    for network, optimizer in zip(self.networks, optimizers, strict=True)
-                ]
-                train_return += float(np.mean(returns)) * len(indices) / len(train)
+            train_return = self._train_epoch(train, optimizers, rng)
             evaluation = evaluate(self.logits, validation)
             if evaluation.mean_return > best_return:
                 best_return = evaluation.mean_return
@@ -179,6 +170,23 @@ class OfflineLearner:
         if len(self.networks) > 1:
             merge_networks(self.networks, self.model.policy)
         return self.model
+
+    def _train_epoch(
+        self, train: OfflineDataset, optimizers: list[_Optimizer], rng: np.random.Generator
+    ) -> float:
+        """Train on each episode once, and return the mean return with the weighted cost of false braking."""
+        mean_return = 0.0
+        batches = -(-len(train) // self.batch_size)
+        for indices in np.array_split(rng.permutation(len(train)), batches):
+            mirrored = rng.random(len(indices)) < 0.5 if self.mirror else ()
+            batch = scale_false_braking_cost(train.batch(indices, mirrored), self.false_cost)
+            features = self._shared_features(batch)
+            returns = [
+                self._update(network, optimizer, batch, features)
+                for network, optimizer in zip(self.networks, optimizers, strict=True)
+            ]
+            mean_return += float(np.mean(returns)) * len(indices) / len(train)
+        return mean_return
 
     @torch.no_grad()
     def _subtract_margin(self, margin: float) -> None:

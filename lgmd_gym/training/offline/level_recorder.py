@@ -12,7 +12,7 @@ from lgmd_gym.agents.base import HOLD
 from lgmd_gym.engine import BrakingVectorEnv
 from lgmd_gym.engine.simulation import Simulation, Snapshot
 from lgmd_gym.training.offline.braking_outcomes import STRIDE, BrakingOutcome, batch_outcomes
-from lgmd_gym.training.offline.episodes import Observation, RecordedEpisode, select_signals, stack
+from lgmd_gym.training.offline.episodes import Observation, RecordedEpisode, select_signals
 
 NUM_ENVS = 4  # environments with cameras; more are slower, because fewer tables fit in the cache
 NUM_REPLAYS = 128  # environments without cameras that replay braking
@@ -30,13 +30,8 @@ class _Run:
 
     def to_episode(self, outcomes: list[BrakingOutcome]) -> RecordedEpisode:
         """Return the episode with the outcomes of braking."""
-        return RecordedEpisode(
-            stack(self.observations),
-            rewards=np.array(self.rewards, np.float32),
-            braking_returns=np.array([item.episode_return for item in outcomes], np.float32),
-            braking_contacts=np.array([item.contact for item in outcomes]),
-            threat=self.threat,
-            family=self.family,
+        return RecordedEpisode.from_outcomes(
+            self.observations, self.rewards, outcomes, self.threat, self.family
         )
 
 
