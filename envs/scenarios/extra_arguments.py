@@ -93,14 +93,9 @@ def _fast_draws(usual: dict[str, Draw], weights: dict[str, float]) -> dict[str, 
 def _without_target(threats: dict[str, Draw], names: tuple[str, ...]) -> dict[str, Draw]:
     """Return draws of threats without their target, by the names family + "WithoutTarget".
 
-    Their weights are half those of the threats. With all families, each is drawn about as often as its
-    threat, because the weights of the non-threats sum to about half those of the threats. They are not drawn
-    for threats on a straight road with three lanes, which EmptyRoad has, too.
+    They are not drawn for threats on a straight road with three lanes, which EmptyRoad has, too.
     """
-    return {
-        f"{name}WithoutTarget": Draw(threats[name].weight / 2.0, threats[name].draw, name, False)
-        for name in names
-    }
+    return {f"{name}WithoutTarget": Draw(1.0, threats[name].draw, name, False) for name in names}
 
 
 EXTRA_THREATS = {
