@@ -75,7 +75,10 @@ def test_trained_policy_acts_as_the_model_predicts(tmp_path, capsys, demands, la
 
 
 def test_neighbouring_seeds_share_no_environment_seeds(tmp_path, monkeypatch):
-    """The constructor of stable-baselines3 seeds environment i with seed + i; the last seeding counts."""
+    """The constructor of stable-baselines3 seeds environment i with seed + i; the last seeding counts.
+
+    CCRs has no levels, so that the seeds below 1,000,000 are those of evaluations.
+    """
     from lgmd_gym.training.policy_vec_env import PolicyVecEnv
 
     seeds, seed_envs = [], PolicyVecEnv.seed
@@ -85,7 +88,7 @@ def test_neighbouring_seeds_share_no_environment_seeds(tmp_path, monkeypatch):
     for seed in (0, 1):
         seeds.clear()
         train(online_config(tmp_path, n_timesteps=32, eval_freq=10_000, seed=seed), tmp_path / f"{seed}")
-        assert seeds[-1] == 1_000_000 * seed
+        assert seeds[-1] == 1_000_000 * (seed + 1)
 
 
 def test_traffic_trains_in_training_worlds_and_is_evaluated_in_those_of_validation(tmp_path, monkeypatch):
