@@ -12,6 +12,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from family_scores import check_agents
+
 from lgmd_gym.benchmark.analysis.detections import detected_rows
 from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.rows import Row
@@ -25,10 +27,7 @@ def lines(agents: Sequence[str], run: StoredRun, without_target: StoredRun) -> l
     Raises:
         ValueError: If a run does not contain one of the agents, or the runs do not belong together.
     """
-    for agent in agents:
-        if agent not in run.config.agents:
-            known = ", ".join(run.config.agents)
-            raise ValueError(f"the run of {run.config.suite} has no agent {agent!r}; it has {known}")
+    check_agents(agents, run)
     run = run._replace(rows=[row for row in run.rows if row["agent"] in agents])
     pairs = list(zip(run.rows, detected_rows(run, without_target), strict=True))
     pairs = [pair for pair in pairs if without_fcw_driver([pair[0]])]

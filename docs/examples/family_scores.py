@@ -30,17 +30,23 @@ def table(agents: Sequence[str], runs: Sequence[StoredRun]) -> list[str]:
             raise ValueError("a run of the suite traffic has no families; use all_scores.py for it")
         rows = without_fcw_driver(run.rows)
         where = run.config.suite + ("" if run.config.worlds else ", laboratory")
+        check_agents(agents, run)
         for family in sorted({row["case"].split("/")[1] for row in rows}):
             cells = []
             for agent in agents:
-                if agent not in run.config.agents:
-                    known = ", ".join(run.config.agents)
-                    raise ValueError(f"the run of {run.config.suite} has no agent {agent!r}; it has {known}")
                 of_family = [row for row in rows if row["case"].split("/")[1] == family]
                 result = summarise(agent, "", [row for row in of_family if row["agent"] == agent])
                 cells.append(rate_text(result.avoided if result.avoided.n else result.false_activations))
             lines.append([where, family, *cells])
     return [f"| {' | '.join(line)} |" for line in lines]
+
+
+def check_agents(agents: Sequence[str], run: StoredRun) -> None:
+    """Raise ValueError if a run does not contain one of the agents."""
+    for agent in agents:
+        if agent not in run.config.agents:
+            known = ", ".join(run.config.agents)
+            raise ValueError(f"the run of {run.config.suite} has no agent {agent!r}; it has {known}")
 
 
 if __name__ == "__main__":
