@@ -160,7 +160,8 @@ def check_recordings(config: TrainConfig) -> None:
             for file in stored:
                 if not is_complete(file):
                     raise ValueError(
-                        f"{str(file)!r} is damaged; delete it, and record it again with --resume"
+                        f"{str(file)!r} is damaged; "
+                        f"lgmd-gym train --resume {config.recordings} records it again"
                     )
             count = sum(check_file(file, origin) for file in stored)
             if count == 0:
