@@ -13,7 +13,6 @@ from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
 from lgmd_gym.camera import CameraSpec
 from lgmd_gym.camera.spec import check_camera
-from lgmd_gym.envs.scenarios.distribution import EXTRA_FAMILIES, check_families
 from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
 from lgmd_gym.errors import (
     check_items,
@@ -25,6 +24,7 @@ from lgmd_gym.errors import (
     check_within,
     shown,
 )
+from lgmd_gym.training.extra_levels import EXAMPLE, ExtraLevels
 from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
 
@@ -61,9 +61,8 @@ class TrainConfig:
         recordings: Folder of an offline training run, to reuse its recorded episodes; None to record anew.
         traffic_episodes: Number of traffic episodes that "offline" trains on in addition; a quarter as many
             are added to its evaluations.
-        extra_levels: Number of levels of `extra_families` that "offline" trains on in addition; a twentieth
-            as many are added to its evaluations.
-        extra_families: Scenario families of the extra levels.
+        extra_levels: Levels that "offline" trains on in addition, a number and scenario families each, for
+            example "400:CCRsCurve,StandingBox"; a twentieth as many are added to its evaluations.
         videos: Number of validation episodes in videos at each evaluation; not for "offline".
         wandb: Project of Weights & Biases that the training is logged to; None for no log there.
 
@@ -86,8 +85,7 @@ class TrainConfig:
     eval_episodes: int = 96
     recordings: str | None = None
     traffic_episodes: int = 0
-    extra_levels: int = 0
-    extra_families: Sequence[str] = ()
+    extra_levels: Sequence[str] = ()
     videos: int = 0
     wandb: str | None = None
 
@@ -95,7 +93,7 @@ class TrainConfig:
         check_known("algorithm", self.algo, ALGORITHMS)
         for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes"):
             object.__setattr__(self, name, check_whole(name, getattr(self, name), 1))
-        for name in ("traffic_episodes", "extra_levels", "seed", "videos"):
+        for name in ("traffic_episodes", "seed", "videos"):
             object.__setattr__(self, name, check_whole(name, getattr(self, name), 0))
         check_text("env_id", self.env_id)
         check_text("policy", self.policy)
@@ -124,13 +122,10 @@ class TrainConfig:
         self._check_extra_levels()
 
     def _check_extra_levels(self) -> None:
-        families = check_items("extra_families", self.extra_families, str, "names")
-        object.__setattr__(self, "extra_families", check_families(families) if families else ())
-        if bool(self.extra_levels) != bool(families):
-            raise ValueError(
-                f"extra_levels and extra_families require each other, got {self.extra_levels} and "
-                f"{list(families)}; use for example --extra-levels 400 --extra-families {EXTRA_FAMILIES[0]}"
-            )
+        texts = check_items("extra_levels", self.extra_levels, str, f"texts such as {EXAMPLE!r}")
+        object.__setattr__(self, "extra_levels", texts)
+        for text in texts:
+            ExtraLevels.parse(text)
         if self.extra_levels and self.env_id != RANDOM_ID:
             raise ValueError(f"extra_levels requires env {RANDOM_ID!r}, got {self.env_id!r}; omit it")
 

@@ -16,6 +16,7 @@ from lgmd_gym.agents.policies.features import FRAME
 from lgmd_gym.camera import BirdsEye
 from lgmd_gym.sensing.cameras import make_cameras
 from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
+from lgmd_gym.training.extra_levels import ExtraLevels
 from lgmd_gym.training.offline.episodes import (
     CHUNK_SIZE,
     EpisodeRecorder,
@@ -39,7 +40,7 @@ class RecordingSet:
     """Recorded episodes of one kind.
 
     Attributes:
-        name: Name of the folder: "train" or "validation", also with "extra-" or "traffic-" before it.
+        name: Name of the folder: "train" or "validation", also after "extra1-", "extra2-" … or "traffic-".
         seeds: Seeds of the environment.
         record: Returns the episodes of each seed.
         option: Options of the command line that record these episodes.
@@ -63,14 +64,15 @@ def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
     count = config.n_timesteps if train else config.eval_episodes
     levels = _level_recorder(config, split)
     sets = [RecordingSet(split, range(first, first + count), levels.record)]
-    if config.extra_levels:
-        families = list(config.extra_families)
-        extra = replace(config, env_kwargs=config.env_kwargs | {"families": families})
-        count = config.extra_levels if train else -(-config.extra_levels // EXTRA_RATIO)
-        option = f" --extra-levels {config.extra_levels} --extra-families {' '.join(families)}"
-        record = _level_recorder(extra, split).record
+    for number, text in enumerate(config.extra_levels, 1):
+        extra = ExtraLevels.parse(text)
+        families = list(extra.families)
+        changed = replace(config, env_kwargs=config.env_kwargs | {"families": families})
+        count = extra.count if train else -(-extra.count // EXTRA_RATIO)
+        option = f" --extra-levels {' '.join(config.extra_levels)}"
+        record = _level_recorder(changed, split).record
         seeds = range(first, first + count)
-        sets.append(RecordingSet(f"extra-{split}", seeds, record, option, {"families": families}))
+        sets.append(RecordingSet(f"extra{number}-{split}", seeds, record, option, {"families": families}))
     if config.traffic_episodes:
         # The traffic suite of the benchmark uses the seeds from 0 on.
         first = SEED_STRIDE * (config.seed + 1) if train else VALIDATION_SEED

@@ -148,20 +148,27 @@ def test_traffic_recordings_are_required_in_addition(tmp_path):
 
 
 def test_extra_levels_are_of_the_chosen_families(tmp_path):
-    options = {"extra_levels": 41, "extra_families": ["CurvePass"], "eval_episodes": 2, "n_timesteps": 3}
-    config = offline_config(tmp_path, **options)
+    texts = ["41:CurvePass", "20:CCRs,EmptyRoad"]
+    config = offline_config(tmp_path, extra_levels=texts, eval_episodes=2, n_timesteps=3)
     sets = [*recording_sets(config, "train"), *recording_sets(config, "validation")]
-    assert [item.name for item in sets] == ["train", "extra-train", "validation", "extra-validation"]
-    assert [len(item.seeds) for item in sets] == [3, 41, 2, 3]
+    names = ["train", "extra1-train", "extra2-train", "validation", "extra1-validation", "extra2-validation"]
+    assert [item.name for item in sets] == names
+    assert [len(item.seeds) for item in sets] == [3, 41, 20, 2, 3, 1]
     ((episode,),) = sets[1].record(range(1))
     assert not episode.threat
     assert len(episode) == pytest.approx(7.3 * 30, abs=9)  # the third car is met after 7 s
-    reused = replace(config, recordings=str(tmp_path), extra_levels=1, eval_episodes=1, n_timesteps=1)
+    assert {episode.family for (episode,) in sets[2].record(range(6))} == {"CCRs", "EmptyRoad"}
+
+
+def test_reused_extra_levels_are_of_the_same_families(tmp_path):
+    text = "1:CurvePass"
+    config = offline_config(tmp_path, extra_levels=[text], eval_episodes=1, n_timesteps=1)
+    reused = replace(config, recordings=str(tmp_path))
     for name in ("train", "validation"):
         write_episodes(tmp_path / "episodes" / name, config, [[synthetic_episode()]])
-    with pytest.raises(ValueError, match="offline --extra-levels 1 --extra-families CurvePass, without"):
+    with pytest.raises(ValueError, match=f"--algo offline --extra-levels {text}, without"):
         check_recordings(reused)
-    for name in ("extra-train", "extra-validation"):
+    for name in ("extra1-train", "extra1-validation"):
         folder = tmp_path / "episodes" / name
         folder.mkdir()
         save([[synthetic_episode()]], folder / "0.npz", origin_of(config) | {"families": ["CCRsCurve"]})

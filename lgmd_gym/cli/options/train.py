@@ -46,10 +46,9 @@ class Train:
     """Folder of an offline training run with the same cameras, to reuse its recorded episodes."""
     traffic_episodes: int = 0
     """Number of traffic episodes, in which braking is false, that offline trains on in addition."""
-    extra_levels: int = 0
-    """Number of levels of --extra-families that offline trains on in addition."""
-    extra_families: Names = None
-    """Scenario families of the extra levels, for example CCRsCurve FastCCRs FastEmptyRoad."""
+    extra_levels: Annotated[tuple[str, ...] | None, arg(metavar="N:NAME[,NAME...] [...]")] = None
+    """Levels of some scenario families that offline trains on in addition, for example
+    4000:CCRsCurve,FastCCRs 1000:EmptyRoad."""
     videos: int = 0
     """Number of validation episodes that are filmed at each evaluation, in FOLDER/videos and TensorBoard."""
     wandb: Name = None

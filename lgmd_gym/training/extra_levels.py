@@ -1,0 +1,29 @@
+"""`ExtraLevels`: levels of chosen families that a policy is trained on in addition to the usual ones."""
+
+from dataclasses import dataclass
+
+from lgmd_gym.envs.scenarios.distribution import EXTRA_FAMILIES, check_families
+from lgmd_gym.errors import check_whole, shown
+
+EXAMPLE = f"400:{','.join(EXTRA_FAMILIES[:2])}"
+
+
+@dataclass(frozen=True)
+class ExtraLevels:
+    """A number of levels and the scenario families that they are drawn from."""
+
+    count: int
+    families: tuple[str, ...]
+
+    @classmethod
+    def parse(cls, text: str) -> "ExtraLevels":
+        """Return the levels of a text such as "400:CCRsCurve,StandingBox".
+
+        Raises:
+            ValueError: If the text has another form, or for an unknown family.
+        """
+        count, separator, names = text.partition(":")
+        if not (separator and count.isdecimal()):
+            raise ValueError(f"extra_levels must be like {EXAMPLE!r}, got {shown(text)}")
+        families = check_families([name.strip() for name in names.split(",")])
+        return cls(check_whole("number of extra_levels", int(count), 1), families)
