@@ -93,9 +93,15 @@ def _fast_draws(usual: dict[str, Draw], weights: dict[str, float]) -> dict[str, 
 def _without_target(threats: dict[str, Draw], names: tuple[str, ...]) -> dict[str, Draw]:
     """Return draws of threats without their target, by the names family + "WithoutTarget".
 
-    They are not drawn for threats on a straight road with three lanes, which EmptyRoad has, too.
+    Each is drawn half as often as its threat, in the order of the threats. Levels of some threats alone and
+    those of the same ones without their targets are therefore twins: levels of one number differ by the
+    target only. Threats on a straight road with three lanes are not among them; EmptyRoad has that road, too.
     """
-    return {f"{name}WithoutTarget": Draw(1.0, threats[name].draw, name, False) for name in names}
+    return {
+        f"{name}WithoutTarget": Draw(draw.weight / 2.0, draw.draw, name, False)
+        for name, draw in threats.items()
+        if name in names
+    }
 
 
 EXTRA_THREATS = {
@@ -115,7 +121,7 @@ EXTRA_NON_THREATS = {
     **_without_target(
         THREATS | EXTRA_THREATS,
         (
-            *("CCCscp", "CCFtap", "CCFhos", "CCFhol", "CCRsCurve", "CMCscp", "CMFtap"),
+            *("CCCscp", "CCFtap", "CCFhos", "CCFhol", "CMCscp", "CMFtap", "CCRsCurve"),
             *("CPNA", "CPFA", "CPNCO", "CPLA", "CPTA", "CPRA"),
             *("CBNA", "CBNAO", "CBFA", "CBLA"),
         ),

@@ -25,6 +25,7 @@ from lgmd_gym.envs.scenarios.extra_arguments import EXTRA_NON_THREATS, EXTRA_THR
 from lgmd_gym.envs.scenarios.free_lanes import free_lane
 from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS
 from lgmd_gym.envs.scenarios.rear import RELEASE
+from lgmd_gym.envs.scenarios.scenario import without_target
 from lgmd_gym.wrappers.vector import LGMDObservation as LGMDVector
 
 HOLD = np.zeros(1, np.float32)
@@ -74,6 +75,15 @@ def test_extra_families_are_drawn_where_they_are_named(draws, threat):
         assert collision is threat, scenario
         families.add(scenario.family)
     assert families == {draw.family or name for name, draw in draws.items()}
+
+
+def test_levels_without_targets_are_twins():
+    """Levels of threats and those of the same threats without their targets differ by the target only."""
+    threats = [name.removesuffix("WithoutTarget") for name in EXTRA_NON_THREATS if "WithoutTarget" in name]
+    without = [f"{name}WithoutTarget" for name in threats]
+    for level in range(200):
+        scenario = draw_scenario(level_generator("train", level), threats)
+        assert draw_scenario(level_generator("train", level), without) == without_target(scenario)
 
 
 @pytest.mark.parametrize(
