@@ -1,18 +1,41 @@
 """Cameras of the all-round sensor: forward fields with columns, and fields at both sides of the path."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from lgmd_gym.agents.zones import CONTRAST_S, NUM_FIELDS, SPAN_M, zone_cameras
 
 # The forward fields are those of `stopping-zone` at twice the width: a pedestrian on collision course is
 # beside the ego's lane until the last second.
 FORWARD_WIDTH_PX, FORWARD_SPAN_M, FORWARD_COLUMNS = 160, 2.0 * SPAN_M, 10
-# Yaw of the optical axis from the path, horizontal field of view and pitch of each pair of fields [degrees].
-# On collision course, a pedestrian (5 km/h) is at a bearing of 5 to 14° for ego speeds of 60 to 20 km/h, a
-# bicycle (15 km/h) at 14 to 37°, and a car as fast as the ego at 45°.
-SIDES = {"near": (8.0, 14.0, -0.7), "middle": (20.0, 20.0, -1.5), "far": (43.0, 34.0, -3.0)}
 DETECTORS = ("lgmd", "dsn", "edges")
-SIDE_SHAPE, SIDE_COLUMNS = (40, 80), 5  # (height, width) [px]
+SIDE_WIDTH_PX, SIDE_COLUMNS = 80, 5
+
+
+class SidePair(NamedTuple):
+    """A pair of fields, left and right of the path.
+
+    Attributes:
+        yaw_deg: Angle between the path and the optical axis [degrees].
+        hfov_deg: Horizontal field of view [degrees].
+        pitch_deg: Upward tilt of the optical axis [degrees].
+        height_px: Height of the frame [px].
+    """
+
+    yaw_deg: float
+    hfov_deg: float
+    pitch_deg: float
+    height_px: int
+
+
+# On collision course, a pedestrian (5 km/h) is at a bearing of 5 to 14° for ego speeds of 60 to 20 km/h, a
+# bicycle (15 km/h) at 14 to 37°, and a car as fast as the ego at 45°. All fields end just below the horizon:
+# there, whatever stands on the ground moves through the frame, unless it is on collision course. Trees and
+# houses above the horizon are far away and stand nearly still, too.
+SIDES = {
+    "near": SidePair(8.0, 14.0, -2.2, 22),
+    "middle": SidePair(20.0, 20.0, -2.3, 16),
+    "far": SidePair(43.0, 34.0, -1.9, 8),
+}
 NUM_SIDE_FIELDS = 2 * len(SIDES)  # per detector
 NUM_MOTION_FIELDS = NUM_FIELDS + 2 * NUM_SIDE_FIELDS  # without the detectors of edges
 NUM_ALL_ROUND = NUM_FIELDS + NUM_SIDE_FIELDS * len(DETECTORS)
@@ -42,19 +65,19 @@ def side_cameras() -> list[dict[str, Any]]:
     return [
         {
             "name": f"{name}_{side}_{detector}",
-            "shape": list(SIDE_SHAPE),
+            "shape": [pair.height_px, SIDE_WIDTH_PX],
             "detector": detector,
             "columns": SIDE_COLUMNS,
             "gaze": "path",
-            "yaw_deg": sign * yaw_deg,
-            "hfov_deg": hfov_deg,
-            "pitch_deg": pitch_deg,
+            "yaw_deg": sign * pair.yaw_deg,
+            "hfov_deg": pair.hfov_deg,
+            "pitch_deg": pair.pitch_deg,
             "stabilised": True,
             "calibrated": True,
             "contrast_s": CONTRAST_S,
         }
         for detector in DETECTORS
-        for name, (yaw_deg, hfov_deg, pitch_deg) in SIDES.items()
+        for name, pair in SIDES.items()
         for side, sign in (("left", -1.0), ("right", 1.0))
     ]
 

@@ -18,13 +18,13 @@ from lgmd_gym.training.hyperparams import read_hyperparams
 CAMERAS = {"zones": zone_cameras, "all-round": all_round_cameras}
 OTHER_HYPERPARAMETERS = {  # as in its card
     "all-round": {
-        "n_networks": 3,
+        "n_networks": 5,
         "n_epochs": 24,
         "weight_decay": 0.1,
         "standardise": True,
         "mirror": True,
         "select_margin": True,
-        "policy_kwargs": {"net_arch": {"pi": [192, 64], "vf": []}},
+        "policy_kwargs": {"net_arch": {"pi": [112, 64], "vf": []}},
     }
 }
 
