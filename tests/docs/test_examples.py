@@ -55,6 +55,13 @@ def test_contact_sheet(tmp_path):
     assert 10_000 < (tmp_path / "sheet.png").stat().st_size < 200_000
 
 
+@pytest.mark.slow
+def test_side_fields(tmp_path):
+    means = load("side_fields").main(tmp_path / "fields.png")
+    assert means.shape == (6, 4)
+    assert 10_000 < (tmp_path / "fields.png").stat().st_size < 200_000
+
+
 def test_ablations(tmp_path, capsys):
     example = load("ablations")
     arguments = ["--worlds", "2", "--seeds", "1", "--every", "14", "--to", str(tmp_path / "arms.png")]
@@ -69,6 +76,23 @@ def test_ablations(tmp_path, capsys):
     assert example.ARMS["no stabilisation"](camera) == camera | {"stabilised": False}
     with pytest.raises(ValueError, match="agent 'ttc-oracle' has no cameras of its own"):
         example.main(["ttc-oracle", *arguments])
+
+
+@pytest.mark.slow
+def test_target_signal(capsys):
+    """All sensors are compared on the same levels, and a network learns a feature that shows the target."""
+    example = load("target_signal")
+    areas = example.main(["--levels", "25", "--jobs", "1"])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("| fields at the sides | all | CBFA | ")
+    assert len(lines) == 2 + len(areas) == 7
+    assert all(0.0 <= value <= 1.0 for values in areas.values() for value in values.values())
+    assert example.area(np.array([[2.0, 1.0], [4.0, 3.0]])) == 0.75
+    rng = np.random.default_rng(0)
+    train, test = rng.normal(size=(2, 80, 2, 5)).astype(np.float32)
+    train[:, 0, 2] += 4.0
+    test[:, 0, 2] += 4.0
+    assert example.area(example.fit_and_score(train, test)) > 0.95
 
 
 @pytest.mark.slow
