@@ -30,7 +30,7 @@ class SidePair(NamedTuple):
 # On collision course, a pedestrian (5 km/h) is at a bearing of 5 to 14° for ego speeds of 60 to 20 km/h, a
 # bicycle (15 km/h) at 14 to 37°, and a car as fast as the ego at 45°. All fields end just below the horizon:
 # there, whatever stands on the ground moves through the frame, unless it is on collision course. Trees and
-# houses above the horizon are far away and stand nearly still, too.
+# houses above the horizon are far away and stand nearly still as well.
 SIDES = {
     "near": SidePair(8.0, 14.0, -2.2, 22),
     "middle": SidePair(20.0, 20.0, -2.3, 16),

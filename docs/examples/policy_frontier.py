@@ -1,11 +1,9 @@
 """Avoided contacts and lead time of a policy against its false activations, on recorded validation episodes.
 
-    lgmd-gym train --algo offline --sensors-of all-round \
-        --inputs zones sides sides_ffi ego_speed ego_yaw_rate \
-        --hyperparams zones.yml --traffic-episodes 60 --out runs/all-round
     python docs/examples/policy_frontier.py runs/all-round policy:all-round
 
-The folder is that of an offline training run with the cameras of the policy. A policy brakes when its log
+The folder is that of an offline training run with the cameras of the policy; the card of `policy:all-round`
+has the command of its training. A policy brakes when its log
 odds of braking exceed a margin; 0 is the margin of the agent. A larger margin delays the braking and leaves
 more contacts. The lead time is the median time from braking to the contact of the same episode without
 braking, over the threats in which the policy brakes. Rates are k/n with Wilson intervals in per cent. Traffic

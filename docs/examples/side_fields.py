@@ -21,7 +21,7 @@ ORDER = ("far_left", "middle_left", "near_left", "near_right", "middle_right", "
 
 
 def main(path: Path, seed: int = SEED) -> np.ndarray:
-    """Save the picture, and return the frames at `TIMES` with the target, one array per field."""
+    """Save the picture, and return the mean grey levels at `TIMES` with the target, (fields, times)."""
     with_target = [film(FAMILY, camera_of(name), seed) for name in ORDER]
     without = [film(f"{FAMILY}WithoutTarget", camera_of(name), seed) for name in ORDER]
     contact = len(with_target[0])

@@ -24,6 +24,7 @@ FAMILIES = ("CCCscp", "CCFtap", "CMCscp", "CMFtap", "CPNA", "CPFA", "CPNCO", "CB
 HORIZON = {"near": (40, -0.7), "middle": (40, -1.5), "far": (40, -3.0)}  # height [px], pitch [degrees]
 WINDOWS = (3, 12, 36)  # [frames]
 FOLDS, NETWORKS, EPOCHS, BATCH_SIZE = 5, 3, 12, 64
+LEAST_LEVELS = 20
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, float]]:
@@ -32,6 +33,8 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, float]]:
     parser.add_argument("--levels", type=int, default=1250)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args(arguments)
+    if options.levels < LEAST_LEVELS:
+        parser.error(f"--levels must be at least {LEAST_LEVELS}, got {options.levels}")
     below = record(side_cameras(), options.levels, options.jobs)
     detectors = {"all models": range(len(DETECTORS))} | {
         f"{name} only": (index,) for index, name in enumerate(DETECTORS)

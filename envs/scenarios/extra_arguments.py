@@ -93,14 +93,15 @@ def _fast_draws(usual: dict[str, Draw], weights: dict[str, float]) -> dict[str, 
 def _without_target(threats: dict[str, Draw], names: tuple[str, ...]) -> dict[str, Draw]:
     """Return draws of threats without their target, by the names family + "WithoutTarget".
 
-    Each is drawn half as often as its threat, in the order of the threats. Levels of some threats alone and
-    those of the same ones without their targets are therefore twins: levels of one number differ by the
-    target only. Threats on a straight road with three lanes are not among them; EmptyRoad has that road, too.
+    Their weights are half of those of the threats, so that a policy cannot infer a threat from the road alone,
+    and their order is the same. With some threats alone, and with the same threats without their targets alone, levels
+    of the same number therefore differ by the target only. Threats on a straight road with three lanes are
+    not among them; EmptyRoad has that road, too.
     """
+    in_order = sorted(names, key=list(threats).index)
     return {
-        f"{name}WithoutTarget": Draw(draw.weight / 2.0, draw.draw, name, False)
-        for name, draw in threats.items()
-        if name in names
+        f"{name}WithoutTarget": Draw(threats[name].weight / 2.0, threats[name].draw, name, False)
+        for name in in_order
     }
 
 

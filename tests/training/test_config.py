@@ -101,6 +101,8 @@ def test_offline_requires_holding_and_hard_braking(demands):
             "of extra_levels must be a whole number >= 1, got 0",
         ),
         ("offline", {"extra_levels": ["3:CCRs,"]}, "unknown family of random levels ''"),
+        ("offline", {"extra_levels": ["3:"]}, "extra_levels must be like .*, got '3:'"),
+        ("offline", {"extra_levels": ["3:CCRs,CCRs"]}, "extra_levels names a family twice: '3:CCRs,CCRs'"),
         (
             "offline",
             {"extra_levels": ["3:CCRs", "3:CCRsCurv"]},
