@@ -93,10 +93,10 @@ def _fast_draws(usual: dict[str, Draw], weights: dict[str, float]) -> dict[str, 
 def _without_target(threats: dict[str, Draw], names: tuple[str, ...]) -> dict[str, Draw]:
     """Return draws of threats without their target, by the names family + "WithoutTarget".
 
-    Their weights are half of those of the threats, so that a policy cannot infer a threat from the road alone,
-    and their order is the same. With some threats alone, and with the same threats without their targets alone, levels
-    of the same number therefore differ by the target only. Threats on a straight road with three lanes are
-    not among them; EmptyRoad has that road, too.
+    Their weights are half of those of the threats, so that a policy cannot infer a threat from the road
+    alone, and their order is the same. With some threats alone, and with the same threats without their
+    targets alone, levels of the same number therefore differ by the target only. Threats on a straight road
+    with three lanes are not among them; EmptyRoad has that road, too.
     """
     in_order = sorted(names, key=list(threats).index)
     return {
