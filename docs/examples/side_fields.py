@@ -21,7 +21,7 @@ ORDER = ("far_left", "middle_left", "near_left", "near_right", "middle_right", "
 
 
 def main(path: Path, seed: int = SEED) -> np.ndarray:
-    """Save the picture, and return the mean grey levels at `TIMES` with the target, (fields, times)."""
+    """Save the picture, and return the mean grey levels with and without the car, (2, fields, times)."""
     with_target = [film(FAMILY, camera_of(name), seed) for name in ORDER]
     without = [film(f"{FAMILY}WithoutTarget", camera_of(name), seed) for name in ORDER]
     contact = len(with_target[0])
@@ -44,7 +44,7 @@ def main(path: Path, seed: int = SEED) -> np.ndarray:
         axes[row, -1].text(1.04, 0.5, label, transform=axes[row, -1].transAxes, fontsize=8, va="center")
     figure.savefig(path, dpi=130, bbox_inches="tight", pil_kwargs={"optimize": True})
     plt.close(figure)
-    return np.array([frames[moments].mean((1, 2)) for frames in with_target])
+    return np.array([[frames[moments].mean((1, 2)) for frames in item] for item in (with_target, without)])
 
 
 def camera_of(name: str) -> dict[str, Any]:

@@ -57,8 +57,10 @@ def test_contact_sheet(tmp_path):
 
 @pytest.mark.slow
 def test_side_fields(tmp_path):
-    means = load("side_fields").main(tmp_path / "fields.png")
-    assert means.shape == (6, 4)
+    """The car comes from the left and the two levels differ by it only: the fields at the right are equal."""
+    with_car, without = load("side_fields").main(tmp_path / "fields.png")
+    assert np.array_equal(with_car[3:], without[3:])
+    assert (np.abs(with_car[0] - without[0]) > 1.0).any()  # grey levels of the far field at the left
     assert 10_000 < (tmp_path / "fields.png").stat().st_size < 200_000
 
 
@@ -88,6 +90,12 @@ def test_target_signal(capsys):
     assert len(lines) == 2 + len(areas) == 7
     assert all(0.0 <= value <= 1.0 for values in areas.values() for value in values.values())
     assert example.area(np.array([[2.0, 1.0], [4.0, 3.0]])) == 0.75
+    (pair,) = example.record(example.side_cameras(), 1, 1)
+    assert [item.threat for item in pair] == [True, False]
+    lgmd = example.features(pair[0], 40, [0])
+    pair[0].observations["column_potential"][:, example.NUM_SIDE_FIELDS * example.SIDE_COLUMNS :] = 0.9
+    assert np.array_equal(example.features(pair[0], 40, [0]), lgmd)  # not of the other models
+    assert not np.array_equal(example.features(pair[0], 40, [1]), lgmd)
     rng = np.random.default_rng(0)
     train, test = rng.normal(size=(2, 80, 2, 5)).astype(np.float32)
     train[:, 0, 2] += 4.0
