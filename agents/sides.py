@@ -73,6 +73,7 @@ def side_cameras() -> list[dict[str, Any]]:
             "hfov_deg": pair.hfov_deg,
             "pitch_deg": pair.pitch_deg,
             "stabilised": True,
+            "derotated": True,
             "calibrated": True,
             "contrast_s": CONTRAST_S,
         }

@@ -20,7 +20,10 @@ from lgmd_gym.agents.sides import DETECTORS, NUM_SIDE_FIELDS, SIDE_COLUMNS, side
 from lgmd_gym.training.offline.episodes import RecordedEpisode, record_parallel
 from lgmd_gym.training.offline.level_recorder import LevelRecorder
 
-FAMILIES = ("CCCscp", "CCFtap", "CMCscp", "CMFtap", "CPNA", "CPFA", "CPNCO", "CBNA", "CBNAO", "CBFA")
+FAMILIES = (
+    *("CCCscp", "CCFtap", "CMCscp", "CMFtap"),
+    *("CPNA", "CPFA", "CPNCO", "CPTA", "CBNA", "CBNAO", "CBFA"),
+)
 HORIZON = {"near": (40, -0.7), "middle": (40, -1.5), "far": (40, -3.0)}  # height [px], pitch [degrees]
 WINDOWS = (3, 12, 36)  # [frames]
 FOLDS, NETWORKS, EPOCHS, BATCH_SIZE = 5, 3, 12, 64
@@ -40,6 +43,10 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, float]]:
         f"{name} only": (index,) for index, name in enumerate(DETECTORS)
     }
     areas = {f"below the horizon, {name}": areas_by_family(below, used) for name, used in detectors.items()}
+    rotating = record(
+        [camera | {"derotated": False} for camera in side_cameras()], options.levels, options.jobs
+    )
+    areas["below the horizon, not derotated"] = areas_by_family(rotating, detectors["all models"])
     horizon = record(cameras_at_the_horizon(), options.levels, options.jobs)
     areas["at the horizon, all models"] = areas_by_family(horizon, detectors["all models"])
     names = list(areas["below the horizon, all models"])

@@ -105,6 +105,14 @@ class EgoCamera:
             raise ValueError("no frame yet: call render() before project()")
         return project(self._lens, points_m)
 
+    @property
+    def yaw_px(self) -> int:
+        """Yaw of the last frame of a derotated view in whole pixels, + to the right; 0 for other views.
+
+        The difference of two frames is the argument `turn_px` of `FrameNeuron.step`.
+        """
+        return 0 if self._lens is None else int(self._lens["yaw_px"])
+
     def _own_stage(self) -> "_Stage":
         if self._stage is None:
             self._stage = _Stage(self._params)

@@ -83,6 +83,9 @@ class CameraParams:
         stabilised: Whether the rotation of the body is compensated: True with a gyroscope whose errors are
             assumptions, see `body_motion.residual_motion`; `"image"` by the registration of a far-field
             image, see `sensing.image_stabiliser`. `"image"` needs a `SensorArray`, as in `LGMDObservation`.
+        derotated: Whether the rotation of the car about the vertical axis, from its yaw rate, and that of the
+            gaze cause no motion in the input of the neuron: the view turns by whole pixels, and the state of
+            the neuron is shifted by as many (`FrameNeuron.step`). Not for the gaze `"stopping"`, which zooms.
         calibrated: Whether the sensor knows the errors of its mount up to a tenth, see `pose.CALIBRATED`.
         texture: Contrast of asphalt and verge, as a multiple of the natural contrast.
         roadside: Density of posts and trees along the road, as a multiple of the natural density.
@@ -154,6 +157,7 @@ class CameraParams:
     brake_known: bool = False
     max_deceleration: float = 9.0
     stabilised: bool | str = False
+    derotated: bool = False
     calibrated: bool = False
     texture: float = 1.0
     roadside: float = 1.0
@@ -272,7 +276,7 @@ def _check_surroundings(p: CameraParams) -> None:
         raise ValueError(
             f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
         )
-    flags = ("guard_rail", "upper_beam", "wet", "linear_light", "bonnet", "calibrated")
+    flags = ("guard_rail", "upper_beam", "wet", "linear_light", "bonnet", "calibrated", "derotated")
     for name in flags:
         object.__setattr__(p, name, check_flag(f"camera {name}", getattr(p, name)))
     object.__setattr__(p, "stabilised", _checked_stabilisation(p.stabilised))
@@ -306,7 +310,8 @@ def _check_zoom(p: CameraParams) -> None:
             f"camera span_m must be at most {4.0 * nearest:.3g} m, four times the least distance of the aim "
             f"from the lens, got {p.span_m:g}; reduce span_m or increase reach"
         )
-    for name, usual in (("panorama", "skyline"), ("bonnet", False), ("windscreen", 0.0)):
+    usual_values = (("panorama", "skyline"), ("bonnet", False), ("windscreen", 0.0), ("derotated", False))
+    for name, usual in usual_values:
         if getattr(p, name) != usual:
             raise ValueError(
                 f"camera {name} must be {usual!r} with gaze='stopping', got {shown(getattr(p, name))}"

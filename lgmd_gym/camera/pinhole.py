@@ -16,12 +16,13 @@ LENS = np.dtype(
         (name, np.float64)
         for name in (
             *("x", "y", "z", "cos_yaw", "sin_yaw", "cos_pitch", "sin_pitch", "cos_roll", "sin_roll"),
-            *("focal", "centre_u", "centre_v", "yaw", "pitch", "roll", "turn"),
+            *("focal", "centre_u", "centre_v", "yaw", "pitch", "roll", "turn", "yaw_px"),
         )
     ]
 )
 """A posed lens, as the kernels read it: position [m], angles [rad], focal length and image centre [px]; for
-the gaze `"stopping"` the yaw relative to the car, 0 for others, whose headlights turn with the lens [rad]."""
+the gaze `"stopping"` the yaw relative to the car, 0 for others, whose headlights turn with the lens [rad];
+yaw of a derotated view, a whole number of pixels, 0 for others [px]."""
 
 
 def project(lens: Any, points_m: np.ndarray) -> np.ndarray:

@@ -36,7 +36,7 @@ MOUNT = np.dtype(
         *((name, np.float64) for name in ("setback", "left", "height", "yaw_deg", "pitch_deg")),
         *((name, np.float64) for name in ("road", "dive_deg", "shutter_s")),
         *((name, np.float64) for name in ("focal", "centre_u", "centre_v", "linear")),
-        *((name, np.int64) for name in ("gaze", "stabilised", "noisy", "box", "drawn", "seed")),
+        *((name, np.int64) for name in ("gaze", "stabilised", "derotated", "noisy", "box", "drawn", "seed")),
         *((name, np.float64) for name in ("image_pitch", "image_roll", "image_yaw")),
         ("aim", AIM),
     ]
@@ -44,8 +44,9 @@ MOUNT = np.dtype(
 """How a camera sits on the car and moves with it, as the kernels read it.
 
 The fields of `CameraParams`; amplitude of the road in `ROADS`; focal length and image centre [px]; gaze, see
-`camera.aim`; 1 for linear light, sensor noise, `vehicles="box"` and a numbered world; stabilisation, see
-`STABILISED`; pitch, roll and yaw of the body that the image stabilisation has measured [degrees].
+`camera.aim`; 1 for linear light, a derotated view, sensor noise, `vehicles="box"` and a numbered world;
+stabilisation, see `STABILISED`; pitch, roll and yaw of the body that the image stabilisation has measured
+[degrees].
 """
 GYROSCOPE, IMAGE = 1, 2
 STABILISED: dict[bool | str, int] = {False: 0, True: GYROSCOPE, "image": IMAGE}
@@ -70,6 +71,7 @@ def mount_of(p: CameraParams) -> np.ndarray:
         *(
             GAZES[p.gaze],
             STABILISED[p.stabilised],
+            p.derotated,
             p.shot_noise > 0.0 or p.read_noise > 0.0,
             p.vehicles == "box",
         ),
@@ -156,6 +158,12 @@ def pose_lens(mount, scene, ago_s, lens):
         lens: Record to write.
     """
     x, y, heading, time_s = scene.x, scene.y, scene.heading, scene.time_s
+    yaw_deg = _yaw_on_car(mount, scene)
+    lens.yaw_px, rounding = 0.0, 0.0
+    if mount.derotated != 0:
+        exact = (heading + math.radians(yaw_deg)) * mount.focal
+        lens.yaw_px = math.floor(exact + 0.5)
+        rounding = (lens.yaw_px - exact) / mount.focal
     if ago_s > 0.0:
         slip, rate = slip_and_yaw_rate(scene)
         distance, course = scene.speed * ago_s, heading + slip - 0.5 * rate * ago_s
@@ -164,7 +172,6 @@ def pose_lens(mount, scene, ago_s, lens):
     forward = 0.5 * scene.length - mount.setback
     c, s = math.cos(heading), math.sin(heading)
     z = mount.height
-    yaw_deg = _yaw_on_car(mount, scene)
     gain = road_gain(mount.road, scene.speed)
     tilt, roll = _tilt(mount, scene, time_s, math.radians(yaw_deg), gain)
     if gain > 0.0:
@@ -173,7 +180,7 @@ def pose_lens(mount, scene, ago_s, lens):
         yaw_deg += gain * _rotation(mount, YAW, time_s)
     if mount.stabilised == IMAGE:
         yaw_deg -= mount.image_yaw
-    yaw = heading + math.radians(yaw_deg)
+    yaw = heading + math.radians(yaw_deg) + rounding
     pitch, focal = math.radians(mount.pitch_deg) + tilt, mount.focal
     lens.turn = 0.0
     if mount.gaze == STOPPING:

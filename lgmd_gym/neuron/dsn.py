@@ -51,6 +51,8 @@ class DSN(MotionNeuron):
         0.5
     """
 
+    _past = slice(3, 5)  # delayed ON and OFF
+
     def __init__(
         self,
         shape: tuple[int, int],

@@ -17,6 +17,7 @@ from lgmd_gym.neuron.validation import (
     checked_selection,
     checked_shape,
     checked_threads,
+    checked_turns,
 )
 
 _UINT8 = np.dtype(np.uint8)
@@ -25,7 +26,7 @@ _UINT8 = np.dtype(np.uint8)
 class FrameNeuron:
     """One or N neurons of a model, stepped frame by frame.
 
-    Subclasses set `_initial`, `_scalars` and `_maps`, and implement `step_range` and `layers`.
+    Subclasses set `_initial`, `_scalars` and `_maps`, and implement `step_range`, `shift_range` and `layers`.
 
     Args:
         shape: (height, width) of the frames [px].
@@ -48,7 +49,9 @@ class FrameNeuron:
         self._frames_dtype: np.dtype[Any] = _UINT8
         self._all_active = np.ones(self._count, np.bool_)
 
-    def step(self, frame: ArrayLike, active: ArrayLike | None = None) -> Response:
+    def step(
+        self, frame: ArrayLike, active: ArrayLike | None = None, turn_px: ArrayLike | None = None
+    ) -> Response:
         """Process one frame per neuron.
 
         Args:
@@ -56,12 +59,15 @@ class FrameNeuron:
                 is the top. Any memory layout is accepted; contiguous uint8 arrays are not copied.
             active: Selection of the neurons to step, bool, shape (N,); None for all. The other neurons
                 keep their state and their last outputs, and their frames are ignored.
+            turn_px: Whole pixels by which the view has turned to the right since the last frame, int or
+                shape (N,). The state is shifted to the left by as many, so that the turn causes no change.
 
         Returns:
             Python scalars for a single neuron, new arrays of shape (N,) for N neurons.
 
         Raises:
-            ValueError: For a frame of another shape, or with values that are not luminance in 0-255.
+            ValueError: For a frame of another shape, with values that are not luminance in 0-255, or a turn
+                that is not whole.
             TypeError: For a frame of another dtype.
         """
         selected = self._all_active if active is None else checked_selection("active", active, self._count)
@@ -73,6 +79,8 @@ class FrameNeuron:
             self._use_floats()
             frame = frame.astype(np.float32, copy=False)
         frames = frame[None] if self.num is None else frame
+        if turn_px is not None:
+            self.shift_range(0, self._count, frames, selected, checked_turns(turn_px, self._count))
         if self._threads.count == 1:
             self.step_range(0, self._count, frames, selected)
         else:
@@ -89,6 +97,25 @@ class FrameNeuron:
             last: Last neuron + 1.
             frames: Frames of all N neurons, contiguous uint8, shape (N, H, W).
             active: Selection of the neurons to step, bool, shape (N,).
+        """
+        raise NotImplementedError
+
+    def shift_range(
+        self,
+        first: int,
+        last: int,
+        frames: NDArray[Any],
+        active: NDArray[np.bool_],
+        turns_px: NDArray[np.int64],
+    ) -> None:
+        """Shift the state of active neurons among first..last-1 before a step, without a check.
+
+        Args:
+            first: First neuron.
+            last: Last neuron + 1.
+            frames: Frames of the next step, see `step_range`.
+            active: Selection of the neurons, bool, shape (N,).
+            turns_px: Pixels by which each view has turned to the right, int64, shape (N,).
         """
         raise NotImplementedError
 

@@ -54,6 +54,8 @@ class LPLC2(MotionNeuron):
         0.5
     """
 
+    _past = slice(3, 5)  # delayed ON and OFF
+
     def __init__(
         self,
         shape: tuple[int, int],

@@ -5,7 +5,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lgmd_gym.neuron import general_kernel, kernels, state
+from lgmd_gym.neuron import general_kernel, kernels, shift_kernels, state
 from lgmd_gym.neuron.frame_neuron import FrameNeuron
 from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
@@ -82,6 +82,30 @@ class LGMD(FrameNeuron):
             first, last, frames, self._previous, self._y0, self._x0, self._weight, active, self._scalars,
             self._const, *self._maps,
         )  # fmt: skip
+
+    def shift_range(
+        self,
+        first: int,
+        last: int,
+        frames: NDArray[Any],
+        active: NDArray[np.bool_],
+        turns_px: NDArray[np.int64],
+    ) -> None:
+        """Shift the state of active neurons among first..last-1; see `FrameNeuron.shift_range`."""
+        chosen = first, last, active, self._scalars, turns_px
+        shift_kernels.shift_light(*chosen, self._previous, frames, self._y0, self._x0)
+        width = self._previous.shape[2]
+        if not self._fast:
+            p, e, memory, _, _, g = self._maps
+            for values in (p, e, memory, g):
+                rows = values.reshape(self._count, -1, values.shape[-1])
+                shift_kernels.shift_rows(*chosen, rows, values.shape[-1])
+            return
+        p, memory, g = state.shifted_views(self._maps, self._previous.shape[1])
+        for frame in range(2):
+            shift_kernels.shift_rows(*chosen, p[:, frame], width)
+        shift_kernels.shift_rows(*chosen, g, width)
+        shift_kernels.shift_blocks(*chosen, memory, width)
 
     @property
     def layers(self) -> dict[str, NDArray[np.float32]]:

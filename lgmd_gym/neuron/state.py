@@ -33,6 +33,24 @@ def allocate(num: int, shape: tuple[int, int]) -> tuple[NDArray[Any], ...]:
     return *(_aligned_zeros(size) for size in sizes), np.zeros((num, 2, h), np.int32)
 
 
+def shifted_views(maps: tuple[NDArray[Any], ...], height: int) -> tuple[NDArray[np.float32], ...]:
+    """Return views of the maps that the next frame depends on.
+
+    Args:
+        maps: Maps of `allocate`.
+        height: Height of the frames [px].
+
+    Returns:
+        p: (N, 2, H + 2, columns + 16), with the borders above and below.
+        memory: (N, H, blocks of 16 pixels, 6, 16).
+        g: (N, H, columns).
+    """
+    p, memory, _, _, g, _ = maps
+    num = len(p)
+    bordered = p[:, :, LANES:].reshape(num, 2, height + 2, -1)
+    return bordered, memory.reshape(num, height, -1, 6, LANES), g.reshape(num, height, -1)
+
+
 def _aligned_zeros(shape: tuple[int, ...]) -> NDArray[np.float32]:
     """Return zeros that start at a multiple of a vector's size: loads across cache lines cost twice."""
     size = math.prod(shape)

@@ -72,6 +72,8 @@ class SustainedEdges(MotionNeuron):
         0.5
     """
 
+    _past = slice(0)  # none
+
     def __init__(
         self,
         shape: tuple[int, int],

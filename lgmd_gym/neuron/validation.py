@@ -158,3 +158,13 @@ def _shape_message(given: tuple[int, ...], expected: tuple[int, ...]) -> str:
     if given == expected[::-1]:
         return f"{message}; transpose it, row 0 is the top"
     return message
+
+
+def checked_turns(turn_px: Any, count: int) -> NDArray[np.int64]:
+    """Return the turn of each view [px], int64 of shape (count,); a scalar applies to all."""
+    turns = checked_array("turn_px", turn_px)
+    if turns.dtype.kind not in "ui" or turns.shape not in ((), (count,)):
+        given = f"dtype {turns.dtype} and shape {turns.shape}"
+        raise ValueError(f"turn_px must be an integer or integers of shape ({count},), got {given}")
+    limited = np.clip(turns, -MAX_SIDE, MAX_SIDE)  # larger turns replace the whole state as well
+    return np.ascontiguousarray(np.broadcast_to(limited, count), np.int64)

@@ -96,7 +96,7 @@ class Variants:
 
         Raises:
             ValueError: If a field is unknown or out of range, changes the shape, detector or columns of a
-                camera, `brake_known`, or `stabilised` from or to `"image"`.
+                camera, `brake_known`, `derotated`, or `stabilised` from or to `"image"`.
         """
         others = {name: value for name, value in fields.items() if name != "texture"}
         texture = fields.get("texture")
@@ -126,7 +126,7 @@ class Variants:
 
 def _check_kept(base: CameraParams, changed: CameraParams | None) -> None:
     """Raise ValueError if fields that determine the arrays of the sensors are changed."""
-    for name in ("shape", "detector", "columns", "brake_known"):
+    for name in ("shape", "detector", "columns", "brake_known", "derotated"):
         kept, given = getattr(base, name), getattr(changed, name)
         if kept != given:
             raise ValueError(

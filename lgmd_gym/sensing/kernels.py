@@ -42,6 +42,33 @@ def select_cameras(first, last, active, group):
 
 
 @kernel
+def count_turns(first, last, selected, lenses, yaws_px, turns_px):
+    """Write the pixels by which derotated views have turned since their last frames, + to the right.
+
+    Args:
+        first: First environment.
+        last: Last environment + 1.
+        selected: Cameras with a new frame, bool, shape (num_envs, members).
+        lenses: `CameraBatch.lenses`.
+        yaws_px: Yaw of the last frame of each camera, float64, shape (num_envs, members), updated [px].
+        turns_px: Turn of each camera, int64, shape (num_envs, members), written [px].
+
+    Returns:
+        Number of cameras that have turned.
+    """
+    count = 0
+    for env in range(first, last):
+        for member in range(selected.shape[1]):
+            turns_px[env, member] = 0
+            if selected[env, member]:
+                yaw = lenses[env, member, 0].yaw_px
+                turns_px[env, member] = int(yaw - yaws_px[env, member])
+                yaws_px[env, member] = yaw
+                count += turns_px[env, member] != 0
+    return count
+
+
+@kernel
 def collect_outputs(first, last, selected, neurons):
     """Copy the outputs of the selected cameras' neurons into arrays of all cameras.
 

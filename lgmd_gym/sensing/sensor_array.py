@@ -177,7 +177,7 @@ class SensorArray:
 
         Raises:
             ValueError: If a field is unknown or out of range, changes the shape, detector or columns of a
-                camera, `brake_known`, or `stabilised` from or to `"image"`.
+                camera, `brake_known`, `derotated`, or `stabilised` from or to `"image"`.
         """
         fields = fields or {}
         if fields == self._fields[index]:

@@ -12,7 +12,7 @@ from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.context import Workspace
 from lgmd_gym.neuron import DSN, LGMD, LPLC2, LGMDParams, SustainedEdges
 from lgmd_gym.neuron.frame_neuron import FrameNeuron
-from lgmd_gym.sensing.kernels import collect_outputs, select_cameras
+from lgmd_gym.sensing.kernels import collect_outputs, count_turns, select_cameras
 
 MODELS = {"lplc2": LPLC2, "dsn": DSN, "edges": SustainedEdges}
 """Models beside the LGMD, by the `detector` of `CameraParams`."""
@@ -73,6 +73,8 @@ class SensorGroup:
         self.columns = np.full((*size, columns), 0.5)
         cameras = np.array(members, dtype=np.int64)
         self._shares = False
+        self._derotated = any(p is not None and p.derotated for p in (params[k] for k in members))
+        self._yaws_px, self._turns_px = np.zeros(size), np.zeros(size, np.int64)
         self._selected, self._fresh = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
         self._selection = Bundle(cameras, enabled, stale, self._selected, self._fresh)
         self._neurons = Bundle(cameras, self.neuron.outputs, *outputs)
@@ -108,7 +110,13 @@ class SensorGroup:
             self._draw(first, last, scene_table, roads)
         count = len(self.members)
         frames = self.frames.reshape(-1, *self.batch.shape)
-        self.neuron.step_range(first * count, last * count, frames, self._selected.reshape(-1))
+        selected = self._selected.reshape(-1)
+        if self._derotated and count_turns(
+            first, last, self._selected, self.batch.lenses, self._yaws_px, self._turns_px
+        ):
+            turns_px = self._turns_px.reshape(-1)
+            self.neuron.shift_range(first * count, last * count, frames, selected, turns_px)
+        self.neuron.step_range(first * count, last * count, frames, selected)
         collect_outputs(first, last, self._selected, self._neurons.native)
         self._read_columns(first, last, self._selected)
 

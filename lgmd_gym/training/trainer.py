@@ -48,7 +48,7 @@ def train(config: TrainConfig, folder: Path, *, progress: bool = False, jobs: in
         config: Configuration of the training.
         folder: Training folder; must not exist.
         progress: Whether to show progress bars.
-        jobs: Number of processes that record episodes.
+        jobs: Number of processes that record episodes, and of threads that train the networks of an ensemble.
 
     Returns:
         Policy file.
@@ -177,7 +177,7 @@ def _train_offline(config: TrainConfig, folder: Path, progress: bool, jobs: int)
                 bar.set_postfix({name: f"{value:.2f}" for name, value in metrics.items()})
                 bar.update(epoch - bar.n)
 
-            return learner.learn(train_data, validation_data, log)
+            return learner.learn(train_data, validation_data, log, jobs)
     finally:
         logger.close()
 

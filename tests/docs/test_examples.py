@@ -87,7 +87,7 @@ def test_target_signal(capsys):
     areas = example.main(["--levels", "25", "--jobs", "1"])
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("| fields at the sides | all | CBFA | ")
-    assert len(lines) == 2 + len(areas) == 7
+    assert len(lines) == 2 + len(areas) == 8
     assert all(0.0 <= value <= 1.0 for values in areas.values() for value in values.values())
     assert example.area(np.array([[2.0, 1.0], [4.0, 3.0]])) == 0.75
     (pair,) = example.record(example.side_cameras(), 1, 1)

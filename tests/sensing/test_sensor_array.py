@@ -27,6 +27,11 @@ CAMERAS = [
     {"name": "columns", "shape": (30, 40), "yaw_deg": 20.0, "seed": 3, "columns": 4},
     {"name": "flow columns", "shape": (30, 40), "yaw_deg": 20.0, "detector": "dsn", "columns": 2},
     {"name": "side", "shape": (45, 80), "yaw_deg": 30.0, "detector": "lplc2"},
+    {"name": "derotated", "shape": (30, 40), "derotated": True, "columns": 4},
+    {"name": "derotated path", "shape": (45, 80), "gaze": "path", "derotated": True},
+    {"name": "derotated flow", "shape": (30, 40), "derotated": True, "detector": "dsn", "columns": 4},
+    {"name": "derotated edges", "shape": (30, 40), "derotated": True, "detector": "edges"},
+    {"name": "derotated side", "shape": (45, 80), "derotated": True, "detector": "lplc2"},
     {"name": "small flow", "shape": (30, 40), "yaw_deg": 20.0, "seed": 3, "detector": "dsn"},
     {"name": "back flow", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box", "detector": "dsn"},
 ]
@@ -79,6 +84,7 @@ def column_potentials(p, neuron):
 def test_frames_and_outputs_equal_those_of_single_cameras_and_neurons(threads):
     envs, sensors = scenes(), make_array(threads=threads)
     singles = [[reference(camera, fields) for camera in CAMERAS] for fields in FIELDS]
+    turns = dict.fromkeys(range(len(CAMERAS)), 0)
     for step in range(6):
         move(envs, step)
         for index, env in enumerate(envs):
@@ -86,12 +92,17 @@ def test_frames_and_outputs_equal_those_of_single_cameras_and_neurons(threads):
         sensors.step()
         for index, env in enumerate(envs):
             for k, (camera, neuron) in enumerate(singles[index]):
+                before = camera.yaw_px
                 frame = camera.render(env)
                 np.testing.assert_array_equal(sensors.frame_of(k, index), frame)
-                expected = neuron.step(frame)
+                turns[k] += abs(camera.yaw_px - before) if step else 0
+                expected = neuron.step(frame, turn_px=camera.yaw_px - before)
                 assert [field[index, k].item() for field in sensors.responses] == list(expected)
             expected = [column_potentials(camera.params, neuron) for camera, neuron in singles[index]]
             np.testing.assert_array_equal(sensors.column_potentials()[index], np.concatenate(expected))
+    assert [name for k, name in enumerate(sensors.names) if turns[k]] == [
+        name for name in sensors.names if name.startswith("derotated")
+    ]
     assert sensors.responses.spikes.dtype == np.int64
     assert sensors.responses.alert.dtype == np.bool_
 
@@ -293,6 +304,8 @@ def test_invalid_camera_fields_raise():
         sensors.set_camera_fields(0, {"detector": "dsn"})
     with pytest.raises(ValueError, match="must keep the brake_known False of camera 'wide', got True"):
         sensors.set_camera_fields(0, {"brake_known": True})
+    with pytest.raises(ValueError, match="must keep the derotated False of camera 'wide', got True"):
+        sensors.set_camera_fields(0, {"derotated": True})
 
 
 def test_conditions_are_covered():

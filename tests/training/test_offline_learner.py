@@ -219,6 +219,28 @@ def test_an_ensemble_converges(tmp_path):
     assert (after.avoided, after.false_activations) == (1.0, 0.0)
 
 
+def test_threads_do_not_change_the_weights(tmp_path):
+    train, validation = dataset(spike_episodes(40, 0)), dataset(spike_episodes(20, 1))
+    single, threaded = (
+        learner(tmp_path, n_networks=3, n_epochs=4, standardise=True).learn(train, validation, jobs=jobs)
+        for jobs in (1, 3)
+    )
+    expected = single.policy.state_dict()
+    assert all(torch.equal(value, expected[name]) for name, value in threaded.policy.state_dict().items())
+
+
+@pytest.mark.parametrize("n_networks", [1, 2])
+def test_bfloat16_converges_to_float32_weights(tmp_path, n_networks):
+    train, validation = dataset(spike_episodes(40, 0)), dataset(spike_episodes(20, 1))
+    offline = learner(tmp_path, n_networks=n_networks, bfloat16=True)
+    model = offline.learn(train, validation)
+    after = evaluate(offline.logits, validation)
+    assert (after.avoided, after.false_activations) == (1.0, 0.0)
+    assert {value.dtype for value in model.policy.state_dict().values()} == {torch.float32}
+    logits = offline.logits(validation.batch([0]))
+    assert not torch.equal(logits, logits.bfloat16().float())  # evaluated in float32
+
+
 @pytest.mark.parametrize(("name", "required"), [("n_networks", 1), ("standardise", False)])
 def test_a_network_on_frames_does_not_share_its_features(name, required):
     class OnFrames:
@@ -233,7 +255,7 @@ def test_standardised_features_have_mean_zero_and_deviation_one():
     rng = np.random.default_rng(0)
     features = torch.from_numpy(rng.normal([3.0, -1.0, 5.0], [0.5, 20.0, 0.0], (4000, 3))).float()
     standardisation = measure([features[:1000], features[1000:]])
-    values = standardisation.apply(features)
+    values = standardisation.apply(features.clone())
     torch.testing.assert_close(values.mean(0), torch.zeros(3), atol=1e-4, rtol=0.0)
     torch.testing.assert_close(values.std(0), torch.tensor([1.0, 1.0, 0.0]), atol=3e-3, rtol=0.0)
     layer = torch.nn.Linear(3, 2)

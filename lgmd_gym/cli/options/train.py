@@ -54,7 +54,7 @@ class Train:
     wandb: Name = None
     """Project of Weights & Biases to log to; requires the package wandb."""
     jobs: int = 2
-    """Number of processes that record episodes."""
+    """Number of processes that record episodes, and of threads that train an ensemble."""
     out: File = None
     """Training folder; must not exist. Default: runs/train-ALGO-DATE-TIME."""
     resume: File = None

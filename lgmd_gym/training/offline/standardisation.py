@@ -25,8 +25,8 @@ class Standardisation(NamedTuple):
     scale: torch.Tensor
 
     def apply(self, features: torch.Tensor) -> torch.Tensor:
-        """Return standardised features, (M, features)."""
-        return (features - self.mean) * self.scale
+        """Standardise features, (M, features), in place and return them."""
+        return features.sub_(self.mean).mul_(self.scale)  # new arrays of 30 MB would cost as much as products
 
     @torch.no_grad()
     def fold(self, layer: torch.nn.Linear) -> None:

@@ -1,0 +1,72 @@
+"""Kernels that shift the state of neurons by whole pixels, as the view turns.
+
+A view that turns to the right by one pixel moves its content one pixel to the left. The state that belongs
+to the content moves with it: element x gets the value of element x + `pixels`. What enters at the side has no
+past: its light is that of the present frame, and its change is 0.
+
+Arguments of all kernels: first neuron and last neuron + 1; neurons to shift, bool, (N,); scalar state, see
+`scalars`, (N, ...); and the shift of each neuron, + for a turn to the right, int64, (N,) [px].
+"""
+
+from numba import njit
+
+from lgmd_gym.neuron.scalars import AGE
+from lgmd_gym.simd import LANES
+from lgmd_gym.system.kernel import kernel
+
+
+@njit(inline="always")
+def _is_shifted(n, active, scalars, pixels):
+    return active[n] and pixels[n] != 0 and scalars[n, AGE] > 0.0
+
+
+@njit(inline="always")
+def _column(step, width, pixels):
+    """Return the column that is written in a step, so that no value is read after it is overwritten."""
+    return step if pixels > 0 else width - 1 - step
+
+
+@kernel
+def shift_light(first, last, active, scalars, pixels, light, frames, y0, x0) -> None:
+    """Shift the light of the last frame, (N, H, W); that of the present one, frames[n, y0:, x0:], enters."""
+    _, height, width = light.shape
+    for n in range(first, last):
+        if not _is_shifted(n, active, scalars, pixels):
+            continue
+        for y in range(height):
+            for step in range(width):
+                x = _column(step, width, pixels[n])
+                source = x + pixels[n]
+                inside = 0 <= source < width
+                light[n, y, x] = light[n, y, source] if inside else frames[n, y0 + y, x0 + x]
+
+
+@kernel
+def shift_rows(first, last, active, scalars, pixels, values, width) -> None:
+    """Shift the rows of maps, (N, rows, at least width); 0 enters."""
+    for n in range(first, last):
+        if not _is_shifted(n, active, scalars, pixels):
+            continue
+        for y in range(values.shape[1]):
+            for step in range(width):
+                x = _column(step, width, pixels[n])
+                source = x + pixels[n]
+                values[n, y, x] = values[n, y, source] if 0 <= source < width else 0.0
+
+
+@kernel
+def shift_blocks(first, last, active, scalars, pixels, memory, width) -> None:
+    """Shift the delayed rings of the fast kernel, (N, H, blocks, 6, 16), see `state.allocate`; 0 enters."""
+    for n in range(first, last):
+        if not _is_shifted(n, active, scalars, pixels):
+            continue
+        for y in range(memory.shape[1]):
+            rings = memory[n, y]
+            for step in range(width):
+                x = _column(step, width, pixels[n])
+                source = x + pixels[n]
+                for ring in range(rings.shape[1]):
+                    value = 0.0
+                    if 0 <= source < width:
+                        value = rings[source // LANES, ring, source % LANES]
+                    rings[x // LANES, ring, x % LANES] = value
