@@ -64,6 +64,14 @@ def test_side_fields(tmp_path):
     assert 10_000 < (tmp_path / "fields.png").stat().st_size < 200_000
 
 
+def test_turning_views(tmp_path):
+    """Derotation removes most of the change of light before the oncoming car is large."""
+    steady, derotated = load("turning_views").main(tmp_path / "views.png")
+    assert (derotated[:3] < 0.5 * steady[:3]).all()
+    assert derotated[3] > 2.0 * derotated[0]
+    assert 10_000 < (tmp_path / "views.png").stat().st_size < 200_000
+
+
 def test_ablations(tmp_path, capsys):
     example = load("ablations")
     arguments = ["--worlds", "2", "--seeds", "1", "--every", "14", "--to", str(tmp_path / "arms.png")]
