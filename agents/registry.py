@@ -13,7 +13,7 @@ from lgmd_gym.agents.policies.policy import Policy, shipped_policies
 from lgmd_gym.agents.rule import Rule
 from lgmd_gym.agents.spike_rules import AdaptiveThreshold, Graded, SpeedGated, SpikeThreshold
 from lgmd_gym.agents.stopping_zone import StoppingZone
-from lgmd_gym.errors import check_known, check_text, shown
+from lgmd_gym.errors import check_keys, check_known, check_text, shown
 
 AGENTS: dict[str, type[Agent]] = {}
 
@@ -50,8 +50,9 @@ def make_agent(text: str) -> Agent:
     Args:
         text: "NAME[:OPTION=VALUE,…]" for a registered agent, as in "spike-threshold:threshold=45,frames=2";
             "RULE:toml=FILE" for a rule with options from a TOML file; "MODULE:CLASS[:OPTION=VALUE,…]" for a
-            user's class with a method `act`; "policy:NAME" or "policy:FILE.zip" for a learned policy; a file
-            whose card does not describe the network is unpickled and can run arbitrary code.
+            user's class with a method `act`; "policy:NAME" or "policy:FILE.zip" for a learned policy, with
+            ":margin=X" for a margin of its log odds. A file whose card does not describe the network is
+            unpickled and can run arbitrary code.
 
     Raises:
         ValueError: For an unknown agent or option, or a value out of bounds.
@@ -62,7 +63,9 @@ def make_agent(text: str) -> Agent:
             f"agent {shown(text)} contains a comma before its options; separate agents by spaces"
         )
     if name == Policy.name:
-        return Policy(rest)
+        file, options = _split_policy(rest)
+        check_keys("option of agent policy", options, ("margin",))
+        return Policy(file, **options)
     if _is_user_class(name, rest):
         return make_user_agent(text)
     name, options = parse_agent(text)
@@ -85,8 +88,17 @@ def outside_code(text: str) -> str | None:
     """
     name, _, rest = text.partition(":")
     if name == Policy.name:
-        return None if rest in shipped_policies() else f"policy file {rest!r}"
+        file, _ = _split_policy(rest)
+        return None if file in shipped_policies() else f"policy file {file!r}"
     return f"module {name!r}" if _is_user_class(name, rest) else None
+
+
+def _split_policy(text: str) -> tuple[str, dict[str, Any]]:
+    """Split "FILE:OPTION=VALUE,…" into the file, which may contain colons, and the options."""
+    file, colon, options = text.rpartition(":")
+    if not colon or "=" not in options:
+        return text, {}
+    return file, parse_agent(f"policy:{options}")[1]
 
 
 def _is_user_class(name: str, rest: str) -> bool:

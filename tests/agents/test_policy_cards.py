@@ -74,6 +74,15 @@ def test_the_agent_acts_as_the_model_in_its_environment(saved, capsys):
     assert agent.card.demands or len(set(demands)) > 1
 
 
+def test_a_margin_requires_two_demands(saved):
+    """The models here choose from three demands, or a continuous one."""
+    _, _, file = saved
+    with pytest.raises(
+        ValueError, match=r"must have two demands and action probabilities for margin=0.5; omit"
+    ):
+        make_agent(f"policy:{file}:margin=0.5")
+
+
 def test_the_card_describes_the_training(saved):
     _, envs, path = saved
     card = make_agent(f"policy:{path}").card

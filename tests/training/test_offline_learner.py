@@ -293,6 +293,24 @@ def test_the_margin_with_the_highest_return_is_selected():
     assert evaluate(lambda batch: log_odds, dataset([threat])).avoided == 0.0
 
 
+def test_a_higher_cost_of_false_braking_selects_a_higher_margin():
+    """The log odds exceed 0.7 in a threat and in a level without a threat, in which braking costs less."""
+    threat, other = synthetic_episode(1), synthetic_episode(1)
+    threat = replace(
+        threat,
+        rewards=np.zeros(1, np.float32),
+        braking_returns=np.array([5.0], np.float32),
+        braking_contacts=np.array([False]),
+    )
+    other = replace(
+        other, rewards=np.zeros(1, np.float32), braking_returns=np.array([-3.0], np.float32), threat=False
+    )
+    episodes, log_odds = dataset([threat, other]), torch.tensor([[0.7], [0.7]])
+    results = [select_margin(lambda batch: log_odds, episodes, false_cost) for false_cost in (1.0, 2.0)]
+    assert [margin for margin, _ in results] == [0.0, 1.0]
+    assert [evaluation.mean_return for _, evaluation in results] == [1.0, 0.0]  # not weighted
+
+
 @pytest.mark.parametrize("n_networks", [1, 2])
 def test_the_saved_policy_brakes_above_the_selected_margin(tmp_path, n_networks):
     """A policy that brakes at the first decision has a higher return with a margin at which it holds."""

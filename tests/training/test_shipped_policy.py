@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.policies.batch import action_values
 from lgmd_gym.agents.policies.card import read_card
 from lgmd_gym.agents.policies.policy import find_policy
+from lgmd_gym.agents.registry import outside_code
 from lgmd_gym.agents.sides import NUM_COLUMNS, all_round_cameras
 from lgmd_gym.agents.zones import zone_cameras
 from lgmd_gym.training import TrainConfig
@@ -24,7 +26,8 @@ OTHER_HYPERPARAMETERS = {  # as in its card
         "standardise": True,
         "mirror": True,
         "select_margin": True,
-        "policy_kwargs": {"net_arch": {"pi": [112, 64], "vf": []}},
+        "bfloat16": True,
+        "policy_kwargs": {"net_arch": {"pi": [160, 64], "vf": []}},
     }
 }
 
@@ -36,6 +39,10 @@ OTHER_HYPERPARAMETERS = {  # as in its card
         ("policy:missing.zip", "policy 'missing.zip' cannot be read: No such file"),
         ("policy:pyproject.toml", "pyproject.toml' is no"),
         ("no-brake,ttc-oracle", "separate agents by spaces"),
+        ("policy:zones:margn=1", "unknown option of agent policy 'margn'; did you mean 'margin'"),
+        ("policy:zones:margin=x", "margin must be a number, got 'x'"),
+        ("policy:zones:margin=21", r"margin must be in \[-20, 20\], got 21"),
+        ("policy:zones:path=a.zip", "unknown option of agent policy 'path'"),
     ],
 )
 def test_invalid_policy_names_are_rejected(text, message):
@@ -46,7 +53,7 @@ def test_invalid_policy_names_are_rejected(text, message):
 @pytest.mark.parametrize("name", CAMERAS)
 def test_file_is_small_and_contains_no_local_path(name):
     path = find_policy(name)
-    assert path.stat().st_size < 3_000_000
+    assert path.stat().st_size < 4_000_000
     with zipfile.ZipFile(path) as archive:
         for member in archive.namelist():
             assert not re.search(rb"/(tmp|home|root|work)/", archive.read(member)), member
@@ -94,3 +101,22 @@ def test_policy_does_not_react_to_own_acceleration(acceleration, name):
             "known_deceleration": np.array([7.5], np.float32),
         }
         assert agent.act(observation, {})[0] == 0.0
+
+
+def test_a_margin_shifts_the_log_odds_of_braking():
+    steady, later = make_agent("policy:zones"), make_agent("policy:zones:margin=2.5")
+    assert (later.name, outside_code(later.name)) == ("policy:zones:margin=2.5", None)
+    rng = np.random.default_rng(0)
+    inputs = {
+        name: rng.normal(size=(50, *box.shape)).astype(np.float32)
+        for name, box in steady.network.observation_space.spaces.items()
+    }
+    brake = int(np.argmin(steady.card.demands))
+    odds = []
+    for policy in (steady, later):
+        values = action_values(policy.network, inputs)
+        odds.append(values[:, brake] - values[:, 1 - brake])
+    np.testing.assert_allclose(odds[1], odds[0] - 2.5, atol=1e-4)
+    for index in range(50):
+        row = {name: values[index] for name, values in inputs.items()}
+        assert (later.decide(row) < 0.0) == (odds[1][index] > 0.0)

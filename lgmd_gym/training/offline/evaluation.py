@@ -7,6 +7,7 @@ import numpy as np
 import torch
 
 from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset
+from lgmd_gym.training.offline.objective import scale_false_braking_cost
 
 BATCH_SIZE = 64  # [episodes]
 MARGINS = tuple(float(margin) for margin in np.arange(-4.0, 4.5, 0.5))  # of log odds
@@ -39,24 +40,33 @@ def evaluate(logits: Callable[[EpisodeBatch], torch.Tensor], dataset: OfflineDat
 
 
 def select_margin(
-    logits: Callable[[EpisodeBatch], torch.Tensor], dataset: OfflineDataset
+    logits: Callable[[EpisodeBatch], torch.Tensor], dataset: OfflineDataset, false_cost: float = 1.0
 ) -> tuple[float, Evaluation]:
-    """Return the margin of `MARGINS` with the highest mean return, and its results.
+    """Return the margin of `MARGINS` with the highest weighted mean return, and its results.
 
-    Of margins with the same mean return, the one closest to 0 is returned.
+    Of margins with the same return, the one closest to 0 is returned. The results are not weighted.
+
+    Args:
+        logits: See `evaluate`.
+        dataset: Recorded episodes.
+        false_cost: Factor on the cost of braking in episodes without a threat, see `OfflineLearner`.
     """
-    results = zip(MARGINS, evaluate_margins(logits, dataset, MARGINS), strict=True)
-    return max(results, key=lambda item: (item[1].mean_return, -abs(item[0])))
+    weighted = zip(MARGINS, evaluate_margins(logits, dataset, MARGINS, false_cost), strict=True)
+    margin, _ = max(weighted, key=lambda item: (item[1].mean_return, -abs(item[0])))
+    return margin, evaluate_margins(logits, dataset, (margin,))[0]
 
 
 def evaluate_margins(
-    logits: Callable[[EpisodeBatch], torch.Tensor], dataset: OfflineDataset, margins: Sequence[float]
+    logits: Callable[[EpisodeBatch], torch.Tensor],
+    dataset: OfflineDataset,
+    margins: Sequence[float],
+    false_cost: float = 1.0,
 ) -> list[Evaluation]:
     """Return the results of a policy that brakes where its log odds exceed a margin, for each margin."""
-    parts = [
-        _evaluate_batch(logits, dataset.batch(range(len(dataset))[start : start + BATCH_SIZE]), margins)
-        for start in range(0, len(dataset), BATCH_SIZE)
-    ]
+    parts = []
+    for start in range(0, len(dataset), BATCH_SIZE):
+        batch = dataset.batch(range(len(dataset))[start : start + BATCH_SIZE])
+        parts.append(_evaluate_batch(logits, scale_false_braking_cost(batch, false_cost), margins))
     threats = np.array([episode.threat for episode in dataset.episodes])
     traffic = np.array([episode.traffic for episode in dataset.episodes])
     results = []

@@ -49,8 +49,9 @@ class OfflineLearner:
         batch_size: Number of episodes per gradient step.
         learning_rate: Maximum of the one-cycle schedule (Smith & Topin 2018).
         weight_decay: Weight decay of AdamW.
-        false_cost: Factor on the cost of braking in episodes without a threat, in training only. A factor
-            of 2 compensates for the few episodes that resemble a threat.
+        false_cost: Factor on the cost of braking in episodes without a threat, in training and in the
+            selection of the margin, not in the evaluations. A factor of 2 compensates for the few episodes
+            that resemble a threat.
         initial_brake_probability: Probability of braking at a decision before training.
         logit_decay: Weight of the squared log odds of braking, summed over the decisions of an episode.
             Without this penalty a network that learns slowly, for example on frames, saturates at never
@@ -59,8 +60,9 @@ class OfflineLearner:
             training episodes, see `standardisation`. It learns in fewer epochs. Not for frames.
         mirror: Whether each training episode is mirrored, left to right, with probability 1/2 in each pass.
         select_margin: Whether the policy brakes where its log odds exceed the margin, of -4, -3.5, ..., 4,
-            with the highest mean return on the validation episodes, in place of 0. The margin is selected
-            for the best epoch and subtracted from the bias: the saved policy brakes above 0.
+            with the highest mean return, weighted by `false_cost`, on the validation episodes, in place of 0.
+            The margin is selected for the best epoch and subtracted from the bias: the saved policy brakes
+            above 0.
         bfloat16: Whether matrix products in training have bfloat16 operands, see `torch.autocast`. Weights
             and evaluation remain in float32. It saves time on CPUs with AVX-512 BF16 or AMX only.
         policy_kwargs: Further arguments of the network.
@@ -169,7 +171,7 @@ class OfflineLearner:
                 self._standardisation.fold(linear_layers(network)[0])
         self._standardisation = None
         if self.select_margin:
-            margin, evaluation = select_margin(self.logits, validation)
+            margin, evaluation = select_margin(self.logits, validation, self.false_cost)
             self._subtract_margin(margin)
             log(self.n_epochs, _metrics(evaluation, margin=margin, best_return=evaluation.mean_return))
         if len(self.networks) > 1:
