@@ -59,9 +59,9 @@ def agents() -> Table:
         options = ", ".join(f"{option}={default:g}" for option, default in cls.options().items())
         table.add_row(name, _entry(_summary(cls), "options", options))
     for name in shipped_policies():
-        algo = read_card(find_policy(name))["algo"].upper()
-        description = f'Policy trained with {algo}; requires the extra "train".'
-        table.add_row(f"policy:{name}", description)
+        inputs = ", ".join(read_card(find_policy(name))["features"]["inputs"])
+        description = f'Learned policy with the inputs {inputs}; requires the extra "train".'
+        table.add_row(f"policy:{name}", _entry(description, "options", "margin=0"))
     return table
 
 
