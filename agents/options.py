@@ -14,15 +14,25 @@ def parse_agent(text: str) -> tuple[str, dict[str, Any]]:
         ('spike-threshold', {'threshold': 45, 'frames': 2})
     """
     name, _, rest = text.partition(":")
+    return name.strip(), parse_options(rest, text)
+
+
+def parse_options(options_text: str, text: str) -> dict[str, Any]:
+    """Split "option=value,option=value" into the options.
+
+    Args:
+        options_text: The options.
+        text: Agent string that contains them, for error messages.
+    """
     options: dict[str, Any] = {}
-    for part in filter(None, rest.split(",")):
+    for part in filter(None, options_text.split(",")):
         key, equals, value = part.partition("=")
         if not equals:
             raise ValueError(
                 f"agent option {shown(part)} in {shown(text)} has no value; write {shown(key)[1:-1]}=VALUE"
             )
         options[key.strip()] = _parse_value(value.strip())
-    return name.strip(), options
+    return options
 
 
 def check_options(name: str, cls: type, options: dict[str, Any]) -> None:

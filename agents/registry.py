@@ -7,7 +7,7 @@ from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.baselines import AlwaysBrake, NoBrake, RandomBrake
 from lgmd_gym.agents.field_rules import DangerZone, NestedFields
 from lgmd_gym.agents.image_rules import FlowDivergence, FrameDifference
-from lgmd_gym.agents.options import check_options, parse_agent
+from lgmd_gym.agents.options import check_options, parse_agent, parse_options
 from lgmd_gym.agents.oracles import EtaOracle, StoppingDistanceOracle, TauOracle, TTCOracle
 from lgmd_gym.agents.policies.policy import Policy, shipped_policies
 from lgmd_gym.agents.rule import Rule
@@ -94,11 +94,12 @@ def outside_code(text: str) -> str | None:
 
 
 def _split_policy(text: str) -> tuple[str, dict[str, Any]]:
-    """Split "FILE:OPTION=VALUE,…" into the file, which may contain colons, and the options."""
-    file, colon, options = text.rpartition(":")
-    if not colon or "=" not in options:
+    """Split "FILE:OPTION=VALUE,…" into the file, which may contain ":" and "=", and the options."""
+    file, _, options = text.rpartition(":")
+    option, equals, _ = options.partition("=")
+    if not file or not equals or not option.strip().isidentifier():
         return text, {}
-    return file, parse_agent(f"policy:{options}")[1]
+    return file, parse_options(options, f"{Policy.name}:{text}")
 
 
 def _is_user_class(name: str, rest: str) -> bool:

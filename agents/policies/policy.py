@@ -33,14 +33,14 @@ class Policy(Agent):
 
     Args:
         path: Zip file, or name of a policy in this package.
-        margin: Log odds of braking above which the policy brakes, in [-20, 20]; a policy with two demands and
-            action probabilities only, such as those of `--algo offline`. A margin above 0 gives fewer false
-            activations and fewer avoided contacts.
+        margin: Log odds of braking above which the policy brakes, in [-20, 20]; not 0 only for a policy that
+            chooses one of two demands by their probabilities, such as those of `--algo offline`. Above 0, the
+            policy brakes later and less often: it has fewer false activations and avoids fewer contacts.
 
     Attributes:
         card: The card.
         features: Inputs of the policy and its decision rate.
-        network: The policy of stable-baselines3, a `BasePolicy`.
+        network: The policy of stable-baselines3, a `BasePolicy`, whose bias includes the margin.
 
     Raises:
         ValueError: If the file cannot be read or has no card, if stable-baselines3 is not installed, or for a
@@ -59,7 +59,7 @@ class Policy(Agent):
         self._check_network(file, names)
         if margin != 0.0:
             self._subtract(margin)
-            self.name += f":margin={margin:g}"
+            self.name += f":margin={margin:.12g}"
         raw = FeatureConfig(inputs=names, history=1, repeat=1, shrink=1)
         self.features = raw if self.card.features is None else self.card.features
         name = self.card.vec_normalize

@@ -21,6 +21,7 @@ import numpy as np
 import torch
 from recorded_levels import level_files
 
+from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.policy import Policy
 from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.statistics import Rate
@@ -75,7 +76,9 @@ def frontier_row(
 
 def main(folder: Path, name: str, margins: Sequence[float] = MARGINS, rate_hz: float = 30.0) -> None:
     """Print the table of a policy."""
-    policy = Policy(name.removeprefix("policy:"))
+    policy = make_agent(name)
+    if not isinstance(policy, Policy):
+        raise SystemExit(f"{name} is not a policy; use policy:NAME or policy:FILE.zip")
     parts = list(level_files(folder, "validation"))
     if (folder / "episodes" / "traffic-validation").exists():
         parts += level_files(folder, "traffic-validation")

@@ -59,9 +59,11 @@ def agents() -> Table:
         options = ", ".join(f"{option}={default:g}" for option, default in cls.options().items())
         table.add_row(name, _entry(_summary(cls), "options", options))
     for name in shipped_policies():
-        inputs = ", ".join(read_card(find_policy(name))["features"]["inputs"])
+        card = read_card(find_policy(name))
+        inputs = ", ".join(card["features"]["inputs"])
         description = f'Learned policy with the inputs {inputs}; requires the extra "train".'
-        table.add_row(f"policy:{name}", _entry(description, "options", "margin=0"))
+        options = "margin=0" if len(card["demands"] or ()) == 2 else ""
+        table.add_row(f"policy:{name}", _entry(description, "options", options))
     return table
 
 

@@ -293,22 +293,30 @@ def test_the_margin_with_the_highest_return_is_selected():
     assert evaluate(lambda batch: log_odds, dataset([threat])).avoided == 0.0
 
 
+def threat_and_other():
+    """Two episodes with the same observations; braking returns 5 in the threat and -3 in the other one."""
+    threat, other = (replace(synthetic_episode(1), rewards=np.zeros(1, np.float32)) for _ in range(2))
+    avoided = {"braking_returns": np.array([5.0], np.float32), "braking_contacts": np.array([False])}
+    false = {"braking_returns": np.array([-3.0], np.float32), "threat": False}
+    return dataset([replace(threat, **avoided), replace(other, **false)])
+
+
 def test_a_higher_cost_of_false_braking_selects_a_higher_margin():
-    """The log odds exceed 0.7 in a threat and in a level without a threat, in which braking costs less."""
-    threat, other = synthetic_episode(1), synthetic_episode(1)
-    threat = replace(
-        threat,
-        rewards=np.zeros(1, np.float32),
-        braking_returns=np.array([5.0], np.float32),
-        braking_contacts=np.array([False]),
-    )
-    other = replace(
-        other, rewards=np.zeros(1, np.float32), braking_returns=np.array([-3.0], np.float32), threat=False
-    )
-    episodes, log_odds = dataset([threat, other]), torch.tensor([[0.7], [0.7]])
-    results = [select_margin(lambda batch: log_odds, episodes, false_cost) for false_cost in (1.0, 2.0)]
+    log_odds = torch.tensor([[0.7], [0.7]])
+    results = [select_margin(lambda batch: log_odds, threat_and_other(), cost) for cost in (1.0, 2.0)]
     assert [margin for margin, _ in results] == [0.0, 1.0]
     assert [evaluation.mean_return for _, evaluation in results] == [1.0, 0.0]  # not weighted
+
+
+def test_the_learner_selects_the_margin_with_its_cost_of_false_braking(tmp_path):
+    episodes, margins = threat_and_other(), []
+    arguments = {"n_epochs": 1, "learning_rate": 1e-7, "initial_brake_probability": 0.6}
+    for false_cost in (1.0, 2.0):
+        offline = learner(tmp_path, **arguments, select_margin=True, false_cost=false_cost)
+        logs = []
+        offline.learn(episodes, episodes, lambda epoch, values, rows=logs: rows.append(values))
+        margins.append(logs[-1]["margin"])
+    assert margins[0] < margins[1]
 
 
 @pytest.mark.parametrize("n_networks", [1, 2])

@@ -117,6 +117,8 @@ def test_a_margin_shifts_the_log_odds_of_braking():
         values = action_values(policy.network, inputs)
         odds.append(values[:, brake] - values[:, 1 - brake])
     np.testing.assert_allclose(odds[1], odds[0] - 2.5, atol=1e-4)
+    values = action_values(make_agent("policy:zones").network, inputs)
+    np.testing.assert_array_equal(values[:, brake] - values[:, 1 - brake], odds[0])
     for index in range(50):
         row = {name: values[index] for name, values in inputs.items()}
         assert (later.decide(row) < 0.0) == (odds[1][index] > 0.0)

@@ -62,7 +62,15 @@ def evaluate_margins(
     margins: Sequence[float],
     false_cost: float = 1.0,
 ) -> list[Evaluation]:
-    """Return the results of a policy that brakes where its log odds exceed a margin, for each margin."""
+    """Return the results of a policy that brakes where its log odds exceed a margin, for each margin.
+
+    Args:
+        logits: See `evaluate`.
+        dataset: Recorded episodes.
+        margins: Margins of the log odds of braking.
+        false_cost: Factor on the cost of braking in episodes without a threat, also in traffic. Of the
+            results, only the mean return depends on it.
+    """
     parts = []
     for start in range(0, len(dataset), BATCH_SIZE):
         batch = dataset.batch(range(len(dataset))[start : start + BATCH_SIZE])
