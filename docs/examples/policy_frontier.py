@@ -2,12 +2,12 @@
 
     python docs/examples/policy_frontier.py runs/all-round policy:all-round
 
-The folder is that of an offline training run with the cameras of the policy; the card of `policy:all-round`
-has the command of its training. A policy brakes when its log odds of braking exceed a margin; 0 is the
-margin of the agent. A larger margin delays the braking and leaves more contacts. The lead time is the median
-time from braking to the contact of the same episode without braking, over the threats in which the policy
-brakes. Rates are k/n with Wilson intervals in per cent. Traffic episodes are segments of at most ten
-seconds, all without an emergency. The table is in Markdown.
+The folder is that of an offline training run with the cameras of the policy; the page on the design of
+`policy:all-round` has the command of its training. A policy brakes when its log odds of braking exceed a
+margin; 0 is the margin of the agent. A larger margin delays the braking and leaves more contacts. The lead
+time is the median time from braking to the contact of the same episode without braking, over the threats in
+which the policy brakes. Rates are k/n with Wilson intervals in per cent. Traffic episodes are segments of at
+most ten seconds, all without an emergency. The table is in Markdown.
 """
 
 import argparse
