@@ -52,6 +52,7 @@ def _config_of(options: Train) -> TrainConfig:
         recordings=None if options.recordings is None else str(options.recordings),
         traffic_episodes=options.traffic_episodes,
         extra_levels=options.extra_levels,
+        extra_traffic=options.extra_traffic,
         videos=options.videos,
         wandb=options.wandb,
     )

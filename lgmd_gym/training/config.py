@@ -1,6 +1,6 @@
 """`TrainConfig`: the options of a training run, from the command line, a YAML file or Python."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from numbers import Real
 from pathlib import Path
@@ -24,7 +24,7 @@ from lgmd_gym.errors import (
     check_within,
     shown,
 )
-from lgmd_gym.training.extra_levels import EXAMPLE, ExtraLevels
+from lgmd_gym.training.extra_episodes import LEVELS_EXAMPLE, TRAFFIC_EXAMPLE, ExtraLevels, ExtraTraffic
 from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
 
@@ -63,6 +63,9 @@ class TrainConfig:
             are added to its evaluations.
         extra_levels: Levels that "offline" trains on in addition, a number and scenario families each, for
             example "400:CCRsCurve,StandingBox"; a twentieth as many are added to its evaluations.
+        extra_traffic: Traffic episodes of some kinds that "offline" trains on in addition, a number and the
+            kinds each, for example "400:intersection,roundabout"; a quarter as many are added to its
+            evaluations.
         videos: Number of validation episodes in videos at each evaluation; not for "offline".
         wandb: Project of Weights & Biases that the training is logged to; None for no log there.
 
@@ -86,6 +89,7 @@ class TrainConfig:
     recordings: str | None = None
     traffic_episodes: int = 0
     extra_levels: Sequence[str] = ()
+    extra_traffic: Sequence[str] = ()
     videos: int = 0
     wandb: str | None = None
 
@@ -116,17 +120,18 @@ class TrainConfig:
             raise ValueError(f"sac requires a continuous demand, got demands {list(self.demands)}; omit them")
         if self.algo == OFFLINE:
             self._check_offline()
-        for name in ("recordings", "traffic_episodes", "extra_levels"):
+        for name in ("recordings", "traffic_episodes", "extra_levels", "extra_traffic"):
             if getattr(self, name) and self.algo != OFFLINE:
                 raise ValueError(f"{name} requires algo 'offline', got {self.algo!r}; omit it")
-        self._check_extra_levels()
+        self._check_extra("extra_levels", LEVELS_EXAMPLE, ExtraLevels.parse)
+        self._check_extra("extra_traffic", TRAFFIC_EXAMPLE, ExtraTraffic.parse)
 
-    def _check_extra_levels(self) -> None:
-        texts = check_items("extra_levels", self.extra_levels, str, f"texts such as {EXAMPLE!r}")
-        object.__setattr__(self, "extra_levels", texts)
+    def _check_extra(self, name: str, example: str, parse: Callable[[str], object]) -> None:
+        texts = check_items(name, getattr(self, name), str, f"texts such as {example!r}")
+        object.__setattr__(self, name, texts)
         for text in texts:
-            ExtraLevels.parse(text)
-        if self.extra_levels and self.env_id != RANDOM_ID:
+            parse(text)
+        if name == "extra_levels" and texts and self.env_id != RANDOM_ID:
             raise ValueError(f"extra_levels requires env {RANDOM_ID!r}, got {self.env_id!r}; omit it")
 
     def _check_offline(self) -> None:
@@ -137,10 +142,11 @@ class TrainConfig:
             )
         if not self.features.latch:
             raise ValueError("algo 'offline' requires latch: true in its hyperparameters")
-        if self.traffic_episodes and {"reward", "brake"} & set(self.env_kwargs.get("config") or {}):
+        changed = {"reward", "brake"} & set(self.env_kwargs.get("config") or {})
+        if changed and (self.traffic_episodes or self.extra_traffic):
             raise ValueError(
-                "traffic_episodes have the default reward and brake, got others in env_kwargs; "
-                "omit one of the two"
+                "traffic episodes have the default reward and brake, got others in env_kwargs; omit them, or "
+                "traffic_episodes and extra_traffic"
             )
         if self.videos:
             raise ValueError("videos requires algo 'dqn', 'ppo' or 'sac', got 'offline'; omit it")

@@ -14,9 +14,10 @@ import lgmd_gym
 from lgmd_gym.agents import HOLD
 from lgmd_gym.agents.policies.features import FRAME
 from lgmd_gym.camera import BirdsEye
+from lgmd_gym.envs.traffic.registration import KINDS
 from lgmd_gym.sensing.cameras import make_cameras
 from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
-from lgmd_gym.training.extra_levels import ExtraLevels
+from lgmd_gym.training.extra_episodes import ExtraLevels, ExtraTraffic
 from lgmd_gym.training.offline.episodes import (
     CHUNK_SIZE,
     EpisodeRecorder,
@@ -31,6 +32,7 @@ from lgmd_gym.training.offline.traffic import TrafficRecorder
 LEVEL_CHUNK_SIZE = 25  # levels recorded by one task of a process, for the environments of the engine
 FILE_SIZE = 100  # largest number of seeds in one file
 TRAFFIC_RATIO = 4  # training episodes in traffic per validation episode in traffic
+EXTRA_TRAFFIC_STRIDE = 100_000  # distance between the first seeds of neighbouring sets in traffic
 EXTRA_RATIO = 20  # extra levels for training per extra level for validation
 FORMAT = 6  # of the files; recordings of another format are rejected
 
@@ -40,7 +42,8 @@ class RecordingSet:
     """Recorded episodes of one kind.
 
     Attributes:
-        name: Name of the folder: "train" or "validation", also after "extra1-", "extra2-" … or "traffic-".
+        name: Name of the folder: "train" or "validation", also after "extra1-", "extra2-" …, "traffic-",
+            "extra-traffic1-" ….
         seeds: Seeds of the environment.
         record: Returns the episodes of each seed.
         option: Options of the command line that record these episodes.
@@ -58,8 +61,11 @@ class RecordingSet:
 
 def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
     """Return the recordings that a training run requires for "train" or "validation"."""
+    return _level_sets(config, split) + _traffic_sets(config, split)
+
+
+def _level_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
     train = split == "train"
-    shrink = _frame_shrink(config)
     first = config.first_seed if train else VALIDATION_SEED
     count = config.n_timesteps if train else config.eval_episodes
     levels = _level_recorder(config, split)
@@ -73,16 +79,34 @@ def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
         record = _level_recorder(changed, split).record
         seeds = range(first, first + count)
         sets.append(RecordingSet(f"extra{number}-{split}", seeds, record, option, {"families": families}))
-    if config.traffic_episodes:
-        # The traffic suite of the benchmark uses the seeds from 0 on.
-        first = SEED_STRIDE * (config.seed + 1) if train else VALIDATION_SEED
-        count = config.traffic_episodes if train else -(-config.traffic_episodes // TRAFFIC_RATIO)
-        traffic = TrafficRecorder(split, config.camera, shrink)
-        option = f" --traffic-episodes {config.traffic_episodes}"
-        seeds = range(first, first + count)
-        name = f"traffic-{split}"
-        sets.append(RecordingSet(name, seeds, traffic.record, option, chunk_size=CHUNK_SIZE))
     return sets
+
+
+def _traffic_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
+    sets = []
+    if config.traffic_episodes:
+        option = f" --traffic-episodes {config.traffic_episodes}"
+        usual = ExtraTraffic(config.traffic_episodes, tuple(KINDS))
+        sets.append(_traffic_set(config, split, 0, usual, option))
+    option = f" --extra-traffic {' '.join(config.extra_traffic)}"
+    for number, text in enumerate(config.extra_traffic, 1):
+        sets.append(_traffic_set(config, split, number, ExtraTraffic.parse(text), option))
+    return sets
+
+
+def _traffic_set(
+    config: TrainConfig, split: str, number: int, traffic: ExtraTraffic, option: str
+) -> RecordingSet:
+    """Return the recordings of traffic episodes: the usual ones for number 0, else of some kinds."""
+    train = split == "train"
+    # The traffic suite of the benchmark uses the seeds from 0 on.
+    first = SEED_STRIDE * (config.seed + 1) if train else VALIDATION_SEED
+    first += EXTRA_TRAFFIC_STRIDE * number
+    seeds = range(first, first + (traffic.count if train else -(-traffic.count // TRAFFIC_RATIO)))
+    recorder = TrafficRecorder(split, config.camera, traffic.kinds, _frame_shrink(config))
+    name = f"extra-traffic{number}-{split}" if number else f"traffic-{split}"
+    settings = {"kinds": list(traffic.kinds)} if number else {}
+    return RecordingSet(name, seeds, recorder.record, option, settings, CHUNK_SIZE)
 
 
 def _level_recorder(config: TrainConfig, split: str) -> LevelRecorder | EpisodeRecorder:

@@ -90,6 +90,19 @@ def test_observations_equal_those_of_the_benchmark(monkeypatch, seed):
         assert np.array_equal(array, np.stack([step.observation[name] for step in steps[:-1]]))
 
 
+def test_successive_seeds_have_the_kinds_in_turn(monkeypatch):
+    made = []
+    make_traffic = traffic.make_traffic
+
+    def record_kind(kind, **arguments):
+        made.append(kind)
+        return make_traffic(kind, config={"duration": 1}, **arguments)
+
+    monkeypatch.setattr(traffic, "make_traffic", record_kind)
+    TrafficRecorder("train", "fovea", kinds=("two-way", "highway")).record(range(4, 7))
+    assert made == ["two-way", "highway", "two-way"]
+
+
 def test_emergencies_equal_those_of_the_benchmark():
     """The episode has emergencies before and after its end."""
     kind, seed, config = "intersection", 8, {"duration": 4.5}

@@ -147,6 +147,29 @@ def test_traffic_recordings_are_required_in_addition(tmp_path):
     check_recordings(replace(config, traffic_episodes=3))
 
 
+def test_extra_traffic_has_seeds_and_kinds_of_its_own(tmp_path):
+    texts = ["9:merge,two-way", "4:merge"]
+    config = offline_config(tmp_path, traffic_episodes=5, extra_traffic=texts)
+    sets = [item for split in ("train", "validation") for item in recording_sets(config, split)]
+    traffic = {item.name: item for item in sets if "traffic" in item.name}
+    assert {name: len(item.seeds) for name, item in traffic.items()} == {
+        "traffic-train": 5,
+        "extra-traffic1-train": 9,
+        "extra-traffic2-train": 4,
+        "traffic-validation": 2,
+        "extra-traffic1-validation": 3,
+        "extra-traffic2-validation": 1,
+    }
+    seeds = [seed for item in traffic.values() for seed in item.seeds]
+    assert len(set(seeds)) == len(seeds)
+    assert min(seeds) >= 10_000  # the traffic suite uses the seeds from 0 on
+    extra = traffic["extra-traffic1-train"]
+    assert extra.record.__self__.kinds == ("merge", "two-way")
+    assert extra.settings == {"kinds": ["merge", "two-way"]}
+    assert traffic["traffic-train"].record.__self__.kinds == tuple(KINDS)
+    assert extra.option == " --extra-traffic 9:merge,two-way 4:merge"
+
+
 def test_extra_levels_are_of_the_chosen_families(tmp_path):
     texts = ["41:CurvePass", "20:CCRs,EmptyRoad"]
     config = offline_config(tmp_path, extra_levels=texts, eval_episodes=2, n_timesteps=3)

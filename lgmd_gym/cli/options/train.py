@@ -49,6 +49,9 @@ class Train:
     extra_levels: Annotated[tuple[str, ...] | None, arg(metavar="N:NAME[,NAME...] [...]")] = None
     """Levels of some scenario families that offline trains on in addition, for example
     4000:CCRsCurve,FastCCRs 1000:EmptyRoad."""
+    extra_traffic: Annotated[tuple[str, ...] | None, arg(metavar="N:KIND[,KIND...] [...]")] = None
+    """Traffic episodes of some kinds that offline trains on in addition, for example
+    2000:intersection,roundabout."""
     videos: int = 0
     """Number of validation episodes that are filmed at each evaluation, in FOLDER/videos and TensorBoard."""
     wandb: Name = None

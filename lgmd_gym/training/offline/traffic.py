@@ -41,11 +41,13 @@ class TrafficRecorder:
     Attributes:
         split: "train" or "validation"; light, weather and ground texture are drawn as for its levels.
         camera: See `LGMDObservation`.
+        kinds: Kinds of traffic, for successive seeds in turn.
         shrink: See `select_signals`.
     """
 
     split: str
     camera: CameraSpec
+    kinds: tuple[str, ...] = tuple(KINDS)
     shrink: int | None = None
 
     def record(self, seeds: range) -> list[list[RecordedEpisode]]:
@@ -53,7 +55,7 @@ class TrafficRecorder:
         return [self._record_segments(seed) for seed in seeds]
 
     def _record_segments(self, seed: int) -> list[RecordedEpisode]:
-        kind = list(KINDS)[seed % len(KINDS)]
+        kind = self.kinds[seed % len(self.kinds)]
         env = make_traffic(kind, camera=self.camera, include_frame=self.shrink is not None, split=self.split)
         base: Any = env.unwrapped
         base.camera_overrides = draw_camera_fields(self.split, seed, tuple(CONDITIONS))
