@@ -6,13 +6,14 @@ The folder is that of an offline training run with the cameras of the policy; th
 `policy:all-round` has the command of its training. A policy brakes when its log odds of braking exceed a
 margin; 0 is the margin of the agent. A larger margin delays the braking and leaves more contacts. The lead
 time is the median time from braking to the contact of the same episode without braking, over the threats in
-which the policy brakes. Rates are k/n with Wilson intervals in per cent. Traffic episodes are segments of at
-most ten seconds, all without an emergency. The table is in Markdown.
+which the policy brakes. Rates are k/n with Wilson intervals in per cent, over all validation episodes of the
+training run, also those of `--extra-levels` and `--extra-traffic`. Traffic episodes are segments of at most
+ten seconds, all without an emergency. The table is in Markdown.
 """
 
 import argparse
 from collections.abc import Sequence
-from itertools import chain
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -79,11 +80,12 @@ def main(folder: Path, name: str, margins: Sequence[float] = MARGINS, rate_hz: f
     policy = make_agent(name)
     if not isinstance(policy, Policy):
         raise SystemExit(f"{name} is not a policy; use policy:NAME or policy:FILE.zip")
-    parts = list(level_files(folder, "validation"))
-    if (folder / "episodes" / "traffic-validation").exists():
-        parts += level_files(folder, "traffic-validation")
-    episodes = list(chain.from_iterable(parts))
-    odds = log_odds(policy, episodes)
+    sets = sorted(item.name for item in (folder / "episodes").glob("*validation"))
+    parts = (part for name in sets or ["validation"] for part in level_files(folder, name))
+    episodes, odds = [], []
+    for part in parts:
+        odds += log_odds(policy, part)
+        episodes += [replace(episode, observations={}) for episode in part]  # one file at a time in memory
     print(HEAD)
     for margin in margins:
         onsets = [first_braking(values, margin, policy.features.repeat) for values in odds]

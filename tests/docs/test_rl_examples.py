@@ -202,15 +202,19 @@ def test_frontier_of_a_policy():
 
 
 def test_frontier_of_the_shipped_policy(tmp_path, capsys):
-    """A margin that every log odds exceed brakes at once, and one that none exceeds never."""
+    """A margin that every log odds exceed brakes at once, and one that none exceeds never; in all sets."""
     pytest.importorskip("stable_baselines3")
     shapes = dict.fromkeys(("spike_frequency", "membrane_potential", "ffi"), NUM_ALL_ROUND)
     shapes |= {"ego_speed": 1, "ego_yaw_rate": 1, "known_deceleration": 1, "column_potential": NUM_COLUMNS}
     observations = {name: np.full((8, size), 0.5, np.float32) for name, size in shapes.items()}
-    folder = tmp_path / "episodes" / "validation"
-    folder.mkdir(parents=True)
-    episode = replace(synthetic_episode(8), observations=observations)
-    save([[episode]], folder / "000000.npz", {})
+    threat = replace(synthetic_episode(8), observations=observations)
+    segment = replace(synthetic_episode(8, threat=False, traffic=True), observations=observations)
+    sets = {"validation": [threat], "extra1-validation": [threat], "extra-traffic1-validation": [segment]}
+    for name, episodes in sets.items():
+        folder = tmp_path / "episodes" / name
+        folder.mkdir(parents=True)
+        save([episodes], folder / "000000.npz", {})
     load("policy_frontier").main(tmp_path, "policy:all-round", margins=(-1000.0, 1000.0))
     rows = capsys.readouterr().out.splitlines()[2:]
-    assert [row.split(" | ")[1].split(" ")[0] for row in rows] == ["1/1", "0/1"]
+    assert [row.split(" | ")[1].split(" ")[0] for row in rows] == ["2/2", "0/2"]
+    assert [row.split(" | ")[4].split(" ")[0] for row in rows] == ["1/1", "0/1"]
