@@ -91,8 +91,10 @@ def best_result(config: TrainConfig, folder: Path) -> Result | None:
         return Result(float(best.mean()), float(best.std()), best.size)
     if offline.exists():
         with offline.open(encoding="utf-8") as file:
-            returns = [float(row["mean_return"]) for row in csv.DictReader(file)]
-        return Result(max(returns), None, config.eval_episodes) if returns else None
+            rows = [*csv.DictReader(file)]
+        # The policy is that of the first epoch with the final best return, which may be a weighted one.
+        chosen = [row["mean_return"] for row in rows if row["best_return"] == rows[-1]["best_return"]]
+        return Result(float(chosen[0]), None, config.eval_episodes) if rows else None
     return None
 
 

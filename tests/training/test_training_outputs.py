@@ -83,7 +83,9 @@ def test_the_best_evaluation_has_the_highest_mean_return(tmp_path):
 def test_model_card_of_offline_training(tmp_path):
     config = offline_config(tmp_path)
     (tmp_path / "log").mkdir()
-    (tmp_path / "log" / "progress.csv").write_text("mean_return,avoided\n-1.0,0.1\n2.5,0.6\n2.0,0.5\n")
+    (tmp_path / "log" / "progress.csv").write_text(
+        "mean_return,avoided,best_return\n-1.0,0.1,1.5\n2.5,0.6,3.0\n2.8,0.5,3.0\n"
+    )
     result = best_result(config, tmp_path)
     assert (str(result), result.episodes) == ("2.50", 4)
     write_model_card(config, tmp_path, "0.1")

@@ -50,8 +50,7 @@ class OfflineLearner:
         learning_rate: Maximum of the one-cycle schedule (Smith & Topin 2018).
         weight_decay: Weight decay of AdamW.
         false_cost: Factor on the cost of braking in episodes without a threat, in training and in the
-            selection of the margin, not in the evaluations. A factor of 2 compensates for the few episodes
-            that resemble a threat.
+            selection of the margin. A factor of 2 compensates for the few episodes that resemble a threat.
         initial_brake_probability: Probability of braking at a decision before training.
         logit_decay: Weight of the squared log odds of braking, summed over the decisions of an episode.
             Without this penalty a network that learns slowly, for example on frames, saturates at never
@@ -61,8 +60,8 @@ class OfflineLearner:
         mirror: Whether each training episode is mirrored, left to right, with probability 1/2 in each pass.
         select_margin: Whether the policy brakes where its log odds exceed the margin, of -4, -3.5, ..., 4,
             with the highest mean return, weighted by `false_cost`, on the validation episodes, in place of 0.
-            The margin is selected for the epoch with the best mean return at a margin of 0 and subtracted
-            from the bias: the saved policy brakes above 0.
+            The weighted return also selects the epoch, each at its own margin. The margin is subtracted from
+            the bias: the saved policy brakes above 0.
         bfloat16: Whether matrix products in training have bfloat16 operands, see `torch.autocast`. Weights
             and evaluation remain in float32. It saves time on CPUs with AVX-512 BF16 or AMX only.
         policy_kwargs: Further arguments of the network.
@@ -131,13 +130,15 @@ class OfflineLearner:
         log: Callable[[int, dict[str, float]], None] = lambda epoch, metrics: None,
         jobs: int = 1,
     ) -> "PPO":
-        """Train for all epochs and return the model with the best mean return on the validation episodes.
+        """Train for all epochs and return the model of the best one on the validation episodes.
+
+        The best epoch has the highest mean return, with `select_margin` the highest weighted return.
 
         Args:
             train: Training episodes.
             validation: Episodes evaluated after each epoch.
-            log: Called after each epoch with its number and its metrics, and with `select_margin` once
-                more for the selected margin.
+            log: Called after each epoch with its number and its metrics, among them `best_return`, the return
+                of the best epoch so far.
             jobs: Number of threads that train the networks of an ensemble; it does not change the result.
         """
         with ThreadPoolExecutor(check_whole("jobs", jobs, 1)) as executor:
@@ -157,26 +158,32 @@ class OfflineLearner:
         rng = np.random.default_rng(self._seed)
         if self.standardise:
             self._standardisation = self._measure(train)
-        best_return, best_weights = -np.inf, [_copy_weights(network) for network in self.networks]
+        best_return, best_margin = -np.inf, 0.0
+        best_weights = [_copy_weights(network) for network in self.networks]
         for epoch in range(1, self.n_epochs + 1):
             train_return = self._train_epoch(train, optimizers, rng, executor)
-            evaluation = evaluate(self.logits, validation)
-            if evaluation.mean_return > best_return:
-                best_return = evaluation.mean_return
+            margin, evaluation = self._evaluate(validation)
+            epoch_return = evaluation.weighted_return if self.select_margin else evaluation.mean_return
+            if epoch_return > best_return:
+                best_return, best_margin = epoch_return, margin
                 best_weights = [_copy_weights(network) for network in self.networks]
-            log(epoch, _metrics(evaluation, train_return=train_return, best_return=best_return))
+            others = {"train_return": train_return, "margin": margin, "best_return": best_return}
+            log(epoch, _metrics(evaluation, **others))
         for network, weights in zip(self.networks, best_weights, strict=True):
             network.load_state_dict(weights)
             if self._standardisation is not None:
                 self._standardisation.fold(linear_layers(network)[0])
         self._standardisation = None
-        if self.select_margin:
-            margin, evaluation = select_margin(self.logits, validation, self.false_cost)
-            self._subtract_margin(margin)
-            log(self.n_epochs, _metrics(evaluation, margin=margin, best_return=evaluation.mean_return))
+        self._subtract_margin(best_margin)
         if len(self.networks) > 1:
             merge_networks(self.networks, self.model.policy)
         return self.model
+
+    def _evaluate(self, validation: OfflineDataset) -> tuple[float, Evaluation]:
+        """Return the margin of the log odds, and the results at this margin."""
+        if self.select_margin:
+            return select_margin(self.logits, validation, self.false_cost)
+        return 0.0, evaluate(self.logits, validation, self.false_cost)
 
     def _train_epoch(
         self,
