@@ -24,7 +24,7 @@ from lgmd_gym.errors import (
     check_within,
     shown,
 )
-from lgmd_gym.training.extra_episodes import LEVELS_EXAMPLE, TRAFFIC_EXAMPLE, ExtraLevels, ExtraTraffic
+from lgmd_gym.training.extra_episodes import LEVELS_EXAMPLE, TRAFFIC_EXAMPLE, parse_levels, parse_traffic
 from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
 
@@ -123,8 +123,8 @@ class TrainConfig:
         for name in ("recordings", "traffic_episodes", "extra_levels", "extra_traffic"):
             if getattr(self, name) and self.algo != OFFLINE:
                 raise ValueError(f"{name} requires algo 'offline', got {self.algo!r}; omit it")
-        self._check_extra("extra_levels", LEVELS_EXAMPLE, ExtraLevels.parse)
-        self._check_extra("extra_traffic", TRAFFIC_EXAMPLE, ExtraTraffic.parse)
+        self._check_extra("extra_levels", LEVELS_EXAMPLE, parse_levels)
+        self._check_extra("extra_traffic", TRAFFIC_EXAMPLE, parse_traffic)
 
     def _check_extra(self, name: str, example: str, parse: Callable[[str], object]) -> None:
         texts = check_items(name, getattr(self, name), str, f"texts such as {example!r}")

@@ -17,7 +17,7 @@ from lgmd_gym.camera import BirdsEye
 from lgmd_gym.envs.traffic.registration import KINDS
 from lgmd_gym.sensing.cameras import make_cameras
 from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
-from lgmd_gym.training.extra_episodes import ExtraLevels, ExtraTraffic
+from lgmd_gym.training.extra_episodes import ExtraEpisodes, parse_levels, parse_traffic
 from lgmd_gym.training.offline.episodes import (
     CHUNK_SIZE,
     EpisodeRecorder,
@@ -71,8 +71,8 @@ def _level_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
     levels = _level_recorder(config, split)
     sets = [RecordingSet(split, range(first, first + count), levels.record)]
     for number, text in enumerate(config.extra_levels, 1):
-        extra = ExtraLevels.parse(text)
-        families = list(extra.families)
+        extra = parse_levels(text)
+        families = list(extra.names)
         changed = replace(config, env_kwargs=config.env_kwargs | {"families": families})
         count = extra.count if train else -(-extra.count // EXTRA_RATIO)
         option = f" --extra-levels {' '.join(config.extra_levels)}"
@@ -86,16 +86,16 @@ def _traffic_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
     sets = []
     if config.traffic_episodes:
         option = f" --traffic-episodes {config.traffic_episodes}"
-        usual = ExtraTraffic(config.traffic_episodes, tuple(KINDS))
+        usual = ExtraEpisodes(config.traffic_episodes, tuple(KINDS))
         sets.append(_traffic_set(config, split, 0, usual, option))
     option = f" --extra-traffic {' '.join(config.extra_traffic)}"
     for number, text in enumerate(config.extra_traffic, 1):
-        sets.append(_traffic_set(config, split, number, ExtraTraffic.parse(text), option))
+        sets.append(_traffic_set(config, split, number, parse_traffic(text), option))
     return sets
 
 
 def _traffic_set(
-    config: TrainConfig, split: str, number: int, traffic: ExtraTraffic, option: str
+    config: TrainConfig, split: str, number: int, traffic: ExtraEpisodes, option: str
 ) -> RecordingSet:
     """Return the recordings of traffic episodes: the usual ones for number 0, else of some kinds."""
     train = split == "train"
@@ -103,9 +103,9 @@ def _traffic_set(
     first = SEED_STRIDE * (config.seed + 1) if train else VALIDATION_SEED
     first += EXTRA_TRAFFIC_STRIDE * number
     seeds = range(first, first + (traffic.count if train else -(-traffic.count // TRAFFIC_RATIO)))
-    recorder = TrafficRecorder(split, config.camera, traffic.kinds, _frame_shrink(config))
+    recorder = TrafficRecorder(split, config.camera, traffic.names, _frame_shrink(config))
     name = f"extra-traffic{number}-{split}" if number else f"traffic-{split}"
-    settings = {"kinds": list(traffic.kinds)} if number else {}
+    settings = {"kinds": list(traffic.names)} if number else {}
     return RecordingSet(name, seeds, recorder.record, option, settings, CHUNK_SIZE)
 
 
