@@ -233,6 +233,9 @@ def test_invalid_algorithm_arguments_are_rejected(tmp_path, algo, algo_kwargs, m
         (["--sensors-of", "stopping-zone", "--camera", "wide"], "use either camera or sensors_of"),
         (["--n-timesteps", "0"], "n_timesteps must be a whole number >= 1, got 0"),
         (["--jobs", "0"], "jobs must be a whole number >= 1, got 0"),
+        (["--extra-levels", "3:CCRs"], "extra_levels requires algo 'offline', got 'dqn'"),
+        (["--extra-traffic", "3:merge"], "extra_traffic requires algo 'offline', got 'dqn'"),
+        (["--traffic-episodes", "3"], "traffic_episodes requires algo 'offline', got 'dqn'"),
         (["--eval-episodes", "0"], "eval_episodes must be a whole number >= 1, got 0"),
     ],
 )
