@@ -99,6 +99,20 @@ def test_a_higher_cost_of_false_braking_selects_a_higher_margin():
     assert evaluate(lambda batch: log_odds, threat_and_other(), 2.0).weighted_return == -0.5
 
 
+@pytest.mark.parametrize("n_segments", [1, 4])
+def test_the_weighted_return_does_not_depend_on_the_number_of_traffic_segments(n_segments):
+    """Half of the weight is that of the threat with a return of 5, half that of the segments with -6 each."""
+    threat, other = threat_and_other().episodes
+    episodes = [threat] + [replace(other, traffic=True)] * n_segments
+    inputs = synthetic_episode(1).observations
+    data = dataset([replace(episode, observations=inputs) for episode in episodes])
+    log_odds = torch.full((1 + n_segments, 1), 0.7)
+    evaluation = evaluate(lambda batch: log_odds, data, 2.0)
+    assert evaluation.weighted_return == (5.0 - 6.0) / 2.0
+    assert evaluation.mean_return == pytest.approx((5.0 - 3.0 * n_segments) / (1.0 + n_segments))
+    assert evaluation.traffic_activations == 1.0
+
+
 def test_the_learner_selects_the_margin_with_its_cost_of_false_braking(tmp_path):
     episodes, margins = threat_and_other(), []
     arguments = {"n_epochs": 1, "learning_rate": 1e-7, "initial_brake_probability": 0.6}

@@ -18,7 +18,8 @@ class Evaluation(NamedTuple):
 
     Attributes:
         mean_return: Mean return over levels and traffic segments.
-        weighted_return: The same with the weighted cost of braking in episodes without a threat.
+        weighted_return: The same with the weighted cost of braking in episodes without a threat. Levels and
+            traffic segments have half of the weight each, whatever their numbers.
         avoided: Share of threats that end without contact.
         false_activations: Share of levels without a threat in which the policy brakes.
         traffic_activations: Share of traffic segments in which the policy brakes; NaN without any.
@@ -88,7 +89,7 @@ def evaluate_margins(
         results.append(
             Evaluation(
                 mean_return=float(returns.mean()),
-                weighted_return=float(weighted.mean()),
+                weighted_return=_balanced_mean(weighted, traffic),
                 avoided=_mean(~contacts[threats]),
                 false_activations=_mean(brakes[~traffic & ~threats]),
                 traffic_activations=_mean(brakes[traffic]),
@@ -129,6 +130,12 @@ def _first_braking(
     weighted_returns = holding + (weighted * onset).sum(1)
     contacts = torch.where(brakes, (batch.braking_contacts & onset).any(1), batch.threats)
     return returns, weighted_returns, brakes, contacts
+
+
+def _balanced_mean(returns: np.ndarray, traffic: np.ndarray) -> float:
+    """Return the mean over the groups, levels and traffic segments, of the mean return of each."""
+    groups = (returns[~traffic], returns[traffic])
+    return float(np.mean([group.mean() for group in groups if len(group)]))
 
 
 def _mean(flags: np.ndarray) -> float:

@@ -59,9 +59,9 @@ class OfflineLearner:
             training episodes, see `standardisation`. It learns in fewer epochs. Not for frames.
         mirror: Whether each training episode is mirrored, left to right, with probability 1/2 in each pass.
         select_margin: Whether the policy brakes where its log odds exceed the margin, of -4, -3.5, ..., 4,
-            with the highest mean return, weighted by `false_cost`, on the validation episodes, in place of 0.
-            The weighted return also selects the epoch, each at its own margin. The margin is subtracted from
-            the bias: the saved policy brakes above 0.
+            with the highest weighted return (see `Evaluation`) on the validation episodes, in place of 0.
+            It also selects the epoch, each at its own margin. The margin is subtracted from the bias: the
+            saved policy brakes above 0.
         bfloat16: Whether matrix products in training have bfloat16 operands, see `torch.autocast`. Weights
             and evaluation remain in float32. It saves time on CPUs with AVX-512 BF16 or AMX only.
         policy_kwargs: Further arguments of the network.
