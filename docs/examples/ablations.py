@@ -55,8 +55,8 @@ ARMS: dict[str, Callable[[Camera], dict[str, Any]]] = {
     "no calibration": replaced(calibrated=False),
     "no contrast control": replaced(contrast_s=0.0),
     "half the pixels per row and column": halved,
-    "lens 1.0 m high": replaced(mount_height=1.0),
-    "lens 1.5 m high": replaced(mount_height=1.5),
+    "camera 1.0 m high": replaced(mount_height=1.0),
+    "camera 1.5 m high": replaced(mount_height=1.5),
     "15 frames/s": dict,
     "60 frames/s": dict,
 }

@@ -11,7 +11,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.cli.console import activity
 from lgmd_gym.cli.modules import find_target
 from lgmd_gym.cli.options import Drive
-from lgmd_gym.cli.params import note_unused_params, parse_arguments, read_params
+from lgmd_gym.cli.params import note_unused_params, parse_arguments, parse_world, read_params
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.rendering.playback import play_episode
 
@@ -23,6 +23,9 @@ def run(options: Drive) -> int:
     target = find_target(options.target, options.case, options.module, options.trust)
     arguments = parse_arguments(options.set)
     sensors = SensorConfig(options.camera, read_params(options.params))
+    surroundings = parse_world(options.world)
+    if options.condition is not None:
+        surroundings["condition"] = options.condition
     try:
         with activity("preparing the episode") as show:
             result = play_episode(
@@ -34,6 +37,7 @@ def run(options: Drive) -> int:
                 live=options.live,
                 overlays=options.overlays,
                 sensors=sensors,
+                surroundings=surroundings,
                 progress=lambda time: show(f"{time:.1f} s simulated"),
             )
     except Exception as error:

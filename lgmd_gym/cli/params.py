@@ -1,4 +1,4 @@
-"""Reading of the `--params` option."""
+"""Reading of the options `--params`, `--set` and `--world`."""
 
 import sys
 from collections.abc import Iterable
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lgmd_gym.agents import Agent
+from lgmd_gym.camera.worlds import LABORATORY, check_world
 from lgmd_gym.neuron import LGMDParams
 
 
@@ -44,3 +45,15 @@ def parse_arguments(pairs: tuple[str, ...]) -> dict[str, Any]:
         except ValueError:
             raise ValueError(f"--set must be NAME=NUMBER, for example ego_speed=8.3, got {pair!r}") from None
     return arguments
+
+
+def parse_world(text: str | None) -> dict[str, Any]:
+    """Return the argument `world` of an environment, or {} for None.
+
+    Raises:
+        ValueError: If there is no such world.
+    """
+    if text is None:
+        return {}
+    world = check_world(int(text) if text.lstrip("-").isdecimal() else text)
+    return {"world": LABORATORY if world is None else world}

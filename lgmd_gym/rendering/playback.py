@@ -1,6 +1,6 @@
 """Playback of one episode, with the dashboard in a window or a video file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,6 +87,7 @@ def play_episode(
     live: bool = False,
     overlays: tuple[str, ...] = (),
     sensors: SensorConfig | None = None,
+    surroundings: Mapping[str, Any] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> PlaybackResult:
     """Run one episode, and optionally show or record the dashboard.
@@ -100,6 +101,7 @@ def play_episode(
         live: Whether to open a window, in real time.
         overlays: See `LGMDView`.
         sensors: Cameras and neurons; None for those of the agent.
+        surroundings: Arguments `world` and `condition` of the environment; None for its defaults.
         progress: Called after every decision with the simulated time [s].
 
     Raises:
@@ -110,7 +112,7 @@ def play_episode(
     checked_overlays(overlays)
     sensors = (sensors or SensorConfig()).for_agent(agent)
     with ExitStack() as stack:
-        env = make_target(target, arguments, **sensors.arguments)
+        env = make_target(target, arguments, **sensors.arguments, **(surroundings or {}))
         stack.callback(env.close)
         if video is None and not live:
             return _play(env, agent, seed, lambda: True, progress)

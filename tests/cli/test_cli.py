@@ -157,6 +157,12 @@ def test_version(capsys):
         (["drive", "CCRz"], "LGMD/CCRs-v0"),
         (["drive", "LGMD/CCRs-v0", "--seed", "-1"], "seed must be >= 0, got -1"),
         (["drive", "LGMD/CCRs-v0", "--overlays", "zones"], "did you mean 'zone'?"),
+        (["drive", "LGMD/CCRs-v0", "--world", "labratory"], "did you mean 'laboratory'?"),
+        (
+            ["drive", "LGMD/CCRs-v0", "--world", "10000"],
+            "world must be a whole number in [0, 9999], got 10000",
+        ),
+        (["drive", "LGMD/CCRs-v0", "--condition", "nite"], "did you mean 'night'?"),
         (["train", "--seed", "-1"], "seed must be a whole number >= 0, got -1"),
         (["drive", "LGMD/CCRs-v0", "--set", "ego_speed=50"], "for 50 km/h pass 13.89"),
         (["drive", "LGMD/CCRs-v0", "--set", "ego_speed=-1"], "ego_speed must be in (0, 40] m/s, got -1"),

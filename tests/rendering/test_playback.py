@@ -10,6 +10,9 @@ from support.rollouts import HOLD
 
 from lgmd_gym import LGMDView
 from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.suites import find_case
+from lgmd_gym.benchmark.task import Task, run_task
 from lgmd_gym.cli import main as cli
 from lgmd_gym.rendering.playback import make_target, play_episode
 from lgmd_gym.rendering.window import DISPLAY_VARIABLES, Window
@@ -80,6 +83,16 @@ def test_result_describes_the_end_of_the_episode():
     assert not stopped.collision
     assert stopped.ego_speed == pytest.approx(0.0, abs=1e-6)
     assert stopped.gap > 0.0
+
+
+def test_world_and_condition_repeat_a_run_of_the_benchmark():
+    sensors, agent = SensorConfig(), "stopping-zone"
+    row = run_task(Task(agent, find_case("quick/CCRs/v30"), 3, sensors, condition="night", world=9003)).row
+    surroundings = {"world": 9003, "condition": "night"}
+    result = play_episode("quick/CCRs/v30", make_agent(agent), 3, {}, surroundings=surroundings)
+    elsewhere = play_episode("quick/CCRs/v30", make_agent(agent), 3, {})
+    assert (result.collision, result.duration) == (row["collision"], pytest.approx(row["duration"]))
+    assert elsewhere.duration != result.duration
 
 
 @pytest.mark.parametrize(

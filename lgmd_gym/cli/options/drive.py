@@ -30,6 +30,11 @@ class Drive:
     """Overlays on the camera frame: zone (lane ahead), targets (vehicles); --overlays alone for none."""
     seed: int = 0
     """Seed of the environment: start position and grey level of the target."""
+    world: Annotated[str | None, arg(metavar="N|laboratory")] = None
+    """World: a number from 0 to 9999, or laboratory. Default: a training world, drawn by the seed."""
+    condition: Name = None
+    """Camera condition: clear, night, night_upper_beam, fog, rain or low_sun, or mixed for that of the world;
+    not for random levels, which draw their own. Default: clear."""
     camera: Name = None
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
     params: File = None
