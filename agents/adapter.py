@@ -7,7 +7,7 @@ import numpy as np
 
 from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.options import check_options, parse_agent
-from lgmd_gym.errors import shown, unknown_name
+from lgmd_gym.errors import check_flag, shown, unknown_name
 from lgmd_gym.system.user_modules import error_reason, import_user_module
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class AgentAdapter(Agent):
     def __init__(self, name: str, agent: Any) -> None:
         self.name = name
         self.agent = agent
-        self.include_frame = bool(getattr(agent, "include_frame", False))
+        self.include_frame = check_flag("include_frame", getattr(agent, "include_frame", False))
 
     @property
     def camera(self) -> "CameraSpec | None":
@@ -111,19 +111,22 @@ def make_user_agent(text: str) -> AgentAdapter:
         agent = agent_class(**options)
     except Exception as error:  # of the class's own code
         raise ValueError(f"agent {shown(name)} cannot be created ({error_reason(error)})") from error
-    _check_signature(name, agent.act)
+    _check_signature(name, "act", agent.act, {"observation": {}, "info": {}})
+    if callable(getattr(agent, "reset", None)):
+        _check_signature(name, "reset", agent.reset, {"seed": None})
     return AgentAdapter(name, agent)
 
 
-def _check_signature(name: str, act: Any) -> None:
-    """Raise ValueError if a method cannot be called with an observation and an info."""
+def _check_signature(name: str, method_name: str, method: Any, arguments: dict[str, Any]) -> None:
+    """Raise ValueError if a method cannot be called with positional arguments."""
     try:
-        signature = inspect.signature(act)
+        signature = inspect.signature(method)
     except (TypeError, ValueError):  # compiled code without a signature
         return
     try:
-        signature.bind({}, {})
+        signature.bind(*arguments.values())
     except TypeError:
+        wanted = f"{method_name}({', '.join(['self', *arguments])})"
         raise ValueError(
-            f"agent {shown(name)} must have the method act(self, observation, info), got act{signature}"
+            f"agent {shown(name)} must have the method {wanted}, got {method_name}{signature}"
         ) from None

@@ -23,6 +23,9 @@ def parse_options(options_text: str, text: str) -> dict[str, Any]:
     Args:
         options_text: The options.
         text: Agent string that contains them, for error messages.
+
+    Raises:
+        ValueError: For an option without a value, or one that occurs twice.
     """
     options: dict[str, Any] = {}
     for part in filter(None, options_text.split(",")):
@@ -31,6 +34,8 @@ def parse_options(options_text: str, text: str) -> dict[str, Any]:
             raise ValueError(
                 f"agent option {shown(part)} in {shown(text)} has no value; write {shown(key)[1:-1]}=VALUE"
             )
+        if key.strip() in options:
+            raise ValueError(f"agent option {shown(key.strip())} occurs twice in {shown(text)}; use it once")
         options[key.strip()] = _parse_value(value.strip())
     return options
 

@@ -28,7 +28,7 @@ class StoppingZoneParams(RuleParams):
     Attributes:
         deceleration: Deceleration of the stopping distance on a dry road, > 0 [m/s²]; determines the zones.
         reaction: Time from the demand to full braking, > 0 [s]; determines the zones.
-        reach: Greatest reach of the zones that brake, > 0.
+        reach: Greatest reach of the zones that brake, >= 0.28, that of the nearest zone.
         ground: Excitation threshold of ground fields, > 0.
         upright: Excitation threshold of upright fields, > 0.
         low: Excitation threshold of low fields, > 0.
@@ -52,6 +52,11 @@ class StoppingZoneParams(RuleParams):
     memory: int = parameter(6, 1, 20)
     yaw_rate: float = parameter(0.05, 0.02, 0.3)
     crawl: float = parameter(1.0, 0.5, 2.7)
+
+    def __post_init__(self) -> None:
+        RuleParams.__post_init__(self)
+        if self.reach < REACHES[0]:
+            raise ValueError(f"reach must be >= {REACHES[0]}, that of the nearest zone, got {self.reach:g}")
 
 
 class StoppingZone(Rule):

@@ -39,12 +39,12 @@ class FeatureConfig:
     """Inputs, decision rate and latch of a learned policy.
 
     Attributes:
-        inputs: Observation keys and inputs derived from them: `speed_change`, the change since the last
-            decision; `spike_peak`, the decaying peak of the spike frequency; with the cameras of
-            `stopping-zone`, `zones`, `zones_spikes` and `zones_ffi`; and with those of `all-round` also
-            `sides`, `sides_ffi` and `columns` (see `ZoneFeatures`).
-        history: Number of decisions in the history, including the present one, >= 1; inputs of zones and
-            sides contain averages over time and have no history.
+        inputs: Observation keys, among them `frame` and `known_deceleration`, and inputs derived from them:
+            `speed_change`, the change since the last decision; `spike_peak`, the decaying peak of the spike
+            frequency; with the cameras of `stopping-zone`, `zones`, `zones_spikes` and `zones_ffi`; and with
+            those of `all-round` also `sides`, `sides_ffi` and `columns` (see `ZoneFeatures`).
+        history: Number of decisions in the history, including the present one, >= 1; inputs of zones,
+            sides and columns contain averages over time and have no history.
         repeat: Number of environment decisions per decision of the policy, >= 1. At 30 Hz, 3 gives 10 Hz.
         shrink: Side of the pixel blocks that frames are averaged over, >= 1 [px].
         latch: Whether the first demand of -0.5 or less is held until the episode ends.
@@ -101,13 +101,16 @@ class FeatureConfig:
         contains the shape of each observation.
 
         Raises:
-            ValueError: If an input requires other cameras.
+            ValueError: If an input requires other cameras, or `shrink` is larger than the frame.
         """
         boxes = {}
         for name in self.inputs:
             shape = shapes.get(source_observation(name), (0,))
             if name == FRAME:
                 height, width, channels = shape
+                if self.shrink > min(height, width):
+                    side = f"the shorter side of the frame, {min(height, width)} px"
+                    raise ValueError(f"shrink must be at most {side}, got {self.shrink}")
                 shape = (height // self.shrink, width // self.shrink, channels * self.history)
                 boxes[name] = (0, 255, shape, np.uint8)
                 continue

@@ -30,6 +30,7 @@ class Policy(Agent):
     The file is a model of stable-baselines3 with a card (`PolicyCard`), inside it or beside it: the cameras,
     features and demands. With a card that describes the network, as of `lgmd-gym train`, loading reads the
     weights only. Other files are unpickled, which can execute any code: load only those that you trust.
+    Loading sets the number of PyTorch's threads in the process to 1, see `torch.set_num_threads`.
 
     Args:
         path: Zip file, or name of a policy in this package.
@@ -188,7 +189,7 @@ def _load_network(path: Path, card: PolicyCard) -> Any:
         import torch
     except ImportError:
         raise missing_extra("a policy", "train") from None
-    torch.set_num_threads(1)  # small network; episodes run in parallel processes
+    torch.set_num_threads(1)  # small network; episodes run in parallel processes; see `Policy`
     try:
         if card.network is not None:
             return card.network.load(path, card.algo, len(card.demands) if card.demands else None)

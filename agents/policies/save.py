@@ -100,19 +100,36 @@ def _values(env: Any) -> dict[str, Any]:
     wrappers = {item.name: item.kwargs or {} for item in spec.additional_wrappers}
     sensors = wrappers.get("LGMDObservation", spec.kwargs)
     config = check_mapping("config", spec.kwargs.get("config"))
-    rate = config.get("policy_frequency", FPS)
-    if rate != FPS:
-        raise ValueError(
-            f"policy_frequency {rate:g} Hz is not that of agents, {FPS:g} Hz; train with "
-            f"PolicyWrapper(env, repeat={max(round(FPS / rate), 1)}) instead"
-        )
+    demands = _demands(env, config)
+    _check_rates(env, spec.kwargs, config)
     features = wrappers.get("PolicyWrapper")
     return {
         "camera": plain_values(sensors.get("camera", "fovea")),
         "neuron": plain_values(sensors.get("params")),
         "features": None if features is None else FeatureConfig.from_dict(features),
-        "demands": _demands(env, config),
+        "demands": demands,
     }
+
+
+def _check_rates(env: Any, arguments: dict[str, Any], config: dict[str, Any]) -> None:
+    """Raise ValueError if the decisions or the frames of an environment have another rate than for agents."""
+    rate = config.get("policy_frequency", _attribute(env, "config", {}).get("policy_frequency", FPS))
+    if rate != FPS:
+        raise ValueError(
+            f"policy_frequency {rate:g} Hz is not that of agents, {FPS:g} Hz; set {FPS:g} and train with "
+            f"PolicyWrapper(env, repeat={max(round(FPS / rate), 1)}) instead"
+        )
+    fps = arguments.get("fps") or _attribute(env, "fps", FPS)
+    if fps != FPS:
+        raise ValueError(f"fps {fps:g} Hz is not that of agents, {FPS:g} Hz; train without fps")
+
+
+def _attribute(env: Any, name: str, default: Any) -> Any:
+    """Return an attribute of an environment, or of the first one of a `VecEnv`; the default without it."""
+    try:
+        return env.get_attr(name)[0] if hasattr(env, "get_attr") else env.get_wrapper_attr(name)
+    except AttributeError:
+        return default
 
 
 def _demands(env: Any, config: dict[str, Any]) -> tuple[float, ...] | None:

@@ -11,7 +11,7 @@ from lgmd_gym.agents.zones import NUM_FIELDS
 TIME_CONSTANTS_S = (0.1, 0.4, 1.2)
 NUM_LEVELS = 1 + len(TIME_CONSTANTS_S)  # features per field
 POTENTIALS = ("membrane_potential", "column_potential")  # converted to responses
-NORM = 3.4  # log(1 + 2 · 15), so that the features of `zones` are in [0, 1]
+NORM = 3.4  # about log(1 + 2 · 15), so that the features of `zones` are in [0, 1.01]
 GAINS = 1.0 / (1.0 + FPS * np.array(TIME_CONSTANTS_S)[:, None])
 _MARGIN = 3e-7  # of K to 0 and 1, so that responses are at most 15
 

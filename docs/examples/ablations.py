@@ -118,8 +118,10 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, Rate]]:
     parser.add_argument("--jobs", type=int, default=1, help="number of processes")
     parser.add_argument("--to", type=Path, help="picture to write")
     chosen = parser.parse_args(arguments)
-    first = SPLIT_WORLDS["test"].start
-    worlds, rates = range(first, first + chosen.worlds), {}
+    test, rates = SPLIT_WORLDS["test"], {}
+    if not 1 <= chosen.worlds <= len(test):
+        parser.error(f"--worlds must be in [1, {len(test)}], the test worlds, got {chosen.worlds}")
+    worlds = test[: chosen.worlds]
     print(f"| {chosen.agent} | {' | '.join(TITLES.values())} |\n|---|---|---|")
     for arm in chosen.arms:
         rates[arm] = {}

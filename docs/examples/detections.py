@@ -1,14 +1,14 @@
 """Contacts avoided because of the target, in every scenario family of a suite.
 
-    python docs/examples/detections.py stopping-zone,ttc-oracle ncap2023 ncap2023-without-target
+    python docs/examples/detections.py ncap2023 ncap2023-without-target --agents stopping-zone ttc-oracle
 
-The first argument names the agents; a run folder of `lgmd-gym bench` and one of the same suite without
-targets follow, and more of such pairs. A cell contains the contacts that the agent avoids and in which it
+The arguments are a run folder of `lgmd-gym bench` and one of the same suite without targets, and more of such
+pairs. A cell contains the contacts that the agent avoids and in which it
 does not brake without the target, in the same scenario and world, with an interval; in parentheses, all
 contacts avoided. Cases with an FCW driver are left out. The table is in Markdown.
 """
 
-import sys
+import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -63,9 +63,13 @@ def main(agents: Sequence[str], folders: Sequence[Path]) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 4 or len(sys.argv) % 2:
-        sys.exit(__doc__)
+    parser = argparse.ArgumentParser(description="Contacts avoided because of the target")
+    parser.add_argument("runs", type=Path, nargs="+", help="run folders, and those without targets")
+    parser.add_argument("--agents", nargs="+", required=True, help="agents of the runs")
+    options = parser.parse_args()
+    if len(options.runs) % 2:
+        parser.error(f"runs must be pairs of folders with and without targets, got {len(options.runs)}")
     try:
-        main(sys.argv[1].split(","), [Path(item) for item in sys.argv[2:]])
+        main(options.agents, options.runs)
     except ValueError as error:
-        sys.exit(str(error))
+        parser.error(str(error))

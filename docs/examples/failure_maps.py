@@ -298,7 +298,17 @@ def read_options(arguments: Sequence[str] | None) -> argparse.Namespace:
         parser.add_argument(f"--{name}", nargs="+", type=float, default=values, help=text)
     parser.add_argument("--jobs", type=int, default=1, help="number of processes")
     parser.add_argument("--to", type=Path, help="picture to write")
-    return parser.parse_args(arguments)
+    chosen = parser.parse_args(arguments)
+    test = SPLIT_WORLDS["test"]
+    if chosen.worlds < 1 or not test.start <= chosen.first_world <= test.stop - chosen.worlds:
+        parser.error(f"worlds must be test worlds, {test.start} to {test.stop - 1}")
+    try:
+        bound, *_ = (make_agent(name) for name in (chosen.bound, *chosen.agents))  # all names, before any run
+    except ValueError as error:
+        parser.error(str(error))
+    if bound.reads_neuron or bound.include_frame:
+        parser.error(f"--bound must use no camera, got {chosen.bound}; add it to --agents")
+    return chosen
 
 
 def main(arguments: Sequence[str] | None = None) -> list[dict[str, Map]]:

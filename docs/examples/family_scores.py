@@ -1,13 +1,13 @@
 """Scores of some agents in every scenario family of several runs.
 
-    python docs/examples/family_scores.py spike-threshold,stopping-zone,ttc-oracle RUN RUN ...
+    python docs/examples/family_scores.py RUN RUN ... --agents spike-threshold stopping-zone ttc-oracle
 
 The first argument names the agents, the others are run folders of `lgmd-gym bench`. A line is a family of a
 suite. A cell contains the threats avoided or, in a family without threats, the episodes with a false
 activation, with an interval. Cases with an FCW driver are left out. The table is in Markdown.
 """
 
-import sys
+import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -50,9 +50,11 @@ def check_agents(agents: Sequence[str], run: StoredRun) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 3:
-        sys.exit(__doc__)
+    parser = argparse.ArgumentParser(description="Scores by scenario family")
+    parser.add_argument("runs", type=Path, nargs="+", help="run folders of lgmd-gym bench")
+    parser.add_argument("--agents", nargs="+", required=True, help="agents of the runs")
+    options = parser.parse_args()
     try:
-        print(*table(sys.argv[1].split(","), [read_run(Path(item)) for item in sys.argv[2:]]), sep="\n")
+        print(*table(options.agents, [read_run(folder) for folder in options.runs]), sep="\n")
     except ValueError as error:
-        sys.exit(str(error))
+        parser.error(str(error))

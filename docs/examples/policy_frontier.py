@@ -14,6 +14,7 @@ ten seconds, all without an emergency. The table is in Markdown.
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
+from json import dumps, loads
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -26,6 +27,7 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.policy import Policy
 from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.statistics import Rate
+from lgmd_gym.camera.spec import plain_values
 from lgmd_gym.training.offline.dataset import OfflineDataset
 from lgmd_gym.training.offline.episodes import RecordedEpisode
 
@@ -81,7 +83,9 @@ def main(folder: Path, name: str, margins: Sequence[float] = MARGINS, rate_hz: f
     if not isinstance(policy, Policy):
         raise SystemExit(f"{name} is not a policy; use policy:NAME or policy:FILE.zip")
     sets = sorted(item.name for item in (folder / "episodes").glob("*validation"))
-    parts = (part for name in sets or ["validation"] for part in level_files(folder, name))
+    # With other cameras the inputs of the policy may have the same shape and another meaning.
+    origin = {"camera": loads(dumps(plain_values(policy.camera)))}
+    parts = (part for name in sets or ["validation"] for part in level_files(folder, name, origin))
     episodes, odds = [], []
     for part in parts:
         odds += log_odds(policy, part)

@@ -16,7 +16,8 @@ from stable_baselines3.common.vec_env import VecEnv
 from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
 from lgmd_gym.training.offline.dataset import OfflineDataset
 from lgmd_gym.training.offline.episodes import RecordedEpisode
-from lgmd_gym.training.offline.storage import load
+from lgmd_gym.training.offline.storage import check_file, load
+from lgmd_gym.training.recordings import FORMAT
 
 
 class Decisions:
@@ -157,14 +158,23 @@ def predict(model: Any, table: Decisions, rows: int = 4096) -> np.ndarray:
     return np.concatenate([model.predict(part, deterministic=True)[0] for part in parts])
 
 
-def level_files(folder: Path, split: str) -> Iterator[list[RecordedEpisode]]:
+def level_files(
+    folder: Path, split: str, origin: dict[str, Any] | None = None
+) -> Iterator[list[RecordedEpisode]]:
     """Yield the recorded levels of each file of a split.
+
+    Args:
+        folder: Folder of an offline training run.
+        split: Folder of the recordings, such as "validation" or "extra1-validation".
+        origin: Required settings of the recordings, such as {"camera": …}; None for any.
 
     Raises:
         SystemExit: If the folder has none.
+        ValueError: If they have another format or other settings.
     """
     files = sorted((folder / "episodes" / split).glob("*.npz"))
     if not files:
         raise SystemExit(f"no recordings in {str(folder)!r}; record them with lgmd-gym train --algo offline")
     for file in files:
+        check_file(file, {"format": FORMAT} | (origin or {}))
         yield [episode for by_seed in load(file) for episode in by_seed]

@@ -276,8 +276,17 @@ def _check_surroundings(p: CameraParams) -> None:
         raise ValueError(
             f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
         )
-    flags = ("guard_rail", "upper_beam", "wet", "linear_light", "bonnet", "calibrated", "derotated")
-    for name in flags:
+    names = (
+        "guard_rail",
+        "upper_beam",
+        "wet",
+        "linear_light",
+        "bonnet",
+        "calibrated",
+        "derotated",
+        "brake_known",
+    )
+    for name in names:
         object.__setattr__(p, name, check_flag(f"camera {name}", getattr(p, name)))
     object.__setattr__(p, "stabilised", _checked_stabilisation(p.stabilised))
 

@@ -49,7 +49,7 @@ def _config_of(options: Train) -> TrainConfig:
         seed=options.seed,
         eval_freq=options.eval_freq,
         eval_episodes=options.eval_episodes,
-        recordings=None if options.recordings is None else str(options.recordings),
+        recordings=None if options.recordings is None else str(options.recordings.resolve()),
         traffic_episodes=options.traffic_episodes,
         extra_levels=options.extra_levels,
         extra_traffic=options.extra_traffic,

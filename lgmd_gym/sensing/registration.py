@@ -144,12 +144,14 @@ class FarFieldRegistration:
             `rotations`.
 
         Raises:
-            ValueError: For frames of another shape or dtype.
+            ValueError: For frames of another shape or dtype, or turns of another shape.
         """
         expected = (len(self.rotations), *self.shape)
         if frames.shape != expected or frames.dtype != np.uint8:
             raise ValueError(f"frames must be uint8 of shape {expected}, got {frames.dtype} {frames.shape}")
         turned = self._no_turns if turns is None else np.asarray(turns, np.float64)
+        if turned.shape != self._no_turns.shape:  # the kernel checks no bounds
+            raise ValueError(f"turns must have the shape {self._no_turns.shape}, got {turned.shape}")
         self.step_range(0, len(self.rotations), np.ascontiguousarray(frames), turned, self._all)
         return self.rotations
 

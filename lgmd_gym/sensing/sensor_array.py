@@ -242,7 +242,7 @@ class SensorArray:
     def stacked_frames(self) -> np.ndarray:
         """Return the last frames of cameras with one shape, uint8, shape (num_envs, cameras, height, width).
 
-        A view if all cameras have the same detector, else a new array.
+        A view if all cameras have the same detector and number of columns, else a new array.
         """
         if len(self._groups) == 1:
             return self.frames[0]

@@ -1,15 +1,15 @@
 """`TrainConfig`: the options of a training run, from the command line, a YAML file or Python."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
-from numbers import Real
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 
-from lgmd_gym.agents import AGENTS, HOLD, make_agent
-from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
+from lgmd_gym.agents import AGENTS, make_agent
+from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
 from lgmd_gym.camera import CameraSpec
 from lgmd_gym.camera.spec import check_camera
@@ -21,17 +21,23 @@ from lgmd_gym.errors import (
     check_text,
     check_type,
     check_whole,
-    check_within,
     shown,
 )
-from lgmd_gym.training.extra_episodes import LEVELS_EXAMPLE, TRAFFIC_EXAMPLE, parse_levels, parse_traffic
+from lgmd_gym.training.config_checks import (
+    RANDOM_ID,
+    check_demands,
+    check_extra_episodes,
+    check_offline,
+    check_rates,
+)
+from lgmd_gym.training.extra_episodes import LEVELS_EXAMPLE, TRAFFIC_EXAMPLE
 from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
 
-RANDOM_ID = "LGMD/RandomBraking-v0"
 ALL_ROUND = "all-round"  # value of `sensors_of` for the cameras of `all_round_cameras`
 CAMERAS = ("fovea", "tele", "wide")
 SEED_STRIDE = 1_000_000  # distance between the environment seeds of neighbouring training seeds
+MAX_SEED = 2**32 - 1  # of NumPy's global generator, which stable-baselines3 seeds
 VALIDATION_SEED = 10_000  # first environment seed of an evaluation
 DEMANDS = {"ppo": (0.0, -1.0), "dqn": (0.0, -1.0), "sac": (), OFFLINE: (0.0, -1.0)}
 
@@ -98,7 +104,8 @@ class TrainConfig:
         for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes"):
             object.__setattr__(self, name, check_whole(name, getattr(self, name), 1))
         for name in ("traffic_episodes", "seed", "videos"):
-            object.__setattr__(self, name, check_whole(name, getattr(self, name), 0))
+            limit = MAX_SEED if name == "seed" else inf
+            object.__setattr__(self, name, check_whole(name, getattr(self, name), 0, limit))
         check_text("env_id", self.env_id)
         check_text("policy", self.policy)
         check_camera(self.camera)
@@ -112,50 +119,17 @@ class TrainConfig:
         check_type("features", self.features, FeatureConfig)
         check_type("recordings", self.recordings, str, type(None))
         check_type("wandb", self.wandb, str, type(None))
-        for demand in check_items("demands", self.demands, Real, "numbers"):
-            check_within("demands", demand, -1.0, 1.0)
-        if self.algo == "dqn" and not self.demands:
-            raise ValueError("dqn requires discrete demands; use for example --demands 0 -1")
-        if self.algo == "sac" and self.demands:
-            raise ValueError(f"sac requires a continuous demand, got demands {list(self.demands)}; omit them")
+        check_demands(self.algo, self.demands)
+        check_rates(self.env_kwargs)
+        for name, example in (("extra_levels", LEVELS_EXAMPLE), ("extra_traffic", TRAFFIC_EXAMPLE)):
+            texts = check_items(name, getattr(self, name), str, f"texts such as {example!r}")
+            object.__setattr__(self, name, texts)
+        check_extra_episodes(self)
         if self.algo == OFFLINE:
-            self._check_offline()
+            check_offline(self)
         for name in ("recordings", "traffic_episodes", "extra_levels", "extra_traffic"):
             if getattr(self, name) and self.algo != OFFLINE:
                 raise ValueError(f"{name} requires algo 'offline', got {self.algo!r}; omit it")
-        self._check_extra("extra_levels", LEVELS_EXAMPLE, parse_levels)
-        self._check_extra("extra_traffic", TRAFFIC_EXAMPLE, parse_traffic)
-
-    def _check_extra(self, name: str, example: str, parse: Callable[[str], object]) -> None:
-        texts = check_items(name, getattr(self, name), str, f"texts such as {example!r}")
-        object.__setattr__(self, name, texts)
-        for text in texts:
-            parse(text)
-        if name == "extra_levels" and texts and self.env_id != RANDOM_ID:
-            raise ValueError(f"extra_levels requires env {RANDOM_ID!r}, got {self.env_id!r}; omit it")
-
-    def _check_offline(self) -> None:
-        if sorted(self.demands)[1:] != [HOLD] or min(self.demands) > LATCH_DEMAND:
-            raise ValueError(
-                f"demands of algo 'offline' must be 0 and one of {LATCH_DEMAND} or less, "
-                f"got {list(self.demands)}; use for example --demands 0 -1"
-            )
-        if not self.features.latch:
-            raise ValueError("algo 'offline' requires latch: true in its hyperparameters")
-        changed = {"reward", "brake"} & set(self.env_kwargs.get("config") or {})
-        if changed and (self.traffic_episodes or self.extra_traffic):
-            raise ValueError(
-                "traffic episodes have the default reward and brake, got others in env_kwargs; omit them, or "
-                "traffic_episodes and extra_traffic"
-            )
-        if self.videos:
-            raise ValueError("videos requires algo 'dqn', 'ppo' or 'sac', got 'offline'; omit it")
-        if "speed_change" in self.features.inputs:
-            # A policy with this input braked in traffic whenever the driver accelerated.
-            raise ValueError(
-                "algo 'offline' does not support the input 'speed_change': the ego never accelerates in "
-                "recorded levels; remove it from the inputs"
-            )
 
     @classmethod
     def from_hyperparams(

@@ -4,7 +4,16 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from lgmd_gym.errors import check_finite, check_known, check_path, check_text, check_type, unknown_name
+from lgmd_gym.errors import (
+    check_finite,
+    check_known,
+    check_path,
+    check_text,
+    check_type,
+    check_whole,
+    shown,
+    unknown_name,
+)
 
 OFFLINE = "offline"  # the algorithm of `lgmd_gym.training.offline.learner`
 ALGORITHMS = ("ppo", "sac", "dqn", OFFLINE)
@@ -40,11 +49,24 @@ def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> dict[s
         values["env_kwargs"] = check_type("env_kwargs", algo_kwargs.pop("env_kwargs"), dict)
     for name in ("n_timesteps", "n_envs"):
         if name in algo_kwargs:
-            values[name] = int(check_finite(name, algo_kwargs.pop(name)))
+            values[name] = check_whole(name, check_finite(name, algo_kwargs.pop(name)), 1)  # also 1e5
     for name, value in algo_kwargs.items():
         if isinstance(value, int):
             check_finite(name, int(value))  # YAML has integers that are no float
+        if isinstance(value, str) and _is_number(value):
+            raise ValueError(
+                f"{name} is the text {value!r} in YAML, where an exponent requires a point and a "
+                "sign; write for example 3.0e-4"
+            )
     return values | {"algo_kwargs": algo_kwargs}
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
@@ -69,7 +91,7 @@ def _features(wrappers: Any) -> dict[str, Any]:
     items = wrappers if isinstance(wrappers, list) else [wrappers]
     if len(items) != 1:
         raise ValueError(f"env_wrapper must contain {WRAPPER} only, got {len(items)} wrappers")
-    name, arguments = (items[0], {}) if isinstance(items[0], str) else next(iter(items[0].items()))
-    if name != WRAPPER:
-        raise ValueError(f"env_wrapper must be {WRAPPER}, got {name!r}")
-    return dict(arguments or {})
+    item = {items[0]: None} if isinstance(items[0], str) else items[0]
+    if not isinstance(item, dict) or list(item) != [WRAPPER]:
+        raise ValueError(f"env_wrapper must be {WRAPPER} alone, got {shown(items[0])}")
+    return dict(check_type("arguments of PolicyWrapper", item[WRAPPER] or {}, dict))

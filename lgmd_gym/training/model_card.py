@@ -49,12 +49,12 @@ class Result(NamedTuple):
     Attributes:
         mean: Mean return.
         std: Standard deviation over episodes; None if it was not recorded.
-        episodes: Number of episodes.
+        episodes: Number of episodes; None for all recorded ones, levels and traffic segments.
     """
 
     mean: float
     std: float | None
-    episodes: int
+    episodes: int | None
 
     def __str__(self) -> str:
         return f"{self.mean:.2f}" if self.std is None else f"{self.mean:.2f} +/- {self.std:.2f}"
@@ -64,10 +64,11 @@ def write_model_card(config: TrainConfig, folder: Path, version: str) -> None:
     """Write the model card of a finished training run into its folder."""
     import yaml
 
-    result = best_result(config, folder)
+    result = best_result(folder)
     text = "The training had no evaluation."
     if result is not None:
-        text = f"Best evaluation: mean return {result} over {result.episodes} episodes of `validation`."
+        number = "all recorded" if result.episodes is None else result.episodes
+        text = f"Best evaluation: mean return {result} over {number} episodes of `validation`."
     page = _PAGE.format(
         algo=config.algo.upper(),
         env_id=config.env_id,
@@ -81,7 +82,7 @@ def write_model_card(config: TrainConfig, folder: Path, version: str) -> None:
         part.write_text(f"---\n{metadata}---\n\n{page}", encoding="utf-8")
 
 
-def best_result(config: TrainConfig, folder: Path) -> Result | None:
+def best_result(folder: Path) -> Result | None:
     """Return the best evaluation in a training folder; None without one."""
     online, offline = folder / "best" / "evaluations.npz", folder / "log" / "progress.csv"
     if online.exists():
@@ -94,7 +95,7 @@ def best_result(config: TrainConfig, folder: Path) -> Result | None:
             rows = [*csv.DictReader(file)]
         # The policy is that of the first epoch with the final best return, which may be a weighted one.
         chosen = [row["mean_return"] for row in rows if row["best_return"] == rows[-1]["best_return"]]
-        return Result(float(chosen[0]), None, config.eval_episodes) if rows else None
+        return Result(float(chosen[0]), None, None) if rows else None
     return None
 
 

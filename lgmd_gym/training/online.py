@@ -106,12 +106,12 @@ def _callbacks(
     config: TrainConfig, folder: Path, eval_envs: "VecEnv", model: "BaseAlgorithm"
 ) -> "list[BaseCallback]":
     from lgmd_gym.training.checkpoints import CheckpointSaver, Evaluator
-    from lgmd_gym.training.episode_log import EpisodeLog
+    from lgmd_gym.training.monitor_log import MonitorLog
 
     frequency = max(config.eval_freq // config.n_envs, 1)
     evaluator = Evaluator(eval_envs, folder, frequency, config.eval_episodes)
     evaluator.restore(model)
-    callbacks = [CheckpointSaver(folder, frequency), evaluator, EpisodeLog(folder, config.env_id)]
+    callbacks = [CheckpointSaver(folder, frequency), evaluator, MonitorLog(folder, config.env_id)]
     if config.videos:
         from lgmd_gym.training.videos import VideoRecorder
 

@@ -103,7 +103,8 @@ def _traffic_set(
     first = SEED_STRIDE * (config.seed + 1) if train else VALIDATION_SEED
     first += EXTRA_TRAFFIC_STRIDE * number
     seeds = range(first, first + (traffic.count if train else -(-traffic.count // TRAFFIC_RATIO)))
-    recorder = TrafficRecorder(split, config.camera, traffic.names, _frame_shrink(config))
+    params = config.env_kwargs.get("params")
+    recorder = TrafficRecorder(split, config.camera, traffic.names, _frame_shrink(config), params)
     name = f"extra-traffic{number}-{split}" if number else f"traffic-{split}"
     settings = {"kinds": list(traffic.names)} if number else {}
     return RecordingSet(name, seeds, recorder.record, option, settings, CHUNK_SIZE)

@@ -3,16 +3,19 @@
 import inspect
 import json
 import time
+import warnings
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import lgmd_gym
 from lgmd_gym.agents.policies.card import write_card
 from lgmd_gym.agents.policies.network import describe_network
+from lgmd_gym.camera.spec import plain_values
 from lgmd_gym.errors import check_keys, check_whole
 from lgmd_gym.system.files import complete_file, new_folder
 from lgmd_gym.system.lock import FolderLock
+from lgmd_gym.system.user_modules import error_reason
 from lgmd_gym.training.config import TrainConfig
 from lgmd_gym.training.hyperparams import OFFLINE
 from lgmd_gym.training.model_card import write_model_card
@@ -105,12 +108,27 @@ def check_config(config: TrainConfig) -> None:
             _make_learner(config, env)
             check_recordings(config)
         else:
-            from lgmd_gym.training.online import algorithm_class
-
-            known = inspect.signature(algorithm_class(config.algo)).parameters
-            check_keys(f"hyperparameter of {config.algo}", config.algo_kwargs, {*known} - SET_BY_TRAINER)
+            _check_algorithm(config, env)
     finally:
         env.close()
+
+
+def _check_algorithm(config: TrainConfig, env: PolicyWrapper) -> None:
+    """Raise ValueError if stable-baselines3 cannot make the algorithm with its hyperparameters."""
+    from lgmd_gym.training.online import algorithm_class, algorithm_kwargs
+
+    algorithm: Any = algorithm_class(config.algo)
+    known = inspect.signature(algorithm).parameters
+    check_keys(f"hyperparameter of {config.algo}", config.algo_kwargs, {*known} - SET_BY_TRAINER)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # on the number of environments, one here
+            algorithm(config.policy, env, seed=config.seed, device="cpu", **algorithm_kwargs(config))
+    except (AssertionError, AttributeError, KeyError, TypeError, ValueError) as error:
+        raise ValueError(
+            f"stable-baselines3 cannot make {config.algo} ({error_reason(error)}); "
+            "correct the hyperparameters in the YAML file"
+        ) from None
 
 
 def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path:
@@ -138,6 +156,7 @@ def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) 
         "lgmd_gym": lgmd_gym.__version__,
         "algo": type(model).__name__.lower(),  # stable-baselines3 class that reads the file
         "camera": values["camera"],
+        "neuron": plain_values(config.env_kwargs.get("params")),
         "features": values["features"],
         "demands": values["demands"] or None,
         "network": None if network is None else asdict(network),

@@ -190,6 +190,12 @@ def test_invalid_features_are_rejected(values, message):
         FeatureConfig.from_dict(values)
 
 
+def test_blocks_larger_than_the_frame_are_rejected():
+    features = FeatureConfig(inputs=("frame",), shrink=91)
+    with pytest.raises(ValueError, match="at most the shorter side of the frame, 90 px, got 91"):
+        features.box_arguments({"frame": (90, 160, 1)})
+
+
 def test_columns_require_the_cameras_of_all_round():
     features = FeatureConfig(inputs=("columns",), history=1)
     with pytest.raises(ValueError, match="requires the 260 columns of all-round, got 0; train with"):

@@ -21,8 +21,10 @@ from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize, unwrap
 
 from lgmd_gym.engine import SB3VecEnv
 from lgmd_gym.training import PolicyWrapper
+from lgmd_gym.wrappers import LGMDObservation
 
 ID = "LGMD/RandomBraking-v0"
+CONTINUOUS = {"simulation_frequency": 30, "action": {"type": "ContinuousAction", "lateral": False}}
 DISCRETE = {"action": {"type": "DiscreteDemand", "demands": [0.0, -0.3, -1.0]}}
 
 
@@ -153,6 +155,9 @@ def test_cards_of_other_environments(tmp_path):
     (lambda: VecFrameStack(SB3VecEnv(ID), 2), r"PolicyWrapper\(env, history=N\)"),
     (lambda: RescaleAction(gym.make("LGMD/CCRs-v0"), 0.0, 1.0), r"one demand in \[-1, 1\], got Box\(0"),
     (lambda: gym.make("highway-v0"), "the actions of Discrete.* are not demands"),
+    (lambda: LGMDObservation(gym.make("highway-v0", config=CONTINUOUS)), r"policy_frequency 1 Hz .*=30"),
+    (lambda: gym.make("LGMD/CCRs-v0", fps=15), "fps 15 Hz is not that of agents, 30 Hz"),
+    (lambda: SB3VecEnv(ID, fps=15), "fps 15 Hz is not that of agents, 30 Hz"),
 ])  # fmt: skip
 def test_an_environment_that_is_not_that_of_an_agent_is_refused(make, words, tmp_path):
     with pytest.raises(ValueError, match=words):

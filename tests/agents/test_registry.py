@@ -74,6 +74,13 @@ def test_a_duplicate_name_is_rejected():
         ("my_detector", "; an agent of your own is MODULE:CLASS$"),
         ("my_detector.py:Agent", "write the name of its module without .py$"),
         (f"{__name__}:OnlyObservation", r"act\(self, observation, info\), got act\(observation\)$"),
+        (f"{__name__}:OtherReset", r"must have the method reset\(self, seed\), got reset\(\)$"),
+        (f"{__name__}:TextFlag", "include_frame must be true or false, got 'no'"),
+        ("stopping-zone:reach=0.2", "reach must be >= 0.28, that of the nearest zone, got 0.2"),
+        (
+            "spike-threshold:threshold=45,threshold=60",
+            "option 'threshold' occurs twice in 'spike",
+        ),
         (f"{__name__}:WithoutWeights", r"cannot be created \(FileNotFoundError: weights.npy, test_reg"),
         ("math:Agent", "unknown agent class 'math:Agent'; known: none"),
         ("collections:OrderedDict", "has no method act"),
@@ -88,6 +95,15 @@ def test_an_invalid_string_is_rejected(text, message):
 class OnlyObservation:
     def act(self, observation):
         return 0.0
+
+
+class OtherReset(Threshold):
+    def reset(self):
+        pass
+
+
+class TextFlag(Threshold):
+    include_frame = "no"
 
 
 class WithoutWeights:

@@ -68,6 +68,7 @@ BAD_VALUES = [
     (lambda: CameraParams(seed=-1), ["seed", "-1"]),
     (lambda: CameraParams(texture=-0.1), ["texture", "-0.1"]),
     (lambda: CameraParams().with_condition("robots"), ["robots", "rain"]),
+    (lambda: CameraParams(brake_known="no"), ["brake_known", "'no'"]),
     (lambda: EgoCamera("fove"), ["fove", "fovea"]),
 ]
 

@@ -277,8 +277,15 @@ def test_failure_maps(tmp_path, capsys, monkeypatch):
     assert "| 80 | – | 2/2 [34–100] |" in lines
     assert picture.stat().st_size > 10_000
     options = "--agents ttc-oracle:ttc=0 --planes width --widths 1 --speeds 20 --worlds 1"
-    with pytest.raises(RuntimeError, match="ttc must be a number > 0, got 0"):
-        script.main(options.split())
+    for wrong, message in (
+        ("", "ttc must be a number > 0, got 0"),
+        ("--agents ttc-oracle --bound stopping-zone", "--bound must use no camera, got stopping-zone"),
+        ("--agents ttc-oracle --worlds 1001", "worlds must be test worlds, 8000 to 8999"),
+        ("--agents ttc-oracle --worlds 0", "worlds must be test worlds, 8000 to 8999"),
+    ):
+        with pytest.raises(SystemExit):
+            script.main([*options.split(), *wrong.split()])
+        assert message in capsys.readouterr().err
 
 
 def test_failure_maps_cells(monkeypatch):

@@ -1,5 +1,6 @@
 """The scripts of docs/examples on reinforcement learning."""
 
+import json
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -9,10 +10,12 @@ from support.examples import EXAMPLES, load
 from support.recordings import synthetic_episode
 
 from lgmd_gym.agents.policies.features import FeatureConfig
-from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS
+from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, all_round_cameras
 from lgmd_gym.benchmark import get_suite
+from lgmd_gym.camera.spec import plain_values
 from lgmd_gym.envs.registration import RANDOM, RANDOM_TASKS, make_source
 from lgmd_gym.training.offline.storage import save
+from lgmd_gym.training.recordings import FORMAT
 
 
 @pytest.mark.slow
@@ -116,7 +119,7 @@ def test_arms_are_trained_on_recorded_levels(name, tmp_path, monkeypatch, capsys
     for split, lengths in (("train", range(4, 24)), ("validation", range(4, 8))):
         (tmp_path / "episodes" / split).mkdir(parents=True)
         episodes = [[synthetic_episode(n, seed=n, threat=n % 2 == 0, frames=True)] for n in lengths]
-        save(episodes, tmp_path / "episodes" / split / "000000.npz", {})
+        save(episodes, tmp_path / "episodes" / split / "000000.npz", {"format": FORMAT})
     trained = []
     offline = example.OfflineDataset
     monkeypatch.setattr(
@@ -213,8 +216,12 @@ def test_frontier_of_the_shipped_policy(tmp_path, capsys):
     for name, episodes in sets.items():
         folder = tmp_path / "episodes" / name
         folder.mkdir(parents=True)
-        save([episodes], folder / "000000.npz", {})
-    load("policy_frontier").main(tmp_path, "policy:all-round", margins=(-1000.0, 1000.0))
+        origin = {"format": FORMAT, "camera": json.loads(json.dumps(plain_values(all_round_cameras())))}
+        save([episodes], folder / "000000.npz", origin)
+    script = load("policy_frontier")
+    script.main(tmp_path, "policy:all-round", margins=(-1000.0, 1000.0))
     rows = capsys.readouterr().out.splitlines()[2:]
     assert [row.split(" | ")[1].split(" ")[0] for row in rows] == ["2/2", "0/2"]
     assert [row.split(" | ")[4].split(" ")[0] for row in rows] == ["1/1", "0/1"]
+    with pytest.raises(ValueError, match="were recorded with another camera"):
+        script.main(tmp_path, "policy:zones")

@@ -165,3 +165,5 @@ def test_invalid_arguments_raise():
         ValueError, match=r"frames must be uint8 of shape \(1, 48, 160\), got uint8 \(48, 160\)"
     ):
         registration.step(np.zeros((48, 160), np.uint8))
+    with pytest.raises(ValueError, match=r"turns must have the shape \(1,\), got \(2,\)"):
+        registration.step(np.zeros((1, 48, 160), np.uint8), np.zeros(2))

@@ -6,10 +6,11 @@ from dataclasses import replace
 import pytest
 from support.recordings import OFFLINE_YAML, offline_config, write_yaml
 
+from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.camera import PRESETS
 from lgmd_gym.cli import main as cli
 from lgmd_gym.training import TrainConfig, train
-from lgmd_gym.training.config import VALIDATION_SEED
+from lgmd_gym.training.config import DEMANDS, VALIDATION_SEED
 from lgmd_gym.training.hyperparams import read_hyperparams
 from lgmd_gym.training.recordings import recording_sets
 from lgmd_gym.training.trainer import check_config
@@ -41,6 +42,19 @@ def test_packaged_hyperparameters(algo):
         ("default: {n_timesteps: many}", "n_timesteps must be a number, got 'many'"),
         ("default: {env_wrapper: gymnasium.wrappers.FlattenObservation}", "env_wrapper must be lgmd_gym"),
         ("default: {env_wrapper: [a, b]}", "PolicyWrapper only, got 2 wrappers"),
+        (
+            "default: {env_wrapper: [null]}",
+            "env_wrapper must be .*PolicyWrapper alone, got None",
+        ),
+        (
+            "default: {env_wrapper: {lgmd_gym.training.PolicyWrapper: {}, gymnasium.wrappers.TimeLimit: {}}}",
+            "env_wrapper must be lgmd_gym.training.PolicyWrapper alone",
+        ),
+        ("default: {n_timesteps: 200.9}", "n_timesteps must be a whole number >= 1, got 200.9"),
+        (
+            "default: {learning_rate: 3e-4}",
+            "learning_rate is the text '3e-4' in YAML.*write for example 3.0",
+        ),
     ],
 )
 def test_invalid_hyperparameter_files_are_rejected(tmp_path, text, message):
@@ -135,13 +149,27 @@ def test_offline_requires_holding_and_hard_braking(demands):
         (
             "offline",
             {"traffic_episodes": 3, "env_kwargs": {"config": {"reward": {"brake": 5.0}}}},
-            "traffic episodes have the default reward and brake",
+            "traffic episodes have the default reward, got others in config of env_kwargs",
         ),
         (
             "offline",
             {"extra_traffic": ["3:merge"], "env_kwargs": {"config": {"brake": {"jerk": 5.0}}}},
-            "traffic episodes have the default reward and brake",
+            "traffic episodes have the default brake, got others in config of env_kwargs",
         ),
+        (
+            "offline",
+            {"extra_levels": ["5:CCRsCurve", "3:StandingBox,CCRsCurve"]},
+            "extra_levels names 'CCRsCurve' in two sets, which would contain the same levels",
+        ),
+        ("ppo", {"env_kwargs": {"fps": 15}}, "fps in env_kwargs must be 30 Hz, the rate of agents, got 15"),
+        (
+            "ppo",
+            {"env_kwargs": {"config": {"policy_frequency": 10}}},
+            "policy_frequency in env_kwargs must be 30 Hz, the rate of agents, got 10",
+        ),
+        ("ppo", {"demands": (0.5,)}, r"demands must be distinct, with one below 0 that brakes, got \[0.5\]"),
+        ("dqn", {"demands": (0.0, 0.0, -1.0)}, "demands must be distinct"),
+        ("ppo", {"seed": 2**32}, r"seed must be a whole number in \[0, 4294967295\], got 4294967296"),
         ("offline", {"videos": 2}, "videos requires algo 'dqn', 'ppo' or 'sac', got 'offline'"),
         ("dqn", {"videos": -1}, "videos must be a whole number >= 0, got -1"),
         ("ppo", {"algo_kwargs": {"policy_kwargs": "dict()"}}, "policy_kwargs must be dict or NoneType"),
@@ -254,3 +282,23 @@ def test_command_rejects_unknown_hyperparameters_in_a_file(tmp_path, capsys):
     assert cli.run(["train", "--algo", "offline", "--hyperparams", str(file), "--out", str(out)]) == 2
     assert "did you mean 'batch_size'" in capsys.readouterr().err
     assert not out.exists()
+
+
+WITHOUT_LAYERS = {"n_networks": 2, "policy_kwargs": {"net_arch": {"vf": [8]}}}
+
+
+@pytest.mark.parametrize(
+    ("algo", "options", "message"),
+    [
+        ("ppo", {"policy": "MlpPolicyX"}, "cannot make ppo .*MlpPolicyX"),
+        ("ppo", {"algo_kwargs": {"learning_rate": "lin_abc"}}, "cannot make ppo .*abc"),
+        ("dqn", {"algo_kwargs": {"train_freq": "often"}}, "cannot make dqn "),
+        ("offline", {"algo_kwargs": WITHOUT_LAYERS}, "net_arch of an ensemble must contain 'pi'"),
+    ],
+)
+def test_an_algorithm_that_cannot_be_made_is_rejected_before_the_training(algo, options, message):
+    options |= {"features": FeatureConfig(("ego_speed",), latch=True), "demands": DEMANDS[algo]}
+    config = TrainConfig(algo=algo, env_id="LGMD/CCRs-v0", camera="fovea", **options)
+    with pytest.raises(ValueError, match=message) as caught:
+        check_config(config)
+    assert "\n" not in str(caught.value)

@@ -94,13 +94,14 @@ def test_successive_seeds_have_the_kinds_in_turn(monkeypatch):
     made = []
     make_traffic = traffic.make_traffic
 
-    def record_kind(kind, **arguments):
-        made.append(kind)
-        return make_traffic(kind, config={"duration": 1}, **arguments)
+    def record_kind(kind, camera, params, **arguments):
+        made.append((kind, params))
+        return make_traffic(kind, camera, params, config={"duration": 1}, **arguments)
 
     monkeypatch.setattr(traffic, "make_traffic", record_kind)
-    TrafficRecorder("train", "fovea", kinds=("two-way", "highway")).record(range(4, 7))
-    assert made == ["two-way", "highway", "two-way"]
+    params = {"t_sp": 0.6}
+    TrafficRecorder("train", "fovea", ("two-way", "highway"), params=params).record(range(4, 7))
+    assert made == [("two-way", params), ("highway", params), ("two-way", params)]
 
 
 def test_emergencies_equal_those_of_the_benchmark():

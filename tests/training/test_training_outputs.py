@@ -1,14 +1,17 @@
 """Files of a training run for other tools: `monitor.csv` and the model card."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import yaml
 from stable_baselines3.common.monitor import load_results
 from support.recordings import offline_config, write_yaml
 
+from lgmd_gym.agents import make_agent
 from lgmd_gym.training import TrainConfig, train
-from lgmd_gym.training.episode_log import EpisodeLog
 from lgmd_gym.training.model_card import best_result, write_model_card
+from lgmd_gym.training.monitor_log import MonitorLog
 
 YAML = """
 LGMD/CCRs-v0:
@@ -19,6 +22,7 @@ LGMD/CCRs-v0:
   n_steps: 8
   batch_size: 8
   policy_kwargs: {net_arch: [4]}
+  env_kwargs: {params: {t_sp: 0.6}}
 """
 
 
@@ -41,20 +45,44 @@ def finished(tmp_path_factory):
 def test_episodes_are_in_the_format_of_stable_baselines3(finished):
     config, folder = finished
     table = load_results(str(folder))
-    assert list(table.columns[:3]) == ["index", "r", "l"]
+    assert list(table.columns) == ["index", "r", "l", "t", "timesteps"]
     assert len(table) >= 2
     assert table["l"].sum() <= config.n_timesteps
     assert (folder / "monitor.csv").read_text().startswith('#{"t_start": 0.0, "env_id": "LGMD/CCRs-v0"}')
 
 
-def test_a_resumed_run_appends_its_episodes(tmp_path):
-    for total in (1.5, -3.0):
-        log = EpisodeLog(tmp_path, "LGMD/CCRs-v0")
-        log.locals = {"infos": [{}, {"episode": {"r": total, "l": 4, "t": 0.5}}]}
-        log._on_training_start()
+def log_episodes(folder, start, returns):
+    """Log an episode at each of the time steps start + 1, start + 2, …, one every half second."""
+    log = MonitorLog(folder, "LGMD/CCRs-v0")
+    log.model = SimpleNamespace(num_timesteps=start)
+    log._on_training_start()
+    for index, total in enumerate(returns, 1):
+        log.num_timesteps = start + index
+        log.locals = {"infos": [{}, {"episode": {"r": total, "l": 4, "t": 0.5 * index}}]}
         log._on_step()
-        log._on_training_end()
-    assert load_results(str(tmp_path))["r"].tolist() == [1.5, -3.0]
+    log._on_training_end()
+
+
+def test_a_resumed_run_replaces_the_episodes_after_its_checkpoint(tmp_path):
+    log_episodes(tmp_path, 0, [1.5, -3.0, 4.0])
+    log_episodes(tmp_path, 2, [5.0, 6.0])
+    table = load_results(str(tmp_path))
+    assert table["r"].tolist() == [1.5, -3.0, 5.0, 6.0]
+    assert table["timesteps"].tolist() == [1, 2, 3, 4]
+    assert table["t"].tolist() == [0.5, 1.0, 1.5, 2.0]
+
+
+def test_a_truncated_last_row_is_dropped(tmp_path):
+    log_episodes(tmp_path, 0, [1.5])
+    with (tmp_path / "monitor.csv").open("a") as file:
+        file.write("2.5,4")
+    log_episodes(tmp_path, 2, [3.0])
+    assert load_results(str(tmp_path))["r"].tolist() == [1.5, 3.0]
+
+
+def test_the_policy_has_the_neuron_of_its_training(finished):
+    _, folder = finished
+    assert make_agent(f"policy:{folder / 'policy.zip'}").neuron["t_sp"] == 0.6
 
 
 def test_model_card_has_the_best_evaluation(finished):
@@ -77,7 +105,7 @@ def test_the_best_evaluation_has_the_highest_mean_return(tmp_path):
     (tmp_path / "best").mkdir()
     results = [[1.0, 1.0], [3.0, 1.0], [9.0, -9.0]]
     np.savez(tmp_path / "best" / "evaluations.npz", timesteps=[16, 32, 48], results=results)
-    assert str(best_result(offline_config(tmp_path), tmp_path)) == "2.00 +/- 1.00"
+    assert str(best_result(tmp_path)) == "2.00 +/- 1.00"
 
 
 def test_model_card_of_offline_training(tmp_path):
@@ -86,10 +114,12 @@ def test_model_card_of_offline_training(tmp_path):
     (tmp_path / "log" / "progress.csv").write_text(
         "mean_return,avoided,best_return\n-1.0,0.1,1.5\n2.5,0.6,3.0\n2.8,0.5,3.0\n"
     )
-    result = best_result(config, tmp_path)
-    assert (str(result), result.episodes) == ("2.50", 4)
+    result = best_result(tmp_path)
+    assert (str(result), result.episodes) == ("2.50", None)
     write_model_card(config, tmp_path, "0.1")
-    assert "value: '2.50'" in (tmp_path / "README.md").read_text()
+    text = (tmp_path / "README.md").read_text()
+    assert "value: '2.50'" in text
+    assert "mean return 2.50 over all recorded episodes of `validation`" in text
 
 
 def test_model_card_without_an_evaluation(tmp_path):

@@ -5,6 +5,8 @@ from typing import Any
 
 import torch
 
+from lgmd_gym.errors import shown
+
 
 def extracts_features(network: Any) -> bool:
     """Return whether a network computes its features with weights of its own, as from frames."""
@@ -19,8 +21,14 @@ def check_without_frames(network: Any, name: str, required: object) -> None:
 
 
 def merged_layers(policy_kwargs: dict[str, Any], count: int) -> dict[str, Any]:
-    """Return the arguments of a network that is as wide as `count` networks together."""
+    """Return the arguments of a network that is as wide as `count` networks together.
+
+    Raises:
+        ValueError: If `net_arch` does not contain the layers of the policy.
+    """
     layers = policy_kwargs["net_arch"]
+    if isinstance(layers, dict) and "pi" not in layers:
+        raise ValueError(f"net_arch of an ensemble must contain 'pi', got {shown(layers)}; use pi: [64, 64]")
     units = layers["pi"] if isinstance(layers, dict) else layers
     return policy_kwargs | {"net_arch": {"pi": [count * size for size in units], "vf": []}}
 

@@ -21,6 +21,7 @@ from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.scenarios.distribution import draw_camera_fields
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, Emergencies, simulate_driver
 from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
+from lgmd_gym.neuron import NeuronSpec
 from lgmd_gym.training.offline.episodes import (
     TRAFFIC,
     Observation,
@@ -43,12 +44,14 @@ class TrafficRecorder:
         camera: See `LGMDObservation`.
         kinds: Kinds of traffic, for successive seeds in turn.
         shrink: See `select_signals`.
+        params: Parameters of the neurons, see `LGMDObservation`.
     """
 
     split: str
     camera: CameraSpec
     kinds: tuple[str, ...] = tuple(KINDS)
     shrink: int | None = None
+    params: NeuronSpec = None
 
     def record(self, seeds: range) -> list[list[RecordedEpisode]]:
         """Return the segments of one traffic episode for each seed."""
@@ -56,7 +59,8 @@ class TrafficRecorder:
 
     def _record_segments(self, seed: int) -> list[RecordedEpisode]:
         kind = self.kinds[seed % len(self.kinds)]
-        env = make_traffic(kind, camera=self.camera, include_frame=self.shrink is not None, split=self.split)
+        with_frame = self.shrink is not None
+        env = make_traffic(kind, self.camera, self.params, include_frame=with_frame, split=self.split)
         base: Any = env.unwrapped
         base.camera_overrides = draw_camera_fields(self.split, seed, tuple(CONDITIONS))
         try:
