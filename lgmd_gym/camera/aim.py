@@ -9,8 +9,9 @@ import math
 
 import numpy as np
 
+from lgmd_gym.camera.bounds import MIN_STOP
 from lgmd_gym.camera.brake_estimate import known_deceleration
-from lgmd_gym.camera.params import MIN_STOP, CameraParams
+from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.render.jit import exact_kernel
 
 FIXED, PATH, STOPPING = 0, 1, 2  # values of `gaze`

@@ -13,6 +13,8 @@ class _Interval(NamedTuple):
     unit: str
 
 
+MIN_STOP = 4.0
+"""Least stopping distance of the gaze `"stopping"` [m]."""
 BOUNDS = {
     "hfov_deg": _Interval(1.0, 170.0, False, False, "degrees"),
     "mount_height": _Interval(0.0, 100.0, False, True, "m above the ground"),

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from lgmd_gym.camera.bounds import BOUNDS, checked_number
+from lgmd_gym.camera.params_checks import (
+    check_behind_windscreen,
+    check_columns,
+    check_surroundings,
+    check_zoom,
+)
 from lgmd_gym.camera.worlds import check_world
 from lgmd_gym.errors import (
-    check_flag,
     check_keys,
     check_known,
     check_size,
@@ -19,9 +23,6 @@ from lgmd_gym.errors import (
     shown,
 )
 
-MAX_PATH = 4096  # characters
-MIN_STOP = 4.0
-"""Least stopping distance of the gaze `"stopping"` [m]."""
 MAX_WIDTH = 4096
 """Maximum width and height of a frame [px]."""
 MIN_LPLC2 = 16
@@ -189,7 +190,7 @@ class CameraParams:
         object.__setattr__(self, "shape", check_size("camera shape", self.shape, 4, MAX_WIDTH))
         for name in BOUNDS:
             object.__setattr__(self, name, checked_number(name, getattr(self, name)))
-        _check_surroundings(self)
+        check_surroundings(self)
         object.__setattr__(self, "world", None if self.world is None else check_world(self.world))
         if self.queue_lane is not None:
             object.__setattr__(self, "queue_lane", check_whole("camera queue_lane", self.queue_lane, 0))
@@ -200,11 +201,11 @@ class CameraParams:
                 f"camera shape must be at least {MIN_LPLC2} × {MIN_LPLC2} px with detector='lplc2', got "
                 f"{self.shape}; use a larger shape"
             )
-        _check_columns(self)
+        check_columns(self)
         if self.gaze == "stopping":
-            _check_zoom(self)
+            check_zoom(self)
         if self.bonnet:
-            _check_behind_windscreen(self)
+            check_behind_windscreen(self)
 
     @property
     def focal_px(self) -> float:
@@ -267,76 +268,6 @@ def _with_condition(changes: Mapping[str, Any]) -> dict[str, Any]:
     condition = others.pop("condition", CLEAR)
     check_known("camera condition", condition, CONDITIONS)
     return {**CONDITIONS[condition], **others}
-
-
-def _check_surroundings(p: CameraParams) -> None:
-    if isinstance(p.panorama, os.PathLike):
-        object.__setattr__(p, "panorama", os.fspath(p.panorama))
-    if not isinstance(p.panorama, str) or not 0 < len(p.panorama) <= MAX_PATH:
-        raise ValueError(
-            f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
-        )
-    names = (
-        "guard_rail",
-        "upper_beam",
-        "wet",
-        "linear_light",
-        "bonnet",
-        "calibrated",
-        "derotated",
-        "brake_known",
-    )
-    for name in names:
-        object.__setattr__(p, name, check_flag(f"camera {name}", getattr(p, name)))
-    object.__setattr__(p, "stabilised", _checked_stabilisation(p.stabilised))
-
-
-def _checked_stabilisation(value: object) -> bool | str:
-    if isinstance(value, str) and value == "image":
-        return value
-    try:
-        return check_flag("camera stabilised", value)
-    except ValueError:
-        raise ValueError(f"camera stabilised must be True, False or 'image', got {shown(value)}") from None
-
-
-def _check_columns(p: CameraParams) -> None:
-    columns, width = check_whole("camera columns", p.columns, 0, p.shape[1]), p.shape[1]
-    object.__setattr__(p, "columns", columns)
-    if columns and width % columns:
-        raise ValueError(f"camera columns must divide the width of {width} px, got {columns}")
-    if columns and p.detector == "lplc2":
-        raise ValueError(
-            f"camera columns must be 0 with detector='lplc2', got {columns}; use 'lgmd' or 'dsn'"
-        )
-
-
-def _check_zoom(p: CameraParams) -> None:
-    """Check the zoom of the gaze `"stopping"`, and that nothing depends on a constant focal length."""
-    nearest = MIN_STOP * p.reach + p.mount_setback
-    if not p.span_m <= 4.0 * nearest:
-        raise ValueError(
-            f"camera span_m must be at most {4.0 * nearest:.3g} m, four times the least distance of the aim "
-            f"from the lens, got {p.span_m:g}; reduce span_m or increase reach"
-        )
-    usual_values = (("panorama", "skyline"), ("bonnet", False), ("windscreen", 0.0), ("derotated", False))
-    for name, usual in usual_values:
-        if getattr(p, name) != usual:
-            raise ValueError(
-                f"camera {name} must be {usual!r} with gaze='stopping', got {shown(getattr(p, name))}"
-            )
-
-
-def _check_behind_windscreen(p: CameraParams) -> None:
-    """Check that a lens with a bonnet is behind the windscreen, also with the mounting errors of a world."""
-    limits = (
-        ("mount_height", p.mount_height >= 1.1, "at least 1.1 m"),
-        ("mount_setback", p.mount_setback >= 1.2, "at least 1.2 m"),
-        ("mount_left", abs(p.mount_left) <= 0.7, "at most 0.7 m to either side"),
-    )
-    for name, allowed, limit in limits:
-        if not allowed:
-            raise ValueError(f"camera {name} must be {limit} with bonnet=True, got {shown(getattr(p, name))}")
 
 
 def _field_names() -> list[str]:

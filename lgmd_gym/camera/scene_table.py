@@ -8,8 +8,9 @@ import numpy as np
 
 from lgmd_gym.camera.aim import MAX_TURN
 from lgmd_gym.camera.body_motion import MAX_DEG, PITCH, ROLL, YAW
+from lgmd_gym.camera.bounds import MIN_STOP
 from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, View, read_objects
-from lgmd_gym.camera.params import MIN_STOP, ROADS, CameraParams
+from lgmd_gym.camera.params import ROADS, CameraParams
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.scene import SCENE, Ego, read_scene
 
