@@ -21,7 +21,7 @@ def run(options: Train) -> int:
         if options.resume is not None:
             policy = resume(folder, progress=progress, jobs=options.jobs)
         else:
-            policy = train(_config_of(options), folder, progress=progress, jobs=options.jobs)
+            policy = train(config_of(options), folder, progress=progress, jobs=options.jobs)
     except KeyboardInterrupt:
         print(f"interrupted; to resume: lgmd-gym train --resume {folder}", file=sys.stderr)
         return 130
@@ -35,7 +35,8 @@ def _check_installed() -> None:
         raise missing_extra("training", "train")
 
 
-def _config_of(options: Train) -> TrainConfig:
+def config_of(options: Train) -> TrainConfig:
+    """Return the configuration of the options of the command line."""
     cameras = list(options.camera or ())
     return TrainConfig.from_hyperparams(
         options.algo,

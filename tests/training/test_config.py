@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from support.recordings import OFFLINE_YAML, offline_config, write_yaml
@@ -9,6 +10,8 @@ from support.recordings import OFFLINE_YAML, offline_config, write_yaml
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.camera import PRESETS
 from lgmd_gym.cli import main as cli
+from lgmd_gym.cli.options import Train
+from lgmd_gym.cli.train import config_of
 from lgmd_gym.training import TrainConfig, train
 from lgmd_gym.training.config import DEMANDS, VALIDATION_SEED
 from lgmd_gym.training.hyperparams import read_hyperparams
@@ -302,3 +305,14 @@ def test_an_algorithm_that_cannot_be_made_is_rejected_before_the_training(algo, 
     with pytest.raises(ValueError, match=message) as caught:
         check_config(config)
     assert "\n" not in str(caught.value)
+
+
+def test_traffic_is_recorded_with_the_neuron_of_the_levels(tmp_path):
+    config = replace(offline_config(tmp_path), traffic_episodes=1, env_kwargs={"params": {"t_sp": 0.6}})
+    _, traffic = recording_sets(config, "train")
+    assert traffic.record.__self__.params == {"t_sp": 0.6}
+
+
+def test_reused_recordings_have_an_absolute_path(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert config_of(Train(algo="offline", recordings=Path("other"))).recordings == str(tmp_path / "other")
