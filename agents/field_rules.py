@@ -12,9 +12,9 @@ from lgmd_gym.agents.filters import ConsecutiveFrames, YawRateGate
 from lgmd_gym.agents.params import RuleParams, parameter
 from lgmd_gym.agents.rule import Rule, SensorReading, excitation, read_ahead
 from lgmd_gym.agents.zones import (
+    CAMERA_SETBACK,
     DRY_DECELERATION,
     FULL_DECELERATION,
-    LENS_SETBACK,
     REACTION,
     stopping_distance,
     zone_camera,
@@ -111,7 +111,7 @@ class NestedFields(FieldRule):
     def field_index(self, speed: float) -> int:
         """Return the index of the narrowest field that covers the lane at the stopping distance."""
         p = self.params
-        distance = stopping_distance(max(speed, 0.0), FULL_DECELERATION, p.reaction) + LENS_SETBACK
+        distance = stopping_distance(max(speed, 0.0), FULL_DECELERATION, p.reaction) + CAMERA_SETBACK
         angle = 2 * degrees(atan(p.half_width / distance))
         return min(int(np.searchsorted(NESTED_DEG, angle)), self.num_fields - 1)
 

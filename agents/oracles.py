@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.agents.base import FPS, LatchingAgent
-from lgmd_gym.agents.zones import FULL_DECELERATION, LENS_SETBACK, stopping_distance
+from lgmd_gym.agents.zones import CAMERA_SETBACK, FULL_DECELERATION, stopping_distance
 from lgmd_gym.errors import check_positive
 
 TARGET_WIDTH = 1.712  # ISO 19206-3 [m]; `info` has no width
@@ -85,7 +85,7 @@ def _visual_angle(info: dict[str, Any]) -> tuple[float, float]:
     """Return the target's visual angle θ at the lens [rad] and θ′ [rad/s]; zeros without a target."""
     if not (isfinite(info["gap"]) and isfinite(info["target_speed"])):
         return 0.0, 0.0
-    distance, half_width = info["gap"] + LENS_SETBACK, TARGET_WIDTH / 2
+    distance, half_width = info["gap"] + CAMERA_SETBACK, TARGET_WIDTH / 2
     closing_speed = info["ego_speed"] - info["target_speed"]
     theta = 2 * float(np.arctan2(half_width, distance))
     return theta, 2 * half_width * closing_speed / hypot(distance, half_width) ** 2

@@ -3,7 +3,7 @@
 The far end of a zone is at its reach, a multiple of the stopping distance at the present speed. Its fields
 are 2.4 m wide there at every speed, see the gaze `"stopping"` of `CameraParams`. A field is a band of rows:
 the ground field covers the road surface in front of the far end, the low field what stands there up to the
-height of the lens, and the upright field the horizon.
+height of the camera, and the upright field the horizon.
 """
 
 from typing import Any, TypeVar
@@ -29,7 +29,7 @@ DRY_DECELERATION, REACTION = (
 # -0.9 to -0.3 and an upright field -0.15 to 0.35. The top of a car 1.4 m high at the far end is at 0.17.
 FIELDS = {"ground": ((18, 80), -1.2), "upright": ((20, 80), 0.1), "low": ((24, 80), -0.6)}
 FULL_DECELERATION = 9.0  # deceleration of full braking in the laboratory [m/s²]
-LENS_SETBACK = 1.7  # distance of the lens behind the front bumper [m]
+CAMERA_SETBACK = 1.7  # distance of the camera behind the front bumper [m]
 
 Speed = TypeVar("Speed", float, np.ndarray)
 

@@ -18,7 +18,7 @@ _MIX = (CLEAR, "night", "fog", "rain")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Appearance:
-    """World, camera condition and motion of the lens in the episodes of an environment.
+    """World, camera condition and motion of the car's body in the episodes of an environment.
 
     Attributes:
         world: Number of the world, or "laboratory"; None to draw a world of the split at each reset.

@@ -105,7 +105,7 @@ class RandomLevels:
         road: See `Appearance`.
         families: Names of the scenario families in use, None for all. Half of the levels are threats if both
             threats and non-threats are among them.
-        mount_heights: Lowest and highest height of the lens above the ground, drawn evenly for each level
+        mount_heights: Lowest and highest height of the camera above the ground, drawn evenly for each level
             [m]; None for the height of each camera.
         decelerations: Lowest and highest full braking, drawn evenly for each level in place of that of its
             world, on dry and wet roads alike [m/s²]; None for that of the world.

@@ -147,9 +147,9 @@ def sensors_of(agent: str, texture: float | None) -> SensorConfig:
         return SensorConfig()
     own = SensorConfig().for_agent(make_agent(agent))
     camera: Any = own.plain.camera
-    lenses = camera if isinstance(camera, list) else [camera]
-    named = [{"name": lens} if isinstance(lens, str) else lens for lens in lenses]
-    return replace(own, camera=[lens | {"texture": texture} for lens in named])
+    cameras = camera if isinstance(camera, list) else [camera]
+    named = [{"name": item} if isinstance(item, str) else item for item in cameras]
+    return replace(own, camera=[item | {"texture": texture} for item in named])
 
 
 def play_all(unit: Unit) -> list[Result]:

@@ -1,8 +1,8 @@
-"""Scenario evaluation: time to contact at the neuron's alert, by speed and lens.
+"""Scenario evaluation: time to contact at the neuron's alert, by speed and camera.
 
     python docs/examples/scenario_evaluation.py docs/tutorials/scenario_evaluation.png
 
-No agent brakes, so that all lenses are compared on the same approach to a standing car. An early alert is
+No agent brakes, so that all cameras are compared on the same approach to a standing car. An early alert is
 useful only if an empty road causes none; the script therefore counts alerts on an empty road too.
 """
 

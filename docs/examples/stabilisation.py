@@ -20,7 +20,7 @@ from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.body_motion import PITCH, ROLL, YAW, body_motion, residual_motion, road_gain
 from lgmd_gym.camera.params import ROADS
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
-from lgmd_gym.sensing.image_stabiliser import far_lens
+from lgmd_gym.sensing.image_stabiliser import far_camera
 from lgmd_gym.sensing.registration import FarFieldRegistration
 
 TRAFFIC = {"empty road": "EmptyRoad", "behind a car": "Following", "oncoming cars": "Oncoming"}
@@ -52,10 +52,10 @@ def drive(family: str, world: int, condition: str, speed: float, frames: int) ->
     env.reset(seed=world)
     rows = []
     fields = {**env.get_wrapper_attr("camera_fields"), "road": ROAD}
-    lens = far_lens([CameraParams.make("fovea", stabilised="image", **fields)])
-    assert lens is not None
-    camera, registration = EgoCamera(lens), FarFieldRegistration(lens.shape, FPS, lens.focal_px)
-    registration.step(EgoCamera(lens, road="still").render(env)[None])
+    far = far_camera([CameraParams.make("fovea", stabilised="image", **fields)])
+    assert far is not None
+    camera, registration = EgoCamera(far), FarFieldRegistration(far.shape, FPS, far.focal_px)
+    registration.step(EgoCamera(far, road="still").render(env)[None])
     seconds = 0.0
     for k in range(frames):
         frame, gain = camera.render(env)[None], road_gain(ROADS[ROAD], speed)

@@ -24,19 +24,19 @@ from lgmd_gym.benchmark.summary import Sample, rate_of
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
 from lgmd_gym.camera import CameraParams
 
-Lens = dict[str, Any]
+Camera = dict[str, Any]
 Row = dict[str, Any]
-Change = Callable[[Lens], Lens]
+Change = Callable[[Camera], Camera]
 
 
 def with_fields(**fields: Any) -> Change:
     """Return a function that replaces camera fields."""
-    return lambda lens: {**lens, **fields}
+    return lambda camera: {**camera, **fields}
 
 
 def pitched(degrees: float) -> Change:
     """Return a function that adds a mounting error in pitch, positive upwards [deg]."""
-    return lambda lens: {**lens, "pitch_deg": CameraParams.make(lens).pitch_deg + degrees}
+    return lambda camera: {**camera, "pitch_deg": CameraParams.make(camera).pitch_deg + degrees}
 
 
 # Name -> change of each camera, and arguments of the cases.
@@ -44,8 +44,8 @@ CHANGES: dict[str, tuple[Change, dict[str, Any]]] = {
     "clear": (with_fields(), {}),
     "night": (with_fields(condition="night"), {}),
     "fog, 120 m": (with_fields(condition="fog"), {}),
-    "lens pitched up 0.3°": (pitched(0.3), {}),
-    "lens pitched down 0.3°": (pitched(-0.3), {}),
+    "camera pitched up 0.3°": (pitched(0.3), {}),
+    "camera pitched down 0.3°": (pitched(-0.3), {}),
     "smooth road": (with_fields(), {"road": "smooth"}),
     "normal road": (with_fields(), {"road": "normal"}),
     "brake dive 0.1° per m/s²": (with_fields(dive_deg=0.1), {}),
@@ -65,9 +65,9 @@ TEXTURES = (0.5, 1.0, 1.6)  # contrast of the asphalt, relative to the default
 def play(agent: str, cases: Sequence[Case], seeds: int, change: Change, jobs: int) -> list[Row]:
     """Return the rows of an agent with changed cameras."""
     own = SensorConfig().for_agent(make_agent(agent))
-    lenses = own.camera if isinstance(own.camera, list) else [own.camera or DEFAULT_CAMERA]
-    named = [{"name": lens} if isinstance(lens, str) else dict(lens) for lens in lenses]
-    changed = SensorConfig([change(lens) for lens in named], own.params, own.condition, own.include_frame)
+    cameras = own.camera if isinstance(own.camera, list) else [own.camera or DEFAULT_CAMERA]
+    named = [{"name": item} if isinstance(item, str) else dict(item) for item in cameras]
+    changed = SensorConfig([change(item) for item in named], own.params, own.condition, own.include_frame)
 
     def both(case: Case, seed: int) -> Row:
         truth = run_task(Task(NO_BRAKE, case, seed, NO_VIEW)).counterfactual

@@ -13,7 +13,7 @@ from lgmd_gym.camera.params import CONDITIONS
 from lgmd_gym.gallery.cards import ScenarioCard, record_video, scenario_cards
 from lgmd_gym.gallery.outcomes import evaluate_agents
 from lgmd_gym.gallery.page import render_page
-from lgmd_gym.gallery.stills import ROADS, lens_sheet, road_sheet
+from lgmd_gym.gallery.stills import ROADS, camera_sheet, road_sheet
 from lgmd_gym.system.files import complete_folder
 
 
@@ -28,7 +28,7 @@ def make_gallery(
 
     Args:
         out: Folder, which must not exist.
-        names: Scenario families or kinds of traffic; empty for all, and the sheets of lenses and roads.
+        names: Scenario families or kinds of traffic; empty for all, and the sheets of cameras and roads.
         agent: Agent in the videos.
         seeds: Number of seeds per scenario for the outcomes.
         on_progress: Function called with a line of text after each scenario.
@@ -68,8 +68,8 @@ def _write(
         on_progress(f"{number}/{len(cards)}  {card.target}: {text}")
     sheets = {}
     if with_sheets:
-        on_progress("lenses and roads")
-        sheets["lenses"] = _save_sheet(media, "lens", lens_sheet())
+        on_progress("cameras and roads")
+        sheets["cameras"] = _save_sheet(media, "camera", camera_sheet())
         sheets["roads"] = _save_sheet(media, "road", road_sheet(tuple(ROADS), tuple(CONDITIONS)))
     page = render_page(cards, outcomes, sheets, agent, seeds)
     (folder / "index.html").write_text(page, encoding="utf-8")

@@ -24,7 +24,7 @@ def render_page(
     Args:
         cards: Scenarios, whose videos are in `media/`.
         outcomes: Outcomes by scenario name and agent; empty for traffic.
-        sheets: Image sheets "lenses" and "roads"; may be empty.
+        sheets: Image sheets "cameras" and "roads"; may be empty.
         agent: Agent in the videos.
         seeds: Number of seeds per scenario behind the outcomes.
     """

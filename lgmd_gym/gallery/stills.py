@@ -1,4 +1,4 @@
-"""Single camera frames of highway-env's roads, and of every lens under every condition."""
+"""Single camera frames of highway-env's roads, and of every camera preset under every condition."""
 
 import warnings
 from typing import Any
@@ -22,7 +22,7 @@ ROADS = {
     "u-turn-v0": (0, 30),
     "parking-v0": (2, 10),
 }
-LENSES = ("wide", "standard", "tele", "fovea")
+CAMERAS = ("wide", "standard", "tele", "fovea")
 APPROACH_DECISIONS = 90  # decisions of an approach at 8 m/s, after which the target is 16 m ahead
 
 
@@ -35,15 +35,15 @@ def road_sheet(roads: tuple[str, ...], conditions: tuple[str, ...]) -> dict[str,
         return {env_id: _road_frames(env_id, cameras) for env_id in roads}
 
 
-def lens_sheet() -> dict[str, dict[str, np.ndarray]]:
-    """Return frames of the same approach by lens and condition, uint8, shape (height, width)."""
+def camera_sheet() -> dict[str, dict[str, np.ndarray]]:
+    """Return frames of the same approach by camera preset and condition, uint8, shape (height, width)."""
     env: Any = gym.make("LGMD/CCRs-v0", ego_speed=8.0, shade=60, camera=None)
     env.reset(seed=0)
     for _ in range(APPROACH_DECISIONS):
         env.step([0.0])
     return {
-        lens: {name: EgoCamera(PRESETS[lens].with_condition(name)).render(env) for name in CONDITIONS}
-        for lens in LENSES
+        preset: {name: EgoCamera(PRESETS[preset].with_condition(name)).render(env) for name in CONDITIONS}
+        for preset in CAMERAS
     }
 
 

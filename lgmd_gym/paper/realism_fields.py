@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.agents.rule import excitation
-from lgmd_gym.agents.zones import FULL_DECELERATION, LENS_SETBACK, stopping_distance
+from lgmd_gym.agents.zones import CAMERA_SETBACK, FULL_DECELERATION, stopping_distance
 from lgmd_gym.neuron import LGMD
 
 MIN_SCALE = 0.3  # pixels of the frame per pixel of a field, below which a field is left out
@@ -16,7 +16,7 @@ SPEEDS_KMH = (10, 20, 25, 30, 40, 50, 60, 70, 80, 90)
 # Excitation threshold, frame shape (height, width) [px] and pitch of each kind of field. The unit of pitch is
 # the angle from the horizon down to the road at the stopping distance.
 KINDS = {"upright": (0.5, (20, 80), 0.1), "ground": (3.0, (30, 80), -1.375)}
-LENS_HEIGHT, SPAN_M, REACTION = 1.2, 2.4, 0.4  # height [m], width at the stopping distance [m], time [s]
+CAMERA_HEIGHT, SPAN_M, REACTION = 1.2, 2.4, 0.4  # height [m], width at the stopping distance [m], time [s]
 
 
 class Fields:
@@ -69,8 +69,8 @@ def field_cameras(kind: str) -> list[dict[str, Any]]:
     _, shape, pitch = KINDS[kind]
     cameras = []
     for speed_kmh in SPEEDS_KMH:
-        depth = stopping_distance(speed_kmh / 3.6, FULL_DECELERATION, REACTION) + LENS_SETBACK
-        hfov_deg, down_deg = 2 * degrees(atan(SPAN_M / 2 / depth)), degrees(atan(LENS_HEIGHT / depth))
+        depth = stopping_distance(speed_kmh / 3.6, FULL_DECELERATION, REACTION) + CAMERA_SETBACK
+        hfov_deg, down_deg = 2 * degrees(atan(SPAN_M / 2 / depth)), degrees(atan(CAMERA_HEIGHT / depth))
         angles = {"hfov_deg": round(hfov_deg, 4), "pitch_deg": round(pitch * down_deg, 4)}
         cameras.append({"name": f"{kind}{speed_kmh}", "shape": list(shape), **angles})
     return cameras

@@ -26,15 +26,15 @@ def checked_overlays(names: Iterable[str]) -> tuple[str, ...]:
 def danger_zone_edges(camera: EgoCamera, ego: Any) -> list[np.ndarray]:
     """Return the left and right edge of the danger zone in pixels of the last frame.
 
-    The zone is that of `lgmd_gym.neuron.danger_zone` with its default width, for the lens, mount and pitch of
-    the camera.
+    The zone is that of `lgmd_gym.neuron.danger_zone` with its default width, for the focal length, mount and
+    pitch of the camera.
 
     Args:
         camera: The camera, after its first frame.
         ego: The ego vehicle.
 
     Returns:
-        Two arrays of points (u, v), float64, shape (points, 2), without points behind the lens.
+        Two arrays of points (u, v), float64, shape (points, 2), without points behind the camera.
     """
     ahead = np.geomspace(*ZONE_REACH, 40)
     heading = float(ego.heading)

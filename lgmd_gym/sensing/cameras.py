@@ -11,7 +11,7 @@ from lgmd_gym.camera.road_pool import RoadKey, road_key
 from lgmd_gym.camera.scene_table import view_of
 from lgmd_gym.camera.spec import is_top_view
 from lgmd_gym.errors import check_keys
-from lgmd_gym.sensing.image_stabiliser import far_lens
+from lgmd_gym.sensing.image_stabiliser import far_camera
 
 _MAX_KNOWN = 256  # distinct fields that are remembered
 
@@ -57,7 +57,7 @@ class Variant(NamedTuple):
         params: Parameters of every camera; None for a top view.
         road_keys: `road_key` of every camera, with a placeholder for a top view, then that of `far`.
         view: Directions that the cameras look in, see `read_objects`.
-        far: Far-field lens that stabilises the cameras, see `far_lens`; None for no such lens.
+        far: Far-field camera that stabilises the cameras, see `far_camera`; None if there is none.
         known_deceleration: The car's estimate of its full braking [m/s²]; None unless a camera has
             `brake_known`.
     """
@@ -115,7 +115,7 @@ class Variants:
         for base, changed in zip(self._base, params, strict=True):
             if base is not None:
                 _check_kept(base, changed)
-        far = far_lens(params)
+        far = far_camera(params)
         known = [p for p in (*params, far) if p is not None]
         placeholder = road_key(known[0]) if known else (0.0, 0, False, False, None)
         keys = tuple(placeholder if p is None else road_key(p) for p in params)

@@ -1,12 +1,12 @@
-"""ImageStabiliser: measures the rotation of the ego's body with one far-field lens per environment.
+"""ImageStabiliser: measures the rotation of the ego's body with one far-field camera per environment.
 
-The lens is fixed to the car at the place of the first camera with `stabilised="image"`. It has 160 columns
+It is fixed to the car at the place of the first camera with `stabilised="image"`. It has 160 columns
 over 24° and the horizon at half height, 6.6 px/°. Its frames are drawn before those of the cameras, and the
 rotation that they show is subtracted from the rotation of the body in the same camera frame.
 
 At the start of an episode, the reference of the registration is a frame without motion of the body. This is
-an assumption: a car that has driven for minutes knows the mean direction of its lens. Another one is that the
-car knows by how much it has turned since the last frame.
+an assumption: a car that has driven for minutes knows the mean direction of its camera. Another one is that
+the car knows by how much it has turned since the last frame.
 """
 
 from collections.abc import Sequence
@@ -23,11 +23,11 @@ from lgmd_gym.camera.render.context import Workspace
 from lgmd_gym.sensing.registration import FarFieldRegistration
 
 FAR_SHAPE, FAR_HFOV_DEG = (48, 160), 24.0
-"""Shape (height, width) [px] and horizontal field of view [degrees] of the far-field lens."""
+"""Shape (height, width) [px] and horizontal field of view [degrees] of the far-field camera."""
 
 
-def far_lens(cameras: Sequence[CameraParams | None]) -> CameraParams | None:
-    """Return the far-field lens of an environment; None if the image stabilises no camera.
+def far_camera(cameras: Sequence[CameraParams | None]) -> CameraParams | None:
+    """Return the far-field camera of an environment; None if the image stabilises no camera.
 
     Args:
         cameras: Cameras of the environment; None for a top view.
@@ -53,37 +53,37 @@ def far_lens(cameras: Sequence[CameraParams | None]) -> CameraParams | None:
 
 
 class ImageStabiliser:
-    """One far-field lens per environment, and the registration of their frames.
+    """One far-field camera per environment, and the registration of their frames.
 
     Args:
-        lens: The far-field lens, see `far_lens`.
+        camera: The far-field camera, see `far_camera`.
         fps: Camera frame rate [Hz].
         num_envs: Number of environments.
-        camera: Index of the lens in the spans of the roads.
+        span: Index of the camera in the spans of the roads.
 
     Attributes:
         frames: The last frames, uint8, shape (num_envs, 1, height, width).
         registration: The registrations; `rotations` are the last estimates.
     """
 
-    def __init__(self, lens: CameraParams, fps: float, num_envs: int, camera: int) -> None:
-        # The moving lens, and the lens without motion of the body.
-        self._batches = [CameraBatch([p], lens.shape, [camera], num_envs) for p in (lens, _steady(lens))]
-        self.frames = np.zeros((num_envs, 1, *lens.shape), np.uint8)
-        self.registration = FarFieldRegistration(lens.shape, fps, lens.focal_px, num_envs)
+    def __init__(self, camera: CameraParams, fps: float, num_envs: int, span: int) -> None:
+        # The camera with and without motion of the body.
+        self._batches = [CameraBatch([p], camera.shape, [span], num_envs) for p in (camera, _steady(camera))]
+        self.frames = np.zeros((num_envs, 1, *camera.shape), np.uint8)
+        self.registration = FarFieldRegistration(camera.shape, fps, camera.focal_px, num_envs)
         self._selected = np.zeros((num_envs, 1), np.bool_)
         self._headings, self._turns = np.zeros(num_envs), np.zeros(num_envs)
         self._workspaces: list[Workspace] = []
 
-    def set_params(self, index: int, lens: CameraParams, texture: float | None) -> None:
-        """Set the lens of environment `index`, and forget its reference.
+    def set_params(self, index: int, camera: CameraParams, texture: float | None) -> None:
+        """Set the camera of environment `index`, and forget its reference.
 
         Args:
             index: Index of the environment.
-            lens: The lens, see `far_lens`.
-            texture: Contrast of the ground in place of that of the lens.
+            camera: The camera, see `far_camera`.
+            texture: Contrast of the ground in place of that of the camera.
         """
-        for batch, p in zip(self._batches, (lens, _steady(lens)), strict=True):
+        for batch, p in zip(self._batches, (camera, _steady(camera)), strict=True):
             batch.set_params(index, 0, p, texture)
         selected = np.zeros(len(self.frames), np.bool_)
         selected[index] = True
@@ -144,6 +144,6 @@ class ImageStabiliser:
         return self.__dict__ | {"_workspaces": []}
 
 
-def _steady(lens: CameraParams) -> CameraParams:
-    """Return the lens without motion of the body."""
-    return replace(lens, road="still", dive_deg=0.0)
+def _steady(camera: CameraParams) -> CameraParams:
+    """Return the camera without motion of the body."""
+    return replace(camera, road="still", dive_deg=0.0)

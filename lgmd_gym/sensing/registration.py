@@ -1,4 +1,4 @@
-"""FarFieldRegistration: pitch, roll and yaw of a lens from its own frames."""
+"""FarFieldRegistration: pitch, roll and yaw of a camera from its own frames."""
 
 from dataclasses import dataclass
 from math import exp
@@ -60,7 +60,7 @@ class RegistrationParams:
 
         Args:
             fps: Frame rate [Hz].
-            focal_px: Focal length of the lens [px].
+            focal_px: Focal length of the camera [px].
         """
         rates = [1.0 - exp(-1.0 / (s * fps)) for s in (self.reference_s, self.variance_s, self.mean_s)]
         spreads = (self.pitch_px, self.roll_rad, self.yaw_px, self.gain, self.offset)
@@ -72,7 +72,7 @@ class RegistrationParams:
 
 
 class FarFieldRegistration:
-    """Pitch, roll and yaw of N lenses that are fixed to cars, estimated from their frames.
+    """Pitch, roll and yaw of N cameras that are fixed to cars, estimated from their frames.
 
     Each frame, smoothed by a binomial of 3 × 3 px, is registered with a reference image. A least-squares fit
     (Lucas and Kanade, 1981; three iterations) yields five numbers: vertical shift (pitch), roll, horizontal
@@ -90,14 +90,14 @@ class FarFieldRegistration:
         shape: (height, width) of the frames [px]; the height is 4 more than a multiple of 4, the width a
             multiple of 16, at least 32.
         fps: Frame rate [Hz].
-        focal_px: Focal length of the lens [px].
-        num: Number of lenses N.
+        focal_px: Focal length of the camera [px].
+        num: Number of cameras N.
         params: Parameters; None for the defaults.
 
     Attributes:
         rotations: The last estimates, float64, shape (N, 3): pitch upwards, and roll and yaw to the right
             [degrees].
-        started: Whether each lens has a reference, bool, shape (N,).
+        started: Whether each camera has a reference, bool, shape (N,).
 
     Raises:
         ValueError: For a shape that does not fit the blocks.
@@ -130,11 +130,11 @@ class FarFieldRegistration:
 
     @property
     def started(self) -> np.ndarray:
-        """Whether each lens has a reference, bool, shape (N,)."""
+        """Whether each camera has a reference, bool, shape (N,)."""
         return self._state[0][:, STARTED] != 0.0
 
     def step(self, frames: np.ndarray, turns: np.ndarray | None = None) -> np.ndarray:
-        """Register one frame per lens; the first frame of a lens is its reference, with a rotation of 0.
+        """Register one frame per camera; the first frame of a camera is its reference, with a rotation of 0.
 
         Args:
             frames: Frames, contiguous uint8, shape (N, height, width).
@@ -158,16 +158,16 @@ class FarFieldRegistration:
     def step_range(
         self, first: int, last: int, frames: np.ndarray, turns: np.ndarray, active: np.ndarray
     ) -> None:
-        """Register frames of the active lenses among first..last-1, without a check of the arguments.
+        """Register frames of the active cameras among first..last-1, without a check of the arguments.
 
         Threads may process disjoint ranges at once.
 
         Args:
-            first: First lens.
-            last: Last lens + 1.
+            first: First camera.
+            last: Last camera + 1.
             frames: Frames, contiguous uint8, shape (N, height, width).
             turns: Turn of each car to the right since its last frame, float64, shape (N,) [rad].
-            active: Selection of the lenses, bool, shape (N,).
+            active: Selection of the cameras, bool, shape (N,).
         """
         try:  # threads take and return scratch memory; both list operations are atomic
             space = self._spaces.pop()
@@ -177,7 +177,7 @@ class FarFieldRegistration:
         self._spaces.append(space)
 
     def reset(self, mask: np.ndarray | None = None) -> None:
-        """Forget the references of selected lenses, bool, shape (N,); None for all."""
+        """Forget the references of selected cameras, bool, shape (N,); None for all."""
         selected = self._all if mask is None else mask
         self._state[0][selected] = 0.0
         self.rotations[selected] = 0.0

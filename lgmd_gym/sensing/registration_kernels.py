@@ -30,18 +30,18 @@ _ITERATIONS = 3
 
 @kernel
 def register(first, last, active, frames, turns, const, state, rotations, space) -> None:
-    """Register a frame of the active lenses among first..last-1.
+    """Register a frame of the active cameras among first..last-1.
 
     Args:
-        first: First lens.
-        last: Last lens + 1.
-        active: Selection of the lenses, bool, shape (N,).
+        first: First camera.
+        last: Last camera + 1.
+        active: Selection of the cameras, bool, shape (N,).
         frames: Frames, uint8, shape (N, height, width).
         turns: Turn of the car to the right since the last frame, float64, shape (N,) [rad].
         const: `CONSTANTS` record, shape (1,).
-        state: Numbers of each lens, float64, shape (N, `STATE_SIZE`); reference and variance of the residual,
-            float32, shape (N, height, width).
-        rotations: Output: pitch, roll and yaw of each lens, float64, shape (N, 3) [degrees].
+        state: Numbers of each camera, float64, shape (N, `STATE_SIZE`); reference and variance of the
+            residual, float32, shape (N, height, width).
+        rotations: Output: pitch, roll and yaw of each camera, float64, shape (N, 3) [degrees].
         space: Scratch memory, see `make_space`.
     """
     numbers, references, variances = state

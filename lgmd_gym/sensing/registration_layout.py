@@ -11,8 +11,8 @@ MIDDLE = 128.0
 """Grey at which the offset of the exposure is defined."""
 STARTED, PITCH_PX, ROLL_RAD, YAW_PX, GAIN, OFFSET, MEAN_PITCH, MEAN_ROLL, MEAN_YAW, COUNT, PAN = range(11)
 STATE_SIZE = 11
-"""Numbers per lens: 1.0 after the first frame; shift due to pitch [px], roll [rad] and shift due to yaw [px],
-gain and offset of the exposure, relative to the reference; means of the three; frames since the
+"""Numbers per camera: 1.0 after the first frame; shift due to pitch [px], roll [rad] and shift due to yaw
+[px], gain and offset of the exposure, relative to the reference; means of the three; frames since the
 reference; shift that the turns of the car have caused [px]."""
 CONSTANTS = np.dtype(
     [

@@ -6,7 +6,7 @@ from support.agents import any_brake, frequency_reading, zone_reading
 from support.roads import straight_env
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.zones import FIELDS, LENS_SETBACK, REACHES, SPAN_M, stopping_distance, zone_cameras
+from lgmd_gym.agents.zones import CAMERA_SETBACK, FIELDS, REACHES, SPAN_M, stopping_distance, zone_cameras
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_case
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
@@ -36,7 +36,7 @@ def test_fields_cover_the_rows_of_their_zones(speed):
         lowest, highest = (-1.0 + (far - row) * 2.0 / width for row in (height, 0))
         expected = {"ground": (-1.43, -0.98), "low": (-0.9, -0.3), "upright": (-0.15, 0.35)}
         kind = next(kind for kind in FIELDS if camera["name"].startswith(kind))
-        if distance + LENS_SETBACK > 8.0:  # nearer, angles are not proportional to rows
+        if distance + CAMERA_SETBACK > 8.0:  # nearer, angles are not proportional to rows
             assert (left, right) == pytest.approx((0.0, width), abs=0.7)
             assert (lowest, highest) == pytest.approx(expected[kind], abs=0.02)
             checked += 1

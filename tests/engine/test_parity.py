@@ -12,11 +12,11 @@ from lgmd_gym.envs import FAMILIES, env_id
 MODES = ["NextStep", "SameStep", "Disabled"]
 LEVELS = env_id("RandomBraking")
 FAST = {"ego_speed": 3.0}  # a second of braking ends the episode
-TWO_LENSES = ["wide", {"name": "fovea", "shape": [60, 100]}]
+TWO_CAMERAS = ["wide", {"name": "fovea", "shape": [60, 100]}]
 FRAMES = {"include_frame": True}
 
 ARGUMENTS = {
-    "two cameras": {"camera": TWO_LENSES},
+    "two cameras": {"camera": TWO_CAMERAS},
     "frames of two cameras": {"camera": ["wide", "fovea"], "include_frame": True},
     "frames of three decisions in two": {"config": {"policy_frequency": 20}, "trace": True},
     "three detectors": {

@@ -18,7 +18,7 @@ from lgmd_gym.gallery.cards import scenario_cards
 from lgmd_gym.gallery.docstrings import parse_docstring
 from lgmd_gym.gallery.outcomes import AgentOutcome, evaluate_agents
 from lgmd_gym.gallery.page import render_page
-from lgmd_gym.gallery.stills import ROADS, lens_sheet, road_sheet
+from lgmd_gym.gallery.stills import ROADS, camera_sheet, road_sheet
 from lgmd_gym.video import VideoReader
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
@@ -104,14 +104,14 @@ def test_the_page_groups_the_cards_and_links_every_section():
         "CCRm": {"no-brake": AgentOutcome.of([NON_THREAT]), "<b>": AgentOutcome("failed", False, False)},
         "merge": {},
     }
-    sheets = {"lenses": {"wide": {"clear": "lens-wide-clear.png", "fog": "lens-wide-fog.png"}}}
+    sheets = {"cameras": {"wide": {"clear": "camera-wide-clear.png", "fog": "camera-wide-fog.png"}}}
     html = render_page(cards, outcomes, sheets, "no-brake", seeds=2)
     page = PageParser(html)
-    assert page.ids == ["threats", "CCRs", "non-threats", "CCRm", "traffic", "merge", "lenses"]
+    assert page.ids == ["threats", "CCRs", "non-threats", "CCRm", "traffic", "merge", "cameras"]
     assert {link for link in page.links if link.startswith("#")} == {
-        "#threats", "#non-threats", "#traffic", "#lenses",
+        "#threats", "#non-threats", "#traffic", "#cameras",
     }  # fmt: skip
-    assert "media/lens-wide-fog.png" in page.links
+    assert "media/camera-wide-fog.png" in page.links
     assert '<td class="failed">avoided 0/1, contact at 36 km/h</td>' in html
     assert '<td class="passed">false activations 0/1</td>' in html
     assert "&lt;b&gt;" in html
@@ -159,10 +159,10 @@ def test_invalid_input_gives_one_line_and_writes_nothing(arguments, message, cap
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_target_is_larger_through_a_narrower_lens():
+def test_the_target_is_larger_in_a_narrower_camera():
     """The target is darker than the road."""
-    sheet = lens_sheet()
-    dark = [float((sheet[lens]["clear"] < 70).mean()) for lens in ("wide", "tele", "fovea")]
+    sheet = camera_sheet()
+    dark = [float((sheet[preset]["clear"] < 70).mean()) for preset in ("wide", "tele", "fovea")]
     assert dark == sorted(dark)
     assert dark[-1] > 4.0 * dark[0]
 

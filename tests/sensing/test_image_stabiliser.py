@@ -1,4 +1,4 @@
-"""`stabilised="image"`: cameras of a `SensorArray` that follow the estimate of a far-field lens."""
+"""`stabilised="image"`: cameras of a `SensorArray` that follow the estimate of a far-field camera."""
 
 import copy
 import math
@@ -10,7 +10,7 @@ from support.roads import add_car, straight_env
 
 from lgmd_gym import CameraParams, EgoCamera, LGMDObservation, LGMDParams
 from lgmd_gym.camera.body_motion import PITCH, ROLL, YAW, body_motion, road_gain
-from lgmd_gym.sensing.image_stabiliser import far_lens
+from lgmd_gym.sensing.image_stabiliser import far_camera
 from lgmd_gym.sensing.registration import FarFieldRegistration
 from lgmd_gym.sensing.sensor_array import SensorArray
 
@@ -66,10 +66,10 @@ def assert_equal(one, other, index=slice(None)):
     np.testing.assert_array_equal(rotations(one)[index], rotations(other)[index])
 
 
-def test_lenses_turn_by_the_body_without_the_estimate():
-    """The estimate is that of the registration of frames of the far-field lens itself."""
+def test_cameras_turn_by_the_body_without_the_estimate():
+    """The estimate is that of the registration of frames of the far-field camera itself."""
     env, sensors = straight_env(speed=17.0), make_array(1)
-    p = far_lens([CameraParams.make(AHEAD)])
+    p = far_camera([CameraParams.make(AHEAD)])
     camera, registration = EgoCamera(p), FarFieldRegistration(p.shape, FPS, p.focal_px)
     heading, moving = 0.0, EgoCamera(CameraParams.make(CAMERAS[3]))
     for step in range(20):
@@ -97,7 +97,7 @@ def test_lenses_turn_by_the_body_without_the_estimate():
         np.testing.assert_array_equal(sensors.frame_of(3), moving.render(env))
 
 
-def test_the_lens_ahead_pitches_little():
+def test_the_camera_ahead_pitches_little():
     env, sensors = straight_env(speed=17.0), make_array(1)
     pitches = []
     for step in range(60):
@@ -158,10 +158,10 @@ def test_copies_continue_alike_and_independently(duplicate):
     assert_equal(sensors, clone)
 
 
-def test_the_far_field_lens_costs_nothing_without_image_stabilisation():
+def test_the_far_field_camera_costs_nothing_without_image_stabilisation():
     sensors = SensorArray([{"name": "ahead", "stabilised": True}, "wide"], FPS, LGMDParams())
     assert sensors._stabiliser is None
-    assert far_lens([None, CameraParams()]) is None
+    assert far_camera([None, CameraParams()]) is None
 
 
 def test_a_camera_alone_refuses_image_stabilisation():

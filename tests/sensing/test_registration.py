@@ -11,15 +11,15 @@ from support.roads import add_car, straight_env
 
 from lgmd_gym import CameraParams, EgoCamera
 from lgmd_gym.camera.body_motion import PITCH, ROLL, YAW, body_motion, road_gain
-from lgmd_gym.sensing.image_stabiliser import far_lens
+from lgmd_gym.sensing.image_stabiliser import far_camera
 from lgmd_gym.sensing.registration import FarFieldRegistration, RegistrationParams
 
 WORLDS = (6003, 6140, 6277)
 FPS = 30.0
 
 
-def lens(world=6003, **fields):
-    return far_lens([CameraParams(stabilised="image", calibrated=True, world=world, **fields)])
+def make_camera(world=6003, **fields):
+    return far_camera([CameraParams(stabilised="image", calibrated=True, world=world, **fields)])
 
 
 def drive(env, camera, count):
@@ -38,7 +38,7 @@ def registration_of(p, num=1):
 
 @pytest.mark.parametrize("condition", ["clear", "night", "fog"])
 def test_the_kernels_equal_the_equations(condition):
-    p = lens(road="rough").with_condition(condition)
+    p = make_camera(road="rough").with_condition(condition)
     env = straight_env()
     add_car(env, 40.0, 3.5)
     frames = drive(env, EgoCamera(p), 12)
@@ -58,7 +58,7 @@ def test_the_kernels_equal_the_equations(condition):
 @pytest.mark.parametrize(("pitch", "roll"), [(0.04, 0.0), (-0.15, 0.1), (0.4, -0.2), (0.0, 0.15)])
 def test_known_rotations_of_rendered_frames(world, pitch, roll):
     """A shift of a quarter to 2.6 px, and a roll by up to 0.28 px at the sides of the frame."""
-    p = lens(world)
+    p = make_camera(world)
     env, camera = straight_env(), EgoCamera(p)
     registration = registration_of(p)
     registration.step(camera.render(env)[None])
@@ -83,7 +83,7 @@ def rotated(camera, env, pitch, roll):
 def test_a_rough_ride_leaves_a_tenth_of_the_pitch():
     errors, body = [], []
     for world in WORLDS:
-        p = lens(world, road="normal")
+        p = make_camera(world, road="normal")
         env, registration = straight_env(), registration_of(p)
         registration.step(EgoCamera(p, road="still").render(env)[None])
         for step, frame in enumerate(drive(env, EgoCamera(p), 90)):
@@ -101,7 +101,7 @@ def test_a_rough_ride_leaves_a_tenth_of_the_pitch():
 
 @pytest.mark.parametrize(("gain", "offset"), [(1.25, 0.0), (0.8, 0.0), (1.0, 20.0), (0.85, -15.0)])
 def test_steps_of_the_exposure_change_little(gain, offset):
-    p = lens().with_condition("rain")
+    p = make_camera().with_condition("rain")
     env, camera = straight_env(), EgoCamera(p)
     registration, changed = registration_of(p), registration_of(p)
     frame, tilted = camera.render(env).copy(), rotated(camera, env, 0.1, 0.0)
@@ -115,7 +115,7 @@ def test_steps_of_the_exposure_change_little(gain, offset):
 
 
 def test_a_turning_car_keeps_its_pitch():
-    p = lens(roadside=0.0)
+    p = make_camera(roadside=0.0)
     env, camera = straight_env(line_types=False), EgoCamera(p)
     registration = registration_of(p)
     registration.step(camera.render(env)[None])
@@ -126,8 +126,8 @@ def test_a_turning_car_keeps_its_pitch():
         assert abs(roll) < 0.2
 
 
-def test_reset_forgets_the_reference_of_selected_lenses():
-    p = lens(road="normal")
+def test_reset_forgets_the_reference_of_selected_cameras():
+    p = make_camera(road="normal")
     frames = drive(straight_env(), EgoCamera(p), 6)
     two, fresh = registration_of(p, 2), registration_of(p)
     for frame in frames[:3]:
@@ -144,7 +144,7 @@ def test_reset_forgets_the_reference_of_selected_lenses():
 
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda item: pickle.loads(pickle.dumps(item))])
 def test_copies_are_independent(duplicate):
-    p = lens(road="normal")
+    p = make_camera(road="normal")
     frames = drive(straight_env(), EgoCamera(p), 4)
     one = registration_of(p)
     one.step(frames[:1])

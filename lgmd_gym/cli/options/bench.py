@@ -35,7 +35,7 @@ class Bench:
     first_world: Count = None
     """First world; 8000 to 8999 are the test worlds. Default: 8000."""
     road: Name = None
-    """Road that moves the lens: still, smooth, normal or rough. Default: normal, in the laboratory still."""
+    """Road under the car: still, smooth, normal or rough. Default: normal, in the laboratory still."""
     camera: Name = None
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
     params: File = None
