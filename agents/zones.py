@@ -2,8 +2,8 @@
 
 The far end of a zone is at its reach, a multiple of the stopping distance at the present speed. Its fields
 are 2.4 m wide there at every speed, see the gaze `"stopping"` of `CameraParams`. A field is a band of rows:
-the ground field covers the road surface in front of the far end, the low field what stands there up to the
-height of the camera, and the upright field the horizon.
+the ground field covers the road surface in front of the far end, the low field what stands there up to
+0.7 of the height of the camera, and the upright field the horizon.
 """
 
 from typing import Any, TypeVar

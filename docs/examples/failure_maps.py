@@ -4,7 +4,8 @@
         --to docs/failure_maps.png
 
 Each cell of a map is one approach to a standing target, played once per test world in the condition and with
-the brake of that world. A run counts as avoided if it has neither contact nor premature braking. Four planes:
+the brake of that world. A run counts as avoided if it has neither contact nor premature braking. Five planes,
+of which the last one is played only if `--planes` names it:
 
 - `vibration`: motion of the car's body, as a multiple of the measured motion, and contrast of the ground's
   texture, as a multiple of that of the world; a car, at 50 km/h;
@@ -12,7 +13,8 @@ the brake of that world. A run counts as avoided if it has neither contact nor p
 - `brake`: deceleration of full braking, in place of that of the world, and ego speed; a car;
 - `curve`: radius of the road and ego speed; a car in the ego's lane. The whole approach is on the curve, to
   the right in even worlds and to the left in odd ones; an infinite radius is a straight road. Lateral
-  accelerations above 4 m/s² are left out.
+  accelerations above 4 m/s² are left out;
+- `height`: height of a box 2 m wide and as long as a car, and ego speed.
 
 Tables in Markdown list k/n with a 95 % interval. In the figure, a line separates the cells with at least 90 %
 from the others; the dashed line is that of `--bound`, an agent that uses no camera. No value is interpolated
@@ -51,13 +53,16 @@ SUITE = "failure-maps"
 NO_VIEW = SensorConfig({"name": "wide", "shape": [8, 8]})  # no-brake and oracles need no useful image
 LEVEL = 0.9  # of the contour
 
-PLANES = ("vibration", "width", "brake", "curve")
+PLANES = ("vibration", "width", "brake", "curve", "height")
+DEFAULT_PLANES = PLANES[:4]  # of the figure in the documentation
+LOW_BOX_WIDTH = 2.0  # of the plane `height` [m]
 GRIDS = {
     "textures": ([0.5, 1.0, 1.6, 2.5], "contrasts of the ground, relative to that of the world"),
     "widths": ([0.3, 0.5, 0.8, 1.2, 1.7, 2.5], "widths of the target [m]"),
     "decelerations": ([5.0, 6.0, 7.0, 8.0, 9.5], "decelerations of full braking [m/s²]"),
     "radii": ([60.0, 100.0, 200.0, 400.0, 800.0, math.inf], "radii of the curve [m]; inf for a straight"),
-    "speeds": ([20.0, 40.0, 60.0, 80.0, 100.0], "ego speeds of the last three planes [km/h]"),
+    "heights": ([0.3, 0.5, 0.8, 1.2, 1.7], "heights of the box [m]"),
+    "speeds": ([20.0, 40.0, 60.0, 80.0, 100.0], "ego speeds of all planes but vibration [km/h]"),
 }
 AGENT_LINE: dict[str, Any] = {"color": COLOURS[1], "linewidth": 3.0, "solid_capstyle": "projecting"}
 BOUND_LINE: dict[str, Any] = {"color": COLOURS[0], "linewidth": 1.4, "linestyle": "--"}
@@ -127,17 +132,25 @@ def curve_cell(radius: float, speed_kmh: float, world: int) -> Cell | None:
     return Cell(make_case(SUITE, "CCRsCurve", name, ego_speed=speed, radius=radius, left=left))
 
 
+def height_cell(height: float, speed_kmh: float, world: int) -> Cell:
+    """Return the cell of a height [m] of a box."""
+    name, speed = f"height-{height:g}-v{speed_kmh:g}", to_mps(speed_kmh)
+    return Cell(make_case(SUITE, "StandingBox", name, ego_speed=speed, width=LOW_BOX_WIDTH, height=height))
+
+
 def make_planes(chosen: argparse.Namespace) -> dict[str, Plane]:
     """Return the planes by name."""
     motion = Axis("road (1 ×: measured motion)", chosen.roads)
     contrast = Axis("contrast of the ground [×]", chosen.textures)
     width, speed = Axis("width [m]", chosen.widths), Axis("ego speed [km/h]", chosen.speeds)
     brake, radius = Axis("deceleration [m/s²]", chosen.decelerations), Axis("radius [m]", chosen.radii)
+    height = Axis("height [m]", chosen.heights)
     return {
         "vibration": Plane("vibration, at 50 km/h", motion, contrast, vibration_cell),
         "width": Plane("width of the target", width, speed, width_cell),
         "brake": Plane("brake", brake, speed, brake_cell),
         "curve": Plane("curve", radius, speed, curve_cell),
+        "height": Plane("height of a box 2 m wide", height, speed, height_cell),
     }
 
 
@@ -292,7 +305,7 @@ def read_options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--bound", default="ttc-oracle", help="agent that uses no camera")
     parser.add_argument("--worlds", type=int, default=8, help="number of worlds, the sample of each cell")
     parser.add_argument("--first-world", type=int, default=first)
-    parser.add_argument("--planes", nargs="+", choices=PLANES, default=PLANES)
+    parser.add_argument("--planes", nargs="+", choices=PLANES, default=DEFAULT_PLANES)
     parser.add_argument("--roads", nargs="+", choices=ROADS, default=list(ROADS))
     for name, (values, text) in GRIDS.items():
         parser.add_argument(f"--{name}", nargs="+", type=float, default=values, help=text)

@@ -25,7 +25,6 @@ from recorded_levels import level_files
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.policy import Policy
-from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.camera.spec import plain_values
 from lgmd_gym.training.offline.dataset import OfflineDataset
@@ -60,6 +59,11 @@ def first_braking(odds: np.ndarray, margin: float, repeat: int) -> int | None:
     return int(above[0]) * repeat if len(above) else None
 
 
+def precise_text(rate: Rate) -> str:
+    """Return k/n and its interval in per cent with one decimal, which the low rates in traffic require."""
+    return f"{rate.k}/{rate.n} [{100 * rate.low:.1f}–{100 * rate.high:.1f}]" if rate.n else "–"
+
+
 def frontier_row(
     margin: float, episodes: Sequence[RecordedEpisode], onsets: Sequence[int | None], rate_hz: float
 ) -> str:
@@ -72,7 +76,7 @@ def frontier_row(
     for episode, onset in pairs:
         if not episode.threat:
             others[episode.traffic].append(onset is not None)
-    rates = [rate_text(Rate.of(flags)) for flags in (avoided, others[False], others[True])]
+    rates = [precise_text(Rate.of(flags)) for flags in (avoided, others[False], others[True])]
     lead = f"{median(leads):.2f}" if leads else "–"
     return f"| {margin:g} | {rates[0]} | {lead} | {rates[1]} | {rates[2]} |"
 

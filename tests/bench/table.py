@@ -25,6 +25,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent)]
 SIZES, THREADS = (1, 16, 64, 256), (1, 2)
 ROUND = 256  # frames per round and vector environment
 PEER_ENVS = 16  # environments of highway-env in a vector
+AGENTS, WORLD = ("stopping-zone", "policy:all-round"), 8_000
 
 
 def interleaved(*calls, rounds=21, repeats=50):
@@ -73,6 +74,29 @@ def closed_loop(env_id, **arguments):
         *_, terminated, truncated, _ = env.step(hold)
         if terminated or truncated:
             env.reset()
+
+    return step
+
+
+def agent_loop(name):
+    """Return a function that steps an environment with an agent's sensors and runs the agent.
+
+    The demand of the agent is not applied, so that all agents approach the same car.
+    """
+    from lgmd_gym.agents import make_agent
+
+    agent, hold = make_agent(name), np.zeros(1, np.float32)
+    params = getattr(agent, "neuron", None)
+    env = gym.make("LGMD/CCRs-v0", camera=agent.camera, params=params, world=WORLD)
+    env.reset(seed=0)
+    agent.reset(0)
+
+    def step():
+        observation, _, terminated, truncated, info = env.step(hold)
+        agent.act(observation, info)
+        if terminated or truncated:
+            env.reset()
+            agent.reset(0)
 
     return step
 
@@ -260,6 +284,10 @@ def rows(path=None):
     ours, theirs = interleaved(closed_loop("LGMD/CCRs-v0", world="laboratory"), top_view(), repeats=60)
     what = "closed loop, 2 vehicles, 160×90, physics 60 Hz"
     yield what, f"{1 / ours:,.0f} frames/s", f"{theirs / ours:.1f}× highway-env with its grey top view"
+    bare = closed_loop("LGMD/CCRs-v0", camera={"name": "wide", "shape": [8, 8]}, world=WORLD)
+    least, *seconds = interleaved(bare, *map(agent_loop, AGENTS), repeats=100)
+    for name, value in zip(AGENTS, seconds, strict=True):
+        yield f"sensor and agent `{name}`, per frame, in a world", f"{(value - least) * 1e6:.0f} µs", ""
     yield from engine_rows(path)
     yield "`import lgmd_gym`", f"{import_seconds():.2f} s", ""
 

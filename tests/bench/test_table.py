@@ -17,7 +17,7 @@ def test_every_row_can_be_measured(monkeypatch, tmp_path):
     monkeypatch.setattr(table, "ROUND", 16)
     monkeypatch.setattr(table, "PEER_ENVS", 2)
     rows = list(table.rows(tmp_path / "rates.png"))
-    assert [len(row) for row in rows] == [3] * 14
+    assert [len(row) for row in rows] == [3] * 16
     assert rows[-1] == ("`import lgmd_gym`", "0.10 s", "")
     names = [row[0] for row in rows]
     assert "engine, 4 environments, 2 threads" in names

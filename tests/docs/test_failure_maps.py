@@ -57,9 +57,11 @@ def test_failure_maps_cells(monkeypatch):
     assert script.edges(np.array([[0.9, 0.8], [np.nan, 1.0]])) == [([1, 1], [0, 1]), ([1, 2], [1, 1])]
     own = SensorConfig().for_agent(make_agent("stopping-zone"))
     changed = script.sensors_of("stopping-zone", 2.5)
-    expected = [CameraParams.make(lens, texture=2.5) for lens in own.camera]
-    assert [CameraParams.make(lens) for lens in changed.camera] == expected
+    expected = [CameraParams.make(camera, texture=2.5) for camera in own.camera]
+    assert [CameraParams.make(camera) for camera in changed.camera] == expected
     assert script.width_cell(0.3, 36.0, 8000).case.scenario.actors[0].width == 0.3
+    box = script.height_cell(0.5, 36.0, 8000).case.scenario.actors[0]
+    assert (box.kind, box.width, box.height) == ("box", 2.0, 0.5)
     right, left = (script.curve_cell(100.0, 36.0, world).case.scenario for world in (8000, 8001))
     assert [bend.curvature for bend in (*right.ego_path, *left.ego_path)] == [-0.01, 0.01]
     assert right.road.bends == right.ego_path
