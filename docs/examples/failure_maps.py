@@ -48,6 +48,7 @@ from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.envs.scenarios.curves import MAX_LATERAL
 from lgmd_gym.plotting.style import COLOURS, saved_figure
+from lgmd_gym.rendering.playback import make_target
 
 SUITE = "failure-maps"
 NO_VIEW = SensorConfig({"name": "wide", "shape": [8, 8]})  # no-brake and oracles need no useful image
@@ -297,6 +298,14 @@ def draw(played: Sequence[tuple[Plane, dict[str, Map]]], chosen: argparse.Namesp
         figure.suptitle(f"Contacts avoided without premature braking in {chosen.worlds} test worlds [%]")
 
 
+def check_cells(plane: Plane, world: int) -> None:
+    """Raise ValueError if a value is outside the range of its scenario or environment."""
+    for x, y in product(plane.x.values, plane.y.values):
+        cell = plane.cell(x, y, world)
+        if cell is not None:
+            make_target(cell.case, {}, camera=None).close()
+
+
 def read_options(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Return the options of the command line."""
     first = SPLIT_WORLDS["test"].start
@@ -317,6 +326,8 @@ def read_options(arguments: Sequence[str] | None) -> argparse.Namespace:
         parser.error(f"worlds must be test worlds, {test.start} to {test.stop - 1}")
     try:
         bound, *_ = (make_agent(name) for name in (chosen.bound, *chosen.agents))  # all names, before any run
+        for plane in (make_planes(chosen)[name] for name in chosen.planes):
+            check_cells(plane, chosen.first_world)
     except ValueError as error:
         parser.error(str(error))
     if bound.reads_neuron or bound.include_frame:

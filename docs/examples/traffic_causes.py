@@ -126,13 +126,15 @@ def play(run: StoredRun, agent: str, jobs: int) -> list[tuple[str, Onset]]:
     """Return the kind of traffic and the begin of the first event of each drive with false events only.
 
     Raises:
-        ValueError: If the run is not one of traffic, or does not contain the agent.
+        ValueError: If the run is not one of traffic, does not contain the agent, or has no such drive.
     """
     if run.config.suite != TRAFFIC:
         raise ValueError(f"the run is one of {run.config.suite}; pass one of lgmd-gym bench --suite traffic")
     check_agents([agent], run)
     rows = [row for row in run.rows if row["agent"] == agent and row["error"] is None]
     only_false = [row for row in rows if 0 < row["brakes"] == row["false_activations"]]
+    if not only_false:
+        raise ValueError(f"the run has no drive in which all braking events of {agent} are false")
     onsets = Parallel(n_jobs=jobs)(delayed(first_event)(run.config, agent, row) for row in only_false)
     return [(row["case"].split("/")[1], onset) for row, onset in zip(only_false, onsets, strict=True)]
 

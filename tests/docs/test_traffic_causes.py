@@ -46,6 +46,8 @@ def test_the_first_event_of_each_drive():
     assert line.startswith(f"| {onset.situation} | 1 | 1 | 2 | {onset.speed:.1f} | ")
     with pytest.raises(RuntimeError, match="no-brake does not brake in traffic/two-way/s0"):
         script.first_event(config, "no-brake", row)
+    with pytest.raises(ValueError, match="no drive in which all braking events of always-brake are false"):
+        script.play(run._replace(rows=others), "always-brake", 1)
     with pytest.raises(ValueError, match="the run of traffic has no agent 'a'"):
         script.play(run, "a", 1)
     with pytest.raises(
