@@ -43,7 +43,7 @@ from lgmd_gym.benchmark.summary import rate_of
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
 from lgmd_gym.benchmark.units import Unit, make_units
 from lgmd_gym.benchmark.worker_processes import run_parallel
-from lgmd_gym.camera.params import ROADS
+from lgmd_gym.camera.params import ROADS, CameraParams
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.envs.scenarios.curves import MAX_LATERAL
@@ -304,6 +304,7 @@ def check_cells(plane: Plane, world: int) -> None:
         cell = plane.cell(x, y, world)
         if cell is not None:
             make_target(cell.case, {}, camera=None).close()
+            CameraParams.make("wide", texture=cell.texture or 0.0)
 
 
 def read_options(arguments: Sequence[str] | None) -> argparse.Namespace:

@@ -46,11 +46,13 @@ def table(families: dict[str, list[Frontier]], camera: CameraParams) -> list[str
     """Return the lines of the table."""
     inside = [CameraParams.preset(name) for name in ("fovea", "wide")]
     heads = ["family", "cases", "avoidable", *(name for name, _, _ in COLUMNS)]
-    heads[-3:-3] = [f"growth in `{camera.name}` [px/frame]", *(f"inside `{lens.name}`" for lens in inside)]
+    heads[-3:-3] = [f"growth in `{camera.name}` [px/frame]", *(f"inside `{item.name}`" for item in inside)]
     lines = [heads, ["---"] * len(heads)]
     for family, items in families.items():
         cells = [text.format(median(map(value, items))) for _, value, text in COLUMNS]
-        shares = [sum(abs(item.view.bearing_deg) < lens.hfov_deg / 2 for item in items) for lens in inside]
+        shares = [
+            sum(abs(item.view.bearing_deg) < preset.hfov_deg / 2 for item in items) for preset in inside
+        ]
         growth = median(item.growth_px(camera) for item in items)
         cells[-3:-3] = [f"{growth:.2f}", *(f"{share}/{len(items)}" for share in shares)]
         avoidable = sum(item.avoidable for item in items)

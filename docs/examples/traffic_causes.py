@@ -3,14 +3,15 @@
     python docs/examples/traffic_causes.py RUN --agent policy:all-round --jobs 2
 
 The argument is a run folder of `lgmd-gym bench --suite traffic`. Drives in which all braking events of the
-agent are false are played again up to the first one. A line of the table is what is in front of the ego when
-the agent begins to brake; the first description that applies counts. Distances are from centre to centre:
+agent are false are played again up to the first one that exceeds 0.25 g. A line of the table is what is in
+front of the ego when this event begins. Only vehicles in front of the ego, at most 30 m from centre to centre
+from it, are considered; the first description that applies counts:
 
-- car ahead: a vehicle within 30 m in the direction of the ego's heading, at most 1.5 m to its side;
-- crossing: a vehicle within 30 m that heads across the ego's direction;
-- oncoming: a vehicle within 30 m that heads against it;
-- other: another vehicle within 30 m;
-- none: no vehicle within 30 m in front of the ego.
+- car ahead: heads within 30° of the ego's direction, at most 1.5 m to its side;
+- crossing: heads 30° to 150° away from it;
+- oncoming: heads more than 150° away from it;
+- other: heads within 30° of it, farther to the side;
+- none: no such vehicle.
 
 Speeds and distances are medians. The table is in Markdown.
 """
@@ -33,6 +34,7 @@ from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.stored_run import StoredRun, read_run
 from lgmd_gym.benchmark.suites import TRAFFIC
+from lgmd_gym.benchmark.traffic.replay import EVENT_PAUSE
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.traffic.registration import KINDS
 from lgmd_gym.rendering.playback import make_target
@@ -88,13 +90,14 @@ def first_event(config: RunConfig, agent_name: str, row: Row) -> Onset:
     env = make_target(f"{TRAFFIC}/{kind}", {}, **sensors.arguments, **place)
     observation, info = env.reset(seed=row["seed"])
     agent.reset(row["seed"])
-    onset, done = None, False
+    onset, pause, done = None, 0.0, False
     while not done:
         demand = agent.act(observation, info)
         road: Any = env.unwrapped
-        if float(demand[0]) >= HOLD:
+        pause = 0.0 if float(demand[0]) < HOLD else pause + 1.0 / road.config["policy_frequency"]
+        if pause > EVENT_PAUSE:
             onset = None
-        elif onset is None:
+        elif pause == 0.0 and onset is None:
             name, distance = situation_of(road.ego, road.road.vehicles)
             onset = Onset(name, float(road.ego.speed), distance)
         observation, _, terminated, truncated, info = env.step(demand)
@@ -147,5 +150,5 @@ if __name__ == "__main__":
     options = parser.parse_args()
     try:
         print(*table(play(read_run(options.run), options.agent, options.jobs)), sep="\n")
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:
         parser.error(str(error))

@@ -125,7 +125,7 @@ class _Stage:
     def __init__(self, p: CameraParams) -> None:
         if p.stabilised == "image":
             raise ValueError(
-                f"camera {p.name!r} must not have stabilised='image' without a far-field lens; use "
+                f"camera {p.name!r} must not have stabilised='image' without a far-field camera; use "
                 f"LGMDObservation or SensorArray, or stabilised=True"
             )
         self.batch = CameraBatch([p], p.shape)

@@ -1,4 +1,4 @@
-"""Frames of all lenses, conditions and options against stored ones."""
+"""Frames of all camera presets, conditions and options against stored ones."""
 
 import numpy as np
 from support.golden_frames import PATH, golden_frames

@@ -46,6 +46,7 @@ def test_failure_maps(tmp_path, capsys, monkeypatch):
         ("--agents ttc-oracle --bound stopping-zone", "--bound must use no camera, got stopping-zone"),
         ("--agents ttc-oracle --worlds 1001", "worlds must be test worlds, 8000 to 8999"),
         ("--agents ttc-oracle --worlds 0", "worlds must be test worlds, 8000 to 8999"),
+        ("--agents ttc-oracle --planes vibration --textures -1", "camera texture must be in [0, 5]"),
         ("--agents ttc-oracle --widths 0.1", "width must be in [0.2, 4] m, got 0.1"),
     ):
         with pytest.raises(SystemExit):

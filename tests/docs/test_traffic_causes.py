@@ -23,6 +23,7 @@ def test_situations():
     behind, far = vehicle(0.0, -5.0, pi / 2), vehicle(0.0, 31.0, pi / 2)
     everything = [ego, oncoming, crossing, beside, ahead, behind, far]
     assert situation_of(ego, everything) == ("car ahead", pytest.approx(np.hypot(1.0, 20.0)))
+    assert situation_of(ego, [vehicle(0.5, 12.0, pi)]) == ("crossing", pytest.approx(np.hypot(0.5, 12.0)))
     assert situation_of(ego, [oncoming, crossing, beside]) == ("crossing", pytest.approx(10.0))
     assert situation_of(ego, [beside, oncoming]) == ("oncoming", pytest.approx(10.0))
     assert situation_of(ego, [beside, behind]) == ("other", pytest.approx(5.0))

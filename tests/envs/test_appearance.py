@@ -60,7 +60,7 @@ def test_roads_have_the_lane_width_of_the_world():
         assert env.unwrapped.vehicle.position[1] in middles
 
 
-def test_the_lens_moves_on_a_normal_road_except_in_the_laboratory():
+def test_the_camera_moves_on_a_normal_road_except_in_the_laboratory():
     assert camera_fields(3, "clear", None)["road"] == "normal"
     assert camera_fields(None, "clear", None)["road"] == "still"
     assert camera_fields(None, "clear", "rough")["road"] == "rough"

@@ -26,7 +26,7 @@ from lgmd_gym.camera import CONDITIONS, CameraParams, EgoCamera
 
 PATH = Path(__file__).parents[1] / "golden" / "camera.npz"
 SHAPE = (45, 80)
-LENSES = ("wide", "standard", "tele", "fovea")
+PRESETS = ("wide", "standard", "tele", "fovea")
 OPTIONS = {
     "box": {"vehicles": "box", "seed": 7},
     "rail": {"guard_rail": True, "texture": 2.0},
@@ -97,11 +97,11 @@ def road_with_figure(kind, ahead, y, heading, speed, travelled):
 def golden_frames():
     """Return all frames by name, uint8, shape (45, 80)."""
     frames = {}
-    for lens in LENSES:
+    for preset in PRESETS:
         for condition in CONDITIONS:
-            camera = EgoCamera(CameraParams.preset(lens, shape=SHAPE, condition=condition))
-            frames[f"{lens}-{condition}"] = camera.render(busy_road())
-        frames[f"{lens}-curve"] = EgoCamera(lens, shape=SHAPE).render(curve())
+            camera = EgoCamera(CameraParams.preset(preset, shape=SHAPE, condition=condition))
+            frames[f"{preset}-{condition}"] = camera.render(busy_road())
+        frames[f"{preset}-curve"] = EgoCamera(preset, shape=SHAPE).render(curve())
     for name, fields in OPTIONS.items():
         frames[name] = EgoCamera("wide", shape=SHAPE, **fields).render(busy_road())
     for name, (figure, fields) in FIGURES.items():

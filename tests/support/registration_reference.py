@@ -16,7 +16,7 @@ def smoothed(frame):
 
 
 class Reference:
-    """Registration of one lens; arguments as for `FarFieldRegistration`."""
+    """Registration of one camera; arguments as for `FarFieldRegistration`."""
 
     def __init__(self, shape, fps, focal_px, params):
         self.shape, self.focal, self.p = shape, focal_px, params
