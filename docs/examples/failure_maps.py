@@ -22,20 +22,19 @@ between cells.
 """
 
 import argparse
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
+from failure_map_figure import draw
+from failure_map_planes import DEFAULT_PLANES, GRIDS, PLANES, Map, Plane, check_cells, make_planes
 from joblib import delayed
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.batch import play_unit
-from lgmd_gym.benchmark.case import Case, make_case, to_mps
 from lgmd_gym.benchmark.rows import Row, key_of
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.statistics import Rate
@@ -43,116 +42,11 @@ from lgmd_gym.benchmark.summary import rate_of
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
 from lgmd_gym.benchmark.units import Unit, make_units
 from lgmd_gym.benchmark.worker_processes import run_parallel
-from lgmd_gym.camera.params import ROADS, CameraParams
+from lgmd_gym.camera.params import ROADS
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.appearance import MIXED
-from lgmd_gym.envs.scenarios.curves import MAX_LATERAL
-from lgmd_gym.plotting.style import COLOURS, saved_figure
-from lgmd_gym.rendering.playback import make_target
 
-SUITE = "failure-maps"
 NO_VIEW = SensorConfig({"name": "wide", "shape": [8, 8]})  # no-brake and oracles need no useful image
-LEVEL = 0.9  # of the contour
-
-PLANES = ("vibration", "width", "brake", "curve", "height")
-DEFAULT_PLANES = PLANES[:4]  # of the figure in the documentation
-LOW_BOX_WIDTH = 2.0  # of the plane `height` [m]
-GRIDS = {
-    "textures": ([0.5, 1.0, 1.6, 2.5], "contrasts of the ground, relative to that of the world"),
-    "widths": ([0.3, 0.5, 0.8, 1.2, 1.7, 2.5], "widths of the target [m]"),
-    "decelerations": ([5.0, 6.0, 7.0, 8.0, 9.5], "decelerations of full braking [m/s²]"),
-    "radii": ([60.0, 100.0, 200.0, 400.0, 800.0, math.inf], "radii of the curve [m]; inf for a straight"),
-    "heights": ([0.3, 0.5, 0.8, 1.2, 1.7], "heights of the box [m]"),
-    "speeds": ([20.0, 40.0, 60.0, 80.0, 100.0], "ego speeds of all planes but vibration [km/h]"),
-}
-AGENT_LINE: dict[str, Any] = {"color": COLOURS[1], "linewidth": 3.0, "solid_capstyle": "projecting"}
-BOUND_LINE: dict[str, Any] = {"color": COLOURS[0], "linewidth": 1.4, "linestyle": "--"}
-
-LEFT_OUT = "0.85"  # grey
-
-Map = list[list[Rate | None]]  # rate of each cell by row and column; None for one that is left out
-
-
-class Cell(NamedTuple):
-    """One cell of a map: a case, and the road and the texture in place of the usual ones."""
-
-    case: Case
-    road: str | None = None
-    texture: float | None = None
-
-
-class Axis(NamedTuple):
-    """One quantity of a map: its label and its values."""
-
-    label: str
-    values: Sequence[Any]
-
-    @property
-    def ticks(self) -> list[str]:
-        """Labels of the values; the number of a road is its multiple of the measured motion."""
-        special = {math.inf: "∞"} | {road: f"{road}\n{gain:g} ×" for road, gain in ROADS.items()}
-        return [special.get(value) or f"{value:g}" for value in self.values]
-
-
-class Plane(NamedTuple):
-    """Two quantities, and the cell for their values and for the number of a world; None if left out."""
-
-    title: str
-    x: Axis
-    y: Axis
-    cell: Callable[[Any, Any, int], Cell | None]
-
-
-def vibration_cell(road: str, texture: float, world: int) -> Cell:
-    """Return the cell of a road and a texture contrast."""
-    case = make_case(SUITE, "CCRs", f"road-{road}-texture-{texture:g}", ego_speed=to_mps(50))
-    return Cell(case, road, texture)
-
-
-def width_cell(width: float, speed_kmh: float, world: int) -> Cell:
-    """Return the cell of a target width [m]."""
-    name = f"width-{width:g}-v{speed_kmh:g}"
-    return Cell(make_case(SUITE, "StandingBox", name, ego_speed=to_mps(speed_kmh), width=width))
-
-
-def brake_cell(deceleration: float, speed_kmh: float, world: int) -> Cell:
-    """Return the cell of a deceleration [m/s²]; dead time and build-up are those of the world's brake."""
-    brake = {"max_deceleration": deceleration}
-    name = f"brake-{deceleration:g}-v{speed_kmh:g}"
-    return Cell(make_case(SUITE, "CCRs", name, ego_speed=to_mps(speed_kmh), config=brake))
-
-
-def curve_cell(radius: float, speed_kmh: float, world: int) -> Cell | None:
-    """Return the cell of a radius [m], infinite for a straight; None with too much lateral acceleration."""
-    speed, name = to_mps(speed_kmh), f"radius-{radius:g}-v{speed_kmh:g}"
-    if math.isinf(radius):
-        return Cell(make_case(SUITE, "CCRs", name, ego_speed=speed))
-    if speed**2 / radius > MAX_LATERAL:
-        return None
-    left = bool(world % 2)
-    return Cell(make_case(SUITE, "CCRsCurve", name, ego_speed=speed, radius=radius, left=left))
-
-
-def height_cell(height: float, speed_kmh: float, world: int) -> Cell:
-    """Return the cell of a height [m] of a box."""
-    name, speed = f"height-{height:g}-v{speed_kmh:g}", to_mps(speed_kmh)
-    return Cell(make_case(SUITE, "StandingBox", name, ego_speed=speed, width=LOW_BOX_WIDTH, height=height))
-
-
-def make_planes(chosen: argparse.Namespace) -> dict[str, Plane]:
-    """Return the planes by name."""
-    motion = Axis("road (1 ×: measured motion)", chosen.roads)
-    contrast = Axis("contrast of the ground [×]", chosen.textures)
-    width, speed = Axis("width [m]", chosen.widths), Axis("ego speed [km/h]", chosen.speeds)
-    brake, radius = Axis("deceleration [m/s²]", chosen.decelerations), Axis("radius [m]", chosen.radii)
-    height = Axis("height [m]", chosen.heights)
-    return {
-        "vibration": Plane("vibration, at 50 km/h", motion, contrast, vibration_cell),
-        "width": Plane("width of the target", width, speed, width_cell),
-        "brake": Plane("brake", brake, speed, brake_cell),
-        "curve": Plane("curve", radius, speed, curve_cell),
-        "height": Plane("height of a box 2 m wide", height, speed, height_cell),
-    }
 
 
 def sensors_of(agent: str, texture: float | None) -> SensorConfig:
@@ -229,82 +123,6 @@ def table(plane: Plane, rates: Map) -> list[str]:
     for tick, row in zip(plane.y.ticks, rates, strict=True):
         lines.append([tick, *("–" if rate is None else rate_text(rate) for rate in row)])
     return [f"| {' | '.join(line)} |" for line in lines]
-
-
-def to_shares(rates: Map) -> np.ndarray:
-    """Return rates as shares, shape (rows, columns), NaN where left out."""
-    return np.array(
-        [[math.nan if rate is None else rate.k / max(rate.n, 1) for rate in row] for row in rates]
-    )
-
-
-def edges(shares: np.ndarray) -> list[tuple[list[int], list[int]]]:
-    """Return the edges between cells that reach the level and others, as x and y of their two ends.
-
-    Args:
-        shares: Share of each cell, shape (rows, columns), NaN if left out; cell (i, j) has its corners at
-            x = j, j + 1 and y = i, i + 1.
-    """
-
-    def differ(*cells: tuple[int, int]) -> bool:
-        one, other = (float(shares[cell]) for cell in cells)
-        return math.isfinite(one + other) and (one >= LEVEL) != (other >= LEVEL)
-
-    found = []
-    for i, j in np.ndindex(*shares.shape):
-        if j and differ((i, j - 1), (i, j)):
-            found.append(([j, j], [i, i + 1]))
-        if i and differ((i - 1, j), (i, j)):
-            found.append(([j, j + 1], [i, i]))
-    return found
-
-
-def draw_map(axes: Any, plane: Plane, rates: Map, bound: Map) -> None:
-    """Draw a map as coloured cells with numbers, its contour, and that of the bound."""
-    shares = to_shares(rates)
-    axes.set_facecolor(LEFT_OUT)
-    axes.pcolormesh(shares, cmap="Blues", vmin=0.0, vmax=1.1, edgecolors="white", linewidth=0.5)
-    for (i, j), share in np.ndenumerate(shares):
-        if math.isfinite(share):
-            style = {"ha": "center", "va": "center", "color": "white" if share > 0.6 else "black"}
-            axes.text(j + 0.5, i + 0.5, f"{100 * share:.0f}", fontsize=8, **style)
-    for x, y in edges(shares):
-        axes.plot(x, y, **AGENT_LINE)
-    for x, y in edges(to_shares(bound)):
-        axes.plot(x, y, **BOUND_LINE)
-    axes.set_xticks(np.arange(len(plane.x.ticks)) + 0.5, plane.x.ticks, fontsize=8)
-    axes.set_yticks(np.arange(len(plane.y.ticks)) + 0.5, plane.y.ticks, fontsize=8)
-    axes.set_ylabel(plane.y.label, fontsize=8)
-    axes.tick_params(length=0)
-    axes.spines[:].set_visible(False)
-
-
-def draw(played: Sequence[tuple[Plane, dict[str, Map]]], chosen: argparse.Namespace) -> None:
-    """Draw one row of maps per agent."""
-    shape = len(chosen.agents), len(played)
-    size = (0.3 + 2.65 * shape[1], 1.1 + 2.2 * shape[0])
-    with saved_figure(chosen.to, *shape, grid=False, squeeze=False, figsize=size) as (figure, panels):
-        for row, agent in zip(panels, chosen.agents, strict=True):
-            for axes, (plane, maps) in zip(row, played, strict=True):
-                draw_map(axes, plane, maps[agent], maps[chosen.bound])
-            row[0].set_ylabel(f"{agent}\n\n{row[0].get_ylabel()}")
-        for top, bottom, (plane, _) in zip(panels[0], panels[-1], played, strict=True):
-            top.set_title(plane.title, fontsize=9)
-            bottom.set_xlabel(plane.x.label, fontsize=8)
-        lines = [panels[0, 0].plot([], [], **style)[0] for style in (AGENT_LINE, BOUND_LINE)]
-        left_out = panels[0, 0].fill([], [], color=LEFT_OUT)[0]
-        names = [f"edge of {LEVEL:.0%} avoided", f"the same for {chosen.bound}", "left out"]
-        figure.legend([*lines, left_out], names, loc="outside lower center", ncols=3, fontsize=8)
-        figure.suptitle(f"Contacts avoided without premature braking in {chosen.worlds} test worlds [%]")
-
-
-def check_cells(plane: Plane, world: int) -> None:
-    """Raise ValueError if a value is outside the range of its scenario or environment."""
-    for x, y in product(plane.x.values, plane.y.values):
-        cell = plane.cell(x, y, world)
-        if cell is not None:
-            make_target(cell.case, {}, camera=None).close()
-            CameraParams.make("wide", texture=cell.texture or 0.0)
 
 
 def read_options(arguments: Sequence[str] | None) -> argparse.Namespace:

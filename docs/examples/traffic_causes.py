@@ -45,7 +45,7 @@ ALONG, AGAINST = 30.0, 150.0  # angle between the headings of a car ahead and of
 
 
 class Onset(NamedTuple):
-    """The begin of a braking event.
+    """Start of a braking event.
 
     Attributes:
         situation: One of `SITUATIONS`.
@@ -78,7 +78,7 @@ def situation_of(ego: Any, vehicles: Iterable[Any]) -> tuple[str, float]:
 
 
 def first_event(config: RunConfig, agent_name: str, row: Row) -> Onset:
-    """Play a drive up to the first braking event of the agent that exceeds 0.25 g, and return its begin.
+    """Play a drive up to the first braking event of the agent that exceeds 0.25 g, and return its start.
 
     Raises:
         RuntimeError: If there is no such event.
@@ -126,7 +126,7 @@ def table(onsets: Sequence[tuple[str, Onset]]) -> list[str]:
 
 
 def play(run: StoredRun, agent: str, jobs: int) -> list[tuple[str, Onset]]:
-    """Return the kind of traffic and the begin of the first event of each drive with false events only.
+    """Return the kind of traffic and the start of the first event of each drive with false events only.
 
     Raises:
         ValueError: If the run is not one of traffic, does not contain the agent, or has no such drive.

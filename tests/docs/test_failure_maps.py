@@ -1,4 +1,4 @@
-"""The script docs/examples/failure_maps.py: maps, cells and options."""
+"""The script docs/examples/failure_maps.py and its modules: maps, cells, figure and options."""
 
 from itertools import product
 from types import SimpleNamespace
@@ -55,16 +55,19 @@ def test_failure_maps(tmp_path, capsys, monkeypatch):
 
 
 def test_failure_maps_cells(monkeypatch):
-    script = load("failure_maps")
-    assert script.edges(np.array([[0.9, 0.8], [np.nan, 1.0]])) == [([1, 1], [0, 1]), ([1, 2], [1, 1])]
+    script, planes = load("failure_maps"), load("failure_map_planes")
+    assert load("failure_map_figure").edges(np.array([[0.9, 0.8], [np.nan, 1.0]])) == [
+        ([1, 1], [0, 1]),
+        ([1, 2], [1, 1]),
+    ]
     own = SensorConfig().for_agent(make_agent("stopping-zone"))
     changed = script.sensors_of("stopping-zone", 2.5)
     expected = [CameraParams.make(camera, texture=2.5) for camera in own.camera]
     assert [CameraParams.make(camera) for camera in changed.camera] == expected
-    assert script.width_cell(0.3, 36.0, 8000).case.scenario.actors[0].width == 0.3
-    box = script.height_cell(0.5, 36.0, 8000).case.scenario.actors[0]
+    assert planes.width_cell(0.3, 36.0, 8000).case.scenario.actors[0].width == 0.3
+    box = planes.height_cell(0.5, 36.0, 8000).case.scenario.actors[0]
     assert (box.kind, box.width, box.height) == ("box", 2.0, 0.5)
-    right, left = (script.curve_cell(100.0, 36.0, world).case.scenario for world in (8000, 8001))
+    right, left = (planes.curve_cell(100.0, 36.0, world).case.scenario for world in (8000, 8001))
     assert [bend.curvature for bend in (*right.ego_path, *left.ego_path)] == [-0.01, 0.01]
     assert right.road.bends == right.ego_path
     # 54.16 m from centre to centre along the arc: chord 2 · 100 m · sin(0.2708), heading 0.5416 rad.
@@ -72,8 +75,8 @@ def test_failure_maps_cells(monkeypatch):
     assert target.heading == pytest.approx(0.54162, abs=1e-4)
     assert target.lateral_offset == pytest.approx(100.0 * (1.0 - np.cos(0.541615)), abs=1e-3)
     assert target.gap + 4.1615 == pytest.approx(100.0 * np.sin(0.541615), abs=1e-3)
-    assert script.curve_cell(100.0, 72.0, 8000) is not None  # 4 m/s²
-    assert script.curve_cell(100.0, 72.5, 8000) is None
+    assert planes.curve_cell(100.0, 72.0, 8000) is not None  # 4 m/s²
+    assert planes.curve_cell(100.0, 72.5, 8000) is None
     own = SimpleNamespace(camera="fovea", neuron=LGMDParams.off_only(), include_frame=True)
     monkeypatch.setattr(script, "make_agent", lambda agent: own)
     expected = SensorConfig([{"name": "fovea", "texture": 2.5}], own.neuron, include_frame=True)

@@ -9,6 +9,7 @@ from support.examples import load
 
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.stored_run import StoredRun
+from lgmd_gym.rendering.playback import make_target
 
 
 def vehicle(x, y, heading=0.0, speed=5.0):
@@ -28,6 +29,34 @@ def test_situations():
     assert situation_of(ego, [beside, oncoming]) == ("oncoming", pytest.approx(10.0))
     assert situation_of(ego, [beside, behind]) == ("other", pytest.approx(5.0))
     assert situation_of(ego, [ego, behind, far]) == ("none", inf)
+
+
+def test_the_event_begins_after_a_pause_in_the_drive_of_the_row(monkeypatch):
+    """A light demand, a pause of two seconds, a demand interrupted for half a second, then full braking."""
+    script, made, speeds = load("traffic_causes"), [], []
+    demands = iter([-0.02] * 3 + [0.0] * 60 + [-0.02] + [0.0] * 15 + [-1.0] * 30)
+
+    class Tapping:
+        camera, neuron = "wide", None
+
+        def reset(self, seed):
+            assert seed == 4
+
+        def act(self, observation, info):
+            speeds.append(info["ego_speed"])
+            return np.array([next(demands)])
+
+    def make(target, arguments, **options):
+        made.append((target, options["world"], options["condition"], options["road"]))
+        return make_target(target, arguments, **options)
+
+    monkeypatch.setattr(script, "make_agent", lambda name: Tapping())
+    monkeypatch.setattr(script, "make_target", make)
+    config = RunConfig(suite="traffic", agents=("no-brake",), seeds=5, conditions=("fog",), road="rough")
+    row = {"case": "traffic/highway/s4", "seed": 4, "world": 8003, "condition": "fog"}
+    onset = script.first_event(config, "tapping", row)
+    assert made == [("traffic/highway", 8003, "fog", "rough")]
+    assert onset.speed == speeds[63]  # the first decision after the pause
 
 
 def test_the_first_event_of_each_drive():
