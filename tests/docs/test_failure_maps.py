@@ -54,6 +54,11 @@ def test_failure_maps(tmp_path, capsys, monkeypatch):
         assert message in capsys.readouterr().err
 
 
+def test_the_documented_figure_has_four_planes():
+    chosen = load("failure_maps").read_options([])
+    assert list(chosen.planes) == ["vibration", "width", "brake", "curve"]
+
+
 def test_failure_maps_cells(monkeypatch):
     script, planes = load("failure_maps"), load("failure_map_planes")
     assert load("failure_map_figure").edges(np.array([[0.9, 0.8], [np.nan, 1.0]])) == [

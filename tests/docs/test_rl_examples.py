@@ -195,13 +195,8 @@ def test_frontier_of_a_policy():
     threats = [synthetic_episode(8, seed=seed) for seed in range(3)]
     others = [synthetic_episode(5, threat=False), synthetic_episode(5, threat=False, traffic=True)]
     row = example.frontier_row(1.0, threats + others, [2, 6, None, 0, None], rate_hz=10.0)
-    assert [cell.split(" [")[0] for cell in row.strip("| ").split(" | ")] == [
-        "1",
-        "1/3",
-        "0.40",
-        "1/1",
-        "0/1",
-    ]
+    # Wilson's interval of 1/3: (p + z²/2n ± z √(p (1 - p) / n + z²/4n²)) / (1 + z²/n) with z = 1.96.
+    assert row == "| 1 | 1/3 [6.1–79.2] | 0.40 | 1/1 [20.7–100.0] | 0/1 [0.0–79.3] |"
 
 
 def test_frontier_of_the_shipped_policy(tmp_path, capsys):
