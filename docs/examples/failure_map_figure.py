@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from failure_map_planes import Map, Plane
 
+from lgmd_gym.errors import counted
 from lgmd_gym.plotting.style import COLOURS, saved_figure
 
 LEVEL = 0.9  # of the contour
@@ -16,6 +17,7 @@ AGENT_LINE: dict[str, Any] = {"color": COLOURS[1], "linewidth": 3.0, "solid_caps
 BOUND_LINE: dict[str, Any] = {"color": COLOURS[0], "linewidth": 1.4, "linestyle": "--"}
 
 LEFT_OUT = "0.85"  # grey
+LEAST_WIDTH = 6.4  # of the figure, for its title and legend [inches]
 
 
 def to_shares(rates: Map) -> np.ndarray:
@@ -69,7 +71,7 @@ def draw_map(axes: Any, plane: Plane, rates: Map, bound: Map) -> None:
 def draw(played: Sequence[tuple[Plane, dict[str, Map]]], chosen: argparse.Namespace) -> None:
     """Draw one row of maps per agent."""
     shape = len(chosen.agents), len(played)
-    size = (0.3 + 2.65 * shape[1], 1.1 + 2.2 * shape[0])
+    size = (max(0.3 + 2.65 * shape[1], LEAST_WIDTH), 1.1 + 2.2 * shape[0])
     with saved_figure(chosen.to, *shape, grid=False, squeeze=False, figsize=size) as (figure, panels):
         for row, agent in zip(panels, chosen.agents, strict=True):
             for axes, (plane, maps) in zip(row, played, strict=True):
@@ -82,4 +84,5 @@ def draw(played: Sequence[tuple[Plane, dict[str, Map]]], chosen: argparse.Namesp
         left_out = panels[0, 0].fill([], [], color=LEFT_OUT)[0]
         names = [f"edge of {LEVEL:.0%} avoided", f"the same for {chosen.bound}", "left out"]
         figure.legend([*lines, left_out], names, loc="outside lower center", ncols=3, fontsize=8)
-        figure.suptitle(f"Contacts avoided without premature braking in {chosen.worlds} test worlds [%]")
+        worlds = counted(chosen.worlds, "test world")
+        figure.suptitle(f"Contacts avoided without premature braking in {worlds} [%]")
