@@ -8,7 +8,7 @@ import numpy as np
 from lgmd_gym.agents.base import Agent
 from lgmd_gym.agents.options import check_options, parse_agent
 from lgmd_gym.errors import check_flag, shown, unknown_name
-from lgmd_gym.system.user_modules import error_reason, import_user_module
+from lgmd_gym.processes.user_modules import error_reason, import_user_module
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec

@@ -13,7 +13,7 @@ from lgmd_gym.agents.base import FPS
 from lgmd_gym.agents.filters import ConsecutiveFrames, YawRateGate
 from lgmd_gym.agents.params import RuleParams, parameter
 from lgmd_gym.agents.rule import Rule, SensorReading, sensor_readings
-from lgmd_gym.system.extras import missing_extra
+from lgmd_gym.processes.extras import missing_extra
 
 
 class ImageRule(Rule):

@@ -10,12 +10,12 @@ from reference_returns import AGENTS, EXAMPLE, Returns, arguments_of
 
 from lgmd_gym.envs import env_id
 from lgmd_gym.envs.braking import BrakingEnv
+from lgmd_gym.envs.families.data import scenario_from_data
 from lgmd_gym.envs.registration import RANDOM_TASKS, SCENARIO
-from lgmd_gym.envs.scenarios.data import scenario_from_data
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.envs.traffic.registration import traffic_id
-from lgmd_gym.gallery.cards import ScenarioCard, scenario_cards
-from lgmd_gym.gallery.docstrings import parse_docstring
+from lgmd_gym.report.gallery.cards import ScenarioCard, scenario_cards
+from lgmd_gym.report.gallery.docstrings import parse_docstring
 
 VIDEO_AGENT = "spike-threshold"
 _NO_THREAT = "; not a threat."

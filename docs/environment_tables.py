@@ -13,12 +13,12 @@ from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.dynamics.bend import Bend
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
 from lgmd_gym.envs.registration import APPEARANCE, RANDOM_TASKS, SCENARIO, make_braking
 from lgmd_gym.envs.reward import RewardParams
-from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
 from lgmd_gym.envs.traffic.registration import make_traffic
-from lgmd_gym.gallery.cards import ScenarioCard
-from lgmd_gym.gallery.docstrings import DocumentedArgument, parse_docstring
+from lgmd_gym.report.gallery.cards import ScenarioCard
+from lgmd_gym.report.gallery.docstrings import DocumentedArgument, parse_docstring
 from lgmd_gym.wrappers.observation import LGMDObservation
 
 _REFERENCES = {cls.__name__: cls for cls in (LGMDObservation, Appearance)}

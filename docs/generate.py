@@ -19,14 +19,14 @@ from reference_returns import read_returns
 
 from lgmd_gym.benchmark.analysis.tables import mean_kmh
 from lgmd_gym.benchmark.config import RunConfig
-from lgmd_gym.benchmark.executor import Executor
 from lgmd_gym.benchmark.runner import Run
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import INTERVAL_TEXT, Sample, summaries
 from lgmd_gym.cli.main import COMMANDS
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.traffic.env import TrafficEnv
-from lgmd_gym.gallery.cards import ScenarioCard, record_video
+from lgmd_gym.processes.executor import Executor
+from lgmd_gym.report.gallery.cards import ScenarioCard, record_video
+from lgmd_gym.statistics.intervals import Rate
 
 
 def main(out: Path) -> None:

@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from lgmd_gym.envs.braking import BrakingEnv
     from lgmd_gym.envs.dynamics.bend import Bend
     from lgmd_gym.envs.dynamics.segment import Segment
+    from lgmd_gym.envs.families import FAMILIES, make_scenario
+    from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
     from lgmd_gym.envs.own_families import import_families
     from lgmd_gym.envs.registration import env_id, register_envs, register_family
-    from lgmd_gym.envs.scenarios import FAMILIES, make_scenario
-    from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
 
 __all__ = [
     "FAMILIES",
@@ -32,17 +32,17 @@ __all__ = [
 
 _MODULES = {
     "BrakingEnv": "braking",
-    "FAMILIES": "scenarios",
-    "make_scenario": "scenarios",
+    "FAMILIES": "families",
+    "make_scenario": "families",
     "env_id": "registration",
     "register_envs": "registration",
     "register_family": "registration",
     "import_families": "own_families",
-    "Actor": "scenarios.scenario",
+    "Actor": "families.scenario",
     "Bend": "dynamics.bend",
     "Segment": "dynamics.segment",
-    "RoadPlan": "scenarios.scenario",
-    "Scenario": "scenarios.scenario",
+    "RoadPlan": "families.scenario",
+    "Scenario": "families.scenario",
 }
 
 

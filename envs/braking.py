@@ -15,9 +15,9 @@ from lgmd_gym.envs.decisions import (
     start_episodes,
 )
 from lgmd_gym.envs.episode_source import EpisodeSource, FixedScenario
+from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.info import INFO_KEYS
 from lgmd_gym.envs.reward import RewardParams
-from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.envs.scene import SceneArrays, write_scene
 from lgmd_gym.envs.simulation.physics_state import PhysicsState
 from lgmd_gym.envs.simulation.road import BrakingRoad

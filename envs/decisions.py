@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lgmd_gym.envs.dynamics.arrays import Arrays
 from lgmd_gym.envs.dynamics.brake import put_demand
 from lgmd_gym.envs.dynamics.episode import Physics, is_terminated, is_truncated
-from lgmd_gym.envs.dynamics.jit import Arrays, compiled
 from lgmd_gym.envs.info import INFO, write_info
 from lgmd_gym.envs.reward import step_reward
 from lgmd_gym.envs.simulation.physics_state import PhysicsState
 from lgmd_gym.envs.surrogate_safety import is_approached
+from lgmd_gym.kernels import kernel
 
 
 class Clock(NamedTuple):
@@ -68,7 +69,7 @@ def make_outcome(num: int) -> Outcome:
     return Outcome(np.zeros(num, INFO), np.zeros(num), flags[0], flags[1])
 
 
-@compiled
+@kernel(exact=True)
 def start_decisions(first: int, last: int, steps: int, physics: Arrays, clock: Arrays) -> None:
     """Put the demands of the environments with `remaining` >= 0 into their delay lines.
 
@@ -92,7 +93,7 @@ def start_decisions(first: int, last: int, steps: int, physics: Arrays, clock: A
         put_demand(physics.lines[i], physics.pending[i], brake.delay, demand)
 
 
-@compiled
+@kernel(exact=True)
 def finish_decisions(
     first: int, last: int, policy_rate: float, physics: Arrays, clock: Arrays, outcome: Arrays
 ) -> None:
@@ -122,7 +123,7 @@ def finish_decisions(
         outcome.truncated[i] = is_truncated(episode)
 
 
-@compiled
+@kernel(exact=True)
 def start_episodes(
     first: int, last: int, selected: np.ndarray, physics: Arrays, clock: Arrays, outcome: Arrays
 ) -> None:

@@ -11,7 +11,7 @@ from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.camera.worlds import LABORATORY, draw_world
 from lgmd_gym.envs.appearance import Appearance, brake_of, world_number
 from lgmd_gym.envs.dynamics.brake import BrakeParams
-from lgmd_gym.envs.scenarios.distribution import (
+from lgmd_gym.envs.families.distribution import (
     LEVELS,
     check_families,
     check_levels,
@@ -20,8 +20,8 @@ from lgmd_gym.envs.scenarios.distribution import (
     draw_scenario,
     level_generator,
 )
-from lgmd_gym.envs.scenarios.free_lanes import free_lane
-from lgmd_gym.envs.scenarios.scenario import Scenario
+from lgmd_gym.envs.families.free_lanes import free_lane
+from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.simulation.network import road_network
 from lgmd_gym.envs.simulation.physics_state import Placement, place
 
@@ -87,7 +87,7 @@ class RandomLevels:
     """A random level per episode.
 
     A level is a random scenario with a number. Half of the levels are threats: the car-to-car, motorcycle,
-    pedestrian and bicycle families of the protocols, see `lgmd_gym.envs.scenarios.distribution`. Half are
+    pedestrian and bicycle families of the protocols, see `lgmd_gym.envs.families.distribution`. Half are
     non-threats: all other families. With `families`, a level has a scenario of one of them, in the same world
     as without. A level fixes the family and its arguments, the grey levels, the world, the camera condition
     (night, fog, …) and the contrast of the road texture, in every process.

@@ -7,8 +7,8 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.bodies import ego_braking
 from lgmd_gym.envs.dynamics.episode import speed_along_ego
-from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.surrogate_safety import contact_time, headway, lead_of, rate_to_avoid_crash
+from lgmd_gym.kernels import kernel
 
 INFO_KEYS = (
     "speed", "crashed", "ego_speed", "gap", "ttc", "thw", "drac", "required_deceleration", "collision",
@@ -20,7 +20,7 @@ INFO = np.dtype(
 """The info of one environment; see `BrakingEnv` for meanings and units."""
 
 
-@compiled
+@kernel(exact=True)
 def write_info(bodies: np.ndarray, episode: Any, ego: Any, paths: np.ndarray, info: Any) -> None:
     """Write the present state of an episode to an `INFO` record.
 

@@ -7,8 +7,8 @@ from highway_env.road.road import RoadNetwork
 
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.braking import BrakingEnv
+from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.registration import SCENARIO, SCENARIO_ARGUMENT, make_source
-from lgmd_gym.envs.scenarios.scenario import Scenario
 
 _NO_DEMAND = np.zeros(1, np.float32)
 

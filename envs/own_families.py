@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 from types import ModuleType
 
+from lgmd_gym.envs.families import FAMILIES
 from lgmd_gym.envs.registration import register_envs, register_family
-from lgmd_gym.envs.scenarios import FAMILIES
 from lgmd_gym.errors import check_text, shown, unknown_name
-from lgmd_gym.system.user_modules import import_user_module
+from lgmd_gym.processes.user_modules import import_user_module
 
 
 def import_families(modules: Iterable[str]) -> None:

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium as gym
 
-from lgmd_gym.envs.scenarios import FAMILIES, make_scenario
-from lgmd_gym.envs.scenarios.data import scenario_from_data
-from lgmd_gym.envs.scenarios.registry import Family
-from lgmd_gym.envs.scenarios.registry import family as add_family
+from lgmd_gym.envs.families import FAMILIES, make_scenario
+from lgmd_gym.envs.families.data import scenario_from_data
+from lgmd_gym.envs.families.registry import Family
+from lgmd_gym.envs.families.registry import family as add_family
 from lgmd_gym.errors import check_keys, check_known, check_text
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
     from lgmd_gym.envs.episode_source import EpisodeSource
-    from lgmd_gym.envs.scenarios.scenario import Scenario
+    from lgmd_gym.envs.families.scenario import Scenario
     from lgmd_gym.neuron import NeuronSpec
 
 RANDOM = "RandomBraking"

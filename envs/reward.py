@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.envs.dynamics.bodies import ego_braking
-from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.errors import check_within
+from lgmd_gym.kernels import kernel
 
 REWARD = np.dtype(
     [(name, np.float64) for name in ("contact", "impact", "progress", "brake", "jerk", "need_ttc")]
@@ -45,7 +45,7 @@ class RewardParams:
         return np.array(astuple(self), REWARD)
 
 
-@compiled
+@kernel(exact=True)
 def step_reward(body: Any, ego: Any, episode: Any, brake: Any, weights: Any, ttc: float, dt: float) -> float:
     """Return the reward of the last decision.
 

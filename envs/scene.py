@@ -15,9 +15,10 @@ from lgmd_gym.camera.objects import (
     MODEL_MOTORCYCLE,
     MODEL_PEDESTRIAN,
 )
+from lgmd_gym.envs.dynamics.arrays import Arrays
 from lgmd_gym.envs.dynamics.bodies import BICYCLE, CAR, MOTORCYCLE, PEDESTRIAN, ROAD_MARKING
 from lgmd_gym.envs.dynamics.episode import Physics
-from lgmd_gym.envs.dynamics.jit import Arrays, compiled
+from lgmd_gym.kernels import kernel
 
 
 class SceneArrays(NamedTuple):
@@ -34,7 +35,7 @@ class SceneArrays(NamedTuple):
     counts: np.ndarray
 
 
-@compiled
+@kernel(exact=True)
 def write_scene(i: int, rate: float, physics: Arrays, arrays: Arrays) -> None:
     """Write the present state of environment i for its cameras.
 
@@ -62,7 +63,7 @@ def write_scene(i: int, rate: float, physics: Arrays, arrays: Arrays) -> None:
     arrays.counts[i] = count - 1
 
 
-@compiled
+@kernel(exact=True)
 def _model_of(kind: int) -> int:
     """Return the model that a kind of body is drawn with."""
     if kind == CAR:

@@ -10,14 +10,14 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.bodies import CAR, MOTORCYCLE, ROAD_MARKING, outline_of
 from lgmd_gym.envs.dynamics.contact import first_touch
-from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.swept_contact import PathMotion, gap_on_path, time_on_paths
+from lgmd_gym.kernels import kernel
 
 TTC_HORIZON, TTC_STEP = 10.0, 0.1  # [s]
 GAP_HORIZON, GAP_STEP = 300.0, 1.0  # [m]
 
 
-@compiled
+@kernel(exact=True)
 def lead_of(bodies: np.ndarray, count: int, paths: np.ndarray) -> tuple[float, int]:
     """Return the gap to the first solid body on the ego's path [m], and its index; `inf` and 0 if none.
 
@@ -46,7 +46,7 @@ def lead_of(bodies: np.ndarray, count: int, paths: np.ndarray) -> tuple[float, i
     return gap, lead
 
 
-@compiled
+@kernel(exact=True)
 def contact_time(bodies: np.ndarray, count: int, paths: np.ndarray) -> float:
     """Return the time to the ego's first contact at constant speeds and paths [s]; `inf` beyond 10 s.
 
@@ -70,7 +70,7 @@ def contact_time(bodies: np.ndarray, count: int, paths: np.ndarray) -> float:
     return ttc
 
 
-@compiled
+@kernel(exact=True)
 def is_approached(bodies: np.ndarray, count: int, paths: np.ndarray) -> bool:
     """Return whether a car or motorcycle touches the ego within 10 s if the ego stands and others keep speed.
 
@@ -89,24 +89,24 @@ def is_approached(bodies: np.ndarray, count: int, paths: np.ndarray) -> bool:
     return False
 
 
-@compiled
+@kernel(exact=True)
 def headway(gap: float, speed: float) -> float:
     """Return the time headway THW = gap / v [s]; `inf` at standstill."""
     return inf if speed == 0.0 else gap / speed
 
 
-@compiled
+@kernel(exact=True)
 def rate_to_avoid_crash(gap: float, closing_speed: float) -> float:
     """Return DRAC = Δv² / (2·gap) [m/s²]; 0 if the gap does not close, `inf` at contact."""
     return max(closing_speed, 0.0) ** 2 / (2.0 * gap) if gap > 0.0 else inf
 
 
-@compiled
+@kernel(exact=True)
 def _is_straight(body: Any) -> bool:
     return body.path_end - body.path == 1
 
 
-@compiled
+@kernel(exact=True)
 def _motion(body: Any, paths: np.ndarray) -> PathMotion:
     cells = paths[body.path : body.path_end]
     return PathMotion(cells, body.travelled, body.speed, body.length, body.width, body.reference)

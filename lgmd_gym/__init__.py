@@ -7,10 +7,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lgmd_gym.system import signals  # noqa: F401  # pyright: ignore[reportUnusedImport]  (before slow imports)
+from lgmd_gym.processes import signals  # noqa: F401  # pyright: ignore[reportUnusedImport]  (before slow imports)
 
 # isort: split
-from lgmd_gym.system.source_links import linked_folders
+from lgmd_gym.source_links import linked_folders
 
 __path__ += linked_folders(Path(__file__).parent)  # before the first import from them
 
@@ -18,7 +18,7 @@ __path__ += linked_folders(Path(__file__).parent)  # before the first import fro
 from lgmd_gym._version import __version__
 from lgmd_gym.envs.registration import register_envs
 from lgmd_gym.envs.traffic.registration import register_traffic
-from lgmd_gym.system.kernel_cache import ensure_kernel_cache
+from lgmd_gym.kernels.kernel_cache import ensure_kernel_cache
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import BirdsEye, CameraParams, EgoCamera

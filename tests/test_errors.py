@@ -8,9 +8,9 @@ import lgmd_gym
 from lgmd_gym import agents, benchmark, camera, envs, errors
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.suite_file import get_suite
+from lgmd_gym.clips import VideoWriter, find_clips, luma
 from lgmd_gym.engine import BrakingVectorEnv
 from lgmd_gym.training import TrainConfig
-from lgmd_gym.video import VideoWriter, find_clips, luma
 
 LONG = 10**5000
 NO_NUMBERS = [True, "3", None, 1j, np.array(2.0), np.array([1.0]), b"1", slice(None), np.bool_(True)]

@@ -12,7 +12,7 @@ import numpy as np
 
 from lgmd_gym.agents.policies.features import FeatureConfig, FeatureHistory
 from lgmd_gym.errors import shown
-from lgmd_gym.system.files import complete_file
+from lgmd_gym.processes.files import complete_file
 
 NORMALIZER_SUFFIX = ".npz"
 

@@ -12,7 +12,7 @@ from lgmd_gym.agents.policies.card import PolicyCard, policy_card
 from lgmd_gym.agents.policies.features import FRAME, SCALES, FeatureConfig
 from lgmd_gym.agents.policies.inputs import PolicyInputs, announce_pickle, load_normalizer, make_inputs
 from lgmd_gym.errors import check_path, check_text, check_within, shown, unknown_name
-from lgmd_gym.system.extras import missing_extra
+from lgmd_gym.processes.extras import missing_extra
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec

@@ -12,8 +12,8 @@ from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.agents.policies.inputs import NORMALIZER_SUFFIX, save_normalizer
 from lgmd_gym.agents.policies.network import describe_network
 from lgmd_gym.errors import check_mapping, check_path, shown
-from lgmd_gym.system.extras import missing_extra
-from lgmd_gym.system.files import complete_file
+from lgmd_gym.processes.extras import missing_extra
+from lgmd_gym.processes.files import complete_file
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm

@@ -23,13 +23,13 @@ from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.summary import rate_of
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.plotting.style import COLOURS, saved_figure
+from lgmd_gym.statistics.intervals import Rate
 
 NO_VIEW = SensorConfig({"name": "wide", "shape": [8, 8]})  # no-brake needs no useful image
 SUITES = {"r152": "avoided", "false-reaction": "false_activation"}

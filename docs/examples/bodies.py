@@ -19,7 +19,7 @@ from highway_env.vehicle.objects import Obstacle
 
 from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.objects import BODY_MODELS, body_of
-from lgmd_gym.envs.scenarios.scenario import ADULT_SIZE, BICYCLE_SIZE, CHILD_SIZE, MOTORCYCLE_SIZE
+from lgmd_gym.envs.families.scenario import ADULT_SIZE, BICYCLE_SIZE, CHILD_SIZE, MOTORCYCLE_SIZE
 from lgmd_gym.plotting.figures import contact_sheet
 
 

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.runner import Run
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import AgentSummary, summaries
 from lgmd_gym.plotting.style import COLOURS
+from lgmd_gym.statistics.intervals import Rate
 
 AGENTS = ("spike-threshold:threshold=30", "spike-threshold:threshold=90,frames=2", "ttc-oracle")
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from lgmd_gym.camera.params import CONDITIONS
-from lgmd_gym.gallery.stills import ROADS, road_sheet
 from lgmd_gym.plotting.figures import contact_sheet
+from lgmd_gym.report.gallery.stills import ROADS, road_sheet
 
 
 def main(

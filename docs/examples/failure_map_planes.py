@@ -7,10 +7,10 @@ from itertools import product
 from typing import Any, NamedTuple
 
 from lgmd_gym.benchmark.case import Case, make_case, to_mps
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.camera.params import ROADS, CameraParams
-from lgmd_gym.envs.scenarios.curves import MAX_LATERAL
+from lgmd_gym.envs.families.curves import MAX_LATERAL
 from lgmd_gym.rendering.playback import make_target
+from lgmd_gym.statistics.intervals import Rate
 
 SUITE = "failure-maps"
 PLANES = ("vibration", "width", "brake", "curve", "height")

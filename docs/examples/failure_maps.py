@@ -37,14 +37,14 @@ from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.batch import play_unit
 from lgmd_gym.benchmark.rows import Row, key_of
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import rate_of
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
 from lgmd_gym.benchmark.units import Unit, make_units
-from lgmd_gym.benchmark.worker_processes import run_parallel
 from lgmd_gym.camera.params import ROADS
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.appearance import MIXED
+from lgmd_gym.processes.worker_processes import run_parallel
+from lgmd_gym.statistics.intervals import Rate
 
 NO_VIEW = SensorConfig({"name": "wide", "shape": [8, 8]})  # no-brake and oracles need no useful image
 

@@ -25,8 +25,8 @@ from recorded_levels import level_files
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.policy import Policy
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.camera.spec import plain_values
+from lgmd_gym.statistics.intervals import Rate
 from lgmd_gym.training.offline.dataset import OfflineDataset
 from lgmd_gym.training.offline.episodes import RecordedEpisode
 

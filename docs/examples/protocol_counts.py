@@ -13,8 +13,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from lgmd_gym.benchmark.case import Case
-from lgmd_gym.benchmark.openscenario import read
 from lgmd_gym.benchmark.suites import SUITES
+from lgmd_gym.openscenario import read
 
 FILES = {
     "ncap2023": "AEB_C2C_2023/Variations/*Variation*.xosc",

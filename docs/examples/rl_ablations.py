@@ -30,7 +30,7 @@ from joblib import Parallel, delayed
 from recorded_levels import Decisions, RecordedLevels, evaluate, level_files
 
 from lgmd_gym.agents.policies.features import FeatureConfig
-from lgmd_gym.benchmark.analysis.bootstrap import StratifiedBootstrap, interquartile_mean
+from lgmd_gym.statistics.bootstrap import StratifiedBootstrap, interquartile_mean
 from lgmd_gym.training import TrainConfig
 from lgmd_gym.training.offline.dataset import OfflineDataset
 from lgmd_gym.training.offline.learner import OfflineLearner

@@ -7,11 +7,11 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.brake import next_part
 from lgmd_gym.envs.dynamics.contact import Rectangle
-from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.longitudinal import advance
 from lgmd_gym.envs.dynamics.path import centre_at
 from lgmd_gym.envs.dynamics.speed_profile import SCRIPT_FIELDS, step_script
 from lgmd_gym.envs.dynamics.units import MAX_SPEED
+from lgmd_gym.kernels import kernel
 
 EGO, CAR, BOX, ROAD_MARKING, PEDESTRIAN, BICYCLE, MOTORCYCLE = 0, 1, 2, 3, 4, 5, 6  # kinds of bodies
 REGAIN_TIME = 0.5  # [s] within which the driver regains the scripted speed after braking
@@ -45,7 +45,7 @@ STEP_START = np.dtype(
 """Fields of a body before a step, as in `BODY`: where it was, and what its motion in the step depends on."""
 
 
-@compiled
+@kernel(exact=True)
 def copy_motion(source: Any, target: Any) -> None:
     """Copy what the motion of a body depends on, between `BODY` and `STEP_START` records."""
     target.speed, target.acceleration = source.speed, source.acceleration
@@ -55,13 +55,13 @@ def copy_motion(source: Any, target: Any) -> None:
     )  # fmt: skip
 
 
-@compiled
+@kernel(exact=True)
 def outline_of(body: Any) -> Rectangle:
     """Return the outline of a body."""
     return Rectangle(body.x, body.y, body.heading, body.length, body.width)
 
 
-@compiled
+@kernel(exact=True)
 def move(body: Any, paths: np.ndarray, distance: float) -> None:
     """Move a body along its path by a distance [m]."""
     before = body.heading
@@ -75,7 +75,7 @@ def move(body: Any, paths: np.ndarray, distance: float) -> None:
         body.steering = atan(2.0 * tan(slip))
 
 
-@compiled
+@kernel(exact=True)
 def step_actor(body: Any, segments: np.ndarray, paths: np.ndarray, dt: float) -> None:
     """Advance an actor by `dt` [s] along its script."""
     distance = step_script(body, segments, dt)
@@ -84,7 +84,7 @@ def step_actor(body: Any, segments: np.ndarray, paths: np.ndarray, dt: float) ->
         move(body, paths, distance)
 
 
-@compiled
+@kernel(exact=True)
 def step_ego(
     body: Any, ego: Any, line: Any, pending: np.ndarray, brake: Any, segments: np.ndarray,
     paths: np.ndarray, parts: np.ndarray, dt: float,
@@ -117,7 +117,7 @@ def step_ego(
     ego.yaw_rate = (body.heading - heading) / dt
 
 
-@compiled
+@kernel(exact=True)
 def _advance_ego(
     body: Any, ego: Any, brake: Any, segments: np.ndarray, duration: float, demand: float
 ) -> tuple[float, float]:
@@ -138,7 +138,7 @@ def _advance_ego(
     return moved[0], target
 
 
-@compiled
+@kernel(exact=True)
 def _target_acceleration(body: Any, brake: Any, demand: float) -> float:
     """Return the ego's acceleration under a constant demand after the build-up [m/s²]."""
     if demand < 0.0:
@@ -150,7 +150,7 @@ def _target_acceleration(body: Any, brake: Any, demand: float) -> float:
     return body.script_acceleration + min(max(deficit / REGAIN_TIME, -limit), limit)
 
 
-@compiled
+@kernel(exact=True)
 def ego_braking(body: Any, ego: Any) -> float:
     """Return the ego's deceleration beyond the script, >= 0 [m/s²]."""
     return 0.0 if ego.on_script else max(0.0, body.script_acceleration - body.acceleration)

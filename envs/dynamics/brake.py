@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.errors import check_flag, check_whole, check_within
+from lgmd_gym.kernels import kernel
 
 DELAY_LINE = np.dtype(
     [("time", np.float64), ("demand", np.float64), ("last_put", np.float64), ("count", np.int64)]
@@ -118,7 +118,7 @@ def draw_brake(world: int, wet: bool) -> BrakeParams:
     return BrakeParams(max_deceleration=values[0], dead_time=values[1], build_up=values[2])
 
 
-@compiled
+@kernel(exact=True)
 def put_demand(line: Any, pending: np.ndarray, delay: float, demand: float) -> None:
     """Add a demand in [-1, 1] to a `DELAY_LINE` at its current time; a repeated demand is not stored.
 
@@ -134,7 +134,7 @@ def put_demand(line: Any, pending: np.ndarray, delay: float, demand: float) -> N
         line.count += 1
 
 
-@compiled
+@kernel(exact=True)
 def next_part(line: Any, pending: np.ndarray, end: float) -> tuple[float, float]:
     """Advance a `DELAY_LINE` to its next change of demand, at most to the time `end` [s].
 

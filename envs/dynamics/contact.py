@@ -7,7 +7,7 @@ late and flags cars that stop a millimetre short. These functions find the first
 from math import cos, hypot, inf, sin
 from typing import Any, NamedTuple
 
-from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.kernels import kernel
 
 END = 0.25  # [m] from an end of the ego within which a touch belongs to that end
 TOLERANCE = 0.02  # [m] by which a corner may be farther away than the nearest one and still touch
@@ -56,7 +56,7 @@ def speed_along(ego: Any, other: Any) -> float:
     return float(other.speed * cos(float(other.heading) - float(ego.heading)))
 
 
-@compiled
+@kernel(exact=True)
 def first_touch(moving: Rectangle, standing: Rectangle, dx: float, dy: float) -> float:
     """Return the fraction of a displacement at which `moving` first touches `standing`.
 

@@ -5,9 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lgmd_gym.envs.dynamics.arrays import Arrays
 from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, copy_motion, move, step_actor, step_ego
-from lgmd_gym.envs.dynamics.jit import Arrays, compiled
 from lgmd_gym.envs.dynamics.refined_contact import StepMotion, progress, touch_time, uniform_touch
+from lgmd_gym.kernels import kernel
 
 PASSED_DISTANCE = 2.0  # [m] behind the ego's rear beyond which an actor has been passed
 
@@ -58,7 +59,7 @@ class Physics(NamedTuple):
     weights: np.ndarray
 
 
-@compiled
+@kernel(exact=True)
 def step_environment(i: int, dt: float, physics: Arrays) -> None:
     """Advance environment i by `dt` [s]; see `step_bodies`."""
     physics = Physics(*physics)
@@ -68,7 +69,7 @@ def step_environment(i: int, dt: float, physics: Arrays) -> None:
     )  # fmt: skip
 
 
-@compiled
+@kernel(exact=True)
 def step_bodies(
     bodies: np.ndarray, episode: Any, ego: Any, line: Any, pending: np.ndarray, brake: Any,
     segments: np.ndarray, paths: np.ndarray, before: np.ndarray, parts: np.ndarray, dt: float,
@@ -109,7 +110,7 @@ def step_bodies(
     episode.relative_impact_speed = here.speed - speed_along_ego(here, other)
 
 
-@compiled
+@kernel(exact=True)
 def _move_back(bodies: np.ndarray, i: int, step: Any, part: float) -> None:
     """Move a body from the end of a step to its place after a part of it."""
     body, before = bodies[i], step.before[i]
@@ -118,7 +119,7 @@ def _move_back(bodies: np.ndarray, i: int, step: Any, part: float) -> None:
     move(body, step.paths, distance - covered if changed else (part - 1.0) * covered)
 
 
-@compiled
+@kernel(exact=True)
 def first_contact_of(bodies: np.ndarray, count: int, step: Any) -> tuple[float, int]:
     """Return the time at which the ego first touches a body, and its index; else `inf` and 0.
 
@@ -143,13 +144,13 @@ def first_contact_of(bodies: np.ndarray, count: int, step: Any) -> tuple[float, 
     return found, touched
 
 
-@compiled
+@kernel(exact=True)
 def _is_uniform(body: Any, before: Any) -> bool:
     """Return whether a body has kept its heading and speed in a step."""
     return body.heading == before.heading and body.speed == before.speed
 
 
-@compiled
+@kernel(exact=True)
 def is_terminated(bodies: np.ndarray, episode: Any, approached: bool) -> bool:
     """Return whether the episode is over, see `BrakingEnv`; updates `closed_in`, once per decision.
 
@@ -182,7 +183,7 @@ def is_terminated(bodies: np.ndarray, episode: Any, approached: bool) -> bool:
     return left == 0 or (episode.closed_in > 0 and resolved)
 
 
-@compiled
+@kernel(exact=True)
 def _is_passed(ego: Any, body: Any) -> bool:
     """Return whether a body is behind the ego's rear and not faster than the ego along its heading."""
     dx, dy = body.x - ego.x, body.y - ego.y
@@ -190,13 +191,13 @@ def _is_passed(ego: Any, body: Any) -> bool:
     return behind > PASSED_DISTANCE and speed_along_ego(ego, body) <= ego.speed
 
 
-@compiled
+@kernel(exact=True)
 def speed_along_ego(ego: Any, body: Any) -> float:
     """Return a body's speed along the ego's heading [m/s]."""
     return body.speed * cos(body.heading - ego.heading)
 
 
-@compiled
+@kernel(exact=True)
 def is_truncated(episode: Any) -> bool:
     """Return whether the scenario's duration has passed."""
     return episode.time >= episode.duration - 1e-9

@@ -7,10 +7,10 @@ closed form, and stopping distances do not depend on the step size.
 
 from math import copysign, inf, sqrt
 
-from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.kernels import kernel
 
 
-@compiled
+@kernel(exact=True)
 def advance(
     speed: float, acceleration: float, target: float, jerk: float, dt: float
 ) -> tuple[float, float, float]:
@@ -45,7 +45,7 @@ def advance(
     return distance, max(speed, 0.0), acceleration
 
 
-@compiled
+@kernel(exact=True)
 def time_to_stop(speed: float, acceleration: float, jerk: float) -> float:
     """Return the first time at which v + a·t + j·t²/2 falls to zero [s]; `math.inf` if it never does."""
     if speed <= 0.0 and (acceleration < 0.0 or (acceleration == 0.0 and jerk <= 0.0)):

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.envs.dynamics.bend import Bend, Pose
-from lgmd_gym.envs.dynamics.jit import compiled, compiled_with_arrays
+from lgmd_gym.kernels import kernel
 
 # Nodes and weights of three-point Gauss-Legendre quadrature on [0, 1]. Over cells of this length its error is
 # about 1e-12 m.
@@ -53,7 +53,7 @@ def path_table(start: Pose, bends: tuple[Bend, ...] = ()) -> np.ndarray:
     return _integrate(float(start.x), float(start.y), float(start.heading), sections)
 
 
-@compiled
+@kernel(exact=True)
 def pose_at(table: np.ndarray, distance: float) -> Pose:
     """Return the pose at a distance along a path [m], given its `Path.table`."""
     low, high = 0, table.shape[0]
@@ -69,7 +69,7 @@ def pose_at(table: np.ndarray, distance: float) -> Pose:
     return advance_pose(cell[1], cell[2], cell[3], cell[4], cell[5], distance - cell[0])
 
 
-@compiled
+@kernel(exact=True)
 def centre_at(table: np.ndarray, distance: float, reference: float) -> Pose:
     """Return the pose of a body's centre, which is `reference` [m] ahead of the point on the path."""
     pose = pose_at(table, distance)
@@ -78,7 +78,7 @@ def centre_at(table: np.ndarray, distance: float, reference: float) -> Pose:
     return Pose(pose.x + reference * cos(pose.heading), pose.y + reference * sin(pose.heading), pose.heading)
 
 
-@compiled
+@kernel(exact=True)
 def advance_pose(x: float, y: float, heading: float, curvature: float, slope: float, distance: float) -> Pose:
     """Return the pose after a distance on a clothoid.
 
@@ -100,7 +100,7 @@ def advance_pose(x: float, y: float, heading: float, curvature: float, slope: fl
     return Pose(x, y, heading + distance * (curvature + distance * slope / 2))
 
 
-@compiled_with_arrays
+@kernel(exact=True, arrays=True)
 def _integrate(x: float, y: float, heading: float, sections: np.ndarray) -> np.ndarray:
     """Return the cells along sections of (length, first curvature, last curvature), + to the left."""
     counts = np.ones(sections.shape[0], np.int64)

@@ -10,10 +10,10 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.bodies import copy_motion
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
-from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.longitudinal import advance
 from lgmd_gym.envs.dynamics.path import centre_at
 from lgmd_gym.envs.dynamics.speed_profile import step_script
+from lgmd_gym.kernels import kernel
 
 PARTS = 16  # of a step
 
@@ -38,7 +38,7 @@ class StepMotion(NamedTuple):
     dt: float
 
 
-@compiled
+@kernel(exact=True)
 def progress(bodies: np.ndarray, i: int, step: Any, part: float) -> tuple[float, float]:
     """Return the distance [m] that a body has covered after a part of a step, and its speed there [m/s].
 
@@ -59,7 +59,7 @@ def progress(bodies: np.ndarray, i: int, step: Any, part: float) -> tuple[float,
     return _ego_progress(moving, step, part * step.dt)
 
 
-@compiled
+@kernel(exact=True)
 def _ego_progress(moving: Any, step: Any, time: float) -> tuple[float, float]:
     """Advance the motion of the ego by a time [s] as `step_ego` did; return distance [m] and speed [m/s]."""
     distance, row = 0.0, 0
@@ -77,7 +77,7 @@ def _ego_progress(moving: Any, step: Any, time: float) -> tuple[float, float]:
     return distance, moving.speed
 
 
-@compiled
+@kernel(exact=True)
 def uniform_touch(ego: Any, body: Any, ego_before: Any, before: Any) -> float:
     """Return the first touch of two bodies in straight, uniform motion in a step as a part of it; else `inf`.
 
@@ -92,7 +92,7 @@ def uniform_touch(ego: Any, body: Any, ego_before: Any, before: Any) -> float:
     return first_touch(start, old, ego.x - start.x - (body.x - old.x), ego.y - start.y - (body.y - old.y))
 
 
-@compiled
+@kernel(exact=True)
 def touch_time(bodies: np.ndarray, i: int, step: Any) -> float:
     """Return the time of the first touch of the ego and body i as a part of a step; `inf` without a touch.
 
@@ -117,7 +117,7 @@ def touch_time(bodies: np.ndarray, i: int, step: Any) -> float:
     return inf
 
 
-@compiled
+@kernel(exact=True)
 def _outline_at(bodies: np.ndarray, i: int, step: Any, part: float) -> Rectangle:
     """Return the outline of a body at a part of a step."""
     body, start = bodies[i], step.before[i].travelled
@@ -128,14 +128,14 @@ def _outline_at(bodies: np.ndarray, i: int, step: Any, part: float) -> Rectangle
     return Rectangle(pose.x, pose.y, pose.heading, body.length, body.width)
 
 
-@compiled
+@kernel(exact=True)
 def touch_between(a: Rectangle, b: Rectangle, c: Rectangle, d: Rectangle) -> float:
     """Return the first touch of bodies that move from outline a to b and from c to d; see `first_touch`."""
     dx, dy = (b.x - a.x) - (d.x - c.x), (b.y - a.y) - (d.y - c.y)
     return first_touch(_turned_half(a, b), _turned_half(c, d), dx, dy)
 
 
-@compiled
+@kernel(exact=True)
 def _turned_half(start: Rectangle, end: Rectangle) -> Rectangle:
     """Return the first outline with the mean heading of both."""
     return Rectangle(start.x, start.y, (start.heading + end.heading) / 2, start.length, start.width)

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.longitudinal import advance
 from lgmd_gym.envs.dynamics.segment import Segment, check_profile
+from lgmd_gym.kernels import kernel
 
 SCRIPT_FIELDS = [
     ("script_speed", np.float64),
@@ -26,7 +26,7 @@ def segment_table(segments: tuple[Segment, ...]) -> np.ndarray:
     return np.array(rows, dtype=np.float64).reshape(len(rows), 4)
 
 
-@compiled
+@kernel(exact=True)
 def step_script(script: Any, segments: np.ndarray, dt: float) -> float:
     """Advance a script, a record with `SCRIPT_FIELDS`, by `dt` [s]; returns the distance travelled [m].
 
@@ -47,7 +47,7 @@ def step_script(script: Any, segments: np.ndarray, dt: float) -> float:
     return distance + _advance_script(script, 0.0, inf, end - script.script_time)
 
 
-@compiled
+@kernel(exact=True)
 def _advance_script(script: Any, target: float, jerk: float, duration: float) -> float:
     """Advance speed and time, and return the distance travelled [m]."""
     if duration <= 0.0:

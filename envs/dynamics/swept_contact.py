@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
-from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.path import centre_at
+from lgmd_gym.kernels import kernel
 
 
 class PathMotion(NamedTuple):
@@ -21,7 +21,7 @@ class PathMotion(NamedTuple):
     reference: float = 0.0  # distance of the centre ahead of the point on the path [m]
 
 
-@compiled
+@kernel(exact=True)
 def time_on_paths(one: Any, other: Any, horizon: float, step: float) -> float:  # pragma: no cover
     """Return the time at which two moving rectangles first touch [s]; `inf` beyond the horizon.
 
@@ -49,7 +49,7 @@ def time_on_paths(one: Any, other: Any, horizon: float, step: float) -> float:  
     return inf
 
 
-@compiled
+@kernel(exact=True)
 def gap_on_path(one: Any, standing: Rectangle, horizon: float, step: float) -> float:  # pragma: no cover
     """Return the distance along a path up to a standing rectangle [m]; `inf` beyond the horizon.
 
@@ -75,7 +75,7 @@ def gap_on_path(one: Any, standing: Rectangle, horizon: float, step: float) -> f
     return inf
 
 
-@compiled
+@kernel(exact=True)
 def _outline(motion: Any, distance: float) -> Rectangle:  # pragma: no cover
     """Return the outline `distance` metres further along the path."""
     pose = centre_at(motion.table, motion.travelled + distance, motion.reference)

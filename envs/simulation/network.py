@@ -8,7 +8,7 @@ from highway_env.road.road import RoadNetwork
 
 from lgmd_gym.envs.dynamics.bend import Pose
 from lgmd_gym.envs.dynamics.path import Path
-from lgmd_gym.envs.scenarios.scenario import LANE_WIDTH, RoadPlan
+from lgmd_gym.envs.families.scenario import LANE_WIDTH, RoadPlan
 
 ROAD_START, ROAD_END = -300.0, 6000.0  # [m], beyond the extent of every scenario
 SIDE_ROAD = 250.0  # [m], length of each arm of a side road, and of the straights before and after a curve

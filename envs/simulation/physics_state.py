@@ -22,7 +22,7 @@ from lgmd_gym.envs.dynamics.brake import DELAY_LINE
 from lgmd_gym.envs.dynamics.episode import EPISODE
 from lgmd_gym.envs.dynamics.path import path_table
 from lgmd_gym.envs.dynamics.speed_profile import segment_table
-from lgmd_gym.envs.scenarios.scenario import LANE_WIDTH, Actor, Scenario
+from lgmd_gym.envs.families.scenario import LANE_WIDTH, Actor, Scenario
 
 KINDS = {
     "car": CAR,

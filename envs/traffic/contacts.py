@@ -7,13 +7,13 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.bodies import outline_of
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
-from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.dynamics.refined_contact import touch_between, uniform_touch
+from lgmd_gym.kernels import kernel
 
 MAX_APART = 8.0  # [m], sum of both coordinates beyond which two cars are not tested for a touch
 
 
-@compiled
+@kernel(exact=True)
 def outline_between(before: Any, after: Any, part: float) -> Rectangle:
     """Return the outline of a car after a part of the way from one `CAR` record to another."""
     rest = 1.0 - part
@@ -21,7 +21,7 @@ def outline_between(before: Any, after: Any, part: float) -> Rectangle:
     return Rectangle(x, y, rest * before.heading + part * after.heading, before.length, before.width)
 
 
-@compiled
+@kernel(exact=True)
 def find_contact(before: Any, after: Any, ego: int) -> Any:
     """Return which other car or object the ego touches first within a step, without turns and acceleration.
 
@@ -43,7 +43,7 @@ def find_contact(before: Any, after: Any, ego: int) -> Any:
     return index
 
 
-@compiled
+@kernel(exact=True)
 def contact_time(before: Any, after: Any, ego: int, other: int, shares: np.ndarray) -> float:
     """Return the time at which the ego touches another record, as a part of the step.
 
@@ -69,7 +69,7 @@ def contact_time(before: Any, after: Any, ego: int, other: int, shares: np.ndarr
     return inf
 
 
-@compiled
+@kernel(exact=True)
 def mark_collisions(cars: Any, number: int) -> None:
     """Mark the cars other than the ego that touch each other as crashed."""
     for i in range(number):

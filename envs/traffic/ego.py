@@ -7,7 +7,7 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.brake import BrakeParams, DelayLine
 from lgmd_gym.envs.dynamics.longitudinal import advance
-from lgmd_gym.envs.scenarios.scenario import EGO_LENGTH, EGO_WIDTH
+from lgmd_gym.envs.families.scenario import EGO_LENGTH, EGO_WIDTH
 from lgmd_gym.envs.traffic.drivers import TrafficCar
 
 

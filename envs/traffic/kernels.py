@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.jit import compiled
 from lgmd_gym.envs.traffic.places import (
     ALL_DONE,
     END_MARGIN,
@@ -19,6 +18,7 @@ from lgmd_gym.envs.traffic.places import (
     not_zero,
     wrapped,
 )
+from lgmd_gym.kernels import kernel
 
 MAX_ACCELERATION, MAX_STEERING = 6.0, pi / 3  # [m/s²], [rad]
 TAU_PURSUIT, KP_HEADING, KP_LATERAL = 0.5 * 0.2, 1 / 0.2, 1 / 0.6  # [s], [1/s], [1/s]
@@ -27,7 +27,7 @@ MAX_SPEED = 40.0  # [m/s]
 COMFORT_DECELERATION = 3.0  # [m/s²], limit of the ego's deceleration towards its target speed
 
 
-@compiled
+@kernel(exact=True)
 def desired_gap(driver: Any, car: Any, front: Any) -> float:
     """Return the IDM distance that a driver would keep in a car behind another one [m]."""
     closing = car.speed - front.speed * cos(front.heading - car.heading)
@@ -35,7 +35,7 @@ def desired_gap(driver: Any, car: Any, front: Any) -> float:
     return driver.distance + car.speed * driver.headway + car.speed * closing / comfort
 
 
-@compiled
+@kernel(exact=True)
 def free_acceleration(driver: Any, car: Any, lanes: Any) -> float:
     """Return the IDM acceleration of a driver in a car on a free road [m/s²]."""
     target = min(max(car.target_speed, 0.0), lanes[int(car.lane)].speed_limit)
@@ -43,7 +43,7 @@ def free_acceleration(driver: Any, car: Any, lanes: Any) -> float:
     return driver.comfort_acceleration * (1.0 - pow(ratio, driver.exponent))
 
 
-@compiled
+@kernel(exact=True)
 def idm(driver: Any, cars: Any, i: int, front: int, lanes: Any, along: Any) -> float:
     """Return the IDM acceleration of a driver in car i behind another one; -1 for none [m/s²]."""
     car = cars[i]
@@ -56,7 +56,7 @@ def idm(driver: Any, cars: Any, i: int, front: int, lanes: Any, along: Any) -> f
     return result
 
 
-@compiled
+@kernel(exact=True)
 def follow(cars: Any, i: int, front: int, lanes: Any, along: Any) -> float:
     """Return the acceleration of car i behind another one; -1 for none [m/s²].
 
@@ -70,7 +70,7 @@ def follow(cars: Any, i: int, front: int, lanes: Any, along: Any) -> float:
     return max(free, -COMFORT_DECELERATION) + (total - free)
 
 
-@compiled
+@kernel(exact=True)
 def accepts(
     cars: Any, number: int, i: int, new: int, lanes: Any, pieces: Any, offsets: Any, along: Any, across: Any
 ) -> bool:
@@ -93,7 +93,7 @@ def accepts(
     return predicted - idm(driver, cars, i, old, lanes, along) >= MIN_GAIN
 
 
-@compiled
+@kernel(exact=True)
 def is_taken(cars: Any, number: int, i: int, along: Any) -> bool:
     """Return whether a car shortly ahead of car i also changes to its target lane."""
     car, own = cars[i], int(cars[i].lane)
@@ -106,7 +106,7 @@ def is_taken(cars: Any, number: int, i: int, along: Any) -> bool:
     return False
 
 
-@compiled
+@kernel(exact=True)
 def change_lane(
     cars: Any, number: int, i: int, lanes: Any, pieces: Any, offsets: Any, along: Any, across: Any
 ) -> None:
@@ -130,7 +130,7 @@ def change_lane(
             car.target_lane = new
 
 
-@compiled
+@kernel(exact=True)
 def steer(car: Any, lane: Any, along: float, across: float, bend: float) -> float:
     """Return the steering angle of a car towards the centre of its target lane [rad].
 
@@ -149,7 +149,7 @@ def steer(car: Any, lane: Any, along: float, across: float, bend: float) -> floa
     return limited(atan(2.0 * tan(slip)), MAX_STEERING)
 
 
-@compiled
+@kernel(exact=True)
 def decide(
     cars: Any, number: int, lanes: Any, pieces: Any, offsets: Any, along: Any, across: Any, bend: Any,
     first: int, follows: bool,
@@ -195,7 +195,7 @@ def decide(
     return ALL_DONE
 
 
-@compiled
+@kernel(exact=True)
 def move(cars: Any, number: int, slip: Any, dt: float) -> None:
     """Advance the cars except the ego by `dt` [s]; they never reverse. `slip` is their slip angle [rad]."""
     for i in range(number):

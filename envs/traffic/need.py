@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
-from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.kernels import kernel
 
 PREDICTION, STEP = 4.0, 0.1  # [s]; a contact after 4 s requires 5 m/s² at a closing speed of 40 m/s only
 
 
-@compiled
+@kernel(exact=True)
 def required_deceleration(bodies: np.ndarray) -> float:
     """Return the highest deceleration that the ego needs to avoid a predicted contact [m/s²]; 0 without one.
 
@@ -33,7 +33,7 @@ def required_deceleration(bodies: np.ndarray) -> float:
     return result
 
 
-@compiled
+@kernel(exact=True)
 def predicted_contact(one: Any, other: Any) -> float:
     """Return the time to the first contact of two bodies at constant speeds and steering angles [s].
 
@@ -58,7 +58,7 @@ def predicted_contact(one: Any, other: Any) -> float:
     return inf
 
 
-@compiled
+@kernel(exact=True)
 def outline_after(body: Any, time: float) -> Rectangle:
     """Return the outline of a body after a time at its present speed and steering angle [s]."""
     slip = atan(tan(body.steering) / 2.0)

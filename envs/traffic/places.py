@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numba import extending, types
 
-from lgmd_gym.envs.dynamics.jit import compiled
+from lgmd_gym.kernels import kernel
 
 CAR_STATE = (
     *("x", "y", "heading", "speed", "lane", "target_lane", "timer", "steering", "acceleration", "crashed"),
@@ -58,25 +58,25 @@ def _fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     return types.float64(types.float64, types.float64, types.float64), generate
 
 
-@compiled
+@kernel(exact=True)
 def dot(ax: float, ay: float, bx: float, by: float) -> float:
     """Return the dot product of two vectors, rounded as `numpy.dot` does with fused multiply-add."""
     return _fma(ay, by, ax * bx)
 
 
-@compiled
+@kernel(exact=True)
 def wrapped(angle: float) -> float:
     """Return an angle in [-pi, pi) [rad]."""
     return (angle + pi) % (2 * pi) - pi
 
 
-@compiled
+@kernel(exact=True)
 def limited(value: float, limit: float) -> float:
     """Return a value clipped to ± limit."""
     return min(max(value, -limit), limit)
 
 
-@compiled
+@kernel(exact=True)
 def not_zero(value: float) -> float:
     """Return a value whose magnitude is at least 0.01."""
     if abs(value) > 1e-2:
@@ -84,7 +84,7 @@ def not_zero(value: float) -> float:
     return 1e-2 if value >= 0 else -1e-2
 
 
-@compiled
+@kernel(exact=True)
 def project(cars: Any, lanes: Any, polar: Any, along: Any, across: Any) -> None:
     """Write the coordinates of every car along and across every lane, shape (cars, lanes) [m].
 
@@ -110,7 +110,7 @@ def project(cars: Any, lanes: Any, polar: Any, along: Any, across: Any) -> None:
                 across[i, k] -= lane.amplitude * sin(lane.pulsation * along[i, k] + lane.phase)
 
 
-@compiled
+@kernel(exact=True)
 def heading_at(lane: Any, along: float, bend: float) -> float:
     """Return the heading of a lane [rad]; `bend` is the angle of a sine lane to its axis."""
     if lane.shape == CIRCLE:
@@ -118,7 +118,7 @@ def heading_at(lane: Any, along: float, bend: float) -> float:
     return lane.heading + bend if lane.shape == SINE else lane.heading
 
 
-@compiled
+@kernel(exact=True)
 def locate(cars: Any, number: int, lanes: Any, along: Any, across: Any, bend: Any) -> None:
     """Assign the first `number` cars to their closest lanes, by distance [m] plus angle [rad]."""
     for i in range(number):
@@ -132,7 +132,7 @@ def locate(cars: Any, number: int, lanes: Any, along: Any, across: Any, bend: An
                 best, cars[i].lane = apart, k
 
 
-@compiled
+@kernel(exact=True)
 def neighbours(
     cars: Any, i: int, own: int, lanes: Any, pieces: Any, offsets: Any, along: Any, across: Any
 ) -> Any:

@@ -7,9 +7,9 @@ from typing import Any
 
 from lgmd_gym.benchmark.case import Case, scenario_case, to_mps
 from lgmd_gym.benchmark.sweep import SPEED, Axis, combine, make_axis, read_values
+from lgmd_gym.envs.families import FAMILIES
+from lgmd_gym.envs.families.data import scenario_from_data
 from lgmd_gym.envs.registration import APPEARANCE
-from lgmd_gym.envs.scenarios import FAMILIES
-from lgmd_gym.envs.scenarios.data import scenario_from_data
 from lgmd_gym.errors import check_flag, check_keys, check_type, is_number
 
 CASE_KEYS = ("family", "name", "speeds_kmh", "sweep", "fcw_driver", "arguments", "scenario")

@@ -18,7 +18,7 @@ from lgmd_gym.camera import CLEAR, CONDITIONS, CameraSpec
 from lgmd_gym.camera.spec import check_camera
 from lgmd_gym.camera.worlds import SPLIT_WORLDS, WORLDS
 from lgmd_gym.envs.appearance import MIXED, Appearance
-from lgmd_gym.envs.scenarios.scenario import Scenario
+from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.traffic.registration import KINDS
 from lgmd_gym.errors import as_tuple, check_items, check_keys, check_known, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec

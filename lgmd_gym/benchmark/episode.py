@@ -12,7 +12,7 @@ from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.recorder import SeriesRecorder
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs import env_id
-from lgmd_gym.envs.scenarios.scenario import Scenario
+from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.sensing.spaces import SIGNALS
 
 

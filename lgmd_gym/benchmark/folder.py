@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lgmd_gym._version import __version__
-from lgmd_gym.system.files import complete_file
+from lgmd_gym.processes.files import complete_file
 
 PACKAGES = ("numpy", "numba", "gymnasium", "highway-env", "joblib")
 

@@ -11,7 +11,6 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.batch import play_unit
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.episode import make_env
-from lgmd_gym.benchmark.executor import TaskMap
 from lgmd_gym.benchmark.metrics import Counterfactual
 from lgmd_gym.benchmark.rows import Row, RowKey, key_of
 from lgmd_gym.benchmark.sensors import SensorConfig
@@ -19,6 +18,7 @@ from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
 from lgmd_gym.benchmark.units import make_units
 from lgmd_gym.benchmark.warm_up import compile_kernels
+from lgmd_gym.processes.executor import TaskMap
 
 
 class Plan(ABC):

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
-from lgmd_gym.benchmark.executor import SERIAL, Executor, PoolLostError
 from lgmd_gym.benchmark.failures import EARLY, failing_agent
 from lgmd_gym.benchmark.file_names import series_name
 from lgmd_gym.benchmark.folder import provenance
@@ -15,6 +14,7 @@ from lgmd_gym.benchmark.run_folder import RunFolder
 from lgmd_gym.benchmark.stored_run import make_plan
 from lgmd_gym.benchmark.task import NO_BRAKE, Result
 from lgmd_gym.benchmark.trust import check_trust
+from lgmd_gym.processes.executor import SERIAL, Executor, PoolLostError
 
 INTERRUPTED = "interrupted"
 

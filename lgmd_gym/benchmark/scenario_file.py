@@ -7,7 +7,7 @@ module = "my_scenarios"             # see `import_families`; optional
 
 or
 
-[scenario]                          # see `lgmd_gym.envs.scenarios.data`
+[scenario]                          # see `lgmd_gym.envs.families.data`
 ego_speed = 19.44
 duration = 9.0
 actors = [{ gap = 40.0, lateral_offset = 1.0 }]
@@ -20,9 +20,9 @@ from typing import Any
 
 from lgmd_gym.benchmark.case import Case, scenario_case
 from lgmd_gym.benchmark.case_table import check_table, read_cases
-from lgmd_gym.benchmark.openscenario.names import file_name
 from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.envs.scenarios.scenario import Scenario
+from lgmd_gym.envs.families.scenario import Scenario
+from lgmd_gym.openscenario.names import file_name
 
 SCENARIO_KEYS = ("name", "module", "family", "arguments", "scenario", "fcw_driver")
 OWN = "scenarios"  # name of a suite of scenarios without a file

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from lgmd_gym.errors import check_path
-from lgmd_gym.system.files import check_output_file, complete_file
+from lgmd_gym.processes.files import check_output_file, complete_file
 
 TEMPLATE = """\
 # A scenario of lgmd-gym. Units: m, m/s, s, rad; 70 km/h is 19.44 m/s, 50 km/h is 13.89 m/s.

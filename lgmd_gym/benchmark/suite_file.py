@@ -26,7 +26,7 @@ arguments = { ego_speed = 13.89, target_speed = 5.56 }
 family = "parked"                   # any name
 name = "v30"                        # mine/parked/v30
 arguments = { condition = "night" }
-[cases.scenario]                    # a scenario of one's own, see `lgmd_gym.envs.scenarios.data`
+[cases.scenario]                    # a scenario of one's own, see `lgmd_gym.envs.families.data`
 ego_speed = 8.33
 duration = 9.0
 actors = [{ gap = 40.0, lateral_offset = 1.0 }]
@@ -40,15 +40,15 @@ import tomli_w
 from lgmd_gym.benchmark.case import Case, scenario_case
 from lgmd_gym.benchmark.case_table import read_cases, read_name
 from lgmd_gym.benchmark.data_file import read_data
-from lgmd_gym.benchmark.openscenario import read, read_all
 from lgmd_gym.benchmark.scenario_file import OWN, distinct, is_scenario, own_case, read_scenario
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, Suite, find_suite
 from lgmd_gym.benchmark.trust import check_named
+from lgmd_gym.envs.families import FAMILIES
+from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.own_families import import_families, is_own
 from lgmd_gym.envs.registration import APPEARANCE, RANDOM, SCENARIO, SCENARIO_ARGUMENT, make_source
-from lgmd_gym.envs.scenarios import FAMILIES
-from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.errors import check_items, check_keys, check_known, check_path, check_text, counted
+from lgmd_gym.openscenario import read, read_all
 
 SUITE_KEYS = ("name", "about", "module", "cases")
 DATA_FILES = (".toml", ".json")

@@ -8,9 +8,9 @@ from statistics import median
 from typing import Any, NamedTuple
 
 from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.statistics import Mean, Rate, cluster_mean
 from lgmd_gym.errors import counted
-from lgmd_gym.system.files import complete_file
+from lgmd_gym.processes.files import complete_file
+from lgmd_gym.statistics.intervals import Mean, Rate, cluster_mean
 
 COLUMNS = (
     "agent",

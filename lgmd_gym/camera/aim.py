@@ -12,7 +12,7 @@ import numpy as np
 from lgmd_gym.camera.bounds import MIN_STOP
 from lgmd_gym.camera.brake_estimate import known_deceleration
 from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.camera.render.jit import exact_kernel
+from lgmd_gym.kernels import kernel
 
 FIXED, PATH, STOPPING = 0, 1, 2  # values of `gaze`
 GAZES = {"fixed": FIXED, "path": PATH, "stopping": STOPPING}
@@ -50,21 +50,21 @@ def _stop_deceleration(p: CameraParams) -> float:
     return p.stop_deceleration * (_WET if p.wet else 1.0)
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def slip_and_yaw_rate(scene):
     """Return slip angle [rad] and yaw rate [rad/s] of highway-env's kinematic bicycle."""
     slip = math.atan(0.5 * math.tan(scene.steering))
     return slip, scene.speed * math.sin(slip) / (0.5 * scene.length)
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def path_yaw(scene):
     """Return the direction, relative to the heading, of the ego's position in one second [rad]."""
     slip, rate = slip_and_yaw_rate(scene)
     return max(-MAX_TURN, min(MAX_TURN, slip + 0.5 * (rate * _PATH_S)))
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def aim_depth(aim, speed):
     """Return the distance of the aim from the lens at an ego speed [m]."""
     v = max(speed, 0.0)
@@ -72,7 +72,7 @@ def aim_depth(aim, speed):
     return max(distance, MIN_STOP) * aim.reach + aim.setback
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def aim_yaw(aim, scene, depth):
     """Return the direction of the aim, at a distance from the lens [m], relative to the heading [rad]."""
     slip, _ = slip_and_yaw_rate(scene)
@@ -84,13 +84,13 @@ def aim_yaw(aim, scene, depth):
     return max(-MAX_TURN, min(MAX_TURN, turn)) - math.atan(aim.offset / depth)
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def aim_pitch(aim, depth):
     """Return the elevation of the optical axis for an aim at a distance from the lens [m] [rad]."""
     return aim.lift * math.atan(aim.height / depth)
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def aim_focal(aim, depth):
     """Return the focal length for an aim at a distance from the lens [m] [px]."""
     return aim.width * depth / aim.span

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from lgmd_gym.camera.render.jit import exact_kernel
+from lgmd_gym.kernels import kernel
 
 MEAN_SPEED = 16.73  # of the recording [m/s]
 _MAX_SPEED = 60.0  # the amplitude does not grow beyond this [m/s]
@@ -62,7 +62,7 @@ _LEFT = _AMPLITUDES * np.hypot(GYRO_GAIN_ERROR, 2.0 * math.pi * HERTZ * GYRO_LAG
 _LEAD = np.arctan2(2.0 * math.pi * HERTZ * GYRO_LAG_S, GYRO_GAIN_ERROR)
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def road_gain(factor, speed):
     """Return the amplitude at a speed [m/s], for the multiple `factor` of the measured motion.
 
@@ -72,7 +72,7 @@ def road_gain(factor, speed):
     return factor * math.sqrt(min(abs(speed), _MAX_SPEED) / MEAN_SPEED)
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def body_motion(seed, axis, time_s):
     """Return the motion of one axis at `MEAN_SPEED`, in the unit of `BAND_RMS`."""
     total = 0.0
@@ -82,7 +82,7 @@ def body_motion(seed, axis, time_s):
     return total
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def residual_motion(seed, axis, time_s):
     """Return the rotation that is left when a gyroscope compensates that of the body [degrees].
 

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgmd_gym.camera.pose import side_tangent
-from lgmd_gym.camera.render.jit import exact_kernel, kernel
 from lgmd_gym.camera.scene import Ego
+from lgmd_gym.kernels import kernel
 
 MAX_RANGE = 600.0
 """Range of vehicles and obstacles from the lens; they fade in over the last sixth [m]."""
@@ -185,7 +185,7 @@ def is_figure(model):
     return MODEL_PEDESTRIAN <= model <= MODEL_MOTORCYCLE
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def choose_objects(lens, mount, objects, count, chosen):
     """Copy the objects that a lens may see; returns their number.
 
@@ -224,7 +224,7 @@ def choose_objects(lens, mount, objects, count, chosen):
     return n
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def light_of_code(grey, linear):
     """Return the light of a display-coded grey level, 255 for white; see `effects.to_light`."""
     return grey * grey * (1.0 / 255.0) if linear > 0.0 else grey
@@ -246,14 +246,14 @@ def _default_appearance(cls: type) -> tuple[int, float]:
     return model
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def index_shade(seed, index):
     """Return the grey of the index-th vehicle: 30 to 225, evenly spread, the same in every process."""
     # Golden-ratio steps: neighbours in the list differ, and any few cover dark to light.
     return 30.0 + 195.0 * ((0.29 + 0.6180339887498949 * index + 0.7548776662466927 * seed) % 1.0)
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def _share(world, index, draw):
     """Return a number from 0 to 1 that is drawn by hashing three integers, the same in every process."""
     mixed = 0
@@ -264,7 +264,7 @@ def _share(world, index, draw):
     return mixed / 4294967296.0
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def body_of(world, index, length, width, height):
     """Return the model and the height [m] of the index-th vehicle of a world.
 

@@ -28,8 +28,8 @@ from lgmd_gym.camera.body_motion import (
 )
 from lgmd_gym.camera.effects import NOISE_LOG2
 from lgmd_gym.camera.params import ROADS, CameraParams
-from lgmd_gym.camera.render.jit import exact_kernel
 from lgmd_gym.camera.worlds import World, draw_world
+from lgmd_gym.kernels import kernel
 
 MOUNT = np.dtype(
     [
@@ -91,7 +91,7 @@ def seed_of(p: CameraParams) -> int:
     return p.seed if p.world is None else p.world
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def _rotation(mount, axis, time_s):
     """Return the rotation of a lens about one axis due to the road, at `MEAN_SPEED` [degrees]."""
     if mount.stabilised == GYROSCOPE:
@@ -99,7 +99,7 @@ def _rotation(mount, axis, time_s):
     return body_motion(mount.seed, axis, time_s)
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def _tilt(mount, scene, time_s, turn, gain):
     """Return the pitch upwards and the roll to the right of a camera due to the road and braking [rad].
 
@@ -125,7 +125,7 @@ def _tilt(mount, scene, time_s, turn, gain):
     return math.radians(pitch), math.radians(roll)
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def _yaw_on_car(mount, scene):
     """Return the yaw of a lens relative to the car [degrees]."""
     if mount.gaze == PATH:
@@ -135,7 +135,7 @@ def _yaw_on_car(mount, scene):
     return mount.yaw_deg
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def pose_on_car(mount, scene, own_car):
     """Write the pose of a lens relative to the car, which the motion of the body does not change.
 
@@ -147,7 +147,7 @@ def pose_on_car(mount, scene, own_car):
     own_car.yaw, own_car.pitch = math.radians(_yaw_on_car(mount, scene)), math.radians(mount.pitch_deg)
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def pose_lens(mount, scene, ago_s, lens):
     """Write the pose of a camera's lens to a `LENS` record.
 
@@ -195,14 +195,14 @@ def pose_lens(mount, scene, ago_s, lens):
     lens.yaw, lens.pitch, lens.roll = yaw, pitch, roll
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def half_frame(lens):
     """Return half of the width and height of the upright rectangle around the rolled frame [px]."""
     c, s = abs(lens.cos_roll), abs(lens.sin_roll)
     return lens.centre_u * c + lens.centre_v * s, lens.centre_v * c + lens.centre_u * s
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def side_tangent(lens):
     """Return the tangent of the largest horizontal angle between a point of the frame and the lens's yaw.
 
@@ -213,7 +213,7 @@ def side_tangent(lens):
     return half_width / nearest if nearest > 1e-3 * lens.focal else -1.0
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def noise_start(mount, scene, lens):
     """Return the index of a frame's first number in the noise table, a function of seed and road state."""
     return hash((mount.seed, scene.steps, lens.x, lens.y, lens.yaw)) & ((1 << NOISE_LOG2) - 1)

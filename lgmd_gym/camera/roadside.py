@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from lgmd_gym.camera.objects import MODEL_POST, MODEL_RAIL, MODEL_TREE, OBJECT
-from lgmd_gym.camera.render.jit import exact_kernel
+from lgmd_gym.kernels import kernel
 
 PLANT_RANGE = 150.0
 """Range of the roadside from the lens; it fades in over the last sixth [m]."""
@@ -120,7 +120,7 @@ def _along_edges(
     return np.concatenate(points)
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def clear_of(points, segments, margin):
     """Return whether each point is at least `margin` beyond the edges of all lanes; bool, shape (n,)."""
     clear = np.ones(len(points), dtype=np.bool_)
@@ -129,7 +129,7 @@ def clear_of(points, segments, margin):
     return clear
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def is_clear(x, y, segments, margin):
     """Return whether a point is at least `margin` beyond the edges of all lanes."""
     for j in range(len(segments)):

@@ -15,9 +15,9 @@ from lgmd_gym.cli.params import note_unused_params, read_params
 from lgmd_gym.errors import counted
 
 if TYPE_CHECKING:
-    from lgmd_gym.benchmark.executor import Executor
     from lgmd_gym.benchmark.runner import Run
     from lgmd_gym.cli.options import Bench
+    from lgmd_gym.processes.executor import Executor
 
 # Options that have an effect on a resumed run.
 RESUME_OPTIONS = ("resume", "trust", "jobs", "backend", "address", "plots", "report")
@@ -25,10 +25,10 @@ RESUME_OPTIONS = ("resume", "trust", "jobs", "backend", "address", "plots", "rep
 
 def run(options: "Bench") -> int:
     """Run a suite and print its summary; return 0 if complete, 1 for failed episodes, 130 for Ctrl-C."""
-    from lgmd_gym.benchmark.executor import Executor
     from lgmd_gym.benchmark.failures import failure_lines
     from lgmd_gym.benchmark.runner import INTERRUPTED
     from lgmd_gym.benchmark.stored_run import ROWS_FILE
+    from lgmd_gym.processes.executor import Executor
     from lgmd_gym.report.outputs import write_outputs
 
     console = make_console()

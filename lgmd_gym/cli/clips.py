@@ -11,17 +11,17 @@ from typing import Any
 from rich.console import Console
 
 from lgmd_gym.benchmark.folder import provenance
-from lgmd_gym.system.files import complete_folder
-from lgmd_gym.video.clips.batch import (
+from lgmd_gym.clips.batch import (
     ClipJob,
     ClipResult,
     detect_from_trace,
     process_clip,
     scored_from_trace,
 )
-from lgmd_gym.video.clips.detection import ClipDetection
-from lgmd_gym.video.clips.playback import PlaybackConfig
-from lgmd_gym.video.clips.scored_clip import ScoredClip
+from lgmd_gym.clips.detection import ClipDetection
+from lgmd_gym.clips.playback import PlaybackConfig
+from lgmd_gym.clips.scored_clip import ScoredClip
+from lgmd_gym.processes.files import complete_folder
 
 
 def print_notes(jobs: Sequence[ClipJob], annotations: Path | None, fps: float | None = None) -> None:

@@ -8,7 +8,7 @@ from lgmd_gym.benchmark.analysis.plots import difference_figure
 from lgmd_gym.benchmark.analysis.trainings import compare_arms
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Compare
-from lgmd_gym.system.files import check_new_file
+from lgmd_gym.processes.files import check_new_file
 
 
 def run(options: Compare) -> int:

@@ -16,7 +16,7 @@ from rich.text import Text
 
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Doctor
-from lgmd_gym.system.extras import install_command
+from lgmd_gym.processes.extras import install_command
 
 PACKAGE = "lgmd-gym"
 SELF_TEST_S = 2.0  # Wall time of the self-test [s].
@@ -149,7 +149,7 @@ def check_codec() -> list[Finding]:
     """Write a short H.264 video and read it back."""
     import av
 
-    from lgmd_gym.video import VideoReader, VideoWriter
+    from lgmd_gym.clips import VideoReader, VideoWriter
 
     fix = "pip install --force-reinstall av"
     picture = np.full((64, 64, 3), 200, np.uint8)

@@ -2,7 +2,7 @@
 
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Gallery
-from lgmd_gym.gallery.build import make_gallery
+from lgmd_gym.report.gallery.build import make_gallery
 
 
 def run(options: Gallery) -> int:

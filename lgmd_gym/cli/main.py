@@ -15,7 +15,7 @@ from lgmd_gym.cli.console import activity, drop_output, io_reason
 from lgmd_gym.cli.help import description, documented, summary, wrapped_output
 from lgmd_gym.cli.parser_errors import one_line
 from lgmd_gym.errors import unknown_name
-from lgmd_gym.system.signals import raise_on_signals
+from lgmd_gym.processes.signals import raise_on_signals
 
 DESCRIPTION = """Simulate emergency braking on the spike frequency of a locust looming neuron (LGMD).
 

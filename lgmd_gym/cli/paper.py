@@ -8,14 +8,14 @@ from rich.console import Console
 from lgmd_gym.cli import clips
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Paper
+from lgmd_gym.clips import tables
+from lgmd_gym.clips.batch import ClipJob, ClipResult, make_jobs
+from lgmd_gym.clips.detection import ClipDetection
+from lgmd_gym.clips.playback import PLAYBACK_CONFIGS
 from lgmd_gym.paper import experiments
 from lgmd_gym.paper.backgrounds import Panorama, Screen
 from lgmd_gym.paper.claims import claim_table, evaluate_claims, write_claims
 from lgmd_gym.paper.plots import paper_figures
-from lgmd_gym.video.clips import tables
-from lgmd_gym.video.clips.batch import ClipJob, ClipResult, make_jobs
-from lgmd_gym.video.clips.detection import ClipDetection
-from lgmd_gym.video.clips.playback import PLAYBACK_CONFIGS
 
 
 def run(options: Paper) -> int:

@@ -8,12 +8,12 @@ from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.cli import clips
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Paper
+from lgmd_gym.clips.batch import ClipJob, make_jobs
 from lgmd_gym.errors import check_whole, check_within
 from lgmd_gym.paper.realism import DriveValues, clip_values, common_optics, compare, simulated_values
 from lgmd_gym.paper.realism_drives import Drives, Optics, simulated_drives
 from lgmd_gym.paper.realism_plots import realism_figure
 from lgmd_gym.paper.realism_tables import comparison_tables, summary_line, write_comparisons
-from lgmd_gym.video.clips.batch import ClipJob, make_jobs
 
 
 def run(options: Paper) -> int:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from lgmd_gym.benchmark.openscenario.names import file_name
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.errors import counted
+from lgmd_gym.openscenario.names import file_name
 
 if TYPE_CHECKING:
-    from lgmd_gym.benchmark.openscenario.check import CheckedFile
     from lgmd_gym.cli.options import Scenario
+    from lgmd_gym.openscenario.check import CheckedFile
 
 NEEDED = {
     "show": "a file, an environment id or a case",
@@ -49,8 +49,8 @@ def _show(options: "Scenario") -> int:
     from lgmd_gym.cli.params import parse_arguments
     from lgmd_gym.envs.motion import record_motion
     from lgmd_gym.plotting.scenario_figure import scenario_figure
+    from lgmd_gym.processes.files import check_output_file
     from lgmd_gym.rendering.playback import make_target
-    from lgmd_gym.system.files import check_output_file
 
     if len(options.targets) != 1:
         raise ValueError(f"scenario show draws one scenario, got {len(options.targets)}: {options.targets}")
@@ -72,7 +72,7 @@ def _show(options: "Scenario") -> int:
 
 
 def _check(options: "Scenario") -> int:
-    from lgmd_gym.benchmark.openscenario.check import check_files
+    from lgmd_gym.openscenario.check import check_files
 
     if options.to is not None:
         raise ValueError(f"scenario check writes no file, got --to {str(options.to)!r}; remove it")
@@ -105,8 +105,8 @@ def _row(item: "CheckedFile") -> list[str]:
 
 
 def _export(options: "Scenario") -> int:
-    from lgmd_gym.benchmark.openscenario.export import export_case
     from lgmd_gym.benchmark.suites import find_case
+    from lgmd_gym.openscenario.export import export_case
 
     if len(options.targets) != 1:
         raise ValueError(f"scenario export needs one case, got {len(options.targets)}: {options.targets}")

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from lgmd_gym.cli.options import Train, refuse_unused
-from lgmd_gym.system.extras import missing_extra
+from lgmd_gym.processes.extras import missing_extra
 from lgmd_gym.training import TrainConfig, resume, train
 
 

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Tune
-from lgmd_gym.system.files import check_new_file, complete_file
+from lgmd_gym.processes.files import check_new_file, complete_file
 from lgmd_gym.tuning.objective import Objective
 from lgmd_gym.tuning.search import evaluate, sensitivity, tune
 from lgmd_gym.tuning.space import CAMERA_KEY, Proposal, SearchSpace, neuron_params, rule_options

@@ -11,15 +11,15 @@ from lgmd_gym.cli import clips
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.options import Video
 from lgmd_gym.cli.params import read_params
+from lgmd_gym.clips import tables
+from lgmd_gym.clips.anticipation import anticipation
+from lgmd_gym.clips.batch import ClipJob, ClipResult, make_jobs
+from lgmd_gym.clips.mcap_file import check_mcap
+from lgmd_gym.clips.playback import PLAYBACK_CONFIGS, ClipRun, PlaybackConfig, named_config
+from lgmd_gym.clips.score_tables import score_table, write_clip_scores, write_scores
+from lgmd_gym.clips.scored_clip import ScoredClip
 from lgmd_gym.errors import check_within
 from lgmd_gym.neuron import LGMDParams
-from lgmd_gym.video.clips import tables
-from lgmd_gym.video.clips.anticipation import anticipation
-from lgmd_gym.video.clips.batch import ClipJob, ClipResult, make_jobs
-from lgmd_gym.video.clips.mcap_file import check_mcap
-from lgmd_gym.video.clips.playback import PLAYBACK_CONFIGS, ClipRun, PlaybackConfig, named_config
-from lgmd_gym.video.clips.score_tables import score_table, write_clip_scores, write_scores
-from lgmd_gym.video.clips.scored_clip import ScoredClip
 
 
 def run(options: Video) -> int:

@@ -3,12 +3,13 @@
 import numpy as np
 
 from lgmd_gym.envs.decisions import Clock
+from lgmd_gym.envs.dynamics.arrays import Arrays
 from lgmd_gym.envs.dynamics.episode import Physics, step_environment
-from lgmd_gym.envs.dynamics.jit import Arrays, compiled
 from lgmd_gym.envs.scene import SceneArrays, write_scene
+from lgmd_gym.kernels import kernel
 
 
-@compiled
+@kernel(exact=True)
 def advance(
     first: int, last: int, stride: int, rate: float, physics: Arrays, clock: Arrays, scenes: Arrays
 ) -> bool:
@@ -43,7 +44,7 @@ def advance(
     return any_due
 
 
-@compiled
+@kernel(exact=True)
 def show_episodes(
     first: int, last: int, rate: float, selected: np.ndarray, physics: Arrays, scenes: Arrays
 ) -> None:

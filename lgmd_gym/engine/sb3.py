@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from lgmd_gym.system.extras import missing_extra
+from lgmd_gym.processes.extras import missing_extra
 
 try:
     from stable_baselines3.common.monitor import Monitor

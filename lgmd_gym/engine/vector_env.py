@@ -17,8 +17,8 @@ from lgmd_gym.engine.observations import Observations
 from lgmd_gym.engine.simulation import Rates, Simulation
 from lgmd_gym.engine.top_view import TopViews
 from lgmd_gym.envs.braking import BrakingEnv
+from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.registration import make_source
-from lgmd_gym.envs.scenarios.scenario import Scenario
 from lgmd_gym.errors import check_flags, check_keys, check_mapping, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.validation import MAX_THREADS

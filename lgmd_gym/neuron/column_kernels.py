@@ -2,10 +2,10 @@
 
 import math
 
-from lgmd_gym.system.kernel import kernel
+from lgmd_gym.kernels import kernel
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def column_potentials(first, last, active, maps, width, sigma, out) -> None:
     """Write the potential of each column for the active neurons among first..last-1.
 

@@ -1,11 +1,11 @@
 """Kernel of the direction-selective neuron."""
 
+from lgmd_gym.kernels import kernel
 from lgmd_gym.neuron.motion_kernels import detect_motion_right, filter_light, start, update_delay
 from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
-from lgmd_gym.system.kernel import kernel
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def step(first, last, frames, active, scalars, const, gains, mean, on, off, late_on, late_off, right) -> None:
     """Step the active neurons among first..last-1.
 

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from lgmd_gym.kernels import kernel
 from lgmd_gym.neuron import scalars as sc
 from lgmd_gym.neuron.scalars import feed_forward, fire
-from lgmd_gym.system.kernel import kernel
 
 
 def allocate(num: int, shape: tuple[int, int], n_p: int, paths: int) -> tuple[NDArray[np.float32], ...]:
@@ -27,7 +27,7 @@ def allocate(num: int, shape: tuple[int, int], n_p: int, paths: int) -> tuple[ND
     return tuple(np.zeros(size, np.float32) for size in sizes)
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def replicate_border(image: NDArray) -> None:
     """Set the border of one pixel to the nearest inner pixel."""
     h, w = image.shape
@@ -37,7 +37,7 @@ def replicate_border(image: NDArray) -> None:
         image[0, x], image[h - 1, x] = image[1, x], image[h - 2, x]
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def photoreceptors(frame, previous, y0, x0, weight, const, p) -> float:
     """Shift P back by one frame, write the new P to p[0] (eq. 1) and return the sum of |P|."""
     n_p, h, w = int(const[sc.N_P]), p.shape[1], p.shape[2]
@@ -58,7 +58,7 @@ def photoreceptors(frame, previous, y0, x0, weight, const, p) -> float:
     return total
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def excitation(p, e, const) -> None:
     """Compute E of every path with its border (eq. 3)."""
     residue = np.float32(const[sc.RESIDUE])
@@ -72,7 +72,7 @@ def excitation(p, e, const) -> None:
         replicate_border(e[c])
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def delayed_inhibition(e, memory, out, const, warm) -> None:
     """Compute I of one path (eq. 4 to 6); each ring of neighbours is summed first, then delayed."""
     _, h, w = memory.shape
@@ -90,7 +90,7 @@ def delayed_inhibition(e, memory, out, const, warm) -> None:
             out[y, x] = total
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def summation(e, inhibition, s, w, const) -> None:
     """Compute S with its border (eq. 7 and 8)."""
     theta_1, theta_2 = np.float32(const[sc.THETA_1]), np.float32(const[sc.THETA_2])
@@ -106,7 +106,7 @@ def summation(e, inhibition, s, w, const) -> None:
     replicate_border(s)
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def local_mean(s, y, x) -> np.floating:
     """Return Ce, the mean of the 3x3 neighbourhood of pixel (y, x), from the bordered S."""
     total = np.float32(0)
@@ -116,7 +116,7 @@ def local_mean(s, y, x) -> np.floating:
     return total / np.float32(9)
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def grouping(s, g_map, row, const) -> float | np.floating:
     """Compute g from S, update G (eq. 9) and return the sum of g."""
     h, w = g_map.shape
@@ -135,7 +135,7 @@ def grouping(s, g_map, row, const) -> float | np.floating:
     return total
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def step(
     first, last, frames, previous, y0, x0, weight, active, scalars, const, p, e, memory, inhibition, s, g
 ) -> None:  # fmt: skip

@@ -21,10 +21,8 @@ the index `_at(y, stride) + x`; its left border is in the padding of the row abo
 import numpy as np
 from numba import njit
 
-from lgmd_gym.neuron import scalars as sc
-from lgmd_gym.neuron.params import LGMDParams
-from lgmd_gym.neuron.scalars import feed_forward, fire
-from lgmd_gym.simd import (
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import (
     LANES,
     at_least,
     clear_below,
@@ -39,7 +37,9 @@ from lgmd_gym.simd import (
     store,
     total,
 )
-from lgmd_gym.system.kernel import kernel
+from lgmd_gym.neuron import scalars as sc
+from lgmd_gym.neuron.params import LGMDParams
+from lgmd_gym.neuron.scalars import feed_forward, fire
 
 # Filter memories below this are set to 0, before they become slow denormal numbers.
 _TINY = np.float32(1e-30)
@@ -60,14 +60,14 @@ def _at(row, stride):
     return LANES + row * stride
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _replicate_sides(image, start, w) -> None:
     """Write the left and right border of a row."""
     image[start - 1] = image[start]
     image[start + w] = image[start + w - 1]
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _photoreceptors(frame, previous, at, width, weight, now, last, h, w, stride, const) -> float:
     """Pass 1: compute P (eq. 1) and return the sum of |P|.
 
@@ -108,7 +108,7 @@ def _photoreceptors(frame, previous, at, width, weight, now, last, h, w, stride,
     return sum_p
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _clear_tiny(values, first, last) -> None:
     """Set tiny values to 0."""
     tiny = splat(_TINY)
@@ -125,7 +125,7 @@ def _delayed(memory, i, gain, value):
     return new
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _summation(p, memory, s, y, target, blocks, stride, warm, weight, const) -> None:
     """Compute I and S of row y (eq. 4 to 8) and write S to s[target:]."""
     one = np.float32(1)
@@ -159,7 +159,7 @@ def _summation(p, memory, s, y, target, blocks, stride, warm, weight, const) -> 
         store(s, target + b * LANES, excess * select_by_sign(centre, theta_on, theta_off))
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _local_means(s, top, middle, bottom, sums, products, target, w):
     """Write S * Ce of a row to products[target:] and return the largest Ce and S * Ce of the row."""
     columns = -(-w // LANES) * LANES
@@ -177,7 +177,7 @@ def _local_means(s, top, middle, bottom, sums, products, target, w):
     return largest(max_mean), largest(max_product)
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _inhibition(p, memory, s, products, slots, h, w, warm, row, const) -> np.floating:
     """Pass 2: compute S * Ce of the rows that can pass the threshold, and return the grouping scale omega."""
     blocks = -(-w // LANES)
@@ -205,7 +205,7 @@ def _inhibition(p, memory, s, products, slots, h, w, warm, row, const) -> np.flo
     return omega
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _grouping(products, g, slots, h, columns, omega, gain, t_g) -> float:
     """Pass 3: update G (eq. 9) in rows where g or G is not 0, and return the sum of g (Yue & Rind)."""
     sum_g = 0.0
@@ -228,7 +228,7 @@ def _grouping(products, g, slots, h, columns, omega, gain, t_g) -> float:
     return sum_g
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def step(
     first, last, frames, previous, y0, x0, weight, active, scalars, const, p, memory, s, products, g, slots
 ) -> None:  # fmt: skip

@@ -4,6 +4,7 @@ import math
 
 from numba import njit
 
+from lgmd_gym.kernels import kernel
 from lgmd_gym.neuron.motion_kernels import (
     detect_motion_down,
     detect_motion_right,
@@ -12,10 +13,9 @@ from lgmd_gym.neuron.motion_kernels import (
     update_delay,
 )
 from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
-from lgmd_gym.system.kernel import kernel
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _integrate(image, table):
     """Write the sums of all rectangles from the top left corner, shape (height + 1, width + 1)."""
     for y in range(image.shape[0]):
@@ -31,7 +31,7 @@ def _box(table, y0, x0, y1, x1):
     return table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0]
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _strongest_unit(across, along, radius, stride, vertical, units):
     """Write the response of every unit (eq. 5 and 6) and return the largest one."""
     area, best = 2.0 * radius * radius, 0.0
@@ -51,7 +51,7 @@ def _strongest_unit(across, along, radius, stride, vertical, units):
     return best
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def step(
     first, last, frames, active, scalars, const, gains, sizes, mean, on, off, late_on, late_off, right, down,
     units, tables,

@@ -8,10 +8,10 @@ import math
 import numpy as np
 from numba import njit
 
-from lgmd_gym.system.kernel import kernel
+from lgmd_gym.kernels import kernel
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def start(frame, mean):
     """Set the mean light to the first frame."""
     for y in range(mean.shape[0]):
@@ -19,7 +19,7 @@ def start(frame, mean):
             mean[y, x] = frame[y, x]
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def filter_light(frame, mean, on, off, gain):
     """Subtract the mean light and split the difference into ON and OFF (eq. 1 and 2)."""
     height, width = mean.shape
@@ -36,7 +36,7 @@ def _compressed(correlation):
     return math.copysign(math.sqrt(abs(correlation)), correlation)
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def detect_motion_right(on, off, late_on, late_off, right):
     """Correlate each pixel with the next one to the right (eq. 4); return the sums of m and |m|."""
     height, width = on.shape
@@ -51,7 +51,7 @@ def detect_motion_right(on, off, late_on, late_off, right):
     return total, strength
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def detect_motion_down(on, off, late_on, late_off, down):
     """Correlate each pixel with the next one below (eq. 4)."""
     height, width = on.shape
@@ -62,7 +62,7 @@ def detect_motion_down(on, off, late_on, late_off, down):
             down[y, x] = _compressed(value)
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def update_delay(on, off, late_on, late_off, gain):
     """Update the delayed ON and OFF (eq. 3)."""
     height, width = on.shape

@@ -11,8 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from lgmd_gym.kernels import kernel
 from lgmd_gym.neuron.params import LGMDParams
-from lgmd_gym.system.kernel import kernel
 
 # Indices of the scalar state: Response, internal state, then a ring buffer of the spikes of `window` frames.
 FREQUENCY, SPIKES, K, K_HAT, F, W, LATENCY, ALERT = range(8)
@@ -56,7 +56,7 @@ def initial_scalars(params: LGMDParams) -> NDArray[np.float64]:
     return row
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def feed_forward(row: NDArray, const: NDArray, sum_p: float | np.floating) -> None:
     """Update F, w and the latency of G from the sum of |P| (eq. 2 and 9)."""
     f_now, f_before = sum_p / const[N_PIXELS], row[F_HAT]
@@ -70,7 +70,7 @@ def feed_forward(row: NDArray, const: NDArray, sum_p: float | np.floating) -> No
     row[GAIN_G] = const[DT] / (const[DT] + latency)
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def fire(row: NDArray, const: NDArray, sum_g: float | np.floating) -> None:
     """Update K, its adaptation, spikes, frequency and alert from the sum of g (eq. 9 to 12).
 

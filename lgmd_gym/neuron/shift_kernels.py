@@ -10,9 +10,9 @@ Arguments of all kernels: first neuron and last neuron + 1; neurons to shift, bo
 
 from numba import njit
 
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import LANES
 from lgmd_gym.neuron.scalars import AGE
-from lgmd_gym.simd import LANES
-from lgmd_gym.system.kernel import kernel
 
 
 @njit(inline="always")
@@ -26,7 +26,7 @@ def _column(step, width, pixels):
     return step if pixels > 0 else width - 1 - step
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def shift_light(first, last, active, scalars, pixels, light, frames, y0, x0) -> None:
     """Shift the light of the last frame, (N, H, W); that of the present one, frames[n, y0:, x0:], enters."""
     _, height, width = light.shape
@@ -41,7 +41,7 @@ def shift_light(first, last, active, scalars, pixels, light, frames, y0, x0) -> 
                 light[n, y, x] = light[n, y, source] if inside else frames[n, y0 + y, x0 + x]
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def shift_rows(first, last, active, scalars, pixels, values, width) -> None:
     """Shift the rows of maps, (N, rows, at least width); 0 enters."""
     for n in range(first, last):
@@ -54,7 +54,7 @@ def shift_rows(first, last, active, scalars, pixels, values, width) -> None:
                 values[n, y, x] = values[n, y, source] if 0 <= source < width else 0.0
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def shift_blocks(first, last, active, scalars, pixels, memory, width) -> None:
     """Shift the delayed rings of the fast kernel, (N, H, blocks, 6, 16), see `state.allocate`; 0 enters."""
     for n in range(first, last):

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lgmd_gym.kernels.simd import LANES
 from lgmd_gym.neuron import scalars as sc
-from lgmd_gym.simd import LANES
 
 
 def allocate(num: int, shape: tuple[int, int]) -> tuple[NDArray[Any], ...]:

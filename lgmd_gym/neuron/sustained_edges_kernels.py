@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from lgmd_gym.kernels import kernel
 from lgmd_gym.neuron.motion_kernels import start
 from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
-from lgmd_gym.system.kernel import kernel
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def step(first, last, frames, active, scalars, const, gain, light, edges) -> None:
     """Step the active detectors among first..last-1.
 

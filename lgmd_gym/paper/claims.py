@@ -10,6 +10,7 @@ import numpy as np
 from rich.table import Table
 from rich.text import Text
 
+from lgmd_gym.clips.detection import ClipDetection, summarize_detections
 from lgmd_gym.paper.experiments import (
     CONTACT,
     DARK,
@@ -19,7 +20,6 @@ from lgmd_gym.paper.experiments import (
     GratingResponse,
     line_fit,
 )
-from lgmd_gym.video.clips.detection import ClipDetection, summarize_detections
 
 HOLDS, PARTLY, FAILS = "holds", "in part", "does not hold"
 RESTING = 0.5005  # K at rest, with the rounding of float32

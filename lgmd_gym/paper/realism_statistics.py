@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lgmd_gym.clips.playback import DuplicateFilter
 from lgmd_gym.neuron import LGMD
 from lgmd_gym.paper.realism_drives import Optics
 from lgmd_gym.paper.realism_fields import Fields
-from lgmd_gym.video.clips.playback import DuplicateFilter
 
 DARK, BRIGHT = 20, 235  # grey levels
 SPECTRUM_FIT = (0.02, 0.2)  # spatial frequencies of the fit [cycles/px]

@@ -8,7 +8,7 @@ from typing import Any, BinaryIO
 
 from PIL import ImageFont
 
-from lgmd_gym.system.files import complete_file
+from lgmd_gym.processes.files import complete_file
 
 # Palette of Okabe and Ito, which colour-blind readers can distinguish; darkest first.
 COLOURS = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

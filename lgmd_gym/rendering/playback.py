@@ -13,6 +13,7 @@ from lgmd_gym.agents import Agent
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, find_case
+from lgmd_gym.clips import VideoWriter
 from lgmd_gym.envs import env_id
 from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
 from lgmd_gym.errors import unknown_name
@@ -20,7 +21,6 @@ from lgmd_gym.rendering.dashboard import SIZE
 from lgmd_gym.rendering.overlays import checked_overlays
 from lgmd_gym.rendering.view import LGMDView
 from lgmd_gym.rendering.window import Window
-from lgmd_gym.video import VideoWriter
 
 FINAL_SECONDS = 1.0  # [s], for which the last picture stays
 

@@ -2,7 +2,6 @@
 
 from lgmd_gym.benchmark.analysis.protocol_limits import LIMIT_CHECKS, R152_SUITES, limit_results, meets_r152
 from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import (
     INTERVAL_TEXT,
     AgentSummary,
@@ -13,6 +12,7 @@ from lgmd_gym.benchmark.summary import (
 )
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.errors import counted
+from lgmd_gym.statistics.intervals import Rate
 
 CAVEAT = (
     "These are results of one simulation with the cases of this suite. They are not a rating and do not show "

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 from lgmd_gym.benchmark.analysis.tables import agent_summaries
 from lgmd_gym.benchmark.folder import replace_file
 from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import AgentSummary, without_fcw_driver, write_csv
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.report.svg import RULE, Axis, Element, Panel, element, file_text
+from lgmd_gym.statistics.intervals import Rate
 
 MAX_SPEEDS = 25  # test speeds of a family from which they are rounded to `COARSE`
 COARSE = 5  # [km/h]

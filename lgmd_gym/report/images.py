@@ -12,7 +12,7 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.episode import make_env, rollout
 from lgmd_gym.benchmark.metrics import brake_onset
 from lgmd_gym.benchmark.task import Task
-from lgmd_gym.system.files import complete_file
+from lgmd_gym.processes.files import complete_file
 
 
 class CapturedFrame(NamedTuple):

@@ -16,7 +16,6 @@ from lgmd_gym.benchmark.analysis.tables import (
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.folder import replace_file
 from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import INTERVAL_TEXT, Sample, by_condition, without_fcw_driver
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.envs.registration import SCENARIO
@@ -34,6 +33,7 @@ from lgmd_gym.report.sections import (
 )
 from lgmd_gym.report.selection import illustrated_agent
 from lgmd_gym.report.svg import DARK_CSS, legend_mark, to_text
+from lgmd_gym.statistics.intervals import Rate
 
 BANDS = ("red", "brown", "orange", "yellow", "green")
 

@@ -1,7 +1,7 @@
 """Kernels that select the cameras to process, and collect the outputs of their neurons."""
 
+from lgmd_gym.kernels import kernel
 from lgmd_gym.neuron.scalars import ALERT, FREQUENCY, K_HAT, LATENCY, SPIKES, F, K, W
-from lgmd_gym.system.kernel import kernel
 
 SIGNALS = ("spike_frequency", "membrane_potential", "ffi")
 """The fields of `Response` in observations and infos."""
@@ -10,7 +10,7 @@ NUMBERS = (*SIGNALS, "adapted_potential", "inhibition_weight", "excitation_laten
 _COLUMNS = (FREQUENCY, K, F, K_HAT, W, LATENCY)  # of `NUMBERS` in the state of a neuron
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def select_cameras(first, last, active, group):
     """Select the enabled cameras of the active environments first..last-1.
 
@@ -41,7 +41,7 @@ def select_cameras(first, last, active, group):
     return num_selected, num_fresh
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def count_turns(first, last, selected, lenses, yaws_px, turns_px):
     """Write the pixels by which derotated views have turned since their last frames, + to the right.
 
@@ -68,7 +68,7 @@ def count_turns(first, last, selected, lenses, yaws_px, turns_px):
     return count
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def collect_outputs(first, last, selected, neurons):
     """Copy the outputs of the selected cameras' neurons into arrays of all cameras.
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from lgmd_gym.camera.params import MAX_WIDTH
 from lgmd_gym.errors import check_positive, check_size
+from lgmd_gym.kernels.simd import LANES
 from lgmd_gym.sensing.registration_kernels import register
 from lgmd_gym.sensing.registration_layout import (
     BANDS,
@@ -18,7 +19,6 @@ from lgmd_gym.sensing.registration_layout import (
     STATE_SIZE,
     make_space,
 )
-from lgmd_gym.simd import LANES
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

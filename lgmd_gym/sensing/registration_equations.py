@@ -2,6 +2,8 @@
 
 import numba as nb
 
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import LANES, load, madd, splat, total
 from lgmd_gym.sensing.registration_layout import (
     BANDS,
     GAIN,
@@ -14,11 +16,9 @@ from lgmd_gym.sensing.registration_layout import (
     ROLL_RAD,
     YAW_PX,
 )
-from lgmd_gym.simd import LANES, load, madd, splat, total
-from lgmd_gym.system.kernel import kernel
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def sum_blocks(warped, reference, variance, const, row, sums) -> None:
     """Write the sums of the normal equations of every block."""
     height, width = warped.shape
@@ -29,7 +29,7 @@ def sum_blocks(warped, reference, variance, const, row, sums) -> None:
             _sum_block(warped, reference, variance, const, row, (y, y + band, x), sums[b * blocks + k])
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _sum_block(warped, reference, variance, const, row, place, out) -> None:
     """Sum the products of gradient, grey and 1, and those with the residual, over the pixels of a block."""
     first, last, x = place
@@ -51,7 +51,7 @@ def _sum_block(warped, reference, variance, const, row, place, out) -> None:
     out[12], out[13] = total(re), total(e1)
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _terms(warped, reference, variance, const, row, at):
     """Return gradient (down, right), grey of the reference, residual and weight of sixteen pixels.
 
@@ -73,7 +73,7 @@ def _terms(warped, reference, variance, const, row, at):
     return rise, slope, grey, residual, weight
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def add_blocks(sums, shape, matrix, right) -> None:
     """Write the normal equations of pitch, roll, yaw, gain and offset from the sums of the blocks."""
     height, width = shape
@@ -107,7 +107,7 @@ def add_blocks(sums, shape, matrix, right) -> None:
             right[4] -= s[13]
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def add_prior(const, row, gain, offset, matrix, right) -> None:
     """Add the prior: no pitch and roll, the yaw of the car's turns, and the exposure of the last frame."""
     matrix[0, 0] += const.pitch_prior
@@ -122,7 +122,7 @@ def add_prior(const, row, gain, offset, matrix, right) -> None:
     right[4] += const.offset_prior * (offset - row[OFFSET])
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def solve(matrix, right) -> None:
     """Replace `right` by the solution of a symmetric positive definite system, given its upper triangle."""
     size = matrix.shape[0]

@@ -9,6 +9,8 @@ import math
 import numba as nb
 import numpy as np
 
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import LANES, load, madd, splat, store
 from lgmd_gym.sensing.registration_layout import (
     BANDS,
     MARGIN_COLUMNS,
@@ -20,11 +22,9 @@ from lgmd_gym.sensing.registration_layout import (
     ROLL_RAD,
     YAW_PX,
 )
-from lgmd_gym.simd import LANES, load, madd, splat, store
-from lgmd_gym.system.kernel import kernel
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def blur(frame, padded, line) -> None:
     """Write the frame, smoothed by a binomial of 3 × 3 px and with repeated edges."""
     height, width = frame.shape
@@ -46,7 +46,7 @@ def blur(frame, padded, line) -> None:
             store(padded, row * total_width + x, mean)
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def follow_turn(shift, row, reference, variance) -> None:
     """Shift the reference by whole pixels with the turn of the car; `shift` is that of the frame [px]."""
     height, width = reference.shape
@@ -67,7 +67,7 @@ def follow_turn(shift, row, reference, variance) -> None:
                 variance[y, x] = NEW
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def warp(padded, row, warped) -> None:
     """Write the frame as registered with the reference, by bilinear interpolation."""
     height, width = warped.shape
@@ -86,7 +86,7 @@ def warp(padded, row, warped) -> None:
             _warp_block(padded, y0, y1, x, dy, dx, warped)
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _warp_block(padded, y0, y1, x, dy, dx, warped) -> None:
     i, j = math.floor(dy), math.floor(dx)
     down, along = splat(nb.float32(dy - i)), splat(nb.float32(dx - j))

@@ -4,6 +4,8 @@ import math
 
 import numba as nb
 
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import LANES, load, madd, select_by_sign, splat, store
 from lgmd_gym.sensing.registration_equations import add_blocks, add_prior, solve, sum_blocks
 from lgmd_gym.sensing.registration_images import blur, follow_turn, warp
 from lgmd_gym.sensing.registration_layout import (
@@ -22,13 +24,11 @@ from lgmd_gym.sensing.registration_layout import (
     STARTED,
     YAW_PX,
 )
-from lgmd_gym.simd import LANES, load, madd, select_by_sign, splat, store
-from lgmd_gym.system.kernel import kernel
 
 _ITERATIONS = 3
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def register(first, last, active, frames, turns, const, state, rotations, space) -> None:
     """Register a frame of the active cameras among first..last-1.
 
@@ -71,7 +71,7 @@ def register(first, last, active, frames, turns, const, state, rotations, space)
         _write_rotation(const[0], row, rotations[n])
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _start(padded, const, row, reference, variance) -> None:
     height, width = reference.shape
     row[:] = 0.0
@@ -82,7 +82,7 @@ def _start(padded, const, row, reference, variance) -> None:
             store(variance, y * width + x, splat(nb.float32(const.first_variance)))
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _adapt(warped, const, row, reference, variance) -> None:
     """Adapt the reference to the registered frame, and the variance to its residual.
 
@@ -103,7 +103,7 @@ def _adapt(warped, const, row, reference, variance) -> None:
         store(variance, at, select_by_sign(is_known, followed, start))
 
 
-@kernel
+@kernel(exact=True, arrays=True)
 def _write_rotation(const, row, rotation) -> None:
     """Write pitch, roll and yaw relative to their means [degrees], and follow the means."""
     pitch, roll = row[PITCH_PX] - row[MEAN_PITCH], row[ROLL_RAD] - row[MEAN_ROLL]

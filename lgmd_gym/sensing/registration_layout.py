@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lgmd_gym.simd import LANES
+from lgmd_gym.kernels.simd import LANES
 
 PAD = 8
 """Columns and rows around a frame that repeat its edge; bounds the shifts [px]."""

@@ -10,7 +10,7 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 from stable_baselines3.common.evaluation import evaluate_policy
 
-from lgmd_gym.system.files import complete_file, is_intact_zip
+from lgmd_gym.processes.files import complete_file, is_intact_zip
 from lgmd_gym.training.config import VALIDATION_SEED
 
 if TYPE_CHECKING:

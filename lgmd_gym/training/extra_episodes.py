@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lgmd_gym.envs.scenarios.distribution import EXTRA_FAMILIES, check_families
+from lgmd_gym.envs.families.distribution import EXTRA_FAMILIES, check_families
 from lgmd_gym.envs.traffic.registration import KINDS
 from lgmd_gym.errors import check_known, check_whole, shown
 

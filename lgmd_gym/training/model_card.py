@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.system.files import complete_file
+from lgmd_gym.processes.files import complete_file
 from lgmd_gym.training.config import TrainConfig
 
 FILE = "README.md"

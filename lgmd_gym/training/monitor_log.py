@@ -8,7 +8,7 @@ from typing import Any
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.monitor import ResultsWriter
 
-from lgmd_gym.system.files import complete_file
+from lgmd_gym.processes.files import complete_file
 
 FILE = "monitor.csv"
 TIMESTEPS = "timesteps"

@@ -9,10 +9,10 @@ from gymnasium.wrappers import RenderCollection
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Image
 
+from lgmd_gym.clips import VideoWriter
 from lgmd_gym.rendering.window import dummy_display
 from lgmd_gym.training.config import VALIDATION_SEED, TrainConfig
 from lgmd_gym.training.policy_wrapper import PolicyWrapper
-from lgmd_gym.video import VideoWriter
 
 STRIP_LENGTH = 8  # pictures of an episode in TensorBoard
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.system.extras import missing_extra
+from lgmd_gym.processes.extras import missing_extra
 from lgmd_gym.tuning.objective import Objective, ObjectiveValue
 from lgmd_gym.tuning.space import Proposal, SearchSpace, agent_string, rule_options, sensor_config
 

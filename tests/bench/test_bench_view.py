@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from lgmd_gym import LGMDView
-from lgmd_gym.video import VideoWriter
+from lgmd_gym.clips import VideoWriter
 
 MIN_DRAWN, MIN_WRITTEN = 30.0, 60.0  # [pictures/s]
 

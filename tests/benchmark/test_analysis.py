@@ -14,9 +14,9 @@ from lgmd_gym.benchmark.analysis.compare_tables import change_text, comparison_t
 from lgmd_gym.benchmark.analysis.froc import OpenLoopTrace, alarm_onsets, froc_curves, load_traces
 from lgmd_gym.benchmark.analysis.plots import difference_figure, froc_figure, trace_figure
 from lgmd_gym.benchmark.runner import Run
-from lgmd_gym.benchmark.statistics import wilson
 from lgmd_gym.cli import main as cli
 from lgmd_gym.report import write_report
+from lgmd_gym.statistics.intervals import wilson
 
 AGENTS = ("spike-threshold", "ttc-oracle")
 SUITE = """

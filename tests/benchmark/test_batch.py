@@ -15,7 +15,6 @@ from lgmd_gym.benchmark import batch
 from lgmd_gym.benchmark.batch import BatchPlayer, play_unit
 from lgmd_gym.benchmark.case import level_case
 from lgmd_gym.benchmark.config import RunConfig
-from lgmd_gym.benchmark.executor import Executor
 from lgmd_gym.benchmark.file_names import series_name
 from lgmd_gym.benchmark.metrics import Counterfactual
 from lgmd_gym.benchmark.rows import key_of
@@ -25,6 +24,7 @@ from lgmd_gym.benchmark.stored_run import read_series
 from lgmd_gym.benchmark.suites import find_case
 from lgmd_gym.benchmark.task import Task, run_task
 from lgmd_gym.benchmark.units import make_units
+from lgmd_gym.processes.executor import Executor
 
 THREAT = Counterfactual(True, 5.0, 10.0)
 DEFAULT_SENSORS = SensorConfig()

@@ -8,11 +8,11 @@ import sys
 import pytest
 from support.runs import new_run, read_rows, sorted_keys
 
-from lgmd_gym.benchmark import executor
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.suite_file import copy_suite, get_suite, load_suite
 from lgmd_gym.cli import main as cli
+from lgmd_gym.processes import executor
 
 LGMD = [sys.executable, "-m", "lgmd_gym"]
 SHORT = """

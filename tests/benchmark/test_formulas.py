@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from support.rows import threat_row
 
-from lgmd_gym.benchmark.analysis.bootstrap import StratifiedBootstrap, interquartile_mean
 from lgmd_gym.benchmark.analysis.compare import QUANTITIES, compare_rows
 from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.metrics import (
@@ -21,7 +20,8 @@ from lgmd_gym.benchmark.metrics import (
     measure,
 )
 from lgmd_gym.benchmark.recorder import SERIES
-from lgmd_gym.benchmark.statistics import (
+from lgmd_gym.statistics.bootstrap import StratifiedBootstrap, interquartile_mean
+from lgmd_gym.statistics.intervals import (
     Mean,
     Rate,
     binomial_tail,

@@ -13,8 +13,8 @@ from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.metrics import METRICS, Counterfactual, brake_onset, metric
 from lgmd_gym.benchmark.recorder import SERIES
 from lgmd_gym.benchmark.rows import KEYS, make_row
-from lgmd_gym.benchmark.statistics import wilson
 from lgmd_gym.benchmark.summary import COLUMNS, Sample, summaries, summarise, write_summary
+from lgmd_gym.statistics.intervals import wilson
 
 SLOW_APPROACH = Case("test/CCRs/v20", "CCRs", (("ego_speed", 5.556),))
 THREAT = Counterfactual(True, 5.0, 10.0)

@@ -14,11 +14,11 @@ from support.runs import new_run, read_rows
 from lgmd_gym import benchmark
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark import RunConfig, get_suite
-from lgmd_gym.benchmark.openscenario.export import export_case
 from lgmd_gym.benchmark.suite_file import copy_suite, find_own_case
 from lgmd_gym.benchmark.suites import find_case
 from lgmd_gym.cli import main as cli
 from lgmd_gym.envs import Actor, Scenario, make_scenario
+from lgmd_gym.openscenario.export import export_case
 from lgmd_gym.rendering.playback import play_episode
 
 FAMILY = {"family": "CutIn", "arguments": {"ego_speed": 19.44, "gap": 8.0, "excess": -5.56}}

@@ -13,7 +13,6 @@ from lgmd_gym.benchmark import RunConfig
 from lgmd_gym.benchmark import run as run_benchmark
 from lgmd_gym.benchmark.analysis.compare import compare_runs
 from lgmd_gym.benchmark.analysis.trainings import compare_arms
-from lgmd_gym.benchmark.executor import Executor
 from lgmd_gym.benchmark.rows import KEYS
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.stored_run import read_run
@@ -21,9 +20,10 @@ from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.benchmark.summary import write_csv
 from lgmd_gym.cli import main as cli
 from lgmd_gym.plotting.style import saved_figure
+from lgmd_gym.processes.executor import Executor
+from lgmd_gym.processes.lock import FolderLock
 from lgmd_gym.report.outputs import write_outputs
 from lgmd_gym.report.page import write_report
-from lgmd_gym.system.lock import FolderLock
 
 BOUNDS = ("no-brake", "always-brake", "ttc-oracle", "spike-threshold")
 
@@ -257,7 +257,7 @@ def test_outputs_are_complete_or_absent(tmp_path, monkeypatch):
     def fail(path):
         raise OSError("disk full")
 
-    monkeypatch.setattr("lgmd_gym.system.files._sync", fail)  # at the end of each file
+    monkeypatch.setattr("lgmd_gym.processes.files._sync", fail)  # at the end of each file
     for name, write in (("summary.csv", lambda path: write_csv(path, ["x"], [])), ("case.png", draw)):
         path = tmp_path / name
         path.write_text("old")

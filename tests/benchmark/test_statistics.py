@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lgmd_gym.benchmark.statistics import Mean, Rate, binomial_tail, cluster_mean, poisson_interval, wilson
+from lgmd_gym.statistics.intervals import Mean, Rate, binomial_tail, cluster_mean, poisson_interval, wilson
 
 
 def test_wilson_interval_matches_newcombe_1998():

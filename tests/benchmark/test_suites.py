@@ -12,7 +12,7 @@ from lgmd_gym.benchmark.rows import make_row
 from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.envs.scenarios.random_arguments import THREATS
+from lgmd_gym.envs.families.random_arguments import THREATS
 
 WITHOUT_TARGET = ("ncap2023-without-target", "ncap2023-vru-without-target")
 SLOW_SUITES = ("ncap2023", "ncap2023-vru", "ncap2026", "ncap2026-extended", "speeds", *WITHOUT_TARGET)

@@ -8,11 +8,11 @@ import pytest
 from support.rows import threat_row
 
 from lgmd_gym import benchmark
-from lgmd_gym.benchmark.analysis.bootstrap import interquartile_mean
 from lgmd_gym.benchmark.analysis.compare_tables import arm_table
 from lgmd_gym.benchmark.analysis.trainings import Arm, arm_results, compare_arms, parse_arm
-from lgmd_gym.benchmark.statistics import wilson
 from lgmd_gym.cli import main as cli
+from lgmd_gym.statistics.bootstrap import interquartile_mean
+from lgmd_gym.statistics.intervals import wilson
 
 AGENTS = ("spike-threshold", "spike-threshold:frames=2", "ttc-oracle")
 SUITE = """

@@ -9,8 +9,8 @@ from lgmd_gym.benchmark import RunConfig
 from lgmd_gym.benchmark.analysis.detections import detected_rows
 from lgmd_gym.benchmark.stored_run import StoredRun
 from lgmd_gym.benchmark.suites import SUITES
-from lgmd_gym.envs.scenarios.distribution import EXTRA_FAMILIES, draw_scenario, level_generator
-from lgmd_gym.envs.scenarios.scenario import without_target
+from lgmd_gym.envs.families.distribution import EXTRA_FAMILIES, draw_scenario, level_generator
+from lgmd_gym.envs.families.scenario import without_target
 
 CONFIG = RunConfig(suite="ncap2023", agents=("no-brake",), seeds=1)
 

@@ -14,7 +14,7 @@ from support.runs import SMALL_SUITE
 
 from lgmd_gym import __version__
 from lgmd_gym.cli import main as cli
-from lgmd_gym.video import VideoReader
+from lgmd_gym.clips import VideoReader
 
 
 def run(*arguments):

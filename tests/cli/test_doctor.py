@@ -47,7 +47,7 @@ def test_a_missing_codec_is_a_fault(monkeypatch):
     def unknown_encoder(*args, **kwargs):
         raise UnknownCodecError("libx264")
 
-    monkeypatch.setattr("lgmd_gym.video.VideoWriter._open", unknown_encoder)
+    monkeypatch.setattr("lgmd_gym.clips.VideoWriter._open", unknown_encoder)
     (fault,) = faults(doctor.run_check("video"))
     assert "libx264" in fault.message
     assert fault.fix == "pip install --force-reinstall av"

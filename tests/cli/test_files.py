@@ -12,12 +12,11 @@ import pytest
 
 from lgmd_gym.cli import main as cli
 from lgmd_gym.cli import paper
-from lgmd_gym.gallery import build
+from lgmd_gym.clips import VideoWriter, batch
 from lgmd_gym.paper import experiments
-from lgmd_gym.system.files import check_new_file, complete_file, complete_folder
-from lgmd_gym.system.lock import LOCK_FILE, FolderLock
-from lgmd_gym.video import VideoWriter
-from lgmd_gym.video.clips import batch
+from lgmd_gym.processes.files import check_new_file, complete_file, complete_folder
+from lgmd_gym.processes.lock import LOCK_FILE, FolderLock
+from lgmd_gym.report.gallery import build
 
 
 def names(folder):

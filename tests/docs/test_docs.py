@@ -17,9 +17,9 @@ from lgmd_gym.agents import AGENTS
 from lgmd_gym.benchmark.rows import KEYS
 from lgmd_gym.benchmark.suite_file import load_suite
 from lgmd_gym.cli import main as cli
+from lgmd_gym.clips import VideoWriter
 from lgmd_gym.training import TrainConfig
 from lgmd_gym.training.trainer import check_config
-from lgmd_gym.video import VideoWriter
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"

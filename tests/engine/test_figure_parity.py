@@ -10,8 +10,8 @@ from support.vectors import assert_equal_steps, make_pair
 from lgmd_gym.camera.objects import MODEL_BICYCLE, MODEL_MOTORCYCLE, MODEL_PEDESTRIAN
 from lgmd_gym.camera.scene_table import SceneTable
 from lgmd_gym.envs import env_id
-from lgmd_gym.envs.scenarios import FAMILIES
-from lgmd_gym.envs.scenarios.scenario import ADULT_SIZE, BICYCLE_SIZE, MOTORCYCLE_SIZE
+from lgmd_gym.envs.families import FAMILIES
+from lgmd_gym.envs.families.scenario import ADULT_SIZE, BICYCLE_SIZE, MOTORCYCLE_SIZE
 
 SIZES = {"pedestrian": ADULT_SIZE, "bicycle": BICYCLE_SIZE, "motorcycle": MOTORCYCLE_SIZE}
 

@@ -10,8 +10,8 @@ import pytest
 from support.scenarios import check_actor, invalid, scenario
 
 from lgmd_gym.envs.braking import BrakingEnv
-from lgmd_gym.envs.scenarios.distribution import draw_scenario, level_generator
-from lgmd_gym.envs.scenarios.scenario import RoadPlan
+from lgmd_gym.envs.families.distribution import draw_scenario, level_generator
+from lgmd_gym.envs.families.scenario import RoadPlan
 
 
 def test_queue_in_the_adjacent_lane():

@@ -4,7 +4,7 @@ from math import cos, pi, sin
 
 import pytest
 
-from lgmd_gym.envs.scenarios import make_scenario
+from lgmd_gym.envs.families import make_scenario
 
 
 @pytest.mark.parametrize(("left", "side"), [(True, 1), (False, -1)])

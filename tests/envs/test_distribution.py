@@ -13,19 +13,19 @@ from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs import FAMILIES
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.episode_source import RandomLevels
-from lgmd_gym.envs.registration import RANDOM_TASKS, env_id
-from lgmd_gym.envs.scenarios.distribution import (
+from lgmd_gym.envs.families.distribution import (
     ALL_FAMILIES,
     EXTRA_FAMILIES,
     LEVELS,
     draw_scenario,
     level_generator,
 )
-from lgmd_gym.envs.scenarios.extra_arguments import EXTRA_NON_THREATS, EXTRA_THREATS
-from lgmd_gym.envs.scenarios.free_lanes import free_lane
-from lgmd_gym.envs.scenarios.random_arguments import NON_THREATS, THREATS
-from lgmd_gym.envs.scenarios.rear import RELEASE
-from lgmd_gym.envs.scenarios.scenario import without_target
+from lgmd_gym.envs.families.extra_arguments import EXTRA_NON_THREATS, EXTRA_THREATS
+from lgmd_gym.envs.families.free_lanes import free_lane
+from lgmd_gym.envs.families.random_arguments import NON_THREATS, THREATS
+from lgmd_gym.envs.families.rear import RELEASE
+from lgmd_gym.envs.families.scenario import without_target
+from lgmd_gym.envs.registration import RANDOM_TASKS, env_id
 from lgmd_gym.wrappers.vector import LGMDObservation as LGMDVector
 
 HOLD = np.zeros(1, np.float32)

@@ -13,7 +13,7 @@ from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch, touched_side
 from lgmd_gym.envs.dynamics.longitudinal import advance, time_to_stop
 from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
-from lgmd_gym.envs.scenarios.scenario import Actor, Scenario
+from lgmd_gym.envs.families.scenario import Actor, Scenario
 
 
 def drive(speed, target, jerk, dt, steps):

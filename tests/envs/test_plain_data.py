@@ -14,7 +14,7 @@ from support.rollouts import HOLD, rollout
 
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.envs import FAMILIES, Actor, Bend, BrakingEnv, RoadPlan, Scenario, Segment, make_scenario
-from lgmd_gym.envs.scenarios.data import scenario_from_data, scenario_to_data
+from lgmd_gym.envs.families.data import scenario_from_data, scenario_to_data
 
 DATA = {
     "family": "mine",

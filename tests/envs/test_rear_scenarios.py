@@ -10,7 +10,7 @@ import pytest
 from support.scenarios import check_actor, invalid, scenario
 
 from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.scenarios.scenario import RoadPlan
+from lgmd_gym.envs.families.scenario import RoadPlan
 
 
 def test_approach_of_a_stationary_car():

@@ -12,7 +12,7 @@ from lgmd_gym.envs.dynamics.bodies import STEP_START
 from lgmd_gym.envs.dynamics.refined_contact import StepMotion, progress
 from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.envs.scenarios.scenario import Actor, Scenario
+from lgmd_gym.envs.families.scenario import Actor, Scenario
 
 
 def contact(scenario, hz, demand=0.0, config=None):

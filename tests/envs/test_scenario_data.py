@@ -10,9 +10,9 @@ import pytest
 from lgmd_gym.envs.dynamics.bodies import BICYCLE, CAR, EGO, PEDESTRIAN
 from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
-from lgmd_gym.envs.scenarios.registry import FAMILIES, make_scenario
-from lgmd_gym.envs.scenarios.road_users import run_up
-from lgmd_gym.envs.scenarios.scenario import Actor, RoadPlan, Scenario
+from lgmd_gym.envs.families.registry import FAMILIES, make_scenario
+from lgmd_gym.envs.families.road_users import run_up
+from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
 from lgmd_gym.envs.simulation.physics_state import place
 
 

@@ -39,13 +39,13 @@ MODULES = {
         _under("envs/dynamics", "contact", "swept_contact"), ("tests/envs/test_contact_by_hand.py",)
     ),
     "scenarios": Module(
-        _under("envs/scenarios", "adjacent", "crossing", "obstacles", "rear", "scenario", "turning"),
+        _under("envs/families", "adjacent", "crossing", "obstacles", "rear", "scenario", "turning"),
         (*_under("tests/envs", *(f"test_{name}_scenarios" for name in _FAMILIES), "test_scenario_data"),),
         ("_time_to_cover",),
     ),
     "metrics": Module(("lgmd_gym/benchmark/metrics.py",), ("tests/benchmark/test_formulas.py",)),
     "statistics": Module(
-        ("lgmd_gym/benchmark/statistics.py", *_under("lgmd_gym/benchmark/analysis", "bootstrap", "compare")),
+        ("lgmd_gym/statistics/intervals.py", *_under("lgmd_gym/benchmark/analysis", "bootstrap", "compare")),
         ("tests/benchmark/test_formulas.py", "tests/benchmark/test_statistics.py"),
         ("compare_runs", "compare_agents", "read_case_rows", "_agent_pairs"),
     ),

@@ -12,12 +12,12 @@ import pytest
 
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import make_env
-from lgmd_gym.benchmark.openscenario import read
-from lgmd_gym.benchmark.openscenario.export import export_case, scenario_xml
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_case
 from lgmd_gym.cli.main import run as run_command
 from lgmd_gym.envs import FAMILIES, Actor, BrakingEnv, Scenario, Segment
+from lgmd_gym.openscenario import read
+from lgmd_gym.openscenario.export import export_case, scenario_xml
 
 OPENDRIVE = os.environ.get("LGMD_OPENDRIVE_SCHEMAS")  # folder with opendrive_17_core.xsd of ASAM
 

@@ -3,8 +3,8 @@
 import pytest
 from support.openscenario import HEADER, START, element, parameter, scenario, values, variation, write
 
-from lgmd_gym.benchmark.openscenario.parameters import variations
-from lgmd_gym.benchmark.openscenario.reader import read_cells
+from lgmd_gym.openscenario.parameters import variations
+from lgmd_gym.openscenario.reader import read_cells
 
 
 def declared(folder, *items):

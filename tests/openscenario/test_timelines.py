@@ -4,9 +4,9 @@ from math import inf
 
 import pytest
 
-from lgmd_gym.benchmark.openscenario.timelines import Piece, Timeline, synchronise
 from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
+from lgmd_gym.openscenario.timelines import Piece, Timeline, synchronise
 
 
 def test_ramp_of_speed():

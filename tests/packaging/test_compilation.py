@@ -9,10 +9,10 @@ import numba
 import pytest
 
 from lgmd_gym.benchmark import warm_up
-from lgmd_gym.benchmark.executor import Executor
 from lgmd_gym.benchmark.plan import CasePlan
 from lgmd_gym.benchmark.runner import Run
-from lgmd_gym.system import compilation
+from lgmd_gym.kernels import compilation
+from lgmd_gym.processes.executor import Executor
 
 
 def kernel():

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from lgmd_gym.cli import main as cli
-from lgmd_gym.system import extras
+from lgmd_gym.processes import extras
 
 
 class Installed:

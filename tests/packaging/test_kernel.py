@@ -7,27 +7,26 @@ import sys
 
 import pytest
 
-from lgmd_gym.system import kernel as kernel_module
-
 SOURCE = """
-from lgmd_gym.system.kernel import kernel
+from lgmd_gym.kernels import kernel
 
-@kernel
+@kernel(exact=True, arrays=True)
 def square(x):
     if x < 0:
         raise ValueError("negative")
     return x * x
 
-@kernel
+@kernel(exact=True, arrays=True)
 def square_sum(x, y):
     return square(x) + square(y)
 
-@kernel
+@kernel(exact=True, arrays=True)
 def tripled(x):
     return square_sum(x, x) + square(x)
 """
 CALLS = "import squares as s; print(s.{}, len(s.square_sum.stats.cache_hits), len(s.square.stats.cache_hits))"
 
+kernel_module = importlib.import_module("lgmd_gym.kernels.kernel")
 pytestmark = pytest.mark.skipif(not kernel_module._KNOWN, reason="numba.njit with this version of numba")
 
 

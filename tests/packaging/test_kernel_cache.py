@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lgmd_gym.system.kernel_cache import VARIABLE, ensure_kernel_cache
+from lgmd_gym.kernels.kernel_cache import VARIABLE, ensure_kernel_cache
 
 NOWHERE = Path("/proc/nowhere")
 

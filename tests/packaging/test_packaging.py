@@ -20,13 +20,13 @@ HOMES = {"lgmd_gym": ROOT / "lgmd_gym", "lgmd_gym.envs": ROOT / "envs", "lgmd_gy
 # The folders of the package, highest first. A folder imports only from folders further down.
 ORDER = (
     "cli",
-    "gallery",
     "report",
     "training",
     "tuning",
     "paper",
     "rendering",
-    "video",
+    "clips",
+    "openscenario",
     "benchmark",
     "plotting",
     "agents",
@@ -36,8 +36,10 @@ ORDER = (
     "sensing",
     "camera",
     "neuron",
-    "simd",
-    "system",
+    "statistics",
+    "processes",
+    "kernels",
+    "source_links",
     "errors",
 )
 # The one exception: `lgmd_gym.benchmark.run`, the Python API of `lgmd-gym bench`, writes the report, too.
@@ -45,9 +47,8 @@ UPWARD = ["lgmd_gym.benchmark imports lgmd_gym.report.outputs"]
 # Within these folders, the sub-folders in the same order; "" is the folder's own files.
 ORDER_WITHIN = {
     "benchmark": ("analysis", ""),
-    "envs": ("traffic", "", "simulation", "scenarios", "dynamics"),
+    "envs": ("traffic", "", "simulation", "families", "dynamics"),
     "training": ("", "offline"),
-    "video": ("clips", ""),
 }
 
 
@@ -155,7 +156,7 @@ def test_import_is_fast():
 
 def test_the_package_folder_contains_four_modules_and_folders():
     flat = {path.name for path in (ROOT / "lgmd_gym").glob("*.py")}
-    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py"}
+    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py", "source_links.py"}
 
 
 def test_every_package_states_its_contents_in_one_sentence():

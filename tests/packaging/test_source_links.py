@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from lgmd_gym.system.source_links import LINKS, linked_folders
+from lgmd_gym.source_links import LINKS, linked_folders
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = "import lgmd_gym.envs as e, lgmd_gym.agents.registry as a; print(e.__file__, a.__file__, sep='\\n')"

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from lgmd_gym.cli import main as cli
+from lgmd_gym.clips.detection import detect
 from lgmd_gym.paper import experiments
 from lgmd_gym.paper.backgrounds import Grating
 from lgmd_gym.paper.claims import FAILS, HOLDS, LOCUST_SLOPE, PARTLY, evaluate_claims, write_claims
-from lgmd_gym.video.clips.detection import detect
 
 
 def stimulus_response(frequency):

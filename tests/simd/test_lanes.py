@@ -4,7 +4,7 @@ import numba as nb
 import numpy as np
 import pytest
 
-from lgmd_gym import simd
+from lgmd_gym.kernels import simd
 
 RNG = np.random.default_rng(0)
 A, B = RNG.normal(size=16).astype(np.float32), RNG.normal(size=16).astype(np.float32)

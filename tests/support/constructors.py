@@ -12,12 +12,12 @@ from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.suites import find_suite
+from lgmd_gym.clips import VideoReader, VideoWriter, find_clips, luma
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.training import PolicyWrapper, TrainConfig
 from lgmd_gym.tuning.objective import Objective
 from lgmd_gym.tuning.space import SearchSpace
-from lgmd_gym.video import VideoReader, VideoWriter, find_clips, luma
 from lgmd_gym.wrappers import LGMDObservation
 from lgmd_gym.wrappers.vector import LGMDObservation as VectorObservation
 

@@ -6,7 +6,7 @@ moviepy requires an old version of pillow with known vulnerabilities, so it is n
 import sys
 from types import ModuleType
 
-from lgmd_gym.video.writer import VideoWriter
+from lgmd_gym.clips.writer import VideoWriter
 
 MODULES = ("moviepy", "moviepy.video", "moviepy.video.io", "moviepy.video.io.ImageSequenceClip")
 

@@ -2,9 +2,9 @@
 
 from textwrap import indent
 
-from lgmd_gym.benchmark.openscenario.nodes import Element, parse_file
-from lgmd_gym.benchmark.openscenario.parameters import declare
-from lgmd_gym.benchmark.openscenario.reader import read_cells
+from lgmd_gym.openscenario.nodes import Element, parse_file
+from lgmd_gym.openscenario.parameters import declare
+from lgmd_gym.openscenario.reader import read_cells
 
 HEADER = '<FileHeader revMajor="1" revMinor="3" date="2026-01-01T00:00:00" author="a" description="d"/>'
 LANES = """<lanes><laneSection s="0">

@@ -12,9 +12,9 @@ from PIL import Image
 from support.recordings import write_yaml
 
 from lgmd_gym.agents.policies.card import read_card
+from lgmd_gym.clips import VideoReader
 from lgmd_gym.training import TrainConfig, train
 from lgmd_gym.training.videos import STRIP_LENGTH
-from lgmd_gym.video import VideoReader
 
 YAML = """
 default:

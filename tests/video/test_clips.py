@@ -8,16 +8,16 @@ import pytest
 from support.clips import write_lossless
 
 from lgmd_gym import LGMD, LGMDParams
-from lgmd_gym.neuron import Response
-from lgmd_gym.video.clips.detection import detect, find_onsets, summarize_detections
-from lgmd_gym.video.clips.playback import (
+from lgmd_gym.clips.detection import detect, find_onsets, summarize_detections
+from lgmd_gym.clips.playback import (
     PLAYBACK_CONFIGS,
     ClipFrame,
     ClipRun,
     DuplicateFilter,
     PlaybackConfig,
 )
-from lgmd_gym.video.clips.summary import BINS, ClipSummary
+from lgmd_gym.clips.summary import BINS, ClipSummary
+from lgmd_gym.neuron import Response
 
 VIDEOS = Path(os.environ.get("LGMD_VIDEOS", Path(__file__).parents[3] / "shared" / "data" / "videos"))
 # 0-based crash frames from the README of the clips; None without a crash.

@@ -11,8 +11,8 @@ from PIL import Image
 from support.clips import make_test_clip, truncate, write_lossless
 
 from lgmd_gym.cli import main as cli
-from lgmd_gym.video import VideoReader
-from lgmd_gym.video.clips.playback import PLAYBACK_CONFIGS, ClipRun, PlaybackConfig
+from lgmd_gym.clips import VideoReader
+from lgmd_gym.clips.playback import PLAYBACK_CONFIGS, ClipRun, PlaybackConfig
 
 
 def run(*arguments):

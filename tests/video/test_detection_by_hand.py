@@ -5,8 +5,8 @@ from math import exp, isnan
 import numpy as np
 import pytest
 
-from lgmd_gym.benchmark.statistics import Rate, poisson_interval
-from lgmd_gym.video.clips.detection import ChanceLevel, detect, find_onsets, summarize_detections
+from lgmd_gym.clips.detection import ChanceLevel, detect, find_onsets, summarize_detections
+from lgmd_gym.statistics.intervals import Rate, poisson_interval
 
 
 def alarm_at(frames, *numbers):

@@ -11,8 +11,8 @@ from mcap.reader import make_reader
 from PIL import Image
 
 from lgmd_gym.cli import main as cli
-from lgmd_gym.system.extras import install_command
-from lgmd_gym.video.clips.playback import ClipRun, PlaybackConfig
+from lgmd_gym.clips.playback import ClipRun, PlaybackConfig
+from lgmd_gym.processes.extras import install_command
 
 
 def read_messages(path):

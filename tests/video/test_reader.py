@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from support.clips import ffmpeg, make_test_clip, truncate
 
-from lgmd_gym.video import TruncatedVideoError, VideoReader, VideoWriter, find_clips, luma
-from lgmd_gym.video.probe import probe
-from lgmd_gym.video.writer import SUFFIXES
+from lgmd_gym.clips import TruncatedVideoError, VideoReader, VideoWriter, find_clips, luma
+from lgmd_gym.clips.probe import probe
+from lgmd_gym.clips.writer import SUFFIXES
 
 
 def test_luma_is_bt601():

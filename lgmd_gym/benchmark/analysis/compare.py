@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lgmd_gym.benchmark.rows import Row, key_of
-from lgmd_gym.benchmark.statistics import Mean, Rate, cluster_mean
 from lgmd_gym.benchmark.stored_run import read_run
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import Sample, cases_and_worlds, without_fcw_driver
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.errors import check_known
+from lgmd_gym.statistics.intervals import Mean, Rate, cluster_mean
 
 
 class Quantity(NamedTuple):

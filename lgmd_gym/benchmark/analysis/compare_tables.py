@@ -6,9 +6,9 @@ from rich.table import Table
 
 from lgmd_gym.benchmark.analysis.compare import Comparison, Difference
 from lgmd_gym.benchmark.analysis.trainings import ArmResult, Estimate
-from lgmd_gym.benchmark.statistics import Mean
 from lgmd_gym.benchmark.summary import INTERVAL_TEXT
 from lgmd_gym.errors import counted
+from lgmd_gym.statistics.intervals import Mean
 
 DIFFERENCE_CAPTION = (
     "B − A [95 % interval, bootstrap over cases and worlds]; number of pairs in which B is higher/lower, of n"

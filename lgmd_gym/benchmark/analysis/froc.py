@@ -19,10 +19,10 @@ import numpy as np
 from lgmd_gym.benchmark.file_names import series_name
 from lgmd_gym.benchmark.metrics import PREMATURE
 from lgmd_gym.benchmark.rows import key_of
-from lgmd_gym.benchmark.statistics import Rate, poisson_interval
 from lgmd_gym.benchmark.stored_run import read_run, read_series
 from lgmd_gym.benchmark.summary import write_csv
 from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.statistics.intervals import Rate, poisson_interval
 
 REARM_TIME = 1.0  # time below the threshold after which the next alarm is a new event [s]
 LEAD_TIME = 1.0  # latest start of a detection before contact [s]

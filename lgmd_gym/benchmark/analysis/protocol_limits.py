@@ -4,9 +4,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import case_order, cases_and_worlds
 from lgmd_gym.envs.dynamics.units import KMH
+from lgmd_gym.statistics.intervals import Rate
 
 # UN R152 Rev.2, 5.2.1.4, 5.2.2 and 5.2.3, M1, by target: relative speeds, and the highest relative impact
 # speeds at maximum mass and in running order, all in km/h. Between two columns the limit of the higher speed

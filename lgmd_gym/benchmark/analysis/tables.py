@@ -11,7 +11,6 @@ from lgmd_gym.benchmark.analysis.protocol_limits import (
     meets_r152,
 )
 from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.statistics import Mean, Rate
 from lgmd_gym.benchmark.summary import (
     INTERVAL_TEXT,
     AgentSummary,
@@ -22,6 +21,7 @@ from lgmd_gym.benchmark.summary import (
 )
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.errors import counted
+from lgmd_gym.statistics.intervals import Mean, Rate
 
 SCORE_CAPTION = (
     f"k/n [{INTERVAL_TEXT}, in %]; mean speed reduction in km/h [95 %, bootstrap over cases and worlds]; "

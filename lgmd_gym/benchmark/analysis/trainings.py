@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgmd_gym.benchmark.analysis.bootstrap import StratifiedBootstrap, interquartile_mean
 from lgmd_gym.benchmark.analysis.compare import read_case_rows
-from lgmd_gym.benchmark.effective_size import effective_size
 from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.statistics import wilson
 from lgmd_gym.benchmark.summary import Sample, cases_and_worlds, without_fcw_driver
 from lgmd_gym.errors import counted, unknown_name
+from lgmd_gym.statistics.bootstrap import StratifiedBootstrap, interquartile_mean
+from lgmd_gym.statistics.effective_size import effective_size
+from lgmd_gym.statistics.intervals import wilson
 
 RETURN = "episode_return"
 SHARES = {

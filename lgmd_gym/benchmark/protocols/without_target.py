@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 
 from lgmd_gym.benchmark.case import Case, scenario_case
+from lgmd_gym.envs.families.scenario import without_target
 from lgmd_gym.envs.registration import APPEARANCE
-from lgmd_gym.envs.scenarios.scenario import without_target
 
 SUFFIX = "-without-target"
 """Ending of the names of these suites, after the name of the suite with targets."""

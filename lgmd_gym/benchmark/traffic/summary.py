@@ -4,10 +4,10 @@ from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from lgmd_gym.benchmark.event_counts import count_interval
 from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.statistics import Rate
 from lgmd_gym.benchmark.summary import by_agent, by_condition, cases_and_worlds, rate_of, write_csv
+from lgmd_gym.statistics.event_counts import count_interval
+from lgmd_gym.statistics.intervals import Rate
 
 PER = 100_000.0  # [m], reference distance of the rates
 COLUMNS = (

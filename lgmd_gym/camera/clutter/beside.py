@@ -24,7 +24,7 @@ from lgmd_gym.camera.objects import (
     MODEL_WALL,
     body_of,
 )
-from lgmd_gym.camera.render.jit import exact_kernel
+from lgmd_gym.kernels import kernel
 
 Parts = list[np.ndarray]
 _SIGNS = np.array([MODEL_ROUND_SIGN, MODEL_TRIANGLE_SIGN, MODEL_PLATE_SIGN])
@@ -136,7 +136,7 @@ def bodies(length: np.ndarray, width: np.ndarray, rng: np.random.Generator) -> n
     return out
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def _write_bodies(world, length, width, out):
     for i in range(len(length)):
         out[0, i], out[1, i] = body_of(world, i, length[i], width[i], 1.5)

@@ -13,9 +13,9 @@ from lgmd_gym.camera.clutter.parts import records_of
 from lgmd_gym.camera.clutter.settings import Clutter
 from lgmd_gym.camera.clutter.sites import Sites, edge_places, lane_places, with_road_width
 from lgmd_gym.camera.objects import MODEL_MARK, OBJECT
-from lgmd_gym.camera.render.jit import exact_kernel
 from lgmd_gym.camera.roadside import is_clear
 from lgmd_gym.errors import check_type, check_whole
+from lgmd_gym.kernels import kernel
 
 FREE_HEIGHT = 4.5
 """No clutter stands on a lane below this height [m], except the queue."""
@@ -87,7 +87,7 @@ def _without_conflicts(records: np.ndarray, owner: np.ndarray, segments: np.ndar
     return ~dropped[owner]
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def _drop_from_lanes(records, owner, segments, dropped):
     """Mark the pieces with a part below the free height on a lane or within its margin."""
     for i in range(len(records)):
@@ -106,7 +106,7 @@ def _drop_from_lanes(records, owner, segments, dropped):
                 break
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def _drop_overlaps(records, owner, order, dropped):
     """Mark the pieces that overlap another one; the kinds that come first remain."""
     for first in range(len(order)):
@@ -123,7 +123,7 @@ def _drop_overlaps(records, owner, order, dropped):
                 dropped[max(owner[i], owner[j])] = True
 
 
-@exact_kernel
+@kernel(exact=True, arrays=True)
 def _overlap(a, b):
     """Return whether box b overlaps box a across the sides of a, and in height."""
     if a.base >= b.height or b.base >= a.height:

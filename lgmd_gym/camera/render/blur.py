@@ -8,7 +8,7 @@ import math
 
 import numba as nb
 
-from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.kernels import kernel
 
 MAX_STEPS = 8
 """Maximum number of images per frame."""

@@ -20,8 +20,8 @@ from lgmd_gym.camera.pose import side_tangent
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
 from lgmd_gym.camera.render.ground import CAST
 from lgmd_gym.camera.render.ground_band import outside_band
-from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.order import first_from
+from lgmd_gym.kernels import kernel
 
 _FADE_START, _FADE_END = 100.0, 150.0  # shadows fade out between these distances from the lens [m]
 _CROWN = np.array([(math.cos(0.25 * math.pi * k), math.sin(0.25 * math.pi * k)) for k in range(8)])

@@ -12,7 +12,6 @@ from lgmd_gym.camera.pose import noise_start, pose_lens, pose_on_car
 from lgmd_gym.camera.render.buffers import Buffers, Tables, Views, make_buffers
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.exposure import follow_exposure
-from lgmd_gym.camera.render.jit import outer_kernel
 from lgmd_gym.camera.render.models import all_models
 from lgmd_gym.camera.render.panorama import panorama_table
 from lgmd_gym.camera.render.raster import draw_frames
@@ -22,6 +21,7 @@ from lgmd_gym.camera.render.weather import aim_beam
 from lgmd_gym.camera.render.windscreen import dashboard_key, dashboard_pattern
 from lgmd_gym.camera.road_geometry import RoadGeometry
 from lgmd_gym.camera.worlds import draw_world
+from lgmd_gym.kernels import kernel
 
 _MAX_JOINED = 8  # tables that a workspace remembers
 
@@ -95,7 +95,7 @@ class Workspace:
         return Workspace, (self._shape,)
 
 
-@outer_kernel
+@kernel(arrays=True)
 def draw_cameras(first, last, tables_index, frames, selected, inputs):
     """Pose and draw the selected cameras of the environments first..last-1.
 

@@ -9,8 +9,8 @@ a tenth of a pixel changes the frame by a tenth of its contrast.
 import numba as nb
 
 from lgmd_gym.camera.render.edges import add_edge
-from lgmd_gym.camera.render.jit import inlined_kernel, kernel
-from lgmd_gym.simd import any_different, load_part, running_sum, splat, splat_last, store_part
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import any_different, load_part, running_sum, splat, splat_last, store_part
 
 NEAR = 0.1
 """Depth of the near plane [m]."""
@@ -48,7 +48,7 @@ def clip_and_project(lens, corners, n, out):
     return m
 
 
-@inlined_kernel
+@kernel(inline=True)
 def winding(uv, n):
     """Return twice the signed area of a projected polygon; positive if its left edge runs downwards."""
     area = 0.0
@@ -58,7 +58,7 @@ def winding(uv, n):
     return area
 
 
-@inlined_kernel
+@kernel(inline=True)
 def bounds(uv, n):
     """Return the bounds (left, top, right, bottom) of a projected polygon [px]."""
     left = right = uv[0, 0]
@@ -77,7 +77,7 @@ def add_polygon(acc, k, uv, n, w, w2):
         add_edge(acc, k, uv[i, 0], uv[i, 1], uv[j, 0], uv[j, 1], w, w2)
 
 
-@inlined_kernel
+@kernel(inline=True)
 def sum_differences(plane, at, count, carry):
     """Return sixteen coverages of a channel from its differences at index `at`, and the last of them.
 

@@ -8,8 +8,18 @@ import math
 
 import numba as nb
 
-from lgmd_gym.camera.render.jit import inlined_kernel, kernel
-from lgmd_gym.simd import LANES, as_floats, lane_numbers, load_part, madd, maximum, minimum, splat, store_part
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import (
+    LANES,
+    as_floats,
+    lane_numbers,
+    load_part,
+    madd,
+    maximum,
+    minimum,
+    splat,
+    store_part,
+)
 
 
 @kernel
@@ -24,7 +34,7 @@ def _add_column(acc, k, y0, y1, w, w2):
         row += 1
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _add_cell(acc, k, row, col, w, w2, both):
     """Add to one cell of channel k, and of the next if `both`; unsigned indices are not checked for sign."""
     r, c = nb.uint64(row), nb.uint64(col)
@@ -33,7 +43,7 @@ def _add_cell(acc, k, row, col, w, w2, both):
         acc[nb.uint64(k + 1), r, c] += nb.float32(w2)
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _add_upright(acc, k, start, y1, slope, col, w, w2):
     """Add an edge within one column of the frame, the most common case for small and upright objects.
 
@@ -52,7 +62,7 @@ def _add_upright(acc, k, start, y1, slope, col, w, w2):
         row += 1
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _add_steep(acc, k, start, y1, slope, w, w2):
     """Add an edge inside the frame with at most one column per row, and so in at most two columns of a row.
 
@@ -84,7 +94,7 @@ def _add_steep(acc, k, start, y1, slope, w, w2):
         row += 1
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _hat_integral(t):
     """Return the integral of the hat function max(1 - |t|, 0) up to t."""
     zero, one, half = splat(nb.float32(0.0)), splat(nb.float32(1.0)), splat(nb.float32(0.5))
@@ -92,14 +102,14 @@ def _hat_integral(t):
     return madd(half, rising * rising - falling * falling, falling)
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _add_lanes(acc, k, at, count, step):
     """Add to sixteen differences of channel k, at most `count`, from index `at` of the channel on."""
     plane = acc[k]
     store_part(plane, at, count, load_part(plane, at, count) + step)
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _add_shallow(acc, k, start, y1, slope, w, w2):
     """Add an edge inside the frame with more than one column per row; see `_add_steep`.
 
@@ -131,7 +141,7 @@ def _add_shallow(acc, k, start, y1, slope, w, w2):
         row += 1
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _add_narrow(acc, k, start, y1, slope, first, w, w2):
     """Add an edge as `_add_shallow` does, within fourteen columns from column `first` on."""
     x, y = start
@@ -153,7 +163,7 @@ def _add_narrow(acc, k, start, y1, slope, first, w, w2):
         at += acc.shape[2]
 
 
-@inlined_kernel
+@kernel(inline=True)
 def add_edge(acc, k, x0, y0, x1, y1, w, w2):  # noqa: C901  (six ways to leave the frame)
     """Add one directed edge, clipped to the frame.
 

@@ -9,8 +9,8 @@ import math
 
 import numba as nb
 
-from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.simd import LANES, load_part, madd, maximum, minimum, splat, square_root, total
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import LANES, load_part, madd, maximum, minimum, splat, square_root, total
 
 _EVERY = 4  # rows between those that are measured
 _GAIN, _CALLED, _TIME, _MEAN, _DEVIATION, _LAST_MEAN, _LAST_DEVIATION = range(7)

@@ -19,7 +19,7 @@ from lgmd_gym.camera.render.figure_builder import (
     SPOKE,
     TOE,
 )
-from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.kernels import kernel
 
 STEP = 0.43
 """Length of a step as a share of a pedestrian's height; adults walk with 0.41 to 0.45."""

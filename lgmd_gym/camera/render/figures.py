@@ -12,7 +12,6 @@ from lgmd_gym.camera.objects import MODEL_PEDESTRIAN
 from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_project, winding
 from lgmd_gym.camera.render.figure_builder import DAY_LAMP, REFLECTOR, WHEEL
 from lgmd_gym.camera.render.figure_motion import pose_figure
-from lgmd_gym.camera.render.jit import inlined_kernel, kernel
 from lgmd_gym.camera.render.order import distance
 from lgmd_gym.camera.render.solids import (
     compose,
@@ -22,6 +21,7 @@ from lgmd_gym.camera.render.solids import (
     place_object,
     to_axes,
 )
+from lgmd_gym.kernels import kernel
 
 _RETURN = 12.0  # light that a reflector returns, relative to that of a white surface in the same beam
 _ROUND = 0.55  # half the width of the round end of a limb, relative to the limb
@@ -75,32 +75,32 @@ def _to_camera(lens, obj, layer, used):
     place_corners(joints, used, axes, joints)
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _row(table, i):
     """Return row i of a table of vectors."""
     return table[i, 0], table[i, 1], table[i, 2]
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _dot(a, b):
     """Return the scalar product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _cross(a, b):
     """Return the vector product of two vectors."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _unit(a):
     """Return the unit vector in the direction of a vector."""
     scale = 1.0 / max(math.sqrt(_dot(a, a)), 1e-9)
     return scale * a[0], scale * a[1], scale * a[2]
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _grey_in_sun(part, obj, view, air, axes, way, along):
     """Return the grey of a part as a cylinder: `way` is the direction of view, `along` that of its length.
 
@@ -121,7 +121,7 @@ def _grey_in_sun(part, obj, view, air, axes, way, along):
     return grey
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _in_frame(layer, m):
     """Return whether the projected polygon may be in the frame; edges left of the frame would cancel."""
     if m < 3:

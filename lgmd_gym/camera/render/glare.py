@@ -4,7 +4,7 @@ import math
 
 import numba as nb
 
-from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.kernels import kernel
 
 BUDGET_PX = 3000.0
 """Approximate maximum area of all halos of a frame [px]."""

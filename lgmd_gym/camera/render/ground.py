@@ -14,7 +14,6 @@ import numpy as np
 
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, sum_differences, winding
 from lgmd_gym.camera.render.ground_band import ground_band
-from lgmd_gym.camera.render.jit import inlined_kernel, kernel
 from lgmd_gym.camera.render.texture_sampling import (
     bend_of,
     bent_texels,
@@ -24,7 +23,8 @@ from lgmd_gym.camera.render.texture_sampling import (
     texture_line,
 )
 from lgmd_gym.camera.render.weather import row_air, through_air
-from lgmd_gym.simd import (
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import (
     LANES,
     any_above,
     as_floats,
@@ -102,7 +102,7 @@ class Surface(NamedTuple):
     sunny: bool
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _surface_of(look):
     """Return the `Surface` of a `LOOK` record, once per row: in loops, compilers read records again."""
     return Surface(
@@ -112,7 +112,7 @@ def _surface_of(look):
     )  # fmt: skip
 
 
-@inlined_kernel
+@kernel(inline=True)
 def _ground_light(surface, tables, line, x, y, coverages):
     """Return the light of sixteen pixels by day: verge, asphalt, paint and shadow by their coverage."""
     road, paint, shadow, cast = coverages

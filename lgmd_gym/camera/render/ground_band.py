@@ -7,7 +7,7 @@ What these kernels exclude would add nothing to the frame, so that frames are th
 import math
 
 from lgmd_gym.camera.pose import half_frame
-from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.kernels import kernel
 
 _MARGIN_M = 0.2  # of the height of an object
 _MARGIN = 1.1  # factor on the height

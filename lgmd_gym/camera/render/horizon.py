@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.kernels import kernel
 
 
 class Horizon(NamedTuple):

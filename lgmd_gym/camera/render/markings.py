@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from lgmd_gym.camera.pose import half_frame, side_tangent
 from lgmd_gym.camera.render.ground import PAINT, add_quad
-from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.kernels import kernel
 
 _FAR = 2000.0  # markings end at this distance [m]
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from lgmd_gym.camera.objects import MODEL_MARK, is_picture
 from lgmd_gym.camera.pose import side_tangent
-from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.kernels import kernel
 
 
 @kernel

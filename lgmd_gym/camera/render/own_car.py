@@ -23,9 +23,9 @@ from lgmd_gym.camera.effects import to_light
 from lgmd_gym.camera.objects import index_shade
 from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pose import height_of, seed_of
-from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.worlds import draw_world
-from lgmd_gym.simd import (
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import (
     LANES,
     any_above,
     as_floats,

@@ -8,7 +8,7 @@ import numpy as np
 
 from lgmd_gym.camera.effects import WHITE, far_transmission, haze_grey, to_light
 from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.camera.render.jit import kernel
+from lgmd_gym.kernels import kernel
 
 _MAX_LOG2 = 13  # maximum width 8192 px, 0.044° each
 _ROWS = 128  # heights are multiples of this

@@ -14,7 +14,6 @@ from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare, add_sun_glare
 from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
 from lgmd_gym.camera.render.ground_band import above_or_below
 from lgmd_gym.camera.render.horizon import horizon_of
-from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.markings import add_lines
 from lgmd_gym.camera.render.models import Models
 from lgmd_gym.camera.render.order import distance, first_from, order_objects, visible
@@ -28,6 +27,7 @@ from lgmd_gym.camera.render.veil import add_sky_veil
 from lgmd_gym.camera.render.weather import light_at
 from lgmd_gym.camera.render.windscreen import add_reflections
 from lgmd_gym.camera.roadside import PLANT_RANGE
+from lgmd_gym.kernels import kernel
 
 
 @kernel

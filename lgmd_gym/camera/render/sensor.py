@@ -5,8 +5,8 @@ import math
 import numba as nb
 
 from lgmd_gym.camera.effects import NOISE_LOG2
-from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.simd import LANES, load_part, madd, maximum, minimum, splat, square_root, store_bytes
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import LANES, load_part, madd, maximum, minimum, splat, square_root, store_bytes
 
 _MID_GREY = 128.0  # where the noise levels of a sensor without a display curve hold
 

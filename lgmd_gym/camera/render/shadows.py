@@ -14,8 +14,8 @@ from lgmd_gym.camera.objects import (
 )
 from lgmd_gym.camera.render.ground import PAINT, SHADOW, add_ground_quad
 from lgmd_gym.camera.render.ground_band import outside_band
-from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.order import distance
+from lgmd_gym.kernels import kernel
 
 # Legs and wheels keep less of the sky's light from the road than a body close above it.
 _FIGURE_SPREAD, _FIGURE_SHARE = 0.3, 0.6

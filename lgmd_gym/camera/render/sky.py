@@ -6,8 +6,8 @@ from functools import lru_cache
 import numba as nb
 import numpy as np
 
-from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.simd import (
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import (
     LANES,
     any_above,
     as_floats,

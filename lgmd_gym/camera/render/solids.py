@@ -8,11 +8,21 @@ import numpy as np
 
 from lgmd_gym.camera.objects import is_picture
 from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_project, sum_differences
-from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL, UNDER
 from lgmd_gym.camera.render.order import distance
 from lgmd_gym.camera.render.veil import row_slope, veil_at
-from lgmd_gym.simd import LANES, any_above, load_part, madd, magnitude, maximum, minimum, splat, store_part
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import (
+    LANES,
+    any_above,
+    load_part,
+    madd,
+    magnitude,
+    maximum,
+    minimum,
+    splat,
+    store_part,
+)
 
 _HALF = 0.55  # reach of the models from their centre, as a share of their length and width
 _TRACE = nb.float32(1e-3)  # less grey comes from rounding

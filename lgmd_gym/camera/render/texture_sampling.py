@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numba as nb
 
-from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.texture import TEXEL_M
-from lgmd_gym.simd import as_floats, as_integers, gather_words, lane_numbers, madd, maximum, splat
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import as_floats, as_integers, gather_words, lane_numbers, madd, maximum, splat
 
 
 class TextureLine(NamedTuple):

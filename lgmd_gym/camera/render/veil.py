@@ -17,8 +17,8 @@ import math
 
 import numba as nb
 
-from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.simd import LANES, load_part, madd, splat, store_part
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import LANES, load_part, madd, splat, store_part
 
 _LAMP_HEIGHT = 0.65  # of the headlights above the ground [m]
 _CUT_OFF = 0.01  # the cut-off falls by this much per metre (UN R48: 1 % for headlights below 0.8 m)

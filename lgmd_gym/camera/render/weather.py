@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numba as nb
 
 from lgmd_gym.camera.effects import BEAM_WIDTH
-from lgmd_gym.camera.render.jit import kernel
 from lgmd_gym.camera.render.veil import veil_at
-from lgmd_gym.simd import load_part, madd, splat
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import load_part, madd, splat
 
 
 @kernel

@@ -8,8 +8,8 @@ import numpy as np
 
 from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pose import seed_of
-from lgmd_gym.camera.render.jit import kernel
-from lgmd_gym.simd import LANES, load_part, madd, splat, store_part
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import LANES, load_part, madd, splat, store_part
 
 _WAVES = 8
 

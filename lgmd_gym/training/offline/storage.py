@@ -8,7 +8,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from lgmd_gym.system.files import complete_file, is_intact_zip
+from lgmd_gym.processes.files import complete_file, is_intact_zip
 from lgmd_gym.training.offline.episodes import RecordedEpisode
 
 PER_DECISION = ("rewards", "braking_returns", "braking_contacts")

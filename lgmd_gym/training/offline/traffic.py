@@ -17,8 +17,8 @@ from lgmd_gym.benchmark.episode import rollout
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.camera import CONDITIONS, CameraSpec
 from lgmd_gym.envs.dynamics.brake import BrakeParams
+from lgmd_gym.envs.families.distribution import draw_camera_fields
 from lgmd_gym.envs.reward import RewardParams
-from lgmd_gym.envs.scenarios.distribution import draw_camera_fields
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, Emergencies, simulate_driver
 from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
 from lgmd_gym.neuron import NeuronSpec

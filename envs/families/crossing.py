@@ -1,0 +1,187 @@
+"""Crossing vehicles: Euro NCAP's CCCscp and CMCscp, and a crossing car that clears in time."""
+
+from math import pi
+
+from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.units import KMH, check_speed
+from lgmd_gym.envs.families.registry import family
+from lgmd_gym.envs.families.road_users import LARGE_CAR, MOTORCYCLE, SIDES, SMALL_CAR, parked_row
+from lgmd_gym.envs.families.scenario import (
+    AFTERMATH,
+    EGO_LENGTH,
+    EGO_WIDTH,
+    LANE_WIDTH,
+    START_TTC,
+    TARGET_LENGTH,
+    TARGET_WIDTH,
+    Actor,
+    RoadPlan,
+    Scenario,
+)
+from lgmd_gym.errors import check_flag, check_known, check_within
+
+START_GAP = 2.9  # [m] from a stopped ego to the target's path (AEB C2C v4.3.1, 8.2.5)
+SIDE_IMPACT = 0.1  # of the ego's length behind its front, where a motorcycle strikes it
+WAITING, PULL_AWAY = 4.5, 1.5  # [s], [m/s²], not specified by the protocol
+
+
+@family("CCCscp")
+def cross_straight(
+    ego_speed: float = 30 * KMH,
+    target_speed: float = 30 * KMH,
+    side: str = "right",
+    from_stop: bool = False,
+    obstructed: bool = False,
+    shade: int | None = None,
+) -> Scenario:
+    """A car crosses the ego's path and is struck in the side (Car-to-Car Crossing straight crossing path).
+
+    Without braking, the ego's centreline meets the target's side a quarter of its length behind its front.
+    Sources: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.5; Frontal Collisions v1.1, with parked cars.
+
+    Args:
+        ego_speed: Scripted ego speed, in (0, 40] [m/s].
+        target_speed: Target speed, in (0, 40] [m/s].
+        side: Side from which the target comes, "right" or "left".
+        from_stop: Whether the ego waits 2.9 m before the target's path and then accelerates to `ego_speed`.
+        obstructed: Whether three cars are parked before the junction, on the side from which the target
+            comes: 2 m beside the ego's centreline on the right, 5.5 m on the left.
+        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
+    """
+    speed, across = check_speed("ego_speed", ego_speed), check_speed("target_speed", target_speed)
+    if check_flag("from_stop", from_stop):
+        distance, profile = START_GAP, (Segment(start=WAITING, acceleration=PULL_AWAY, final_speed=speed),)
+        contact = _time_to_cover(distance, profile)
+    else:
+        distance, profile = START_TTC * speed, ()
+        contact = START_TTC
+    target = _crossing_car(distance, contact * across + TARGET_LENGTH / 4, across, side, shade)
+    parked = _occluders(distance + TARGET_WIDTH / 2, side) if check_flag("obstructed", obstructed) else ()
+    return Scenario(
+        family="CCCscp",
+        ego_speed=0.0 if from_stop else speed,
+        duration=contact + AFTERMATH,
+        actors=(target, *parked),
+        ego_profile=profile,
+        road=_road(distance, side),
+    )
+
+
+@family("CMCscp")
+def motorcycle_crosses(
+    ego_speed: float = 30 * KMH,
+    target_speed: float = 30 * KMH,
+    side: str = "right",
+    obstructed: bool = False,
+    shade: int | None = None,
+) -> Scenario:
+    """A motorcycle crosses the ego's path and strikes the ego (Car-to-Motorcyclist Crossing straight path).
+
+    Without braking, the middle of the motorcycle's front meets the ego's side 10 % of the ego's length behind
+    its front. Source: Euro NCAP Frontal Collisions v1.1.
+
+    Args:
+        ego_speed: Ego speed, in (0, 40] [m/s].
+        target_speed: Speed of the motorcycle, in (0, 40] [m/s].
+        side: Side from which the motorcycle comes, "right" or "left".
+        obstructed: Whether three cars are parked before the junction, as in CCCscp.
+        shade: Grey level of the rider's clothes in [0, 255]; None to draw it from the seed.
+    """
+    speed, across = check_speed("ego_speed", ego_speed), check_speed("target_speed", target_speed)
+    check_known("side", side, SIDES)
+    to_left = SIDES[side]
+    path = START_TTC * speed - SIDE_IMPACT * EGO_LENGTH  # of the motorcycle, from the ego's front [m]
+    before = EGO_WIDTH / 2 + MOTORCYCLE.length / 2 + START_TTC * across
+    target = Actor(
+        gap=path - MOTORCYCLE.length / 2,
+        lateral_offset=-to_left * before,
+        heading=to_left * pi / 2,
+        speed=across,
+        shade=shade,
+        **MOTORCYCLE.fields,
+    )
+    parked = _occluders(path, side) if check_flag("obstructed", obstructed) else ()
+    return Scenario(
+        family="CMCscp",
+        ego_speed=speed,
+        duration=START_TTC + AFTERMATH,
+        actors=(target, *parked),
+        road=_road(path - TARGET_WIDTH / 2, side),
+    )
+
+
+@family("CrossingClears")
+def cross_and_clear(
+    ego_speed: float = 40 * KMH,
+    target_speed: float = 40 * KMH,
+    clear_by: float = 1.5,
+    side: str = "right",
+    shade: int | None = None,
+) -> Scenario:
+    """A car crosses the ego's path and clears it before the ego arrives; not a threat.
+
+    Args:
+        ego_speed: Ego speed, in (0, 40] [m/s].
+        target_speed: Target speed, in (0, 40] [m/s].
+        clear_by: Time between the target's rear leaving the ego's lane and the ego's arrival, in [0.5, 4]
+            [s].
+        side: Side from which the target comes, "right" or "left".
+        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
+    """
+    speed, across = check_speed("ego_speed", ego_speed), check_speed("target_speed", target_speed)
+    distance = START_TTC * speed
+    clear_time = START_TTC - check_within("clear_by", clear_by, 0.5, 4.0, "s")
+    # At that time the target's rear is half a lane beyond the ego's centreline.
+    before = clear_time * across - LANE_WIDTH / 2 - TARGET_LENGTH / 2
+    return Scenario(
+        family="CrossingClears",
+        ego_speed=speed,
+        duration=START_TTC + 2.0,
+        actors=(_crossing_car(distance, before, across, side, shade),),
+        road=_road(distance, side),
+    )
+
+
+def _crossing_car(distance: float, before: float, speed: float, side: str, shade: int | None) -> Actor:
+    """Return a car that crosses the ego's path.
+
+    Args:
+        distance: Distance from the ego's front to the nearer side of the car, along the road [m].
+        before: Distance from the car's centre to the ego's centreline, along the car's path [m].
+        speed: Speed [m/s].
+        side: Side from which the car comes.
+        shade: Grey level; None to draw it from the seed.
+    """
+    check_known("side", side, SIDES)
+    to_left = SIDES[side]
+    return Actor(
+        gap=distance + TARGET_WIDTH / 2 - TARGET_LENGTH / 2,
+        lateral_offset=-to_left * before,
+        heading=to_left * pi / 2,
+        speed=speed,
+        shade=shade,
+    )
+
+
+def _occluders(path: float, side: str) -> tuple[Actor, ...]:
+    """Return the cars parked before the junction, `path` [m] from the ego's front to the target's path."""
+    from_right = side == "right"
+    front, inner = (path - 24.0, -2.0) if from_right else (path - 21.0, LANE_WIDTH + 2.0)
+    return parked_row(front, inner, (LARGE_CAR, SMALL_CAR, SMALL_CAR), 1.0)
+
+
+def _road(distance: float, side: str) -> RoadPlan:
+    """Return a crossing whose lane for traffic from that side contains the crossing car."""
+    lane = LANE_WIDTH / 2 * SIDES.get(side, 1.0)
+    return RoadPlan(kind="crossing", distance=EGO_LENGTH / 2 + distance + TARGET_WIDTH / 2 - lane)
+
+
+def _time_to_cover(distance: float, profile: tuple[Segment, ...]) -> float:
+    """Return the time that a car needs for a distance from a standstill [s]."""
+    # A module that loads numba; the registration of the scenario families must not.
+    from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
+
+    script, covered, step = SpeedProfile(0.0, profile), 0.0, 1e-3
+    while covered < distance:
+        covered += script.step(step)
+    return script.time

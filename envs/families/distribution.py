@@ -1,0 +1,101 @@
+"""Random distribution over the scenario families, divided into numbered levels for training and tuning."""
+
+from collections.abc import Collection, Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from lgmd_gym.camera import CONDITIONS
+from lgmd_gym.envs.families.extra_arguments import EXTRA_NON_THREATS, EXTRA_THREATS
+from lgmd_gym.envs.families.random_arguments import NON_THREATS, THREATS
+from lgmd_gym.envs.families.registry import make_scenario
+from lgmd_gym.envs.families.scenario import Scenario, without_target
+from lgmd_gym.errors import check_items, check_known, check_positive, check_whole
+
+SPLITS = ("train", "validation", "test")
+LEVELS = 1_000_000  # per split
+THREAT_SHARE = 0.5
+ALL_FAMILIES = (*THREATS, *NON_THREATS)
+EXTRA_FAMILIES = (*EXTRA_THREATS, *EXTRA_NON_THREATS)
+"""Families, and those at high speed, that levels contain only where they are named."""
+
+
+def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> tuple[int, int]:
+    """Check the arguments of `RandomLevels`, and return the first level and the number of levels.
+
+    Raises:
+        ValueError: If the split or a condition is unknown, or levels are outside the split.
+    """
+    check_known("split", split, SPLITS)
+    check_conditions(conditions)
+    first = check_whole("start_level", start_level, 0, LEVELS - 1)
+    return first, check_whole("num_levels", num_levels, 0, LEVELS - first)  # 0 for all
+
+
+def check_conditions(conditions: Sequence[str]) -> None:
+    """Raise ValueError for an unknown camera condition or an empty sequence."""
+    if not check_items("conditions", conditions, str):
+        raise ValueError("conditions needs at least one name, got none")
+    for condition in conditions:
+        check_known("condition", condition, CONDITIONS)
+
+
+def check_families(families: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the names of scenario families, or `ALL_FAMILIES` for None.
+
+    Raises:
+        ValueError: For an unknown family or an empty sequence.
+    """
+    if families is None:
+        return ALL_FAMILIES
+    if not check_items("families", families, str):
+        raise ValueError("families needs at least one name, got none")
+    for name in families:
+        check_known("family of random levels", name, (*ALL_FAMILIES, *EXTRA_FAMILIES))
+    return tuple(families)
+
+
+def check_range(name: str, limits: Sequence[float], unit: str) -> tuple[float, float]:
+    """Return the lowest and the highest value of a quantity.
+
+    Raises:
+        ValueError: Unless they are two numbers above 0 in ascending order.
+    """
+    values = [check_positive(name, value) for value in check_items(name, limits, Real)]
+    if len(values) != 2 or values[0] > values[1]:
+        raise ValueError(f"{name} must be the lowest and the highest value [{unit}], got {values}")
+    return values[0], values[1]
+
+
+def level_generator(split: str, level: int, part: int = 0) -> np.random.Generator:
+    """Return the random generator of a level; `part` selects one of its independent streams."""
+    return np.random.default_rng([SPLITS.index(split), level, *([part] if part else [])])
+
+
+def draw_camera_fields(split: str, level: int, conditions: Sequence[str]) -> dict[str, Any]:
+    """Return the camera fields of a level: a condition, and the contrast of the ground texture in [0.5, 1.5].
+
+    They are drawn from a separate random stream, so that the scenario does not depend on `conditions`.
+    """
+    rng = level_generator(split, level, part=1)
+    texture = float(rng.uniform(0.5, 1.5))
+    return {"condition": conditions[int(rng.integers(len(conditions)))], "texture": texture}
+
+
+def draw_scenario(rng: np.random.Generator, families: Collection[str] = ALL_FAMILIES) -> Scenario:
+    """Return a random scenario: a threat with probability `THREAT_SHARE`, otherwise a non-threat.
+
+    Args:
+        rng: Random generator of the level.
+        families: Families to draw from, with the frequencies that they have among all. Without a threat, or
+            without a non-threat, all scenarios are of the other kind.
+    """
+    threats, non_threats = THREATS | EXTRA_THREATS, NON_THREATS | EXTRA_NON_THREATS
+    kinds = (threats, non_threats) if rng.random() < THREAT_SHARE else (non_threats, threats)
+    first, second = ({name: kind[name] for name in kind if name in families} for kind in kinds)
+    drawn = first or second
+    weights = np.cumsum([family.weight for family in drawn.values()])
+    name = list(drawn)[int(np.searchsorted(weights, rng.random() * weights[-1], side="right"))]
+    scenario = make_scenario(drawn[name].family or name, **drawn[name].draw(rng))
+    return scenario if drawn[name].has_target else without_target(scenario)

@@ -1,0 +1,185 @@
+"""Run the neuron on a video, frame by frame."""
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from lgmd_gym.clips import VideoReader, luma
+from lgmd_gym.clips.detection import SILENCE_S
+from lgmd_gym.errors import check_known
+from lgmd_gym.neuron import LGMD, LGMDParams, Response
+
+TRACE_COLUMNS = (
+    "frame", "time_s", "duplicate", "spike_frequency", "spikes", "membrane_potential", "adapted_potential",
+    "ffi", "inhibition_weight", "excitation_latency_ms", "alert", "onset",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlaybackConfig:
+    """Neuron parameters and frame processing of a clip.
+
+    Attributes:
+        params: Neuron parameters.
+        fps: Rate to resample to [Hz]; None for the clip's.
+        size: (width, height) to scale to [px]; None for the clip's.
+        drop_duplicates: Threshold of the duplicate filter, a fraction of the typical difference between
+            frames; 0 disables it. The neuron skips duplicates and holds its last response. A conversion from
+            25 to 30 Hz makes every sixth frame a duplicate.
+        roi: (top, left, height, width) of the neuron's region of interest [px]; None for the whole frame.
+    """
+
+    params: LGMDParams = field(default_factory=LGMDParams)
+    fps: float | None = None
+    size: tuple[int, int] | None = None
+    drop_duplicates: float = 0.0
+    roi: tuple[int, int, int, int] | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.drop_duplicates < 1.0:
+            raise ValueError(
+                f"drop_duplicates must be in [0, 1), got {self.drop_duplicates:g}; 0.25 is typical"
+            )
+
+    def describe(self, fps: float | None = None) -> str:
+        """Describe T_sf with its frame rate, and all values that differ from the defaults.
+
+        Args:
+            fps: Frame rate of a clip [Hz]; None if unknown.
+        """
+        rate = fps or self.fps
+        at = f"at {rate:g} Hz" if rate else "at the clip's rate"
+        defaults = LGMDParams().to_dict()
+        other = {n: v for n, v in self.params.to_dict().items() if v != defaults[n] and n != "t_sf"}
+        listed = [f"{n} = {v}" for n, v in other.items()] if len(other) <= 2 else ["other parameters"]
+        extra = [f"near-duplicates below {self.drop_duplicates:g} dropped"] if self.drop_duplicates else []
+        return ", ".join([f"T_sf = {self.params.t_sf:g} spikes/s {at}", *listed, *extra])
+
+
+# The paper's model, variants with fewer false alarms, ablations and the previous model.
+PLAYBACK_CONFIGS = {
+    "paper": PlaybackConfig(),
+    "conservative": PlaybackConfig(params=LGMDParams(sigma_3=1.5), drop_duplicates=0.25),
+    "paper-18hz": PlaybackConfig(params=LGMDParams(t_sf=15.0), fps=18.0),
+    "t_sf-60": PlaybackConfig(params=LGMDParams(t_sf=60.0)),
+    "t_sp-0.78": PlaybackConfig(params=LGMDParams(t_sp=0.78, t_sf=15.0)),
+    "released": PlaybackConfig(params=LGMDParams.released()),
+    "off-only": PlaybackConfig(params=LGMDParams.off_only()),
+    "fixed-inhibition": PlaybackConfig(params=LGMDParams.fixed_inhibition()),
+    "yue-rind-2006": PlaybackConfig(params=LGMDParams.yue_rind2006(), fps=25.0),
+}
+
+
+def named_config(name: str) -> PlaybackConfig:
+    """Return one of `PLAYBACK_CONFIGS`.
+
+    Raises:
+        ValueError: For an unknown name, with the nearest known one.
+    """
+    check_known("configuration", name, PLAYBACK_CONFIGS)
+    return PLAYBACK_CONFIGS[name]
+
+
+class ClipFrame(NamedTuple):
+    """One frame of a clip and the neuron's response.
+
+    Attributes:
+        frame: Frame number from 0, at the rate of the run.
+        time: Time since the first frame [s].
+        picture: RGB picture, uint8, shape (height, width, 3).
+        duplicate: Whether the neuron skipped the frame as a duplicate.
+        response: The neuron's response; for a duplicate, the last one.
+        onset: Whether an alarm begins here after `SILENCE_S` without alarm.
+    """
+
+    frame: int
+    time: float
+    picture: np.ndarray
+    duplicate: bool
+    response: Response
+    onset: bool
+
+    def row(self) -> list[str]:
+        """Return the values of `TRACE_COLUMNS`."""
+        r = self.response
+        numbers = (r.spike_frequency, r.spikes, r.membrane_potential, r.adapted_potential, r.ffi,
+                   r.inhibition_weight, r.excitation_latency)  # fmt: skip
+        head = [str(self.frame), f"{self.time:.4f}", str(int(self.duplicate))]
+        return [*head, *(f"{value:.6g}" for value in numbers), str(int(r.alert)), str(int(self.onset))]
+
+
+class ClipRun:
+    """A run of one neuron on a clip; iterate over its frames once. Memory does not depend on its length.
+
+    Args:
+        path: Video file.
+        config: Neuron parameters and frame processing.
+
+    Attributes:
+        reader: Reader of the clip.
+        neuron: The neuron; None before the first frame.
+        duplicates: Number of duplicates so far.
+    """
+
+    def __init__(self, path: str | Path, config: PlaybackConfig) -> None:
+        self.config = config
+        self.reader = VideoReader(path, config.fps, config.size)
+        self.neuron: LGMD | None = None
+        self.duplicates = 0
+
+    def __iter__(self) -> Iterator[ClipFrame]:
+        """Yield the frames in order; `VideoReader` documents the exceptions."""
+        fps = self.reader.fps
+        silence, min_silence = 0, max(round(SILENCE_S * fps), 1)  # [frames]
+        duplicates = DuplicateFilter(self.config.drop_duplicates)
+        response: Response | None = None
+        for frame, picture in enumerate(self.reader):
+            grey = luma(picture)
+            if self.neuron is None:
+                self.neuron = LGMD(grey.shape, fps, self.config.params, roi=self.config.roi)
+            duplicate = duplicates.is_duplicate(grey)
+            if response is None or not duplicate:
+                response = self.neuron.step(grey)
+            self.duplicates += duplicate
+            onset = bool(response.alert) and silence >= min_silence
+            silence = 0 if response.alert else silence + 1
+            yield ClipFrame(frame, frame / fps, picture, duplicate, response, onset)
+
+
+class DuplicateFilter:
+    """Detect frames that differ far less than is typical from the last frame that is not a duplicate.
+
+    Args:
+        threshold: Fraction of the median of the last differences below which a frame is a duplicate; 0
+            disables the filter.
+    """
+
+    MAX_IN_A_ROW = 2  # duplicates come singly or in pairs; a longer row is a static scene
+    WINDOW = 15  # number of differences in the median
+
+    def __init__(self, threshold: float) -> None:
+        self.threshold = threshold
+        self._last: np.ndarray | None = None
+        self._differences: deque[float] = deque(maxlen=self.WINDOW)
+        self._in_a_row = 0
+
+    def is_duplicate(self, grey: np.ndarray) -> bool:
+        """Return whether the next frame, uint8, shape (H, W), is a duplicate."""
+        if self.threshold == 0.0:
+            return False
+        if self._last is None:
+            self._last = grey
+            return False
+        difference = float(np.abs(np.subtract(grey, self._last, dtype=np.int16)).mean())
+        typical = float(np.median(self._differences)) if len(self._differences) >= 3 else 0.0
+        if self._in_a_row < self.MAX_IN_A_ROW and difference < self.threshold * typical:
+            self._in_a_row += 1
+            return True
+        self._in_a_row = 0
+        self._last = grey
+        self._differences.append(difference)
+        return False

@@ -1,0 +1,182 @@
+"""Functions that numba compiles in 40 % less time than with `numba.njit`, to the same arithmetic.
+
+`numba.njit` makes machine code of every function, and a wrapper for calls from Python and another for calls
+from C. Most functions here are called by other compiled functions only, as a part of their machine code. They
+have none of the three until Python calls them.
+"""
+
+import gc
+from collections.abc import Callable
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+import numba
+from numba.core import config, sigutils
+from numba.core.caching import FunctionCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import register_pass
+from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
+
+from lgmd_gym.kernels.compilation import report_compilation
+from lgmd_gym.kernels.sources import source_stamp
+
+report_compilation()
+
+# Versions of numba with the internals that `Kernel` uses; with any other, `kernel` is `numba.njit`.
+_KNOWN = (0, 61) <= numba.version_info.short <= (0, 68)
+
+
+def kernel(
+    function: Callable[..., Any] | None = None,
+    *,
+    exact: bool = False,
+    inline: bool = False,
+    arrays: bool = False,
+) -> Any:
+    """Compile a function at its first call, without the GIL and single-threaded; numba caches it on disk.
+
+    A change of its file, or of any file of this package that it imports, invalidates the cache.
+
+    Args:
+        function: Function that numba can compile.
+        exact: Whether the results equal those of the same arithmetic in Python to the bit; if not, the
+            compiler may contract multiplications and additions, and ignore the sign of zero.
+        inline: Whether the function becomes part of each caller. It serves short functions that are called
+            for every edge or row: a call passes an array as eleven numbers.
+        arrays: Whether the function may create arrays, assign one array to another, return an array or
+            receive a `Bundle`. Without it, calls do not count references to arrays; the atomic counts took
+            half of the time of a frame.
+    """
+    if function is None:
+        return partial(kernel, exact=exact, inline=inline, arrays=arrays)
+    options: dict[str, Any] = {
+        "nogil": True,
+        "no_cfunc_wrapper": True,
+        "error_model": "numpy",
+        "_nrt": arrays,
+    }
+    options["fastmath"] = False if exact else {"contract", "nsz"}
+    if inline:
+        options["forceinline"] = True
+    if config.DISABLE_JIT or not _KNOWN:  # pyright: ignore[reportAttributeAccessIssue]
+        compiled: Any = numba.njit(cache=True, **options)(function)
+    else:
+        compiled = Kernel(function, targetoptions={**options, "nopython": True}, pipeline_class=_Compiler)
+        compiled.enable_caching()
+    index: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    if hasattr(index, "_source_stamp") and function.__module__.startswith("lgmd_gym."):
+        index._source_stamp = source_stamp(function.__module__)
+    return compiled
+
+
+class Kernel(CPUDispatcher):
+    """A function as `numba.njit` returns it, which is compiled for Python only if Python calls it.
+
+    Its overloads of the kind that Python cannot call are named `inner`; `_insert` never sees them.
+    """
+
+    _depth = 0  # of compilations, each of which was started by its caller's
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._inner: set[Any] = set()
+
+    def enable_caching(self) -> None:
+        """Cache on disk."""
+        self._cache = _Cache(self.py_func)
+
+    def compile(self, sig: Any) -> Any:
+        """Compile or load the function for the types `sig`; return the entry point."""
+        with global_compiler_lock, _without_garbage_collection():
+            args, _ = sigutils.normalize_signature(sig)
+            if Kernel._depth == 0 and args in self._inner:
+                self._inner.remove(args)
+                del self.overloads[args]
+            Kernel._depth += 1
+            try:
+                return super().compile(sig)
+            finally:
+                Kernel._depth -= 1
+
+    def add_overload(self, cres: Any) -> None:
+        """Store a compiled or loaded overload."""
+        if _is_inner():
+            args = tuple(cres.signature.args)
+            self._inner.add(args)
+            self.overloads[args] = cres
+            return
+        # The addresses of the environments of called functions, as numba does after loading from the cache.
+        for environment in cres._find_referenced_environments():
+            cres.codegen.set_env(environment.env_name, environment)
+        super().add_overload(cres)
+
+
+def _is_inner() -> bool:
+    """Return whether the function is compiled for a caller that is compiled."""
+    return Kernel._depth > 1
+
+
+@contextmanager
+def _without_garbage_collection() -> Any:
+    """Leave the collector off: it searches the growing structures of the compiler again and again."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+class _Cache(FunctionCache):
+    """Cache with separate entries for the two kinds of overloads."""
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return *super()._index_key(sig, codegen), _is_inner()
+
+
+class _InnerLibrary(JITCodeLibrary):
+    """LLVM module of a function without machine code, for the modules of the functions that call it."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    def serialize_using_object_code(self) -> Any:
+        return self.serialize_using_bitcode()
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Lowering(NativeLowering):
+    """Lowering of an inner function without wrapper and machine code, and of others as numba does."""
+
+    _name = "kernel_lowering"
+
+    def run_pass(self, state: Any) -> Any:
+        if not _is_inner():
+            return super().run_pass(state)
+        state.flags.no_compile = state.flags.no_cpython_wrapper = True
+        state.library = _InnerLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        super().run_pass(state)
+        state.library.finalize()
+        entry_point = object()
+        state.targetctx.insert_user_function(entry_point, state.cr.fndesc, [state.library])
+        state.cr = state.cr._replace(cfunc=entry_point)
+        return True
+
+
+class _Compiler(CompilerBase):
+    """numba's compiler with `_Lowering`."""
+
+    def define_pipelines(self) -> list[Any]:
+        manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        manager.passes = [
+            (_Lowering, name) if each is NativeLowering else (each, name) for each, name in manager.passes
+        ]
+        manager.finalize()
+        return [manager]

@@ -1,0 +1,10 @@
+"""OpenSCENARIO XML 1.1 to 1.3: files as suites, a comparison with their intent, and export of cases.
+
+XML is parsed with the standard library's expat, which reports lines. Packages for OpenSCENARIO and OpenDRIVE
+are not used: scenariogeneration only writes files and needs SciPy, pyxodr needs matplotlib and Shapely, and
+the ASAM checkers (asam-qc-openscenarioxml, asam-qc-opendrive) find faults but resolve no positions.
+"""
+
+from lgmd_gym.openscenario.reader import read, read_all
+
+__all__ = ["read", "read_all"]

@@ -1,0 +1,245 @@
+"""Compilation of a scenario to time scripts: our actors follow paths and segments of speed.
+
+Triggers and synchronisations are solved for the ego's undisturbed motion, as on a test track: an ego that
+brakes does not change the motion of the others. The episode begins `START_TTC` before the first contact, or
+1 s before the first change of speed of an entity if that is earlier: a longer wait at the start is cut, and a
+shorter one is extended at constant speeds.
+
+An ego that drives backwards is compiled to one that drives forwards with its leading end: the camera looks in
+the direction of travel, and the body is turned by 180 degrees.
+"""
+
+from dataclasses import dataclass, replace
+from math import hypot, inf, pi, remainder
+from pathlib import Path
+
+from lgmd_gym.envs.dynamics.bend import Bend
+from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
+from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.families.scenario import AFTERMATH, START_TTC, Actor, Scenario
+from lgmd_gym.openscenario.catalogs import Catalogs
+from lgmd_gym.openscenario.entities import Mover, read_entities
+from lgmd_gym.openscenario.nodes import Element, LocatedError, check_used
+from lgmd_gym.openscenario.paths import Place
+from lgmd_gym.openscenario.roads import read_roads
+from lgmd_gym.openscenario.storyboard import read_story, run_init
+from lgmd_gym.openscenario.surroundings import condition_of, road_plan
+from lgmd_gym.openscenario.world import World
+
+EGO = "ego"  # name of the ego, in any case; without one, the first entity
+LEAD_IN = 1.0  # [s] at constant speeds before the first change of speed
+HORIZON = 120.0  # [s] within which a contact is searched for
+DURATION = "lgmd_gym.duration"
+"""Property of the file: duration of the episode [s]; the episode then begins at the file's start."""
+_TAGS = (
+    "FileHeader VariableDeclarations MonitorDeclarations StopTrigger Performance SceneGraphFile UsedArea "
+    "TrafficSignals TimeOfDay DomeImage Wind AdditionalAxle License"
+)
+IGNORED_TAGS = frozenset(_TAGS.split())
+"""Elements without an effect on us, with all that they contain."""
+_ATTRIBUTES = (
+    "name z mass model model3d role h p r Weather.fractionalCloudCover Weather.cloudState Sun.elevation "
+    "Sun.azimuth Sun.intensity Sun.illuminance Weather.atmosphericPressure Weather.temperature "
+    "FrontAxle.maxSteering FrontAxle.wheelDiameter FrontAxle.trackWidth FrontAxle.positionZ "
+    "RearAxle.maxSteering RearAxle.wheelDiameter RearAxle.trackWidth RearAxle.positionZ "
+    "Vehicle.vehicleCategory Pedestrian.pedestrianCategory MiscObject.miscObjectCategory "
+    "Precipitation.precipitationIntensity Precipitation.intensity Controller.controllerType"
+)
+IGNORED_ATTRIBUTES = frozenset(_ATTRIBUTES.split())
+"""Attributes without an effect on us."""
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A concrete scenario.
+
+    Attributes:
+        scenario: The scenario.
+        condition: Camera condition.
+        start: Time in the file at which the episode begins [s].
+        contact: Time in the file of the ego's first contact if it does not brake [s]; inf without one.
+        ego: The ego.
+        target: The entity that the ego touches first, or the one it comes nearest to; None without one.
+        world: The world, for positions.
+        root: Root element with the values of the parameters.
+        properties: Properties of the file.
+    """
+
+    scenario: Scenario
+    condition: str
+    start: float
+    contact: float
+    ego: Mover
+    target: Mover | None
+    world: World
+    root: Element
+    properties: dict[str, str]
+
+
+def compile_scenario(root: Element, family: str) -> Compiled:
+    """Return a concrete scenario.
+
+    Args:
+        root: Root element with the values of the parameters.
+        family: Family of the scenario.
+
+    Raises:
+        ValueError: If the scenario contains something that is not supported; the message begins with the file
+            and line.
+    """
+    catalogs = Catalogs(root)
+    movers = read_entities(root, catalogs)
+    network = root.child("RoadNetwork").child("LogicFile")
+    world = World(read_roads(_file(network)), catalogs, movers)
+    board = root.child("Storyboard")
+    environment = run_init(board, world)
+    condition = condition_of(environment)
+    read_story(board, world).play(world)
+    for node in (root.node, *catalogs.visited):
+        check_used(node, IGNORED_TAGS, IGNORED_ATTRIBUTES)
+    ego = next((item for name, item in movers.items() if name.lower() == EGO), None)
+    if ego is None:
+        raise root.child("Entities").error("the scenario needs an entity with the name Ego")
+    try:
+        return _compile(root, world, ego, family, condition)
+    except LocatedError:
+        raise
+    except ValueError as error:
+        raise root.error(str(error)) from None
+
+
+def _file(item: Element) -> Path:
+    return item.node.file.parent / item.text("filepath")
+
+
+def _compile(root: Element, world: World, ego: Mover, family: str, condition: str) -> Compiled:
+    others = [item for item in world.movers.values() if item is not ego and not item.deleted]
+    contact, target = _first_contact(ego, [item for item in others if item.body.kind != "road_marking"])
+    properties = _properties(root)
+    duration = float(properties[DURATION]) if DURATION in properties else None
+    start = 0.0 if duration is not None else _start(contact, [ego, *others])
+    if duration is None:
+        others.sort(key=lambda item: item is not target)
+        duration = (
+            (contact if contact < inf else _last_change([ego, *others]) + START_TTC) - start + AFTERMATH
+        )
+    length = ego.body.length
+    base, _, _ = _pose(ego, start)
+    scenario = Scenario(
+        family=family,
+        ego_speed=ego.timeline.at(start).speed,
+        duration=duration,
+        actors=tuple(_actor(item, base, length, start) for item in others),
+        ego_profile=_profile(ego, start),
+        ego_path=_bends(ego, start),
+        road=road_plan(world.network, base, world.locate(base)),
+        ego_length=length,
+        ego_width=ego.body.width,
+        ego_reference=_pose(ego, start)[1] if _bends(ego, start) else 0.0,
+    )
+    return Compiled(scenario, condition, start, contact, ego, target, world, root, properties)
+
+
+def _properties(root: Element) -> dict[str, str]:
+    """Return the properties of a file, such as those of an exported one."""
+    header = root.find("FileHeader")
+    block = None if header is None else header.find("Properties")
+    return {} if block is None else {item.text("name"): item.text("value") for item in block.all("Property")}
+
+
+def _start(contact: float, movers: list[Mover]) -> float:
+    changes = [item.timeline.segments[0].start for item in movers if item.timeline.segments]
+    first = min(changes, default=inf) - LEAD_IN
+    start = min(contact - START_TTC, first)
+    return start if start < inf else 0.0
+
+
+def _last_change(movers: list[Mover]) -> float:
+    return max((item.start for mover in movers for item in mover.timeline.segments), default=0.0)
+
+
+def _pose(mover: Mover, time: float) -> tuple[Place, float, float]:
+    """Return the pose of a body's centre in its direction of travel, its reference, and its speed."""
+    motion = mover.timeline.at(time)
+    reference = -mover.body.reference if mover.backwards else mover.body.reference
+    if mover.track is None:
+        raise ValueError(f"entity {mover.name!r} has no position; add a TeleportAction to Init")
+    return mover.track.at(motion.distance).moved(reference), reference, motion.speed
+
+
+def _bends(mover: Mover, time: float) -> tuple[Bend, ...]:
+    """Return the bends of a body's path from a time on; none for a body that never moves."""
+    assert mover.track is not None
+    moves = mover.timeline.segments or mover.timeline.initial_speed > 0.0
+    return mover.track.part(mover.timeline.at(time).distance).bends if moves else ()
+
+
+def _profile(mover: Mover, start: float) -> tuple[Segment, ...]:
+    return tuple(replace(item, start=max(item.start - start, 0.0)) for item in mover.timeline.segments)
+
+
+def _actor(mover: Mover, ego: Place, ego_length: float, start: float) -> Actor:
+    place, reference, speed = _pose(mover, start)
+    seen, bends, body = place.seen_from(ego), _bends(mover, start), mover.body
+    heading = remainder(seen.heading, 2.0 * pi)
+    return Actor(
+        gap=seen.x - ego_length / 2 - body.length / 2,
+        lateral_offset=0.0 if abs(seen.y) < 1e-12 else seen.y,
+        heading=0.0 if abs(heading) < 1e-12 else heading,
+        speed=speed,
+        profile=_profile(mover, start),
+        path=bends,
+        kind=body.kind,
+        shade=body.shade,
+        length=body.length,
+        width=body.width,
+        height=body.height,
+        reference=reference if bends else 0.0,
+    )
+
+
+def _first_contact(ego: Mover, others: list[Mover]) -> tuple[float, Mover | None]:
+    """Return the time of the first contact, inf for none, and the body touched or else the nearest one."""
+    found, target, nearest = inf, None, inf
+    for other in others:
+        time, distance = _contact(ego, other, min(found, HORIZON))
+        if time < found:
+            found, target, nearest = time, other, 0.0
+        elif distance < nearest:
+            target, nearest = other, distance
+    return found, target
+
+
+def _contact(one: Mover, other: Mover, horizon: float) -> tuple[float, float]:
+    """Return the time of the first contact before a horizon, inf for none, and the least distance [m]."""
+    reach = (hypot(one.body.length, one.body.width) + hypot(other.body.length, other.body.width)) / 2
+    fastest = max(_top_speed(one) + _top_speed(other), 0.1)
+    time, least = 0.0, inf
+    while time < horizon:
+        a, b = _pose(one, time)[0], _pose(other, time)[0]
+        apart = hypot(a.x - b.x, a.y - b.y)
+        least = min(least, apart)
+        if apart <= reach and _touch(a, b, one, other):
+            return _bisect(one, other, max(time - 0.02, 0.0), time), 0.0
+        time += max((apart - reach) / fastest, 0.005)
+    return inf, least
+
+
+def _bisect(one: Mover, other: Mover, low: float, high: float) -> float:
+    while high - low > 1e-12 * max(high, 1.0):
+        middle = (low + high) / 2
+        if _touch(_pose(one, middle)[0], _pose(other, middle)[0], one, other):
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+def _top_speed(mover: Mover) -> float:
+    return max(mover.timeline.initial_speed, *(item.final_speed for item in mover.timeline.segments), 0.0)
+
+
+def _touch(a: Place, b: Place, one: Mover, other: Mover) -> bool:
+    first = Rectangle(a.x, a.y, a.heading, one.body.length, one.body.width)
+    second = Rectangle(b.x, b.y, b.heading, other.body.length, other.body.width)
+    return first_touch(first, second, 0.0, 0.0) == 0.0

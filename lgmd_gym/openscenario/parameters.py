@@ -1,0 +1,176 @@
+"""Parameters: declarations, constraints, assignments, and files that vary them."""
+
+from collections.abc import Mapping
+from itertools import product
+from math import floor
+from typing import NamedTuple
+
+from lgmd_gym.errors import shown, unknown_name
+from lgmd_gym.openscenario.nodes import Element, Node
+
+MAX_CELLS = 100_000
+_NUMBERS = ("double", "int", "integer", "unsignedInt", "unsignedShort")
+RULES = ("equalTo", "greaterThan", "lessThan", "greaterOrEqual", "lessOrEqual", "notEqualTo")
+
+
+class Assignment(NamedTuple):
+    """A value given to a parameter, and the node that gives it."""
+
+    value: str
+    node: Node
+
+
+def compare(value: str, rule: str, other: str) -> bool:
+    """Return whether a rule holds between two values; numbers are compared as numbers."""
+    try:
+        one, two = float(value), float(other)
+    except ValueError:
+        if rule not in ("equalTo", "notEqualTo"):
+            raise ValueError(
+                f"rule {rule} needs numbers, got {shown(value)} and {shown(other)}; use equalTo or notEqualTo"
+            ) from None
+        return (value == other) == (rule == "equalTo")
+    return {
+        "equalTo": one == two,
+        "notEqualTo": one != two,
+        "greaterThan": one > two,
+        "lessThan": one < two,
+        "greaterOrEqual": one >= two,
+        "lessOrEqual": one <= two,
+    }[rule]
+
+
+def declare(parent: Element, given: Mapping[str, Assignment]) -> dict[str, str]:
+    """Return the parameters that an element declares, with given values instead of the defaults.
+
+    Args:
+        parent: Element that may contain `ParameterDeclarations`.
+        given: Assigned values by name.
+
+    Returns:
+        The scope of the parent with the declared parameters, in the order of the file.
+
+    Raises:
+        ValueError: If a given parameter is not declared, a value has the wrong type, or a constraint is
+            violated.
+    """
+    scope, declared = dict(parent.scope), set[str]()
+    declarations = parent.find("ParameterDeclarations")
+    for item in () if declarations is None else declarations.all("ParameterDeclaration"):
+        item = Element(item.node, scope)
+        name = item.name_of("name")
+        default = item.text("value")
+        value, source = given.get(name, Assignment(default, item.node))
+        kind = item.choice("parameterType", (*_NUMBERS, "string", "boolean", "dateTime"))
+        _check_type(name, kind, value, source)
+        scope[name] = value
+        declared.add(name)
+        _check_constraints(item, name, value, source)
+    for name in given.keys() - declared:
+        raise given[name].node.error(str(unknown_name("parameter", name, declared)))
+    return scope
+
+
+def _check_type(name: str, kind: str, value: str, source: Node) -> None:
+    if kind in _NUMBERS:
+        try:
+            number = float(value)
+        except ValueError:
+            raise source.error(
+                f"parameter {name} of type {kind} must be a number, got {shown(value)}"
+            ) from None
+        if kind != "double" and number != floor(number):
+            raise source.error(f"parameter {name} of type {kind} must be a whole number, got {shown(value)}")
+    elif kind == "boolean" and value not in ("true", "false", "0", "1"):
+        raise source.error(f"parameter {name} must be true or false, got {shown(value)}")
+
+
+def _check_constraints(item: Element, name: str, value: str, source: Node) -> None:
+    """Check that all constraints of one of the groups hold."""
+    groups = [list(group.all("ValueConstraint")) for group in item.all("ConstraintGroup")]
+    texts = []
+    for group in groups:
+        rules = [(entry.choice("rule", RULES), entry.text("value")) for entry in group]
+        try:
+            met = all(compare(value, rule, bound) for rule, bound in rules)
+        except ValueError as error:
+            raise item.error(f"parameter {name}: {error}") from None
+        if met:
+            for other in item.all("ConstraintGroup"):
+                other.skip()
+            return
+        texts.append(" and ".join(f"{rule} {bound}" for rule, bound in rules))
+    if groups:
+        raise source.error(f"parameter {name} must be {' or '.join(texts)}, got {shown(value)}")
+
+
+def assignments(parent: Element) -> dict[str, Assignment]:
+    """Return the `ParameterAssignments` of an element."""
+    block = parent.find("ParameterAssignments")
+    given = {}
+    for item in () if block is None else block.all("ParameterAssignment"):
+        given[item.name_of("parameterRef")] = Assignment(item.text("value"), item.node)
+    return given
+
+
+def variations(distribution: Element) -> list[dict[str, Assignment]]:
+    """Return the assignments of every cell of a `ParameterValueDistribution`.
+
+    The cells are all combinations of the distributions; the first distribution varies slowest.
+
+    Raises:
+        ValueError: If a distribution is not deterministic or not supported, a parameter is assigned twice, or
+            there are too many cells.
+    """
+    block = distribution.child("Deterministic")
+    axes, size, names = list[list[dict[str, Assignment]]](), 1, set[str]()
+    for node in block.node.children:
+        item = Element(node, block.scope)
+        axis = _axis(item)
+        size *= len(axis)
+        if size > MAX_CELLS:
+            raise item.error(f"the file has more than {MAX_CELLS} cells; use fewer values")
+        for name in axis[0]:
+            if name in names:
+                raise item.error(f"parameter {name} is varied twice; remove one distribution")
+        names.update(axis[0])
+        axes.append(axis)
+    return [{name: item for part in parts for name, item in part.items()} for parts in product(*axes)]
+
+
+def _axis(item: Element) -> list[dict[str, Assignment]]:
+    if item.tag == "DeterministicMultiParameterDistribution":
+        sets = list(item.only("ValueSetDistribution").all("ParameterValueSet"))
+        axis = [
+            {
+                entry.name_of("parameterRef"): Assignment(entry.text("value"), entry.node)
+                for entry in values.all("ParameterAssignment")
+            }
+            for values in sets
+        ]
+        if not axis or any(entry.keys() != axis[0].keys() for entry in axis):
+            raise item.error("every ParameterValueSet of a distribution must assign the same parameters")
+        return axis
+    if item.tag != "DeterministicSingleParameterDistribution":
+        raise item.error(f"{item.tag} is not supported; use DeterministicSingleParameterDistribution")
+    name = item.name_of("parameterName")
+    values = item.only("DistributionSet", "DistributionRange")
+    if values.tag == "DistributionSet":
+        axis = [{name: Assignment(entry.text("value"), entry.node)} for entry in values.all("Element")]
+    else:
+        axis = [{name: Assignment(value, values.node)} for value in _range(values)]
+    if not axis:
+        raise item.error(f"the distribution of {name} has no value")
+    return axis
+
+
+def _range(values: Element) -> list[str]:
+    """Return the values of a range, both limits included if the steps reach them."""
+    step, limits = values.number("stepWidth"), values.child("Range")
+    low, high = limits.number("lowerLimit"), limits.number("upperLimit")
+    if step <= 0.0 or high < low:
+        raise values.error(f"a range needs stepWidth > 0 and upperLimit >= lowerLimit, got {step:g}")
+    count = floor((high - low) / step + 1e-9) + 1
+    if count > MAX_CELLS:
+        raise values.error(f"a range must have at most {MAX_CELLS} values, got {count}")
+    return [format(low + number * step, ".12g") for number in range(count)]

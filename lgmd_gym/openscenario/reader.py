@@ -1,0 +1,161 @@
+"""Reading of OpenSCENARIO XML 1.1 to 1.3 as suites."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from os.path import normpath
+from pathlib import Path
+
+from lgmd_gym.benchmark.case import Case, scenario_case
+from lgmd_gym.benchmark.suites import Suite
+from lgmd_gym.camera import CLEAR
+from lgmd_gym.errors import check_path, counted
+from lgmd_gym.openscenario.compiler import Compiled, compile_scenario
+from lgmd_gym.openscenario.names import file_name, variants
+from lgmd_gym.openscenario.nodes import Element, Node, parse_file
+from lgmd_gym.openscenario.parameters import Assignment, declare, variations
+
+SUFFIX = ".xosc"
+FAMILY = "Scenario_ID"  # parameter that names the family
+VERSIONS = ("1", "2", "3")
+DRIVER = "lgmd_gym.fcw_driver"
+"""Property of the file: whether the driver brakes after the alert."""
+FCW = "_FCW"
+"""Part of the name of a file or of its `Scenario_ID` that marks tests in which the driver brakes."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a file.
+
+    Attributes:
+        variant: Name within its family and file.
+        compiled: The scenario.
+        fcw_driver: Whether the driver brakes after the alert.
+    """
+
+    variant: str
+    compiled: Compiled
+    fcw_driver: bool
+
+
+def read(path: str | Path) -> Suite:
+    """Return the cells of an OpenSCENARIO file as a suite.
+
+    A case is named `stem/family/variant`: the file's stem, the parameter `Scenario_ID` or else the stem of
+    the scenario file, and the ego's speed in km/h with the other varied parameters. In a cell of a file with
+    "_FCW" in its stem or `Scenario_ID`, the driver brakes after the agent's alert (`Case.fcw_driver`). An
+    `Environment` at night, in fog or in rain sets the camera condition.
+
+    Args:
+        path: A scenario, or a file that varies the parameters of one.
+
+    Raises:
+        ValueError: If the file cannot be read, or contains something that is not supported. The message
+            begins with the file and line.
+    """
+    path = check_path("path", path)
+    suite = file_name(path.stem)
+    return Suite(suite, tuple(_case(suite, cell) for cell in read_cells(path)), f"OpenSCENARIO {path.name}")
+
+
+def read_all(paths: Sequence[str | Path]) -> Suite:
+    """Return the cells of several files and folders as one suite.
+
+    A folder stands for its files that vary parameters, and for all its scenarios if there is none; catalogs
+    are left out. The suite's name is that of the folder that contains all files; a case is named
+    `folder/family/file/variant`, with the path of the file in the folder.
+
+    Raises:
+        ValueError: See `read`; or if there is no file.
+    """
+    found = [file for path in paths for file in find_files(check_path("path", path))]
+    files = list({file.resolve(): file for file in found}.values())
+    if not files:
+        raise ValueError("suite must contain at least one file or folder, got none")
+    if len(files) == 1:
+        return read(files[0])
+    stems = [file.resolve().with_suffix("").parts for file in files]
+    common = 0
+    while all(len(parts) > common + 1 and parts[common] == stems[0][common] for parts in stems):
+        common += 1
+    suite = file_name(stems[0][common - 1])
+    cases = []
+    for file, parts in zip(files, stems, strict=True):
+        inside = "/".join(file_name(part) for part in parts[common:])
+        cases += [_case(suite, cell, f"{inside}/") for cell in read_cells(file)]
+    return Suite(suite, tuple(cases), f"OpenSCENARIO, {counted(len(files), 'file')}")
+
+
+def find_files(path: Path) -> list[Path]:
+    """Return an OpenSCENARIO file, or the files of a folder and its sub-folders; see `read_all`.
+
+    Raises:
+        ValueError: If there is none.
+    """
+    if not path.is_dir():
+        return [path]
+    found: dict[str, list[Path]] = {"ParameterValueDistribution": [], "Storyboard": []}
+    for file in sorted(path.rglob(f"*{SUFFIX}")):
+        for tag in found.keys() & {node.tag for node in parse_file(file).children}:
+            found[tag].append(file)
+    files = found["ParameterValueDistribution"] or found["Storyboard"]
+    if not files:
+        raise ValueError(f"suite: folder {str(path)!r} contains no scenario ({SUFFIX}); check the path")
+    return files
+
+
+def read_cells(path: Path) -> list[Cell]:
+    """Return the cells of a file, in the order of its variations.
+
+    Raises:
+        ValueError: See `read`.
+    """
+    root = _root(path)
+    distribution = root.find("ParameterValueDistribution")
+    if distribution is None:
+        return _cells(path, path, root.node, [{}])
+    target = distribution.child("ScenarioFile")
+    file = Path(normpath(path.parent / target.text("filepath")))
+    scenario = _root(file)
+    if scenario.find("Storyboard") is None:
+        raise target.error(f"{str(file)!r} is no scenario; ScenarioFile must name one with a Storyboard")
+    return _cells(path, file, scenario.node, variations(distribution))
+
+
+def _root(path: Path) -> Element:
+    root = Element(parse_file(path), {})
+    if root.tag != "OpenSCENARIO":
+        raise root.error(f"an OpenSCENARIO file must begin with OpenSCENARIO, got {root.tag}")
+    if root.find("ParameterValueDistribution", "Storyboard") is None:
+        found = ", ".join(node.tag for node in root.node.children) or "nothing"
+        raise root.error(f"the file has no Storyboard or ParameterValueDistribution, got {found}")
+    header = root.child("FileHeader")
+    version = header.text("revMajor"), header.text("revMinor")
+    if version[0] != "1" or version[1] not in VERSIONS:
+        raise header.error(f"OpenSCENARIO {'.'.join(version)} is not supported; use 1.1, 1.2 or 1.3")
+    return root
+
+
+def _cells(path: Path, file: Path, root: Node, given: Iterable[dict[str, Assignment]]) -> list[Cell]:
+    cells, varied = [], []
+    for assignments in given:
+        scope = declare(Element(root, {}), assignments)
+        family = file_name(scope.get(FAMILY, file.stem))
+        cells.append(compile_scenario(Element(root, scope), family))
+        varied.append({name: item.value for name, item in assignments.items()})
+    names = variants(varied, [cell.scenario.ego_speed for cell in cells])
+    return [
+        Cell(
+            name,
+            cell,
+            FCW in path.stem or FCW in cell.scenario.family or cell.properties.get(DRIVER) == "true",
+        )
+        for name, cell in zip(names, cells, strict=True)
+    ]
+
+
+def _case(suite: str, cell: Cell, prefix: str = "") -> Case:
+    compiled, arguments = cell.compiled, {}
+    if compiled.condition != CLEAR:
+        arguments["condition"] = compiled.condition
+    return scenario_case(suite, prefix + cell.variant, compiled.scenario, cell.fcw_driver, **arguments)

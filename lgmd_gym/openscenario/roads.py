@@ -1,0 +1,266 @@
+"""OpenDRIVE road networks: reference lines, lanes and the links between roads."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from heapq import heappop, heappush
+from pathlib import Path
+from typing import NamedTuple
+
+from lgmd_gym.envs.dynamics.bend import Bend
+from lgmd_gym.errors import unknown_name
+from lgmd_gym.openscenario.nodes import Element, Node, parse_file
+from lgmd_gym.openscenario.paths import Place, Track
+
+_CLOSE = 1e-3  # [m], tolerance of the geometries of a reference line
+End = tuple[str, str]  # road, and "start" or "end"
+
+
+class Width(NamedTuple):
+    """A cubic polynomial of the distance from `s`."""
+
+    s: float
+    coefficients: tuple[float, float, float, float]
+
+
+class Lane(NamedTuple):
+    """A lane of a lane section."""
+
+    kind: str  # OpenDRIVE's lane type, such as "driving"
+    widths: tuple[Width, ...]
+
+
+@dataclass(frozen=True)
+class Road:
+    """A road.
+
+    Attributes:
+        name: Its id.
+        length: Length [m].
+        line: Reference line.
+        sections: Start of each lane section [m], and its lanes by id; + left of the reference line.
+        offsets: Lane offsets.
+        left_hand: Whether traffic drives on the left.
+        junction: Id of the junction that the road belongs to, "-1" for none.
+        links: Road ends that the road's start and end are connected to.
+    """
+
+    name: str
+    length: float
+    line: Track
+    sections: tuple[tuple[float, dict[int, Lane]], ...]
+    offsets: tuple[Width, ...]
+    left_hand: bool
+    junction: str
+    links: dict[str, End]
+
+    def lanes(self, s: float) -> dict[int, Lane]:
+        """Return the lanes at a distance [m]."""
+        return next(lanes for start, lanes in reversed(self.sections) if start <= s or start == 0.0)
+
+    def section_start(self, s: float) -> float:
+        """Return the start of the lane section at a distance [m]."""
+        return next(start for start, _ in reversed(self.sections) if start <= s or start == 0.0)
+
+    def lane_centre(self, lane: int, s: float) -> float:
+        """Return the offset of a lane's centre from the reference line, + left [m].
+
+        Raises:
+            ValueError: If there is no such lane.
+        """
+        lanes, total = self.lanes(s), _polynomial(self.offsets, s)
+        if lane == 0:
+            return total
+        if lane not in lanes:
+            raise unknown_name(f"lane of road {self.name}", str(lane), map(str, lanes))
+        side, local = (1 if lane > 0 else -1), s - self.section_start(s)
+        for number in range(side, lane, side):
+            total += side * _polynomial(lanes[number].widths, local)
+        return total + side * _polynomial(lanes[lane].widths, local) / 2
+
+    def direction(self, lane: int) -> int:
+        """Return 1 if the traffic of a lane drives along the reference line, else -1."""
+        return 1 if (lane < 0) != self.left_hand else -1
+
+    def at(self, s: float, t: float = 0.0) -> Place:
+        """Return the pose of the reference line at a distance, shifted to the left by `t` [m]."""
+        return self.line.at(s, t)
+
+    def nearest(self, place: Place) -> tuple[float, float]:
+        """Return distance along and offset from the reference line of the point nearest to a place [m]."""
+        s = self.line.nearest(place, 0.0, self.length)
+        return s, place.seen_from(self.line.at(s)).y
+
+    def bends(self, direction: int, t: float) -> tuple[Bend, ...]:
+        """Return the bends of the line at offset `t` of the reference line [m].
+
+        Args:
+            direction: 1 for the direction of the reference line, -1 for the opposite.
+            t: Offset from the reference line, + left of it [m].
+
+        Raises:
+            ValueError: If a spiral would have to be shifted sideways.
+        """
+        bends, line = [], self.line.part(0.0, self.length).bends
+        for bend in line:
+            constant = bend.curvature == bend.last_curvature
+            if t != 0.0 and not constant:
+                raise ValueError(f"a lane along a spiral of road {self.name} is not supported; use an arc")
+            scale = 1.0 - bend.curvature * t if t != 0.0 else 1.0
+            first, last = bend.curvature / scale, bend.last_curvature / scale
+            if direction < 0:
+                first, last = -last, -first
+            bends.append(Bend(bend.length * scale, first, None if constant else last))
+        missing = self.length - sum(bend.length for bend in line)
+        straight = [Bend(missing)] if missing > _CLOSE else []
+        return (*bends, *straight) if direction > 0 else (*straight, *reversed(bends))
+
+
+def _polynomial(items: tuple[Width, ...], s: float) -> float:
+    item = next((item for item in reversed(items) if item.s <= s + 1e-9), None)
+    if item is None:
+        return 0.0
+    a, b, c, d = item.coefficients
+    ds = s - item.s
+    return a + ds * (b + ds * (c + ds * d))
+
+
+@dataclass(frozen=True)
+class RoadNetwork:
+    """The roads of an OpenDRIVE file by id."""
+
+    roads: dict[str, Road]
+
+    def road(self, name: str) -> Road:
+        """Return the road with an id.
+
+        Raises:
+            ValueError: If there is none.
+        """
+        if name not in self.roads:
+            raise unknown_name("road", name, self.roads)
+        return self.roads[name]
+
+    def route(self, first: str, direction: int | None, last: str) -> list[tuple[Road, int]]:
+        """Return the shortest way from one road to another, as roads and directions.
+
+        Args:
+            first: Id of the first road.
+            direction: Direction on it, 1 along the reference line; None for any.
+            last: Id of the last road.
+
+        Raises:
+            ValueError: If there is no way.
+        """
+        starts = (1, -1) if direction is None else (direction,)
+        queue: list[tuple[float, str, int, tuple[tuple[str, int], ...]]]
+        queue = [(self.road(first).length, first, way, ((first, way),)) for way in starts]
+        seen = set[tuple[str, int]]()
+        while queue:
+            length, name, way, steps = heappop(queue)
+            if name == last:
+                return [(self.roads[road], side) for road, side in steps]
+            if (name, way) in seen:
+                continue
+            seen.add((name, way))
+            for other, end in self._after(name, "end" if way > 0 else "start"):
+                side = 1 if end == "start" else -1
+                total = length + self.roads[other].length
+                heappush(queue, (total, other, side, (*steps, (other, side))))
+        raise ValueError(f"the road network has no way from road {first} to road {last}")
+
+    def _after(self, name: str, end: str) -> Iterator[End]:
+        """Yield the road ends that are connected to the end of a road."""
+        if end in self.roads[name].links:
+            yield self.roads[name].links[end]
+        for other in self.roads.values():
+            for side, target in other.links.items():
+                if target == (name, end):
+                    yield other.name, side
+
+
+def read_roads(path: Path) -> RoadNetwork:
+    """Return the road network of an OpenDRIVE file.
+
+    Raises:
+        ValueError: If the file cannot be read, or a geometry is not supported.
+    """
+    return _network(parse_file(path))
+
+
+@lru_cache(maxsize=32)
+def _network(node: Node) -> RoadNetwork:
+    root = Element(node, {})
+    if root.tag != "OpenDRIVE":
+        raise root.error(f"an OpenDRIVE file must begin with OpenDRIVE, got {root.tag}")
+    roads = [_road(item) for item in root.all("road")]
+    if not roads:
+        raise root.error("the file has no road")
+    return RoadNetwork({road.name: road for road in roads})
+
+
+def _road(item: Element) -> Road:
+    lanes = item.child("lanes")
+    return Road(
+        item.text("id"),
+        item.number("length"),
+        _reference_line(item.child("planView")),
+        tuple((section.number("s"), _lanes(section)) for section in lanes.all("laneSection")),
+        tuple(_width(offset, "s") for offset in lanes.all("laneOffset")),
+        item.text("rule", "RHT") == "LHT",
+        item.text("junction", "-1"),
+        dict(_links(item)),
+    )
+
+
+def _links(item: Element) -> Iterator[tuple[str, End]]:
+    """Yield the connections to roads; those to junctions follow from the connecting roads."""
+    link = item.find("link")
+    for tag, own in (("predecessor", "start"), ("successor", "end")):
+        other = None if link is None else link.find(tag)
+        if other is not None and other.text("elementType") == "road":
+            yield own, (other.text("elementId"), other.text("contactPoint"))
+
+
+def _lanes(section: Element) -> dict[int, Lane]:
+    lanes = {}
+    for side in section.all("left", "right"):
+        for lane in side.all("lane"):
+            widths = tuple(_width(width, "sOffset") for width in lane.all("width"))
+            lanes[int(lane.number("id"))] = Lane(lane.text("type"), widths)
+    return lanes
+
+
+def _width(item: Element, start: str) -> Width:
+    a, b, c, d = (item.number(name) for name in "abcd")
+    return Width(item.number(start), (a, b, c, d))
+
+
+def _reference_line(view: Element) -> Track:
+    """Return the reference line; its geometries must be continuous."""
+    start, bends, line = None, list[Bend](), None
+    for item in sorted(view.all("geometry"), key=lambda item: item.number("s")):
+        place = Place(item.number("x"), item.number("y"), item.number("hdg"))
+        if line is None:
+            start = place
+        else:
+            end = line.at(line.length)
+            if abs(end.x - place.x) + abs(end.y - place.y) > _CLOSE:
+                raise item.error("the geometries of a road must be continuous")
+        length = item.number("length")
+        if length > 1e-9:
+            bends.append(_bend(item, length))
+        assert start is not None
+        line = Track(start, tuple(bends))
+    if line is None:
+        raise view.error("planView must contain a geometry")
+    return line
+
+
+def _bend(item: Element, length: float) -> Bend:
+    shape = item.only("line", "arc", "spiral")
+    if shape.tag == "line":
+        return Bend(length)
+    if shape.tag == "arc":
+        return Bend(length, shape.number("curvature"))
+    return Bend(length, shape.number("curvStart"), shape.number("curvEnd"))

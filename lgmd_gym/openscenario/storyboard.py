@@ -1,0 +1,195 @@
+"""The storyboard: initial actions, and events that start in the order of their triggers."""
+
+from dataclasses import dataclass, field
+from math import inf
+
+from lgmd_gym.openscenario.actions import Run, global_action, private_action
+from lgmd_gym.openscenario.conditions import States, Trigger, read_trigger
+from lgmd_gym.openscenario.entities import Mover
+from lgmd_gym.openscenario.nodes import Element
+from lgmd_gym.openscenario.parameters import declare
+from lgmd_gym.openscenario.path_actions import settle
+from lgmd_gym.openscenario.world import World
+
+
+@dataclass(eq=False)
+class Event:
+    """An event of the storyboard.
+
+    Attributes:
+        item: The element.
+        triggers: Triggers of its act and of the event itself.
+        groups: Kind and name of the elements that contain it, and its own.
+        runs: Its actions; empty if none has an effect.
+        compiled: The triggers in a form that can be evaluated.
+        started: Start [s]; inf before.
+        ended: End [s]; inf before the start.
+    """
+
+    item: Element
+    triggers: tuple[Element | None, Element | None]
+    groups: list[tuple[str, str]]
+    runs: list[tuple[str, Run]]
+    compiled: tuple[Trigger, Trigger] | None = None
+    started: float = inf
+    ended: float = inf
+
+
+@dataclass
+class Storyboard:
+    """The events of a scenario, and what has happened.
+
+    Attributes:
+        events: The events, in the order of the file.
+        states: Start and end of acts, maneuvers, events and actions by kind and name [s].
+    """
+
+    events: list[Event]
+    states: States = field(default_factory=dict)
+
+    def play(self, world: World) -> None:
+        """Carry out all events that have an effect, in the order of their triggers.
+
+        Raises:
+            ValueError: If a trigger or an action is not supported.
+        """
+        waiting = [event for event in self.events if self._matters(event)]
+        for event in self.events:
+            if event not in waiting:
+                for trigger in event.triggers:
+                    if trigger is not None:
+                        trigger.skip()
+        for event in waiting:
+            act, own = (read_trigger(item, world, self.states) for item in event.triggers)
+            event.compiled = act, own
+        now = 0.0
+        while waiting:
+            times = [self._start(event, now) for event in waiting]
+            now = min(times)
+            if now == inf:
+                for event in waiting:
+                    event.item.skip()
+                return
+            event = waiting.pop(times.index(now))
+            self._carry_out(event, now)
+
+    def _matters(self, event: Event) -> bool:
+        """Return whether an event changes the motion, or another event that does refers to it."""
+        if event.runs:
+            return True
+        names = {name for _, name in event.groups}
+        return any(
+            reference.text("storyboardElementRef") in names
+            for other in self.events
+            if other.runs
+            for trigger in other.triggers
+            if trigger is not None
+            for reference in _references(trigger)
+        )
+
+    @staticmethod
+    def _start(event: Event, now: float) -> float:
+        assert event.compiled is not None
+        act, own = event.compiled
+        begun = act.first(0.0)
+        return own.first(max(begun, now)) if begun < inf else inf
+
+    def _carry_out(self, event: Event, now: float) -> None:
+        event.started = event.ended = now
+        for name, run in event.runs:
+            end = run(now)
+            self.states["action", name] = now, end
+            event.ended = max(event.ended, end)
+        for key in event.groups:
+            members = [other for other in self.events if key in other.groups and self._matters(other)]
+            start = min(other.started for other in members)
+            self.states[key] = start, max(other.ended for other in members)
+
+
+def _references(trigger: Element) -> list[Element]:
+    """Return the references to elements of the storyboard in a trigger."""
+    found = []
+    for group in trigger.all("ConditionGroup"):
+        for condition in group.all("Condition"):
+            for value in condition.all("ByValueCondition"):
+                found += value.all("StoryboardElementStateCondition")
+    return found
+
+
+def run_init(board: Element, world: World) -> Element | None:
+    """Carry out the initial actions; return the environment, None without one.
+
+    Raises:
+        ValueError: If an action is not supported.
+    """
+    environment, actions = None, board.child("Init").child("Actions")
+    for item in actions.all("GlobalAction"):
+        found = item.only("EnvironmentAction", "VariableAction")
+        if found.tag == "EnvironmentAction":
+            environment = world.catalogs.resolve(found, "Environment")
+        else:
+            found.skip()
+    for item in actions.all("Private"):
+        mover = world.mover(item)
+        for action in item.all("PrivateAction"):
+            run = private_action(action, mover, world)
+            if run is not None:
+                run(0.0)
+    for mover in world.movers.values():
+        settle(world, mover)
+    return environment
+
+
+def read_story(board: Element, world: World) -> Storyboard:
+    """Return the events of all stories.
+
+    Raises:
+        ValueError: If an action is not supported.
+    """
+    events = []
+    for story in board.all("Story"):
+        story = Element(story.node, declare(story, {}))
+        for act in story.all("Act"):
+            stop = act.find("StopTrigger")
+            if stop is not None:
+                stop.skip()
+            trigger = act.find("StartTrigger")
+            for group in act.all("ManeuverGroup"):
+                events += _group_events(story, act, trigger, group, world)
+    return Storyboard(events)
+
+
+def _group_events(
+    story: Element, act: Element, trigger: Element | None, group: Element, world: World
+) -> list[Event]:
+    _once(group)
+    actors = group.child("Actors")
+    if actors.flag("selectTriggeringEntities"):
+        raise actors.error("selectTriggeringEntities=true is not supported; list the entities")
+    movers = [world.mover(item) for item in actors.all("EntityRef")]
+    maneuvers = [*group.all("Maneuver")]
+    maneuvers += [world.catalogs.entry(item, "Maneuver") for item in group.all("CatalogReference")]
+    outer = [("story", story.text("name")), ("act", act.text("name")), ("maneuverGroup", group.text("name"))]
+    events = []
+    for maneuver in maneuvers:
+        for event in maneuver.all("Event"):
+            _once(event)
+            event.choice("priority", ("override", "overwrite", "parallel", "skip"))
+            names = [*outer, ("maneuver", maneuver.text("name")), ("event", event.text("name"))]
+            runs = [run for action in event.all("Action") for run in _runs(action, movers, world)]
+            events.append(Event(event, (trigger, event.find("StartTrigger")), names, runs))
+    return events
+
+
+def _runs(action: Element, movers: list[Mover], world: World) -> list[tuple[str, Run]]:
+    found = action.only("PrivateAction", "GlobalAction")
+    if found.tag == "GlobalAction":
+        runs = [global_action(found, world)]
+    else:
+        runs = [private_action(found, mover, world) for mover in movers]
+    return [(action.text("name"), run) for run in runs if run is not None]
+
+
+def _once(item: Element) -> None:
+    if item.number("maximumExecutionCount", 1.0) != 1.0:
+        raise item.error(f"{item.tag} maximumExecutionCount must be 1")

@@ -1,0 +1,1 @@
+"""Intervals, clustered rates and the bootstrap."""

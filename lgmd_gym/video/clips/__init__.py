@@ -1,1 +1,0 @@
-"""The neuron on video clips: playback, alert detection, summaries, tables and figures."""
