@@ -40,6 +40,7 @@ ORDER = (
     "processes",
     "kernels",
     "source_links",
+    "fields",
     "errors",
 )
 # The one exception: `lgmd_gym.benchmark.run`, the Python API of `lgmd-gym bench`, writes the report, too.
@@ -156,7 +157,7 @@ def test_import_is_fast():
 
 def test_the_package_folder_contains_four_modules_and_folders():
     flat = {path.name for path in (ROOT / "lgmd_gym").glob("*.py")}
-    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py", "source_links.py"}
+    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py", "fields.py", "source_links.py"}
 
 
 def test_every_package_states_its_contents_in_one_sentence():

@@ -1,0 +1,299 @@
+"""Records of parameters: frozen dataclasses whose fields state default, bounds, unit and meaning once.
+
+A field is declared in one place; checks, messages, documentation, the command line and the ranges of tuning
+read that declaration.
+
+Example:
+    >>> @record
+    ... class Mount(Record):
+    ...     '''Position of a camera.'''
+    ...
+    ...     label = "mount"
+    ...     height_m: float = number(1.2, "(0, 100]", "m", "Height above the ground.")
+    >>> Mount(height_m=0.0)
+    Traceback (most recent call last):
+    ...
+    ValueError: mount height_m must be in (0, 100] m, got 0.0
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
+
+from lgmd_gym.errors import (
+    as_tuple,
+    check_flag,
+    check_keys,
+    check_known,
+    check_number,
+    check_text,
+    check_type,
+    shown,
+)
+
+_KEY = "lgmd_gym"  # of the declaration in the metadata of a dataclass field
+_R = TypeVar("_R", bound=type)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Interval:
+    """A range of numbers.
+
+    Attributes:
+        low: Lower end.
+        high: Upper end; may be infinite.
+        has_low: Whether the lower end belongs to the range.
+        has_high: Whether the upper end belongs to the range.
+    """
+
+    low: float
+    high: float
+    has_low: bool = True
+    has_high: bool = True
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Return the range of a text such as "(0, 100]" or "[0, inf]"."""
+        low, high = (float(part) for part in text[1:-1].split(","))
+        return cls(low, high, text[0] == "[", text[-1] == "]")
+
+    def __contains__(self, value: float) -> bool:
+        above = self.low <= value if self.has_low else self.low < value
+        return above and (value <= self.high if self.has_high else value < self.high)
+
+    def __str__(self) -> str:
+        low = f"{'[' if self.has_low else '('}{self.low:g}"
+        return f"{low}, {self.high:g}{']' if self.has_high else ')'}"
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Declaration:
+    """What a field of a record may contain.
+
+    Attributes:
+        name: Name of the field; empty within the class body.
+        default: Default value; `dataclasses.MISSING` for a field that must be given.
+        check: Function of a name and a value that returns the checked value or raises ValueError.
+        bounds: Range or choices, for documentation; empty for none.
+        unit: Unit; empty for none.
+        doc: Meaning, one sentence or more.
+        interval: Range of a number; None for other kinds.
+        search: Range that tuning searches; None for a field that is not tuned.
+        group: Free label, for example of parameters that determine a rule's cameras.
+    """
+
+    name: str
+    default: Any
+    check: Callable[[str, Any], Any]
+    bounds: str
+    unit: str
+    doc: str
+    interval: Interval | None = None
+    search: tuple[float, float] | None = None
+    group: str = ""
+
+
+def number(
+    default: Any,
+    within: str,
+    unit: str = "",
+    doc: str = "",
+    *,
+    search: tuple[float, float] | None = None,
+    group: str = "",
+) -> Any:
+    """Declare a float.
+
+    Args:
+        default: Default value.
+        within: Range, for example "(0, 100]"; "[0, inf]" also allows infinity.
+        unit: Unit.
+        doc: Meaning.
+        search: Range that tuning searches.
+        group: See `Declaration`.
+    """
+    interval = Interval.parse(within)
+
+    def check(name: str, value: Any) -> float:
+        return _check_interval(name, check_number(name, value), interval, unit, value)
+
+    return _field(Declaration("", default, check, str(interval), unit, doc, interval, search, group))
+
+
+def whole(
+    default: Any,
+    within: str,
+    unit: str = "",
+    doc: str = "",
+    *,
+    search: tuple[float, float] | None = None,
+    group: str = "",
+) -> Any:
+    """Declare an int; arguments as of `number`."""
+    interval = Interval.parse(within)
+
+    def check(name: str, value: Any) -> int:
+        given = check_number(name, value)
+        if math.isinf(given) or given != int(given):
+            raise ValueError(f"{name} must be a whole number in {interval}, got {shown(value)}")
+        return int(_check_interval(name, given, interval, unit, value))
+
+    return _field(Declaration("", default, check, str(interval), unit, doc, interval, search, group))
+
+
+def numbers(default: tuple[float, ...], within: str, unit: str = "", doc: str = "") -> Any:
+    """Declare a tuple of as many floats as the default has; further arguments as of `number`."""
+    interval = Interval.parse(within)
+
+    def check(name: str, value: Any) -> tuple[float, ...]:
+        items = as_tuple(value)
+        if items is None or len(items) != len(default):
+            raise ValueError(f"{name} must be {len(default)} numbers, got {shown(value)}")
+        return tuple(_check_interval(name, check_number(name, x), interval, unit, x) for x in items)
+
+    return _field(Declaration("", default, check, str(interval), unit, doc, interval))
+
+
+def flag(default: Any, doc: str = "") -> Any:
+    """Declare a bool."""
+    return _field(Declaration("", default, check_flag, "", "", doc))
+
+
+def choice(default: Any, names: Collection[str], doc: str = "") -> Any:
+    """Declare one of some names."""
+
+    def check(name: str, value: Any) -> str:
+        return check_known(name, value, names)
+
+    return _field(Declaration("", default, check, ", ".join(map(repr, names)), "", doc))
+
+
+def text(default: Any, doc: str = "") -> Any:
+    """Declare a string."""
+    return _field(Declaration("", default, check_text, "", "", doc))
+
+
+def value(default: Any, check: Callable[[str, Any], Any], doc: str = "", bounds: str = "") -> Any:
+    """Declare a value with a check of its own, for example a nested record.
+
+    Args:
+        default: Default value.
+        check: Function of a name and a value that returns the checked value or raises ValueError.
+        doc: Meaning.
+        bounds: Values in words, for documentation.
+    """
+    return _field(Declaration("", default, check, bounds, "", doc))
+
+
+def optional(declared: Any) -> Any:
+    """Allow None in a declared field, and make it the default."""
+    declaration: Declaration = declared.metadata[_KEY]
+    inner = declaration.check
+
+    def check(name: str, value: Any) -> Any:
+        return None if value is None else inner(name, value)
+
+    bounds = f"{declaration.bounds}, or None" if declaration.bounds else ""
+    return _field(dataclasses.replace(declaration, default=None, check=check, bounds=bounds))
+
+
+@dataclass_transform(
+    frozen_default=True,
+    kw_only_default=True,
+    field_specifiers=(number, whole, numbers, flag, choice, text, value, optional),
+)
+def record(cls: _R) -> _R:
+    """Make a class a frozen dataclass, and add its declared fields to its docstring."""
+    made: Any = dataclasses.dataclass(frozen=True, slots=True, kw_only=True)(cls)
+    lines = [f"    {item.name}: {_documentation(item)}" for item in declarations(made)]
+    if lines and "Attributes:" not in (made.__doc__ or ""):
+        made.__doc__ = "\n".join([(made.__doc__ or "").rstrip(), "", "Attributes:", *lines, ""])
+    return made
+
+
+class Record:
+    """Base class of records, which checks every declared field.
+
+    Attributes:
+        label: Name of the record in error messages; empty for none.
+    """
+
+    __slots__ = ()
+    label: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        """Check every declared field, then call `check`."""
+        for item in declarations(type(self)):
+            name = f"{self.label} {item.name}".lstrip()
+            object.__setattr__(self, item.name, item.check(name, getattr(self, item.name)))
+        self.check()
+
+    def check(self) -> None:
+        """Raise ValueError for values that do not belong together; by default nothing is checked."""
+
+    @classmethod
+    def make(cls, value: Self | Mapping[str, Any] | None = None, **changes: Any) -> Self:
+        """Return a record from an instance, a mapping of its fields, or None for the defaults.
+
+        Args:
+            value: The record, or some of its fields.
+            changes: Fields to change on top.
+
+        Raises:
+            ValueError: For another type, an unknown field, or a value out of range.
+        """
+        if isinstance(value, cls):
+            return cast(Self, dataclasses.replace(cast(Any, value), **cls._known(changes)))
+        given = {} if value is None else dict(check_type(cls.label or cls.__name__, value, Mapping))
+        return cls(**cls._known(given | changes))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields as plain values; nested records become dicts and tuples become lists."""
+        return {item.name: _plain(getattr(self, item.name)) for item in dataclasses.fields(cast(Any, self))}
+
+    @classmethod
+    def _known(cls, values: Mapping[str, Any]) -> dict[str, Any]:
+        known = [item.name for item in dataclasses.fields(cast(Any, cls))]
+        check_keys(f"{cls.label or cls.__name__} field", values, known)
+        return dict(values)
+
+
+def declarations(cls: type) -> list[Declaration]:
+    """Return the declared fields of a record, in order."""
+    return [
+        dataclasses.replace(item.metadata[_KEY], name=item.name)
+        for item in dataclasses.fields(cast(Any, cls))
+        if _KEY in item.metadata
+    ]
+
+
+def _field(declaration: Declaration) -> Any:
+    metadata = {_KEY: declaration}
+    if declaration.default is dataclasses.MISSING:
+        return dataclasses.field(metadata=metadata)
+    return dataclasses.field(default=declaration.default, metadata=metadata)
+
+
+def _check_interval(name: str, number: float, interval: Interval, unit: str, given: Any) -> float:
+    if math.isinf(number) and not (math.isinf(interval.high) and interval.has_high and number > 0):
+        raise ValueError(f"{name} must be finite, got {shown(given)}")
+    if number not in interval:
+        raise ValueError(f"{name} must be in {interval}{f' {unit}' if unit else ''}, got {shown(given)}")
+    return number
+
+
+def _documentation(item: Declaration) -> str:
+    """Return meaning, unit, range and default of a field in one line."""
+    text = item.doc.rstrip(".")
+    text += f" [{item.unit}]" if item.unit else ""
+    text += f"; in {item.bounds}" if item.interval else f"; one of {item.bounds}" if item.bounds else ""
+    return f"{text}; default {item.default!r}." if item.default is not dataclasses.MISSING else f"{text}."
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Record):
+        return value.to_dict()
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(item) for item in cast(Sequence[Any], value)]
+    return value
