@@ -127,8 +127,7 @@ def make_braking(
     Args:
         family: A scenario family for `BrakingEnv`, "RandomBraking" for random levels, or "Scenario" for a
             scenario given as data.
-        camera: See `LGMDObservation`; None for no camera, as required by the vectorized
-            `lgmd_gym.wrappers.vector.LGMDObservation`.
+        camera: See `LGMDObservation`; None for no camera.
         params: See `LGMDObservation`.
         fps: See `LGMDObservation`.
         include_frame: See `LGMDObservation`.

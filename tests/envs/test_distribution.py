@@ -26,7 +26,6 @@ from lgmd_gym.envs.families.random_arguments import NON_THREATS, THREATS
 from lgmd_gym.envs.families.rear import RELEASE
 from lgmd_gym.envs.families.scenario import without_target
 from lgmd_gym.envs.registration import RANDOM_TASKS, env_id
-from lgmd_gym.wrappers.vector import LGMDObservation as LGMDVector
 
 HOLD = np.zeros(1, np.float32)
 
@@ -288,21 +287,6 @@ def test_the_engine_draws_the_same_families(name, arguments):
             key: info[key] for key in ("level", "world", "gap", "ego_speed")
         }
     envs.close()
-
-
-def test_vector_environment_equals_single_environments():
-    kind, count = "LGMD/RandomBraking-v0", 6
-    vector = LGMDVector(gym.make_vec(kind, num_envs=count, vectorization_mode="sync", camera=None))
-    vector.reset(seed=list(range(count)))
-    single = [gym.make(kind) for _ in range(count)]
-    for seed, env in enumerate(single):
-        env.reset(seed=seed)
-    for _ in range(12):
-        both, *_ = vector.step(np.zeros((count, 1), np.float32))
-        for index, env in enumerate(single):
-            one, *_ = env.step(HOLD)
-            assert np.array_equal(both["ffi"][index], one["ffi"])
-    assert len({env.unwrapped.camera_fields["condition"] for env in single}) > 1
 
 
 @pytest.mark.parametrize(

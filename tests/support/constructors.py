@@ -19,7 +19,6 @@ from lgmd_gym.training import PolicyWrapper, TrainConfig
 from lgmd_gym.tuning.objective import Objective
 from lgmd_gym.tuning.space import SearchSpace
 from lgmd_gym.wrappers import LGMDObservation
-from lgmd_gym.wrappers.vector import LGMDObservation as VectorObservation
 
 CONFIG = (
     *("simulation_frequency", "policy_frequency", "throttle", "reward", "action", "observation", "duration"),
@@ -101,12 +100,6 @@ def wrapped(wrapper, **arguments):
 def viewed(**arguments):
     """Wrap an environment with a view."""
     return lgmd_gym.LGMDView(gym.make("LGMD/CCRs-v0", camera={"name": "wide", "shape": [8, 8]}), **arguments)
-
-
-def vector(**arguments):
-    """Wrap a vector environment."""
-    made_envs = gym.make_vec("LGMD/CCRs-v0", num_envs=2, vectorization_mode="sync", camera=None)
-    return VectorObservation(made_envs, **arguments)
 
 
 def case(**arguments):
@@ -210,7 +203,6 @@ def _add_environments(add):
         made,
     )
     add("LGMDObservation env", LGMDObservation, {"env": None}, {"env": "int"})
-    add("vector LGMDObservation", vector, {"camera": SMALL}, _without_env(VectorObservation), made)
     add("LGMDView", viewed, {}, _without_env(lgmd_gym.LGMDView), made)
 
 
