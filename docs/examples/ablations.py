@@ -50,7 +50,6 @@ def replaced(**fields: Any) -> Callable[[Camera], dict[str, Any]]:
 
 ARMS: dict[str, Callable[[Camera], dict[str, Any]]] = {
     "complete sensor": dict,
-    "stabilised by the image": replaced(stabilised="image"),
     "no stabilisation": replaced(stabilised=False),
     "no calibration": replaced(calibrated=False),
     "no contrast control": replaced(contrast_s=0.0),

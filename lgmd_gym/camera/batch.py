@@ -15,7 +15,6 @@ from lgmd_gym.camera.render.buffers import Views
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.context import SharedTables, Workspace, draw_cameras, tables_key
 from lgmd_gym.camera.render.exposure import STATE_SIZE
-from lgmd_gym.camera.render.own_car import OWN_CAR, own_car_of
 
 
 class _Prepared(NamedTuple):
@@ -24,7 +23,6 @@ class _Prepared(NamedTuple):
     mount: np.ndarray
     look: np.ndarray
     beam: np.ndarray
-    own_car: np.ndarray
     tables_key: tuple[Any, ...]
     params: CameraParams
 
@@ -32,8 +30,7 @@ class _Prepared(NamedTuple):
 @lru_cache(maxsize=512)
 def _prepare(p: CameraParams) -> _Prepared:
     p = in_world(p)
-    look = look_of(p)
-    return _Prepared(mount_of(p), look, beam_profile(p), own_car_of(p, look), tables_key(p), p)
+    return _Prepared(mount_of(p), look_of(p), beam_profile(p), tables_key(p), p)
 
 
 class CameraBatch:
@@ -71,7 +68,6 @@ class CameraBatch:
             sky_aims=np.full((*size, 3), np.nan),
             noise_starts=np.zeros(size, dtype=np.int64),
             exposures=np.full((*size, STATE_SIZE), np.nan),
-            own_cars=np.zeros(size, OWN_CAR),
         )
         # Index of the tables, camera, mount and lenses of each camera, and the fields of its view.
         self._bundle = Bundle(
@@ -98,7 +94,6 @@ class CameraBatch:
         self._mounts[index, member] = prepared.mount
         self._views.looks[index, member] = prepared.look
         self._views.beams[index, member] = prepared.beam
-        self._views.own_cars[index, member] = prepared.own_car
         self._views.sky_aims[index, member] = np.nan  # redraw the sky
         self._views.exposures[index, member] = np.nan  # adapt to the next frame
         if texture is not None:
@@ -126,17 +121,6 @@ class CameraBatch:
         right, up = gaze or (0.0, 0.0)
         mount["yaw_deg"], mount["pitch_deg"] = mounted["yaw_deg"] + right, mounted["pitch_deg"] + up
         mount["gaze"] = GAZES[p.gaze] if gaze is None else FIXED
-
-    def set_measured_rotation(self, first: int, last: int, rotations: np.ndarray) -> None:
-        """Set the rotation of the body as measured in the image, for `stabilised="image"`.
-
-        Args:
-            first: First environment.
-            last: Last environment + 1.
-            rotations: Pitch, roll and yaw of every environment, float64, shape (num_envs, 3) [degrees].
-        """
-        for axis, name in enumerate(("image_pitch", "image_roll", "image_yaw")):
-            self._mounts[name][first:last] = rotations[first:last, axis, None]
 
     def draw(
         self,

@@ -39,7 +39,6 @@ BOUNDS = {
     "stop_deceleration": _Interval(0.5, 12.0, True, True, "m/s²"),
     "max_deceleration": _Interval(0.1, 12.0, True, True, "m/s²"),
     "stop_reaction": _Interval(0.0, 3.0, True, True, "s"),
-    "windscreen": _Interval(0.0, 0.2, True, True, "of the light of the sky"),
 }
 
 

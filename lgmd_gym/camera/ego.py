@@ -20,7 +20,7 @@ class EgoCamera:
     """A camera on the ego car of any highway-env environment.
 
     Frames are grey, uint8, shape (height, width), with row 0 at the top. The same seed and the same road
-    state give the same frame, in any process. Of the ego's own body, at most the bonnet is drawn.
+    state give the same frame, in any process. The ego's own body is not drawn.
 
     Args:
         params: A preset's name, `CameraParams`, a dict of its fields, or None for `wide`.
@@ -123,11 +123,6 @@ class _Stage:
     """What one camera needs to draw frames by itself."""
 
     def __init__(self, p: CameraParams) -> None:
-        if p.stabilised == "image":
-            raise ValueError(
-                f"camera {p.name!r} must not have stabilised='image' without a far-field camera; use "
-                f"LGMDObservation or SensorArray, or stabilised=True"
-            )
         self.batch = CameraBatch([p], p.shape)
         self.workspace = Workspace(p.shape)
         self._params, self._keys = p, (road_key(p),)

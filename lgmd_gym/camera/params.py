@@ -9,7 +9,6 @@ from typing import Any
 
 from lgmd_gym.camera.bounds import BOUNDS, checked_number
 from lgmd_gym.camera.params_checks import (
-    check_behind_windscreen,
     check_columns,
     check_surroundings,
     check_zoom,
@@ -81,9 +80,8 @@ class CameraParams:
             deceleration is then `stop_deceleration` times that estimate over 9 m/s², on any road. See
             `brake_estimate.known_deceleration`, also the observation `known_deceleration`.
         max_deceleration: Full braking of the car; braking environments set it to that of their brake [m/s²].
-        stabilised: Whether the rotation of the body is compensated: True with a gyroscope whose errors are
-            assumptions, see `body_motion.residual_motion`; `"image"` by the registration of a far-field
-            image, see `sensing.image_stabiliser`. `"image"` needs a `SensorArray`, as in `LGMDObservation`.
+        stabilised: Whether the rotation of the body is compensated with a gyroscope whose errors are
+            assumptions, see `body_motion.residual_motion`.
         derotated: Whether the rotation of the car about the vertical axis, from its yaw rate, and that of the
             gaze cause no motion in the input of the neuron: the view turns by whole pixels, and the state of
             the neuron is shifted by as many (`FrameNeuron.step`). Not for the gaze `"stopping"`, which zooms.
@@ -126,16 +124,6 @@ class CameraParams:
         contrast_s: Time constant of a contrast control [s], which brings the standard deviation of the frames
             before to 25 grey levels with a gain of 0.5 to 3, and their mean to 110; 0 disables it. Fog and a
             dark road then weaken the responses of a neuron less, and a bright skyline raises them less.
-        bonnet: Whether the own car's bonnet is visible at the bottom of the frame, see `render.own_car`. It
-            is fixed to the car: neither the road nor the motion of the body moves it in the frame. With the
-            mount of `wide`, it covers the lowest 11 rows; in `standard`, `tele` and `fovea` it is below the
-            frame. A lens that is 0.1 m lower (an error of the mount in a world) shows 12 rows more. Needs a
-            lens behind the windscreen: at least 1.1 m high, at least 1.2 m behind the front bumper and at
-            most 0.7 m from the centreline.
-        windscreen: Reflections of the dashboard in the windscreen: their mean light as a share of that of the
-            sky, in [0, 0.2]; 0 for none. They are fixed in the frame and stronger in its lower part. Glass
-            reflects 17 % at 60° (both surfaces, by Fresnel), so that 0.01 to 0.03 stands for a dark dashboard
-            and 0.14 for a sheet of white paper; the pattern is an assumption.
     """
 
     name: str = "custom"
@@ -157,7 +145,7 @@ class CameraParams:
     stop_reaction: float = 0.5
     brake_known: bool = False
     max_deceleration: float = 9.0
-    stabilised: bool | str = False
+    stabilised: bool = False
     derotated: bool = False
     calibrated: bool = False
     texture: float = 1.0
@@ -180,8 +168,6 @@ class CameraParams:
     linear_light: bool = False
     auto_exposure_s: float = 0.0
     contrast_s: float = 0.0
-    bonnet: bool = False
-    windscreen: float = 0.0
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -204,8 +190,6 @@ class CameraParams:
         check_columns(self)
         if self.gaze == "stopping":
             check_zoom(self)
-        if self.bonnet:
-            check_behind_windscreen(self)
 
     @property
     def focal_px(self) -> float:

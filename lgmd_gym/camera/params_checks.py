@@ -22,19 +22,9 @@ def check_surroundings(p: CameraParams) -> None:
         raise ValueError(
             f"camera panorama must be 'skyline', 'natural' or the path of an image, got {shown(p.panorama)}"
         )
-    flags = ("guard_rail", "upper_beam", "wet", "linear_light", "bonnet", "calibrated", "derotated")
-    for name in (*flags, "brake_known"):
+    flags = ("guard_rail", "upper_beam", "wet", "linear_light", "calibrated", "derotated")
+    for name in (*flags, "brake_known", "stabilised"):
         object.__setattr__(p, name, check_flag(f"camera {name}", getattr(p, name)))
-    object.__setattr__(p, "stabilised", _checked_stabilisation(p.stabilised))
-
-
-def _checked_stabilisation(value: object) -> bool | str:
-    if isinstance(value, str) and value == "image":
-        return value
-    try:
-        return check_flag("camera stabilised", value)
-    except ValueError:
-        raise ValueError(f"camera stabilised must be True, False or 'image', got {shown(value)}") from None
 
 
 def check_columns(p: CameraParams) -> None:
@@ -57,21 +47,9 @@ def check_zoom(p: CameraParams) -> None:
             f"camera span_m must be at most {4.0 * nearest:.3g} m, four times the least distance of the aim "
             f"from the lens, got {p.span_m:g}; reduce span_m or increase reach"
         )
-    usual_values = (("panorama", "skyline"), ("bonnet", False), ("windscreen", 0.0), ("derotated", False))
+    usual_values = (("panorama", "skyline"), ("derotated", False))
     for name, usual in usual_values:
         if getattr(p, name) != usual:
             raise ValueError(
                 f"camera {name} must be {usual!r} with gaze='stopping', got {shown(getattr(p, name))}"
             )
-
-
-def check_behind_windscreen(p: CameraParams) -> None:
-    """Check that a lens with a bonnet is behind the windscreen, also with the mounting errors of a world."""
-    limits = (
-        ("mount_height", p.mount_height >= 1.1, "at least 1.1 m"),
-        ("mount_setback", p.mount_setback >= 1.2, "at least 1.2 m"),
-        ("mount_left", abs(p.mount_left) <= 0.7, "at most 0.7 m to either side"),
-    )
-    for name, allowed, limit in limits:
-        if not allowed:
-            raise ValueError(f"camera {name} must be {limit} with bonnet=True, got {shown(getattr(p, name))}")

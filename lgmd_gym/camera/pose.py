@@ -37,20 +37,15 @@ MOUNT = np.dtype(
         *((name, np.float64) for name in ("road", "dive_deg", "shutter_s")),
         *((name, np.float64) for name in ("focal", "centre_u", "centre_v", "linear")),
         *((name, np.int64) for name in ("gaze", "stabilised", "derotated", "noisy", "box", "drawn", "seed")),
-        *((name, np.float64) for name in ("image_pitch", "image_roll", "image_yaw")),
         ("aim", AIM),
     ]
 )
 """How a camera sits on the car and moves with it, as the kernels read it.
 
 The fields of `CameraParams`; amplitude of the road in `ROADS`; focal length and image centre [px]; gaze, see
-`camera.aim`; 1 for linear light, a derotated view, sensor noise, `vehicles="box"` and a numbered world;
-stabilisation, see `STABILISED`; pitch, roll and yaw of the body that the image stabilisation has measured
-[degrees].
+`camera.aim`; 1 for linear light, a stabilised lens, a derotated view, sensor noise, `vehicles="box"` and a
+numbered world.
 """
-GYROSCOPE, IMAGE = 1, 2
-STABILISED: dict[bool | str, int] = {False: 0, True: GYROSCOPE, "image": IMAGE}
-"""Number of each kind of stabilisation in a `MOUNT` record."""
 CALIBRATED = 0.1
 """Share of the errors of a calibrated mount that remains: 0.05° and 1 cm at most. An assumption: a car that
 drives for minutes measures the direction of its lens from the vanishing point of its own motion."""
@@ -66,16 +61,16 @@ def mount_of(p: CameraParams) -> np.ndarray:
     values = (
         *(p.mount_setback, p.mount_left, lens_height),
         *(p.yaw_deg + left * world.yaw_error_deg, p.pitch_deg + left * world.pitch_error_deg),
-        *(ROADS[p.road], p.dive_deg * (_GYRO_DIVE if p.stabilised is True else 1.0), p.shutter_s),
+        *(ROADS[p.road], p.dive_deg * (_GYRO_DIVE if p.stabilised else 1.0), p.shutter_s),
         *(p.focal_px, 0.5 * width, 0.5 * height, p.linear_light),
         *(
             GAZES[p.gaze],
-            STABILISED[p.stabilised],
+            p.stabilised,
             p.derotated,
             p.shot_noise > 0.0 or p.read_noise > 0.0,
             p.vehicles == "box",
         ),
-        *(world.drawn, seed_of(p), 0.0, 0.0, 0.0),
+        *(world.drawn, seed_of(p)),
         aim_of(p, known_height),
     )
     return np.array(values, dtype=MOUNT)
@@ -94,7 +89,7 @@ def seed_of(p: CameraParams) -> int:
 @kernel(exact=True, arrays=True)
 def _rotation(mount, axis, time_s):
     """Return the rotation of a lens about one axis due to the road, at `MEAN_SPEED` [degrees]."""
-    if mount.stabilised == GYROSCOPE:
+    if mount.stabilised != 0:
         return residual_motion(mount.seed, axis, time_s)
     return body_motion(mount.seed, axis, time_s)
 
@@ -118,10 +113,6 @@ def _tilt(mount, scene, time_s, turn, gain):
         pitch, roll = body_pitch * c - body_roll * s, body_roll * c + body_pitch * s
     if mount.dive_deg > 0.0:
         pitch += mount.dive_deg * max(-12.0, min(6.0, scene.acceleration))
-    if mount.stabilised == IMAGE:
-        c, s = math.cos(turn), math.sin(turn)
-        pitch -= mount.image_pitch * c - mount.image_roll * s
-        roll -= mount.image_roll * c + mount.image_pitch * s
     return math.radians(pitch), math.radians(roll)
 
 
@@ -133,18 +124,6 @@ def _yaw_on_car(mount, scene):
     if mount.gaze == STOPPING:
         return mount.yaw_deg + math.degrees(aim_yaw(mount.aim, scene, aim_depth(mount.aim, scene.speed)))
     return mount.yaw_deg
-
-
-@kernel(exact=True, arrays=True)
-def pose_on_car(mount, scene, own_car):
-    """Write the pose of a lens relative to the car, which the motion of the body does not change.
-
-    Args:
-        mount: `MOUNT` record.
-        scene: `SCENE` record.
-        own_car: `OWN_CAR` record to write.
-    """
-    own_car.yaw, own_car.pitch = math.radians(_yaw_on_car(mount, scene)), math.radians(mount.pitch_deg)
 
 
 @kernel(exact=True, arrays=True)
@@ -178,8 +157,6 @@ def pose_lens(mount, scene, ago_s, lens):
         # Above the ground.
         z = max(z + gain * body_motion(mount.seed, HEAVE, time_s), 0.1 * z)
         yaw_deg += gain * _rotation(mount, YAW, time_s)
-    if mount.stabilised == IMAGE:
-        yaw_deg -= mount.image_yaw
     yaw = heading + math.radians(yaw_deg) + rounding
     pitch, focal = math.radians(mount.pitch_deg) + tilt, mount.focal
     lens.turn = 0.0

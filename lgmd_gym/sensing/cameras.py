@@ -11,7 +11,6 @@ from lgmd_gym.camera.road_pool import RoadKey, road_key
 from lgmd_gym.camera.scene_table import view_of
 from lgmd_gym.camera.spec import is_top_view
 from lgmd_gym.errors import check_keys
-from lgmd_gym.sensing.image_stabiliser import far_camera
 
 _MAX_KNOWN = 256  # distinct fields that are remembered
 
@@ -55,9 +54,8 @@ class Variant(NamedTuple):
 
     Attributes:
         params: Parameters of every camera; None for a top view.
-        road_keys: `road_key` of every camera, with a placeholder for a top view, then that of `far`.
+        road_keys: `road_key` of every camera, with a placeholder for a top view.
         view: Directions that the cameras look in, see `read_objects`.
-        far: Far-field camera that stabilises the cameras, see `far_camera`; None if there is none.
         known_deceleration: The car's estimate of its full braking [m/s²]; None unless a camera has
             `brake_known`.
     """
@@ -65,7 +63,6 @@ class Variant(NamedTuple):
     params: tuple[CameraParams | None, ...]
     road_keys: tuple[RoadKey, ...]
     view: View | None
-    far: CameraParams | None
     known_deceleration: float | None
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Variant":
@@ -96,7 +93,7 @@ class Variants:
 
         Raises:
             ValueError: If a field is unknown or out of range, changes the shape, detector or columns of a
-                camera, `brake_known`, `derotated`, or `stabilised` from or to `"image"`.
+                camera, `brake_known` or `derotated`.
         """
         others = {name: value for name, value in fields.items() if name != "texture"}
         texture = fields.get("texture")
@@ -115,13 +112,11 @@ class Variants:
         for base, changed in zip(self._base, params, strict=True):
             if base is not None:
                 _check_kept(base, changed)
-        far = far_camera(params)
-        known = [p for p in (*params, far) if p is not None]
+        known = [p for p in params if p is not None]
         placeholder = road_key(known[0]) if known else (0.0, 0, False, False, None)
         keys = tuple(placeholder if p is None else road_key(p) for p in params)
-        keys = keys if far is None else (*keys, road_key(far))
         estimates = [known_deceleration(p) for p in known if p.brake_known]
-        return Variant(params, keys, view_of(known), far, estimates[0] if estimates else None)
+        return Variant(params, keys, view_of(known), estimates[0] if estimates else None)
 
 
 def _check_kept(base: CameraParams, changed: CameraParams | None) -> None:
@@ -133,8 +128,3 @@ def _check_kept(base: CameraParams, changed: CameraParams | None) -> None:
                 f"camera_fields must keep the {name} {kept} of camera {base.name!r}, got {given}; "
                 f"set the {name} in the camera argument"
             )
-    if changed is not None and (base.stabilised == "image") != (changed.stabilised == "image"):
-        raise ValueError(
-            f"camera_fields must keep stabilised={base.stabilised!r} of camera {base.name!r}, got "
-            f"{changed.stabilised!r}; set 'image' in the camera argument"
-        )

@@ -14,7 +14,6 @@ from lgmd_gym.camera.scene_table import SceneTable
 from lgmd_gym.neuron import LGMDParams, Response
 from lgmd_gym.neuron.threads import Threads
 from lgmd_gym.sensing.cameras import Variant, Variants, make_cameras
-from lgmd_gym.sensing.image_stabiliser import ImageStabiliser
 from lgmd_gym.sensing.kernels import NUMBERS, SIGNALS
 from lgmd_gym.sensing.sensor_group import SensorGroup, make_neurons
 
@@ -91,9 +90,6 @@ class SensorArray:
         size = num_envs, len(self.names)
         self._scene_table = SceneTable(num_envs)
         self._roads = RoadPool(num_envs, len(unchanged.road_keys))
-        self._stabiliser = None
-        if unchanged.far is not None:
-            self._stabiliser = ImageStabiliser(unchanged.far, fps, num_envs, len(self.names))
         self.enabled = np.ones(size, np.bool_)
         self._stale = np.zeros(size, np.bool_)
         self._all = np.ones(num_envs, np.bool_)
@@ -177,7 +173,7 @@ class SensorArray:
 
         Raises:
             ValueError: If a field is unknown or out of range, changes the shape, detector or columns of a
-                camera, `brake_known`, `derotated`, or `stabilised` from or to `"image"`.
+                camera, `brake_known` or `derotated`.
         """
         fields = fields or {}
         if fields == self._fields[index]:
@@ -186,8 +182,6 @@ class SensorArray:
         for (group, member), p in zip(self._locations, variant.params, strict=True):
             if p is not None:
                 self._groups[group].batch.set_params(index, member, p, texture)
-        if self._stabiliser is not None and variant.far is not None:
-            self._stabiliser.set_params(index, variant.far, texture)
         if self.known_decelerations is not None:
             self.known_decelerations[index] = variant.known_deceleration
         self._used_variants[index], self._textures[index] = variant, texture
@@ -208,10 +202,6 @@ class SensorArray:
         if self._shares and not self.enabled.all():
             self._separate()
         scene_table, roads = self._scene_table.bundle, self._roads.bundle
-        if self._stabiliser is not None:
-            rotations = self._stabiliser.process(first, last, active, scene_table, roads)
-            for group in self._groups:
-                group.batch.set_measured_rotation(first, last, rotations)
         for group in self._groups:
             group.process(first, last, active, scene_table, roads)
 
@@ -229,8 +219,6 @@ class SensorArray:
         """
         mask = self._all if mask is None else mask
         self._stale[mask] = False
-        if self._stabiliser is not None:
-            self._stabiliser.reset(mask)
         for group in self._groups:
             group.reset(mask)
 

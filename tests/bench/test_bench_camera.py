@@ -18,8 +18,6 @@ OPTIONS = {
     "fog": (CONDITIONS["fog"], 1.4),
     "guard_rail": ({"guard_rail": True}, 2.6),
     "night_fog": ({"light": "night", "visibility_m": 30.0}, 1.7),
-    "bonnet": ({"bonnet": True}, 1.3),
-    "windscreen": ({"windscreen": 0.1}, 1.3),
     "road": ({"road": "normal"}, 1.5),  # redraws the sky, and no edge is level
     "shutter": ({"shutter_s": 0.011}, 3.4),  # two sharp images
     "panorama": ({"panorama": "natural"}, 1.4),  # redrawn only when the lens turns

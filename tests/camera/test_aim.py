@@ -195,8 +195,6 @@ def test_at_night_the_headlights_are_those_of_the_car():
     ("fields", "message"),
     [
         ({"panorama": "natural"}, "panorama must be 'skyline' with gaze='stopping', got 'natural'"),
-        ({"bonnet": True}, "bonnet must be False with gaze='stopping'"),
-        ({"windscreen": 0.1}, "windscreen must be 0.0 with gaze='stopping'"),
         ({"span_m": 50.0}, "span_m must be at most 22.8 m, four times the least distance"),
         ({"reach": 0.1, "mount_setback": -9.0}, "span_m must be at most -34.4 m"),
         ({"reach": 0.0}, "reach must be in \\[0.1, 10\\] stopping distances, got 0"),

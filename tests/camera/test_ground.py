@@ -10,7 +10,6 @@ from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.render.buffers import Tables, View
 from lgmd_gym.camera.render.ground import shade_row
 from lgmd_gym.camera.render.horizon import Horizon
-from lgmd_gym.camera.render.own_car import OWN_CAR
 from lgmd_gym.camera.render.texture import TEXEL_M, ground_texture
 from lgmd_gym.camera.render.veil import veil_at
 
@@ -23,7 +22,7 @@ def view_of(p, yaw, x=31.7, y=-4.2, pitch=-0.05):
     lens["cos_pitch"], lens["sin_pitch"] = np.cos(pitch), np.sin(pitch)
     lens["centre_v"], lens["centre_u"] = 0.5 * np.array(p.shape)
     empty = np.zeros((0, 0), np.float32)
-    return View(lens[()], look_of(p)[()], beam_profile(p), empty, np.zeros(2), np.zeros((), OWN_CAR)[()])
+    return View(lens[()], look_of(p)[()], beam_profile(p), empty, np.zeros(2))
 
 
 def level_horizon(row):
@@ -33,7 +32,7 @@ def level_horizon(row):
 def tables_of(seed):
     asphalt, verge = ground_texture("asphalt", seed), ground_texture("verge", seed)
     empty = np.zeros((0, 0), np.float32)
-    return Tables(asphalt.data, verge.data, asphalt.level_start, empty, np.zeros(0, np.float32), empty, empty)
+    return Tables(asphalt.data, verge.data, asphalt.level_start, empty, np.zeros(0, np.float32), empty)
 
 
 def sample(data, level_start, lens, row, width):

@@ -39,10 +39,8 @@ ARGUMENTS = {
     },
     "condition": {"condition": "night", "include_frame": True},
     "neuron": {"params": {"t_sf": 10.0}},
-    "own car": {"camera": {"name": "wide", "bonnet": True, "windscreen": 0.05, "gaze": "path"}, **FRAMES},
     "night fog": {"camera": {"name": "wide", "light": "night", "visibility_m": 30.0}, **FRAMES},
     "automatic exposure": {"camera": {"name": "wide", "auto_exposure_s": 0.3}, "include_frame": True},
-    "image stabilisation": {"camera": {"name": "wide", "stabilised": "image"}, "world": 6003, **FRAMES},
     "columns": {
         "camera": ["fovea", {"name": "wide", "columns": 5}, {"name": "tele", "detector": "dsn", "columns": 4}]
     },

@@ -40,15 +40,14 @@ LIGHT_BOUNDS = (-1.0, 500.0)  # [grey levels], for natural contrast without nois
 
 def draw_camera(rng, name, shape):
     """Return random parameters of a camera."""
-    choice, bonnet = rng.choice, rng.random() < 0.2
-    stopping = not bonnet and rng.random() < 0.2
+    choice, stopping = rng.choice, rng.random() < 0.2
     return CameraParams(
         name=name,
         shape=shape,
         hfov_deg=float(rng.uniform(2.0, 160.0)),
-        mount_height=float(choice([1.2, 5.0] if bonnet else [0.05, 1.2, 5.0])),
-        mount_setback=float(rng.uniform(1.2 if bonnet or stopping else -3.0, 5.0)),
-        mount_left=float(rng.uniform(-0.7, 0.7) if bonnet else rng.uniform(-1.0, 1.0)),
+        mount_height=float(choice([0.05, 1.2, 5.0])),
+        mount_setback=float(rng.uniform(1.2 if stopping else -3.0, 5.0)),
+        mount_left=float(rng.uniform(-1.0, 1.0)),
         pitch_deg=float(choice([0.0, rng.uniform(-60.0, 60.0)])),
         yaw_deg=float(choice([0.0, rng.uniform(-360.0, 360.0)])),
         gaze="stopping" if stopping else str(choice(["fixed", "path"])),
@@ -72,8 +71,6 @@ def draw_camera(rng, name, shape):
         shutter_s=float(choice([0.0, 0.0, 0.03])),
         linear_light=bool(rng.integers(2)),
         auto_exposure_s=float(choice([0.0, 0.2])),
-        bonnet=bonnet,
-        windscreen=0.0 if stopping else float(choice([0.0, 0.0, 0.2])),
     )
 
 

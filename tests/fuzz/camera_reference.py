@@ -27,7 +27,7 @@ def draw_case(rng):
     text, env = draw_scene(rng)
     shape = tuple(rng.integers(4, 48, 2).tolist())
     params = replace(draw_camera(rng, "one", shape), panorama="skyline", shutter_s=0.0, guard_rail=False)
-    params = replace(params, bonnet=False, windscreen=0.0, linear_light=False)
+    params = replace(params, linear_light=False)
     # Ground nearer than the near plane is drawn without road. Pieces of a rail that meet have no order.
     params = replace(params, mount_height=max(params.mount_height, 0.4))
     if params.light == "night":

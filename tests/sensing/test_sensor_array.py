@@ -22,7 +22,7 @@ CAMERAS = [
     CameraParams.preset("fovea", **SMALL, guard_rail=True),
     {"name": "back", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box"},
     {"name": "path", "shape": (45, 80), "gaze": "path", "panorama": "natural", "mount_left": 0.4},
-    {"name": "driver", "shape": (45, 80), "gaze": "path", "bonnet": True, "windscreen": 0.1},
+    {"name": "driver", "shape": (45, 80), "gaze": "path", "guard_rail": True},
     {"name": "back edges", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box", "detector": "edges"},
     {"name": "columns", "shape": (30, 40), "yaw_deg": 20.0, "seed": 3, "columns": 4},
     {"name": "flow columns", "shape": (30, 40), "yaw_deg": 20.0, "detector": "dsn", "columns": 2},

@@ -41,13 +41,9 @@ OPTIONS = {
     "world-low-sun": {"world": 10, "condition": "low_sun"},
     "night-fog": {"light": "night", "visibility_m": 30.0},
     "world-night-fog": {"world": 4, "light": "night", "visibility_m": 60.0, "road": "rough"},
-    "bonnet": {"bonnet": True, "road": "rough"},
-    "bonnet-mount": {"bonnet": True, "gaze": "path", "pitch_deg": -8.0, "yaw_deg": 12.0, "mount_left": 0.4},
-    "world-windscreen": {"world": 11, "bonnet": True, "windscreen": 0.1},
     "stopping": {"gaze": "stopping", "reach": 1.3, "lift": -0.6, "road": "rough", "stabilised": True},
     "stopping-night": {"gaze": "stopping", "offset_m": 6.0, "span_m": 9.0, "light": "night"},
     "world-stopping": {"gaze": "stopping", "world": 6, "wet": True, "calibrated": True, "contrast_s": 0.5},
-    "night-windscreen": {"light": "night", "bonnet": True, "windscreen": 0.2},
 }
 """Camera fields that the golden frames cover in addition to the named conditions."""
 

@@ -1,6 +1,6 @@
 """A slow reference of the camera: many rays per pixel, without culling, polygons' edges or kernels.
 
-It leaves out motion blur, sensor noise, panoramas, the halos of headlights, the own car and its windscreen.
+It leaves out motion blur, sensor noise, panoramas and the halos of headlights.
 """
 
 import math

@@ -19,7 +19,6 @@ class Views(NamedTuple):
         sky_aims: Yaw, pitch and roll of the last sky, float64, shape (cameras, 3).
         noise_starts: Index of the frame's first number in the noise table, int64, shape (cameras,).
         exposures: State of exposure and contrast control, see `exposure`, float64, shape (cameras, 7).
-        own_cars: `OWN_CAR` records, shape (cameras,).
     """
 
     looks: np.ndarray
@@ -28,7 +27,6 @@ class Views(NamedTuple):
     sky_aims: np.ndarray
     noise_starts: np.ndarray
     exposures: np.ndarray
-    own_cars: np.ndarray
 
 
 class View(NamedTuple):
@@ -39,7 +37,6 @@ class View(NamedTuple):
     beam: np.ndarray
     sky: np.ndarray
     sky_aim: np.ndarray
-    own_car: np.ndarray
 
 
 class Tables(NamedTuple):
@@ -52,7 +49,6 @@ class Tables(NamedTuple):
         skyline: See `skyline`.
         noise: See `noise_table`.
         panorama: See `panorama_table`.
-        dashboard: See `dashboard_pattern`.
     """
 
     asphalt: np.ndarray
@@ -61,7 +57,6 @@ class Tables(NamedTuple):
     skyline: np.ndarray
     noise: np.ndarray
     panorama: np.ndarray
-    dashboard: np.ndarray
 
 
 class Buffers(NamedTuple):

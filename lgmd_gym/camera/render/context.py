@@ -8,7 +8,7 @@ from lgmd_gym.camera.aim import STOPPING
 from lgmd_gym.camera.effects import noise_table
 from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, choose_objects
 from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.camera.pose import noise_start, pose_lens, pose_on_car
+from lgmd_gym.camera.pose import noise_start, pose_lens
 from lgmd_gym.camera.render.buffers import Buffers, Tables, Views, make_buffers
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.exposure import follow_exposure
@@ -18,7 +18,6 @@ from lgmd_gym.camera.render.raster import draw_frames
 from lgmd_gym.camera.render.sky import skyline
 from lgmd_gym.camera.render.texture import ground_texture
 from lgmd_gym.camera.render.weather import aim_beam
-from lgmd_gym.camera.render.windscreen import dashboard_key, dashboard_pattern
 from lgmd_gym.camera.road_geometry import RoadGeometry
 from lgmd_gym.camera.worlds import draw_world
 from lgmd_gym.kernels import kernel
@@ -33,7 +32,7 @@ def tables_key(p: CameraParams) -> tuple[Any, ...]:
     if p.panorama != "skyline":
         # The table of a panorama includes light and fog, at the resolution of the lens.
         key = *key, p.panorama, p.seed, p.light, p.visibility_m, p.focal_px
-    return *key, dashboard_key(p)
+    return key
 
 
 class SharedTables:
@@ -55,7 +54,6 @@ class SharedTables:
             skyline=skyline(100_000 + world.skyline if world.drawn else p.seed),
             noise=noise_table(0 if world.drawn else p.seed),
             panorama=panorama_table(p),
-            dashboard=dashboard_pattern(dashboard_key(p), p.shape),
         )
         self.bundle = Bundle(tuple(tables), tuple(all_models(linear=p.linear_light)))
 
@@ -134,8 +132,6 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
                 aim_beam(views.beams[env, k], lens)
             if views.looks[env, k].auto_exposure_s > 0.0 or views.looks[env, k].contrast_s > 0.0:
                 follow_exposure(views.exposures[env, k], scene, views.looks[env, k])
-            if views.own_cars[env, k].bonnet > 0.0:
-                pose_on_car(mount, scene, views.own_cars[env, k])
             count = choose_objects(lens, mount, objects[env], counts[env], chosen)
             road = RoadGeometry(
                 surface[span[0] : span[1]],
@@ -146,7 +142,7 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
             rows = (
                 views.looks[env, k : k + 1], views.beams[env, k : k + 1], views.skies[env, k : k + 1],
                 views.sky_aims[env, k : k + 1], views.noise_starts[env, k : k + 1],
-                views.exposures[env, k : k + 1], views.own_cars[env, k : k + 1],
+                views.exposures[env, k : k + 1],
             )  # fmt: skip
             draw_frames(
                 frames[env, k : k + 1], lenses[env, k : k + 1], rows, road, lookup_tables, models, chosen,

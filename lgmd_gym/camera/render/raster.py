@@ -17,7 +17,6 @@ from lgmd_gym.camera.render.horizon import horizon_of
 from lgmd_gym.camera.render.markings import add_lines
 from lgmd_gym.camera.render.models import Models
 from lgmd_gym.camera.render.order import distance, first_from, order_objects, visible
-from lgmd_gym.camera.render.own_car import draw_bonnet
 from lgmd_gym.camera.render.panorama import draw_panorama
 from lgmd_gym.camera.render.sensor import expose, fixed_tone
 from lgmd_gym.camera.render.shadows import add_shadow
@@ -25,7 +24,6 @@ from lgmd_gym.camera.render.sky import draw_sky
 from lgmd_gym.camera.render.solids import Air, draw_object
 from lgmd_gym.camera.render.veil import add_sky_veil
 from lgmd_gym.camera.render.weather import light_at
-from lgmd_gym.camera.render.windscreen import add_reflections
 from lgmd_gym.camera.roadside import PLANT_RANGE
 from lgmd_gym.kernels import kernel
 
@@ -143,8 +141,6 @@ def draw_light(view, road, tables, models, objects, count, buffers):
         buffers.solids, buffers.corners, buffers.uv, buffers.axes, buffers.greys, buffers.joints
     )
     draw_solids(image, view, models, objects, order, n, solids)
-    if view.own_car.bonnet > 0.0:
-        draw_bonnet(image, lens, view.own_car)
     if view.look.glare > 0.0:
         add_sun_glare(image, lens, view.look)
 
@@ -169,10 +165,9 @@ def draw_frames(out, lenses, views, road, tables, models, objects, count, buffer
     for k in range(out.shape[0]):
         end, start = lenses[k, 0], lenses[k, 1]
         look, beam, sky, sky_aim = views.looks[k], views.beams[k], views.skies[k], views.sky_aims[k]
-        own_car = views.own_cars[k]
         steps = blur_steps(end, start, look.shutter_s, objects, count) if look.shutter_s > 0.0 else 1
         if steps == 1:
-            view = View(end, look, beam, sky, sky_aim, own_car)
+            view = View(end, look, beam, sky, sky_aim)
             draw_light(view, road, tables, models, objects, count, buffers)
         else:
             total[:] = nb.float32(0.0)
@@ -180,13 +175,11 @@ def draw_frames(out, lenses, views, road, tables, models, objects, count, buffer
                 ago = (step + 0.5) / steps
                 lens_before(end, start, ago, moment)
                 move_objects(objects, count, -ago * look.shutter_s)
-                view = View(moment, look, beam, sky, sky_aim, own_car)
+                view = View(moment, look, beam, sky, sky_aim)
                 draw_light(view, road, tables, models, objects, count, buffers)
                 move_objects(objects, count, ago * look.shutter_s)
                 add_weighted(total, image, nb.float32(1.0 / steps))
             overwrite(image, total)
-        if own_car.reflected > 0.0:
-            add_reflections(image, tables.dashboard, own_car.reflected)
         gain = adapt_exposure(views.exposures[k], image, look) if look.auto_exposure_s > 0.0 else 1.0
         tone = fixed_tone(look)
         if look.contrast_s > 0.0:
