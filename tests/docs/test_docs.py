@@ -34,6 +34,7 @@ ELSEWHERE = (
     ".venv/bin/",
     "git clone",
     "python docs/examples/",
+    "python docs/experiments/",
 )
 # Pages whose blocks take under a second; the others run with -m slow.
 QUICK = {"README", "neuron"}

@@ -1,6 +1,6 @@
 """A picture of what an LGMD at the side of a turning car responds to, with and without derotation.
 
-python docs/examples/turning_views.py docs/turning_views.png
+python docs/experiments/turning_views.py docs/turning_views.png
 
 The car turns across the path of an oncoming car (a validation level of CCFtap). The picture shows a field at
 the side and the change of light |P| of its LGMD. Without derotation the whole image moves; with it, mostly

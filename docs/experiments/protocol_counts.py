@@ -1,6 +1,6 @@
 """Cases of the Euro NCAP suites beside the cells of OpenSCENARIO files, by family.
 
-    python docs/examples/protocol_counts.py FOLDER
+    python docs/experiments/protocol_counts.py FOLDER
 
 FOLDER contains the Euro NCAP scenarios of Vector Informatik, `OSC-NCAP-scenarios/OpenSCENARIO/NCAP`. The
 files that vary all parameters of a test are counted, not those of single cells. The table is in Markdown.

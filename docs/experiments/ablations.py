@@ -1,6 +1,6 @@
 """Ablations of a sensor: scores of an agent with one property of its cameras changed at a time.
 
-    python docs/examples/ablations.py stopping-zone --worlds 20 --jobs 2 --to docs/ablations.png
+    python docs/experiments/ablations.py stopping-zone --worlds 20 --jobs 2 --to docs/ablations.png
 
 Each arm plays the suites r152 (contacts avoided without premature braking) and false-reaction (false
 activations) in test worlds, in the condition and with the brake of each world. In r152 every case is played

@@ -1,6 +1,6 @@
 """Add agents to the leaderboard: run all of its suites, and print a row per agent.
 
-    python docs/examples/leaderboard.py --agents my_module:MyAgent policy:my.zip --out runs/board --jobs 2
+    python docs/experiments/leaderboard.py --agents my_module:MyAgent policy:my.zip --out runs/board --jobs 2
 
 The run folders are subfolders of `--out`. A suite whose folder exists is not run again; complete an
 interrupted one with `lgmd-gym bench --resume FOLDER`. The page "Leaderboard" states which levels, worlds and

@@ -1,6 +1,6 @@
 """Bodies: pedestrians, two-wheelers and vehicles from the side, rear and front by day, at night and in fog.
 
-    python docs/examples/bodies.py docs/bodies.png
+    python docs/experiments/bodies.py docs/bodies.png
 
 The camera reads road users of any highway-env road by the name of their class: "Pedestrian", "Bicycle" and
 "Motorcycle" have bodies of their own, and the body of a vehicle follows from its size.

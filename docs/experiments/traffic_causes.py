@@ -1,6 +1,6 @@
 """Road users near the ego at the false activations of an agent in traffic.
 
-    python docs/examples/traffic_causes.py RUN --agent policy:all-round --jobs 2
+    python docs/experiments/traffic_causes.py RUN --agent policy:all-round --jobs 2
 
 The argument is a run folder of `lgmd-gym bench --suite traffic`. Drives in which all braking events of the
 agent are false are played again up to the first one that exceeds 0.25 g. A line of the table is what is in
@@ -24,7 +24,7 @@ from statistics import median
 from typing import Any, NamedTuple
 
 import numpy as np
-from family_scores import check_agents
+from all_scores import check_agents
 from joblib import Parallel, delayed
 
 from lgmd_gym.agents import HOLD, make_agent

@@ -2,7 +2,7 @@
 
     lgmd-gym train --algo offline --sensors-of stopping-zone --inputs zones ego_speed ego_yaw_rate \
         --hyperparams zones.yml --n-timesteps 3000 --out runs/zones0
-    python docs/examples/rl_ablations.py runs/zones0 --seeds 5 --jobs 2
+    python docs/experiments/rl_ablations.py runs/zones0 --seeds 5 --jobs 2
 
 Each arm changes one property of the recipe of `lgmd-gym train`, and is trained on recorded levels (see
 `recorded_levels.py`), which takes about a minute. All arms see the same number of camera frames;
@@ -14,7 +14,7 @@ The arm on camera frames requires recordings of frames:
 
     lgmd-gym train --algo offline --inputs frame ego_speed ego_yaw_rate --hyperparams frames.yml \
         --n-timesteps 3000 --out runs/frames0
-    python docs/examples/rl_ablations.py runs/frames0 --arms frames --seeds 5
+    python docs/experiments/rl_ablations.py runs/frames0 --arms frames --seeds 5
 """
 
 import argparse

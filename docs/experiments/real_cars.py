@@ -1,6 +1,6 @@
 """Agents in the cells of 49 CFR 571.127 in which NHTSA tested six cars.
 
-    python docs/examples/real_cars.py RUN RUN ...
+    python docs/experiments/real_cars.py RUN RUN ...
 
 Each argument is a run folder of `lgmd-gym bench --suite fmvss127`. A line is an agent of a run, and a cell
 contains the runs without contact and without premature braking, of n, and the highest relative impact speed.

@@ -1,6 +1,6 @@
 """Effect of the deviations of the default neuron from the printed equations, on the stimuli of the paper.
 
-    python docs/examples/deviations.py
+    python docs/experiments/deviations.py
 
 Each row but the first has one field of `LGMDParams` as printed; the last one has all of them. The table is in
 Markdown.

@@ -1,6 +1,6 @@
 """Contacts avoided because of the target, in every scenario family of a suite.
 
-    python docs/examples/detections.py ncap2023 ncap2023-without-target --agents stopping-zone ttc-oracle
+    python docs/experiments/detections.py ncap2023 ncap2023-without-target --agents stopping-zone ttc-oracle
 
 The arguments are a run folder of `lgmd-gym bench` and one of the same suite without targets, and more of such
 pairs. A cell contains the contacts that the agent avoids and in which it
@@ -12,7 +12,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from family_scores import check_agents
+from all_scores import check_agents, markdown
 
 from lgmd_gym.benchmark.analysis.detections import detected_rows
 from lgmd_gym.benchmark.analysis.tables import rate_text
@@ -55,11 +55,11 @@ def _cell(agent: str, pairs: Sequence[tuple[Row, Row]]) -> str:
 
 def main(agents: Sequence[str], folders: Sequence[Path]) -> None:
     """Print the table of pairs of run folders."""
-    table = [["suite", "family", *(f"`{agent}`" for agent in agents)], ["---"] * (len(agents) + 2)]
+    table = [["suite", "family", *(f"`{agent}`" for agent in agents)]]
     runs = [read_run(folder) for folder in folders]
     for run, without_target in zip(runs[::2], runs[1::2], strict=True):
         table += lines(agents, run, without_target)
-    print(*(f"| {' | '.join(line)} |" for line in table), sep="\n")
+    print(*markdown(table), sep="\n")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """How well the fields at the sides distinguish a road user on collision course from an empty road.
 
-python docs/examples/target_signal.py --levels 1250 --jobs 2
+python docs/experiments/target_signal.py --levels 1250 --jobs 2
 
 Random levels with crossing and turning road users are recorded with and without the target, which is the only
 difference. At the last decision at which full braking avoids the contact, a small network distinguishes the

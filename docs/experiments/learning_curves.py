@@ -1,6 +1,6 @@
 """Learning curves of training runs: mean return on validation levels over the number of decisions.
 
-    python docs/examples/learning_curves.py docs/tutorials/rl_training.png runs/dqn0 runs/dqn1
+    python docs/experiments/learning_curves.py docs/tutorials/rl_training.png runs/dqn0 runs/dqn1
 
 A curve contains the evaluations of a folder of `lgmd-gym train`.
 """

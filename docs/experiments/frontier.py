@@ -1,6 +1,6 @@
 """What a camera sees of the target at the last time at which full braking avoids the contact, by family.
 
-    python docs/examples/frontier.py --suites ncap2026 --to frontier.png
+    python docs/experiments/frontier.py --suites ncap2026 --to frontier.png
 
 Prints a table in Markdown, medians over the cases of a family, and draws its figure. Angles do not depend on
 the camera; pixels, contrast and visibility are those of `--camera`. A target is inside a camera if its centre

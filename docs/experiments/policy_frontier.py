@@ -1,6 +1,6 @@
 """Avoided contacts and lead time of a policy against its false activations, on recorded validation episodes.
 
-    python docs/examples/policy_frontier.py runs/all-round policy:all-round
+    python docs/experiments/policy_frontier.py runs/all-round policy:all-round
 
 The folder is that of an offline training run with the cameras of the policy; the page on the design of
 `policy:all-round` has the command of its training. A policy brakes when its log odds of braking exceed a

@@ -1,6 +1,6 @@
 """The picture and the GIF of the README: an approach to a standing car.
 
-python docs/examples/picture.py docs/picture.png docs/approach.gif
+python docs/experiments/picture.py docs/picture.png docs/approach.gif
 """
 
 import sys

@@ -1,6 +1,6 @@
 """A picture of the fields at the sides of `policy:all-round`, with a crossing car and without it.
 
-python docs/examples/side_fields.py docs/side_fields.png
+python docs/experiments/side_fields.py docs/side_fields.png
 """
 
 import sys

@@ -1,0 +1,311 @@
+"""The scripts in docs/experiments run: one short test each, not a check of their results."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.examples import EXPERIMENTS, load
+from support.recordings import synthetic_episode
+from support.rows import threat_row
+
+from lgmd_gym.agents.policies.features import FeatureConfig
+from lgmd_gym.benchmark import RunConfig, get_suite
+from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.stored_run import StoredRun
+from lgmd_gym.benchmark.suites import Suite
+from lgmd_gym.training.offline.storage import save
+from lgmd_gym.training.recordings import FORMAT
+
+
+def test_bodies(tmp_path):
+    sheet = load("bodies").main(tmp_path / "bodies.png", quick=True)
+    assert list(sheet) == ["motorcycle", "small"]
+    assert list(sheet["small"]) == ["day, side", "day, rear", "day, front"]
+    assert sheet["motorcycle"]["day, front"].max() == 255  # the headlight
+
+
+@pytest.mark.slow
+def test_side_fields(tmp_path):
+    """The car comes from the left and the two levels differ by it only: the fields at the right are equal."""
+    with_car, without = load("side_fields").main(tmp_path / "fields.png")
+    assert np.array_equal(with_car[3:], without[3:])
+    assert (np.abs(with_car[0] - without[0]) > 1.0).any()  # grey levels of the far field at the left
+    assert 10_000 < (tmp_path / "fields.png").stat().st_size < 200_000
+
+
+def test_turning_views(tmp_path):
+    """Derotation removes most of the change of light before the oncoming car is large."""
+    steady, derotated = load("turning_views").main(tmp_path / "views.png")
+    assert (derotated[:3] < 0.5 * steady[:3]).all()
+    assert derotated[3] > 2.0 * derotated[0]
+    assert 10_000 < (tmp_path / "views.png").stat().st_size < 200_000
+
+
+def test_picture(tmp_path):
+    from PIL import Image
+
+    load("picture").main(tmp_path / "view.png", tmp_path / "film.gif", ego_speed=5.0, after=2)
+    assert Image.open(tmp_path / "view.png").size == (1280, 720)
+    film = Image.open(tmp_path / "film.gif")
+    assert film.size == (800, 450)
+    assert film.n_frames > 20
+
+
+def test_ablations(tmp_path, capsys):
+    example = load("ablations")
+    arguments = ["--worlds", "2", "--seeds", "1", "--every", "14", "--to", str(tmp_path / "arms.png")]
+    arms = ["complete sensor", "half the pixels per row and column", "60 frames/s"]
+    rates = example.main(["stopping-zone", *arguments, "--arms", *arms])
+    assert list(rates) == arms
+    assert {suite: rate.n for suite, rate in rates[arms[1]].items()} == {"r152": 2, "false-reaction": 3}
+    assert capsys.readouterr().out.count("\n") == 5
+    assert (tmp_path / "arms.png").stat().st_size > 5_000
+    with pytest.raises(ValueError, match="agent 'ttc-oracle' has no cameras of its own"):
+        example.main(["ttc-oracle", *arguments])
+
+
+@pytest.mark.slow
+def test_target_signal(capsys):
+    areas = load("target_signal").main(["--levels", "25", "--jobs", "1"])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("| fields at the sides | all | CBFA | ")
+    assert len(lines) == 2 + len(areas) == 8
+    assert all(0.0 <= value <= 1.0 for values in areas.values() for value in values.values())
+
+
+@pytest.mark.slow
+def test_deviations(capsys):
+    effects = load("deviations").main()
+    assert capsys.readouterr().out.count("\n") == 2 + len(effects)
+    default, literal = effects["default"], effects["`literal`"]
+    assert (default.silent_gratings, default.frames[2]) == (30, 0)
+    assert literal.silent_gratings < 30
+    assert literal.peak > effects["spikes from K (eq. 11)"].peak > default.peak
+
+
+def test_all_scores():
+    """One column per run; cases with an FCW driver are left out."""
+    config = RunConfig(suite="r152", agents=("no-brake", "a"), seeds=1)
+    values = {"avoided": True, "premature_brake": False, "speed_reduction": 5.0, "fcw_driver": False}
+    rows = [
+        threat_row(case=f"r152/CCRs/v{speed}", world=world, **values)
+        for speed, world in ((20, 8000), (40, 8001))
+    ]
+    rows.append(rows[0] | {"fcw_driver": True, "avoided": False, "seed": 1})
+    false = [row | {"threat": False, "false_activation": row["world"] == 8000} for row in rows[:2]]
+    quiet = RunConfig(suite="false-reaction", agents=("a",), seeds=1, worlds=0)
+    drive = {"distance": 5e4, "false_activations": 1, "moving_time": 9.0, "needed_time": 0.0}
+    drive |= {"side": "", "alerts": 1, "brakes": 1, "collision": False, "peak_deceleration": 9.0}
+    traffic = RunConfig(suite="traffic", agents=("a",), seeds=1, conditions=("mixed",))
+    runs = [StoredRun(config, rows, False), StoredRun(quiet, false, False)]
+    runs.append(StoredRun(traffic, [rows[0] | drive | {"threat": False}], False))
+    example = load("all_scores")
+    heading, _, none, a = example.table([example.column(run) for run in runs])
+    assert "r152: avoided, 2 cases in 2 worlds, clear" in heading
+    assert "false-reaction: false activations, 2 cases in the laboratory, clear" in heading
+    assert "traffic: false activations per 100 km, 1 case in 1 world, mixed" in heading
+    assert a.startswith("| a | 2/2 [")
+    assert "| 1/2 [" in a
+    assert "| 2.0 [" in a
+    assert none == "| no-brake | – | – | – |"
+
+
+def test_scores_by_family():
+    config = RunConfig(suite="r152", agents=("no-brake", "a"), seeds=1)
+    values = {"premature_brake": False, "speed_reduction": 5.0, "fcw_driver": False}
+    cases = (("CCRs/v20", True), ("CCRs/v40", False), ("CCRm/v30", True))
+    rows = [threat_row(case=f"r152/{case}", avoided=avoided, **values) for case, avoided in cases]
+    script, run = load("all_scores"), StoredRun(config, rows, False)
+    _, _, slower, standing = script.family_table(["a"], [run])
+    assert slower.startswith("| r152 | CCRm | 1/1 [")
+    assert standing.startswith("| r152 | CCRs | 1/2 [")
+    with pytest.raises(ValueError, match="the run of r152 has no agent 'b'; it has no-brake, a"):
+        script.family_table(["b"], [run])
+
+
+def test_real_cars():
+    """A line per agent and run; premature braking and contact are failures."""
+    cases = ("CCRs/v10", "CCRs/v80", "CCRm/v70", "CCRm/v60", "CCRb/v80/brake0.5g-gap12")
+    impact = {"collision": True, "avoided": False, "relative_impact_speed": 10 / 3.6}
+    rows = [threat_row(case=f"fmvss127/{case}", avoided=True) for case in cases]
+    rows[1] |= impact
+    rows.append(rows[0] | {"seed": 1, "avoided": False, "premature_brake": True})
+    config = RunConfig(suite="fmvss127", agents=("a",), seeds=2)
+    *_, line = load("real_cars").table([StoredRun(config, rows, False)])
+    assert line == "| `a`, worlds | 1/3 (10 km/h) | 1/1 | 0/0 | 1/1 |"
+
+
+def test_detections():
+    config = RunConfig(suite="ncap2023", agents=("no-brake", "a"), seeds=1)
+    values = {"premature_brake": False, "speed_reduction": 5.0, "fcw_driver": False}
+    runs = []
+    for suite in ("ncap2023", "ncap2023-without-target"):
+        avoided = {"CCRs/v20": True, "CCRs/v40": False, "CCCscp/v20/target20": True}
+        rows = [threat_row(case=f"{suite}/{case}", avoided=avoided[case], **values) for case in avoided]
+        runs.append(StoredRun(replace(config, suite=suite), rows, False))
+    for row in runs[1].rows:
+        row["false_activation"] = "CCCscp" in row["case"]
+    runs[0].rows.append(threat_row("no-brake", f"{config.suite}/CCRs/v20", avoided=False, **values))
+    script = load("detections")
+    crossing, standing, together = script.lines(["a"], *runs)
+    assert (crossing[1], standing[1], together[1]) == ("CCCscp", "CCRs", "all")
+    assert crossing[2].startswith("0/1 [")
+    assert crossing[2].endswith("] (1)")
+    assert standing[2].startswith("1/2 [")
+    assert standing[2].endswith("] (1)")
+    assert together[2].startswith("1/3 [")
+    assert together[2].endswith("] (2)")
+    with pytest.raises(ValueError, match="the run of ncap2023 has no agent 'b'; it has no-brake, a"):
+        script.lines(["b"], *runs)
+
+
+def test_frontier(tmp_path, capsys, monkeypatch):
+    script, picture = load("frontier"), tmp_path / "frontier.png"
+    arguments = ["frontier.py", "--suites", "r152-vru", "--camera", "standard", "--to", str(picture)]
+    monkeypatch.setattr("sys.argv", arguments)
+    script.main()
+    heads, _, bicycle, pedestrian = capsys.readouterr().out.splitlines()
+    assert "growth in `standard` [px/frame]" in heads
+    assert len({line.count("|") for line in (heads, bicycle, pedestrian)}) == 1
+    assert bicycle.startswith("| CBNA | 4 | 4/4 |")
+    assert pedestrian.startswith("| CPNA | 4 | 4/4 |")
+    assert picture.stat().st_size > 10_000
+
+
+def test_protocol_counts(tmp_path, monkeypatch):
+    """Files of a family with locations or turns in its name count as that family."""
+    script = load("protocol_counts")
+    for pattern in script.FILES.values():
+        file = tmp_path / pattern.replace("*", "x")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.touch()
+    families = ("CPNA-25", "CPTAfs", "CPRA_Cm", "CCRs")
+    cells = tuple(Case(f"x/{family}/v10", "Scenario", fcw_driver=family == "CCRs") for family in families)
+    monkeypatch.setattr(script, "read", lambda path: Suite("x", cells, ""))
+    lines = script.table(tmp_path)
+    assert lines[0] == "| family | ncap2023 | ncap2023-vru | ncap2026 | ncap2026-extended |"
+    assert "| CPNA | 0 / 1 | 22 / 1 | 36 / 1 | 24 / 1 |" in lines
+    assert "| CPTA | 0 / 1 | 8 / 1 | 0 / 1 | 0 / 1 |" in lines
+    assert "| CCRs warned | 30 / 1 | 0 / 1 | 15 / 1 | 6 / 1 |" in lines
+    assert lines[-1] == "| all | 177 / 4 | 133 / 4 | 428 / 4 | 435 / 4 |"
+    with pytest.raises(ValueError, match=r"no file .*Variation\*.xosc in '.*other'; pass the folder NCAP"):
+        script.table(tmp_path / "other")
+
+
+def test_learning_curves(capsys, tmp_path):
+    for name, returns in (("dqn0", [[1.0, 2.0], [2.0, 4.0], [0.0, 1.0]]), ("dqn1", [[-1.0, 0.0]] * 3)):
+        (tmp_path / name / "best").mkdir(parents=True)
+        np.savez(tmp_path / name / "best" / "evaluations.npz", timesteps=[100, 200, 300], results=returns)
+    load("learning_curves").main(tmp_path / "curves.png", [tmp_path / "dqn0", tmp_path / "dqn1"])
+    assert capsys.readouterr().out.splitlines() == [
+        "dqn0: best return 3.00 at 200 decisions, n = 2",
+        "dqn1: best return -0.50 at 100 decisions, n = 2",
+    ]
+    assert (tmp_path / "curves.png").stat().st_size > 5_000
+
+
+def test_leaderboard_prints_a_row_per_agent(monkeypatch, tmp_path, capsys):
+    """A run that exists is not repeated."""
+    example = load("leaderboard")
+    suite = tmp_path / "mine.toml"
+    suite.write_text('name = "mine"\n[[cases]]\nfamily = "CCRs"\nspeeds_kmh = [20]\n')
+    monkeypatch.setitem(example.RUNS, "levels", {"suite": str(suite), "seeds": 1, "worlds": 0})
+    for _ in range(2):
+        example.main(["ttc-oracle"], tmp_path / "board", ["levels"])
+        lines = capsys.readouterr().out.splitlines()[-3:]
+        heading = "mine: avoided, 1 case in the laboratory, clear | levels: false activations"
+        assert lines[0] == f"| agent | {heading} |"
+        assert lines[2].startswith("| ttc-oracle | 1/1 ")
+    assert [path.name for path in (tmp_path / "board").iterdir()] == ["levels"]
+    with pytest.raises(ValueError, match="levels' has ttc-oracle, not no-brake; choose another --out"):
+        example.main(["no-brake"], tmp_path / "board", ["levels"])
+    rows = tmp_path / "board" / "levels" / "episodes.jsonl"
+    rows.write_text("".join(rows.read_text().splitlines(keepends=True)[:1]))
+    with pytest.raises(ValueError, match="lacks 1 episode; complete it with lgmd-gym bench --resume"):
+        example.main(["ttc-oracle"], tmp_path / "board", ["levels"])
+
+
+def test_levels_of_the_leaderboard():
+    """Held-out levels: each case is one level of the split "test"."""
+    cases = [dict(case.arguments) for case in get_suite(str(EXPERIMENTS / "levels.toml")).cases]
+    assert [case["start_level"] for case in cases] == list(range(1000, 1400))
+    assert all(case["num_levels"] == 1 and case["split"] == "test" for case in cases)
+
+
+def test_recorded_levels():
+    """An episode pays its rewards until it ends or the policy brakes."""
+    pytest.importorskip("stable_baselines3")
+    example = load("recorded_levels")
+    episode = synthetic_episode(9, seed=9)
+    features = FeatureConfig(inputs=("ego_speed",), history=1, repeat=2)
+    table = example.Decisions([[episode]], features, 1.0)
+    envs = example.RecordedLevels(table, num_envs=1, scale=0.5)
+    envs.seed(3)
+    envs.reset()
+    rewards = np.add.reduceat(episode.rewards, range(0, len(episode), 2))
+    for brake_at, expected in ((None, rewards), (1, [rewards[0], episode.braking_returns[2]])):
+        paid = []
+        for decision in range(len(expected)):
+            _, reward, ends, _ = envs.step(np.array([int(decision == brake_at)]))
+            paid.append(reward[0])
+        assert ends[0]
+        assert paid == pytest.approx([0.5 * value for value in expected])
+
+
+def test_rl_ablations(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("stable_baselines3")
+    example = load("rl_ablations")
+    few = {"buffer_size": 200, "learning_starts": 64, "batch_size": 16}
+    features = {"inputs": ("frame", "ego_speed"), "repeat": 2}
+    arm = replace(example.ARMS["frames"], features=features, algo_kwargs=few)
+    monkeypatch.setitem(example.ARMS, "frames", arm)
+    for split, lengths in (("train", range(4, 24)), ("validation", range(4, 8))):
+        (tmp_path / "episodes" / split).mkdir(parents=True)
+        episodes = [[synthetic_episode(n, seed=n, threat=n % 2 == 0, frames=True)] for n in lengths]
+        save(episodes, tmp_path / "episodes" / split / "000000.npz", {"format": FORMAT})
+    example.main(tmp_path, ["frames"], seeds=1, levels=10, budget=0.002)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "n = 1 seeds, 2 threats and 2 other validation levels"
+    assert lines[-1].startswith(f"| {arm.title} | ")
+    assert "nan" not in lines[-1]
+
+
+def test_policy_frontier():
+    """Braking at decision 2 of 8 avoids the contact, at 6 it does not; lead times are 6 and 2 decisions."""
+    pytest.importorskip("stable_baselines3")
+    threats = [synthetic_episode(8, seed=seed) for seed in range(3)]
+    others = [synthetic_episode(5, threat=False), synthetic_episode(5, threat=False, traffic=True)]
+    row = load("policy_frontier").frontier_row(1.0, threats + others, [2, 6, None, 0, None], rate_hz=10.0)
+    assert row == "| 1 | 1/3 [6.1–79.2] | 0.40 | 1/1 [20.7–100.0] | 0/1 [0.0–79.3] |"
+
+
+def test_failure_maps(tmp_path, capsys):
+    """At 80 km/h, 44 m are left 2 s before contact; braking needs 49 m at 5 m/s² and 26 m at 9.5 m/s²."""
+    script, picture = load("failure_maps"), tmp_path / "maps.png"
+    options = "--agents ttc-oracle --planes brake curve --worlds 2 --decelerations 5 9.5 --radii 60 inf"
+    brake, curve = script.main([*options.split(), "--speeds", "20", "80", "--to", str(picture)])
+
+    def counts(rates):
+        return [[rate and (rate.k, rate.n) for rate in row] for row in rates["ttc-oracle"]]
+
+    assert counts(brake) == [[(2, 2), (2, 2)], [(0, 2), (2, 2)]]
+    assert counts(curve) == [[(2, 2), (2, 2)], [None, (2, 2)]]
+    assert "| 80 | – | 2/2 [34–100] |" in capsys.readouterr().out.splitlines()
+    assert picture.stat().st_size > 10_000
+    with pytest.raises(SystemExit):
+        script.main([*options.split(), "--bound", "stopping-zone"])
+    assert "--bound must use no camera, got stopping-zone" in capsys.readouterr().err
+
+
+def test_traffic_causes():
+    """`always-brake` brakes at once; drives with a braking event that is needed are left out."""
+    script = load("traffic_causes")
+    config = RunConfig(suite="traffic", agents=("always-brake",), seeds=2, worlds=0, conditions=("clear",))
+    row = {"agent": "always-brake", "case": "traffic/two-way/s0", "seed": 0, "world": None, "error": None}
+    row |= {"condition": "clear", "brakes": 2, "false_activations": 2}
+    run = StoredRun(config, [row, row | {"false_activations": 1}], False)
+    ((kind, onset),) = script.play(run, "always-brake", 1)
+    assert kind == "two-way"
+    head, _, line = script.table([(kind, onset), ("merge", onset)])
+    assert head == "| in front of the ego | merge | two-way | all | ego speed [m/s] | distance [m] |"
+    assert line.startswith(f"| {onset.situation} | 1 | 1 | 2 | {onset.speed:.1f} | ")
