@@ -7,18 +7,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lgmd_gym.processes import signals  # noqa: F401  # pyright: ignore[reportUnusedImport]  (before slow imports)
+# Git writes the links to envs and agents as text files where `core.symlinks` is false, as on Windows.
+if not all(Path(__file__).with_name(link).is_dir() for link in ("envs", "agents")):
+    __path__.append(str(Path(__file__).parents[1]))
 
-# isort: split
-from lgmd_gym.source_links import linked_folders
-
-__path__ += linked_folders(Path(__file__).parent)  # before the first import from them
-
-# isort: split
 from lgmd_gym._version import __version__
 from lgmd_gym.envs.registration import register_envs
 from lgmd_gym.envs.traffic.registration import register_traffic
-from lgmd_gym.kernels.kernel_cache import ensure_kernel_cache
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import BirdsEye, CameraParams, EgoCamera
@@ -49,7 +44,6 @@ _MODULES = {
     "LGMDView": "rendering.view",
 }
 
-ensure_kernel_cache(Path(__file__).parent)
 register_envs()
 register_traffic()
 

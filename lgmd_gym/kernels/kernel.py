@@ -7,7 +7,7 @@ have none of the three until Python calls them.
 
 import gc
 from collections.abc import Callable
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
@@ -21,10 +21,9 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
 
+from lgmd_gym.kernels.cache_folder import use_temporary_folder
 from lgmd_gym.kernels.compilation import report_compilation
 from lgmd_gym.kernels.sources import source_stamp
-
-report_compilation()
 
 # Versions of numba with the internals that `Kernel` uses; with any other, `kernel` is `numba.njit`.
 _KNOWN = (0, 61) <= numba.version_info.short <= (0, 68)
@@ -53,6 +52,7 @@ def kernel(
     """
     if function is None:
         return partial(kernel, exact=exact, inline=inline, arrays=arrays)
+    report_compilation()
     options: dict[str, Any] = {
         "nogil": True,
         "no_cfunc_wrapper": True,
@@ -87,7 +87,12 @@ class Kernel(CPUDispatcher):
 
     def enable_caching(self) -> None:
         """Cache on disk."""
-        self._cache = _Cache(self.py_func)
+        try:
+            self._cache = _Cache(self.py_func)
+        except RuntimeError:  # no folder is writable
+            with suppress(OSError):
+                use_temporary_folder()
+            self._cache = _Cache(self.py_func)
 
     def compile(self, sig: Any) -> Any:
         """Compile or load the function for the types `sig`; return the entry point."""

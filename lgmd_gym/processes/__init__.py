@@ -1,1 +1,1 @@
-"""What the package needs of the operating system: whole files, signals, a folder for compiled kernels."""
+"""What the package needs of the operating system: atomic files, locks, signals, worker processes."""

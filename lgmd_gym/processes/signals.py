@@ -1,7 +1,4 @@
-"""SIGINT (Ctrl-C) and SIGTERM for the command `lgmd-gym`: one line and an exit code, no traceback.
-
-Importing this module in the process of the command handles signals until `raise_on_signals`.
-"""
+"""SIGINT (Ctrl-C) and SIGTERM for the command `lgmd-gym`: one line and an exit code, no traceback."""
 
 import os
 import signal
@@ -67,19 +64,10 @@ def raise_on_signals() -> Iterator[Interruption]:
             signal.signal(number, handler)
 
 
-def _is_command() -> bool:
-    """Return whether this process is `lgmd-gym` or `python -m lgmd_gym`."""
-    program = sys.argv[0] if sys.argv else ""
-    if program == "-m":  # Python imports the package of the module that it will run
-        return "lgmd_gym" in sys.orig_argv[sys.orig_argv.index("-m") + 1 :][:1]
-    return os.path.basename(program) == "lgmd-gym"
-
-
-def _exit_on_signals() -> None:
-    """Let the process of the command end at a signal during its imports, when there is nothing to keep."""
-    if _is_command():
-        for number in SIGNALS:
-            _set(number, _exit)
+def exit_on_signals() -> None:
+    """End this process at a signal until `raise_on_signals`: during imports, there is nothing to keep."""
+    for number in SIGNALS:
+        _set(number, _exit)
 
 
 def _set(number: int, handler: object) -> None:
@@ -90,6 +78,3 @@ def _set(number: int, handler: object) -> None:
 def _exit(number: int, frame: FrameType | None) -> None:
     os.write(2, b"lgmd-gym: interrupted\n")
     os._exit(128 + number)
-
-
-_exit_on_signals()

@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
+from pathlib import Path
 
 import docstring_parser
 import pytest
@@ -15,6 +17,8 @@ from support.runs import SMALL_SUITE
 from lgmd_gym import __version__
 from lgmd_gym.cli import main as cli
 from lgmd_gym.clips import VideoReader
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def run(*arguments):
@@ -228,6 +232,24 @@ def test_a_failed_episode_gives_exit_code_one(tmp_path, monkeypatch, capsys):
     assert "- no-brake: RuntimeError: no road today at " in printed
     assert "every episode of no-brake failed, 8 so far: 8 of 19 episodes kept; correct the agent" in printed
     assert "no road today" in (tmp_path / "run" / "episodes.jsonl").read_text()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_during_the_imports_ends_the_command(number, tmp_path):
+    (tmp_path / "tyro.py").write_text(f"import signal; signal.raise_signal({int(number)})")
+    done = subprocess.run(
+        [sys.executable, "-m", "lgmd_gym", "--version"],
+        env={**os.environ, "PYTHONPATH": f"{tmp_path}:{ROOT}"},
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", "lgmd-gym: interrupted\n")
+
+
+def test_the_installed_command_is_that_of_the_module():
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
+    assert scripts == {"lgmd-gym": "lgmd_gym.__main__:main"}
 
 
 @pytest.mark.slow

@@ -14,7 +14,6 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-HEAVY = ("torch", "pandas", "matplotlib", "cv2", "highway_env", "numba", "stable_baselines3")
 HOMES = {"lgmd_gym": ROOT / "lgmd_gym", "lgmd_gym.envs": ROOT / "envs", "lgmd_gym.agents": ROOT / "agents"}
 
 # The folders of the package, highest first. A folder imports only from folders further down.
@@ -39,7 +38,6 @@ ORDER = (
     "statistics",
     "processes",
     "kernels",
-    "source_links",
     "fields",
     "errors",
 )
@@ -139,25 +137,21 @@ def run(code, **kwargs):
     ).stdout
 
 
-def test_import_is_light(bare):
-    assert [name for name in HEAVY if name in bare] == []
-
-
 @pytest.mark.bench
 def test_import_is_fast():
-    """The import adds under 0.5 s to the start of the interpreter (fastest of five runs)."""
+    """The import adds under 0.2 s to the start of the interpreter (fastest of five runs)."""
 
     def timed(code):
         start = time.perf_counter()
         run(code)
         return time.perf_counter() - start
 
-    assert min(timed("import lgmd_gym") for _ in range(5)) - min(timed("pass") for _ in range(5)) < 0.5
+    assert min(timed("import lgmd_gym") for _ in range(5)) - min(timed("pass") for _ in range(5)) < 0.2
 
 
 def test_the_package_folder_contains_four_modules_and_folders():
     flat = {path.name for path in (ROOT / "lgmd_gym").glob("*.py")}
-    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py", "fields.py", "source_links.py"}
+    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py", "fields.py"}
 
 
 def test_every_package_states_its_contents_in_one_sentence():
