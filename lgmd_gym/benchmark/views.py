@@ -34,7 +34,7 @@ class Views:
         self._traces: list[list[TraceFrame]] = [[] for _ in range(self.num_envs)]
         self._substeps = [0] * self.num_envs  # simulation steps up to the next camera frame
         rates = simulation.rates
-        space = make_space(self._sensors, params, rates.camera, rates.simulation, include_frame, None)
+        space = make_space(self._sensors, rates.simulation, include_frame, None)
         self._reader = Observations(simulation, space, include_frame, include_base=False, copy=True)
         self.observations: dict[str, np.ndarray] = {}
 

@@ -14,18 +14,10 @@ from lgmd_gym.camera.params_checks import (
     check_zoom,
 )
 from lgmd_gym.camera.worlds import check_world
-from lgmd_gym.errors import (
-    check_keys,
-    check_known,
-    check_size,
-    check_whole,
-    shown,
-)
+from lgmd_gym.errors import check_keys, check_known, check_size, check_text, check_whole, shown
 
 MAX_WIDTH = 4096
 """Maximum width and height of a frame [px]."""
-MIN_LPLC2 = 16
-"""Minimum width and height of a frame for LPLC2 units with arms of 8 px [px]."""
 
 
 ROADS = {"still": 0.0, "smooth": 0.5, "normal": 1.0, "rough": 2.0}
@@ -35,7 +27,6 @@ ROADS = {"still": 0.0, "smooth": 0.5, "normal": 1.0, "rough": 2.0}
 before.
 """
 _CHOICES = {
-    "detector": ("lgmd", "lplc2", "dsn", "edges"),
     "gaze": ("fixed", "path", "stopping"),
     "vehicles": ("car", "box"),
     "light": ("day", "night", "low_sun"),
@@ -54,12 +45,10 @@ class CameraParams:
     Attributes:
         name: Label of the camera; its results are stored under this key.
         shape: `(height, width)` of the frame [px].
-        detector: Model that processes the frames: `"lgmd"` (`LGMD`), `"lplc2"` (`LPLC2`, for frames of at
-            least 16 × 16 px), `"dsn"` (`DSN`) or `"edges"` (`SustainedEdges`), the last three with their
-            default parameters.
+        detector: Name of the neuron model that processes the frames, see `lgmd_gym.neuron.register`.
         columns: Number of vertical strips of equal width whose potentials are the observation
-            `column_potential` (`FrameNeuron.column_potentials`); 0 for none. Divides the width; not for
-            `detector="lplc2"`.
+            `column_potential` (`FrameNeuron.column_potentials`); 0 for none. Divides the width; only for
+            models with a map of columns.
         hfov_deg: Horizontal field of view, in (1, 170) [degrees].
         mount_height: Height of the lens above the ground [m].
         mount_setback: Distance of the lens behind the front bumper [m].
@@ -182,11 +171,7 @@ class CameraParams:
             object.__setattr__(self, "queue_lane", check_whole("camera queue_lane", self.queue_lane, 0))
         for name, known in _CHOICES.items():
             check_known(f"camera {name}", getattr(self, name), known)
-        if self.detector == "lplc2" and min(self.shape) < MIN_LPLC2:
-            raise ValueError(
-                f"camera shape must be at least {MIN_LPLC2} × {MIN_LPLC2} px with detector='lplc2', got "
-                f"{self.shape}; use a larger shape"
-            )
+        check_text("camera detector", self.detector)
         check_columns(self)
         if self.gaze == "stopping":
             check_zoom(self)

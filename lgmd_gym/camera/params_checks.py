@@ -28,15 +28,11 @@ def check_surroundings(p: CameraParams) -> None:
 
 
 def check_columns(p: CameraParams) -> None:
-    """Check that the columns divide the width, and that the detector has columns."""
+    """Check that the columns divide the width."""
     columns, width = check_whole("camera columns", p.columns, 0, p.shape[1]), p.shape[1]
     object.__setattr__(p, "columns", columns)
     if columns and width % columns:
         raise ValueError(f"camera columns must divide the width of {width} px, got {columns}")
-    if columns and p.detector == "lplc2":
-        raise ValueError(
-            f"camera columns must be 0 with detector='lplc2', got {columns}; use 'lgmd' or 'dsn'"
-        )
 
 
 def check_zoom(p: CameraParams) -> None:

@@ -262,9 +262,7 @@ class BrakingVectorEnv(VectorEnv):
         self.single_observation_space = cast(gym.Space, base)
         if sensors is not None:
             included = base if include_base else None
-            self.single_observation_space = make_space(
-                sensors, neuron, rates.camera, rates.simulation, include_frame, included
-            )
+            self.single_observation_space = make_space(sensors, rates.simulation, include_frame, included)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 

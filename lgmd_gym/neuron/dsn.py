@@ -2,15 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lgmd_gym.neuron import dsn_kernels
+from lgmd_gym.neuron.frame_neuron import Layer
 from lgmd_gym.neuron.motion_neuron import MotionNeuron
 from lgmd_gym.neuron.motion_params import MotionParams
-from lgmd_gym.neuron.params import NeuronSpec
+from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
+from lgmd_gym.neuron.registry import register
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +54,8 @@ class DSN(MotionNeuron):
     """
 
     _past = slice(3, 5)  # delayed ON and OFF
+    _shown: ClassVar = {"right": Layer("motion to the right", 32.0, signed=True)}
+    _lowest = 0.0  # motion to the left inhibits below 0.5
 
     def __init__(
         self,
@@ -71,7 +75,8 @@ class DSN(MotionNeuron):
         """Step the active neurons among first..last-1; see `FrameNeuron.step_range`."""
         dsn_kernels.step(first, last, frames, active, self._scalars, self._const, self._gains, *self._maps)
 
-    def _column_maps(self) -> tuple[NDArray[np.float32], float]:
+    def column_map(self) -> tuple[NDArray[np.float32], float]:
+        """Return the map of the columns; see `FrameNeuron.column_map`."""
         return self._maps[5], self.params.sigma
 
     @property
@@ -79,3 +84,10 @@ class DSN(MotionNeuron):
         """Map `right` of the last frame, the motion m [grey levels]; new array, (H, W) or (N, H, W)."""
         right = self._maps[5]
         return {"right": (right[0] if self.num is None else right).copy()}
+
+
+def _make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams) -> DSN:
+    return DSN(shape, fps, num=num, spikes=params)
+
+
+register("dsn", _make, takes_params=True)

@@ -1,12 +1,14 @@
 """FrameNeuron: base class of the neuron models, with steps of one or N neurons."""
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lgmd_gym.errors import check_whole
 from lgmd_gym.neuron.column_kernels import column_potentials
+from lgmd_gym.neuron.params import LGMDParams
 from lgmd_gym.neuron.response import Response
 from lgmd_gym.neuron.scalars import RESPONSE
 from lgmd_gym.neuron.threads import Threads
@@ -21,12 +23,42 @@ from lgmd_gym.neuron.validation import (
 )
 
 _UINT8 = np.dtype(np.uint8)
+_ROUNDING = 1.0001  # float32 sums may slightly exceed the bound of exact arithmetic
+
+
+class Signal(NamedTuple):
+    """Declaration of an output of a neuron.
+
+    Attributes:
+        low: Lower bound.
+        high: Upper bound.
+        unit: Unit; empty for none.
+    """
+
+    low: float
+    high: float
+    unit: str = ""
+
+
+class Layer(NamedTuple):
+    """Declaration of a map of a neuron in pictures.
+
+    Attributes:
+        label: Text below the picture.
+        full: Value of full brightness.
+        signed: Whether the sign is drawn.
+    """
+
+    label: str
+    full: float
+    signed: bool = False
 
 
 class FrameNeuron:
     """One or N neurons of a model, stepped frame by frame.
 
-    Subclasses set `_initial`, `_scalars` and `_maps`, and implement `step_range`, `shift_range` and `layers`.
+    Subclasses set `_initial`, `_scalars` and `_maps`, implement `step_range`, `shift_range`, `layers` and
+    `signals`, and set `_shown`; those with columns implement `column_map`.
 
     Args:
         shape: (height, width) of the frames [px].
@@ -35,6 +67,7 @@ class FrameNeuron:
         threads: Number of threads that share the neurons of a step; None or 1 for the calling thread only.
     """
 
+    _shown: ClassVar[Mapping[str, Layer]] = {}  # `shown_layers`
     _initial: NDArray[np.float64]  # scalar state before the first frame
     _scalars: NDArray[np.float64]  # scalar state of each neuron
     _maps: tuple[NDArray[Any], ...]  # state of each neuron that is 0 before the first frame
@@ -152,12 +185,30 @@ class FrameNeuron:
             active: Selection of the neurons, bool, shape (N,).
             out: Output, float64, shape (N, columns).
         """
-        maps, sigma = self._column_maps()
+        maps, sigma = self.column_map()
         column_potentials(first, last, active, maps, self.shape[1], sigma, out)
 
-    def _column_maps(self) -> tuple[NDArray[np.float32], float]:
-        """Return the maps of the columns, shape (N, H, at least W), and the mean at which K is 0.73."""
-        raise ValueError(f"{type(self).__name__} has no columns; use LGMD or DSN")
+    def column_map(self) -> tuple[NDArray[np.float32], float]:
+        """Return the map of the columns, shape (N, H, at least W), and the mean at which K is 0.73.
+
+        Raises:
+            ValueError: If the model has no columns, or has a mask.
+        """
+        raise ValueError(f"{type(self).__name__} has no columns; use a model that has, such as lgmd")
+
+    @property
+    def signals(self) -> dict[str, Signal]:
+        """Bounds and units of the outputs that observations have."""
+        raise NotImplementedError
+
+    @property
+    def shown_layers(self) -> Mapping[str, Layer]:
+        """Those of `layers` that pictures show, by name, in the order of display."""
+        return self._shown
+
+    def make_single(self) -> None:
+        """Make a batch of one neuron a single neuron with scalar outputs."""
+        self.num, self._frames_shape = None, self.shape
 
     @property
     def outputs(self) -> NDArray[np.float64]:
@@ -193,3 +244,19 @@ class FrameNeuron:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}(shape={self.shape}, fps={self.fps:g}, num={self.num})"
+
+
+def spiking_signals(params: LGMDParams, fps: float, lowest: float, strongest: float) -> dict[str, Signal]:
+    """Return the signals of a model with the spikes of the LGMD.
+
+    Args:
+        params: Parameters of the spikes.
+        fps: Frame rate [Hz].
+        lowest: Lower bound of K after the first change.
+        strongest: Upper bound of `ffi` in exact arithmetic [grey levels].
+    """
+    return {
+        "spike_frequency": Signal(0.0, params.max_spike_frequency(fps), "spikes/s"),
+        "membrane_potential": Signal(min(params.k_0, lowest), 1.0),
+        "ffi": Signal(0.0, strongest * _ROUNDING, "grey levels"),
+    }

@@ -1,15 +1,17 @@
 """LPLC2: a looming detector of the fly, which compares motion along four directions."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lgmd_gym.neuron import lplc2_kernels
+from lgmd_gym.neuron.frame_neuron import Layer
 from lgmd_gym.neuron.lplc2_params import LPLC2Params
 from lgmd_gym.neuron.motion_neuron import MotionNeuron
-from lgmd_gym.neuron.params import NeuronSpec
+from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
+from lgmd_gym.neuron.registry import register
 
 
 class LPLC2(MotionNeuron):
@@ -55,6 +57,11 @@ class LPLC2(MotionNeuron):
     """
 
     _past = slice(3, 5)  # delayed ON and OFF
+    _shown: ClassVar = {
+        "right": Layer("motion to the right", 32.0, signed=True),
+        "down": Layer("motion downwards", 32.0, signed=True),
+        "units": Layer("responses of the units", 8.0),
+    }
 
     def __init__(
         self,
@@ -96,3 +103,10 @@ class LPLC2(MotionNeuron):
         """
         maps = dict(zip(("right", "down", "units"), self._maps[5:8], strict=True))
         return {name: (values[0] if self.num is None else values).copy() for name, values in maps.items()}
+
+
+def _make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams) -> LPLC2:
+    return LPLC2(shape, fps, num=num, spikes=params)
+
+
+register("lplc2", _make, takes_params=True)

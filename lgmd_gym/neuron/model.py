@@ -1,13 +1,14 @@
 """LGMD: the stateful neuron."""
 
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lgmd_gym.neuron import general_kernel, kernels, shift_kernels, state
-from lgmd_gym.neuron.frame_neuron import FrameNeuron
+from lgmd_gym.neuron.frame_neuron import FrameNeuron, Layer, Signal, spiking_signals
 from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
+from lgmd_gym.neuron.registry import register
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
 from lgmd_gym.neuron.validation import checked_region
 
@@ -45,6 +46,13 @@ class LGMD(FrameNeuron):
         >>> neuron.step(np.zeros((90, 160), np.uint8)).spikes
         0
     """
+
+    _shown: ClassVar = {
+        "P": Layer("P  change, ON and OFF", 64.0, signed=True),
+        "I": Layer("I  delayed inhibition", 64.0),
+        "S": Layer("S  remaining excitation", 64.0),
+        "G": Layer("G  grouped excitation", 64.0),
+    }
 
     def __init__(
         self,
@@ -125,7 +133,13 @@ class LGMD(FrameNeuron):
             images[name] = image[0] if self.num is None else image
         return images
 
-    def _column_maps(self) -> tuple[NDArray[np.float32], float]:
+    @property
+    def signals(self) -> dict[str, Signal]:
+        """Bounds and units of the outputs; F̂ has full-range changes in every frame, with persistence."""
+        return spiking_signals(self.params, self.fps, 0.5, 255.0 / (1.0 - sum(self.params.persistence)))
+
+    def column_map(self) -> tuple[NDArray[np.float32], float]:
+        """Return the map of the columns; see `FrameNeuron.column_map`."""
         if self._weight.size > 0 or self._previous.shape[1:] != self.shape:
             raise ValueError("columns require a neuron without mask and roi; leave both out")
         g: NDArray[np.float32] = self._maps[4] if self._fast else self._maps[5]
@@ -134,3 +148,10 @@ class LGMD(FrameNeuron):
     def _use_floats(self) -> None:
         super()._use_floats()
         self._previous = self._previous.astype(np.float32, copy=False)
+
+
+def _make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams) -> LGMD:
+    return LGMD(shape, fps, num=num, params=params)
+
+
+register("lgmd", _make, takes_params=True)

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from lgmd_gym.neuron.frame_neuron import FrameNeuron
+from lgmd_gym.neuron.frame_neuron import FrameNeuron, Signal, spiking_signals
 from lgmd_gym.neuron.motion_params import ModelParams
 from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
@@ -28,6 +28,7 @@ class MotionNeuron(FrameNeuron):
     """
 
     _past: ClassVar[slice]
+    _lowest: ClassVar[float] = 0.5  # lower bound of K
 
     def __init__(
         self,
@@ -39,12 +40,17 @@ class MotionNeuron(FrameNeuron):
         spikes: NeuronSpec,
     ) -> None:
         super().__init__(shape, fps, num, threads)
-        stage = LGMDParams.make(spikes)
+        self._stage = stage = LGMDParams.make(spikes)
         self._initial = initial_scalars(stage)
         self._scalars = np.tile(self._initial, (self._count, 1))
         constants = LGMDParams.make({**stage.to_dict(), "sigma_3": params.sigma})
         self._const = pack_constants(constants, self.fps, n_pixels=1)
         self._gains = np.array(params.gains(self.fps), np.float32)
+
+    @property
+    def signals(self) -> dict[str, Signal]:
+        """Bounds and units of the outputs; no motion or edge is stronger than the range of grey levels."""
+        return spiking_signals(self._stage, self.fps, self._lowest, 255.0)
 
     def shift_range(
         self,

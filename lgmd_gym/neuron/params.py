@@ -144,6 +144,14 @@ class LGMDParams:
         """Return the frame interval dt of the filters [ms] at a frame rate [Hz]."""
         return float(math.floor(1000.0 / fps)) if self.whole_ms else 1000.0 / fps
 
+    def max_spike_frequency(self, fps: float) -> float:
+        """Return the upper bound of the spike frequency [spikes/s], from K <= 1 and K̂ <= τ_s / (τ_s + dt)."""
+        interval_ms = self.frame_interval_ms(fps)
+        adapts = self.spikes_from == "adapted" and not math.isinf(self.tau_s)
+        highest = self.tau_s / (self.tau_s + interval_ms) if adapts else 1.0
+        spikes = math.floor(math.exp(self.sigma_4 * (highest - self.t_sp)))
+        return min(spikes, self.max_spikes) * self.window / self.n_ts * 1000.0 / interval_ms
+
     @classmethod
     def literal(cls) -> Self:
         """Return the parameters for the equations as printed in the paper.

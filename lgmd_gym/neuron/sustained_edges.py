@@ -2,16 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lgmd_gym.errors import check_positive
 from lgmd_gym.neuron import sustained_edges_kernels
+from lgmd_gym.neuron.frame_neuron import Layer
 from lgmd_gym.neuron.motion_neuron import MotionNeuron
 from lgmd_gym.neuron.motion_params import ModelParams
-from lgmd_gym.neuron.params import NeuronSpec
+from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
+from lgmd_gym.neuron.registry import register
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +75,10 @@ class SustainedEdges(MotionNeuron):
     """
 
     _past = slice(0)  # none
+    _shown: ClassVar = {
+        "light": Layer("low-passed light", 255.0),
+        "edges": Layer("sustained edges", 32.0),
+    }
 
     def __init__(
         self,
@@ -100,5 +106,13 @@ class SustainedEdges(MotionNeuron):
         maps = dict(zip(("light", "edges"), self._maps, strict=True))
         return {name: (values[0] if self.num is None else values).copy() for name, values in maps.items()}
 
-    def _column_maps(self) -> tuple[NDArray[np.float32], float]:
+    def column_map(self) -> tuple[NDArray[np.float32], float]:
+        """Return the map of the columns; see `FrameNeuron.column_map`."""
         return self._maps[1], self.params.sigma
+
+
+def _make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams) -> SustainedEdges:
+    return SustainedEdges(shape, fps, num=num, spikes=params)
+
+
+register("edges", _make, takes_params=True)

@@ -60,7 +60,7 @@ class Dashboard:
         self._enlarged = cameras[0]
         self._camera_panel.draw(canvas, cameras)
         sensors = self._observer.sensors
-        panels.draw_layers(canvas, sensors.detectors[self._enlarged], sensors.layers(self._enlarged))
+        panels.draw_layers(canvas, sensors.shown_layers(self._enlarged), sensors.layers(self._enlarged))
         potential = self._observer.response.membrane_potential
         self._trace_panel.draw(canvas, float(potential[self._enlarged]))
         panels.draw_bars(canvas, state)

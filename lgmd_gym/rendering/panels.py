@@ -1,11 +1,13 @@
 """Panels of the dashboard: camera frame, layers, bars, lamps and top view."""
 
+from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from lgmd_gym.camera import EgoCamera
+from lgmd_gym.neuron import Layer
 from lgmd_gym.rendering.canvas import FAINT, GREEN, INK, PINK, PURPLE, RED, SKY, UNLIT, YELLOW, Box, Canvas
 from lgmd_gym.rendering.overlays import danger_zone_edges, target_boxes
 from lgmd_gym.rendering.state import DisplayState
@@ -16,25 +18,6 @@ CAMERA_COLOURS = (SKY, INK, PURPLE, GREEN)  # of the traces, in the order of the
 
 CAMERA_FRAME: Box = (24, 60, 824, 510)
 INSET = (192, 108)  # [px], size of the inset of each further camera
-# Name, label, value of full brightness and whether the sign is drawn, for each layer of a detector's picture.
-LAYERS = {
-    "lgmd": (
-        ("P", "P  change, ON and OFF", 64.0, True),
-        ("I", "I  delayed inhibition", 64.0, False),
-        ("S", "S  remaining excitation", 64.0, False),
-        ("G", "G  grouped excitation", 64.0, False),
-    ),
-    "lplc2": (
-        ("right", "motion to the right", 32.0, True),
-        ("down", "motion downwards", 32.0, True),
-        ("units", "responses of the units", 8.0, False),
-    ),
-    "edges": (
-        ("light", "low-passed light", 255.0, False),
-        ("edges", "sustained edges", 32.0, False),
-    ),
-    "dsn": (("right", "motion to the right", 32.0, True),),
-}
 LAYER_BOXES: tuple[Box, ...] = (
     (848, 60, 1044, 170),
     (1060, 60, 1256, 170),
@@ -117,22 +100,22 @@ class CameraPanel:
         canvas.clip(None)
 
 
-def draw_layers(canvas: Canvas, detector: str, maps: dict[str, np.ndarray]) -> None:
+def draw_layers(canvas: Canvas, shown: Mapping[str, Layer], maps: Mapping[str, np.ndarray]) -> None:
     """Draw the maps of a neuron's last frame and their labels.
 
     Args:
         canvas: The canvas.
-        detector: See `CameraParams`.
+        shown: The maps to draw, `FrameNeuron.shown_layers`; the first four have space.
         maps: The maps by name.
     """
-    for (name, label, full, signed), box in zip(LAYERS[detector], LAYER_BOXES, strict=False):
-        levels = maps[name] * (255.0 / full)
-        if signed:
+    for (name, layer), box in zip(shown.items(), LAYER_BOXES, strict=False):
+        levels = maps[name] * (255.0 / layer.full)
+        if layer.signed:
             colours = SIGNED[np.clip(127.5 + 0.5 * levels, 0, 255).astype(np.uint8)]
         else:
             colours = HEAT[np.clip(levels, 0, 255).astype(np.uint8)]
         canvas.paste(colours, box)
-        canvas.text((box[0], box[3] + 5), label, 13, FAINT)
+        canvas.text((box[0], box[3] + 5), layer.label, 13, FAINT)
 
 
 # Name, full scale, unit and colour of each bar.

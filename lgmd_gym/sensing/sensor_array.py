@@ -8,14 +8,15 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from lgmd_gym import neuron
 from lgmd_gym.camera import BirdsEye, CameraParams, CameraSpec, EgoCamera
 from lgmd_gym.camera.road_pool import RoadPool
 from lgmd_gym.camera.scene_table import SceneTable
-from lgmd_gym.neuron import LGMDParams, Response
+from lgmd_gym.neuron import Layer, LGMDParams, Response
 from lgmd_gym.neuron.threads import Threads
 from lgmd_gym.sensing.cameras import Variant, Variants, make_cameras
 from lgmd_gym.sensing.kernels import NUMBERS, SIGNALS
-from lgmd_gym.sensing.sensor_group import SensorGroup, make_neurons
+from lgmd_gym.sensing.sensor_group import SensorGroup
 
 _separation = Lock()
 
@@ -101,7 +102,17 @@ class SensorArray:
             by_kind.setdefault(kind, []).append(index)
         self._groups = [
             SensorGroup(
-                make_neurons(detector, shape, fps, params, num_envs * len(members)),
+                neuron.make(
+                    detector,
+                    shape,
+                    fps,
+                    num_envs * len(members),
+                    params,
+                    columns=columns,
+                    derotated=any(
+                        p is not None and p.derotated for p in (unchanged.params[k] for k in members)
+                    ),
+                ),
                 members,
                 unchanged.params,
                 self.enabled,
@@ -250,6 +261,16 @@ class SensorArray:
         """Return the layer maps of one camera's last frame in the first environment."""
         group, row = self._locations[camera]
         return {name: maps[row] for name, maps in self._groups[group].neuron.layers.items()}
+
+    def shown_layers(self, camera: int = 0) -> Mapping[str, Layer]:
+        """Return those of `layers` that pictures show."""
+        return self._groups[self._locations[camera][0]].neuron.shown_layers
+
+    def bounds(self, signal: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the lower and upper bounds of an output of each camera, float32, shape (cameras,)."""
+        declared = [self._groups[group].neuron.signals[signal] for group, _ in self._locations]
+        low, high = zip(*((item.low, item.high) for item in declared), strict=True)
+        return np.array(low, np.float32), np.array(high, np.float32)
 
     def close(self) -> None:
         """Close the cameras that hold resources."""

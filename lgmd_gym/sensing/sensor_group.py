@@ -10,29 +10,8 @@ from lgmd_gym.camera import CameraParams
 from lgmd_gym.camera.batch import CameraBatch
 from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.render.context import Workspace
-from lgmd_gym.neuron import DSN, LGMD, LPLC2, LGMDParams, SustainedEdges
-from lgmd_gym.neuron.frame_neuron import FrameNeuron
+from lgmd_gym.neuron import FrameNeuron
 from lgmd_gym.sensing.kernels import collect_outputs, count_turns, select_cameras
-
-MODELS = {"lplc2": LPLC2, "dsn": DSN, "edges": SustainedEdges}
-"""Models beside the LGMD, by the `detector` of `CameraParams`."""
-
-
-def make_neurons(
-    detector: str, shape: tuple[int, int], fps: float, params: LGMDParams, num: int
-) -> FrameNeuron:
-    """Return `num` neurons.
-
-    Args:
-        detector: See `CameraParams`.
-        shape: Frame shape (height, width) [px].
-        fps: Camera frame rate [Hz].
-        params: Parameters of the LGMD; of the other models, only those of the adaptation and the spikes.
-        num: Number of neurons.
-    """
-    if detector == "lgmd":
-        return LGMD(shape, fps, params, num)
-    return MODELS[detector](shape, fps, num=num, spikes=params)
 
 
 class SensorGroup:

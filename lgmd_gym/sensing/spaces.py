@@ -1,12 +1,11 @@
 """Observation space and arrays of `LGMDObservation`."""
 
-from math import exp, floor, isinf, pi
+from math import pi
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
-from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.sensing.kernels import SIGNALS
 from lgmd_gym.sensing.sensor_array import SensorArray
 
@@ -16,8 +15,6 @@ DECELERATION_BOUND = 15.0  # [m/s²], above 12 m/s² with the largest error of a
 
 def make_space(
     sensors: SensorArray,
-    params: LGMDParams,
-    fps: float,
     simulation_frequency: float,
     include_frame: bool,
     base: spaces.Space[Any] | None,
@@ -26,8 +23,6 @@ def make_space(
 
     Args:
         sensors: The cameras and neurons.
-        params: Parameters of the neurons.
-        fps: Camera frame rate [Hz].
         simulation_frequency: Simulation frequency [Hz].
         include_frame: Whether to include the frames.
         base: The observation space of the environment; None to exclude it.
@@ -36,13 +31,8 @@ def make_space(
         ValueError: For `include_frame` with cameras of different shapes.
     """
     count = (len(sensors.names),)
-    # A direction-selective neuron is inhibited below 0.5 by motion against its direction.
-    lowest = [0.0 if detector == "dsn" else min(params.k_0, 0.5) for detector in sensors.detectors]
-    low = np.array(lowest, np.float32)
     parts: dict[str, spaces.Space[Any]] = {
-        "spike_frequency": spaces.Box(0.0, max_spike_frequency(params, fps), count, np.float32),
-        "membrane_potential": spaces.Box(low, np.ones(count, np.float32), dtype=np.float32),
-        "ffi": spaces.Box(0.0, max_ffi(params), count, np.float32),
+        **{signal: spaces.Box(*sensors.bounds(signal), dtype=np.float32) for signal in SIGNALS},
         "ego_speed": spaces.Box(-SPEED_BOUND, SPEED_BOUND, (1,), np.float32),
         # The heading changes by at most half a turn per simulation step.
         "ego_yaw_rate": spaces.Box(-pi * simulation_frequency, pi * simulation_frequency, (1,), np.float32),
@@ -115,18 +105,3 @@ def yaw_rate(heading: float, previous: float, elapsed: float) -> float:
     """Return the mean yaw rate [rad/s] between two headings [rad] by the shorter turn; 0 without duration."""
     turned = (heading - previous + pi) % (2 * pi) - pi
     return turned / elapsed if elapsed > 0.0 else 0.0
-
-
-def max_spike_frequency(params: LGMDParams, fps: float) -> float:
-    """Return the upper bound of the spike frequency [spikes/s], from K <= 1 and K̂ <= τ_s / (τ_s + dt)."""
-    interval_ms = params.frame_interval_ms(fps)
-    adapts = params.spikes_from == "adapted" and not isinf(params.tau_s)
-    highest = params.tau_s / (params.tau_s + interval_ms) if adapts else 1.0
-    spikes = floor(exp(params.sigma_4 * (highest - params.t_sp)))
-    return min(spikes, params.max_spikes) * params.window / params.n_ts * 1000.0 / interval_ms
-
-
-def max_ffi(params: LGMDParams) -> float:
-    """Return the upper bound of F̂ [grey levels]: full-range changes in every frame, with persistence."""
-    # float32 sums may slightly exceed the bound of exact arithmetic.
-    return 255.0 / (1.0 - sum(params.persistence)) * 1.0001

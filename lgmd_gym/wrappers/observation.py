@@ -194,7 +194,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self._info_keys = [key for keys in signal_keys(self.sensors.names).values() for key in keys]
         base = self.env.observation_space if self.include_base else None
         self.observation_space = make_space(
-            self.sensors, self.params, self.fps, self._simulation_frequency, self.include_frame, base
+            self.sensors, self._simulation_frequency, self.include_frame, base
         )
 
     def _check_frequency(self, options: dict[str, Any] | None) -> None:

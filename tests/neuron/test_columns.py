@@ -56,7 +56,7 @@ def test_columns_are_one_half_before_the_first_change_and_after_a_reset():
 def test_invalid_columns_are_rejected():
     with pytest.raises(ValueError, match="columns must divide the width of 80 px, got 3"):
         LGMD(SHAPE).column_potentials(3)
-    with pytest.raises(ValueError, match="LPLC2 has no columns; use LGMD or DSN"):
+    with pytest.raises(ValueError, match="LPLC2 has no columns; use a model that has, such as lgmd"):
         LPLC2(SHAPE).column_potentials(2)
     with pytest.raises(ValueError, match="columns require a neuron without mask and roi"):
         LGMD(SHAPE, roi=(0, 0, 20, 40)).column_potentials(2)

@@ -78,6 +78,6 @@ def test_neuron_imports_only_vectors_errors_and_the_decorator_of_kernels():
                 imported |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 imported.add(node.module or "")
-    below = ("lgmd_gym.errors", "lgmd_gym.kernels.simd", "lgmd_gym.kernels.kernel")
+    below = ("lgmd_gym.errors", "lgmd_gym.fields", "lgmd_gym.kernels", "lgmd_gym.kernels.simd")
     own = {name for name in imported if name.startswith("lgmd_gym.neuron") or name in below}
     assert {name for name in imported - own if name.split(".")[0] not in allowed} == set()

@@ -1,0 +1,116 @@
+"""Own neuron models: one class and one registration, used like the models of the package."""
+
+import copy
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from lgmd_gym import neuron
+from lgmd_gym.neuron import LGMDParams, Signal
+
+
+class Change:
+    """Mean absolute change of each frame [grey levels] as a frequency and potential."""
+
+    signals = {  # noqa: RUF012
+        "spike_frequency": Signal(0.0, 255.0, "spikes/s"),
+        "membrane_potential": Signal(0.5, 1.0),
+    }
+
+    def __init__(self, shape, fps, num):
+        self.last, self.map = np.zeros((num, *shape)), np.zeros((num, *shape), np.float32)
+        self.first = np.ones(num, bool)
+
+    def step(self, frames, active):
+        self.last[self.first] = frames[self.first]
+        self.map[active] = np.abs(frames - self.last)[active]
+        self.last[active], self.first[active] = frames[active], False
+        change = self.map.mean((1, 2))
+        return {"spike_frequency": change, "membrane_potential": 0.5 + change / 510.0}
+
+    def reset(self, mask):
+        self.first[mask], self.map[mask] = True, 0.0
+
+    def column_map(self):
+        return self.map, 10.0
+
+
+if "change" not in neuron.names():
+    neuron.register("change", Change)
+
+CAMERAS = ["wide", {"name": "own", "shape": (30, 40), "detector": "change", "columns": 4}]
+
+
+def test_an_own_model_in_environments_and_the_engine():
+    names = "spike_frequency", "membrane_potential", "ffi", "column_potential"
+    single = gym.make("LGMD/CCRs-v0", ego_speed=8.0, camera=CAMERAS, world="laboratory")
+    batch = gym.make_vec("LGMD/CCRs-v0", 2, ego_speed=8.0, camera=CAMERAS, world="laboratory", threads=2)
+    one, _ = single.reset(seed=1)
+    many, _ = batch.reset(seed=[1, 2])
+    assert one in single.observation_space
+    changed = False
+    for _ in range(12):
+        assert all((one[name] == many[name][0]).all() for name in names)
+        one, *_ = single.step(np.array([-0.5], np.float32))
+        many, *_ = batch.step(np.full((2, 1), -0.5, np.float32))
+        assert one in single.observation_space
+        changed |= one["spike_frequency"][1] > 0.1
+    assert changed
+    assert one["ffi"][1] == 0.0
+    assert one["column_potential"].max() > 0.5
+
+
+@pytest.mark.parametrize("twin", [copy.deepcopy, lambda neurons: pickle.loads(pickle.dumps(neurons))])
+def test_an_own_model_by_itself(twin):
+    neurons = neuron.make("change", (4, 8), 30.0, 2, LGMDParams(t_sf=5.0))
+    frames = np.zeros((2, 4, 8), np.uint8)
+    neurons.step(frames)
+    frames[0] = 10
+    response = twin(neurons).step(frames, np.array([True, False]))
+    assert response.spike_frequency.tolist() == [10.0, 0.0]
+    assert response.alert.tolist() == [True, False]
+    single = neuron.make("change", (4, 8))
+    assert single.step(frames[0]).membrane_potential == 0.5
+
+
+class Wrong(Change):
+    """A model with outputs beside its declaration."""
+
+    outputs = {}  # noqa: RUF012
+
+    def step(self, frames, active):
+        return super().step(frames, active) | self.outputs
+
+
+@pytest.mark.parametrize(
+    ("outputs", "message"),
+    [
+        ({"spike_frequency": [np.nan, 0.0]}, r"must be in \[0, 255\], got nan"),
+        ({"membrane_potential": [0.7, 1.5]}, r"must be in \[0.5, 1\], got 1.5"),
+        ({"membrane_potential": 0.7}, r"must have the shape \(2,\), got \(\)"),
+        ({"ffj": [0.0, 0.0]}, "unknown signal of neuron 'wrong' 'ffj'"),
+    ],
+)
+def test_wrong_outputs_are_refused(outputs, message, monkeypatch):
+    monkeypatch.delitem(neuron.registry._MODELS, "wrong", raising=False)
+    neuron.register("wrong", Wrong)
+    monkeypatch.setattr(Wrong, "outputs", outputs)
+    neurons = neuron.make("wrong", (4, 8), 30.0, 2)
+    with pytest.raises(ValueError, match=message):
+        neurons.step(np.zeros((2, 4, 8), np.uint8))
+    monkeypatch.delitem(neuron.registry._MODELS, "wrong")
+
+
+def test_names_and_declarations_are_checked():
+    with pytest.raises(ValueError, match="'lgmd' is registered already"):
+        neuron.register("lgmd", Change)
+    with pytest.raises(ValueError, match="must be a function or class, got 3"):
+        neuron.register("three", 3)
+    with pytest.raises(ValueError, match="unknown neuron 'lplc3'; did you mean 'lplc2'"):
+        gym.make("LGMD/CCRs-v0", ego_speed=8.0, camera={"detector": "lplc3"})
+    with pytest.raises(ValueError, match="LPLC2 has no columns"):
+        neuron.make("lplc2", (32, 40), columns=4)
+    with pytest.raises(ValueError, match=r"must have shift\(active, turns_px\)"):
+        neuron.make("change", (4, 8), derotated=True)
