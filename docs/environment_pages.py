@@ -14,8 +14,7 @@ from lgmd_gym.envs.families.data import scenario_from_data
 from lgmd_gym.envs.registration import RANDOM_TASKS, SCENARIO
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.envs.traffic.registration import traffic_id
-from lgmd_gym.report.gallery.cards import ScenarioCard, scenario_cards
-from lgmd_gym.report.gallery.docstrings import parse_docstring
+from lgmd_gym.report.gallery.cards import ScenarioCard, parse_docstring, scenario_cards
 
 VIDEO_AGENT = "spike-threshold"
 _NO_THREAT = "; not a threat."

@@ -17,8 +17,7 @@ from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
 from lgmd_gym.envs.registration import APPEARANCE, RANDOM_TASKS, SCENARIO, make_braking
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.traffic.registration import make_traffic
-from lgmd_gym.report.gallery.cards import ScenarioCard
-from lgmd_gym.report.gallery.docstrings import DocumentedArgument, parse_docstring
+from lgmd_gym.report.gallery.cards import DocumentedArgument, ScenarioCard, parse_docstring
 from lgmd_gym.wrappers.observation import LGMDObservation
 
 _REFERENCES = {cls.__name__: cls for cls in (LGMDObservation, Appearance)}

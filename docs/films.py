@@ -14,7 +14,7 @@ from PIL import Image
 
 from lgmd_gym import LGMDView
 from lgmd_gym.agents import make_agent
-from lgmd_gym.rendering.canvas import BACKGROUND, Box
+from lgmd_gym.rendering.canvas import BACKGROUND, PixelBox
 
 WIDTH, EVERY, HOLD_S = 480, 3, 1.0  # width [px], decisions per film frame, time of the last frame [s]
 QUALITY = 55  # of WebP
@@ -37,7 +37,7 @@ class Film(NamedTuple):
 
     id: str
     arguments: dict[str, Any]
-    panels: tuple[Box, ...] = (LAMPS, CAMERA, TRACE)
+    panels: tuple[PixelBox, ...] = (LAMPS, CAMERA, TRACE)
     agent: str = "spike-threshold"
     start: float = 2.0
     end: float = 8.0
@@ -76,7 +76,7 @@ def pictures(film: Film) -> Iterator[Image.Image]:
     env.close()
 
 
-def stacked(picture: np.ndarray, panels: tuple[Box, ...]) -> Image.Image:
+def stacked(picture: np.ndarray, panels: tuple[PixelBox, ...]) -> Image.Image:
     """Return the panels of a dashboard one below the other, with the width of the films."""
     parts = [Image.fromarray(picture).crop(box) for box in panels]
     parts = [part.resize((WIDTH, round(part.height * WIDTH / part.width))) for part in parts]

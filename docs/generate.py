@@ -24,7 +24,7 @@ from lgmd_gym.benchmark.summary import INTERVAL_TEXT, Sample, summaries
 from lgmd_gym.cli.main import COMMANDS
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.traffic.env import TrafficEnv
-from lgmd_gym.processes.executor import Executor
+from lgmd_gym.processes.pool import Executor
 from lgmd_gym.report.gallery.cards import ScenarioCard, record_video
 from lgmd_gym.statistics.intervals import Rate
 

@@ -47,7 +47,7 @@ from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.envs.families.curves import MAX_LATERAL
 from lgmd_gym.errors import counted
 from lgmd_gym.plotting.style import COLOURS, saved_figure
-from lgmd_gym.processes.worker_processes import run_parallel
+from lgmd_gym.processes.pool import run_parallel
 from lgmd_gym.rendering.playback import make_target
 from lgmd_gym.statistics.intervals import Rate
 

@@ -20,7 +20,7 @@ from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.stored_run import StoredRun, make_plan, read_run
 from lgmd_gym.benchmark.summary import summarise
 from lgmd_gym.errors import counted
-from lgmd_gym.processes.executor import Executor
+from lgmd_gym.processes.pool import Executor
 
 # Worlds 8,000 to 8,019 and the road "normal" are the defaults.
 MIXED = {"conditions": ("mixed",)}

@@ -9,7 +9,7 @@ from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.suite_file import Source, get_suite
 from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.errors import shown
-from lgmd_gym.processes.executor import SERIAL, Executor
+from lgmd_gym.processes.pool import SERIAL, Executor
 
 if TYPE_CHECKING:
     import pandas as pd

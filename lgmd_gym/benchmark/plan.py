@@ -18,7 +18,7 @@ from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
 from lgmd_gym.benchmark.units import make_units
 from lgmd_gym.benchmark.warm_up import compile_kernels
-from lgmd_gym.processes.executor import TaskMap
+from lgmd_gym.processes.pool import TaskMap
 
 
 class Plan(ABC):

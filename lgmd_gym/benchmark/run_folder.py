@@ -12,8 +12,7 @@ from lgmd_gym._version import __version__
 from lgmd_gym.benchmark.folder import provenance, replace_file
 from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.stored_run import ROWS_FILE, read_run, read_settings, rows_file
-from lgmd_gym.processes.files import new_folder
-from lgmd_gym.processes.lock import FolderLock
+from lgmd_gym.processes.files import FolderLock, new_folder
 
 
 class RunFolder:

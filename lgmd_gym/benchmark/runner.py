@@ -14,7 +14,7 @@ from lgmd_gym.benchmark.run_folder import RunFolder
 from lgmd_gym.benchmark.stored_run import make_plan
 from lgmd_gym.benchmark.task import NO_BRAKE, Result
 from lgmd_gym.benchmark.trust import check_trust
-from lgmd_gym.processes.executor import SERIAL, Executor, PoolLostError
+from lgmd_gym.processes.pool import SERIAL, Executor, PoolLostError
 
 INTERRUPTED = "interrupted"
 

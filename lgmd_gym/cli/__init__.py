@@ -1,1 +1,1 @@
-"""The `lgmd-gym` command line: option dataclasses, and one module per command."""
+"""The `lgmd-gym` command line: one module per command, with its options."""

@@ -1,34 +1,96 @@
-"""The `bench` command."""
+"""The `bench` command; the attribute docstrings of `Bench` are its help texts."""
 
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rich.console import Console
 
 from lgmd_gym.cli.console import activity, make_console
-from lgmd_gym.cli.modules import chosen_modules
-from lgmd_gym.cli.options import refuse_unused
-from lgmd_gym.cli.params import note_unused_params, read_params
+from lgmd_gym.cli.values import (
+    Count,
+    File,
+    Name,
+    Names,
+    chosen_modules,
+    note_unused_params,
+    read_params,
+    refuse_unused,
+)
 from lgmd_gym.errors import counted
 
 if TYPE_CHECKING:
     from lgmd_gym.benchmark.runner import Run
-    from lgmd_gym.cli.options import Bench
-    from lgmd_gym.processes.executor import Executor
+    from lgmd_gym.processes.pool import Executor
 
 # Options that have an effect on a resumed run.
 RESUME_OPTIONS = ("resume", "trust", "jobs", "backend", "address", "plots", "report")
 
 
-def run(options: "Bench") -> int:
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    """Run agents on a suite, print the scores and write a run folder.
+
+    The folder contains episodes.jsonl (one row per episode, written as it finishes), episodes.csv,
+    summary.csv, report.html with its figures, run.toml, run.json, time series and one PNG per case. Ctrl-C
+    keeps the finished episodes.
+    """
+
+    suite: Names = None
+    """Suite name (see `lgmd-gym list suites`), or paths: suite or scenario files (.toml, .json), OpenSCENARIO
+    files (.xosc), folders with such files. Default: quick."""
+    agents: Names = None
+    """Agents with options, for example spike-threshold:threshold=45,frames=2; MODULE:CLASS for an agent of
+    your own. Default: no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""
+    seeds: Count = None
+    """Number of seeds per case; a seed sets the start position and the target's grey level. Default: 3."""
+    first_seed: Count = None
+    """First seed. Default: 0."""
+    module: Names = None
+    """Modules with scenario families of your own: my_scenarios, or my_scenarios:MyFamily."""
+    conditions: Names = None
+    """Camera conditions, each run separately: clear, night, night_upper_beam, fog, rain, low_sun, or mixed
+    for that of each world. Default: clear."""
+    worlds: Count = None
+    """Number of worlds (asphalt, light, surroundings, brake); 0 for the plain laboratory. Default: 20."""
+    first_world: Count = None
+    """First world; 8000 to 8999 are the test worlds. Default: 8000."""
+    road: Name = None
+    """Road under the car: still, smooth, normal or rough. Default: normal, in the laboratory still."""
+    camera: Name = None
+    """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
+    params: File = None
+    """TOML file of LGMD parameters."""
+    config: File = None
+    """run.toml of an earlier run to repeat; replaces the options above."""
+    resume: File = None
+    """Folder of an interrupted run; runs the missing episodes with the settings of that run."""
+    trust: bool = False
+    """Load modules and policy files that --resume, --config or the suite file names; they can run any
+    code."""
+    jobs: int = 2
+    """Number of processes."""
+    backend: Literal["processes", "dask"] = "processes"
+    """Executor: local processes or a running Dask cluster."""
+    address: Name = None
+    """Address of the Dask scheduler, for example tcp://10.0.0.1:8786."""
+    out: File = None
+    """Run folder; must not exist. Default: runs/SUITE-DATE-TIME."""
+    plots: bool = True
+    """Draw one PNG per case."""
+    report: bool = True
+    """Write report.html."""
+
+
+def run(options: Bench) -> int:
     """Run a suite and print its summary; return 0 if complete, 1 for failed episodes, 130 for Ctrl-C."""
     from lgmd_gym.benchmark.failures import failure_lines
     from lgmd_gym.benchmark.runner import INTERRUPTED
     from lgmd_gym.benchmark.stored_run import ROWS_FILE
-    from lgmd_gym.processes.executor import Executor
+    from lgmd_gym.processes.pool import Executor
     from lgmd_gym.report.outputs import write_outputs
 
     console = make_console()
@@ -75,12 +137,12 @@ def _print_stop(benchmark: "Run", console: Console) -> None:
     console.print(f"{benchmark.stop_reason}: {kept}; {resume}", style="yellow", soft_wrap=True)
 
 
-def _trust(options: "Bench") -> bool:
+def _trust(options: Bench) -> bool:
     """Return whether agents may run code from outside the package: those of --agents may."""
     return options.trust or (options.resume is None and options.config is None)
 
 
-def _cluster(options: "Bench") -> str | None:
+def _cluster(options: Bench) -> str | None:
     """Return the address of the Dask scheduler, or None for local processes."""
     if options.backend == "dask" and options.address is None:
         raise ValueError("--backend dask needs --address tcp://HOST:8786 of the scheduler")
@@ -89,7 +151,7 @@ def _cluster(options: "Bench") -> str | None:
     return options.address
 
 
-def _resume(options: "Bench", executor: "Executor", console: Console) -> "Run":
+def _resume(options: Bench, executor: "Executor", console: Console) -> "Run":
     from lgmd_gym.benchmark.runner import Run
 
     assert options.resume is not None
@@ -100,7 +162,7 @@ def _resume(options: "Bench", executor: "Executor", console: Console) -> "Run":
     return benchmark
 
 
-def _new(options: "Bench", executor: "Executor") -> "Run":
+def _new(options: Bench, executor: "Executor") -> "Run":
     from lgmd_gym.agents.registry import make_agent
     from lgmd_gym.benchmark.config import RunConfig
     from lgmd_gym.benchmark.runner import Run

@@ -20,7 +20,7 @@ from lgmd_gym.clips.batch import (
 )
 from lgmd_gym.clips.detection import ClipDetection
 from lgmd_gym.clips.playback import PlaybackConfig
-from lgmd_gym.clips.scored_clip import ScoredClip
+from lgmd_gym.clips.scores import ScoredClip
 from lgmd_gym.processes.files import complete_folder
 
 
@@ -61,9 +61,15 @@ def make_clip_folders(out: Path, jobs: Sequence[ClipJob]) -> list[Path]:
 
 
 def process_clips(
-    jobs: Sequence[ClipJob], folders: Sequence[Path], name: str, config: PlaybackConfig, suffix: str,
-    *, overlay: bool = False, mcap: bool = False, figure: bool = True,
-) -> list[ClipResult]:  # fmt: skip
+    jobs: Sequence[ClipJob],
+    folders: Sequence[Path],
+    name: str,
+    config: PlaybackConfig,
+    suffix: str,
+    *,
+    overlay: bool = False,
+    figure: bool = True,
+) -> list[ClipResult]:
     """Process every clip with one configuration into its folder and show a progress bar."""
     results, frames_before = [], 0
     with progress_bar(name, sum(job.info.frames for job in jobs)) as set_progress:
@@ -72,10 +78,17 @@ def process_clips(
             def on_progress(fraction: float, before: int = frames_before, job: ClipJob = job) -> None:
                 set_progress(before + fraction * job.info.frames)
 
-            results.append(process_clip(
-                job, config, folder, suffix=suffix, overlay=overlay, mcap=mcap, figure=figure,
-                on_progress=on_progress,
-            ))  # fmt: skip
+            results.append(
+                process_clip(
+                    job,
+                    config,
+                    folder,
+                    suffix=suffix,
+                    overlay=overlay,
+                    figure=figure,
+                    on_progress=on_progress,
+                )
+            )
             frames_before += job.info.frames
         set_progress(frames_before)
     return results

@@ -10,12 +10,10 @@ from tempfile import TemporaryDirectory, TemporaryFile
 from textwrap import wrap
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.text import Text
 
 from lgmd_gym.cli.console import make_console
-from lgmd_gym.cli.options import Doctor
 from lgmd_gym.processes.extras import install_command
 
 PACKAGE = "lgmd-gym"
@@ -24,6 +22,14 @@ SPEED = 8.0  # Ego speed of the self-test's approach to a standing car [m/s].
 REINSTALL = "in a clone of the repository and a fresh virtual environment: pip install -c constraints.txt ."
 INDENT = 18  # columns before a message
 OK, NOTE, FAULT = "ok", "note", "fault"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doctor:
+    """Check package versions, numba's cache, the video codec and the display, and simulate for two seconds.
+
+    The exit code is 1 if a check finds a fault; the output suggests a fix.
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +154,7 @@ def _cache_folder(module: Any) -> str:
 def check_codec() -> list[Finding]:
     """Write a short H.264 video and read it back."""
     import av
+    import numpy as np
 
     from lgmd_gym.clips import VideoReader, VideoWriter
 

@@ -1,5 +1,6 @@
-"""Help texts of the commands, from the docstrings of the options, wrapped at words to the terminal."""
+"""Help texts of the commands, from the docstrings of the options, and one-line errors of the parser."""
 
+import ast
 import contextlib
 import inspect
 import io
@@ -7,12 +8,14 @@ import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import docstring_parser
 from tyro.conf import arg
+
+from lgmd_gym.errors import unknown_name
 
 _PLACEHOLDERS = {int: "N", float: "X", str: "NAME", tuple: "[NAME ...]"}
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
@@ -91,3 +94,39 @@ class _Buffer(io.StringIO):
 
     def isatty(self) -> bool:
         return sys.__stdout__ is not None and sys.__stdout__.isatty()
+
+
+def one_line(box: str, command: str) -> str:
+    """Return the message in the parser's box, with the nearest option of the command if the box has one.
+
+    Args:
+        box: Output of the parser.
+        command: Name of the command.
+    """
+    lines = [line.strip("│╭╰╮╯|+ ") for line in re.sub(r"\x1b\[[0-9;]*m", "", box).splitlines()[1:]]
+    text = " ".join("──" if re.fullmatch("[─-]+", line) else line for line in lines if line)
+    text = re.sub(r" \(applied to [^)]*\)| Arguments are applied .* matter\.", "", text)
+    message = re.split(r" ?──", text.removeprefix("── "))[0]
+    for pattern, rewrite in _MESSAGES.items():
+        if match := re.match(pattern, message):
+            message = rewrite(match)
+            break
+    for suggestion in text.partition("Perhaps you meant:")[2].split(" --help"):
+        option = re.search(rf"--[a-z-]+(?=.* in lgmd-gym {command}$)", suggestion)
+        if option:
+            return f"{message}; did you mean {option[0]}?"
+    return message if message.endswith("?") else f"{message}; see lgmd-gym {command} --help"
+
+
+def _unknown_choice(match: re.Match[str]) -> str:
+    return str(unknown_name(f"value of {match[2]}", match[1], ast.literal_eval(match[3])))
+
+
+# Messages of the parser and how to say them.
+_MESSAGES: dict[str, Callable[[re.Match[str]], str]] = {
+    r"Error parsing (--[a-z-]+):.*?('.*?')": lambda match: f"{match[1]} has the invalid value {match[2]}",
+    r"invalid choice '(.*?)' for argument '(.*?)'\. Expected one of (\(.*?\))": _unknown_choice,
+    r"Missing from lgmd-gym (\S+): (\S+)": lambda match: f"{match[1]} requires {match[2]}",
+    r"Missing value for argument '(.*?)'": lambda match: f"{match[1]} requires a value",
+    r"Unrecognized (?:or misplaced )?options: ([^,]*).*": lambda match: f"unknown option {match[1]}",
+}

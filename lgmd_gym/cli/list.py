@@ -5,23 +5,35 @@ import os
 import pydoc
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
 
 from rich.table import Table
+from tyro.conf import Positional
 
-from lgmd_gym.agents import AGENTS
-from lgmd_gym.agents.policies.card import read_card
-from lgmd_gym.agents.policies.policy import find_policy, shipped_policies
-from lgmd_gym.benchmark.suites import SUITES, TRAFFIC
-from lgmd_gym.camera.params import PRESETS
 from lgmd_gym.cli.console import make_console
-from lgmd_gym.cli.options import List
-from lgmd_gym.envs import FAMILIES, env_id, import_families
-from lgmd_gym.envs.registration import LEVEL_ARGUMENTS, RANDOM_TASKS, SCENARIO, SCENARIO_ARGUMENT
-from lgmd_gym.envs.traffic.registration import KINDS
+from lgmd_gym.cli.values import Names
+
+
+@dataclass(frozen=True, kw_only=True)
+class List:
+    """List suites, agents, environments, cameras or cases.
+
+    A list that is longer than the terminal opens in a pager ($PAGER, else less).
+    """
+
+    what: Positional[Literal["all", "suites", "agents", "envs", "cameras", "cases"]] = "all"
+    """Table to print; all has no cases."""
+    module: Names = None
+    """Modules with scenario families of your own to list: my_scenarios, or my_scenarios:MyFamily."""
+    pager: bool = True
+    """Use a pager in a terminal."""
 
 
 def run(options: List) -> int:
     """Print one table, or all of them."""
+    from lgmd_gym.envs import import_families
+
     import_families(options.module or ())
     console = make_console()
     with console.capture() as capture:
@@ -39,6 +51,9 @@ def run(options: List) -> int:
 
 def suites() -> Table:
     """Return the suites with their number of cases per family."""
+    from lgmd_gym.benchmark.suites import SUITES, TRAFFIC
+    from lgmd_gym.envs.traffic.registration import KINDS
+
     table = Table("suite", "cases", "description", title="suites")
     for name, suite in SUITES.items():
         counts: dict[str, int] = {}
@@ -54,6 +69,10 @@ def suites() -> Table:
 
 def agents() -> Table:
     """Return the agents with their options."""
+    from lgmd_gym.agents import AGENTS
+    from lgmd_gym.agents.policies.card import read_card
+    from lgmd_gym.agents.policies.policy import find_policy, shipped_policies
+
     table = Table("agent", "description", title="agents")
     for name, cls in AGENTS.items():
         options = ", ".join(f"{option}={default:g}" for option, default in cls.options().items())
@@ -69,6 +88,9 @@ def agents() -> Table:
 
 def envs() -> Table:
     """Return the environments with their arguments."""
+    from lgmd_gym.envs import FAMILIES, env_id
+    from lgmd_gym.envs.registration import LEVEL_ARGUMENTS, RANDOM_TASKS, SCENARIO, SCENARIO_ARGUMENT
+
     table = Table("environment", "description", title="environments (arguments in SI units)")
     for family, function in FAMILIES.items():
         arguments = ", ".join(inspect.signature(function).parameters)
@@ -82,6 +104,8 @@ def envs() -> Table:
 
 def cameras() -> Table:
     """Return the camera presets."""
+    from lgmd_gym.camera.params import PRESETS
+
     table = Table("camera", "frame", "field of view", "px per degree", title="cameras")
     for name, params in PRESETS.items():
         height, width = params.shape
@@ -92,6 +116,8 @@ def cameras() -> Table:
 
 def cases() -> Table:
     """Return the cases of all suites with their arguments."""
+    from lgmd_gym.benchmark.suites import SUITES
+
     table = Table("case", "arguments (SI units)", title="cases")
     for suite in SUITES.values():
         for case in suite.cases:

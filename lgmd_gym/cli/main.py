@@ -10,10 +10,19 @@ import tyro
 from tyro.conf import subcommand
 
 from lgmd_gym._version import __version__
-from lgmd_gym.cli import options
+from lgmd_gym.cli.bench import Bench
+from lgmd_gym.cli.compare import Compare
 from lgmd_gym.cli.console import activity, drop_output, io_reason
-from lgmd_gym.cli.help import description, documented, summary, wrapped_output
-from lgmd_gym.cli.parser_errors import one_line
+from lgmd_gym.cli.doctor import Doctor
+from lgmd_gym.cli.drive import Drive
+from lgmd_gym.cli.gallery import Gallery
+from lgmd_gym.cli.help import description, documented, one_line, summary, wrapped_output
+from lgmd_gym.cli.list import List
+from lgmd_gym.cli.paper import Paper
+from lgmd_gym.cli.scenario import Scenario
+from lgmd_gym.cli.train import Train
+from lgmd_gym.cli.tune import Tune
+from lgmd_gym.cli.video import Video
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.processes.signals import raise_on_signals
 
@@ -31,19 +40,19 @@ lgmd-gym --version prints the version."""
 
 INTERRUPTED = 130  # exit code of a command that was interrupted
 
-# Each command's options; the module `lgmd_gym.cli.<name>` has the function `run(options) -> exit code`.
+# Each command's options; its module has the function `run(options) -> exit code` and imports the rest there.
 COMMANDS: dict[str, type] = {
-    "bench": options.Bench,
-    "compare": options.Compare,
-    "drive": options.Drive,
-    "video": options.Video,
-    "paper": options.Paper,
-    "train": options.Train,
-    "tune": options.Tune,
-    "list": options.List,
-    "scenario": options.Scenario,
-    "gallery": options.Gallery,
-    "doctor": options.Doctor,
+    "bench": Bench,
+    "compare": Compare,
+    "drive": Drive,
+    "video": Video,
+    "paper": Paper,
+    "train": Train,
+    "tune": Tune,
+    "list": List,
+    "scenario": Scenario,
+    "gallery": Gallery,
+    "doctor": Doctor,
 }
 
 

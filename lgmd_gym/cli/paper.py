@@ -1,21 +1,49 @@
-"""The `paper` command."""
+"""The `paper` command; the attribute docstrings of `Paper` are its help texts."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from lgmd_gym.cli import clips
 from lgmd_gym.cli.console import make_console
-from lgmd_gym.cli.options import Paper
-from lgmd_gym.clips import tables
-from lgmd_gym.clips.batch import ClipJob, ClipResult, make_jobs
-from lgmd_gym.clips.detection import ClipDetection
-from lgmd_gym.clips.playback import PLAYBACK_CONFIGS
-from lgmd_gym.paper import experiments
-from lgmd_gym.paper.backgrounds import Panorama, Screen
-from lgmd_gym.paper.claims import claim_table, evaluate_claims, write_claims
-from lgmd_gym.paper.plots import paper_figures
+from lgmd_gym.cli.values import File, Names
+
+if TYPE_CHECKING:
+    from lgmd_gym.clips.batch import ClipJob, ClipResult
+    from lgmd_gym.clips.detection import ClipDetection
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paper:
+    """Repeat the experiments of the LGMD paper; write figures and a table of its claims.
+
+    The paper's crash and near-miss clips are not included in this package; pass a folder of your own. With
+    --realism, compare statistics of simulated drives with those of the clips instead.
+    """
+
+    out: File = None
+    """Run folder; must not exist. Default: runs/paper-DATE-TIME, or runs/realism-DATE-TIME."""
+    clips: File = None
+    """Folder of driving clips; requires --crashes, except with --realism."""
+    crashes: File = None
+    """CSV file with the columns clip,crash_frame (empty for no crash)."""
+    picture: File = None
+    """Image for the shifting panorama. Default: a random image with a natural spectrum."""
+    realism: bool = False
+    """Compare simulated drives with the clips: realism.md, realism.csv, drives.csv, realism.png."""
+    clip_hfov_deg: float = 90.0
+    """With --realism: horizontal field of view of the clips [degrees]; 90 has the pixels per degree of a
+    dash camera of 120 to 140 degrees on the diagonal in the centre of the frame."""
+    ignore_bottom: float = 0.0
+    """With --realism: share of the height, at the bottom, that is left out: bonnets and captions."""
+    night: Names = None
+    """With --realism: clips at night. Default: those with a median grey below 75."""
+    seeds: int = 3
+    """With --realism: seeds of every simulated drive."""
+    worlds: int = 20
+    """With --realism: number of training worlds of the simulated drives; 0 for the plain laboratory."""
 
 
 def run(options: Paper) -> int:
@@ -31,6 +59,10 @@ def run(options: Paper) -> int:
         raise ValueError(
             "--clips and --crashes must be used together: a folder, and a CSV with clip,crash_frame"
         )
+    from lgmd_gym.cli import clips
+    from lgmd_gym.clips.batch import make_jobs
+    from lgmd_gym.paper.backgrounds import Panorama, Screen
+
     Panorama(picture=options.picture).render(0.0, Screen())  # check the image before creating the folder
     jobs = []
     if options.clips is not None:
@@ -44,8 +76,13 @@ def run(options: Paper) -> int:
     return clips.print_errors(clip_results)
 
 
-def _experiments(options: Paper, jobs: Sequence[ClipJob], folder: Path) -> list[ClipResult]:
+def _experiments(options: Paper, jobs: "Sequence[ClipJob]", folder: Path) -> "list[ClipResult]":
     """Run the experiments, write the claims and figures, and return the results of the clips."""
+    from lgmd_gym.cli import clips
+    from lgmd_gym.paper import experiments
+    from lgmd_gym.paper.claims import claim_table, evaluate_claims, write_claims
+    from lgmd_gym.paper.plots import paper_figures
+
     with clips.progress_bar("paper", experiments.STEPS) as set_progress:
         steps = iter(range(1, experiments.STEPS + 1))
         results = experiments.run_experiments(lambda: set_progress(next(steps)), options.picture)
@@ -60,13 +97,17 @@ def _experiments(options: Paper, jobs: Sequence[ClipJob], folder: Path) -> list[
 
 
 def _process_all_configs(
-    out: Path, jobs: Sequence[ClipJob], console: Console
-) -> tuple[list[ClipResult], list[ClipDetection]]:
+    out: Path, jobs: "Sequence[ClipJob]", console: Console
+) -> "tuple[list[ClipResult], list[ClipDetection]]":
     """Process the clips with every configuration and print the tables.
 
     Returns:
         Results of all configurations, and the detections of the configuration `paper`.
     """
+    from lgmd_gym.cli import clips
+    from lgmd_gym.clips import tables
+    from lgmd_gym.clips.playback import PLAYBACK_CONFIGS
+
     folders = clips.make_clip_folders(out, jobs)
     results, detections = [], {}
     for name, config in PLAYBACK_CONFIGS.items():

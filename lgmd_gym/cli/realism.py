@@ -7,7 +7,7 @@ from pathlib import Path
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.cli import clips
 from lgmd_gym.cli.console import make_console
-from lgmd_gym.cli.options import Paper
+from lgmd_gym.cli.paper import Paper
 from lgmd_gym.clips.batch import ClipJob, make_jobs
 from lgmd_gym.errors import check_whole, check_within
 from lgmd_gym.paper.realism import DriveValues, clip_values, common_optics, compare, simulated_values

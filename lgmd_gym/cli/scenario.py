@@ -1,18 +1,19 @@
-"""The `scenario` command: write templates, draw scenarios, check OpenSCENARIO files, export cases."""
+"""The `scenario` command; the attribute docstrings of `Scenario` are its help texts."""
 
 import time
+from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from rich.table import Table
+from tyro.conf import Positional, arg
 
 from lgmd_gym.cli.console import make_console
+from lgmd_gym.cli.values import File, Name, Names, find_target, parse_arguments
 from lgmd_gym.errors import counted
-from lgmd_gym.openscenario.names import file_name
 
 if TYPE_CHECKING:
-    from lgmd_gym.cli.options import Scenario
     from lgmd_gym.openscenario.check import CheckedFile
 
 NEEDED = {
@@ -23,7 +24,41 @@ NEEDED = {
 COLUMNS = ("file", "cells", "contacts", "location [cm]", "speed [km/h]", "time [s]")
 
 
-def run(options: "Scenario") -> int:
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """Write, draw, check or export scenarios.
+
+    lgmd-gym scenario new [FILE.toml] writes a commented scenario file to start from. lgmd-gym scenario show
+    TARGET draws a scenario file, an OpenSCENARIO file, an environment id or a case from above at several
+    times, with all speeds, as a picture. lgmd-gym scenario check PATH [PATH ...] plays every cell of
+    OpenSCENARIO files and folders without braking, and prints one row per file: the cells, the contacts, and
+    the largest deviations of impact location, impact speed and time from what the parameters and positions of
+    the file state. lgmd-gym scenario export CASE --to FILE.xosc writes a case as OpenSCENARIO 1.3, and its
+    road as OpenDRIVE next to it.
+    """
+
+    action: Positional[Literal["new", "show", "check", "export"]]
+    """Write a template, draw a scenario, compare files, or export a case."""
+    targets: Annotated[Positional[tuple[str, ...]], arg(metavar="FILE|PATH|CASE [PATH ...]")]
+    """File to write (default: scenario.toml); scenario to draw; files and folders to compare; or the name of
+    a case, for example quick/CCRs/v30."""
+    to: File = None
+    """Picture (.png, .svg; default: TARGET.png) or OpenSCENARIO file (.xosc) to write; must not exist."""
+    force: bool = False
+    """Replace an existing template or picture."""
+    case: Name = None
+    """Case to draw, of a file with several."""
+    module: Names = None
+    """Modules with scenario families of your own: my_scenarios, or my_scenarios:MyFamily."""
+    trust: bool = False
+    """Load the modules that the file names; they can run any code."""
+    set: Annotated[tuple[str, ...], arg(metavar="NAME=NUMBER [...]")] = ()
+    """Arguments of the scenario to draw, in SI units."""
+    jobs: int = 2
+    """Number of processes that compare files."""
+
+
+def run(options: Scenario) -> int:
     """Run one action; return the exit code."""
     if options.action == "new":
         return _new(options)
@@ -33,7 +68,7 @@ def run(options: "Scenario") -> int:
     return actions[options.action](options)
 
 
-def _new(options: "Scenario") -> int:
+def _new(options: Scenario) -> int:
     from lgmd_gym.benchmark.scenario_template import write_template
 
     if len(options.targets) > 1:
@@ -43,11 +78,10 @@ def _new(options: "Scenario") -> int:
     return 0
 
 
-def _show(options: "Scenario") -> int:
+def _show(options: Scenario) -> int:
     from lgmd_gym.benchmark.case import Case
-    from lgmd_gym.cli.modules import find_target
-    from lgmd_gym.cli.params import parse_arguments
     from lgmd_gym.envs.motion import record_motion
+    from lgmd_gym.openscenario.names import file_name
     from lgmd_gym.plotting.scenario_figure import scenario_figure
     from lgmd_gym.processes.files import check_output_file
     from lgmd_gym.rendering.playback import make_target
@@ -71,7 +105,7 @@ def _show(options: "Scenario") -> int:
     return 0
 
 
-def _check(options: "Scenario") -> int:
+def _check(options: Scenario) -> int:
     from lgmd_gym.openscenario.check import check_files
 
     if options.to is not None:
@@ -104,7 +138,7 @@ def _row(item: "CheckedFile") -> list[str]:
     return [name, str(item.cells), str(item.contacts), *texts]
 
 
-def _export(options: "Scenario") -> int:
+def _export(options: Scenario) -> int:
     from lgmd_gym.benchmark.suites import find_case
     from lgmd_gym.openscenario.export import export_case
 

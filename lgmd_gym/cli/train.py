@@ -1,17 +1,80 @@
-"""The `train` command."""
+"""The `train` command; the attribute docstrings of `Train` are its help texts."""
 
 import sys
 import time
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from lgmd_gym.cli.options import Train, refuse_unused
-from lgmd_gym.processes.extras import missing_extra
-from lgmd_gym.training import TrainConfig, resume, train
+from tyro.conf import arg
+
+from lgmd_gym.cli.values import Count, File, Name, Names, refuse_unused
+
+if TYPE_CHECKING:
+    from lgmd_gym.training import TrainConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train:
+    """Train a policy with stable-baselines3; run it with --agents policy:FOLDER/policy.zip.
+
+    The folder contains TensorBoard logs, checkpoints, the evaluations on the validation split and the policy
+    with the best mean return in them. Ctrl-C keeps the checkpoints; --resume continues from the last one.
+    """
+
+    algo: str = "dqn"
+    """Algorithm: dqn, ppo, sac, or offline (trained on recorded episodes)."""
+    env: str = "LGMD/RandomBraking-v0"
+    """Environment id; random levels and traffic are trained on the split train, evaluated on validation."""
+    camera: Names = None
+    """Camera presets, one neuron each. Default: those that the inputs require, else fovea tele wide."""
+    sensors_of: Name = None
+    """Agent whose cameras are used instead, for example stopping-zone; all-round adds fields at the sides."""
+    inputs: Names = None
+    """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change and
+    ego_yaw_rate; also frame; with the cameras of stopping-zone, also zones, zones_spikes and zones_ffi; with
+    those of all-round, also sides, sides_ffi, columns and known_deceleration.
+    Default: from the hyperparameters."""
+    demands: Annotated[tuple[float, ...] | None, arg(metavar="[X ...]")] = None
+    """Demands that the policy chooses from, from -1 (full braking) to 1; --demands alone for a continuous
+    demand. Default: 0 -1; continuous for sac."""
+    n_timesteps: Count = None
+    """Number of policy decisions (offline: of recorded episodes). Default: from the hyperparameters."""
+    seed: int = 0
+    """Seed of the network and the environments."""
+    hyperparams: File = None
+    """YAML file in rl-zoo's format. Default: the file of this package."""
+    eval_freq: int = 16_000
+    """Number of decisions between two evaluations; offline evaluates after every epoch."""
+    eval_episodes: Count = None
+    """Number of episodes per evaluation. Default: 96; for offline, 600."""
+    recordings: File = None
+    """Folder of an offline training run with the same cameras, to reuse its recorded episodes."""
+    traffic_episodes: int = 0
+    """Number of traffic episodes, in which braking is false, that offline trains on in addition."""
+    extra_levels: Annotated[tuple[str, ...] | None, arg(metavar="N:NAME[,NAME...] [...]")] = None
+    """Levels of some scenario families that offline trains on in addition, for example
+    4000:CCRsCurve,FastCCRs 1000:EmptyRoad."""
+    extra_traffic: Annotated[tuple[str, ...] | None, arg(metavar="N:KIND[,KIND...] [...]")] = None
+    """Traffic episodes of some kinds that offline trains on in addition, for example
+    2000:intersection,roundabout."""
+    videos: int = 0
+    """Number of validation episodes that are filmed at each evaluation, in FOLDER/videos and TensorBoard."""
+    wandb: Name = None
+    """Project of Weights & Biases to log to; requires the package wandb."""
+    jobs: int = 2
+    """Number of processes that record episodes, and of threads that train an ensemble."""
+    out: File = None
+    """Training folder; must not exist. Default: runs/train-ALGO-DATE-TIME."""
+    resume: File = None
+    """Folder of an interrupted training run, to continue it with its own options."""
 
 
 def run(options: Train) -> int:
     """Train a policy, or resume a training run, and print the path of the policy."""
+    from lgmd_gym.training import resume, train
+
     if options.resume is not None:
         refuse_unused(options, "--resume", ("resume", "jobs"))
     _check_installed()
@@ -31,12 +94,16 @@ def run(options: Train) -> int:
 
 
 def _check_installed() -> None:
+    from lgmd_gym.processes.extras import missing_extra
+
     if not all(map(find_spec, ("stable_baselines3", "tensorboard", "yaml"))):
         raise missing_extra("training", "train")
 
 
-def config_of(options: Train) -> TrainConfig:
+def config_of(options: Train) -> "TrainConfig":
     """Return the configuration of the options of the command line."""
+    from lgmd_gym.training import TrainConfig
+
     cameras = list(options.camera or ())
     return TrainConfig.from_hyperparams(
         options.algo,

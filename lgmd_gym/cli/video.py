@@ -1,35 +1,79 @@
-"""The `video` command."""
+"""The `video` command; the attribute docstrings of `Video` are its help texts."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from rich.text import Text
+from tyro.conf import Positional, arg
 
-from lgmd_gym.cli import clips
 from lgmd_gym.cli.console import make_console
-from lgmd_gym.cli.options import Video
-from lgmd_gym.cli.params import read_params
-from lgmd_gym.clips import tables
-from lgmd_gym.clips.anticipation import anticipation
-from lgmd_gym.clips.batch import ClipJob, ClipResult, make_jobs
-from lgmd_gym.clips.mcap_file import check_mcap
-from lgmd_gym.clips.playback import PLAYBACK_CONFIGS, ClipRun, PlaybackConfig, named_config
-from lgmd_gym.clips.score_tables import score_table, write_clip_scores, write_scores
-from lgmd_gym.clips.scored_clip import ScoredClip
-from lgmd_gym.errors import check_within
-from lgmd_gym.neuron import LGMDParams
+from lgmd_gym.cli.values import Count, File, Number, read_params
+
+if TYPE_CHECKING:
+    from lgmd_gym.clips.batch import ClipJob, ClipResult
+    from lgmd_gym.clips.playback import PlaybackConfig
+    from lgmd_gym.clips.scores import ScoredClip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Video:
+    """Run the neuron on video clips: spike traces, figures, overlay videos, a detection table.
+
+    For each clip the run folder contains trace.csv (one row per frame), trace.png and, with --overlay,
+    overlay.mp4. With --events it contains scores.csv and clip_scores.csv.
+    """
+
+    clips: Annotated[Positional[tuple[str, ...]], arg(metavar="CLIP [CLIP ...]")]
+    """Video files in any format that ffmpeg reads, or folders with video files."""
+    configs: tuple[str, ...] = ("paper",)
+    """Named configurations of the neuron, compared in one table if several: paper, conservative, paper-18hz,
+    t_sf-60, t_sp-0.78, released, off-only, fixed-inhibition, yue-rind-2006; or all."""
+    crashes: File = None
+    """CSV file with the columns clip,crash_frame (empty for no crash); prints the detection table."""
+    crash_frame: Count = None
+    """Crash frame of a single clip, 0-based; prints the detection table."""
+    events: File = None
+    """CSV file with the columns file,event_s (seconds; empty for no event), optionally start_s,end_s; prints
+    recall and average precision 0.5, 1.0 and 1.5 s before the event, and the time to accident."""
+    false_alarm_cap: float = 0.1
+    """With --events: highest share of 1.5 s windows in alarm in clips without an event."""
+    out: File = None
+    """Run folder; must not exist. Default: runs/video-DATE-TIME."""
+    params: File = None
+    """TOML file of LGMD parameters; replaces those of the configuration."""
+    threshold: Number = None
+    """Alarm level T_sf [spikes/s]; it applies to one frame rate."""
+    fps: Number = None
+    """Frame rate to resample to [Hz]; the neuron's response depends on it. Default: the clip's."""
+    drop_duplicates: Number = None
+    """Skip frames whose difference is below this fraction of the typical difference, for example 0.25; 0
+    disables the filter. Default: from the configuration."""
+    size: Annotated[tuple[int, int] | None, arg(metavar="WIDTH HEIGHT")] = None
+    """Size to scale to [px]. Default: the clip's."""
+    roi: Annotated[
+        tuple[int, int, int, int] | None,
+        arg(metavar="TOP LEFT HEIGHT WIDTH"),
+    ] = None
+    """Region of interest of the neuron [px]. Default: the whole frame."""
+    overlay: bool = False
+    """Write the overlay video: frame, excitation, spikes and alert indicator."""
+    plots: bool = True
+    """Draw one figure per clip."""
 
 
 def run(options: Video) -> int:
     """Process clips and print tables; return 2 if a clip is truncated, else 0."""
+    from lgmd_gym.cli import clips
+    from lgmd_gym.clips.batch import make_jobs
+    from lgmd_gym.clips.playback import ClipRun
+    from lgmd_gym.errors import check_within
+
     if not options.clips:
         raise ValueError("a clip is required: pass video files or folders, as in lgmd-gym video CLIP.mp4")
     configs = _configs(options)
     check_within("--false-alarm-cap", options.false_alarm_cap, 0.0, 1.0)
-    if options.mcap:
-        check_mcap()
     jobs = make_jobs(options.clips, options.crashes, options.crash_frame, options.events)
     if options.events is not None and not any(job.event and job.event.event_s is not None for job in jobs):
         raise ValueError(f"{options.events} has no clip with an event; the scores need at least one event_s")
@@ -44,18 +88,22 @@ def run(options: Video) -> int:
 
 
 def _process_all(
-    options: Video, jobs: Sequence[ClipJob], configs: dict[str, PlaybackConfig], folder: Path
-) -> list[ClipResult]:
+    options: Video, jobs: "Sequence[ClipJob]", configs: "dict[str, PlaybackConfig]", folder: Path
+) -> "list[ClipResult]":
     """Process the clips with every configuration, print the tables and return all results."""
+    from lgmd_gym.cli import clips
+    from lgmd_gym.clips import tables
+    from lgmd_gym.clips.scores import anticipation
+    from lgmd_gym.clips.tables import score_table, write_clip_scores, write_scores
+
     folders = clips.make_clip_folders(folder, jobs)
     console, results, detections = make_console(), [], {}
     scored: dict[str, list[ScoredClip]] = {}
     for name, config in configs.items():
         suffix = f"-{name}" if len(configs) > 1 else ""
         batch = clips.process_clips(
-            jobs, folders, name, config, suffix,
-            overlay=options.overlay, mcap=options.mcap, figure=options.plots,
-        )  # fmt: skip
+            jobs, folders, name, config, suffix, overlay=options.overlay, figure=options.plots
+        )
         results += batch
         rates = sorted({result.summary.fps for result in batch})
         description = ", ".join(config.describe(rate) for rate in rates[:3])
@@ -77,8 +125,11 @@ def _process_all(
     return results
 
 
-def _configs(options: Video) -> dict[str, PlaybackConfig]:
+def _configs(options: Video) -> "dict[str, PlaybackConfig]":
     """Return the named configurations with the values of the other options."""
+    from lgmd_gym.clips.playback import PLAYBACK_CONFIGS, named_config
+    from lgmd_gym.neuron import LGMDParams
+
     names = tuple(PLAYBACK_CONFIGS) if options.configs == ("all",) else dict.fromkeys(options.configs)
     values: dict[str, Any] = {
         name: getattr(options, name) for name in ("fps", "size", "drop_duplicates", "roi")

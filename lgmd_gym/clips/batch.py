@@ -1,4 +1,4 @@
-"""Process clips and write their traces, figures and overlay videos to a folder."""
+"""Process annotated clips and write their traces, figures and overlay videos to a folder."""
 
 import csv
 import time
@@ -10,13 +10,140 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.clips import TruncatedVideoError, find_clips
-from lgmd_gym.clips.annotations import ClipEvent, read_crashes, read_events
 from lgmd_gym.clips.detection import ClipDetection, detect
-from lgmd_gym.clips.playback import TRACE_COLUMNS, ClipRun, PlaybackConfig
-from lgmd_gym.clips.probe import VideoInfo, probe
-from lgmd_gym.clips.scored_clip import ScoredClip
-from lgmd_gym.clips.summary import ClipSummary
+from lgmd_gym.clips.playback import TRACE_COLUMNS, ClipRun, ClipSummary, PlaybackConfig
+from lgmd_gym.clips.scores import ScoredClip
+from lgmd_gym.clips.video import TruncatedVideoError, VideoInfo, find_clips, probe
+from lgmd_gym.errors import unknown_name
+
+_EMPTY = ("", "none", "-")
+EVENT_COLUMNS = ("file", "event_s", "start_s", "end_s")
+
+
+class ClipEvent(NamedTuple):
+    """The event of a clip, and the part in which alarms are scored.
+
+    Attributes:
+        event_s: Time of the event from the first frame [s]; None without one.
+        start_s: Start of the evaluated part [s].
+        end_s: End of the evaluated part [s]; None for the event, or the end of the clip.
+    """
+
+    event_s: float | None
+    start_s: float = 0.0
+    end_s: float | None = None
+
+
+def read_crashes(path: Path, clips: Sequence[Path]) -> dict[Path, int | None]:
+    """Return the crash frame of each clip in a CSV file, None for a clip without a crash.
+
+    The file has the columns `clip` (file name, with or without suffix) and `crash_frame` (0-based, at the
+    frame rate of the clip's file; empty or `none` for no crash). Other columns are ignored.
+
+    Args:
+        path: The CSV file.
+        clips: Clips that the file may list; those that it does not list are not in the result.
+
+    Raises:
+        ValueError: If the file cannot be read, lacks a column, lists an unknown clip or the same clip twice,
+            or contains an invalid crash frame.
+    """
+    rows = _rows(path, "crash file", ("clip", "crash_frame"))
+    crashes: dict[Path, int | None] = {}
+    for number, row in enumerate(rows, start=2):
+        clip = _clip(row["clip"], clips, crashes, f"{path} line {number}")
+        crashes[clip] = _crash_frame(row["crash_frame"], f"{path} line {number}")
+    return crashes
+
+
+def read_events(path: Path, clips: Sequence[VideoInfo]) -> dict[Path, ClipEvent]:
+    """Return the event of each clip in a CSV file.
+
+    The file has the columns `file` (file name, with or without suffix) and `event_s` (time of the event from
+    the first frame in seconds; empty or `none` for a clip without an event), and optionally `start_s` and
+    `end_s` (the evaluated part in seconds; empty for the whole clip).
+
+    Args:
+        path: The CSV file.
+        clips: Clips that the file may list; those that it does not list are not in the result.
+
+    Raises:
+        ValueError: If the file cannot be read, lacks a column, has an unknown one, lists an unknown clip or
+            the same clip twice, or contains a time outside the clip, or an event outside the evaluated part.
+    """
+    rows = _rows(path, "event file", EVENT_COLUMNS[:2], EVENT_COLUMNS)
+    infos, events = {info.path: info for info in clips}, {}
+    for number, row in enumerate(rows, start=2):
+        where = f"{path} line {number}"
+        clip = _clip(row["file"], list(infos), events, where)
+        values = {name: _seconds(name, row.get(name), infos[clip], where) for name in EVENT_COLUMNS[1:]}
+        event = ClipEvent(values["event_s"], values["start_s"] or 0.0, values["end_s"])
+        end = event.end_s if event.end_s is not None else infos[clip].duration
+        if event.start_s >= end:
+            raise ValueError(f"{where}: start_s must be before end_s, got {event.start_s:g} and {end:g}")
+        if event.event_s is not None and not event.start_s < event.event_s <= end:
+            part = f"{event.start_s:g} to {end:g} s"
+            raise ValueError(f"{where}: event_s {event.event_s:g} is outside the evaluated part, {part}")
+        events[clip] = event
+    return events
+
+
+def _clip(field: str | None, clips: Sequence[Path], listed: dict[Path, Any], where: str) -> Path:
+    """Return the clip that a CSV field names; `listed` has the clips of the rows before."""
+    name = (field or "").strip()
+    matching = [clip for clip in clips if name in (clip.name, clip.stem)]
+    if not matching:
+        raise ValueError(f"{where}: {unknown_name('clip', name, [clip.name for clip in clips])}")
+    if len(matching) > 1:
+        both = ", ".join(clip.name for clip in matching)
+        raise ValueError(f"{where}: clip {name!r} matches several clips; add its suffix ({both})")
+    if matching[0] in listed:
+        raise ValueError(f"{where}: clip {name!r} is listed twice")
+    return matching[0]
+
+
+def _rows(
+    path: Path, kind: str, needed: Sequence[str], known: Sequence[str] | None = None
+) -> list[dict[str, str | None]]:
+    """Return the rows of a CSV file that has at least the needed columns, and only `known` ones if given."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file, skipinitialspace=True)
+            columns = [str(name) for name in reader.fieldnames or ()]
+            if unknown := [name for name in columns if known and name not in known]:
+                raise ValueError(f"{path}: {unknown_name('column', unknown[0], known or ())}")
+            if missing := [name for name in needed if name not in columns]:
+                raise ValueError(f"{path} lacks the column {missing[0]!r}; it needs {','.join(needed)}")
+            return list(reader)
+    except OSError as error:
+        raise ValueError(f"{kind} {str(path)!r} cannot be read: {error.strerror}") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{kind} {str(path)!r} is not a CSV file: {error}") from None
+
+
+def _seconds(name: str, text: str | None, info: VideoInfo, where: str) -> float | None:
+    """Return the time in a CSV field, or None for an empty one."""
+    value = (text or "").strip().lower()
+    if value in _EMPTY:
+        return None
+    try:
+        seconds = float(value)
+    except ValueError:
+        raise ValueError(f"{where}: {name} must be a time in seconds, or empty, got {text!r}") from None
+    if not 0.0 <= seconds <= info.duration:
+        end = f"{info.duration:.2f} s ({info.frames} frames at {info.fps:g} Hz)"
+        raise ValueError(f"{where}: {name} must be in the clip, 0 to {end}, got {text!r}")
+    return seconds
+
+
+def _crash_frame(text: str | None, where: str) -> int | None:
+    """Return the frame number in a CSV field, or None for no crash."""
+    value = (text or "").strip().lower()
+    if value in _EMPTY:
+        return None
+    if not value.isdecimal():
+        raise ValueError(f"{where}: crash_frame must be a frame number, or empty for no crash, got {text!r}")
+    return int(value)
 
 
 class ClipJob(NamedTuple):
@@ -106,17 +233,16 @@ def _job(info: VideoInfo, annotated: bool, crash: int | None, event: ClipEvent |
 
 def process_clip(
     job: ClipJob, config: PlaybackConfig, folder: Path, *, suffix: str = "", overlay: bool = False,
-    mcap: bool = False, figure: bool = True, on_progress: Callable[[float], object] | None = None,
+    figure: bool = True, on_progress: Callable[[float], object] | None = None,
 ) -> ClipResult:  # fmt: skip
-    """Run the neuron on one clip and write trace.csv, and optionally trace.png, overlay.mp4 and clip.mcap.
+    """Run the neuron on one clip and write trace.csv, and optionally trace.png and overlay.mp4.
 
     Args:
         job: The clip.
         config: Neuron parameters and frame processing.
         folder: Existing folder for the files.
-        suffix: Text after "trace", "overlay" and "clip" in the file names.
+        suffix: Text after "trace" and "overlay" in the file names.
         overlay: Whether to write the overlay video.
-        mcap: Whether to write the MCAP file.
         figure: Whether to draw the figure.
         on_progress: Function called after each frame with the completed fraction.
     """
@@ -128,23 +254,18 @@ def process_clip(
     with ExitStack() as stack:
         trace = csv.writer(stack.enter_context(result.trace.open("w", newline="", encoding="utf-8")))
         trace.writerow(TRACE_COLUMNS)
-        writers: list[Any] = []
+        writer = None
         if overlay:
-            from lgmd_gym.clips.overlay import OverlayWriter
+            from lgmd_gym.clips.pictures import OverlayWriter
 
             path = folder / f"overlay{suffix}.mp4"
-            writers.append(OverlayWriter(path, job.clip.name, reader.fps, config, job.crash_s))
-        if mcap:
-            from lgmd_gym.clips.mcap_file import McapWriter
-
-            writers.append(McapWriter(folder / f"clip{suffix}.mcap", job.clip.name, job.crash_s))
-        for writer in writers:
+            writer = OverlayWriter(path, job.clip.name, reader.fps, config, job.crash_s)
             stack.enter_context(writer)
         try:
             for frame in run:
                 trace.writerow(frame.row())
                 result.summary.add(frame)
-                for writer in writers if run.neuron is not None else ():
+                if writer is not None and run.neuron is not None:
                     writer.write(frame, run.neuron)
                 if on_progress is not None:
                     on_progress(min((frame.frame + 1) / reader.total, 1.0))
@@ -152,7 +273,7 @@ def process_clip(
             result.error = str(error)
     result.duplicates, result.seconds = run.duplicates, time.perf_counter() - start
     if figure and result.summary.frames:
-        from lgmd_gym.clips.plots import clip_figure
+        from lgmd_gym.clips.pictures import clip_figure
 
         clip_figure(folder / f"trace{suffix}.png", job.clip.name, result.summary, config, job.crash_s)
     return result

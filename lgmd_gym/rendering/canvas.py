@@ -8,7 +8,7 @@ import pygame
 from lgmd_gym.plotting.style import load_font
 
 Colour = tuple[int, int, int]
-Box = tuple[int, int, int, int]  # left, top, right, bottom [px]
+PixelBox = tuple[int, int, int, int]  # left, top, right, bottom [px]
 
 # The palette of Okabe & Ito, which colour-blind readers can distinguish, on a dark background.
 INK, FAINT, UNLIT, BACKGROUND = (236, 236, 236), (158, 163, 172), (46, 49, 56), (20, 22, 26)
@@ -70,16 +70,16 @@ class Canvas:
         self.pill((left - 5, top, left + width + 5, top + height), BACKGROUND)
         self.text(at, text, size, INK, "mm")
 
-    def rectangle(self, box: Box, colour: Colour) -> None:
+    def rectangle(self, box: PixelBox, colour: Colour) -> None:
         """Fill a rectangle."""
         left, top, right, bottom = box
         self.pixels[max(top, 0) : bottom, max(left, 0) : right] = colour
 
-    def pill(self, box: Box, colour: Colour) -> None:
+    def pill(self, box: PixelBox, colour: Colour) -> None:
         """Fill a rectangle with rounded corners."""
         pygame.draw.rect(self.surface, colour, _rect(box), border_radius=8)
 
-    def frame(self, box: Box, colour: Colour) -> None:
+    def frame(self, box: PixelBox, colour: Colour) -> None:
         """Draw the outline of a rectangle."""
         pygame.draw.rect(self.surface, colour, _rect(box), width=1)
 
@@ -88,16 +88,16 @@ class Canvas:
         if len(points) > 1:
             pygame.draw.lines(self.surface, colour, False, points, width)
 
-    def clip(self, box: Box | None) -> None:
+    def clip(self, box: PixelBox | None) -> None:
         """Clip shapes, but not text, to a box; None removes the clipping."""
         self.surface.set_clip(None if box is None else _rect(box))
 
-    def paste(self, pixels: np.ndarray, box: Box) -> Box:
+    def paste(self, pixels: np.ndarray, box: PixelBox) -> PixelBox:
         """Paste an RGB image, centred and scaled to fit a box; enlarged images are not smoothed.
 
         Args:
             pixels: Contiguous image, uint8, shape (height, width, 3).
-            box: Box to fit.
+            box: PixelBox to fit.
 
         Returns:
             The box of the scaled image.
@@ -111,7 +111,7 @@ class Canvas:
         return placed
 
 
-def fit_box(size: tuple[int, int], box: Box) -> Box:
+def fit_box(size: tuple[int, int], box: PixelBox) -> PixelBox:
     """Return the largest centred box with the aspect ratio of `size` (width, height) inside a box."""
     available = box[2] - box[0], box[3] - box[1]
     scale = min(available[0] / size[0], available[1] / size[1])
@@ -120,7 +120,7 @@ def fit_box(size: tuple[int, int], box: Box) -> Box:
     return left, top, left + width, top + height
 
 
-def _rect(box: Box) -> pygame.Rect:
+def _rect(box: PixelBox) -> pygame.Rect:
     return pygame.Rect(box[0], box[1], box[2] - box[0], box[3] - box[1])
 
 

@@ -18,7 +18,7 @@ from lgmd_gym.envs import env_id
 from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.rendering.dashboard import SIZE
-from lgmd_gym.rendering.overlays import checked_overlays
+from lgmd_gym.rendering.display import checked_overlays
 from lgmd_gym.rendering.view import LGMDView
 from lgmd_gym.rendering.window import Window
 

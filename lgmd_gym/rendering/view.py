@@ -7,8 +7,7 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from lgmd_gym.errors import check_known, check_text
-from lgmd_gym.rendering.overlays import OVERLAYS, checked_overlays
-from lgmd_gym.rendering.state import DisplayState
+from lgmd_gym.rendering.display import OVERLAYS, DisplayState, checked_overlays
 from lgmd_gym.wrappers.observation import LGMDObservation
 
 MODES = ("rgb_array", "human")

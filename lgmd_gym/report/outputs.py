@@ -13,7 +13,7 @@ from lgmd_gym.benchmark.summary import write_summary
 from lgmd_gym.benchmark.traffic.summary import write_traffic_summary
 from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.plotting.figures import episode_figure
-from lgmd_gym.processes.lock import FolderLock
+from lgmd_gym.processes.files import FolderLock
 from lgmd_gym.report.page import write_report
 
 

@@ -13,8 +13,7 @@ from lgmd_gym.agents.policies.card import write_card
 from lgmd_gym.agents.policies.network import describe_network
 from lgmd_gym.camera.spec import plain_values
 from lgmd_gym.errors import check_keys, check_whole
-from lgmd_gym.processes.files import complete_file, new_folder
-from lgmd_gym.processes.lock import FolderLock
+from lgmd_gym.processes.files import FolderLock, complete_file, new_folder
 from lgmd_gym.processes.user_modules import error_reason
 from lgmd_gym.training.config import TrainConfig
 from lgmd_gym.training.hyperparams import OFFLINE

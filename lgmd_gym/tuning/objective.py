@@ -27,7 +27,7 @@ from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.envs.families.distribution import LEVELS
 from lgmd_gym.errors import check_known, check_whole
-from lgmd_gym.processes.worker_processes import run_parallel
+from lgmd_gym.processes.pool import run_parallel
 
 FIRST_SEED = {"train": 1000, "validation": 2000}  # of the false-reaction suite; reports use seeds from 0
 MAX_SEEDS = 1000  # the seeds of the splits do not overlap

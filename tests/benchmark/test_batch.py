@@ -24,7 +24,7 @@ from lgmd_gym.benchmark.stored_run import read_series
 from lgmd_gym.benchmark.suites import find_case
 from lgmd_gym.benchmark.task import Task, run_task
 from lgmd_gym.benchmark.units import make_units
-from lgmd_gym.processes.executor import Executor
+from lgmd_gym.processes.pool import Executor
 
 THREAT = Counterfactual(True, 5.0, 10.0)
 DEFAULT_SENSORS = SensorConfig()

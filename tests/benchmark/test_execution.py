@@ -12,7 +12,7 @@ from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.suite_file import copy_suite, get_suite, load_suite
 from lgmd_gym.cli import main as cli
-from lgmd_gym.processes import executor
+from lgmd_gym.processes import pool
 
 LGMD = [sys.executable, "-m", "lgmd_gym"]
 SHORT = """
@@ -142,8 +142,8 @@ def test_config_rejects_further_options(tmp_path, capsys):
 
 
 def test_unreachable_cluster_is_reported_within_seconds(tmp_path, capsys, monkeypatch):
-    assert executor.CONNECT <= 10.0
-    monkeypatch.setattr(executor, "CONNECT", 0.5)
+    assert pool.CONNECT <= 10.0
+    monkeypatch.setattr(pool, "CONNECT", 0.5)
     with socket.socket() as unused:  # a port without a listener
         unused.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{unused.getsockname()[1]}"

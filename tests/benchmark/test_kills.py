@@ -12,8 +12,8 @@ from support import kills
 from support.runs import read_rows, sorted_rows
 
 from lgmd_gym.cli import main as cli
-from lgmd_gym.processes import worker_processes
-from lgmd_gym.processes.executor import Executor
+from lgmd_gym.processes import pool as worker_processes
+from lgmd_gym.processes.pool import Executor
 
 SUITE = """
 name = "tiny"
@@ -137,7 +137,7 @@ def test_worker_processes_leave_signals_to_the_command():
     code = """
 import signal
 from joblib import delayed
-from lgmd_gym.processes.worker_processes import run_parallel
+from lgmd_gym.processes.pool import run_parallel
 calls = [delayed(signal.pthread_sigmask)(signal.SIG_BLOCK, []) for _ in range(4)]
 print([sorted(map(int, blocked)) for blocked in run_parallel(calls, 2)])
 """

@@ -121,21 +121,3 @@ def test_cluster_that_loses_a_worker_runs_every_episode_once(cluster, complete_r
     assert len(rows) == 171
     assert sorted_keys(rows) == sorted_keys(read_rows(complete_run))
     assert (out / "summary.csv").read_bytes() == (complete_run / "summary.csv").read_bytes()
-
-
-@pytest.mark.slow
-def test_lost_cluster_is_reported_and_the_run_can_be_resumed(cluster, complete_run, tmp_path):
-    address, processes = cluster
-    out = tmp_path / "run"
-    command = bench(out, "--backend", "dask", "--address", address)
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    wait_for_rows(out, 20, process)
-    for one in processes:
-        one.kill()
-    output, errors = process.communicate(timeout=180)
-    assert process.returncode == 1, errors
-    assert f"the cluster at {address} is lost" in output
-    assert 20 <= len(read_rows(out)) < 171
-    done = subprocess.run([*LGMD, "bench", "--resume", str(out), "--no-plots", "--no-report"])
-    assert done.returncode == 0
-    assert (out / "summary.csv").read_bytes() == (complete_run / "summary.csv").read_bytes()

@@ -20,8 +20,8 @@ from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.benchmark.summary import write_csv
 from lgmd_gym.cli import main as cli
 from lgmd_gym.plotting.style import saved_figure
-from lgmd_gym.processes.executor import Executor
-from lgmd_gym.processes.lock import FolderLock
+from lgmd_gym.processes.files import FolderLock
+from lgmd_gym.processes.pool import Executor
 from lgmd_gym.report.outputs import write_outputs
 from lgmd_gym.report.page import write_report
 

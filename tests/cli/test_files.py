@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 
 from lgmd_gym.cli import main as cli
-from lgmd_gym.cli import paper
 from lgmd_gym.clips import VideoWriter, batch
-from lgmd_gym.paper import experiments
-from lgmd_gym.processes.files import check_new_file, complete_file, complete_folder
-from lgmd_gym.processes.lock import LOCK_FILE, FolderLock
+from lgmd_gym.paper import claims, experiments, plots
+from lgmd_gym.processes.files import LOCK_FILE, FolderLock, check_new_file, complete_file, complete_folder
 from lgmd_gym.report.gallery import build
 
 
@@ -98,7 +96,7 @@ def test_a_new_file_is_checked_and_not_made(tmp_path):
     [
         (["gallery", "--families", "CCRs"], build, "record_video"),
         (["paper"], experiments, "run_experiments"),
-        (["paper"], paper, "paper_figures"),
+        (["paper"], plots, "paper_figures"),
         (["video"], batch, "csv"),
     ],
 )
@@ -114,7 +112,7 @@ def test_an_interrupted_command_leaves_no_folder(arguments, module, function, cl
     monkeypatch.setattr(experiments, "STEPS", 1)
     if function == "paper_figures":
         for name in ("evaluate_claims", "write_claims"):
-            monkeypatch.setattr(paper, name, lambda *_: [])
+            monkeypatch.setattr(claims, name, lambda *_: [])
         monkeypatch.setattr(experiments, "run_experiments", lambda *_: None)
     clips = [str(clip)] if arguments == ["video"] else []
     assert cli.run([*arguments, *clips, "--out", str(tmp_path / "out")]) == 130

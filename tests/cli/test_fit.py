@@ -12,8 +12,7 @@ from lgmd_gym.benchmark.summary import Sample
 from lgmd_gym.benchmark.traffic.rows import KEYS
 from lgmd_gym.benchmark.traffic.tables import traffic_table
 from lgmd_gym.cli import main as cli
-from lgmd_gym.cli.console import make_console
-from lgmd_gym.cli.fit import fit
+from lgmd_gym.cli.console import fit, make_console
 
 AGENTS = ["no-brake", "spike-threshold", "policy:runs/train-sac/policy.zip", "my_agents.rules:MyLongAgent",
           "stopping-zone", "nested-fields", "ttc-oracle", "adaptive-threshold"]  # fmt: skip

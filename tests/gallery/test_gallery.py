@@ -14,12 +14,8 @@ from lgmd_gym.clips import VideoReader
 from lgmd_gym.envs import FAMILIES
 from lgmd_gym.envs.registration import RANDOM_TASKS
 from lgmd_gym.envs.traffic.registration import KINDS
-from lgmd_gym.report.gallery.build import make_gallery
-from lgmd_gym.report.gallery.cards import scenario_cards
-from lgmd_gym.report.gallery.docstrings import parse_docstring
-from lgmd_gym.report.gallery.outcomes import AgentOutcome, evaluate_agents
-from lgmd_gym.report.gallery.page import render_page
-from lgmd_gym.report.gallery.stills import ROADS, camera_sheet, road_sheet
+from lgmd_gym.report.gallery.build import AgentOutcome, evaluate_agents, make_gallery, render_page
+from lgmd_gym.report.gallery.cards import ROADS, camera_sheet, parse_docstring, road_sheet, scenario_cards
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
@@ -90,7 +86,7 @@ def test_every_family_and_kind_of_traffic_has_a_card():
 def test_outcomes_of_the_easy_task_are_of_its_levels(monkeypatch):
     cases = []
     monkeypatch.setattr(
-        "lgmd_gym.report.gallery.outcomes.run_task", lambda task: cases.append(task.case) or Result(row())
+        "lgmd_gym.report.gallery.build.run_task", lambda task: cases.append(task.case) or Result(row())
     )
     evaluate_agents(scenario_cards(("RandomBrakingEasy",))[0], ["no-brake"], seeds=2)
     assert [case.family for case in cases] == ["RandomBraking"] * 2

@@ -12,7 +12,7 @@ from lgmd_gym.benchmark import warm_up
 from lgmd_gym.benchmark.plan import CasePlan
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.kernels import compilation
-from lgmd_gym.processes.executor import Executor
+from lgmd_gym.processes.pool import Executor
 
 
 def kernel():

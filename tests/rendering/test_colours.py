@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lgmd_gym.rendering.canvas import PINK, RED, UNLIT, YELLOW
-from lgmd_gym.rendering.panels import CAMERA_COLOURS
+from lgmd_gym.rendering.dashboard import CAMERA_COLOURS
 
 # Machado, Oliveira and Fernandes (2009), severity 1, on linear RGB.
 COLOUR_BLINDNESS = {

@@ -6,7 +6,7 @@ import pytest
 
 from lgmd_gym import EgoCamera
 from lgmd_gym.neuron import danger_zone
-from lgmd_gym.rendering.overlays import danger_zone_edges, target_boxes
+from lgmd_gym.rendering.display import danger_zone_edges, target_boxes
 
 EGO_SPEED = 8.0
 

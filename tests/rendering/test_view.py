@@ -8,9 +8,15 @@ from support.rollouts import BRAKE, HOLD
 
 from lgmd_gym import LGMDObservation, LGMDView
 from lgmd_gym.rendering import canvas
-from lgmd_gym.rendering.panels import CAMERA_COLOURS, CAMERA_FRAME, LAYER_BOXES, TOP_VIEW
-from lgmd_gym.rendering.state import DisplayState
-from lgmd_gym.rendering.trace_panel import PLOT, SpikeTracePanel
+from lgmd_gym.rendering.dashboard import (
+    CAMERA_COLOURS,
+    CAMERA_FRAME,
+    LAYER_BOXES,
+    PLOT,
+    TOP_VIEW,
+    SpikeTracePanel,
+)
+from lgmd_gym.rendering.display import DisplayState
 
 EGO_COLOUR = (50, 200, 0)  # in highway-env's top view
 

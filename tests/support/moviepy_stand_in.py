@@ -6,7 +6,7 @@ moviepy requires an old version of pillow with known vulnerabilities, so it is n
 import sys
 from types import ModuleType
 
-from lgmd_gym.clips.writer import VideoWriter
+from lgmd_gym.clips.video import VideoWriter
 
 MODULES = ("moviepy", "moviepy.video", "moviepy.video.io", "moviepy.video.io.ImageSequenceClip")
 

@@ -5,7 +5,7 @@ import json
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.rows import key_of
 from lgmd_gym.benchmark.runner import Run
-from lgmd_gym.processes.executor import Executor
+from lgmd_gym.processes.pool import Executor
 
 SMALL_SUITE = """
 name = "small"

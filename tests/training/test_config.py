@@ -10,8 +10,7 @@ from support.recordings import OFFLINE_YAML, offline_config, write_yaml
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.camera import PRESETS
 from lgmd_gym.cli import main as cli
-from lgmd_gym.cli.options import Train
-from lgmd_gym.cli.train import config_of
+from lgmd_gym.cli.train import Train, config_of
 from lgmd_gym.training import TrainConfig, train
 from lgmd_gym.training.config import DEMANDS, VALIDATION_SEED
 from lgmd_gym.training.hyperparams import read_hyperparams

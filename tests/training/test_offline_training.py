@@ -12,7 +12,7 @@ from support.recordings import OFFLINE_YAML, offline_config, write_yaml
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.card import read_card
 from lgmd_gym.cli import main as cli
-from lgmd_gym.processes.lock import FolderLock
+from lgmd_gym.processes.files import FolderLock
 from lgmd_gym.training.offline import traffic
 from lgmd_gym.training.offline.level_recorder import LevelRecorder
 from lgmd_gym.training.offline.storage import load

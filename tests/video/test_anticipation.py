@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from lgmd_gym.clips.anticipation import anticipation
-from lgmd_gym.clips.score_tables import score_table
-from lgmd_gym.clips.scored_clip import ScoredClip
+from lgmd_gym.clips.scores import ScoredClip, anticipation
+from lgmd_gym.clips.tables import score_table
 
 
 def scored(frames, event, fps=10.0, **peaks):

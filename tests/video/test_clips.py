@@ -10,13 +10,14 @@ from support.clips import write_lossless
 from lgmd_gym import LGMD, LGMDParams
 from lgmd_gym.clips.detection import detect, find_onsets, summarize_detections
 from lgmd_gym.clips.playback import (
+    BINS,
     PLAYBACK_CONFIGS,
     ClipFrame,
     ClipRun,
+    ClipSummary,
     DuplicateFilter,
     PlaybackConfig,
 )
-from lgmd_gym.clips.summary import BINS, ClipSummary
 from lgmd_gym.neuron import Response
 
 VIDEOS = Path(os.environ.get("LGMD_VIDEOS", Path(__file__).parents[3] / "shared" / "data" / "videos"))

@@ -7,8 +7,7 @@ import pytest
 from support.clips import ffmpeg, make_test_clip, truncate
 
 from lgmd_gym.clips import TruncatedVideoError, VideoReader, VideoWriter, find_clips, luma
-from lgmd_gym.clips.probe import probe
-from lgmd_gym.clips.writer import SUFFIXES
+from lgmd_gym.clips.video import SUFFIXES, probe
 
 
 def test_luma_is_bt601():

@@ -1,20 +1,144 @@
-"""Write the gallery: an HTML page with its videos and pictures."""
+"""The gallery: outcomes of agents, the page from `gallery.html`, and its files."""
 
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from statistics import median
+from typing import NamedTuple
 
 import numpy as np
+from markupsafe import Markup, escape
 from PIL import Image
 
 import lgmd_gym  # noqa: F401  (registers the ids)
+from lgmd_gym._version import __version__
 from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.config import DEFAULT_AGENTS
+from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
 from lgmd_gym.camera.params import CONDITIONS
+from lgmd_gym.envs.registration import RANDOM, RANDOM_TASKS
 from lgmd_gym.processes.files import complete_folder
-from lgmd_gym.report.gallery.cards import ScenarioCard, record_video, scenario_cards
-from lgmd_gym.report.gallery.outcomes import evaluate_agents
-from lgmd_gym.report.gallery.page import render_page
-from lgmd_gym.report.gallery.stills import ROADS, camera_sheet, road_sheet
+from lgmd_gym.report.gallery.cards import (
+    ROADS,
+    ScenarioCard,
+    camera_sheet,
+    record_video,
+    road_sheet,
+    scenario_cards,
+)
+
+
+class AgentOutcome(NamedTuple):
+    """Result of an agent over the seeds of a scenario.
+
+    Attributes:
+        text: Result in words.
+        passed: Whether every threat was avoided, and no episode had a false activation or an error.
+        threat: Whether the scenario is a threat in any of the episodes.
+    """
+
+    text: str
+    passed: bool
+    threat: bool
+
+    @classmethod
+    def of(cls, rows: Sequence[Row]) -> "AgentOutcome":
+        """Return the outcome of the rows of one agent."""
+        threats = [row for row in rows if row["threat"]]
+        if any(row["error"] is not None for row in rows):
+            return cls("failed", False, bool(threats))
+        non_threats = [row for row in rows if not row["threat"]]
+        parts = []
+        if threats:
+            parts.append(f"avoided {sum(row['avoided'] for row in threats)}/{len(threats)}")
+            impacts = [3.6 * row["relative_impact_speed"] for row in threats if row["collision"]]
+            if impacts:
+                parts.append(f"contact at {median(impacts):.0f} km/h")
+            if any(row["premature_brake"] for row in threats):
+                parts.append("braked too early")
+        if non_threats:
+            contacts = sum(row["collision"] for row in non_threats)
+            false_activations = sum(row["false_activation"] for row in non_threats)
+            parts.append(f"false activations {false_activations}/{len(non_threats)}")
+            if contacts:
+                parts.append(f"contact {contacts}/{len(non_threats)}")
+        passed = all(row["avoided"] for row in threats) and not any(
+            row["false_activation"] or row["collision"] for row in non_threats
+        )
+        return cls(", ".join(parts), passed, bool(threats))
+
+
+def evaluate_agents(card: ScenarioCard, agents: Sequence[str], seeds: int) -> dict[str, AgentOutcome]:
+    """Return the outcome of each agent and of no-brake; empty for traffic."""
+    if card.traffic:
+        return {}
+    name, task = f"gallery/{card.name}/default", RANDOM_TASKS.get(card.name)
+    case = Case(name, RANDOM, tuple(task.arguments.items())) if task else Case(name, card.name)
+    results = [run_task(Task(NO_BRAKE, case, seed, SensorConfig())) for seed in range(seeds)]
+    outcomes = {NO_BRAKE: AgentOutcome.of([result.row for result in results])}
+    for agent in agents:
+        if agent != NO_BRAKE:
+            tasks = [
+                Task(agent, case, seed, SensorConfig(), result.counterfactual)
+                for seed, result in enumerate(results)
+            ]
+            outcomes[agent] = AgentOutcome.of([run_task(task).row for task in tasks])
+    return outcomes
+
+
+ImageSheet = Mapping[str, Mapping[str, str]]  # row -> column -> file name
+
+
+def render_page(
+    cards: Sequence[ScenarioCard],
+    outcomes: Mapping[str, Mapping[str, AgentOutcome]],
+    sheets: Mapping[str, ImageSheet],
+    agent: str,
+    seeds: int,
+) -> str:
+    """Return the page as HTML.
+
+    Args:
+        cards: Scenarios, whose videos are in `media/`.
+        outcomes: Outcomes by scenario name and agent; empty for traffic.
+        sheets: Image sheets "cameras" and "roads"; may be empty.
+        agent: Agent in the videos.
+        seeds: Number of seeds per scenario behind the outcomes.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("lgmd_gym.report.gallery", "."), autoescape=True, undefined=StrictUndefined
+    )
+    environment.filters |= {"code": _code, "paragraphs": _paragraphs}
+    groups: dict[str, list[ScenarioCard]] = {"threats": [], "non-threats": [], "traffic": []}
+    for card in cards:
+        groups[_group(card, outcomes[card.name])].append(card)
+    example = next((card.name for card in cards if card.name == "CCRs"), cards[0].name)
+    return environment.get_template("gallery.html").render(
+        groups=groups, outcomes=outcomes, sheets=sheets, agent=agent, seeds=seeds, example=example,
+        version=__version__,
+    )  # fmt: skip
+
+
+def _group(card: ScenarioCard, outcomes: Mapping[str, AgentOutcome]) -> str:
+    """Return the section of a card; a threat is a scenario in which no-brake has contact."""
+    if card.traffic:
+        return "traffic"
+    return "threats" if outcomes["no-brake"].threat else "non-threats"
+
+
+def _code(text: str) -> Markup:
+    """Return docstring text as HTML, with text in backticks as code."""
+    return Markup(re.sub(r"`+([^`]+)`+", r"<code>\1</code>", str(escape(" ".join(text.split())))))
+
+
+def _paragraphs(text: str) -> list[str]:
+    """Return the paragraphs of a docstring without its headings."""
+    return [part for part in text.split("\n\n") if part.strip() and not part.startswith("#")]
 
 
 def make_gallery(

@@ -1,14 +1,21 @@
-"""The scenarios of the gallery and their videos."""
+"""Scenarios of the gallery: their docstrings, videos and single camera frames."""
 
+import inspect
+import re
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
+import gymnasium as gym
 import numpy as np
+from docstring_parser import DocstringStyle, parse
 from PIL import Image
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera.params import CONDITIONS, PRESETS
 from lgmd_gym.clips import VideoWriter
 from lgmd_gym.envs import FAMILIES, env_id
 from lgmd_gym.envs.episode_source import RandomLevels
@@ -17,7 +24,63 @@ from lgmd_gym.envs.traffic.registration import KINDS, find_kind
 from lgmd_gym.errors import check_known
 from lgmd_gym.rendering.playback import make_target
 from lgmd_gym.rendering.view import LGMDView
-from lgmd_gym.report.gallery.docstrings import ParsedDocstring, parse_docstring
+
+
+class DocumentedArgument(NamedTuple):
+    """One argument in a docstring.
+
+    Attributes:
+        name: Name of the argument.
+        default: Default value as code; empty without one.
+        text: Description.
+    """
+
+    name: str
+    default: str
+    text: str
+
+
+class ParsedDocstring(NamedTuple):
+    """A Google-style docstring.
+
+    Attributes:
+        summary: The first line.
+        text: Following paragraphs, in Markdown.
+        arguments: Documented arguments in the order of the signature.
+    """
+
+    summary: str
+    text: str
+    arguments: tuple[DocumentedArgument, ...]
+
+
+def parse_docstring(item: Any) -> ParsedDocstring:
+    """Return the parsed docstring of a function or class.
+
+    Raises:
+        ValueError: If it has no docstring.
+    """
+    doc = inspect.getdoc(item)
+    if not doc:
+        raise ValueError(f"{item!r} has no docstring; write one")
+    parsed = parse(doc, DocstringStyle.GOOGLE)
+    texts = {param.arg_name: " ".join((param.description or "").split()) for param in parsed.params}
+    arguments = [
+        DocumentedArgument(name, _default(parameter), texts[name])
+        for name, parameter in inspect.signature(item).parameters.items()
+        if name in texts
+    ]
+    text = re.sub(r"^#+ *Arguments *$", "", parsed.long_description or "", flags=re.MULTILINE)
+    return ParsedDocstring(parsed.short_description or "", text.strip(), tuple(arguments))
+
+
+def _default(parameter: inspect.Parameter) -> str:
+    """Return a default value as code, with floats shortened; empty without one."""
+    value = parameter.default
+    if value is inspect.Parameter.empty:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else repr(value)
+
 
 SCALE = 2  # factor by which the rendered pictures are reduced
 FRAME_SKIP = 2  # decisions per video frame
@@ -106,3 +169,60 @@ def _reduce(picture: np.ndarray) -> np.ndarray:
     height, width = picture.shape[0] // SCALE, picture.shape[1] // SCALE
     blocks = picture.reshape(height, SCALE, width, SCALE, 3)
     return blocks.mean(axis=(1, 3), dtype=np.float32).astype(np.uint8)
+
+
+# Environment id -> seed and number of simulation steps after which vehicles are in view.
+ROADS = {
+    "highway-v0": (1, 30),
+    "merge-v0": (0, 60),
+    "roundabout-v0": (0, 60),
+    "intersection-v0": (2, 40),
+    "racetrack-v0": (3, 15),
+    "exit-v0": (1, 30),
+    "two-way-v0": (0, 45),
+    "lane-keeping-v0": (0, 15),
+    "u-turn-v0": (0, 30),
+    "parking-v0": (2, 10),
+}
+CAMERAS = ("wide", "standard", "tele", "fovea")
+APPROACH_DECISIONS = 90  # decisions of an approach at 8 m/s, after which the target is 16 m ahead
+
+
+def road_sheet(roads: tuple[str, ...], conditions: tuple[str, ...]) -> dict[str, dict[str, np.ndarray]]:
+    """Return frames of the wide camera by road and condition, uint8, shape (height, width)."""
+    wide = CameraParams.preset("wide")
+    cameras = {name: EgoCamera(wide.with_condition(name)) for name in conditions}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # highway-env's warnings about its own spaces and versions
+        return {env_id: _road_frames(env_id, cameras) for env_id in roads}
+
+
+def camera_sheet() -> dict[str, dict[str, np.ndarray]]:
+    """Return frames of the same approach by camera preset and condition, uint8, shape (height, width)."""
+    env: Any = gym.make("LGMD/CCRs-v0", ego_speed=8.0, shade=60, camera=None)
+    env.reset(seed=0)
+    for _ in range(APPROACH_DECISIONS):
+        env.step([0.0])
+    return {
+        preset: {name: EgoCamera(PRESETS[preset].with_condition(name)).render(env) for name in CONDITIONS}
+        for preset in CAMERAS
+    }
+
+
+def _road_frames(env_id: str, cameras: dict[str, EgoCamera]) -> dict[str, np.ndarray]:
+    """Return one frame per camera after some simulation steps without steering or braking."""
+    import highway_env  # noqa: F401  (registers the environments)
+
+    seed, steps = ROADS[env_id]
+    config = {"simulation_frequency": 30, "policy_frequency": 30}
+    if env_id in ("highway-v0", "exit-v0"):
+        config["vehicles_count"] = 8
+    env: Any = gym.make(env_id, config=config).unwrapped
+    env.reset(seed=seed)
+    for _ in range(steps):
+        env.road.act()
+        env.road.step(1 / 30)
+        env.steps += 1
+    frames = {name: camera.render(env) for name, camera in cameras.items()}
+    env.close()
+    return frames

@@ -15,7 +15,7 @@ import numpy as np
 from joblib import delayed
 
 from lgmd_gym.agents.policies.features import FRAME, SCALES, shrink_frame
-from lgmd_gym.processes.worker_processes import run_parallel
+from lgmd_gym.processes.pool import run_parallel
 from lgmd_gym.training.offline.braking_outcomes import STRIDE, BrakingOutcome, braking_outcomes
 
 MINIMAL_CAMERA = {"name": "wide", "shape": (8, 8)}  # of the environment that is copied and replayed

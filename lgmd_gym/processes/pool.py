@@ -1,31 +1,82 @@
 """Execution of tasks in this process, in worker processes or on a Dask cluster, through joblib."""
 
-import contextlib
 import logging
+import os
+import signal
 import threading
 import time
 import warnings
-from _thread import interrupt_main
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
+from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any
 
 from lgmd_gym._version import __version__
 from lgmd_gym.errors import check_text, check_whole
 from lgmd_gym.processes.extras import missing_extra
-from lgmd_gym.processes.worker_processes import signals_blocked, worker_options
 
 if TYPE_CHECKING:
     from joblib import Parallel
 
+INTERVAL = 0.5  # [s] between two looks at the parent
+
+
+def worker_options() -> dict[str, Any]:
+    """Return options of `joblib.Parallel` for worker processes that end with this process.
+
+    Joblib's resource tracker removes their shared memory once all of them have ended.
+    """
+    return {"initializer": _watch_parent, "initargs": (os.getpid(),)}
+
+
+@contextmanager
+def signals_blocked() -> Iterator[None]:
+    """Block SIGINT and SIGTERM while worker processes start, which inherit the block.
+
+    This process receives a signal at the end of the block. A terminal sends Ctrl-C to all processes, and some
+    schedulers send SIGTERM to all; workers would end with tracebacks before this process stops them.
+    """
+    # Joblib starts this with the first worker, and its start unblocks both signals.
+    resource_tracker.ensure_running()
+    previous = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous)
+
+
+def run_parallel(calls: Iterable[Any], jobs: int) -> Iterator[Any]:
+    """Run calls in `jobs` worker processes and return their results in order, as they finish.
+
+    Args:
+        calls: Calls made with `joblib.delayed`.
+        jobs: Number of processes; 1 for this process.
+    """
+    from joblib import Parallel
+
+    parallel: Any = Parallel(n_jobs=jobs, return_as="generator", **worker_options())
+    with signals_blocked():
+        return parallel(calls)
+
+
+def _watch_parent(parent: int) -> None:
+    """End this process soon after its parent process; a parent killed by SIGKILL cannot end it."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(INTERVAL)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True, name="watch-parent").start()
+
+
 CONNECT = 5.0  # [s] limit for reaching the scheduler
 WORKERS = 10.0  # [s] limit for the first worker
-PATIENCE = 20.0  # [s] without scheduler or worker after which a cluster counts as lost
 MAX_JOBS = 1024
-KILLED = "a task killed worker after worker"
 
 
 class PoolLostError(RuntimeError):
@@ -92,11 +143,23 @@ class Executor:
         Raises:
             ValueError: If it is not, within seconds.
         """
-        if self.cluster is not None:
-            with contextlib.closing(_connect(self.cluster)) as client:
-                _check_workers(client, self.cluster)
+        if self.cluster is None:
+            return
+        with closing(_connect(self.cluster)) as client:
+            try:
+                client.wait_for_workers(1, timeout=WORKERS)
+            except TimeoutError:
+                raise ValueError(
+                    f"cluster {self.cluster} has no worker; start some with `dask worker {self.cluster}`"
+                ) from None
+            for worker, version in client.run(_installed_version).items():
+                if version != __version__:
+                    raise ValueError(
+                        f"worker {worker} has lgmd-gym {version}, this is {__version__}; "
+                        "install the same version"
+                    )
 
-    @contextlib.contextmanager
+    @contextmanager
     def open(self) -> Iterator[TaskMap]:
         """Yield a function that maps a function over tasks and yields results as they finish.
 
@@ -108,10 +171,14 @@ class Executor:
             yield task_map
 
 
+def _installed_version() -> str:
+    return __version__
+
+
 SERIAL = Executor()
 
 
-@contextlib.contextmanager
+@contextmanager
 def _local(jobs: int) -> Iterator[TaskMap]:
     from joblib import Parallel
 
@@ -126,11 +193,13 @@ def _local(jobs: int) -> Iterator[TaskMap]:
         raise PoolLostError("a worker process was killed (possibly out of memory)") from None
 
 
-@contextlib.contextmanager
+@contextmanager
 def _dask(address: str) -> Iterator[TaskMap]:
+    from distributed.client import FutureCancelledError
+    from distributed.comm.core import CommClosedError
     from joblib import Parallel, parallel_config
 
-    with contextlib.closing(_connect(address)) as client, _ClusterMonitor(client) as monitor:
+    with closing(_connect(address)) as client:
         try:
             with (
                 parallel_config(backend="dask", client=client),
@@ -138,11 +207,7 @@ def _dask(address: str) -> Iterator[TaskMap]:
             ):
                 # At least 2, because the workers are other processes.
                 yield TaskMap(parallel, max(sum(client.ncores().values()), 2))
-        except KeyboardInterrupt:
-            if monitor.failure:
-                raise PoolLostError(f"the cluster at {address} is lost: {monitor.failure}") from None
-            raise
-        except _lost_errors() as error:
+        except (CommClosedError, FutureCancelledError) as error:
             reason = str(error).splitlines()[0]
             raise PoolLostError(f"the cluster at {address} is lost: {reason}") from None
 
@@ -162,79 +227,3 @@ def _connect(address: str) -> Any:
             f"no Dask scheduler at {address!r} ({reason}); start one with `dask scheduler` and pass "
             "--address tcp://HOST:8786"
         ) from None
-
-
-def _lost_errors() -> tuple[type[BaseException], ...]:
-    """Return the exception types that indicate a lost cluster."""
-    from distributed.client import FutureCancelledError
-    from distributed.comm.core import CommClosedError
-    from distributed.scheduler import KilledWorker
-
-    return CommClosedError, FutureCancelledError, KilledWorker
-
-
-def _check_workers(client: Any, address: str) -> None:
-    end = time.monotonic() + WORKERS
-    while not client.ncores():
-        if time.monotonic() > end:
-            raise ValueError(f"cluster {address} has no worker; start some with `dask worker {address}`")
-        time.sleep(0.1)
-    try:
-        versions = client.run(_installed_version)
-    except Exception as error:
-        raise ValueError(
-            f"a worker of {address} cannot import lgmd_gym ({error}); install it there"
-        ) from None
-    for worker, version in versions.items():
-        if version != __version__:
-            raise ValueError(
-                f"worker {worker} has lgmd-gym {version}, this is {__version__}; install the same version"
-            )
-
-
-def _installed_version() -> str:
-    return __version__
-
-
-class _ClusterMonitor:
-    """Interrupts the main thread once a cluster is lost, because joblib would wait for results forever.
-
-    Attributes:
-        failure: Reason why the cluster was lost; "" if it is not.
-    """
-
-    def __init__(self, client: Any) -> None:
-        self.client, self.failure = client, ""
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._watch, daemon=True)
-
-    def __enter__(self) -> "_ClusterMonitor":
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join()
-
-    def _watch(self) -> None:
-        last_good = time.monotonic()
-        while not self._stop.wait(0.5):
-            failure = self._failure()
-            if not failure:
-                last_good = time.monotonic()
-            elif time.monotonic() - last_good > PATIENCE or failure == KILLED:
-                self.failure = failure
-                interrupt_main()
-                return
-
-    def _failure(self) -> str:
-        """Return the present fault of the cluster, or "" if there is none."""
-        if self.client.status != "running":
-            return "its scheduler does not respond"
-        # Tasks turn exceptions into rows, so only Dask itself sets this status.
-        if any(future.status == "error" for future in list(self.client.futures.values())):
-            return KILLED
-        try:
-            return "" if self.client.ncores() else "it has no worker left"
-        except Exception:
-            return "its scheduler does not respond"

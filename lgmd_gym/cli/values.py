@@ -1,0 +1,133 @@
+"""Values of options: types with a readable placeholder; reading of files, worlds and modules."""
+
+import sys
+from collections.abc import Collection, Iterable
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from tyro.conf import arg
+
+if TYPE_CHECKING:
+    from lgmd_gym.agents import Agent
+    from lgmd_gym.benchmark.case import Case
+
+Name = Annotated[str | None, arg(metavar="NAME")]
+Names = Annotated[tuple[str, ...] | None, arg(metavar="NAME [NAME ...]")]
+Count = Annotated[int | None, arg(metavar="N")]
+Number = Annotated[float | None, arg(metavar="X")]
+File = Annotated[Path | None, arg(metavar="PATH")]
+SecondFile = Annotated[Path | None, arg(metavar="[PATH]")]
+
+
+def refuse_unused(options: Any, flag: str, used: Collection[str]) -> None:
+    """Raise ValueError for options that have no effect beside a flag and differ from their defaults.
+
+    Args:
+        options: Options of a command.
+        flag: The flag, for example "--resume".
+        used: Names of the options that have an effect.
+    """
+    given = [
+        f"--{item.name.replace('_', '-')}"
+        for item in fields(options)
+        if item.name not in used and getattr(options, item.name) != item.default
+    ]
+    if given:
+        raise ValueError(f"{flag} uses the settings of its run and ignores {', '.join(given)}; remove them")
+
+
+def read_params(path: Path | None) -> dict[str, Any] | None:
+    """Return the LGMD parameters in a TOML file as plain values, or None for no file.
+
+    Raises:
+        ValueError: If the file cannot be read or holds an unknown parameter.
+    """
+    from lgmd_gym.neuron import LGMDParams
+
+    if path is None:
+        return None
+    try:
+        return LGMDParams.from_toml(path).to_dict()
+    except OSError as error:
+        raise ValueError(f"params file {str(path)!r} cannot be read: {error.strerror}") from None
+
+
+def note_unused_params(path: Path | None, agents: "Iterable[Agent]") -> None:
+    """Print a line to stderr for agents whose braking the parameters do not change."""
+    names = [agent.name for agent in agents if not agent.reads_neuron]
+    if path is not None and names:
+        print(
+            f"lgmd-gym: --params {path} does not change the braking of {', '.join(names)}, which does not "
+            "depend on the neuron",
+            file=sys.stderr,
+        )
+
+
+def parse_arguments(pairs: tuple[str, ...]) -> dict[str, Any]:
+    """Return NAME=NUMBER pairs as a dict."""
+    arguments: dict[str, Any] = {}
+    for pair in pairs:
+        name, _, value = pair.partition("=")
+        try:
+            arguments[name] = int(value) if name == "shade" else float(value)
+        except ValueError:
+            raise ValueError(f"--set must be NAME=NUMBER, for example ego_speed=8.3, got {pair!r}") from None
+    return arguments
+
+
+def parse_world(text: str | None) -> dict[str, Any]:
+    """Return the argument `world` of an environment, or {} for None.
+
+    Raises:
+        ValueError: If there is no such world.
+    """
+    from lgmd_gym.camera.worlds import LABORATORY, check_world
+
+    if text is None:
+        return {}
+    world = check_world(int(text) if text.lstrip("-").isdecimal() else text)
+    return {"world": LABORATORY if world is None else world}
+
+
+def chosen_modules(sources: tuple[str, ...], named: tuple[str, ...] | None, trust: bool) -> tuple[str, ...]:
+    """Return the modules that a command imports.
+
+    Args:
+        sources: Names of suites and paths of files.
+        named: Modules of `--module`.
+        trust: Whether to add those that the files name; each is printed to stderr.
+    """
+    from lgmd_gym.benchmark.suite_file import declared_modules
+
+    modules = list(named or ())
+    for source in sources if trust else ():
+        for module in declared_modules(source):
+            if module not in modules:
+                print(f"lgmd-gym: loading module {module!r}, named in {source!r}", file=sys.stderr)
+                modules.append(module)
+    return tuple(modules)
+
+
+def find_target(target: str, case: str | None, named: tuple[str, ...] | None, trust: bool) -> "str | Case":
+    """Return the case of a file, or another target as it is.
+
+    Args:
+        target: Target of a command, such as the path of a file or an environment id.
+        case: Name of a case of the file; None if it has only one.
+        named: See `chosen_modules`.
+        trust: See `chosen_modules`.
+
+    Raises:
+        ValueError: See `find_own_case`; or for a name of a case although the target is no file.
+    """
+    from lgmd_gym.benchmark.suite_file import find_own_case, is_file
+    from lgmd_gym.envs import import_families
+
+    modules = chosen_modules((target,), named, trust)
+    if is_file(target):
+        return find_own_case(target, case, modules)
+    if case is not None:
+        raise ValueError(f"--case {case!r} needs a file with several cases, got {target!r}; remove it")
+    import_families(modules)
+    return target
