@@ -19,6 +19,7 @@ Example:
 import dataclasses
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import cache
 from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
 
 from lgmd_gym.errors import (
@@ -174,7 +175,9 @@ def text(default: Any, doc: str = "") -> Any:
     return _field(Declaration("", default, check_text, "", "", doc))
 
 
-def value(default: Any, check: Callable[[str, Any], Any], doc: str = "", bounds: str = "") -> Any:
+def value(
+    default: Any, check: Callable[[str, Any], Any], doc: str = "", bounds: str = "", unit: str = ""
+) -> Any:
     """Declare a value with a check of its own, for example a nested record.
 
     Args:
@@ -182,8 +185,9 @@ def value(default: Any, check: Callable[[str, Any], Any], doc: str = "", bounds:
         check: Function of a name and a value that returns the checked value or raises ValueError.
         doc: Meaning.
         bounds: Values in words, for documentation.
+        unit: Unit.
     """
-    return _field(Declaration("", default, check, bounds, "", doc))
+    return _field(Declaration("", default, check, bounds, unit, doc))
 
 
 def optional(declared: Any) -> Any:
@@ -259,13 +263,22 @@ class Record:
         return dict(values)
 
 
-def declarations(cls: type) -> list[Declaration]:
+@cache
+def declarations(cls: type) -> tuple[Declaration, ...]:
     """Return the declared fields of a record, in order."""
-    return [
+    return tuple(
         dataclasses.replace(item.metadata[_KEY], name=item.name)
         for item in dataclasses.fields(cast(Any, cls))
         if _KEY in item.metadata
-    ]
+    )
+
+
+def declaration_of(annotation: Any) -> Declaration | None:
+    """Return the declaration in an annotation such as `Annotated[float, number(...)]`; None without one."""
+    for item in getattr(annotation, "__metadata__", ()):
+        if isinstance(item, dataclasses.Field) and _KEY in item.metadata:
+            return item.metadata[_KEY]
+    return None
 
 
 def _field(declaration: Declaration) -> Any:
