@@ -20,8 +20,7 @@ from lgmd_gym.envs.families.distribution import (
     draw_scenario,
     level_generator,
 )
-from lgmd_gym.envs.families.free_lanes import free_lane
-from lgmd_gym.envs.families.scenario import Scenario
+from lgmd_gym.envs.families.scenario import Scenario, free_lane
 from lgmd_gym.envs.simulation.network import road_network
 from lgmd_gym.envs.simulation.physics_state import Placement, place
 

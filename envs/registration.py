@@ -8,8 +8,8 @@ import gymnasium as gym
 
 from lgmd_gym.envs.families import FAMILIES, make_scenario
 from lgmd_gym.envs.families.data import scenario_from_data
-from lgmd_gym.envs.families.registry import Family
-from lgmd_gym.envs.families.registry import family as add_family
+from lgmd_gym.envs.families.family import Family
+from lgmd_gym.envs.families.family import family as add_family
 from lgmd_gym.errors import check_keys, check_known, check_text
 
 if TYPE_CHECKING:

@@ -1,22 +1,19 @@
-"""Scenario families: functions from SI arguments to a `Scenario`, and a random distribution over them."""
+"""Scenario families: functions from SI arguments to a `Scenario`, and a random distribution over them.
 
-# Imported to register their families, in the order of the documentation.
+A family is declared in one place, see `family`: its function, the bounds and meanings of its arguments, and
+how often and with which arguments random levels contain it.
+"""
+
+# Imported to register their families; the order is that of the documentation only.
 from lgmd_gym.envs.families import (  # noqa: F401, I001
     rear,
-    motorcycles,
     crossing,
-    crossing_pedestrians,
-    crossing_bicycles,
-    along,
-    turning_across,
-    head_on,
+    vulnerable,
+    turning,
     adjacent,
     obstacles,
-    turning,
-    manoeuvres,
     curves,
-    boxes,
 )
-from lgmd_gym.envs.families.registry import FAMILIES, make_scenario
+from lgmd_gym.envs.families.family import FAMILIES, LEVELS, Level, family, make_scenario
 
-__all__ = ["FAMILIES", "make_scenario"]
+__all__ = ["FAMILIES", "LEVELS", "Level", "family", "make_scenario"]

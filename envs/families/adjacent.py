@@ -1,10 +1,30 @@
-"""Cars in adjacent lanes, cut-ins and cut-outs: driving without a threat."""
+"""Cars in adjacent and oncoming lanes, lane changes, and head-on threats: CCFhos and CCFhol."""
 
 from math import pi
+from typing import Annotated, Any
 
-from lgmd_gym.envs.dynamics.bend import Bend, lane_change
-from lgmd_gym.envs.dynamics.units import KMH, MAX_SPEED, check_speed
-from lgmd_gym.envs.families.registry import family
+import numpy as np
+
+from lgmd_gym.envs.dynamics.bend import Bend, Pose, lane_change
+from lgmd_gym.envs.dynamics.units import KMH, check_speed
+from lgmd_gym.envs.families.arguments import (
+    FAST_KMH,
+    ChangeLength,
+    EgoSpeed,
+    Headway,
+    OtherShade,
+    Shade,
+    either,
+    fast,
+    grey,
+    speed,
+    speed_kmh,
+    truth,
+    uniform,
+    within,
+)
+from lgmd_gym.envs.families.family import Level, family
+from lgmd_gym.envs.families.road_users import LARGE_CAR
 from lgmd_gym.envs.families.scenario import (
     AFTERMATH,
     EGO_LENGTH,
@@ -19,191 +39,313 @@ from lgmd_gym.envs.families.scenario import (
     RoadPlan,
     Scenario,
 )
-from lgmd_gym.errors import check_whole, check_within, shown
+from lgmd_gym.errors import shown
+from lgmd_gym.fields import optional, whole
 
 CONTACT_OFFSET = (EGO_WIDTH + TARGET_WIDTH) / 2  # [m], lateral offset up to which the cars touch
 QUEUE_SPACING = 2.0  # [m] between the cars of a queue
 AFTER_PASSING = 2.0  # [s] of driving after the last car
 CHANGE_START = 2.0  # [s] after which a car that cuts in leaves its lane
 MIN_CLOSING = 0.5  # [m/s], slowest approach to a car that cuts in; slower ones take minutes
+LAST_STRAIGHT = 1.5  # [s] before the contact, at which the lane change of CCFhol ends
+TOP_KMH = 140.0  # of cars that overtake on a motorway, in random levels
 
 
-@family("AdjacentPass")
+def _queue(rng: np.random.Generator) -> dict[str, Any]:
+    offset = uniform(rng, 3.0, 3.7) * (1.0 if either(rng) else -1.0)
+    return {"ego_speed": speed_kmh(rng), "lateral_offset": offset, "cars": int(rng.integers(1, 7))}
+
+
+@family("AdjacentPass", Level("AdjacentPass", 1.0, _queue), Level("FastAdjacentPass", 0.3, fast(_queue)))
 def pass_standing(
-    ego_speed: float = 50 * KMH,
-    lateral_offset: float = LANE_WIDTH,
-    cars: int = 1,
-    shade: int | None = None,
+    ego_speed: EgoSpeed = 50 * KMH,
+    lateral_offset: Annotated[
+        float,
+        within(
+            "[-20, 20]",
+            "m",
+            "Centreline of the stationary cars minus ego centreline, + left; far enough to avoid contact",
+        ),
+    ] = LANE_WIDTH,
+    cars: Annotated[int, whole(None, "[1, 20]", doc="Number of stationary cars in the queue")] = 1,
+    shade: Annotated[int | None, grey("the stationary cars")] = None,
 ) -> Scenario:
-    """The ego passes a stationary car or a queue of cars in the adjacent lane; not a threat.
-
-    Args:
-        ego_speed: Ego speed, in (0, 40] [m/s].
-        lateral_offset: Centreline of the stationary cars minus ego centreline, + left, in [-20, 20] and far
-            enough to avoid contact [m].
-        cars: Number of stationary cars in the queue, in [1, 20].
-        shade: Grey level of the stationary cars in [0, 255]; None to draw each from the seed.
-    """
-    speed = check_speed("ego_speed", ego_speed)
-    if abs(check_within("lateral_offset", lateral_offset, -20.0, 20.0, "m")) <= CONTACT_OFFSET:
+    """The ego passes a stationary car or a queue of cars in the adjacent lane; not a threat."""
+    if abs(lateral_offset) <= CONTACT_OFFSET:
         raise ValueError(
             f"lateral_offset must exceed {CONTACT_OFFSET:g} m to either side in AdjacentPass, "
             f"got {shown(lateral_offset)}; for a car in the ego's path use CCRs"
         )
-    count = check_whole("cars", cars, 1, 20)
     pitch = TARGET_LENGTH + QUEUE_SPACING
     queue = tuple(
-        Actor(gap=START_TTC * speed + number * pitch, lateral_offset=lateral_offset, shade=shade)
-        for number in range(count)
+        Actor(gap=START_TTC * ego_speed + number * pitch, lateral_offset=lateral_offset, shade=shade)
+        for number in range(cars)
     )
-    length = START_TTC * speed + count * pitch + EGO_LENGTH
-    return Scenario(
-        family="AdjacentPass", ego_speed=speed, duration=length / speed + AFTER_PASSING, actors=queue
-    )
+    length = START_TTC * ego_speed + cars * pitch + EGO_LENGTH
+    duration = length / ego_speed + AFTER_PASSING
+    return Scenario(family="AdjacentPass", ego_speed=ego_speed, duration=duration, actors=queue)
 
 
-@family("PassBetween")
+@family(
+    "PassBetween",
+    Level(
+        "PassBetween",
+        1.0,
+        lambda rng: {"ego_speed": speed_kmh(rng, 30.0), "inner_gap": uniform(rng, 4.0, 5.0)},
+    ),
+)
 def pass_between(
-    ego_speed: float = 80 * KMH,
-    wheel_gap: float | None = None,
-    inner_gap: float | None = None,
-    shade: int | None = None,
+    ego_speed: EgoSpeed = 80 * KMH,
+    wheel_gap: Annotated[
+        float | None,
+        optional(
+            within(
+                "[2, 10]",
+                "m",
+                "Distance between the facing outer sides of the parked cars' closest front tyres; 4.5 m "
+                "without `wheel_gap` and `inner_gap`",
+            )
+        ),
+    ] = None,
+    inner_gap: Annotated[
+        float | None, optional(within("[2, 10]", "m", "Distance between the inner sides of the parked cars"))
+    ] = None,
+    shade: Annotated[int | None, grey("the parked cars")] = None,
 ) -> Scenario:
     """The ego drives between two parked cars with aligned rears; not a threat.
 
     Source: 49 CFR 571.127 S9.3.1 at 80 km/h, with 4.5 m between the closest front wheels of the parked cars;
     GB 39901-2025 at 60 km/h, with 4.5 m between their inner sides. At most one of both gaps can be given.
-
-    Args:
-        ego_speed: Ego speed, in (0, 40] [m/s].
-        wheel_gap: Distance between the facing outer sides of the parked cars' closest front tyres, in [2, 10]
-            [m]; 4.5 m without `wheel_gap` and `inner_gap`.
-        inner_gap: Distance between the inner sides of the parked cars, in [2, 10] [m].
-        shade: Grey level of the parked cars in [0, 255]; None to draw each from the seed.
     """
-    speed = check_speed("ego_speed", ego_speed)
-    aside = _parked_offset(wheel_gap, inner_gap)
-    gap = max(START_TTC * speed, 50.0)
-    parked = tuple(Actor(gap=gap, lateral_offset=side * aside, shade=shade) for side in (1, -1))
-    duration = (gap + TARGET_LENGTH + EGO_LENGTH) / speed + AFTER_PASSING
-    return Scenario(family="PassBetween", ego_speed=speed, duration=duration, actors=parked)
-
-
-def _parked_offset(wheel_gap: float | None, inner_gap: float | None) -> float:
-    """Return the distance of each parked car's centreline from the ego's [m]."""
     if inner_gap is None:
-        between = check_within("wheel_gap", 4.5 if wheel_gap is None else wheel_gap, 2.0, 10.0, "m")
-        return between / 2 + (TARGET_TRACK + TYRE_WIDTH) / 2
-    if wheel_gap is not None:
+        aside = (4.5 if wheel_gap is None else wheel_gap) / 2 + (TARGET_TRACK + TYRE_WIDTH) / 2
+    elif wheel_gap is not None:
         raise ValueError("wheel_gap and inner_gap cannot both be given in PassBetween; remove one")
-    return check_within("inner_gap", inner_gap, 2.0, 10.0, "m") / 2 + TARGET_WIDTH / 2
+    else:
+        aside = inner_gap / 2 + TARGET_WIDTH / 2
+    gap = max(START_TTC * ego_speed, 50.0)
+    parked = tuple(Actor(gap=gap, lateral_offset=side * aside, shade=shade) for side in (1, -1))
+    duration = (gap + TARGET_LENGTH + EGO_LENGTH) / ego_speed + AFTER_PASSING
+    return Scenario(family="PassBetween", ego_speed=ego_speed, duration=duration, actors=parked)
 
 
-@family("Overtaken")
+def _overtaken(rng: np.random.Generator) -> dict[str, Any]:
+    return {"ego_speed": speed_kmh(rng, 30.0), "excess": speed_kmh(rng, 10.0, 40.0)}
+
+
+def _overtaken_fast(rng: np.random.Generator) -> dict[str, Any]:
+    ego_speed = speed_kmh(rng, *FAST_KMH)
+    fastest = max(TOP_KMH * KMH - ego_speed, 11.0 * KMH)
+    return {"ego_speed": ego_speed, "excess": uniform(rng, 10.0 * KMH, fastest)}
+
+
+@family("Overtaken", Level("Overtaken", 1.0, _overtaken), Level("FastOvertaken", 0.5, _overtaken_fast))
 def being_overtaken(
-    ego_speed: float = 80 * KMH, excess: float = 30 * KMH, shade: int | None = None
+    ego_speed: EgoSpeed = 80 * KMH,
+    excess: Annotated[float, within("[0.1, 40]", "m/s", "Speed of the other car minus ego speed")] = 30 * KMH,
+    shade: OtherShade = None,
 ) -> Scenario:
-    """A faster car overtakes the ego in the left lane and enters the image from the side; not a threat.
-
-    Args:
-        ego_speed: Ego speed, in (0, 40) [m/s].
-        excess: Speed of the other car minus ego speed, >= 0.1 [m/s].
-        shade: Grey level of the other car in [0, 255]; None to draw it from the seed.
-    """
-    speed = check_speed("ego_speed", ego_speed)
-    faster = check_speed("ego_speed + excess", speed + check_within("excess", excess, 0.1, MAX_SPEED, "m/s"))
+    """A faster car overtakes the ego in the left lane and enters the image from the side; not a threat."""
+    faster = check_speed("ego_speed + excess", ego_speed + excess)
     behind = -(EGO_LENGTH + TARGET_LENGTH) - 3.0 * excess  # next to the ego after 3 s
     other = Actor(gap=behind, lateral_offset=LANE_WIDTH, speed=faster, shade=shade)
-    return Scenario(family="Overtaken", ego_speed=speed, duration=10.0, actors=(other,))
+    return Scenario(family="Overtaken", ego_speed=ego_speed, duration=10.0, actors=(other,))
 
 
-@family("Oncoming")
+@family(
+    "Oncoming",
+    Level(
+        "Oncoming",
+        1.0,
+        lambda rng: {"ego_speed": speed_kmh(rng, 30.0), "oncoming_speed": speed_kmh(rng, 30.0)},
+    ),
+)
 def meet_oncoming(
-    ego_speed: float = 80 * KMH, oncoming_speed: float = 80 * KMH, shade: int | None = None
+    ego_speed: EgoSpeed = 80 * KMH,
+    oncoming_speed: Annotated[float, speed("Speed of the other car")] = 80 * KMH,
+    shade: OtherShade = None,
 ) -> Scenario:
-    """The ego meets an oncoming car in the adjacent lane of a two-way road; not a threat.
+    """The ego meets an oncoming car in the adjacent lane of a two-way road; not a threat."""
+    gap = START_TTC * (ego_speed + oncoming_speed)
+    other = Actor(gap=gap, lateral_offset=LANE_WIDTH, heading=pi, speed=oncoming_speed, shade=shade)
+    return _on_two_way_road("Oncoming", ego_speed, START_TTC + AFTER_PASSING, other)
 
-    Args:
-        ego_speed: Ego speed, in (0, 40] [m/s].
-        oncoming_speed: Speed of the oncoming car, in (0, 40] [m/s].
-        shade: Grey level of the other car in [0, 255]; None to draw it from the seed.
+
+@family(
+    "CCFhos",
+    Level(
+        "CCFhos",
+        3.0,
+        lambda rng: {
+            "ego_speed": speed_kmh(rng, 30.0),
+            "target_speed": speed_kmh(rng, 30.0),
+            "impact_location": uniform(rng, 0.0, 1.0),
+        },
+    ),
+    threat=True,
+    twin=True,
+)
+def meet_in_lane(
+    ego_speed: EgoSpeed = 50 * KMH,
+    target_speed: Annotated[float, speed("Target speed")] = 50 * KMH,
+    impact_location: Annotated[
+        float,
+        within(
+            "[-0.25, 1.25]",
+            "",
+            "Position of the target's centre across the ego's width; 0 is the right side and 1 the left",
+        ),
+    ] = 0.5,
+    shade: Shade = None,
+) -> Scenario:
+    """An oncoming car drives in the ego's lane (Car-to-Car Front Head-on straight).
+
+    Braking lowers the ego's speed at the contact but does not avoid it: the target does not stop. The
+    episode continues at the ego's standstill. Sources: Euro NCAP AEB Car-to-Car v4.3.1; Frontal Collisions
+    v1.1.
     """
-    speed, oncoming = check_speed("ego_speed", ego_speed), check_speed("oncoming_speed", oncoming_speed)
-    gap = START_TTC * (speed + oncoming)
-    other = Actor(gap=gap, lateral_offset=LANE_WIDTH, heading=pi, speed=oncoming, shade=shade)
-    return Scenario(
-        family="Oncoming",
-        ego_speed=speed,
-        duration=START_TTC + AFTER_PASSING,
-        actors=(other,),
-        road=RoadPlan(kind="two-way"),
+    target = Actor(
+        gap=START_TTC * (ego_speed + target_speed),
+        lateral_offset=(impact_location - 0.5) * EGO_WIDTH,
+        heading=pi,
+        speed=target_speed,
+        shade=shade,
     )
+    return _on_two_way_road("CCFhos", ego_speed, START_TTC + AFTERMATH, target)
 
 
-@family("CutIn")
+def _lane_change(rng: np.random.Generator) -> dict[str, Any]:
+    oncoming = speed_kmh(rng, 40.0)
+    return {
+        "ego_speed": speed_kmh(rng, 30.0),
+        "target_speed": oncoming,
+        "change_length": oncoming * uniform(rng, 2.7, 4.0),
+        "following_distance": uniform(rng, 10.0, 25.0),
+    }
+
+
+@family("CCFhol", Level("CCFhol", 2.0, _lane_change), threat=True, twin=True)
+def meet_overtaking(
+    ego_speed: EgoSpeed = 50 * KMH,
+    target_speed: Annotated[float | None, optional(speed("Target speed; None for that of the ego"))] = None,
+    change_length: ChangeLength = 44.0,
+    following_distance: Annotated[
+        float, within("[1, 100]", "m", "Distance between the target and the car ahead of it")
+    ] = 13.9,
+    shade: Shade = None,
+) -> Scenario:
+    """An oncoming car overtakes another one into the ego's lane (Car-to-Car Front Head-on lane change).
+
+    The lane change ends 1.5 s before the contact. As in CCFhos, braking does not avoid it. Source: Euro NCAP
+    AEB Car-to-Car v4.3.1: 44 m and 13.9 m at 50 km/h, 60 m and 19.4 m at 70 km/h.
+    """
+    # A module that loads numba; the registration of the scenario families must not.
+    from lgmd_gym.envs.dynamics.path import Path
+
+    oncoming = ego_speed if target_speed is None else target_speed
+    shift = lane_change(change_length, LANE_WIDTH)
+    way = sum(bend.length for bend in shift)
+    contact = max(START_TTC, way / oncoming + LAST_STRAIGHT + 0.5)
+    bends = (Bend((contact - LAST_STRAIGHT) * oncoming - way), *shift)
+    gap = contact * ego_speed + Path(Pose(0.0, 0.0, 0.0), bends).pose(contact * oncoming).x
+    target = Actor(gap=gap, lateral_offset=LANE_WIDTH, heading=pi, speed=oncoming, path=bends, shade=shade)
+    overtaken = Actor(
+        gap=gap - following_distance - LARGE_CAR.length,
+        lateral_offset=LANE_WIDTH,
+        heading=pi,
+        speed=oncoming,
+        **LARGE_CAR.fields,
+    )
+    return _on_two_way_road("CCFhol", ego_speed, contact + AFTERMATH, target, overtaken)
+
+
+@family(
+    "CutIn",
+    Level("CutIn", 1.0, lambda rng: {"ego_speed": speed_kmh(rng, 30.0), "gap": uniform(rng, 10.0, 25.0)}),
+)
 def cut_in(
-    ego_speed: float = 50 * KMH,
-    gap: float = 12.0,
-    excess: float = 5 * KMH,
-    change_length: float = 44.0,
-    shade: int | None = None,
+    ego_speed: EgoSpeed = 50 * KMH,
+    gap: Annotated[
+        float, within("[2, 200]", "m", "Bumper-to-bumper distance at the start of the lane change")
+    ] = 12.0,
+    excess: Annotated[
+        float,
+        within("[-40, 40]", "m/s", "Speed of the other car minus ego speed; not between -0.5 and 0"),
+    ] = 5 * KMH,
+    change_length: ChangeLength = 44.0,
+    shade: OtherShade = None,
 ) -> Scenario:
     """A car changes from the left lane into the ego's lane; a threat only if it is slower than the ego.
 
     The lane change begins after 2 s. With a slower car it begins later if needed, so that the ego covers the
     gap at least 5 s after the start. A much slower car is passed before it reaches the ego's lane.
-
-    Args:
-        ego_speed: Ego speed, in (0, 40] [m/s].
-        gap: Bumper-to-bumper distance at the start of the lane change, in [2, 200] [m].
-        excess: Speed of the other car minus ego speed, >= 0 or <= -0.5 [m/s].
-        change_length: Length of the lane change along the road, in [10, 200] [m].
-        shade: Grey level of the other car in [0, 255]; None to draw it from the seed.
     """
-    speed = check_speed("ego_speed", ego_speed)
-    distance = check_within("gap", gap, 2.0, 200.0, "m")
-    difference = check_within("excess", excess, -MAX_SPEED, MAX_SPEED, "m/s")
-    if -MIN_CLOSING < difference < 0.0:
+    if -MIN_CLOSING < excess < 0.0:
         raise ValueError(f"excess must be >= 0 or <= -{MIN_CLOSING:g} m/s in CutIn, got {shown(excess)}")
-    target_speed = check_speed("ego_speed + excess", speed + difference)
+    target_speed = check_speed("ego_speed + excess", ego_speed + excess)
     before, duration = CHANGE_START, 9.0  # [s] in adjacent lanes; of the episode
-    if difference < 0.0:
-        closing = distance / -difference  # [s] from the start of the lane change
+    if excess < 0.0:
+        closing = gap / -excess  # [s] from the start of the lane change
         before = max(CHANGE_START, START_TTC - closing)
         duration = before + closing + AFTERMATH
     other = Actor(
-        gap=distance - before * difference,
+        gap=gap - before * excess,
         lateral_offset=LANE_WIDTH,
         speed=target_speed,
-        path=_straight_then_change(before * target_speed, change_length, -LANE_WIDTH),
+        path=(Bend(before * target_speed), *lane_change(change_length, -LANE_WIDTH)),
         shade=shade,
     )
-    return Scenario(family="CutIn", ego_speed=speed, duration=duration, actors=(other,))
+    return Scenario(family="CutIn", ego_speed=ego_speed, duration=duration, actors=(other,))
 
 
-@family("CutOut")
+@family(
+    "CutOut",
+    Level("CutOut", 1.0, lambda rng: {"ego_speed": speed_kmh(rng, 30.0), "headway": uniform(rng, 1.2, 2.5)}),
+)
 def cut_out(
-    ego_speed: float = 50 * KMH, headway: float = 1.5, change_length: float = 44.0, shade: int | None = None
+    ego_speed: Annotated[float, speed("Speed of both cars")] = 50 * KMH,
+    headway: Headway = 1.5,
+    change_length: ChangeLength = 44.0,
+    shade: OtherShade = None,
 ) -> Scenario:
-    """The lead car changes into the left lane and leaves a free road; not a threat.
-
-    Args:
-        ego_speed: Speed of both cars, in (0, 40] [m/s].
-        headway: Time headway, in [0.3, 10] [s].
-        change_length: Length of the lane change along the road, in [10, 200] [m].
-        shade: Grey level of the other car in [0, 255]; None to draw it from the seed.
-    """
-    speed = check_speed("ego_speed", ego_speed)
+    """The lead car changes into the left lane and leaves a free road; not a threat."""
     lead = Actor(
-        gap=speed * check_within("headway", headway, 0.3, 10.0, "s"),
-        speed=speed,
-        path=_straight_then_change(3.0 * speed, change_length, LANE_WIDTH),
+        gap=ego_speed * headway,
+        speed=ego_speed,
+        path=(Bend(3.0 * ego_speed), *lane_change(change_length, LANE_WIDTH)),
         shade=shade,
     )
-    return Scenario(family="CutOut", ego_speed=speed, duration=9.0, actors=(lead,))
+    return Scenario(family="CutOut", ego_speed=ego_speed, duration=9.0, actors=(lead,))
 
 
-def _straight_then_change(before: float, length: float, offset: float) -> tuple[Bend, ...]:
-    """Return a straight followed by a lane change."""
-    shift = lane_change(check_within("change_length", length, 10.0, 200.0, "m"), offset)
-    return (Bend(before), *shift)
+@family(
+    "LaneClosure",
+    Level("LaneClosure", 1.0, lambda rng: {"ego_speed": speed_kmh(rng, 25.0, 55.0), "left": either(rng)}),
+)
+def change_lane_before_sign(
+    ego_speed: Annotated[float, within(f"[{20 * KMH}, {60 * KMH}]", "m/s", "Ego speed; 20 to 60 km/h")] = 40
+    * KMH,
+    left: Annotated[bool, truth("Whether the ego changes to the left lane; otherwise to the right")] = True,
+) -> Scenario:
+    """The ego changes lane before a signboard that closes its lane; not a threat.
+
+    The ego drives at constant speed and begins to steer 4.1 s before the sign. Source: UN R152 Rev.2, Annex 3
+    Appendix 2, case 4, at 40 km/h.
+    """
+    steady = 4.0  # [s] before the ego steers
+    onset = steady * ego_speed
+    shift = lane_change(3.3 * ego_speed, LANE_WIDTH if left else -LANE_WIDTH)
+    gap = onset + 4.1 * ego_speed
+    sign = Actor(gap=gap, kind="box", shade=225, length=0.3, width=1.5, height=1.8)
+    return Scenario(
+        family="LaneClosure",
+        ego_speed=ego_speed,
+        duration=steady + 4.1 + 2.0,
+        actors=(sign,),
+        ego_path=(Bend(onset), *shift),
+    )
+
+
+def _on_two_way_road(name: str, ego_speed: float, duration: float, *actors: Actor) -> Scenario:
+    road = RoadPlan(kind="two-way")
+    return Scenario(family=name, ego_speed=ego_speed, duration=duration, actors=actors, road=road)

@@ -1,10 +1,26 @@
 """Crossing vehicles: Euro NCAP's CCCscp and CMCscp, and a crossing car that clears in time."""
 
 from math import pi
+from typing import Annotated, Any
+
+import numpy as np
 
 from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.dynamics.units import KMH, check_speed
-from lgmd_gym.envs.families.registry import family
+from lgmd_gym.envs.dynamics.units import KMH
+from lgmd_gym.envs.families.arguments import (
+    EgoSpeed,
+    RiderShade,
+    Shade,
+    either,
+    one_of,
+    side,
+    speed,
+    speed_kmh,
+    truth,
+    uniform,
+    within,
+)
+from lgmd_gym.envs.families.family import Level, family
 from lgmd_gym.envs.families.road_users import LARGE_CAR, MOTORCYCLE, SIDES, SMALL_CAR, parked_row
 from lgmd_gym.envs.families.scenario import (
     AFTERMATH,
@@ -18,48 +34,62 @@ from lgmd_gym.envs.families.scenario import (
     RoadPlan,
     Scenario,
 )
-from lgmd_gym.errors import check_flag, check_known, check_within
 
 START_GAP = 2.9  # [m] from a stopped ego to the target's path (AEB C2C v4.3.1, 8.2.5)
 SIDE_IMPACT = 0.1  # of the ego's length behind its front, where a motorcycle strikes it
 WAITING, PULL_AWAY = 4.5, 1.5  # [s], [m/s²], not specified by the protocol
 
+TargetSpeed = Annotated[float, speed("Target speed")]
+Side = Annotated[str, one_of(tuple(SIDES), 'Side from which the target comes, "right" or "left"')]
 
-@family("CCCscp")
+
+def _crossing(rng: np.random.Generator) -> dict[str, Any]:
+    return {
+        "ego_speed": speed_kmh(rng, 20.0, 60.0),
+        "target_speed": speed_kmh(rng, 20.0, 60.0),
+        "side": side(rng),
+    }
+
+
+def _maybe_obstructed(rng: np.random.Generator) -> dict[str, Any]:
+    return _crossing(rng) | {"obstructed": either(rng)}
+
+
+@family("CCCscp", Level("CCCscp", 8.0, _maybe_obstructed), threat=True, twin=True)
 def cross_straight(
-    ego_speed: float = 30 * KMH,
-    target_speed: float = 30 * KMH,
-    side: str = "right",
-    from_stop: bool = False,
-    obstructed: bool = False,
-    shade: int | None = None,
+    ego_speed: Annotated[float, speed("Scripted ego speed")] = 30 * KMH,
+    target_speed: TargetSpeed = 30 * KMH,
+    side: Side = "right",
+    from_stop: Annotated[
+        bool,
+        truth("Whether the ego waits 2.9 m before the target's path and then accelerates to `ego_speed`"),
+    ] = False,
+    obstructed: Annotated[
+        bool,
+        truth(
+            "Whether three cars are parked before the junction, on the side from which the target comes: 2 m "
+            "beside the ego's centreline on the right, 5.5 m on the left"
+        ),
+    ] = False,
+    shade: Shade = None,
 ) -> Scenario:
     """A car crosses the ego's path and is struck in the side (Car-to-Car Crossing straight crossing path).
 
     Without braking, the ego's centreline meets the target's side a quarter of its length behind its front.
     Sources: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.5; Frontal Collisions v1.1, with parked cars.
-
-    Args:
-        ego_speed: Scripted ego speed, in (0, 40] [m/s].
-        target_speed: Target speed, in (0, 40] [m/s].
-        side: Side from which the target comes, "right" or "left".
-        from_stop: Whether the ego waits 2.9 m before the target's path and then accelerates to `ego_speed`.
-        obstructed: Whether three cars are parked before the junction, on the side from which the target
-            comes: 2 m beside the ego's centreline on the right, 5.5 m on the left.
-        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
     """
-    speed, across = check_speed("ego_speed", ego_speed), check_speed("target_speed", target_speed)
-    if check_flag("from_stop", from_stop):
-        distance, profile = START_GAP, (Segment(start=WAITING, acceleration=PULL_AWAY, final_speed=speed),)
+    if from_stop:
+        distance = START_GAP
+        profile = (Segment(start=WAITING, acceleration=PULL_AWAY, final_speed=ego_speed),)
         contact = _time_to_cover(distance, profile)
     else:
-        distance, profile = START_TTC * speed, ()
+        distance, profile = START_TTC * ego_speed, ()
         contact = START_TTC
-    target = _crossing_car(distance, contact * across + TARGET_LENGTH / 4, across, side, shade)
-    parked = _occluders(distance + TARGET_WIDTH / 2, side) if check_flag("obstructed", obstructed) else ()
+    target = _crossing_car(distance, contact * target_speed + TARGET_LENGTH / 4, target_speed, side, shade)
+    parked = _occluders(distance + TARGET_WIDTH / 2, side) if obstructed else ()
     return Scenario(
         family="CCCscp",
-        ego_speed=0.0 if from_stop else speed,
+        ego_speed=0.0 if from_stop else ego_speed,
         duration=contact + AFTERMATH,
         actors=(target, *parked),
         ego_profile=profile,
@@ -67,77 +97,65 @@ def cross_straight(
     )
 
 
-@family("CMCscp")
+@family("CMCscp", Level("CMCscp", 3.0, _maybe_obstructed), threat=True, twin=True)
 def motorcycle_crosses(
-    ego_speed: float = 30 * KMH,
-    target_speed: float = 30 * KMH,
-    side: str = "right",
-    obstructed: bool = False,
-    shade: int | None = None,
+    ego_speed: EgoSpeed = 30 * KMH,
+    target_speed: Annotated[float, speed("Speed of the motorcycle")] = 30 * KMH,
+    side: Side = "right",
+    obstructed: Annotated[
+        bool, truth("Whether three cars are parked before the junction, as in CCCscp")
+    ] = False,
+    shade: RiderShade = None,
 ) -> Scenario:
     """A motorcycle crosses the ego's path and strikes the ego (Car-to-Motorcyclist Crossing straight path).
 
     Without braking, the middle of the motorcycle's front meets the ego's side 10 % of the ego's length behind
     its front. Source: Euro NCAP Frontal Collisions v1.1.
-
-    Args:
-        ego_speed: Ego speed, in (0, 40] [m/s].
-        target_speed: Speed of the motorcycle, in (0, 40] [m/s].
-        side: Side from which the motorcycle comes, "right" or "left".
-        obstructed: Whether three cars are parked before the junction, as in CCCscp.
-        shade: Grey level of the rider's clothes in [0, 255]; None to draw it from the seed.
     """
-    speed, across = check_speed("ego_speed", ego_speed), check_speed("target_speed", target_speed)
-    check_known("side", side, SIDES)
     to_left = SIDES[side]
-    path = START_TTC * speed - SIDE_IMPACT * EGO_LENGTH  # of the motorcycle, from the ego's front [m]
-    before = EGO_WIDTH / 2 + MOTORCYCLE.length / 2 + START_TTC * across
+    path = START_TTC * ego_speed - SIDE_IMPACT * EGO_LENGTH  # of the motorcycle, from the ego's front [m]
+    before = EGO_WIDTH / 2 + MOTORCYCLE.length / 2 + START_TTC * target_speed
     target = Actor(
         gap=path - MOTORCYCLE.length / 2,
         lateral_offset=-to_left * before,
         heading=to_left * pi / 2,
-        speed=across,
+        speed=target_speed,
         shade=shade,
         **MOTORCYCLE.fields,
     )
-    parked = _occluders(path, side) if check_flag("obstructed", obstructed) else ()
+    parked = _occluders(path, side) if obstructed else ()
     return Scenario(
         family="CMCscp",
-        ego_speed=speed,
+        ego_speed=ego_speed,
         duration=START_TTC + AFTERMATH,
         actors=(target, *parked),
         road=_road(path - TARGET_WIDTH / 2, side),
     )
 
 
-@family("CrossingClears")
+@family(
+    "CrossingClears",
+    Level("CrossingClears", 1.0, lambda rng: _crossing(rng) | {"clear_by": uniform(rng, 1.2, 2.5)}),
+)
 def cross_and_clear(
-    ego_speed: float = 40 * KMH,
-    target_speed: float = 40 * KMH,
-    clear_by: float = 1.5,
-    side: str = "right",
-    shade: int | None = None,
+    ego_speed: EgoSpeed = 40 * KMH,
+    target_speed: TargetSpeed = 40 * KMH,
+    clear_by: Annotated[
+        float,
+        within("[0.5, 4]", "s", "Time from the target's rear leaving the ego's lane to the ego's arrival"),
+    ] = 1.5,
+    side: Side = "right",
+    shade: Shade = None,
 ) -> Scenario:
-    """A car crosses the ego's path and clears it before the ego arrives; not a threat.
-
-    Args:
-        ego_speed: Ego speed, in (0, 40] [m/s].
-        target_speed: Target speed, in (0, 40] [m/s].
-        clear_by: Time between the target's rear leaving the ego's lane and the ego's arrival, in [0.5, 4]
-            [s].
-        side: Side from which the target comes, "right" or "left".
-        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
-    """
-    speed, across = check_speed("ego_speed", ego_speed), check_speed("target_speed", target_speed)
-    distance = START_TTC * speed
-    clear_time = START_TTC - check_within("clear_by", clear_by, 0.5, 4.0, "s")
+    """A car crosses the ego's path and clears it before the ego arrives; not a threat."""
+    distance = START_TTC * ego_speed
     # At that time the target's rear is half a lane beyond the ego's centreline.
-    before = clear_time * across - LANE_WIDTH / 2 - TARGET_LENGTH / 2
+    before = (START_TTC - clear_by) * target_speed - LANE_WIDTH / 2 - TARGET_LENGTH / 2
     return Scenario(
         family="CrossingClears",
-        ego_speed=speed,
+        ego_speed=ego_speed,
         duration=START_TTC + 2.0,
-        actors=(_crossing_car(distance, before, across, side, shade),),
+        actors=(_crossing_car(distance, before, target_speed, side, shade),),
         road=_road(distance, side),
     )
 
@@ -152,7 +170,6 @@ def _crossing_car(distance: float, before: float, speed: float, side: str, shade
         side: Side from which the car comes.
         shade: Grey level; None to draw it from the seed.
     """
-    check_known("side", side, SIDES)
     to_left = SIDES[side]
     return Actor(
         gap=distance + TARGET_WIDTH / 2 - TARGET_LENGTH / 2,
@@ -172,7 +189,7 @@ def _occluders(path: float, side: str) -> tuple[Actor, ...]:
 
 def _road(distance: float, side: str) -> RoadPlan:
     """Return a crossing whose lane for traffic from that side contains the crossing car."""
-    lane = LANE_WIDTH / 2 * SIDES.get(side, 1.0)
+    lane = LANE_WIDTH / 2 * SIDES[side]
     return RoadPlan(kind="crossing", distance=EGO_LENGTH / 2 + distance + TARGET_WIDTH / 2 - lane)
 
 

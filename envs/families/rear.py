@@ -1,251 +1,404 @@
-"""Rear scenarios: Euro NCAP's CCRs, CCRm and CCRb, and car following without a threat."""
+"""Cars, motorcycles and boxes ahead in the ego's lane: CCRs, CCRm, CCRb, CMRs, CMRb, and following."""
 
 from dataclasses import replace
 from math import copysign, pi
+from typing import Annotated, Any
+
+import numpy as np
 
 from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.dynamics.units import KMH, check_speed
-from lgmd_gym.envs.families.registry import family
+from lgmd_gym.envs.dynamics.units import KMH
+from lgmd_gym.envs.families.arguments import (
+    HEADWAY,
+    EgoSpeed,
+    Headway,
+    LeadShade,
+    RiderShade,
+    Shade,
+    either,
+    fast,
+    grey,
+    slower,
+    speed,
+    speed_kmh,
+    truth,
+    uniform,
+    within,
+)
+from lgmd_gym.envs.families.family import Level, family
+from lgmd_gym.envs.families.road_users import MOTORCYCLE
 from lgmd_gym.envs.families.scenario import (
     AFTERMATH,
     EGO_WIDTH,
     LANE_WIDTH,
     START_TTC,
+    TARGET_HEIGHT,
+    TARGET_LENGTH,
     TARGET_WIDTH,
     Actor,
     Scenario,
     bridge_shadow,
 )
-from lgmd_gym.errors import check_flag, check_within, shown
+from lgmd_gym.errors import check_within, shown
+from lgmd_gym.fields import optional
 
 LEAD_IN = (
     3.0  # [s] at constant distance before the lead car brakes; T0 is 1 s before (AEB C2C v4.3.1, 8.2.2.3)
 )
 RELEASE = 2.5  # [m/s²], deceleration and acceleration of a lead car that brakes and releases
+BOX_KMH = (20.0, 100.0)  # ego speeds of random levels
+
+Offset = Annotated[
+    float | None,
+    optional(
+        within("[-20, 20]", "m", "Target centreline minus ego centreline, + left; 0 if no position is given")
+    ),
+]
+Overlap = Annotated[
+    float | None,
+    optional(
+        within(
+            "[-1, 1]", "", "Overlapped share of the ego's width; its sign is the side, + left; ±1 is aligned"
+        )
+    ),
+]
+ImpactLocation = Annotated[
+    float | None,
+    optional(
+        within(
+            "[-0.25, 1.25]",
+            "",
+            "Position of the target's centre across the ego's width; 0.5 is aligned, larger values are to "
+            "the left",
+        )
+    ),
+]
+MotorcycleLocation = Annotated[
+    float,
+    within(
+        "[-0.25, 1.25]",
+        "",
+        "Position of the motorcycle's centre across the ego's width; 0 is the right side and 1 the left",
+    ),
+]
+Gap = Annotated[
+    float | None, optional(within("[1, 200]", "m", "Initial distance; 40 m without `gap` and `headway`"))
+]
+FreeHeadway = Annotated[
+    float | None, optional(within("[0.3, 10]", "s", "Alternative to `gap`: initial time headway"))
+]
+BuildUp = Annotated[float, within("[0, 5]", "s", "Time from the onset to the full deceleration")]
+Beside = Annotated[
+    bool, truth("Whether a second car does the same next to the target, in the lane to the left")
+]
 
 
-@family("CCRs")
+def _overlap(rng: np.random.Generator) -> float:
+    """Draw 1 (aligned) with probability 0.5, otherwise an overlap of 0.4 to 1 on either side."""
+    if either(rng):
+        return 1.0
+    return uniform(rng, 0.4, 1.0) * (1.0 if either(rng) else -1.0)
+
+
+def _standing(rng: np.random.Generator) -> dict[str, Any]:
+    return {"ego_speed": speed_kmh(rng), "overlap": _overlap(rng)}
+
+
+def _moving(rng: np.random.Generator) -> dict[str, Any]:
+    ego_speed = speed_kmh(rng, 30.0)
+    return {
+        "ego_speed": ego_speed,
+        "target_speed": ego_speed * uniform(rng, 0.2, 0.7),
+        "overlap": _overlap(rng),
+    }
+
+
+def _braking(rng: np.random.Generator) -> dict[str, Any]:
+    return {
+        "ego_speed": speed_kmh(rng, 30.0),
+        "headway": uniform(rng, *HEADWAY),
+        "deceleration": uniform(rng, 2.0, 6.0),
+        "build_up": uniform(rng, 0.3, 1.0),
+        "overlap": _overlap(rng),
+    }
+
+
+def _motorcycle(rng: np.random.Generator) -> dict[str, Any]:
+    return {"ego_speed": speed_kmh(rng), "impact_location": uniform(rng, 0.1, 0.9)}
+
+
+@family("CCRs", Level("CCRs", 15.0, _standing), Level("FastCCRs", 3.0, fast(_standing)), threat=True)
 def approach_standing(
-    ego_speed: float = 50 * KMH,
-    lateral_offset: float | None = None,
-    overlap: float | None = None,
-    impact_location: float | None = None,
-    target_heading: float = 0.0,
-    beside: bool = False,
-    shade: int | None = None,
+    ego_speed: EgoSpeed = 50 * KMH,
+    lateral_offset: Offset = None,
+    overlap: Overlap = None,
+    impact_location: ImpactLocation = None,
+    target_heading: Annotated[
+        float, within(f"[{-pi / 2}, {pi / 2}]", "rad", "Target heading relative to the ego's, + left")
+    ] = 0.0,
+    beside: Beside = False,
+    shade: Shade = None,
 ) -> Scenario:
     """The ego approaches a stationary car from behind (Car-to-Car Rear stationary).
 
     Source: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.2; impact locations: Euro NCAP 2026. At most one of
     `lateral_offset`, `overlap` and `impact_location` can be given.
-
-    Args:
-        ego_speed: Ego speed, in (0, 40] [m/s].
-        lateral_offset: Target centreline minus ego centreline, + left, in [-20, 20] [m]; 0 if no position
-            is given.
-        overlap: Overlapped share of the ego's width, in [-1, 1]; the sign is the side, + left, and ±1 is
-            aligned (2023).
-        impact_location: Position of the target's centre across the ego's width, in [-0.25, 1.25]; 0.5 is
-            aligned, larger values are to the left (2026).
-        target_heading: Target heading relative to the ego's, + left, in [-π/2, π/2] [rad].
-        beside: Whether a second stationary car is next to the target, in the lane to the left.
-        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
     """
-    speed = check_speed("ego_speed", ego_speed)
     target = Actor(
-        gap=START_TTC * speed,
+        gap=START_TTC * ego_speed,
         lateral_offset=_offset(lateral_offset, overlap, impact_location),
-        heading=check_within("target_heading", target_heading, -pi / 2, pi / 2, "rad"),
+        heading=target_heading,
         shade=shade,
     )
-    duration = START_TTC + AFTERMATH
-    return Scenario(
-        family="CCRs", ego_speed=speed, duration=duration, actors=_with_second_car(target, beside)
-    )
+    return _scenario("CCRs", ego_speed, target, beside)
 
 
-@family("CCRm")
+@family("CCRm", Level("CCRm", 13.0, _moving), Level("FastCCRm", 2.0, fast(_moving)), threat=True)
 def approach_slower(
-    ego_speed: float = 50 * KMH,
-    target_speed: float = 20 * KMH,
-    lateral_offset: float | None = None,
-    overlap: float | None = None,
-    impact_location: float | None = None,
-    beside: bool = False,
-    shade: int | None = None,
+    ego_speed: EgoSpeed = 50 * KMH,
+    target_speed: Annotated[float, slower("Target speed")] = 20 * KMH,
+    lateral_offset: Offset = None,
+    overlap: Overlap = None,
+    impact_location: ImpactLocation = None,
+    beside: Beside = False,
+    shade: Shade = None,
 ) -> Scenario:
     """The ego approaches a slower car from behind (Car-to-Car Rear moving).
 
     Source: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.2, with a target speed of 20 km/h; Euro NCAP Frontal
     Collisions v1.1, 3.1, also with an ego speed of 90 to 130 km/h and a target that is 60 km/h slower.
-
-    Args:
-        ego_speed: Ego speed, in (0, 40] [m/s].
-        target_speed: Target speed, in (0, ego_speed) [m/s].
-        lateral_offset: Target centreline minus ego centreline, + left, in [-20, 20] [m].
-        overlap: Alternative to `lateral_offset`, as in CCRs.
-        impact_location: Alternative to `lateral_offset`, as in CCRs.
-        beside: Whether a second car drives next to the target, in the lane to the left.
-        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
     """
-    speed = check_speed("ego_speed", ego_speed)
-    lead = check_speed("target_speed", target_speed)
-    if lead >= speed:
-        raise ValueError(f"target_speed must be below ego_speed {speed:g} m/s in CCRm, got {lead:g}")
+    if target_speed >= ego_speed:
+        raise ValueError(
+            f"target_speed must be below ego_speed {ego_speed:g} m/s in CCRm, got {target_speed:g}"
+        )
     target = Actor(
-        gap=START_TTC * (speed - lead),
+        gap=START_TTC * (ego_speed - target_speed),
         lateral_offset=_offset(lateral_offset, overlap, impact_location),
-        speed=lead,
+        speed=target_speed,
         shade=shade,
     )
-    duration = START_TTC + AFTERMATH
-    return Scenario(
-        family="CCRm", ego_speed=speed, duration=duration, actors=_with_second_car(target, beside)
-    )
+    return _scenario("CCRm", ego_speed, target, beside)
 
 
-@family("CCRb")
+@family("CCRb", Level("CCRb", 13.0, _braking), Level("FastCCRb", 2.0, fast(_braking)), threat=True)
 def follow_braking(
-    ego_speed: float = 50 * KMH,
-    gap: float | None = None,
-    headway: float | None = None,
-    deceleration: float = 6.0,
-    build_up: float = 1.0,
-    lateral_offset: float | None = None,
-    overlap: float | None = None,
-    impact_location: float | None = None,
-    beside: bool = False,
-    shade: int | None = None,
+    ego_speed: Annotated[float, speed("Initial speed of both cars")] = 50 * KMH,
+    gap: Gap = None,
+    headway: FreeHeadway = None,
+    deceleration: Annotated[float, within("[0.5, 10]", "m/s²", "Full deceleration of the target")] = 6.0,
+    build_up: BuildUp = 1.0,
+    lateral_offset: Offset = None,
+    overlap: Overlap = None,
+    impact_location: ImpactLocation = None,
+    beside: Beside = False,
+    shade: Shade = None,
 ) -> Scenario:
     """The ego follows a car that brakes to a standstill (Car-to-Car Rear braking).
 
     Source: Euro NCAP AEB Car-to-Car v4.3.1, 8.2.2.3, at 50 km/h with 2 or 6 m/s² and gaps of 12 or 40 m.
-
-    Args:
-        ego_speed: Initial speed of both cars, in (0, 40] [m/s].
-        gap: Initial bumper-to-bumper distance, in [1, 200] [m]; 40 m without `gap` and `headway`.
-        headway: Alternative to `gap`: initial time headway, in [0.3, 10] [s].
-        deceleration: Full deceleration of the target, in [0.5, 10] [m/s²].
-        build_up: Time from the onset to the full deceleration, in [0, 5] [s].
-        lateral_offset: Target centreline minus ego centreline, + left, in [-20, 20] [m].
-        overlap: Alternative to `lateral_offset`, as in CCRs.
-        impact_location: Alternative to `lateral_offset`, as in CCRs.
-        beside: Whether a second car brakes next to the target, in the lane to the left.
-        shade: Grey level of the target in [0, 255]; None to draw it from the seed.
     """
-    speed = check_speed("ego_speed", ego_speed)
-    strength = check_within("deceleration", deceleration, 0.5, 10.0, "m/s²")
-    braking = Segment(
-        start=LEAD_IN, acceleration=-strength, build_up=check_within("build_up", build_up, 0.0, 5.0, "s")
-    )
-    distance = _gap(speed, gap, headway)
+    distance = _gap(ego_speed, gap, headway)
     target = Actor(
         gap=distance,
         lateral_offset=_offset(lateral_offset, overlap, impact_location),
-        speed=speed,
-        profile=(braking,),
+        speed=ego_speed,
+        profile=(Segment(start=LEAD_IN, acceleration=-deceleration, build_up=build_up),),
         shade=shade,
     )
     # At its scripted speed the ego covers the gap and the lead car's stopping distance.
-    contact = LEAD_IN + build_up / 2 + speed / (2 * strength) + distance / speed
-    return Scenario(
-        family="CCRb",
-        ego_speed=speed,
-        duration=contact + AFTERMATH,
-        actors=_with_second_car(target, beside),
-    )
+    contact = LEAD_IN + build_up / 2 + ego_speed / (2 * deceleration) + distance / ego_speed
+    return _scenario("CCRb", ego_speed, target, beside, contact)
 
 
-@family("Following")
-def follow_steadily(ego_speed: float = 50 * KMH, headway: float = 2.0, shade: int | None = None) -> Scenario:
-    """The ego follows a car at a constant distance; not a threat.
+@family("CMRs", Level("CMRs", 4.0, _motorcycle), threat=True)
+def approach_standing_motorcycle(
+    ego_speed: EgoSpeed = 50 * KMH, impact_location: MotorcycleLocation = 0.5, shade: RiderShade = None
+) -> Scenario:
+    """The ego approaches a stationary motorcycle from behind (Car-to-Motorcyclist Rear stationary).
 
-    Args:
-        ego_speed: Speed of both cars, in (0, 40] [m/s].
-        headway: Time headway, in [0.3, 10] [s].
-        shade: Grey level of the lead car in [0, 255]; None to draw it from the seed.
+    Source: Euro NCAP Frontal Collisions v1.1.
     """
-    speed = check_speed("ego_speed", ego_speed)
-    gap = speed * check_within("headway", headway, 0.3, 10.0, "s")
-    lead = Actor(gap=gap, speed=speed, shade=shade)
-    return Scenario(family="Following", ego_speed=speed, duration=10.0, actors=(lead,))
+    made = approach_standing(ego_speed, impact_location=impact_location, shade=shade)
+    return _with_motorcycle("CMRs", made)
 
 
-@family("BrakeRelease")
+@family(
+    "CMRb",
+    Level("CMRb", 4.0, lambda rng: _motorcycle(rng) | {"headway": uniform(rng, *HEADWAY)}),
+    threat=True,
+)
+def follow_braking_motorcycle(
+    ego_speed: Annotated[float, speed("Initial speed of both")] = 50 * KMH,
+    gap: Gap = None,
+    headway: FreeHeadway = None,
+    deceleration: Annotated[float, within("[0.5, 10]", "m/s²", "Full deceleration of the motorcycle")] = 4.0,
+    build_up: BuildUp = 1.0,
+    impact_location: MotorcycleLocation = 0.5,
+    shade: RiderShade = None,
+) -> Scenario:
+    """The ego follows a motorcycle that brakes to a standstill (Car-to-Motorcyclist Rear braking).
+
+    Source: Euro NCAP Frontal Collisions v1.1, with a headway of 1.0 s and 4 m/s² within 1.0 s.
+    """
+    made = follow_braking(
+        ego_speed, gap, headway, deceleration, build_up, impact_location=impact_location, shade=shade
+    )
+    return _with_motorcycle("CMRb", made)
+
+
+def _following(rng: np.random.Generator) -> dict[str, Any]:
+    return {"ego_speed": speed_kmh(rng), "headway": uniform(rng, *HEADWAY)}
+
+
+@family("Following", Level("Following", 1.0, _following), Level("FastFollowing", 0.5, fast(_following)))
+def follow_steadily(
+    ego_speed: Annotated[float, speed("Speed of both cars")] = 50 * KMH,
+    headway: Headway = 2.0,
+    shade: LeadShade = None,
+) -> Scenario:
+    """The ego follows a car at a constant distance; not a threat."""
+    lead = Actor(gap=ego_speed * headway, speed=ego_speed, shade=shade)
+    return Scenario(family="Following", ego_speed=ego_speed, duration=10.0, actors=(lead,))
+
+
+def _release(rng: np.random.Generator) -> dict[str, Any]:
+    return {
+        "ego_speed": speed_kmh(rng, 40.0),
+        "headway": uniform(rng, 1.5, 2.5),
+        "speed_drop": uniform(rng, 2.0, 5.0),
+    }
+
+
+def _close_release(rng: np.random.Generator) -> dict[str, Any]:
+    """Draw a short headway, and a brake tap that takes 10 to 60 % of it."""
+    ego_speed, headway = speed_kmh(rng, 40.0, 100.0), uniform(rng, 1.0, 2.0)
+    lost = uniform(rng, 0.1, 0.6) * ego_speed * headway
+    return {"ego_speed": ego_speed, "headway": headway, "speed_drop": min((RELEASE * lost) ** 0.5, 6.0)}
+
+
+@family(
+    "BrakeRelease",
+    Level("BrakeRelease", 1.0, _release),
+    Level("CloseBrakeRelease", 1.0, _close_release),
+    Level("FastBrakeRelease", 0.5, fast(_release)),
+)
 def lead_brakes_and_releases(
-    ego_speed: float = 50 * KMH,
-    headway: float = 1.5,
-    speed_drop: float = 5.0,
-    shadow_length: float = 0.0,
-    shade: int | None = None,
+    ego_speed: Annotated[float, speed("Initial speed of both cars")] = 50 * KMH,
+    headway: Headway = 1.5,
+    speed_drop: Annotated[
+        float, within("[0.1, 40]", "m/s", "Speed that the lead car loses and regains at 2.5 m/s²")
+    ] = 5.0,
+    shadow_length: Annotated[
+        float, within("[0, 100]", "m", "Length of a bridge's shadow along the road; 0 for none")
+    ] = 0.0,
+    shade: LeadShade = None,
 ) -> Scenario:
     """The ego follows a car that brakes briefly and regains its speed without contact; not a threat.
 
     With a bridge's shadow, the lead car begins to brake as it reaches the shadow: brake lights, a shorter
     distance and a dark edge on the road come at the same time.
-
-    Args:
-        ego_speed: Initial speed of both cars, in (0, 40] [m/s].
-        headway: Initial time headway, in [0.3, 10] [s].
-        speed_drop: Speed that the lead car loses and regains at 2.5 m/s², in [0.1, ego_speed] [m/s].
-        shadow_length: Length of a bridge's shadow along the road, in [0, 100]; 0 for none [m].
-        shade: Grey level of the lead car in [0, 255]; None to draw it from the seed.
     """
-    speed = check_speed("ego_speed", ego_speed)
-    gap = speed * check_within("headway", headway, 0.3, 10.0, "s")
-    drop = check_within("speed_drop", speed_drop, 0.1, speed, "m/s")
+    gap = ego_speed * headway
+    drop = check_within("speed_drop", speed_drop, 0.1, ego_speed, "m/s")
     lost = drop**2 / RELEASE  # half while braking, half while accelerating
     if lost >= gap:
         raise ValueError(
             f"speed_drop {drop:g} m/s reduces the gap of {gap:.1f} m by {lost:.1f} m; "
             "lower it or raise headway"
         )
-    braking = Segment(start=LEAD_IN, acceleration=-RELEASE, final_speed=speed - drop)
-    accelerating = Segment(start=LEAD_IN, acceleration=RELEASE, final_speed=speed)
-    actors = [Actor(gap=gap, speed=speed, profile=(braking, accelerating), shade=shade)]
-    if check_within("shadow_length", shadow_length, 0.0, 100.0, "m") > 0.0:
-        actors.append(bridge_shadow(gap + LEAD_IN * speed, shadow_length))
-    return Scenario(family="BrakeRelease", ego_speed=speed, duration=10.0, actors=tuple(actors))
+    braking = Segment(start=LEAD_IN, acceleration=-RELEASE, final_speed=ego_speed - drop)
+    accelerating = Segment(start=LEAD_IN, acceleration=RELEASE, final_speed=ego_speed)
+    actors = [Actor(gap=gap, speed=ego_speed, profile=(braking, accelerating), shade=shade)]
+    if shadow_length > 0.0:
+        actors.append(bridge_shadow(gap + LEAD_IN * ego_speed, shadow_length))
+    return Scenario(family="BrakeRelease", ego_speed=ego_speed, duration=10.0, actors=tuple(actors))
 
 
-def _gap(speed: float, gap: float | None, headway: float | None) -> float:
+def _box(rng: np.random.Generator, widest: float = 2.5) -> dict[str, Any]:
+    return {
+        "ego_speed": speed_kmh(rng, *BOX_KMH),
+        "width": uniform(rng, 0.3, widest),
+        "height": uniform(rng, 0.6, 2.5),
+        "length": uniform(rng, 0.3, 5.0),
+        "lateral_offset": uniform(rng, -0.5, 0.5),
+    }
+
+
+@family(
+    "StandingBox",
+    Level("StandingBox", 2.0, _box),
+    Level("NarrowBox", 2.0, lambda rng: _box(rng, widest=1.2)),
+    threat=True,
+)
+def approach_box(
+    ego_speed: EgoSpeed = 50 * KMH,
+    width: Annotated[float, within("[0.2, 4]", "m", "Width of the box")] = 1.2,
+    height: Annotated[float, within("[0.2, 4]", "m", "Height of the box")] = TARGET_HEIGHT,
+    length: Annotated[float, within("[0.2, 20]", "m", "Length of the box")] = TARGET_LENGTH,
+    lateral_offset: Annotated[
+        float,
+        within(
+            "[-2.85, 2.85]",
+            "m",
+            "Centre of the box minus the ego's centreline, + left; at most 0.85 + width / 2 to either side, "
+            "so that it is in the ego's way",
+        ),
+    ] = 0.0,
+    shade: Annotated[int | None, grey("the box")] = None,
+) -> Scenario:
+    """The ego approaches a box that stands in its lane, such as lost cargo.
+
+    It is not a case of a protocol.
+    """
+    beside = (EGO_WIDTH + width) / 2 - 0.05
+    box = Actor(
+        gap=START_TTC * ego_speed,
+        lateral_offset=check_within("lateral_offset", lateral_offset, -beside, beside, "m"),
+        kind="box",
+        shade=shade,
+        length=length,
+        width=width,
+        height=height,
+    )
+    return _scenario("StandingBox", ego_speed, box)
+
+
+def _scenario(
+    name: str, ego_speed: float, target: Actor, beside: bool = False, contact: float = START_TTC
+) -> Scenario:
+    """Return a scenario with the target and, if `beside`, a copy of it in the lane to the left."""
+    second = (replace(target, lateral_offset=LANE_WIDTH, heading=0.0, shade=None),) if beside else ()
+    return Scenario(family=name, ego_speed=ego_speed, duration=contact + AFTERMATH, actors=(target, *second))
+
+
+def _with_motorcycle(name: str, made: Scenario) -> Scenario:
+    """Return a rear scenario with a motorcycle in place of the car; the distance to its rear is the same."""
+    target = replace(made.actors[0], **MOTORCYCLE.fields)
+    return replace(made, family=name, actors=(target,))
+
+
+def _gap(ego_speed: float, gap: float | None, headway: float | None) -> float:
     """Return the gap [m] from `gap` or `headway`; 40 m if both are None."""
     if headway is None:
-        return check_within("gap", 40.0 if gap is None else gap, 1.0, 200.0, "m")
+        return 40.0 if gap is None else gap
     if gap is not None:
         raise ValueError(f"gap={shown(gap)} and headway={shown(headway)} both set the distance; pass one")
-    return speed * check_within("headway", headway, 0.3, 10.0, "s")
-
-
-def _with_second_car(target: Actor, beside: bool) -> tuple[Actor, ...]:
-    """Return the target, with a copy of it in the lane to the left if `beside`."""
-    if not check_flag("beside", beside):
-        return (target,)
-    return target, replace(target, lateral_offset=LANE_WIDTH, heading=0.0, shade=None)
+    return ego_speed * headway
 
 
 def _offset(lateral_offset: float | None, overlap: float | None, impact_location: float | None) -> float:
     """Return the lateral offset [m] from one of the three arguments; 0 if all are None."""
-    names = ("lateral_offset", "overlap", "impact_location")
-    given = {
-        name: value
-        for name, value in zip(names, (lateral_offset, overlap, impact_location), strict=True)
-        if value is not None
-    }
+    given = {"lateral_offset": lateral_offset, "overlap": overlap, "impact_location": impact_location}
+    given = {name: value for name, value in given.items() if value is not None}
     if len(given) > 1:
         text = " and ".join(f"{name}={shown(value)}" for name, value in given.items())
         raise ValueError(f"{text} both set the lateral position; pass one")
     if overlap is not None:
-        return _offset_from_overlap(overlap)
+        # As defined in Euro NCAP AEB C2C v4.3.1, 3.4.
+        share = abs(overlap)
+        return 0.0 if share == 1.0 else copysign((EGO_WIDTH + TARGET_WIDTH) / 2 - share * EGO_WIDTH, overlap)
     if impact_location is not None:
         # As in the OpenSCENARIO files of Euro NCAP 2026: 0 and 1 are the ego's sides, 0.5 its centreline.
-        return (check_within("impact_location", impact_location, -0.25, 1.25) - 0.5) * EGO_WIDTH
-    return check_within("lateral_offset", 0.0 if lateral_offset is None else lateral_offset, -20.0, 20.0, "m")
-
-
-def _offset_from_overlap(overlap: float) -> float:
-    """Return the lateral offset [m] for an overlap as defined in Euro NCAP AEB C2C v4.3.1, 3.4."""
-    share = check_within("overlap", overlap, -1.0, 1.0)
-    if abs(share) == 1.0:
-        return 0.0
-    return copysign((EGO_WIDTH + TARGET_WIDTH) / 2 - abs(share) * EGO_WIDTH, share)
+        return (impact_location - 0.5) * EGO_WIDTH
+    return 0.0 if lateral_offset is None else lateral_offset

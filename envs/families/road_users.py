@@ -17,7 +17,6 @@ from lgmd_gym.envs.families.scenario import (
     TARGET_WIDTH,
     Actor,
 )
-from lgmd_gym.errors import check_known, check_within
 
 SIDES = {"right": 1.0, "left": -1.0}
 """Sides from which road users cross, with the sign of their direction, + to the left."""
@@ -58,7 +57,7 @@ LARGE_CAR = RoadUser("car", 4.418, 1.82, 1.533)  # parked cars that hide a targe
 SMALL_CAR = RoadUser("car", 4.316, 1.79, 1.48)
 
 
-class Run(NamedTuple):
+class RunUp(NamedTuple):
     """Motion of a road user up to a contact.
 
     Attributes:
@@ -72,7 +71,7 @@ class Run(NamedTuple):
     distance: float
 
 
-def run_up(contact: float, speed: float, steady: float, acceleration_distance: float) -> Run:
+def run_up(contact: float, speed: float, steady: float, acceleration_distance: float) -> RunUp:
     """Return the motion of a road user that accelerates from rest and then keeps its speed.
 
     Args:
@@ -85,15 +84,15 @@ def run_up(contact: float, speed: float, steady: float, acceleration_distance: f
     strength, wait = speed / ramp, contact - steady / speed - ramp
     if wait >= 0.0:
         segment = Segment(start=wait, acceleration=strength, final_speed=speed)
-        return Run(0.0, (segment,), steady + acceleration_distance)
+        return RunUp(0.0, (segment,), steady + acceleration_distance)
     reached = -wait * strength
     if reached < MIN_SPEED:  # a start from rest; the road user is placed so that it is in time
         segment = Segment(start=0.0, acceleration=strength, final_speed=speed)
-        return Run(0.0, (segment,), steady + acceleration_distance + wait * speed)
+        return RunUp(0.0, (segment,), steady + acceleration_distance + wait * speed)
     if contact > steady / speed:  # the episode begins during the acceleration
         segment = Segment(start=0.0, acceleration=strength, final_speed=speed)
-        return Run(reached, (segment,), steady + acceleration_distance - reached**2 / (2.0 * strength))
-    return Run(speed, (), speed * contact)
+        return RunUp(reached, (segment,), steady + acceleration_distance - reached**2 / (2.0 * strength))
+    return RunUp(speed, (), speed * contact)
 
 
 def parked_row(front: float, inner: float, cars: tuple[RoadUser, ...], spacing: float) -> tuple[Actor, ...]:
@@ -114,9 +113,8 @@ def parked_row(front: float, inner: float, cars: tuple[RoadUser, ...], spacing: 
 
 
 def crossing_actor(
-    user: RoadUser, ego_speed: float, side: str, impact_location: float, run: tuple[float, float, float],
-    shade: int | None,
-) -> Actor:  # fmt: skip
+    user: RoadUser, ego_speed: float, side: str, impact_location: float, motion: RunUp, shade: int | None
+) -> Actor:
     """Return a road user whose impact point is at the impact location 5 s after the start.
 
     Args:
@@ -124,12 +122,10 @@ def crossing_actor(
         ego_speed: Ego speed [m/s].
         side: Side from which the road user comes, "right" or "left".
         impact_location: Position across the ego's width, 0 the right side and 1 the left.
-        run: Speed [m/s], distance at that speed [m], and distance of the acceleration before it [m].
+        motion: Its motion up to that time, see `run_up`.
         shade: Grey level; None to draw it from the seed.
     """
-    check_known("side", side, SIDES)
-    to_left, motion = SIDES[side], run_up(START_TTC, *run)
-    aim = (check_within("impact_location", impact_location, 0.1, 0.9) - 0.5) * EGO_WIDTH
+    to_left, aim = SIDES[side], (impact_location - 0.5) * EGO_WIDTH
     return Actor(
         gap=START_TTC * ego_speed + user.width / 2 - user.length / 2,
         lateral_offset=aim - to_left * (user.impact_point + motion.distance),

@@ -1,20 +1,15 @@
 """Scenarios as plain data: the road, the ego's script, and the other actors."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, replace
+from functools import partial
+from math import cos, sin
+from typing import Any
 
 from lgmd_gym.envs.dynamics.bend import Bend
 from lgmd_gym.envs.dynamics.segment import Segment, check_profile
 from lgmd_gym.envs.dynamics.units import check_speed
-from lgmd_gym.errors import (
-    check_finite,
-    check_items,
-    check_known,
-    check_text,
-    check_type,
-    check_whole,
-    check_within,
-    shown,
-)
+from lgmd_gym.errors import check_finite, check_items, check_known, check_type, check_whole, shown
+from lgmd_gym.fields import Record, number, optional, record, text, value, whole
 
 EGO_LENGTH, EGO_WIDTH = 4.3, 1.8  # [m]
 WHEELBASE = 2.67  # [m]
@@ -40,60 +35,58 @@ AFTERMATH = 6.0
 """Maximum duration of an episode after the scripted contact [s], enough for a slow stop."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Actor:
-    """Another road user or object, placed relative to the ego at the start.
+def _items(kind: type, doc: str) -> Any:
+    """Declare a tuple of instances of a class, by default empty."""
+    return value((), lambda name, given: check_items(name, given, kind), doc)
 
-    Attributes:
-        gap: Distance along the ego's heading from its front bumper to the point half a length before the
-            actor's centre, which is the actor's rear if it has the ego's heading; negative for actors next
-            to or behind the ego [m].
-        lateral_offset: Actor centre minus ego centreline, + left [m].
-        heading: Heading relative to the ego's, + left [rad].
-        speed: Initial speed along its path, in [0, 40] [m/s].
-        profile: Scripted changes of speed, in order of their start.
-        path: Bends driven from the start on; empty for a straight path.
-        kind: "car"; "pedestrian"; "bicycle" or "motorcycle", with a rider; "box", a solid object; or
-            "road_marking", a flat object that the ego drives over.
-        shade: Grey level in [0, 255]; None to draw it from the environment's seed.
-        length: Length [m].
-        width: Width [m].
-        height: Height [m].
-        reference: Distance of the centre ahead of the point that follows the path, such as the rear axle, in
-            [-20, 20] [m].
-    """
 
-    gap: float
-    lateral_offset: float = 0.0
-    heading: float = 0.0
-    speed: float = 0.0
-    profile: tuple[Segment, ...] = ()
-    path: tuple[Bend, ...] = ()
-    kind: str = "car"
-    shade: int | None = None
-    length: float = TARGET_LENGTH
-    width: float = TARGET_WIDTH
-    height: float = TARGET_HEIGHT
-    reference: float = 0.0
+def _kind(default: str, label: str, names: tuple[str, ...], doc: str) -> Any:
+    """Declare one of some names, whose messages begin with a label."""
+    return value(default, lambda _, given: check_known(label, given, names), doc, ", ".join(map(repr, names)))
 
-    def __post_init__(self) -> None:
-        # As float, because small integers of numpy overflow in calculations.
-        gap = check_within("gap", self.gap, -1000.0, 1000.0, "m")
-        lateral_offset = check_within("lateral_offset", self.lateral_offset, -500.0, 500.0, "m")
-        heading = check_finite("heading", self.heading)
-        object.__setattr__(self, "gap", gap)
-        object.__setattr__(self, "lateral_offset", lateral_offset)
-        object.__setattr__(self, "heading", heading)
-        check_speed("speed", self.speed, zero=True)
-        object.__setattr__(self, "profile", check_items("profile", self.profile, Segment))
-        object.__setattr__(self, "path", check_items("path", self.path, Bend))
+
+@record
+class Actor(Record):
+    """Another road user or object, placed relative to the ego at the start."""
+
+    gap: float = number(
+        MISSING,
+        "[-1000, 1000]",
+        "m",
+        "Distance along the ego's heading from its front bumper to the point half a length before the "
+        "actor's centre, which is the actor's rear if it has the ego's heading; negative for actors next to "
+        "or behind the ego.",
+    )
+    lateral_offset: float = number(0.0, "[-500, 500]", "m", "Actor centre minus ego centreline, + left.")
+    heading: float = value(0.0, check_finite, "Heading relative to the ego's, + left.", unit="rad")
+    speed: float = value(
+        0.0, partial(check_speed, zero=True), "Initial speed along its path, in [0, 40].", unit="m/s"
+    )
+    profile: tuple[Segment, ...] = _items(Segment, "Scripted changes of speed, in order of their start.")
+    path: tuple[Bend, ...] = _items(Bend, "Bends driven from the start on; empty for a straight path.")
+    kind: str = _kind(
+        "car",
+        "actor kind",
+        ACTOR_KINDS,
+        "Pedestrian; bicycle or motorcycle, with a rider; car; box, a solid object; or road marking, a flat "
+        "object that the ego drives over.",
+    )
+    shade: int | None = optional(
+        whole(None, "[0, 255]", doc="Grey level; None to draw it from the environment's seed.")
+    )
+    length: float = number(TARGET_LENGTH, "[0, 1000]", "m", "Length.")
+    width: float = number(TARGET_WIDTH, "[0, 1000]", "m", "Width.")
+    height: float = number(TARGET_HEIGHT, "[0, 1000]", "m", "Height.")
+    reference: float = number(
+        0.0,
+        "[-20, 20]",
+        "m",
+        "Distance of the centre ahead of the point that follows the path, such as the rear axle.",
+    )
+
+    def check(self) -> None:
+        """Raise ValueError if a segment of the profile does not lead to its final speed."""
         check_profile(self.speed, self.profile)
-        check_known("actor kind", self.kind, ACTOR_KINDS)
-        if self.shade is not None:
-            check_whole("shade", self.shade, 0, 255)
-        for name in ("length", "width", "height"):
-            check_within(name, getattr(self, name), 0.0, 1000.0, "m")
-        check_within("reference", self.reference, -20.0, 20.0, "m")
 
 
 def bridge_shadow(gap: float, length: float, shade: int = BRIDGE_SHADOW) -> Actor:
@@ -107,32 +100,30 @@ def bridge_shadow(gap: float, length: float, shade: int = BRIDGE_SHADOW) -> Acto
     return Actor(gap=gap, kind="road_marking", shade=shade, length=length, width=40.0, height=0.0)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RoadPlan:
+@record
+class RoadPlan(Record):
     """Layout of the road.
 
-    Attributes:
-        kind: "straight", parallel lanes in one direction; "two-way", the ego's lane and an oncoming lane on
-            its left; "curve", a two-way road along `bends`; "crossing", a two-way road crossed by another.
-        lanes: Number of lanes of a straight road.
-        ego_lane: Lane of the ego on a straight road, 0 the leftmost.
-        distance: Distance from the ego's initial centre to the start of the curve or to the centre of the
-            crossing road [m].
-        bends: Arcs of the curve.
+    A "straight" road has parallel lanes in one direction, a "two-way" road the ego's lane and an oncoming
+    lane on its left. A "curve" is a two-way road along `bends`, a "crossing" a two-way road crossed by
+    another one.
     """
 
-    kind: str = "straight"
-    lanes: int = 3
-    ego_lane: int = 1
-    distance: float = 0.0
-    bends: tuple[Bend, ...] = ()
+    kind: str = _kind("straight", "road kind", ROAD_KINDS, "Kind of road.")
+    lanes: int = whole(3, f"[1, {MAX_LANES}]", doc="Number of lanes of a straight road.")
+    ego_lane: int = whole(1, "[0, 99]", doc="Lane of the ego on a straight road, 0 the leftmost.")
+    distance: float = number(
+        0.0,
+        "[-10000, 10000]",
+        "m",
+        "Distance from the ego's initial centre to the start of the curve or to the centre of the crossing "
+        "road.",
+    )
+    bends: tuple[Bend, ...] = _items(Bend, "Arcs of the curve.")
 
-    def __post_init__(self) -> None:
-        check_known("road kind", self.kind, ROAD_KINDS)
-        check_whole("lanes", self.lanes, 1, MAX_LANES)
+    def check(self) -> None:
+        """Raise ValueError if the road does not have the ego's lane."""
         check_whole("ego_lane", self.ego_lane, 0, self.lanes - 1)
-        check_within("distance", self.distance, -1e4, 1e4, "m")
-        object.__setattr__(self, "bends", check_items("bends", self.bends, Bend))
 
     @property
     def relative_to_ego(self) -> bool:
@@ -140,48 +131,51 @@ class RoadPlan:
         return self.kind in ("curve", "crossing")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scenario:
-    """One test case in SI units.
+def _duration(name: str, given: Any) -> float:
+    if check_finite(name, given) <= 0.0:
+        raise ValueError(f"{name} must be > 0 s, got {shown(given)}")
+    return float(given)
 
-    Attributes:
-        family: Scenario family, as in the environment id ("CCRs").
-        ego_speed: Initial ego speed, in (0, 40] [m/s]; 0 is allowed with an `ego_profile`.
-        duration: Time after which the episode is truncated [s].
-        actors: Other road users and objects; benchmark rows refer to the first one as the target.
-        ego_profile: Scripted changes of the ego's speed, in order of their start.
-        ego_path: Bends that the ego drives from the start on; empty for a straight path.
-        road: Layout of the road.
-        ego_length: Length of the ego, in [1, 20] [m].
-        ego_width: Width of the ego, in [0.5, 4] [m].
-        ego_reference: Distance of the ego's centre ahead of the point that follows `ego_path`, in [-20, 20]
-            [m]; see `REAR_AXLE`.
-    """
 
-    family: str
-    ego_speed: float
-    duration: float
-    actors: tuple[Actor, ...] = field(default=())
-    ego_profile: tuple[Segment, ...] = ()
-    ego_path: tuple[Bend, ...] = ()
-    road: RoadPlan = field(default_factory=RoadPlan)
-    ego_length: float = EGO_LENGTH
-    ego_width: float = EGO_WIDTH
-    ego_reference: float = 0.0
+@record
+class Scenario(Record):
+    """One test case in SI units."""
 
-    def __post_init__(self) -> None:
-        check_text("family", self.family)
-        object.__setattr__(self, "actors", check_items("actors", self.actors, Actor))
-        object.__setattr__(self, "ego_profile", check_items("ego_profile", self.ego_profile, Segment))
-        object.__setattr__(self, "ego_path", check_items("ego_path", self.ego_path, Bend))
-        check_type("road", self.road, RoadPlan)
+    family: str = text(MISSING, 'Scenario family, as in the environment id ("CCRs").')
+    ego_speed: float = value(
+        MISSING,
+        partial(check_speed, zero=True),
+        "Initial ego speed, in (0, 40]; 0 is allowed with an `ego_profile`.",
+        unit="m/s",
+    )
+    duration: float = value(
+        MISSING, _duration, "Time after which the episode is truncated, above 0.", unit="s"
+    )
+    actors: tuple[Actor, ...] = _items(
+        Actor, "Other road users and objects; benchmark rows refer to the first one as the target."
+    )
+    ego_profile: tuple[Segment, ...] = _items(
+        Segment, "Scripted changes of the ego's speed, in order of their start."
+    )
+    ego_path: tuple[Bend, ...] = _items(
+        Bend, "Bends that the ego drives from the start on; empty for a straight path."
+    )
+    road: RoadPlan = value(
+        RoadPlan(), lambda name, given: check_type(name, given, RoadPlan), "Layout of the road."
+    )
+    ego_length: float = number(EGO_LENGTH, "[1, 20]", "m", "Length of the ego.")
+    ego_width: float = number(EGO_WIDTH, "[0.5, 4]", "m", "Width of the ego.")
+    ego_reference: float = number(
+        0.0,
+        "[-20, 20]",
+        "m",
+        "Distance of the ego's centre ahead of the point that follows `ego_path`, see `REAR_AXLE`.",
+    )
+
+    def check(self) -> None:
+        """Raise ValueError if the ego has neither speed nor profile, or its profile contradicts itself."""
         check_speed("ego_speed", self.ego_speed, zero=bool(self.ego_profile))
         check_profile(self.ego_speed, self.ego_profile)
-        check_within("ego_length", self.ego_length, 1.0, 20.0, "m")
-        check_within("ego_width", self.ego_width, 0.5, 4.0, "m")
-        check_within("ego_reference", self.ego_reference, -20.0, 20.0, "m")
-        if check_finite("duration", self.duration) <= 0.0:
-            raise ValueError(f"duration must be > 0 s, got {shown(self.duration)}")
 
     @property
     def top_speed(self) -> float:
@@ -192,3 +186,29 @@ class Scenario:
 def without_target(scenario: Scenario) -> Scenario:
     """Return a scenario without its first actor, the target, so that a threat becomes a non-threat."""
     return replace(scenario, actors=scenario.actors[1:])
+
+
+def free_lane(scenario: Scenario) -> int | None:
+    """Return the index of a lane next to the ego's that no actor uses; None without one.
+
+    The right lane comes first. Only straight roads with lanes in one direction are considered, and only
+    scenarios in which the ego and the other solid actors drive straight on.
+    """
+    road, solid = scenario.road, [actor for actor in scenario.actors if actor.kind != "road_marking"]
+    if road.kind != "straight" or scenario.ego_path or any(map(_leaves_lane, solid)):
+        return None
+    for lane in (road.ego_lane + 1, road.ego_lane - 1):
+        offset = (road.ego_lane - lane) * LANE_WIDTH
+        if 0 <= lane < road.lanes and not any(_reaches(actor, offset) for actor in solid):
+            return lane
+    return None
+
+
+def _leaves_lane(actor: Actor) -> bool:
+    return bool(actor.path) or (actor.speed > 0.0 and abs(sin(actor.heading)) > 1e-9)
+
+
+def _reaches(actor: Actor, offset: float) -> bool:
+    """Return whether an actor reaches into the lane with a lateral offset from the ego's [m]."""
+    half = 0.5 * (actor.width * abs(cos(actor.heading)) + actor.length * abs(sin(actor.heading)))
+    return abs(actor.lateral_offset - offset) < 0.5 * LANE_WIDTH + half

@@ -1,44 +1,156 @@
-"""False-reaction scenarios of UN R152 Rev.2, Annex 3 Appendix 2: scripted driving without contact."""
+"""Turns at a junction: Euro NCAP's CCFtap, CMFtap and CPTA, and turns without a threat of UN R152."""
 
-from math import pi, sqrt
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from math import cos, pi, radians, sin, tan
+from typing import Annotated, Any
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose, arc, lane_change, turn
+import numpy as np
+
+from lgmd_gym.envs.dynamics.bend import Bend, Pose, turn
 from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.envs.families.obstacles import rail_along
-from lgmd_gym.envs.families.registry import family
+from lgmd_gym.envs.dynamics.units import KMH, check_speed
+from lgmd_gym.envs.families.arguments import (
+    ClothesShade,
+    LeadShade,
+    RiderShade,
+    Shade,
+    either,
+    grey,
+    one_of,
+    speed,
+    speed_kmh,
+    truth,
+)
+from lgmd_gym.envs.families.family import Level, family
+from lgmd_gym.envs.families.road_users import ADULT, MOTORCYCLE, TARGET_CAR, RoadUser, run_up
 from lgmd_gym.envs.families.scenario import (
+    AFTERMATH,
     EGO_LENGTH,
     LANE_WIDTH,
+    REAR_AXLE,
+    START_TTC,
     TARGET_LENGTH,
-    TARGET_WIDTH,
+    WHEELBASE,
     Actor,
     RoadPlan,
     Scenario,
 )
-from lgmd_gym.errors import check_flag, check_within
+from lgmd_gym.errors import check_within
+from lgmd_gym.fields import value
 
-OUTER_RADIUS = 25.0  # [m] of the outer side of the road in case 3, the largest allowed
-PIPE_PIECE, PIPE_HEIGHT, PIPE_DEPTH = 2.0, 0.8, 0.11  # [m]
-PIPE_CLEARANCE, CAR_CLEARANCE = 0.25, 0.1  # [m] between lane edge and pipes, and between pipes and car
-APPROACH = 4.0  # [s] at constant speed before the ego or the lead car slows down or steers
+DIRECTIONS = {"same": 1.0, "opposite": -1.0}
+PEDESTRIAN_LINE = 9.5  # [m] between the centre line of the ego's road and the pedestrian's path
+APPROACH_TIME = 4.0  # [s] at constant speed before the ego or the lead car slows down (UN R152)
+FIRST_RADIUS = 1500.0  # [m] at the start of the clothoid
+BEFORE_TURN = 2.0  # [s] from the start to the turn; T0 is 1 s before it
+FRONT = REAR_AXLE + EGO_LENGTH / 2  # [m] from the rear axle to the front bumper
 
 
-@family("TurnBeforeOncoming")
-def turn_before_oncoming(left: bool = True, shade: int | None = None) -> Scenario:
+def _turning_speed(name: str, given: Any) -> float:
+    return check_within(name, check_speed(name, given), 0.0, 25.02 * KMH, "m/s")
+
+
+TurningSpeed = Annotated[
+    float, value(None, _turning_speed, "Ego speed; the limit is 25 km/h", "(0, 6.95]", "m/s")
+]
+
+
+def _oncoming(rng: np.random.Generator) -> dict[str, Any]:
+    return {"ego_speed": speed_kmh(rng, 10.0, 25.0), "target_speed": speed_kmh(rng, 30.0, 80.0)}
+
+
+def _pedestrian(rng: np.random.Generator) -> dict[str, Any]:
+    return {
+        "ego_speed": speed_kmh(rng, 10.0, 20.0),
+        "left": either(rng),
+        "direction": "same" if either(rng) else "opposite",
+    }
+
+
+@family("CCFtap", Level("CCFtap", 4.0, _oncoming), threat=True, twin=True)
+def turn_across_car(
+    ego_speed: TurningSpeed = 15 * KMH,
+    target_speed: Annotated[float, speed("Target speed")] = 45 * KMH,
+    shade: Shade = None,
+) -> Scenario:
+    """The ego turns left across the path of an oncoming car (Car-to-Car Front Turn-Across-Path).
+
+    Without braking, the near corner of the target's front meets the middle of the ego's front. Sources: Euro
+    NCAP AEB Car-to-Car v4.3.1, 8.2; Frontal Collisions v1.1, 1.2.4.
+    """
+    return _turn_across("CCFtap", TARGET_CAR, ego_speed, target_speed, shade)
+
+
+@family("CMFtap", Level("CMFtap", 2.0, _oncoming), threat=True, twin=True)
+def turn_across_motorcycle(
+    ego_speed: TurningSpeed = 15 * KMH,
+    target_speed: Annotated[float, speed("Speed of the motorcycle")] = 45 * KMH,
+    shade: RiderShade = None,
+) -> Scenario:
+    """The ego turns left across the path of a motorcycle (Car-to-Motorcyclist Front Turn-Across-Path).
+
+    Without braking, the near corner of the motorcycle's front meets the middle of the ego's front. Sources:
+    Euro NCAP AEB VRU v4.5.1; Frontal Collisions v1.1, 1.2.4.
+    """
+    return _turn_across("CMFtap", MOTORCYCLE, ego_speed, target_speed, shade)
+
+
+@family("CPTA", Level("CPTA", 2.0, _pedestrian), threat=True, twin=True)
+def turn_towards_pedestrian(
+    ego_speed: TurningSpeed = 10 * KMH,
+    left: Annotated[bool, truth("Whether the ego turns left; otherwise right")] = True,
+    direction: Annotated[
+        str,
+        one_of(
+            tuple(DIRECTIONS),
+            'Direction in which the pedestrian walks, relative to the ego\'s before the turn: "same" or '
+            '"opposite"',
+        ),
+    ] = "same",
+    shade: ClothesShade = None,
+) -> Scenario:
+    """The ego turns into a road that a pedestrian crosses (Car-to-Pedestrian Turning Adult).
+
+    The pedestrian walks at 5 km/h on a line 9.5 m beside the centre line of the ego's road. Without braking,
+    its hip is on the ego's centreline at the contact. Source: Euro NCAP AEB VRU v4.5.1: left (far side) in
+    the same and the opposite direction at 10 to 20 km/h, right (near side) at 10 km/h.
+    """
+    ahead, line = DIRECTIONS[direction], _pedestrian_line(left)
+    ego = turning_ego(ego_speed, left, _pedestrian_contact(turn_of(ego_speed), left, ahead))
+    # The pedestrian starts 6 m before the contact if it comes from the far kerb, else 9.5 m.
+    start = 6.0 if left and direction == "opposite" else 9.5
+    run = run_up(ego.contact, 5 * KMH, start - 2.0, 2.0)
+    hip = ego.front.x + _hip(ego.front, line)[0]
+    centre = hip - ahead * (ADULT.impact_point + run.distance)
+    walker = Actor(
+        gap=centre - ADULT.length / 2,
+        lateral_offset=line,
+        heading=0.0 if ahead > 0.0 else pi,
+        speed=run.speed,
+        profile=run.profile,
+        shade=shade,
+        **ADULT.fields,
+    )
+    return ego.scenario("CPTA", ego_speed, walker)
+
+
+@family("TurnBeforeOncoming", Level("TurnBeforeOncoming", 1.0, lambda rng: {"left": either(rng)}))
+def turn_before_oncoming(
+    left: Annotated[
+        bool, truth("Whether the ego turns left, across the front of the other car; otherwise right")
+    ] = True,
+    shade: Annotated[int | None, grey("the stationary car")] = None,
+) -> Scenario:
     """The ego turns off in front of an oncoming car that has stopped at the junction; not a threat.
 
     The ego approaches at 30 km/h and turns at 17 km/h; at steering onset the stationary car is within 2.8 s.
     Source: UN R152 Rev.2, Annex 3 Appendix 2, case 1.
-
-    Args:
-        left: Whether the ego turns left, across the front of the other car; otherwise right.
-        shade: Grey level of the stationary car in [0, 255]; None to draw it from the seed.
     """
-    check_flag("left", left)
     approach, slow, slowing = 30 * KMH, 17 * KMH, 2.5
     slowing_distance = (approach**2 - slow**2) / (2 * slowing)
-    onset = APPROACH * approach + slowing_distance + 1.0
+    onset = APPROACH_TIME * approach + slowing_distance + 1.0
     radius = 9.0 if left else 6.0
     bends = turn((1.0 if left else -1.0) * pi / 2, radius, 3.0)
     turn_length = sum(bend.length for bend in bends)
@@ -48,37 +160,35 @@ def turn_before_oncoming(left: bool = True, shade: int | None = None) -> Scenari
     return Scenario(
         family="TurnBeforeOncoming",
         ego_speed=approach,
-        duration=APPROACH + (approach - slow) / slowing + (turn_length + 10.0) / slow,
+        duration=APPROACH_TIME + (approach - slow) / slowing + (turn_length + 10.0) / slow,
         actors=(standing,),
-        ego_profile=(Segment(start=APPROACH, acceleration=-slowing, final_speed=slow),),
+        ego_profile=(Segment(start=APPROACH_TIME, acceleration=-slowing, final_speed=slow),),
         ego_path=(Bend(onset), *bends),
         road=RoadPlan(kind="crossing", distance=onset + reach - lane),
     )
 
 
-@family("LeadTurnsOff")
-def lead_turns_off(left: bool = False, shade: int | None = None) -> Scenario:
+@family("LeadTurnsOff", Level("LeadTurnsOff", 1.0, lambda rng: {"left": either(rng)}))
+def lead_turns_off(
+    left: Annotated[bool, truth("Whether the lead car turns left; otherwise right")] = False,
+    shade: LeadShade = None,
+) -> Scenario:
     """The lead car slows down and turns off while the ego drives straight on; not a threat.
 
     Both cars start at 40 km/h. The lead car slows to 10 km/h and turns; the ego slows to 27 km/h by then.
     Source: UN R152 Rev.2, Annex 3 Appendix 2, case 2.
-
-    Args:
-        left: Whether the lead car turns left; otherwise right.
-        shade: Grey level of the lead car in [0, 255]; None to draw it from the seed.
     """
-    check_flag("left", left)
     both, lead_slow, slow, slowing = 40 * KMH, 10 * KMH, 27 * KMH, 3.0
     lead_time = (both - lead_slow) / slowing
-    lead_distance = APPROACH * both + (both**2 - lead_slow**2) / (2 * slowing)
+    lead_distance = APPROACH_TIME * both + (both**2 - lead_slow**2) / (2 * slowing)
     ease = (both - slow) / lead_time  # the ego reaches 27 km/h when the lead car begins to turn
-    ego_distance = APPROACH * both + (both**2 - slow**2) / (2 * ease)
+    ego_distance = APPROACH_TIME * both + (both**2 - slow**2) / (2 * ease)
     gap_at_turn = 4.6 * (slow - lead_slow)
     radius = 8.0
     lead = Actor(
         gap=gap_at_turn + ego_distance - lead_distance,
         speed=both,
-        profile=(Segment(start=APPROACH, acceleration=-slowing, final_speed=lead_slow),),
+        profile=(Segment(start=APPROACH_TIME, acceleration=-slowing, final_speed=lead_slow),),
         path=(Bend(lead_distance), *turn((1.0 if left else -1.0) * pi / 2, radius, 2.0)),
         shade=shade,
     )
@@ -87,74 +197,177 @@ def lead_turns_off(left: bool = False, shade: int | None = None) -> Scenario:
     return Scenario(
         family="LeadTurnsOff",
         ego_speed=both,
-        duration=APPROACH + lead_time + 6.0,
+        duration=APPROACH_TIME + lead_time + 6.0,
         actors=(lead,),
-        ego_profile=(Segment(start=APPROACH, acceleration=-ease, final_speed=slow),),
+        ego_profile=(Segment(start=APPROACH_TIME, acceleration=-ease, final_speed=slow),),
         road=RoadPlan(kind="crossing", distance=onset + radius + 1.0 - lane),
     )
 
 
-@family("CurveObjectOutside")
-def curve_with_car_outside(left: bool = True, shade: int | None = None) -> Scenario:
-    """The ego drives through a tight curve with guard pipes and a stationary car behind them; not a threat.
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A turn of 90° of the ego's front axle: clothoid, arc and clothoid.
 
-    The ego slows from 30 to 22.5 km/h before a curve whose outer side has a radius of 25 m. Guard pipes stand
-    along the outer side, and the car just behind them, on the extension of the lane's centre: within 1.6 s at
-    the entry of the curve. The pipes are drawn as a closed rail. A right curve is the mirror image, for
-    driving on the left; the road drawn is for driving on the right, so the pipes are on its centre line.
-    Source: UN R152 Rev.2, Annex 3 Appendix 2, case 3, with a stationary vehicle.
+    Attributes:
+        radius: Radius of the arc [m].
+        clothoid_deg: Change of heading on each clothoid [degrees].
+        arc_deg: Change of heading on the arc [degrees].
+    """
+
+    radius: float
+    clothoid_deg: float
+    arc_deg: float
+
+    def bends(self, left: bool) -> tuple[Bend, ...]:
+        """Return the path of the front axle."""
+        sign = 1.0 if left else -1.0
+        low, high = sign / FIRST_RADIUS, sign / self.radius
+        length = 2.0 * radians(self.clothoid_deg) / (1.0 / FIRST_RADIUS + 1.0 / self.radius)
+        arc = Bend(radians(self.arc_deg) * self.radius, high)
+        return Bend(length, low, high), arc, Bend(length, high, low)
+
+
+# Highest ego speed [km/h] of each turn, Euro NCAP Frontal Collisions v1.1, 1.2.4.
+TURNS = {10: Turn(9.0, 20.62, 48.76), 15: Turn(11.75, 20.93, 48.14), 25: Turn(14.75, 21.79, 46.42)}
+
+
+@dataclass(frozen=True, slots=True)
+class TurningEgo:
+    """The ego's turn up to the contact.
+
+    Attributes:
+        path: Path of the rear axle.
+        junction: Distance from the ego's initial centre to the centre of the crossing road [m].
+        contact: Time of the contact [s].
+        front: Middle of the ego's front at the contact, relative to that at the start, + left; heading.
+    """
+
+    path: tuple[Bend, ...]
+    junction: float
+    contact: float
+    front: Pose
+
+    def scenario(self, name: str, speed: float, actor: Actor) -> Scenario:
+        """Return the scenario with an actor."""
+        return Scenario(
+            family=name,
+            ego_speed=speed,
+            duration=self.contact + AFTERMATH,
+            actors=(actor,),
+            ego_path=self.path,
+            road=RoadPlan(kind="crossing", distance=self.junction),
+            ego_reference=REAR_AXLE,
+        )
+
+
+def turn_of(speed: float) -> Turn:
+    """Return the turn that the ego drives at a speed [m/s]."""
+    return next(turn for limit, turn in TURNS.items() if speed <= (limit + 0.02) * KMH)
+
+
+def turning_ego(speed: float, left: bool, contact: tuple[float, Pose]) -> TurningEgo:
+    """Return the ego's turn with a contact that is at least 5 s after the start.
 
     Args:
-        left: Whether the curve turns left; otherwise right.
-        shade: Grey level of the stationary car in [0, 255]; None to draw it from the seed.
+        speed: Ego speed [m/s].
+        left: Whether the ego turns left.
+        contact: See `contact_in_turn`.
     """
     # A module that loads numba; the registration of the scenario families must not.
     from lgmd_gym.envs.dynamics.path import Path
 
-    side = 1.0 if check_flag("left", left) else -1.0
-    approach, slow, slowing = 30 * KMH, 22.5 * KMH, 2.0
-    onset = APPROACH * approach + (approach**2 - slow**2) / (2 * slowing) + 1.0
-    radius = OUTER_RADIUS - LANE_WIDTH / 2
-    curve, aside = arc(radius, side * pi / 2), LANE_WIDTH / 2 + PIPE_CLEARANCE + PIPE_DEPTH / 2
-    path = Path(Pose(0.0, 0.0, 0.0), (Bend(onset), curve))
-    pipes = rail_along(
-        path, onset - 10.0, onset + curve.length + 10.0, side * aside, PIPE_PIECE, PIPE_HEIGHT, PIPE_DEPTH
-    )
-    # The car's rear corner on the inside of the curve is the closest to the pipes.
-    behind_pipes = radius + aside + PIPE_DEPTH / 2 + CAR_CLEARANCE
-    ahead = sqrt(behind_pipes**2 - (radius - TARGET_WIDTH / 2) ** 2)
-    standing = Actor(gap=onset - EGO_LENGTH / 2 + ahead, shade=shade)
-    return Scenario(
-        family="CurveObjectOutside",
-        ego_speed=approach,
-        duration=APPROACH + (approach - slow) / slowing + (curve.length + 10.0) / slow,
-        actors=(standing, *pipes),
-        ego_profile=(Segment(start=APPROACH, acceleration=-slowing, final_speed=slow),),
-        ego_path=(Bend(onset), curve),
-        road=RoadPlan(kind="curve", distance=onset, bends=(curve,)),
-    )
+    turn, (way, front) = turn_of(speed), contact
+    straight = max(BEFORE_TURN * speed, START_TTC * speed - way)
+    length = sum(bend.length for bend in turn.bends(left))
+    # End of the front axle's turn along the initial heading, from the turn's start.
+    end = Path(Pose(0.0, 0.0, 0.0), turn.bends(left)).pose(length).x
+    lane = LANE_WIDTH / 2 if left else -LANE_WIDTH / 2  # of the crossing road, into which the ego turns
+    path = (Bend(straight), *_rear_path(turn, left))
+    moved = Pose(straight + front.x, front.y, front.heading)
+    return TurningEgo(path, REAR_AXLE + straight + end - lane, (straight + way) / speed, moved)
 
 
-@family("LaneClosure")
-def change_lane_before_sign(ego_speed: float = 40 * KMH, left: bool = True) -> Scenario:
-    """The ego changes lane before a signboard that closes its lane; not a threat.
+@lru_cache
+def _rear_path(turn: Turn, left: bool) -> tuple[Bend, ...]:
+    """Return the path of the rear axle from the time at which the front axle begins the turn."""
+    # A module that loads numba; the registration of the scenario families must not.
+    from lgmd_gym.envs.dynamics.steered_path import rear_axle_path
 
-    The ego drives at constant speed and begins to steer 4.1 s before the sign.
-    Source: UN R152 Rev.2, Annex 3 Appendix 2, case 4, at 40 km/h.
+    return rear_axle_path(turn.bends(left), WHEELBASE)
+
+
+def contact_in_turn(turn: Turn, left: bool, clearance: Callable[[Pose], float]) -> tuple[float, Pose]:
+    """Return the place of a contact in a turn, by bisection.
 
     Args:
-        ego_speed: Ego speed, in [5.56, 16.67] [m/s], which is 20 to 60 km/h.
-        left: Whether the ego changes to the left lane; otherwise to the right.
+        turn: The turn.
+        left: Whether the ego turns left.
+        clearance: Returns a distance for the middle of the ego's front that decreases along the turn and is 0
+            at the contact.
+
+    Returns:
+        Distance that the rear axle has covered in the turn [m]; position of the middle of the ego's front
+        relative to that at the start of the turn, + left, and the heading.
     """
-    speed = check_within("ego_speed", ego_speed, 20 * KMH, 60 * KMH, "m/s")
-    onset = APPROACH * speed
-    shift = lane_change(3.3 * speed, LANE_WIDTH if check_flag("left", left) else -LANE_WIDTH)
-    gap = onset + 4.1 * speed
-    sign = Actor(gap=gap, kind="box", shade=225, length=0.3, width=1.5, height=1.8)
-    return Scenario(
-        family="LaneClosure",
-        ego_speed=speed,
-        duration=APPROACH + 4.1 + 2.0,
-        actors=(sign,),
-        ego_path=(Bend(onset), *shift),
+    from lgmd_gym.envs.dynamics.path import Path
+
+    path = Path(Pose(-FRONT, 0.0, 0.0), _rear_path(turn, left))
+
+    def front(way: float) -> Pose:
+        pose = path.pose(way)
+        x, y = pose.x + FRONT * cos(pose.heading), pose.y + FRONT * sin(pose.heading)
+        return Pose(x, -y, -pose.heading)
+
+    low, high = 1.0, float(path.table[-1, 0])  # after 1 m the ego has turned a little
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if clearance(front(middle)) > 0.0 else (low, middle)
+    return low, front(low)
+
+
+def _pedestrian_line(left: bool) -> float:
+    """Return the lateral position of the pedestrian's path, + left of the ego's initial centreline [m]."""
+    return (PEDESTRIAN_LINE if left else -PEDESTRIAN_LINE) + LANE_WIDTH / 2
+
+
+def _hip(front: Pose, line: float) -> tuple[float, float]:
+    """Return where the ego's centreline meets the pedestrian's path, x and y from the ego's front [m]."""
+    return (line - front.y) / tan(front.heading), line - front.y
+
+
+@lru_cache
+def _pedestrian_contact(turn: Turn, left: bool, ahead: float) -> tuple[float, Pose]:
+    """Return the contact with the pedestrian, see `contact_in_turn`."""
+    line = _pedestrian_line(left)
+
+    def clearance(front: Pose) -> float:
+        """Return the distance of the pedestrian's nearest corner ahead of the ego's front [m]."""
+        x, y = _hip(front, line)
+        x -= ahead * ADULT.impact_point
+        forward, aside = cos(front.heading), sin(front.heading)
+        reach = (abs(forward) * ADULT.length + abs(aside) * ADULT.width) / 2
+        return x * forward + y * aside - reach
+
+    return contact_in_turn(turn, left, clearance)
+
+
+@lru_cache
+def _crossing_contact(turn: Turn, width: float) -> tuple[float, Pose]:
+    """Return the contact with an oncoming road user of a width [m], see `contact_in_turn`."""
+    return contact_in_turn(turn, True, lambda front: LANE_WIDTH - width / 2 - front.y)
+
+
+def _turn_across(
+    name: str, user: RoadUser, ego_speed: float, target_speed: float, shade: int | None
+) -> Scenario:
+    """Return a left turn in which the middle of the ego's front meets an oncoming road user."""
+    ego = turning_ego(ego_speed, True, _crossing_contact(turn_of(ego_speed), user.width))
+    target = Actor(
+        gap=ego.front.x + target_speed * ego.contact,
+        lateral_offset=LANE_WIDTH,
+        heading=pi,
+        speed=target_speed,
+        shade=shade,
+        **user.fields,
     )
+    return ego.scenario(name, ego_speed, target)

@@ -6,7 +6,7 @@ from typing import Any
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.data import scenario_from_data, scenario_to_data
 from lgmd_gym.envs.families.distribution import check_families, draw_scenario, level_generator
-from lgmd_gym.envs.families.registry import make_scenario
+from lgmd_gym.envs.families.family import make_scenario
 from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.registration import APPEARANCE, RANDOM, SCENARIO, SCENARIO_ARGUMENT
 from lgmd_gym.errors import check_flag, check_items, check_text

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from docstring_parser import DocstringStyle, parse
 
 from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.envs.families.registry import FAMILIES
+from lgmd_gym.envs.families.family import FAMILIES
 from lgmd_gym.errors import check_finite, check_keys, is_number, shown
 from lgmd_gym.openscenario.names import file_name
 

@@ -12,7 +12,7 @@ from lgmd_gym.benchmark.rows import make_row
 from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.envs.families.random_arguments import THREATS
+from lgmd_gym.envs.families import LEVELS
 
 WITHOUT_TARGET = ("ncap2023-without-target", "ncap2023-vru-without-target")
 SLOW_SUITES = ("ncap2023", "ncap2023-vru", "ncap2026", "ncap2026-extended", "speeds", *WITHOUT_TARGET)
@@ -57,7 +57,7 @@ def violations(case):
     """Return the expectations on the bounding agents that a case does not meet."""
     rows = bounding_rows(case)
     never, always, oracle = rows["no-brake"], rows["always-brake"], rows["ttc-oracle"]
-    threat = case.scenario.family in THREATS and case.suite not in WITHOUT_TARGET
+    threat = LEVELS[case.scenario.family].threat and case.suite not in WITHOUT_TARGET
     avoidable = not threat or case.scenario.family not in UNAVOIDABLE
     fault = "premature_brake" if threat else "false_activation"
     expectations = {

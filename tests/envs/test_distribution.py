@@ -13,6 +13,7 @@ from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs import FAMILIES
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.episode_source import RandomLevels
+from lgmd_gym.envs.families import LEVELS as DECLARED
 from lgmd_gym.envs.families.distribution import (
     ALL_FAMILIES,
     EXTRA_FAMILIES,
@@ -20,14 +21,12 @@ from lgmd_gym.envs.families.distribution import (
     draw_scenario,
     level_generator,
 )
-from lgmd_gym.envs.families.extra_arguments import EXTRA_NON_THREATS, EXTRA_THREATS
-from lgmd_gym.envs.families.free_lanes import free_lane
-from lgmd_gym.envs.families.random_arguments import NON_THREATS, THREATS
 from lgmd_gym.envs.families.rear import RELEASE
-from lgmd_gym.envs.families.scenario import without_target
+from lgmd_gym.envs.families.scenario import free_lane, without_target
 from lgmd_gym.envs.registration import RANDOM_TASKS, env_id
 
 HOLD = np.zeros(1, np.float32)
+THREATS = {name for name in ALL_FAMILIES if DECLARED[name].threat}
 
 
 def random_env(**arguments):
@@ -46,10 +45,9 @@ def run_episode(env, seed=None):
 
 
 def test_every_family_is_drawn():
-    draws = (*THREATS.items(), *NON_THREATS.items(), *EXTRA_THREATS.items(), *EXTRA_NON_THREATS.items())
-    own = [name for name, draw in draws if not draw.family]
-    assert sorted(own) == sorted(FAMILIES)
-    assert all(draw.family in FAMILIES for _, draw in draws if draw.family)
+    assert {level.family for level in DECLARED.values()} == {*FAMILIES}
+    assert {*ALL_FAMILIES, *EXTRA_FAMILIES} == {*DECLARED}
+    assert not {*ALL_FAMILIES} & {*EXTRA_FAMILIES}
     drawn = [draw_scenario(level_generator("train", level)).family for level in range(600)]
     assert set(drawn) == set(ALL_FAMILIES)
     share = np.mean([family in THREATS for family in drawn])
@@ -64,21 +62,22 @@ def test_levels_are_valid():
             draw_scenario(level_generator(split, level), EXTRA_FAMILIES)
 
 
-@pytest.mark.parametrize(("draws", "threat"), [(EXTRA_THREATS, True), (EXTRA_NON_THREATS, False)])
-def test_extra_families_are_drawn_where_they_are_named(draws, threat):
+@pytest.mark.parametrize("threat", [True, False])
+def test_extra_families_are_drawn_where_they_are_named(threat):
     """A standing target is a threat in every level; a car next to the lane or a missing target is not."""
-    env = random_env(split="validation", families=list(draws))
+    names = [name for name in EXTRA_FAMILIES if DECLARED[name].threat is threat]
+    env = random_env(split="validation", families=names)
     families = set()
     for seed in range(200):
         _, scenario, _, collision, _ = run_episode(env, seed)
         assert collision is threat, scenario
         families.add(scenario.family)
-    assert families == {draw.family or name for name, draw in draws.items()}
+    assert families == {DECLARED[name].family for name in names}
 
 
 def test_levels_without_targets_are_twins():
     """Levels of threats and those of the same threats without their targets differ by the target only."""
-    threats = [name.removesuffix("WithoutTarget") for name in EXTRA_NON_THREATS if "WithoutTarget" in name]
+    threats = [name.removesuffix("WithoutTarget") for name in EXTRA_FAMILIES if "WithoutTarget" in name]
     without = [f"{name}WithoutTarget" for name in threats]
     for level in range(200):
         scenario = draw_scenario(level_generator("train", level), threats)
@@ -143,8 +142,8 @@ def test_levels_include_the_headways_of_fmvss127():
     """In FMVSS 127 a lead car brakes at a headway of 0.54 s."""
     cases = [dict(case.arguments) for case in find_suite("fmvss127").cases if case.family == "CCRb"]
     shortest = min(arguments["gap"] / arguments["ego_speed"] for arguments in cases)
-    for draw in THREATS["CCRb"], NON_THREATS["Following"]:
-        drawn = [draw.draw(level_generator("train", level))["headway"] for level in range(2000)]
+    for name in "CCRb", "Following":
+        drawn = [DECLARED[name].draw(level_generator("train", level))["headway"] for level in range(2000)]
         assert min(drawn) < shortest
         assert max(drawn) > 2.5
 

@@ -8,9 +8,8 @@ from lgmd_gym import CameraParams
 from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.camera.road_geometry import road_geometry
 from lgmd_gym.camera.road_pool import road_key
-from lgmd_gym.envs.families.free_lanes import free_lane
-from lgmd_gym.envs.families.registry import make_scenario
-from lgmd_gym.envs.families.scenario import LANE_WIDTH
+from lgmd_gym.envs.families.family import make_scenario
+from lgmd_gym.envs.families.scenario import LANE_WIDTH, free_lane
 
 RIGHT, LEFT = 2, 0  # of the ego's lane, 1
 

@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym import LGMDObservation
 from lgmd_gym.envs import FAMILIES, env_id
-from lgmd_gym.envs.families.registry import family
+from lgmd_gym.envs.families.family import family
 from lgmd_gym.envs.traffic.registration import KINDS, find_kind, traffic_id
 
 TRAFFIC_IDS = {

@@ -10,7 +10,7 @@ import pytest
 from lgmd_gym.envs.dynamics.bodies import BICYCLE, CAR, EGO, PEDESTRIAN
 from lgmd_gym.envs.dynamics.segment import Segment
 from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
-from lgmd_gym.envs.families.registry import FAMILIES, make_scenario
+from lgmd_gym.envs.families.family import FAMILIES, make_scenario
 from lgmd_gym.envs.families.road_users import run_up
 from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
 from lgmd_gym.envs.simulation.physics_state import place
@@ -59,7 +59,7 @@ def test_lanes_of_a_road():
     for lane in (0, 2):
         RoadPlan(ego_lane=lane)
     for lane in (-1, 3):
-        with pytest.raises(ValueError, match=r"ego_lane must be a whole number in \[0, 2\]"):
+        with pytest.raises(ValueError, match="ego_lane must be"):
             RoadPlan(ego_lane=lane)
     with pytest.raises(ValueError, match="unknown road kind"):
         RoadPlan(kind="curved")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lgmd_gym.envs.families.registry import make_scenario
+from lgmd_gym.envs.families.family import make_scenario
 
 CAR = {"kind": "car", "length": 4.023, "width": 1.712, "height": 1.427, "shade": None}
 STILL = {"speed": 0.0, "heading": 0.0, "lateral_offset": 0.0, "profile": (), "path": ()}
