@@ -1,12 +1,9 @@
 """The `doctor` command: check versions, kernel cache, video codec, display and a short simulation."""
 
-import platform
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-from tempfile import TemporaryDirectory, TemporaryFile
 from textwrap import wrap
 from typing import Any
 
@@ -14,7 +11,6 @@ from rich.console import Console
 from rich.text import Text
 
 from lgmd_gym.cli.console import make_console
-from lgmd_gym.processes.extras import install_command
 
 PACKAGE = "lgmd-gym"
 SELF_TEST_S = 2.0  # Wall time of the self-test [s].
@@ -92,6 +88,9 @@ def _indented(text: str, console: Console) -> str:
 
 def check_versions() -> list[Finding]:
     """Compare Python and the installed packages with the requirements in `pyproject.toml`."""
+    import platform
+    from importlib.metadata import PackageNotFoundError, requires, version
+
     from packaging.requirements import Requirement
 
     found = [Finding("python", OK, f"{platform.python_version()} on {platform.platform()}")]
@@ -118,6 +117,10 @@ def check_versions() -> list[Finding]:
 
 def _check_training() -> Finding:
     """Report whether the packages of the extra "train" are installed."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    from lgmd_gym.processes.extras import install_command
+
     names = ("stable-baselines3", "torch")
     try:
         return Finding("training", OK, ", ".join(f"{name} {version(name)}" for name in names))
@@ -127,6 +130,8 @@ def _check_training() -> Finding:
 
 def check_cache() -> list[Finding]:
     """Check that numba can store compiled kernels; otherwise every process compiles them again."""
+    from tempfile import TemporaryFile
+
     fix = "set NUMBA_CACHE_DIR to a writable folder"
     try:
         from lgmd_gym.camera.render import raster
@@ -153,6 +158,8 @@ def _cache_folder(module: Any) -> str:
 
 def check_codec() -> list[Finding]:
     """Write a short H.264 video and read it back."""
+    from tempfile import TemporaryDirectory
+
     import av
     import numpy as np
 

@@ -2,7 +2,6 @@
 
 import inspect
 import os
-import pydoc
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -42,6 +41,8 @@ def run(options: List) -> int:
                 console.print(table())
     text = capture.get()
     if options.pager and console.is_terminal and text.count("\n") >= console.height:
+        import pydoc
+
         os.environ.setdefault("LESS", "FRX")  # show colours, and leave the text on the screen
         pydoc.pager(text)
     else:

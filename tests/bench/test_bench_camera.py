@@ -1,4 +1,4 @@
-"""Rendering time: run with `pytest -n 0 -m bench tests/bench/test_bench_camera.py`."""
+"""Rendering time: run with `pytest -m bench tests/bench/test_bench_camera.py`."""
 
 import timeit
 

@@ -1,4 +1,4 @@
-"""Memory of the engine: `pytest -n 0 -m slow tests/engine/test_memory.py`."""
+"""Memory of the engine: `pytest -m slow tests/engine/test_memory.py`."""
 
 import subprocess
 import sys
