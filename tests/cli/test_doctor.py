@@ -37,7 +37,8 @@ def test_messages_are_wrapped_and_paths_are_not(capsys, monkeypatch):
     [("numpy>=99", "requires >=99"), ("no-such-package-here>=1", "no-such-package-here is missing")],
 )
 def test_an_unmet_requirement_is_a_fault(requirement, message, monkeypatch):
-    monkeypatch.setattr(doctor, "requires", lambda package: [requirement, 'torch>=99; extra == "train"'])
+    listed = [requirement, 'torch>=99; extra == "train"']
+    monkeypatch.setattr("importlib.metadata.requires", lambda package: listed)
     (fault,) = faults(doctor.check_versions())
     assert message in fault.message
     assert "pip install" in fault.fix
