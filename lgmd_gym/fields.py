@@ -202,11 +202,7 @@ def optional(declared: Any) -> Any:
     return _field(dataclasses.replace(declaration, default=None, check=check, bounds=bounds))
 
 
-@dataclass_transform(
-    frozen_default=True,
-    kw_only_default=True,
-    field_specifiers=(number, whole, numbers, flag, choice, text, value, optional),
-)
+@dataclass_transform(frozen_default=True, kw_only_default=True)
 def record(cls: _R) -> _R:
     """Make a class a frozen dataclass, and add its declared fields to its docstring."""
     made: Any = dataclasses.dataclass(frozen=True, slots=True, kw_only=True)(cls)
@@ -249,7 +245,7 @@ class Record:
         """
         if isinstance(value, cls):
             return cast(Self, dataclasses.replace(cast(Any, value), **cls._known(changes)))
-        given = {} if value is None else dict(check_type(cls.label or cls.__name__, value, Mapping))
+        given = {} if value is None else dict(check_type(cls.label or cls.__name__, value, cls, Mapping))
         return cls(**cls._known(given | changes))
 
     def to_dict(self) -> dict[str, Any]:

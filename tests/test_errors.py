@@ -77,7 +77,7 @@ def test_values_are_shown_in_one_short_line():
         (lambda: camera.EgoCamera({"name": []}), "camera name must be a non-empty string, got []"),
         (lambda: camera.BirdsEye(scaling=True), "scaling must be a number, got True"),
         (lambda: gym.make("LGMD/CCRs-v0", trace="yes"), "trace must be true or false, got 'yes'"),
-        (lambda: gym.make("LGMD/CCRs-v0", params=3), "params must be LGMDParams, a mapping or None, got 3"),
+        (lambda: gym.make("LGMD/CCRs-v0", params=3), "LGMD must be LGMDParams or Mapping, got 3"),
         (lambda: gym.make("LGMD/CCRs-v0", config=[1]), "config must be dict, got [1]"),
         (lambda: gym.make("LGMD/CCRs-v0", config={"throttle": "no"}), "throttle must be true or false"),
         (lambda: gym.make("LGMD/CCRs-v0", config={"screen_width": 10**9}), "screen_width must be a whole"),

@@ -135,7 +135,7 @@ def check_cache() -> list[Finding]:
     fix = "set NUMBA_CACHE_DIR to a writable folder"
     try:
         from lgmd_gym.camera.render import raster
-        from lgmd_gym.neuron import kernels
+        from lgmd_gym.neuron.lgmd import kernels
     except RuntimeError as error:  # numba: "no locator available"
         return [Finding("numba cache", FAULT, str(error), fix)]
     found = []

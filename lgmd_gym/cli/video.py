@@ -136,7 +136,7 @@ def _configs(options: Video) -> "dict[str, PlaybackConfig]":
     }
     params = read_params(options.params)
     if params is not None:
-        values["params"] = LGMDParams.from_dict(params)
+        values["params"] = LGMDParams.make(params)
     given = {name: value for name, value in values.items() if value is not None}
     configs = {name: replace(named_config(name), **given) for name in names}
     if options.threshold is not None:

@@ -70,7 +70,6 @@ PLAYBACK_CONFIGS = {
     "released": PlaybackConfig(params=LGMDParams.released()),
     "off-only": PlaybackConfig(params=LGMDParams.off_only()),
     "fixed-inhibition": PlaybackConfig(params=LGMDParams.fixed_inhibition()),
-    "yue-rind-2006": PlaybackConfig(params=LGMDParams.yue_rind2006(), fps=25.0),
 }
 
 

@@ -1,23 +1,32 @@
 """DSN: a neuron that is selective to the direction of horizontal motion."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lgmd_gym.neuron import dsn_kernels
-from lgmd_gym.neuron.frame_neuron import Layer
-from lgmd_gym.neuron.motion_neuron import MotionNeuron
-from lgmd_gym.neuron.motion_params import MotionParams
-from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
+from lgmd_gym.fields import record
+from lgmd_gym.kernels import kernel
+from lgmd_gym.neuron.base import Layer
+from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
+from lgmd_gym.neuron.motion import (
+    MotionNeuron,
+    MotionParams,
+    detect_motion_right,
+    filter_light,
+    start,
+    update_delay,
+)
 from lgmd_gym.neuron.registry import register
+from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@record
 class DSNParams(MotionParams):
     """Parameters of the direction-selective neuron, those of `MotionParams`."""
+
+    label = "DSN"
 
 
 class DSN(MotionNeuron):
@@ -73,7 +82,7 @@ class DSN(MotionNeuron):
 
     def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
         """Step the active neurons among first..last-1; see `FrameNeuron.step_range`."""
-        dsn_kernels.step(first, last, frames, active, self._scalars, self._const, self._gains, *self._maps)
+        _step(first, last, frames, active, self._scalars, self._const, self._gains, *self._maps)
 
     def column_map(self) -> tuple[NDArray[np.float32], float]:
         """Return the map of the columns; see `FrameNeuron.column_map`."""
@@ -84,6 +93,43 @@ class DSN(MotionNeuron):
         """Map `right` of the last frame, the motion m [grey levels]; new array, (H, W) or (N, H, W)."""
         right = self._maps[5]
         return {"right": (right[0] if self.num is None else right).copy()}
+
+
+@kernel(exact=True, arrays=True)
+def _step(
+    first, last, frames, active, scalars, const, gains, mean, on, off, late_on, late_off, right
+) -> None:
+    """Step the active neurons among first..last-1.
+
+    Args:
+        first: First neuron.
+        last: Last neuron + 1.
+        frames: Frames, (N, H, W).
+        active: Neurons to step, bool, (N,).
+        scalars: Scalar state, see `scalars`, (N, ...).
+        const: Constants of the stage of spikes, see `scalars.pack_constants`.
+        gains: Gains of the mean light and of the delay, float32, (2,).
+        mean: Mean light; this and the other maps are float32, (N, H, W).
+        on: ON of the last frame.
+        off: OFF of the last frame.
+        late_on: Delayed ON.
+        late_off: Delayed OFF.
+        right: Motion to the right.
+    """
+    pixels = frames.shape[1] * frames.shape[2]
+    for n in range(first, last):
+        if not active[n]:
+            continue
+        row = scalars[n]
+        if row[AGE] == 0.0:
+            start(frames[n], mean[n])
+            row[AGE] = 1.0
+            continue
+        filter_light(frames[n], mean[n], on[n], off[n], gains[0])
+        total, strength = detect_motion_right(on[n], off[n], late_on[n], late_off[n], right[n])
+        update_delay(on[n], off[n], late_on[n], late_off[n], gains[1])
+        row[F], row[W], row[LATENCY], row[GAIN_G] = strength / pixels, 0.0, 0.0, 1.0
+        fire(row, const, total / pixels)
 
 
 def _make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams) -> DSN:

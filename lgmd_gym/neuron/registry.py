@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lgmd_gym.errors import check_keys, check_known, check_text, shown
-from lgmd_gym.neuron.frame_neuron import FrameNeuron, Layer, Signal
-from lgmd_gym.neuron.params import LGMDParams
-from lgmd_gym.neuron.response import Response
+from lgmd_gym.neuron.base import FrameNeuron, Layer, Response, Signal
+from lgmd_gym.neuron.lgmd.params import LGMDParams
 
 
 class Model(Protocol):

@@ -71,12 +71,12 @@ def checked_mask(mask: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
 
 
 def checked_region(
-    shape: tuple[int, int], mask: ArrayLike | None, roi: tuple[int, int, int, int] | None, margin: int
+    shape: tuple[int, int], mask: ArrayLike | None, roi: tuple[int, int, int, int] | None
 ) -> tuple[int, int, tuple[int, int], NDArray[np.float32], int]:
     """Return top row, left column, (height, width), pixel weights and number of pixels of the region.
 
-    The region contains the pixels with a weight > 0 and `margin` pixels around them. The weights are of shape
-    (0, 0) if all are 1; the number counts the pixels with a weight > 0.
+    The region contains the pixels with a weight > 0 and one pixel around them, which I and Ce reach. The
+    weights are of shape (0, 0) if all are 1; the number counts the pixels with a weight > 0.
     """
     if mask is not None and roi is not None:
         raise ValueError("mask and roi must not both be given; set the mask to 0 outside the region instead")
@@ -95,8 +95,8 @@ def checked_region(
         return 0, 0, shape, np.zeros((0, 0), np.float32), shape[0] * shape[1]
     weight = checked_mask(mask, shape)
     rows, columns = np.flatnonzero(weight.any(1)), np.flatnonzero(weight.any(0))
-    top, left = max(rows[0] - margin, 0), max(columns[0] - margin, 0)
-    box = weight[top : rows[-1] + 1 + margin, left : columns[-1] + 1 + margin]
+    top, left = max(rows[0] - 1, 0), max(columns[0] - 1, 0)
+    box = weight[top : rows[-1] + 2, left : columns[-1] + 2]
     return int(top), int(left), box.shape, np.ascontiguousarray(box), int(np.count_nonzero(weight))
 
 

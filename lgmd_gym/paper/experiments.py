@@ -24,11 +24,10 @@ from lgmd_gym.paper.stimuli import (
 FPS = 30.0
 SCREEN = Screen(fps=FPS)
 DARK, LIGHT, GREY = 20.0, 235.0, 127.5
-# The paper's model, an ablation and the previous model.
+# The paper's model and an ablation.
 MODELS = {
     "paper": LGMDParams(),
     "fixed inhibition": LGMDParams.fixed_inhibition(),
-    "Yue & Rind 2006": LGMDParams.yue_rind2006(),
 }
 SPATIAL = (1000 / 190, 10.0, 20.0, 40.0, 60.0, 80.0)  # [periods/m]: periods of 190 to 12.5 px
 TEMPORAL = (0.5, 1.0, 2.0, 7.0, 14.0)  # [Hz]

@@ -27,7 +27,7 @@ from lgmd_gym.paper.stimuli import stimulus_frames
 from lgmd_gym.plotting.style import COLOURS, STYLE, load_pyplot
 
 ALARM_LEVEL = 30.0  # T_sf [spikes/s]
-MODEL_COLOURS = dict(zip(MODELS, (COLOURS[0], COLOURS[1], COLOURS[2]), strict=True))
+MODEL_COLOURS = dict(zip(MODELS, COLOURS, strict=False))
 
 
 def paper_figures(results: ExperimentResults, folder: Path) -> list[Path]:
@@ -46,8 +46,8 @@ def paper_figures(results: ExperimentResults, folder: Path) -> list[Path]:
 
 
 def _gratings(plt: Any, results: ExperimentResults) -> Any:
-    """Draw six gratings, and the highest K of four models over contrast, spatial and temporal frequency."""
-    models = ("paper", "fixed inhibition", "neither adaptation nor silencing", "Yue & Rind 2006")
+    """Draw six gratings, and the highest K of three models over contrast, spatial and temporal frequency."""
+    models = ("paper", "fixed inhibition", "neither adaptation nor silencing")
     figure = plt.figure(figsize=(11.0, 7.6), layout="constrained")
     figure.suptitle(
         "Gratings alone: highest membrane potential K (rest 0.5, first spike 0.7); grey numbers: mean F̂"

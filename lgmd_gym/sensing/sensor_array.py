@@ -12,8 +12,8 @@ from lgmd_gym import neuron
 from lgmd_gym.camera import BirdsEye, CameraParams, CameraSpec, EgoCamera
 from lgmd_gym.camera.road_pool import RoadPool
 from lgmd_gym.camera.scene_table import SceneTable
+from lgmd_gym.kernels.threads import Threads
 from lgmd_gym.neuron import Layer, LGMDParams, Response
-from lgmd_gym.neuron.threads import Threads
 from lgmd_gym.sensing.cameras import Variant, Variants, make_cameras
 from lgmd_gym.sensing.kernels import NUMBERS, SIGNALS
 from lgmd_gym.sensing.sensor_group import SensorGroup

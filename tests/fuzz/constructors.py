@@ -40,7 +40,7 @@ VALUES = (
     np.zeros((8, 8), np.complex128), range(3), "birdseye", ["fovea", "fovea"], {"camera": "fovea"},
     {"seed": -1}, slice(3), Ellipsis, NotImplemented, ValueError("x"),
 )  # fmt: skip
-INFINITE = {"tau_1", "tau_2", "tau_s", "t_f", "t_ffi", "max_spikes", "far_m"}  # where infinity is documented
+INFINITE = {"tau_1", "tau_2", "tau_s", "t_f", "t_ffi", "far_m"}  # where infinity is documented
 
 
 def acceptable(name, annotation, value):

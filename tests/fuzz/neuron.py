@@ -30,8 +30,6 @@ CHANGES = {
     "tau_s": lambda rng: float(rng.choice([0.0, 100.0, np.inf])),
     "t_f": lambda rng: float(rng.choice([5.0, 50.0, np.inf])),
     "t_ffi": lambda rng: float(rng.choice([10.0, 30.0])),
-    "ffi_delay": lambda rng: int(rng.integers(2)),
-    "on_off": lambda rng: bool(rng.integers(2)),
     "on_off_residue": lambda rng: float(rng.choice([0.0, 0.1, 0.8])),
     "delay": lambda rng: str(rng.choice(["recursive", "two-tap"])),
     "latency": lambda rng: str(rng.choice(["clamp", "jump"])),
@@ -75,7 +73,7 @@ def draw_case(rng):
     """Return the description of a random neuron and its comparison with the reference."""
     preset = str(rng.choice(list(PRESETS)))
     changes = {name: draw(rng) for name, draw in CHANGES.items() if rng.random() < 0.12}
-    params = PRESETS[preset].from_dict(PRESETS[preset].to_dict() | changes)
+    params = PRESETS[preset].make(PRESETS[preset], **changes)
     shape = tuple(rng.integers(1, 56, 2).tolist())
     mask, roi = draw_region(rng, shape)
     frames, fps = draw_frames(rng, shape), float(rng.choice([10.0, 15.0, 18.0, 25.0, 30.0, 60.0]))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lgmd_gym.neuron.reference import ReferenceLGMD
+from lgmd_gym.neuron.lgmd.reference import ReferenceLGMD
 from tests.golden.sequences import KINDS
 from tests.support.neurons import PRESETS
 

@@ -75,9 +75,9 @@ def test_reset_copies_and_pickles():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"params": {"sigm": 0.4}}, "unknown DSN parameter 'sigm'; did you mean 'sigma'"),
-        ({"params": {"sigma": -1.0}}, "sigma must be a number > 0, got -1"),
-        ({"params": LGMDParams()}, "params must be DSNParams"),
+        ({"params": {"sigm": 0.4}}, "unknown DSN field 'sigm'; did you mean 'sigma'"),
+        ({"params": {"sigma": -1.0}}, r"DSN sigma must be in \(0, inf\) grey levels, got -1"),
+        ({"params": LGMDParams()}, "DSN must be DSNParams or Mapping"),
     ],
 )
 def test_invalid_arguments(arguments, message):

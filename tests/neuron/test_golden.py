@@ -6,7 +6,7 @@ import numpy as np
 from golden.sequences import KINDS
 from support.neurons import PRESETS, responses
 
-from lgmd_gym.neuron.reference import ReferenceLGMD
+from lgmd_gym.neuron.lgmd.reference import ReferenceLGMD
 
 TRACES = Path(__file__).parents[1] / "golden" / "neuron.npz"
 SHAPE, COUNT = (45, 80), 40

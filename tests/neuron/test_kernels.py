@@ -8,8 +8,9 @@ from golden.sequences import KINDS, grating, looming, natural, random
 from support.neuron_comparison import compare
 from support.neurons import PRESETS
 
-from lgmd_gym.neuron import LGMD, LGMDParams, kernels
-from lgmd_gym.neuron.reference import ReferenceLGMD
+from lgmd_gym.neuron import LGMD, LGMDParams
+from lgmd_gym.neuron.lgmd import kernels
+from lgmd_gym.neuron.lgmd.reference import ReferenceLGMD
 
 
 @pytest.mark.parametrize("preset", PRESETS)
@@ -103,13 +104,9 @@ def test_mask_equals_masked_frames_over_fewer_pixels(preset):
 @pytest.mark.parametrize("warm_start", [False, True])
 @pytest.mark.parametrize("delay", ["recursive", "two-tap"])
 @pytest.mark.parametrize("residue", [0.0, 0.5])
-@pytest.mark.parametrize("on_off", [False, True])
-def test_masks_with_every_structure_of_the_paths(on_off, residue, delay, warm_start):
-    """Without ON and OFF paths, S is negative beside the mask, and the residue has no effect."""
+def test_masks_with_every_structure_of_the_paths(residue, delay, warm_start):
     rng = np.random.default_rng(0)
-    params = LGMDParams(
-        on_off=on_off, on_off_residue=residue, delay=delay, warm_start=warm_start, sigma_1=3.0, sigma_3=10.0
-    )
+    params = LGMDParams(on_off_residue=residue, delay=delay, warm_start=warm_start, sigma_1=3.0, sigma_3=10.0)
     for top, left, height, width in [(0, 0, 9, 11), (3, 4, 1, 1), (2, 5, 4, 3), (0, 9, 9, 2), (1, 1, 7, 9)]:
         mask = np.zeros((9, 11))
         mask[top : top + height, left : left + width] = 1

@@ -154,11 +154,11 @@ def test_float_frames_equal_bytes():
     [
         ({"shape": (10, 64)}, "radius_px must be at most half of the smaller side"),
         ({"params": {"radius": 4}}, "radius_px"),
-        ({"params": {"sigma": 0.0}}, "sigma must be a number > 0, got 0"),
+        ({"params": {"sigma": 0.0}}, r"LPLC2 sigma must be in \(0, inf\) grey levels, got 0"),
         ({"params": {"tau_delay_ms": math.inf}}, "tau_delay_ms must be .*finite"),
         ({"params": {"stride_px": 0}}, "stride_px"),
         ({"params": {"vertical": 2}}, "vertical"),
-        ({"params": LGMDParams()}, "params must be LPLC2Params"),
+        ({"params": LGMDParams()}, "LPLC2 must be LPLC2Params or Mapping"),
         ({"spikes": {"n_tss": 4}}, "n_ts"),
     ],
 )

@@ -52,12 +52,13 @@ def test_forked_child_continues_the_neuron_of_its_parent(threads):
 
 OTHER_PROCESS = """
 import numpy as np
-from lgmd_gym.neuron import LGMD, LGMDParams, general_kernel, kernels
+from lgmd_gym.neuron import LGMD, LGMDParams
+from lgmd_gym.neuron.lgmd import general, kernels
 for params in (LGMDParams(), LGMDParams.released()):
     neuron = LGMD((90, 160), params=params)
     for level in (0, 90, 20):
         response = neuron.step(np.full((90, 160), level, np.uint8) + np.arange(160, dtype=np.uint8) // 2)
-hits = [sum(module.step.stats.cache_hits.values()) for module in (kernels, general_kernel)]
+hits = [sum(module.step.stats.cache_hits.values()) for module in (kernels, general)]
 print(*hits, repr(response))
 """
 
@@ -69,15 +70,15 @@ def test_other_processes_use_the_compilation_cache_and_get_equal_outputs():
     assert len({run.split(maxsplit=2)[2] for run in runs}) == 1
 
 
-def test_neuron_imports_only_vectors_errors_and_the_decorator_of_kernels():
+def test_neuron_imports_only_errors_fields_and_kernels():
     allowed = {"numpy", "numba", "llvmlite", "tomli_w", *sys.stdlib_module_names}
     imported = set()
-    for path in Path(lgmd_gym.neuron.__file__).parent.glob("*.py"):
+    for path in Path(lgmd_gym.neuron.__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
                 imported |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 imported.add(node.module or "")
-    below = ("lgmd_gym.errors", "lgmd_gym.fields", "lgmd_gym.kernels", "lgmd_gym.kernels.simd")
-    own = {name for name in imported if name.startswith("lgmd_gym.neuron") or name in below}
+    below = "lgmd_gym.errors", "lgmd_gym.fields", "lgmd_gym.kernels"
+    own = {name for name in imported if name.startswith(("lgmd_gym.neuron", *below))}
     assert {name for name in imported - own if name.split(".")[0] not in allowed} == set()

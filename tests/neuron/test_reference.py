@@ -7,7 +7,7 @@ import pytest
 from golden.sequences import grating, looming, natural
 
 from lgmd_gym.neuron import LGMDParams
-from lgmd_gym.neuron.reference import ReferenceLGMD
+from lgmd_gym.neuron.lgmd.reference import ReferenceLGMD
 
 GRATINGS = [(period, hz) for period in (12, 24, 48, 96, 190) for hz in (0.5, 1, 2, 4, 8, 14)]
 
@@ -197,25 +197,3 @@ def test_off_only_responds_to_dark_objects_only():
         return sum(r.spikes for r in run(looming((30, 40), 25, target=target), LGMDParams.off_only())[0])
 
     assert total(40) > 0 == total(255)
-
-
-def test_yue_rind_2006_by_hand():
-    # A step of 60 on one pixel: P is 60, then its persistent part; I is the last P of the neighbours.
-    frame = np.zeros((5, 5))
-    frame[2, 2] = 60
-    neuron = ReferenceLGMD((5, 5), params=LGMDParams.yue_rind2006())
-    for luminance in (0 * frame, frame, frame):
-        neuron.step(luminance)
-    p = 60 / (1 + math.e)
-    assert neuron.layers["P"][2, 2] == pytest.approx(p)
-    assert neuron.layers["S"][1:4, 1:4] == pytest.approx(
-        np.array([[-2.25, -4.5, -2.25], [-4.5, p, -4.5], [-2.25, -4.5, -2.25]])
-    )
-
-
-def test_yue_rind_2006_alerts_after_four_spikes_in_a_row_unless_silenced():
-    neuron = ReferenceLGMD((1, 1), 25.0, LGMDParams.yue_rind2006())
-    outputs = [neuron.fire(5, 0, 0.3) for _ in range(4)]
-    assert [r.spikes for r in outputs] == [1, 1, 1, 1]
-    assert [r.alert for r in outputs] == [False, False, False, True]
-    assert neuron.fire(5, 10.0, 0.3).spikes == 0

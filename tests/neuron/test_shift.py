@@ -13,7 +13,6 @@ HEIGHT, WIDTH, PANORAMA, FRAMES = 20, 61, 160, 14
 MODELS = {
     "LGMD": (LGMD, ("P", "E", "I")),
     "LGMD with the delay of two frames": (partial(LGMD, params={"delay": "two-tap"}), ("P", "E", "I")),
-    "LGMD without ON and OFF": (partial(LGMD, params={"on_off": False}), ("P", "E", "I")),
     "DSN": (DSN, ("right",)),
     "LPLC2": (LPLC2, ("right", "down")),
     "SustainedEdges": (SustainedEdges, ("light", "edges")),

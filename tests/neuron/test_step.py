@@ -108,8 +108,8 @@ def test_constant_float_frames_are_valid():
         ({"num": 0}, "num must be >= 1, got 0; pass None for a single neuron"),
         ({"num": 2.5}, "num must be an integer or None, got 2.5"),
         ({"threads": 0}, r"threads must be a whole number in \[1, 1024\], got 0"),
-        ({"params": {"tsp": 0.7}}, "unknown LGMD parameter 'tsp'; did you mean 't_sp'?"),
-        ({"params": 0.7}, "params must be LGMDParams, a mapping or None, got 0.7"),
+        ({"params": {"tsp": 0.7}}, "unknown LGMD field 'tsp'; did you mean 't_sp'?"),
+        ({"params": 0.7}, "LGMD must be LGMDParams or Mapping, got 0.7"),
         ({"mask": np.zeros(SHAPE)}, "mask must have a weight > 0, got 0 everywhere"),
         ({"mask": np.ones((3, 3))}, r"mask must have the shape \(24, 37\) .*, got \(3, 3\)"),
         ({"mask": np.full(SHAPE, 1.5)}, r"mask must have weights in \[0, 1\], got 1.5 to 1.5"),
@@ -126,7 +126,7 @@ def test_invalid_arguments_raise(options, message):
 
 def test_reset_neuron_equals_a_new_one():
     frames = looming(SHAPE, 20)
-    for params in (LGMDParams(), LGMDParams.released(), LGMDParams.yue_rind2006()):
+    for params in (LGMDParams(), LGMDParams.released()):
         neuron = LGMD(SHAPE, params=params)
         first = [neuron.step(frame) for frame in frames]
         neuron.reset()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lgmd_gym.neuron import LGMD
-from lgmd_gym.neuron.reference import ReferenceLGMD
+from lgmd_gym.neuron.lgmd.reference import ReferenceLGMD
 
 CLOSE = 1e-4
 

@@ -8,7 +8,6 @@ PRESETS = {
     "released": LGMDParams.released(),
     "fixed_inhibition": LGMDParams.fixed_inhibition(),
     "off_only": LGMDParams.off_only(),
-    "yue_rind2006": LGMDParams.yue_rind2006(),
 }
 
 

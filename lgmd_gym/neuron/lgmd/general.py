@@ -8,20 +8,20 @@ from lgmd_gym.neuron import scalars as sc
 from lgmd_gym.neuron.scalars import feed_forward, fire
 
 
-def allocate(num: int, shape: tuple[int, int], n_p: int, paths: int) -> tuple[NDArray[np.float32], ...]:
-    """Return the maps of `num` neurons over `shape` pixels, filled with 0; ON and OFF are two paths.
+def allocate(num: int, shape: tuple[int, int], n_p: int) -> tuple[NDArray[np.float32], ...]:
+    """Return the maps of `num` neurons over `shape` pixels, filled with 0; the paths are ON and OFF.
 
     Returns:
         p: P of the last n_p frames (at least one), newest first, (N, n_p, H, W).
-        e: E per path with a border of one pixel, (N, paths, H + 2, W + 2).
-        memory: Memory of the delay per path and ring, (N, paths, 3, H, W).
-        inhibition: I per path, (N, paths, H, W).
+        e: E per path with a border of one pixel, (N, 2, H + 2, W + 2).
+        memory: Memory of the delay per path and ring, (N, 2, 3, H, W).
+        inhibition: I per path, (N, 2, H, W).
         s: S with a border of one pixel, (N, H + 2, W + 2).
         g: G, (N, H, W).
     """
     h, w = shape
     sizes = (
-        (num, max(n_p, 1), h, w), (num, paths, h + 2, w + 2), (num, paths, 3, h, w), (num, paths, h, w),
+        (num, max(n_p, 1), h, w), (num, 2, h + 2, w + 2), (num, 2, 3, h, w), (num, 2, h, w),
         (num, h + 2, w + 2), (num, h, w),
     )  # fmt: skip
     return tuple(np.zeros(size, np.float32) for size in sizes)
@@ -65,10 +65,8 @@ def excitation(p, e, const) -> None:
     for c in range(e.shape[0]):
         for y in range(p.shape[0]):
             for x in range(p.shape[1]):
-                value = p[y, x]
-                if e.shape[0] == 2:
-                    value = max(np.float32(0), value if c == 0 else -value) + residue * e[c, y + 1, x + 1]
-                e[c, y + 1, x + 1] = value
+                value = p[y, x] if c == 0 else -p[y, x]
+                e[c, y + 1, x + 1] = max(np.float32(0), value) + residue * e[c, y + 1, x + 1]
         replicate_border(e[c])
 
 
@@ -97,12 +95,9 @@ def summation(e, inhibition, s, w, const) -> None:
     theta_3, weight, zero = np.float32(const[sc.THETA_3]), np.float32(w), np.float32(0)
     for y in range(s.shape[0] - 2):
         for x in range(s.shape[1] - 2):
-            first = e[0, y + 1, x + 1] - weight * inhibition[0, y, x]
-            if e.shape[0] == 2:
-                on = max(zero, first)
-                off = max(zero, e[1, y + 1, x + 1] - weight * inhibition[1, y, x])
-                first = theta_1 * on + theta_2 * off + theta_3 * on * off
-            s[y + 1, x + 1] = first
+            on = max(zero, e[0, y + 1, x + 1] - weight * inhibition[0, y, x])
+            off = max(zero, e[1, y + 1, x + 1] - weight * inhibition[1, y, x])
+            s[y + 1, x + 1] = theta_1 * on + theta_2 * off + theta_3 * on * off
     replicate_border(s)
 
 
@@ -167,7 +162,5 @@ def step(
 def layers(scalars, const, p, e, memory, inhibition, s, g) -> dict[str, NDArray[np.float32]]:
     """Return P, E, I, S and G of the last frame, each of shape (N, H, W)."""
     inner = (..., slice(1, -1), slice(1, -1))
-    own_path = inhibition[:, 0]
-    if e.shape[1] == 2:
-        own_path = np.where(p[:, 0] >= 0, own_path, inhibition[:, 1])
+    own_path = np.where(p[:, 0] >= 0, inhibition[:, 0], inhibition[:, 1])
     return {"P": p[:, 0], "E": e[inner].sum(1), "I": own_path, "S": s[inner], "G": g}

@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lgmd_gym.errors import check_whole
-from lgmd_gym.neuron.column_kernels import column_potentials
-from lgmd_gym.neuron.params import LGMDParams
-from lgmd_gym.neuron.response import Response
+from lgmd_gym.kernels.threads import Threads
+from lgmd_gym.neuron.lgmd.params import LGMDParams
+from lgmd_gym.neuron.maps import column_potentials
 from lgmd_gym.neuron.scalars import RESPONSE
-from lgmd_gym.neuron.threads import Threads
 from lgmd_gym.neuron.validation import (
     checked_fps,
     checked_frames,
@@ -52,6 +51,32 @@ class Layer(NamedTuple):
     label: str
     full: float
     signed: bool = False
+
+
+class Response(NamedTuple):
+    """Outputs of a neuron for one frame: Python scalars, or arrays of shape (N,) for N neurons.
+
+    Equation numbers are those of Fu et al. (AIAI 2019).
+
+    Attributes:
+        spike_frequency: Spikes of the last n_ts frames per second [spikes/s] (eq. 12); float or float64.
+        spikes: Number of spikes of this frame (eq. 11); int or int64.
+        membrane_potential: K in [0.5, 1] (eq. 10), k_0 before the first change; float or float64.
+        adapted_potential: K̂, which is K after spike frequency adaptation; float or float64.
+        ffi: Feed-forward inhibition F̂, low-passed mean of `|P|` [grey levels] (eq. 2); float or float64.
+        inhibition_weight: w, the weight of I in S (eq. 9); float or float64.
+        excitation_latency: τ̂_g, the time constant of G [ms] (eq. 9); float or float64.
+        alert: Whether `spike_frequency` >= t_sf ("Coll" in eq. 12); bool.
+    """
+
+    spike_frequency: Any
+    spikes: Any
+    membrane_potential: Any
+    adapted_potential: Any
+    ffi: Any
+    inhibition_weight: Any
+    excitation_latency: Any
+    alert: Any
 
 
 class FrameNeuron:
@@ -233,10 +258,11 @@ class FrameNeuron:
 
     def _response(self) -> Response:
         if self.num is None:
-            frequency, spikes, k, k_hat, f, w, latency, alert = self._scalars[0, RESPONSE].tolist()
-            return Response(frequency, int(spikes), k, k_hat, f, w, latency, alert > 0.0)
-        frequency, spikes, k, k_hat, f, w, latency, alert = self._scalars[:, RESPONSE].T.copy()
-        return Response(frequency, spikes.astype(np.int64), k, k_hat, f, w, latency, alert > 0.0)
+            outputs = dict(zip(Response._fields, self._scalars[0, RESPONSE].tolist(), strict=True))
+            return Response(**outputs | {"spikes": int(outputs["spikes"]), "alert": outputs["alert"] > 0.0})
+        columns = dict(zip(Response._fields, self._scalars[:, RESPONSE].T.copy(), strict=True))
+        spikes, alert = columns["spikes"].astype(np.int64), columns["alert"] > 0.0
+        return Response(**columns | {"spikes": spikes, "alert": alert})
 
     def _use_floats(self) -> None:
         """Process frames as float32 from now on: a frame of another dtype than uint8 was given."""

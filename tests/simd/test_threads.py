@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from lgmd_gym.neuron.threads import Threads
+from lgmd_gym.kernels.threads import Threads
 
 
 @pytest.fixture

@@ -1,12 +1,14 @@
-"""Kernels that shift the state of neurons by whole pixels, as the view turns.
+"""Kernels on the maps of any model: their shift by whole pixels as the view turns, and their columns.
 
 A view that turns to the right by one pixel moves its content one pixel to the left. The state that belongs
 to the content moves with it: element x gets the value of element x + `pixels`. What enters at the side has no
 past: its light is that of the present frame, and its change is 0.
 
-Arguments of all kernels: first neuron and last neuron + 1; neurons to shift, bool, (N,); scalar state, see
-`scalars`, (N, ...); and the shift of each neuron, + for a turn to the right, int64, (N,) [px].
+Arguments of the kernels that shift: first neuron and last neuron + 1; neurons to shift, bool, (N,); scalar
+state, see `scalars`, (N, ...); and the shift of each neuron, + for a turn to the right, int64, (N,) [px].
 """
+
+import math
 
 from numba import njit
 
@@ -70,3 +72,31 @@ def shift_blocks(first, last, active, scalars, pixels, memory, width) -> None:
                     if 0 <= source < width:
                         value = rings[source // LANES, ring, source % LANES]
                     rings[x // LANES, ring, x % LANES] = value
+
+
+@kernel(exact=True, arrays=True)
+def column_potentials(first, last, active, maps, width, sigma, out) -> None:
+    """Write the potential of each column for the active neurons among first..last-1.
+
+    K_c = 1 / (1 + exp(-m_c / sigma)) for the mean m_c of the map over column c.
+
+    Args:
+        first: First neuron.
+        last: Last neuron + 1.
+        active: Selection of the neurons, bool, shape (N,).
+        maps: Maps, float32, shape (N, H, at least width).
+        width: Width of the maps without padding, a multiple of the number of columns [px].
+        sigma: Mean at which K_c = 0.73.
+        out: Output, float64, shape (N, columns).
+    """
+    height, columns = maps.shape[1], out.shape[1]
+    span = width // columns
+    for n in range(first, last):
+        if not active[n]:
+            continue
+        for column in range(columns):
+            total = 0.0
+            for y in range(height):
+                for x in range(column * span, (column + 1) * span):
+                    total += maps[n, y, x]
+            out[n, column] = 1.0 / (1.0 + math.exp(-total / (height * span * sigma)))

@@ -1,39 +1,27 @@
 """SustainedEdges: a detector of edges that stand still in the frame."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lgmd_gym.errors import check_positive
-from lgmd_gym.neuron import sustained_edges_kernels
-from lgmd_gym.neuron.frame_neuron import Layer
-from lgmd_gym.neuron.motion_neuron import MotionNeuron
-from lgmd_gym.neuron.motion_params import ModelParams
-from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
+from lgmd_gym.fields import number, record
+from lgmd_gym.kernels import kernel
+from lgmd_gym.neuron.base import Layer
+from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
+from lgmd_gym.neuron.motion import ModelParams, MotionNeuron, start
 from lgmd_gym.neuron.registry import register
+from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@record
 class SustainedEdgesParams(ModelParams):
-    """Parameters of `SustainedEdges`.
+    """Parameters of `SustainedEdges`."""
 
-    Attributes:
-        tau_ms: Time constant of the low-passed light, > 0 [ms].
-        sigma: Mean edge strength at which K = 0.73, > 0 [grey levels].
-
-    Raises:
-        ValueError: For a value out of range or of another type.
-    """
-
-    tau_ms: float = 200.0
-    sigma: float = 2.0
-
-    def __post_init__(self) -> None:
-        for name in ("tau_ms", "sigma"):
-            object.__setattr__(self, name, check_positive(name, getattr(self, name)))
+    label = "SustainedEdges"
+    tau_ms: float = number(200.0, "(0, inf)", "ms", "Time constant of the low-passed light.")
+    sigma: float = number(2.0, "(0, inf)", "grey levels", "Mean edge strength at which K = 0.73.")
 
     def gains(self, fps: float) -> tuple[float]:
         """Return the gain dt / (dt + τ) of the low-passed light at a frame rate [Hz]."""
@@ -96,9 +84,7 @@ class SustainedEdges(MotionNeuron):
 
     def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
         """Step the active detectors among first..last-1; see `FrameNeuron.step_range`."""
-        sustained_edges_kernels.step(
-            first, last, frames, active, self._scalars, self._const, self._gains[0], *self._maps
-        )
+        _step(first, last, frames, active, self._scalars, self._const, self._gains[0], *self._maps)
 
     @property
     def layers(self) -> dict[str, NDArray[np.float32]]:
@@ -109,6 +95,42 @@ class SustainedEdges(MotionNeuron):
     def column_map(self) -> tuple[NDArray[np.float32], float]:
         """Return the map of the columns; see `FrameNeuron.column_map`."""
         return self._maps[1], self.params.sigma
+
+
+@kernel(exact=True, arrays=True)
+def _step(first, last, frames, active, scalars, const, gain, light, edges) -> None:
+    """Step the active detectors among first..last-1.
+
+    Args:
+        first: First detector.
+        last: Last detector + 1.
+        frames: Frames, (N, H, W).
+        active: Detectors to step, bool, (N,).
+        scalars: Scalar state, see `scalars`, (N, ...).
+        const: Constants of the stage of spikes, see `scalars.pack_constants`.
+        gain: Gain of the low-passed light, float32.
+        light: Low-passed light, float32, (N, H, W).
+        edges: Edge strength, float32, (N, H, W); 0 in the last column.
+    """
+    height, width = frames.shape[1], frames.shape[2]
+    for n in range(first, last):
+        if not active[n]:
+            continue
+        row = scalars[n]
+        if row[AGE] == 0.0:
+            start(frames[n], light[n])
+            row[AGE] = 1.0
+            continue
+        total = 0.0
+        for y in range(height):
+            for x in range(width):
+                light[n, y, x] += gain * (np.float32(frames[n, y, x]) - light[n, y, x])
+            for x in range(width - 1):
+                edges[n, y, x] = abs(light[n, y, x + 1] - light[n, y, x])
+                total += edges[n, y, x]
+        mean = total / (height * width)
+        row[F], row[W], row[LATENCY], row[GAIN_G] = mean, 0.0, 0.0, 1.0
+        fire(row, const, mean)
 
 
 def _make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams) -> SustainedEdges:

@@ -5,9 +5,10 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lgmd_gym.neuron import general_kernel, kernels, shift_kernels, state
-from lgmd_gym.neuron.frame_neuron import FrameNeuron, Layer, Signal, spiking_signals
-from lgmd_gym.neuron.params import LGMDParams, NeuronSpec
+from lgmd_gym.neuron import maps
+from lgmd_gym.neuron.base import FrameNeuron, Layer, Signal, spiking_signals
+from lgmd_gym.neuron.lgmd import general, kernels
+from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.registry import register
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
 from lgmd_gym.neuron.validation import checked_region
@@ -68,9 +69,7 @@ class LGMD(FrameNeuron):
         super().__init__(shape, fps, num, threads)
         self.params = LGMDParams.make(params)
 
-        # I and Ce reach one pixel beyond the mask. A signed S is not 0 there, so its Ce reaches two pixels.
-        margin = 1 if self.params.on_off else 2
-        region = checked_region(self.shape, mask, roi, margin)
+        region = checked_region(self.shape, mask, roi)
         self._y0, self._x0, region_shape, self._weight, n_pixels = region
         self._const = pack_constants(self.params, self.fps, n_pixels)
         self._initial = initial_scalars(self.params)
@@ -78,14 +77,13 @@ class LGMD(FrameNeuron):
         self._previous = np.zeros((self._count, *region_shape), np.uint8)
         self._fast = kernels.supports(self.params)
         if self._fast:
-            self._maps = state.allocate(self._count, region_shape)
+            self._maps = kernels.allocate(self._count, region_shape)
         else:
-            paths = 2 if self.params.on_off else 1
-            self._maps = general_kernel.allocate(self._count, region_shape, self.params.n_p, paths)
+            self._maps = general.allocate(self._count, region_shape, self.params.n_p)
 
     def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
         """Step the active neurons among first..last-1; see `FrameNeuron.step_range`."""
-        kernel = cast(Any, kernels if self._fast else general_kernel).step
+        kernel = cast(Any, kernels if self._fast else general).step
         kernel(
             first, last, frames, self._previous, self._y0, self._x0, self._weight, active, self._scalars,
             self._const, *self._maps,
@@ -101,19 +99,19 @@ class LGMD(FrameNeuron):
     ) -> None:
         """Shift the state of active neurons among first..last-1; see `FrameNeuron.shift_range`."""
         chosen = first, last, active, self._scalars, turns_px
-        shift_kernels.shift_light(*chosen, self._previous, frames, self._y0, self._x0)
+        maps.shift_light(*chosen, self._previous, frames, self._y0, self._x0)
         width = self._previous.shape[2]
         if not self._fast:
             p, e, memory, _, _, g = self._maps
             for values in (p, e, memory, g):
                 rows = values.reshape(self._count, -1, values.shape[-1])
-                shift_kernels.shift_rows(*chosen, rows, values.shape[-1])
+                maps.shift_rows(*chosen, rows, values.shape[-1])
             return
-        p, memory, g = state.shifted_views(self._maps, self._previous.shape[1])
+        p, memory, g = kernels.shifted_views(self._maps, self._previous.shape[1])
         for frame in range(2):
-            shift_kernels.shift_rows(*chosen, p[:, frame], width)
-        shift_kernels.shift_rows(*chosen, g, width)
-        shift_kernels.shift_blocks(*chosen, memory, width)
+            maps.shift_rows(*chosen, p[:, frame], width)
+        maps.shift_rows(*chosen, g, width)
+        maps.shift_blocks(*chosen, memory, width)
 
     @property
     def layers(self) -> dict[str, NDArray[np.float32]]:
@@ -121,9 +119,9 @@ class LGMD(FrameNeuron):
 
         E is `|P|` by path, and I is that of the path which P excites (ON where P >= 0); see `LGMDParams` for
         the equations. All maps are 0 before the first change. Outside the mask, only I of adjacent pixels is
-        not 0; without ON and OFF paths, their S and G are not 0 either.
+        not 0.
         """
-        read = cast(Any, state if self._fast else general_kernel).layers
+        read = cast(Any, kernels if self._fast else general).layers
         maps = read(self._scalars, self._const, *self._maps)
         h, w = self._previous.shape[1:]
         images: dict[str, NDArray[np.float32]] = {}

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lgmd_gym.neuron.params import LGMDParams
-from lgmd_gym.neuron.response import Response
+from lgmd_gym.neuron.base import Response
+from lgmd_gym.neuron.lgmd.params import LGMDParams
 
 Map = NDArray[np.float64]
 
@@ -57,12 +57,12 @@ class ReferenceLGMD:
         p, zeros = self.params, np.zeros(self.mask.shape)
         self.luminance: Map | None = None
         self.past_p = [zeros] * p.n_p
-        self.paths = [zeros, zeros] if p.on_off else [zeros]
+        self.paths = [zeros, zeros]
         self.delayed = [[zeros] * 3 for _ in self.paths]
-        self.f_hat = self.f_last = 0.0
+        self.f_hat = 0.0
         self.first_change = True
         self.k = self.k_hat = p.k_0
-        self.window = [0] * (p.n_ts + p.extra_frame)
+        self.window = [0] * p.window
         self.g = zeros
         self.layers = dict.fromkeys("PEISG", zeros)
 
@@ -76,7 +76,7 @@ class ReferenceLGMD:
         luminance = np.asarray(frame, float) * self.mask
         if self.luminance is None:
             self.luminance = luminance
-            return Response(0.0, 0, self.k, self.k_hat, 0.0, p.sigma_1, self.latency(0.0), False)
+            return self.response(0.0, 0, 0.0, p.sigma_1)
         photo = luminance - self.luminance  # eq. 1
         for a, past in zip(p.persistence, self.past_p, strict=True):
             photo = photo + a * past
@@ -94,12 +94,12 @@ class ReferenceLGMD:
         return self.fire(potential.sum(), f, w)
 
     def feed_forward(self, photo: Map) -> float:
-        """Return F with its delay (eq. 2)."""
+        """Return F (eq. 2)."""
         p = self.params
         f = np.abs(photo).sum() / self.n
         start = p.warm_start and self.first_change
-        before, self.f_hat = self.f_hat, f if start else self.f_hat + self.gain(p.tau_1) * (f - self.f_hat)
-        return before if p.ffi_delay else self.f_hat
+        self.f_hat = f if start else self.f_hat + self.gain(p.tau_1) * (f - self.f_hat)
+        return self.f_hat
 
     def latency(self, f: float) -> float:
         """Return the time constant of G [ms] (eq. 9)."""
@@ -112,16 +112,10 @@ class ReferenceLGMD:
     def summation(self, photo: Map, w: float) -> Map:
         """Return S (eq. 3 to 8)."""
         p = self.params
-        half_waves = [np.maximum(photo, 0), np.maximum(-photo, 0)] if p.on_off else [photo]  # eq. 3
-        residue = p.on_off_residue if p.on_off else 0.0
-        last, self.paths = (
-            self.paths,
-            [now + residue * old for now, old in zip(half_waves, self.paths, strict=True)],
-        )
-        inhibition = [self.inhibition(i, last[i]) for i in range(len(self.paths))]
-        if not p.on_off:
-            self.layers |= {"E": photo, "I": inhibition[0]}
-            return photo - w * inhibition[0]
+        half_waves = np.maximum(photo, 0), np.maximum(-photo, 0)  # eq. 3
+        last = self.paths
+        self.paths = [now + p.on_off_residue * old for now, old in zip(half_waves, last, strict=True)]
+        inhibition = [self.inhibition(i, last[i]) for i in range(2)]
         s_on, s_off = (np.maximum(0, e - w * i) for e, i in zip(self.paths, inhibition, strict=True))  # eq. 7
         self.layers |= {"E": sum(self.paths), "I": np.where(photo >= 0, *inhibition)}
         return p.theta_1 * s_on + p.theta_2 * s_off + p.theta_3 * s_on * s_off  # eq. 8
@@ -156,9 +150,20 @@ class ReferenceLGMD:
         self.k_hat = max(0.5, keep * (self.k_hat + rise if rise <= p.t_sfa else k))
         self.k = k
         potential = self.k_hat if p.spikes_from == "adapted" else self.k
-        spikes = int(min(p.max_spikes, math.floor(math.exp(p.sigma_4 * (potential - p.t_sp)))))
+        spikes = math.floor(math.exp(p.sigma_4 * (potential - p.t_sp)))
         self.window = [*self.window[1:], spikes]
         rate = 1000.0 / self.dt if p.whole_ms else self.fps
-        frequency = sum(self.window) * rate / p.n_ts
-        alert = frequency >= p.t_sf
-        return Response(frequency, spikes, k, self.k_hat, f, w, self.latency(f), alert)
+        return self.response(sum(self.window) * rate / p.n_ts, spikes, f, w)
+
+    def response(self, frequency: float, spikes: int, f: float, w: float) -> Response:
+        """Return the outputs of a frame."""
+        return Response(
+            spike_frequency=frequency,
+            spikes=spikes,
+            membrane_potential=self.k,
+            adapted_potential=self.k_hat,
+            ffi=f,
+            inhibition_weight=w,
+            excitation_latency=self.latency(f),
+            alert=frequency >= self.params.t_sf,
+        )

@@ -1,0 +1,162 @@
+"""What the models beside the LGMD share: parameters, the base class, and kernels of motion detectors.
+
+Equation numbers are those in the docstring of `LPLC2`.
+"""
+
+import math
+from typing import Any, ClassVar
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from lgmd_gym.fields import Record, number, record
+from lgmd_gym.kernels import kernel
+from lgmd_gym.neuron.base import FrameNeuron, Signal, spiking_signals
+from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
+from lgmd_gym.neuron.maps import shift_light, shift_rows
+from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
+
+
+@record
+class ModelParams(Record):
+    """Base class of the parameters of a model with the spikes of the LGMD."""
+
+    sigma: float = number(1.0, "(0, inf)", "grey levels", "Response at which K = 0.73.")
+
+    def gains(self, fps: float) -> tuple[float, ...]:
+        """Return the gains of the model's filters at a frame rate [Hz]."""
+        raise NotImplementedError
+
+
+@record
+class MotionParams(ModelParams):
+    """Parameters of motion detectors; see `LPLC2` for the equations."""
+
+    tau_mean_ms: float = number(
+        100.0, "(0, inf)", "ms", "Time constant of the mean light that photoreceptors subtract."
+    )
+    tau_delay_ms: float = number(
+        30.0, "(0, inf)", "ms", "Time constant of the delay of the motion detectors."
+    )
+
+    def gains(self, fps: float) -> tuple[float, float]:
+        """Return the gains dt / (dt + τ) of the mean light and of the delay at a frame rate [Hz]."""
+        dt = 1000.0 / fps
+        return dt / (dt + self.tau_mean_ms), dt / (dt + self.tau_delay_ms)
+
+
+class MotionNeuron(FrameNeuron):
+    """One or N neurons of a model of its own, with the membrane potential and the spikes of the LGMD.
+
+    The first map of a subclass is its low-passed light; `_past` selects the other maps that the next frame
+    depends on.
+
+    Args:
+        shape: (height, width) of the frames [px].
+        fps: Frame rate [Hz].
+        num: Number of neurons N, each with its own frames; None for a single one with scalar outputs.
+        threads: Number of threads that share the neurons of a step; None or 1 for the calling thread only.
+        params: Parameters of the model.
+        spikes: Parameters of the adaptation and the spikes; None for those of the paper.
+    """
+
+    _past: ClassVar[slice]
+    _lowest: ClassVar[float] = 0.5  # lower bound of K
+
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        fps: float,
+        num: int | None,
+        threads: int | None,
+        params: ModelParams,
+        spikes: NeuronSpec,
+    ) -> None:
+        super().__init__(shape, fps, num, threads)
+        self._stage = stage = LGMDParams.make(spikes)
+        self._initial = initial_scalars(stage)
+        self._scalars = np.tile(self._initial, (self._count, 1))
+        constants = LGMDParams.make({**stage.to_dict(), "sigma_3": params.sigma})
+        self._const = pack_constants(constants, self.fps, n_pixels=1)
+        self._gains = np.array(params.gains(self.fps), np.float32)
+
+    @property
+    def signals(self) -> dict[str, Signal]:
+        """Bounds and units of the outputs; no motion or edge is stronger than the range of grey levels."""
+        return spiking_signals(self._stage, self.fps, self._lowest, 255.0)
+
+    def shift_range(
+        self,
+        first: int,
+        last: int,
+        frames: NDArray[Any],
+        active: NDArray[np.bool_],
+        turns_px: NDArray[np.int64],
+    ) -> None:
+        """Shift the state of active neurons among first..last-1; see `FrameNeuron.shift_range`."""
+        chosen = first, last, active, self._scalars, turns_px
+        shift_light(*chosen, self._maps[0], frames, 0, 0)
+        for values in self._maps[self._past]:
+            shift_rows(*chosen, values, self.shape[1])
+
+
+@kernel(exact=True, arrays=True)
+def start(frame, mean):
+    """Set the mean light to the first frame."""
+    for y in range(mean.shape[0]):
+        for x in range(mean.shape[1]):
+            mean[y, x] = frame[y, x]
+
+
+@kernel(exact=True, arrays=True)
+def filter_light(frame, mean, on, off, gain):
+    """Subtract the mean light and split the difference into ON and OFF (eq. 1 and 2)."""
+    height, width = mean.shape
+    for y in range(height):
+        for x in range(width):
+            change = np.float32(frame[y, x]) - mean[y, x]
+            mean[y, x] += gain * change
+            on[y, x], off[y, x] = max(change, np.float32(0.0)), max(-change, np.float32(0.0))
+
+
+@njit(inline="always")
+def _compressed(correlation):
+    """Return the signed square root."""
+    return math.copysign(math.sqrt(abs(correlation)), correlation)
+
+
+@kernel(exact=True, arrays=True)
+def detect_motion_right(on, off, late_on, late_off, right):
+    """Correlate each pixel with the next one to the right (eq. 4); return the sums of m and |m|."""
+    height, width = on.shape
+    total = strength = 0.0
+    for y in range(height):
+        for x in range(width - 1):
+            value = late_on[y, x] * on[y, x + 1] - on[y, x] * late_on[y, x + 1]
+            value += late_off[y, x] * off[y, x + 1] - off[y, x] * late_off[y, x + 1]
+            right[y, x] = _compressed(value)
+            total += right[y, x]
+            strength += abs(right[y, x])
+    return total, strength
+
+
+@kernel(exact=True, arrays=True)
+def detect_motion_down(on, off, late_on, late_off, down):
+    """Correlate each pixel with the next one below (eq. 4)."""
+    height, width = on.shape
+    for y in range(height - 1):
+        for x in range(width):
+            value = late_on[y, x] * on[y + 1, x] - on[y, x] * late_on[y + 1, x]
+            value += late_off[y, x] * off[y + 1, x] - off[y, x] * late_off[y + 1, x]
+            down[y, x] = _compressed(value)
+
+
+@kernel(exact=True, arrays=True)
+def update_delay(on, off, late_on, late_off, gain):
+    """Update the delayed ON and OFF (eq. 3)."""
+    height, width = on.shape
+    for y in range(height):
+        for x in range(width):
+            late_on[y, x] += gain * (on[y, x] - late_on[y, x])
+            late_off[y, x] += gain * (off[y, x] - late_off[y, x])
