@@ -17,6 +17,7 @@ Example:
 """
 
 import dataclasses
+import inspect
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
@@ -208,7 +209,7 @@ def record(cls: _R) -> _R:
     made: Any = dataclasses.dataclass(frozen=True, slots=True, kw_only=True)(cls)
     lines = [f"    {item.name}: {_documentation(item)}" for item in declarations(made)]
     if lines and "Attributes:" not in (made.__doc__ or ""):
-        made.__doc__ = "\n".join([(made.__doc__ or "").rstrip(), "", "Attributes:", *lines, ""])
+        made.__doc__ = "\n".join([inspect.cleandoc(made.__doc__ or ""), "", "Attributes:", *lines, ""])
     return made
 
 
