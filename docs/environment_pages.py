@@ -11,9 +11,8 @@ from reference_returns import AGENTS, EXAMPLE, Returns, arguments_of
 from lgmd_gym.envs import env_id
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.families.data import scenario_from_data
-from lgmd_gym.envs.registration import RANDOM_TASKS, SCENARIO
+from lgmd_gym.envs.registration import RANDOM_TASKS, SCENARIO, traffic_id
 from lgmd_gym.envs.traffic.env import TrafficEnv
-from lgmd_gym.envs.traffic.registration import traffic_id
 from lgmd_gym.report.gallery.cards import ScenarioCard, parse_docstring, scenario_cards
 
 VIDEO_AGENT = "spike-threshold"

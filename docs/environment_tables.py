@@ -10,13 +10,11 @@ from gymnasium import spaces
 
 from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.braking import BrakingEnv
-from lgmd_gym.envs.dynamics.bend import Bend
 from lgmd_gym.envs.dynamics.brake import BrakeParams
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Bend, Segment
 from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
-from lgmd_gym.envs.registration import APPEARANCE, RANDOM_TASKS, SCENARIO, make_braking
+from lgmd_gym.envs.registration import APPEARANCE, RANDOM_TASKS, SCENARIO, make_braking, make_traffic
 from lgmd_gym.envs.reward import RewardParams
-from lgmd_gym.envs.traffic.registration import make_traffic
 from lgmd_gym.report.gallery.cards import DocumentedArgument, ScenarioCard, parse_docstring
 from lgmd_gym.wrappers.observation import LGMDObservation
 

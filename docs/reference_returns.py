@@ -18,8 +18,7 @@ import lgmd_gym  # noqa: F401  (registers the environments)
 from lgmd_gym.agents import Agent, make_agent
 from lgmd_gym.benchmark.episode import rollout
 from lgmd_gym.envs import FAMILIES, env_id
-from lgmd_gym.envs.registration import RANDOM_TASKS, SCENARIO
-from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
+from lgmd_gym.envs.registration import RANDOM_TASKS, SCENARIO, TRAFFIC_KINDS, traffic_id
 
 AGENTS = ("random", "no-brake", "spike-threshold", "ttc-oracle")
 """Agents in the order of the tables; "random" draws every action from the action space."""
@@ -71,7 +70,7 @@ class RandomActions(Agent):
 def environments() -> dict[str, int]:
     """Return the ids of all environments with their numbers of episodes."""
     braking = {env_id(name): EPISODES for name in (*FAMILIES, *RANDOM_TASKS, SCENARIO)}
-    return braking | {traffic_id(kind): TRAFFIC_EPISODES for kind in KINDS}
+    return braking | {traffic_id(kind): TRAFFIC_EPISODES for kind in TRAFFIC_KINDS}
 
 
 def arguments_of(name: str) -> dict[str, Any]:

@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from lgmd_gym.envs.braking import BrakingEnv
-    from lgmd_gym.envs.dynamics.bend import Bend
-    from lgmd_gym.envs.dynamics.segment import Segment
+    from lgmd_gym.envs.dynamics.script import Bend, Segment
     from lgmd_gym.envs.families import FAMILIES, make_scenario
     from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
-    from lgmd_gym.envs.own_families import import_families
-    from lgmd_gym.envs.registration import env_id, register_envs, register_family
+    from lgmd_gym.envs.registration import env_id, import_families, register_envs, register_family
 
 __all__ = [
     "FAMILIES",
@@ -37,10 +35,10 @@ _MODULES = {
     "env_id": "registration",
     "register_envs": "registration",
     "register_family": "registration",
-    "import_families": "own_families",
+    "import_families": "registration",
     "Actor": "families.scenario",
-    "Bend": "dynamics.bend",
-    "Segment": "dynamics.segment",
+    "Bend": "dynamics.script",
+    "Segment": "dynamics.script",
     "RoadPlan": "families.scenario",
     "Scenario": "families.scenario",
 }

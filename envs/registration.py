@@ -1,16 +1,19 @@
-"""Registration of the braking environments with Gymnasium."""
+"""Registration of the environments with Gymnasium, and of the user's scenario families."""
 
 import inspect
 from collections.abc import Callable, Iterable
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium as gym
+from gymnasium.envs.registration import load_env_creator
 
 from lgmd_gym.envs.families import FAMILIES, make_scenario
 from lgmd_gym.envs.families.data import scenario_from_data
 from lgmd_gym.envs.families.family import Family
 from lgmd_gym.envs.families.family import family as add_family
-from lgmd_gym.errors import check_keys, check_known, check_text
+from lgmd_gym.errors import check_keys, check_known, check_text, shown, unknown_name
+from lgmd_gym.processes.user_modules import import_user_module
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
@@ -197,3 +200,134 @@ def with_camera(env: gym.Env, camera: "CameraSpec | None", *observation: Any) ->
     from lgmd_gym.wrappers.observation import LGMDObservation
 
     return LGMDObservation(env, camera, *observation)
+
+
+def import_families(modules: Iterable[str]) -> None:
+    """Import modules that define scenario families, and register the families and their ids.
+
+    Args:
+        modules: "MODULE" for a module that calls `register_family`, or "MODULE:NAME" for a function or class
+            in it, which is registered under its name. Modules may be in the working directory.
+
+    Raises:
+        ValueError: If a module cannot be imported, or defines no such family.
+    """
+    for text in modules:
+        module_name, _, name = check_text("module", text).partition(":")
+        module = import_user_module(module_name, f"module {shown(module_name)}")
+        if name:
+            _register(module, name)
+        elif not _families_of(module_name):
+            raise ValueError(
+                f"module {module_name!r} registers no scenario family; decorate a function with "
+                f"@register_family('NAME'), or pass {module_name}:FUNCTION"
+            )
+    register_envs()
+
+
+def is_own(family: str) -> bool:
+    """Return whether a registered family is defined outside this package."""
+    return not _module_of(family).startswith("lgmd_gym.")
+
+
+def _register(module: ModuleType, name: str) -> None:
+    """Register a function or class of a module under its name, unless it is registered."""
+    if name in _families_of(module.__name__):
+        return
+    function = getattr(module, name, None)
+    if function is None:
+        known = {*_families_of(module.__name__), *(key for key in vars(module) if not key.startswith("_"))}
+        raise unknown_name(f"family of module {module.__name__}", name, known)
+    if function not in FAMILIES.values():
+        register_family(name)(function)
+
+
+def _families_of(module: str) -> list[str]:
+    """Return the families that are defined in a module or, for a package, below it."""
+    return [name for name in FAMILIES if f"{_module_of(name)}.".startswith(f"{module}.")]
+
+
+def _module_of(family: str) -> str:
+    return str(getattr(FAMILIES[family], "__module__", ""))
+
+
+if TYPE_CHECKING:
+    from lgmd_gym.camera import CameraSpec
+    from lgmd_gym.envs.traffic.env import TrafficEnv
+    from lgmd_gym.neuron import NeuronSpec
+
+# Entry points rather than classes, so that registering the ids does not import highway-env.
+TRAFFIC_KINDS: dict[str, str] = {
+    "highway": "lgmd_gym.envs.traffic.kinds:HighwayTraffic",
+    "merge": "lgmd_gym.envs.traffic.kinds:MergeTraffic",
+    "two-way": "lgmd_gym.envs.traffic.kinds:TwoWayTraffic",
+    "intersection": "lgmd_gym.envs.traffic.kinds:IntersectionTraffic",
+    "roundabout": "lgmd_gym.envs.traffic.kinds:RoundaboutTraffic",
+}
+
+
+def traffic_id(kind: str) -> str:
+    """Return the Gymnasium id of a kind of traffic, `LGMD/Traffic-TwoWay-v0` for "two-way"."""
+    return env_id(f"Traffic-{kind.title().replace('-', '')}")
+
+
+def register_traffic() -> None:
+    """Register the id of every kind of traffic; idempotent."""
+    for kind in TRAFFIC_KINDS:
+        if traffic_id(kind) not in gym.registry:
+            arguments = {"kind": kind, "split": "train"}
+            gym.register(traffic_id(kind), entry_point=f"{__name__}:make_traffic", kwargs=arguments)
+
+
+def find_kind(kind: str) -> "type[TrafficEnv]":
+    """Return the environment class of a kind of traffic.
+
+    Raises:
+        ValueError: If the kind is unknown.
+    """
+    check_known("kind of traffic", kind, TRAFFIC_KINDS)
+    return load_env_creator(TRAFFIC_KINDS[kind])  # type: ignore[return-value]
+
+
+def make_traffic(
+    kind: str,
+    camera: "CameraSpec | None" = "fovea",
+    params: "NeuronSpec | None" = None,
+    fps: float | None = None,
+    include_frame: bool = False,
+    include_base: bool = False,
+    trace: bool = False,
+    config: dict[str, Any] | None = None,
+    render_mode: str | None = None,
+    world: int | str | None = None,
+    condition: str = "clear",
+    road: str | None = None,
+    split: str = "train",
+) -> gym.Env:
+    """Return a traffic environment inside `LGMDObservation`, or without it for `camera=None`.
+
+    This is the entry point of the registered ids: prefer `gym.make(traffic_id(kind), ...)`.
+
+    Args:
+        kind: A key of `TRAFFIC_KINDS`.
+        camera: See `LGMDObservation`; None for no camera.
+        params: See `LGMDObservation`.
+        fps: See `LGMDObservation`.
+        include_frame: See `LGMDObservation`.
+        include_base: See `LGMDObservation`.
+        trace: See `LGMDObservation`.
+        config: Configuration of `TrafficEnv`.
+        render_mode: None, "rgb_array" or "human".
+        world: Number of the world, 0 to 9,999, or "laboratory"; None to draw one of the split at each reset.
+        condition: Camera condition, see `lgmd_gym.camera.CONDITIONS`, or "mixed" for that of the world.
+        road: See `lgmd_gym.envs.appearance.Appearance`.
+        split: See `lgmd_gym.envs.appearance.Appearance`.
+
+    Raises:
+        ValueError: If a kind, key or name is unknown, or a value is out of range.
+    """
+    from lgmd_gym.envs.appearance import Appearance
+
+    env = find_kind(kind)(config=config, render_mode=render_mode)
+    env.appearance = Appearance(world=world, condition=condition, road=road, split=split)
+    return with_camera(env, camera, params, fps, include_frame, include_base, trace)

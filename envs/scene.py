@@ -15,9 +15,8 @@ from lgmd_gym.camera.objects import (
     MODEL_MOTORCYCLE,
     MODEL_PEDESTRIAN,
 )
-from lgmd_gym.envs.dynamics.arrays import Arrays
 from lgmd_gym.envs.dynamics.bodies import BICYCLE, CAR, MOTORCYCLE, PEDESTRIAN, ROAD_MARKING
-from lgmd_gym.envs.dynamics.episode import Physics
+from lgmd_gym.envs.dynamics.episode import Arrays, Physics
 from lgmd_gym.kernels import kernel
 
 

@@ -10,7 +10,7 @@ from highway_env.envs.common.action import ActionType
 from highway_env.envs.common.observation import ObservationType
 
 from lgmd_gym.envs.dynamics.units import MAX_SPEED
-from lgmd_gym.envs.simulation.vehicles import EgoCar
+from lgmd_gym.envs.highway.road import EgoCar
 from lgmd_gym.errors import check_items, check_keys, check_known, check_within
 
 if TYPE_CHECKING:

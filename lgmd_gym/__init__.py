@@ -12,8 +12,7 @@ if not all(Path(__file__).with_name(link).is_dir() for link in ("envs", "agents"
     __path__.append(str(Path(__file__).parents[1]))
 
 from lgmd_gym._version import __version__
-from lgmd_gym.envs.registration import register_envs
-from lgmd_gym.envs.traffic.registration import register_traffic
+from lgmd_gym.envs.registration import register_envs, register_traffic
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import BirdsEye, CameraParams, EgoCamera

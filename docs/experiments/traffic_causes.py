@@ -36,7 +36,7 @@ from lgmd_gym.benchmark.stored_run import StoredRun, read_run
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.traffic.replay import EVENT_PAUSE
 from lgmd_gym.camera.worlds import LABORATORY
-from lgmd_gym.envs.traffic.registration import KINDS
+from lgmd_gym.envs.registration import TRAFFIC_KINDS
 from lgmd_gym.rendering.playback import make_target
 
 SITUATIONS = ("car ahead", "crossing", "oncoming", "other", "none")
@@ -109,7 +109,7 @@ def first_event(config: RunConfig, agent_name: str, row: Row) -> Onset:
 
 def table(onsets: Sequence[tuple[str, Onset]]) -> list[str]:
     """Return the lines of the table of the kinds of traffic and the onsets."""
-    kinds = [kind for kind in KINDS if any(kind == item for item, _ in onsets)]
+    kinds = [kind for kind in TRAFFIC_KINDS if any(kind == item for item, _ in onsets)]
     lines = [["in front of the ego", *kinds, "all", "ego speed [m/s]", "distance [m]"]]
     lines.append(["---"] * len(lines[0]))
     for name in SITUATIONS:

@@ -7,9 +7,8 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.brake import next_part
 from lgmd_gym.envs.dynamics.contact import Rectangle
-from lgmd_gym.envs.dynamics.longitudinal import advance
+from lgmd_gym.envs.dynamics.longitudinal import SCRIPT_FIELDS, advance, step_script
 from lgmd_gym.envs.dynamics.path import centre_at
-from lgmd_gym.envs.dynamics.speed_profile import SCRIPT_FIELDS, step_script
 from lgmd_gym.envs.dynamics.units import MAX_SPEED
 from lgmd_gym.kernels import kernel
 
@@ -51,8 +50,10 @@ def copy_motion(source: Any, target: Any) -> None:
     target.speed, target.acceleration = source.speed, source.acceleration
     target.script_speed, target.script_acceleration = source.script_speed, source.script_acceleration
     target.script_time, target.segment, target.segment_end = (
-        source.script_time, source.segment, source.segment_end,
-    )  # fmt: skip
+        source.script_time,
+        source.segment,
+        source.segment_end,
+    )
 
 
 @kernel(exact=True)
@@ -86,9 +87,16 @@ def step_actor(body: Any, segments: np.ndarray, paths: np.ndarray, dt: float) ->
 
 @kernel(exact=True)
 def step_ego(
-    body: Any, ego: Any, line: Any, pending: np.ndarray, brake: Any, segments: np.ndarray,
-    paths: np.ndarray, parts: np.ndarray, dt: float,
-) -> None:  # fmt: skip
+    body: Any,
+    ego: Any,
+    line: Any,
+    pending: np.ndarray,
+    brake: Any,
+    segments: np.ndarray,
+    paths: np.ndarray,
+    parts: np.ndarray,
+    dt: float,
+) -> None:
     """Advance the ego by `dt` [s] under its delayed demands.
 
     Args:

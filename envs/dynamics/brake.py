@@ -1,12 +1,12 @@
 """The ego's brake: latency and dead time, then a linear build-up of the deceleration."""
 
-from dataclasses import dataclass
 from math import ceil, inf
 from typing import Any
 
 import numpy as np
 
-from lgmd_gym.errors import check_flag, check_whole, check_within
+from lgmd_gym.errors import check_flag, check_whole
+from lgmd_gym.fields import Record, number, record
 from lgmd_gym.kernels import kernel
 
 DELAY_LINE = np.dtype(
@@ -30,35 +30,33 @@ BRAKE = np.dtype(
 """`BrakeParams` for the compiled functions; `throttle` is 1 if demands above 0 have an effect, else 0."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BrakeParams:
-    """Response of the ego to a longitudinal demand.
+@record
+class BrakeParams(Record):
+    """Response of the ego to a longitudinal demand."""
 
-    Attributes:
-        max_deceleration: Full braking [m/s²]; 9.0 is typical of a dry road with a peak braking coefficient
-            of 0.9.
-        max_acceleration: Full throttle [m/s²].
-        latency: Time from the end of a camera frame to the demand at the brake [s]; one frame at 30 Hz.
-        dead_time: Time from the demand to the first deceleration [s].
-        build_up: Time from the first to the full deceleration, a linear ramp [s].
-        regain_acceleration: Limit of the acceleration with which the driver regains the scripted speed
-            [m/s²].
-    """
-
-    max_deceleration: float = 9.0
-    max_acceleration: float = 3.0
-    latency: float = 1.0 / 30.0
-    dead_time: float = 0.1
-    build_up: float = 0.2
-    regain_acceleration: float = 2.0
-
-    def __post_init__(self) -> None:
-        check_within("max_deceleration", self.max_deceleration, 0.1, 12.0, "m/s²")
-        check_within("max_acceleration", self.max_acceleration, 0.0, 12.0, "m/s²")
-        check_within("latency", self.latency, 0.0, 2.0, "s")
-        check_within("dead_time", self.dead_time, 0.0, 2.0, "s")
-        check_within("build_up", self.build_up, 0.0, 5.0, "s")
-        check_within("regain_acceleration", self.regain_acceleration, 0.0, 12.0, "m/s²")
+    max_deceleration: float = number(
+        9.0,
+        "[0.1, 12]",
+        "m/s²",
+        "Full braking; 9.0 is typical of a dry road with a peak braking coefficient of 0.9.",
+    )
+    max_acceleration: float = number(3.0, "[0, 12]", "m/s²", "Full throttle.")
+    latency: float = number(
+        1.0 / 30.0,
+        "[0, 2]",
+        "s",
+        "Time from the end of a camera frame to the demand at the brake; one frame at 30 Hz.",
+    )
+    dead_time: float = number(0.1, "[0, 2]", "s", "Time from the demand to the first deceleration.")
+    build_up: float = number(
+        0.2, "[0, 5]", "s", "Time from the first to the full deceleration, a linear ramp."
+    )
+    regain_acceleration: float = number(
+        2.0,
+        "[0, 12]",
+        "m/s²",
+        "Limit of the acceleration with which the driver regains the scripted speed.",
+    )
 
     @property
     def jerk(self) -> float:
@@ -76,8 +74,11 @@ class BrakeParams:
 
     def record(self, throttle: bool) -> np.ndarray:
         """Return the parameters as a `BRAKE` record of shape ()."""
-        values = (self.max_deceleration, self.max_acceleration, self.jerk, self.delay)
-        return np.array((*values, self.regain_acceleration, float(throttle)), BRAKE)
+        record = np.zeros((), BRAKE)
+        for name in ("max_deceleration", "max_acceleration", "jerk", "delay", "regain_acceleration"):
+            record[name] = getattr(self, name)
+        record["throttle"] = throttle
+        return record
 
 
 # Ranges of `draw_brake`.

@@ -1,14 +1,23 @@
-"""One simulation step of all bodies with contact detection, and the end of an episode."""
+"""One simulation step of all bodies with contact detection, and the end of an episode.
 
-from math import cos, inf, sin
-from typing import Any, NamedTuple
+The contact of bodies that turn or change their speed is found by cutting the step into short parts. The
+speeds and distances at their ends are exact: the motion of the step is repeated up to that time.
+"""
+
+from math import cos, hypot, inf, isnan, sin
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.arrays import Arrays
 from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING, copy_motion, move, step_actor, step_ego
-from lgmd_gym.envs.dynamics.refined_contact import StepMotion, progress, touch_time, uniform_touch
+from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
+from lgmd_gym.envs.dynamics.longitudinal import advance, step_script
+from lgmd_gym.envs.dynamics.path import centre_at
 from lgmd_gym.kernels import kernel
+
+Arrays: TypeAlias = tuple[Any, ...]
+"""The fields of a NamedTuple of arrays, or the NamedTuple itself, which is slower to pass from Python."""
+
 
 PASSED_DISTANCE = 2.0  # [m] behind the ego's rear beyond which an actor has been passed
 
@@ -64,16 +73,34 @@ def step_environment(i: int, dt: float, physics: Arrays) -> None:
     """Advance environment i by `dt` [s]; see `step_bodies`."""
     physics = Physics(*physics)
     step_bodies(
-        physics.bodies[i], physics.episodes[i], physics.egos[i], physics.lines[i], physics.pending[i],
-        physics.brakes[i], physics.segments[i], physics.paths[i], physics.before[i], physics.parts[i], dt,
-    )  # fmt: skip
+        physics.bodies[i],
+        physics.episodes[i],
+        physics.egos[i],
+        physics.lines[i],
+        physics.pending[i],
+        physics.brakes[i],
+        physics.segments[i],
+        physics.paths[i],
+        physics.before[i],
+        physics.parts[i],
+        dt,
+    )
 
 
 @kernel(exact=True)
 def step_bodies(
-    bodies: np.ndarray, episode: Any, ego: Any, line: Any, pending: np.ndarray, brake: Any,
-    segments: np.ndarray, paths: np.ndarray, before: np.ndarray, parts: np.ndarray, dt: float,
-) -> None:  # fmt: skip
+    bodies: np.ndarray,
+    episode: Any,
+    ego: Any,
+    line: Any,
+    pending: np.ndarray,
+    brake: Any,
+    segments: np.ndarray,
+    paths: np.ndarray,
+    before: np.ndarray,
+    parts: np.ndarray,
+    dt: float,
+) -> None:
     """Advance all bodies by `dt` [s], or up to the ego's first contact; after it they do not move.
 
     Args:
@@ -201,3 +228,129 @@ def speed_along_ego(ego: Any, body: Any) -> float:
 def is_truncated(episode: Any) -> bool:
     """Return whether the scenario's duration has passed."""
     return episode.time >= episode.duration - 1e-9
+
+
+PARTS = 16  # of a step
+
+
+class StepMotion(NamedTuple):
+    """What the motion of the bodies within a step depends on.
+
+    Attributes:
+        before: `STEP_START` records of the bodies, and one more as scratch memory.
+        parts: See `step_ego`.
+        jerk: Slope of every change of the ego's acceleration [m/s³].
+        segments: Table of the scripts' segments.
+        paths: Table of the paths' cells.
+        dt: Duration of the step [s].
+    """
+
+    before: np.ndarray
+    parts: np.ndarray
+    jerk: float
+    segments: np.ndarray
+    paths: np.ndarray
+    dt: float
+
+
+@kernel(exact=True)
+def progress(bodies: np.ndarray, i: int, step: Any, part: float) -> tuple[float, float]:
+    """Return the distance [m] that a body has covered after a part of a step, and its speed there [m/s].
+
+    Args:
+        bodies: `BODY` records after the step, the ego first.
+        i: Index of the body.
+        step: `StepMotion`.
+        part: Time as a part of the step, in [0, 1].
+    """
+    body, before = bodies[i], step.before[i]
+    if before.speed == body.speed:
+        return part * (body.travelled - before.travelled), body.speed
+    moving = step.before[len(step.before) - 1]
+    copy_motion(before, moving)
+    if i > 0:
+        distance = step_script(moving, step.segments, part * step.dt)
+        return distance, moving.script_speed
+    return _ego_progress(moving, step, part * step.dt)
+
+
+@kernel(exact=True)
+def _ego_progress(moving: Any, step: Any, time: float) -> tuple[float, float]:
+    """Advance the motion of the ego by a time [s] as `step_ego` did; return distance [m] and speed [m/s]."""
+    distance, row = 0.0, 0
+    while time > 0.0:
+        duration, target = min(step.parts[row, 0], time), step.parts[row, 1]
+        if isnan(target):
+            distance += step_script(moving, step.segments, duration)
+            moving.speed, moving.acceleration = moving.script_speed, moving.script_acceleration
+        else:
+            moved = advance(moving.speed, moving.acceleration, target, step.jerk, duration)
+            distance += moved[0]
+            moving.speed, moving.acceleration = moved[1], moved[2]
+        time -= duration
+        row += 1
+    return distance, moving.speed
+
+
+@kernel(exact=True)
+def uniform_touch(ego: Any, body: Any, ego_before: Any, before: Any) -> float:
+    """Return the first touch of two bodies in straight, uniform motion in a step as a part of it; else `inf`.
+
+    Args:
+        ego: Record of the ego after the step: position, heading and size.
+        body: The same of the other body.
+        ego_before: Record of the ego before the step: position and heading.
+        before: The same of the other body.
+    """
+    start = Rectangle(ego_before.x, ego_before.y, ego_before.heading, ego.length, ego.width)
+    old = Rectangle(before.x, before.y, before.heading, body.length, body.width)
+    return first_touch(start, old, ego.x - start.x - (body.x - old.x), ego.y - start.y - (body.y - old.y))
+
+
+@kernel(exact=True)
+def touch_time(bodies: np.ndarray, i: int, step: Any) -> float:
+    """Return the time of the first touch of the ego and body i as a part of a step; `inf` without a touch.
+
+    Args:
+        bodies: `BODY` records after the step, the ego first.
+        i: Index of the other body.
+        step: `StepMotion`.
+    """
+    ego, body, ego_before, before = bodies[0], bodies[i], step.before[0], step.before[i]
+    moved = abs(ego.travelled - ego_before.travelled) + abs(body.travelled - before.travelled)
+    reach = hypot(ego.length, ego.width) / 2 + hypot(body.length, body.width) / 2
+    if hypot(ego_before.x - before.x, ego_before.y - before.y) > reach + moved:
+        return inf
+    a, c = _outline_at(bodies, 0, step, 0.0), _outline_at(bodies, i, step, 0.0)
+    for number in range(PARTS):
+        later = (number + 1.0) / PARTS
+        b, d = _outline_at(bodies, 0, step, later), _outline_at(bodies, i, step, later)
+        touch = touch_between(a, b, c, d)
+        if touch <= 1.0:
+            return (number + touch) / PARTS
+        a, c = b, d
+    return inf
+
+
+@kernel(exact=True)
+def _outline_at(bodies: np.ndarray, i: int, step: Any, part: float) -> Rectangle:
+    """Return the outline of a body at a part of a step."""
+    body, start = bodies[i], step.before[i].travelled
+    if body.travelled == start:
+        return Rectangle(body.x, body.y, body.heading, body.length, body.width)
+    distance, _ = progress(bodies, i, step, part)
+    pose = centre_at(step.paths[body.path : body.path_end], start + distance, body.reference)
+    return Rectangle(pose.x, pose.y, pose.heading, body.length, body.width)
+
+
+@kernel(exact=True)
+def touch_between(a: Rectangle, b: Rectangle, c: Rectangle, d: Rectangle) -> float:
+    """Return the first touch of bodies that move from outline a to b and from c to d; see `first_touch`."""
+    dx, dy = (b.x - a.x) - (d.x - c.x), (b.y - a.y) - (d.y - c.y)
+    return first_touch(_turned_half(a, b), _turned_half(c, d), dx, dy)
+
+
+@kernel(exact=True)
+def _turned_half(start: Rectangle, end: Rectangle) -> Rectangle:
+    """Return the first outline with the mean heading of both."""
+    return Rectangle(start.x, start.y, (start.heading + end.heading) / 2, start.length, start.width)

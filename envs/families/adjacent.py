@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose, lane_change
+from lgmd_gym.envs.dynamics.script import Bend, Pose, lane_change
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.families.arguments import (
     FAST_KMH,

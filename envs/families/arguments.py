@@ -9,7 +9,7 @@ import numpy as np
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.fields import choice, flag, number, optional, value, whole
 
-Draw = Callable[[np.random.Generator], dict[str, Any]]
+DrawArguments = Callable[[np.random.Generator], dict[str, Any]]
 """Draws the arguments of a family."""
 SPEED_KMH = (10.0, 80.0)
 FAST_KMH = (80.0, 130.0)  # of a motorway
@@ -61,30 +61,30 @@ LeftCurve = Annotated[bool, truth("Whether the curve turns left; otherwise right
 
 
 def uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """Draw a number."""
+    """DrawArguments a number."""
     return float(rng.uniform(low, high))
 
 
 def speed_kmh(rng: np.random.Generator, low: float = SPEED_KMH[0], high: float = SPEED_KMH[1]) -> float:
-    """Draw a speed between limits in km/h, and return it in m/s."""
+    """DrawArguments a speed between limits in km/h, and return it in m/s."""
     return uniform(rng, low, high) * KMH
 
 
 def either(rng: np.random.Generator) -> bool:
-    """Draw True or False."""
+    """DrawArguments True or False."""
     return bool(rng.random() < 0.5)
 
 
 def side(rng: np.random.Generator) -> str:
-    """Draw "left" or "right"."""
+    """DrawArguments "left" or "right"."""
     return "left" if either(rng) else "right"
 
 
-def ego_speed(low: float = SPEED_KMH[0], high: float = SPEED_KMH[1]) -> Draw:
+def ego_speed(low: float = SPEED_KMH[0], high: float = SPEED_KMH[1]) -> DrawArguments:
     """Return a function that draws the ego speed alone, between limits in km/h."""
     return lambda rng: {"ego_speed": speed_kmh(rng, low, high)}
 
 
-def fast(draw: Draw) -> Draw:
+def fast(draw: DrawArguments) -> DrawArguments:
     """Return a draw with the ego speed of a motorway."""
     return lambda rng: draw(rng) | {"ego_speed": speed_kmh(rng, *FAST_KMH)}

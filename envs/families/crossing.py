@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.arguments import (
     EgoSpeed,
@@ -196,7 +196,7 @@ def _road(distance: float, side: str) -> RoadPlan:
 def _time_to_cover(distance: float, profile: tuple[Segment, ...]) -> float:
     """Return the time that a car needs for a distance from a standstill [s]."""
     # A module that loads numba; the registration of the scenario families must not.
-    from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
+    from lgmd_gym.envs.dynamics.longitudinal import SpeedProfile
 
     script, covered, step = SpeedProfile(0.0, profile), 0.0, 1e-3
     while covered < distance:

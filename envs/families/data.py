@@ -18,8 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.bend import Bend
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Bend, Segment
 from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
 from lgmd_gym.errors import check_keys, check_type
 

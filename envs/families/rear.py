@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.arguments import (
     HEADWAY,

@@ -3,7 +3,7 @@
 from math import pi
 from typing import Any, NamedTuple
 
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.dynamics.units import MIN_SPEED
 from lgmd_gym.envs.families.scenario import (
     ADULT_SIZE,

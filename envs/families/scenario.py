@@ -5,8 +5,7 @@ from functools import partial
 from math import cos, sin
 from typing import Any
 
-from lgmd_gym.envs.dynamics.bend import Bend
-from lgmd_gym.envs.dynamics.segment import Segment, check_profile
+from lgmd_gym.envs.dynamics.script import Bend, Segment, check_profile
 from lgmd_gym.envs.dynamics.units import check_speed
 from lgmd_gym.errors import check_finite, check_items, check_known, check_type, check_whole, shown
 from lgmd_gym.fields import Record, number, optional, record, text, value, whole

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose, turn
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Bend, Pose, Segment, turn
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.families.arguments import (
     ClothesShade,
@@ -291,7 +290,7 @@ def turning_ego(speed: float, left: bool, contact: tuple[float, Pose]) -> Turnin
 def _rear_path(turn: Turn, left: bool) -> tuple[Bend, ...]:
     """Return the path of the rear axle from the time at which the front axle begins the turn."""
     # A module that loads numba; the registration of the scenario families must not.
-    from lgmd_gym.envs.dynamics.steered_path import rear_axle_path
+    from lgmd_gym.envs.dynamics.path import rear_axle_path
 
     return rear_axle_path(turn.bends(left), WHEELBASE)
 

@@ -14,8 +14,8 @@ from lgmd_gym.envs import surrogate_safety
 from lgmd_gym.envs.appearance import Appearance, brake_of, world_number
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.envs.spaces import ContinuousDemand, DiscreteDemand, EgoState, make_action
-from lgmd_gym.envs.traffic.ego import TrafficEgo
-from lgmd_gym.envs.traffic.need import required_deceleration
+from lgmd_gym.envs.surrogate_safety import required_deceleration
+from lgmd_gym.envs.traffic.cars import TrafficEgo
 from lgmd_gym.envs.traffic.road import TrafficRoad
 
 JAM_TIME, JAM_SPEED = 10.0, 0.5  # [s], [m/s]: the episode ends after this time below this speed
@@ -139,7 +139,7 @@ class TrafficEnv(EgoBrakeEnv):
         return super().default_config() | {
             "observation": {"type": "TrafficState"},
             "action": {"type": "TrafficDemand"},
-            "other_vehicles_type": "lgmd_gym.envs.traffic.drivers.TrafficCar",
+            "other_vehicles_type": "lgmd_gym.envs.traffic.cars.TrafficCar",
             "simulation_frequency": 30,
             "duration": 60,
             # Without it, drivers ignore cars beyond the end of their own lane section.

@@ -8,7 +8,7 @@ from highway_env.envs.merge_env import MergeGenericEnv
 from highway_env.envs.roundabout_env import RoundaboutEnv
 from highway_env.envs.two_way_env import TwoWayEnv
 
-from lgmd_gym.envs.traffic.drivers import TrafficCar
+from lgmd_gym.envs.traffic.cars import TrafficCar
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.envs.traffic.road import TrafficRoad
 
@@ -79,7 +79,7 @@ class IntersectionTraffic(TrafficEnv, IntersectionEnv):
     regulated: ClassVar[bool] = True
     warm_up: ClassVar[float] = 0.0  # highway-env simulates 3 s before the episode
     settings: ClassVar[dict[str, Any]] = {
-        "other_vehicles_type": "lgmd_gym.envs.traffic.drivers.IntersectionCar",
+        "other_vehicles_type": "lgmd_gym.envs.traffic.cars.IntersectionCar",
         "destination": None,
         "initial_vehicle_count": 8,
         "spawn_probability": 0.35,

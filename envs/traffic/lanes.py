@@ -6,7 +6,7 @@ import numpy as np
 from highway_env.road.lane import CircularLane, SineLane
 from highway_env.road.road import RoadNetwork
 
-from lgmd_gym.envs.traffic.places import CIRCLE, LANE, SINE, STRAIGHT, project
+from lgmd_gym.envs.traffic.kernels import CIRCLE, LANE, SINE, STRAIGHT, project
 
 
 class LaneTable:

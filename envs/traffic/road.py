@@ -12,12 +12,21 @@ from highway_env.vehicle.objects import Landmark
 
 from lgmd_gym.envs.dynamics.bodies import BODY, BOX
 from lgmd_gym.envs.dynamics.contact import Contact
-from lgmd_gym.envs.dynamics.refined_contact import PARTS
-from lgmd_gym.envs.traffic.contacts import contact_time, find_contact, mark_collisions
-from lgmd_gym.envs.traffic.ego import TrafficEgo
-from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, decide, move
+from lgmd_gym.envs.dynamics.episode import PARTS
+from lgmd_gym.envs.traffic.cars import TrafficEgo
+from lgmd_gym.envs.traffic.kernels import (
+    ALL_DONE,
+    CAR,
+    CAR_STATE,
+    TAU_PURSUIT,
+    contact_time,
+    decide,
+    find_contact,
+    locate,
+    mark_collisions,
+    move,
+)
 from lgmd_gym.envs.traffic.lanes import LaneTable
-from lgmd_gym.envs.traffic.places import ALL_DONE, CAR, CAR_STATE, locate
 
 
 class TrafficRoad(RegulatedRoad):

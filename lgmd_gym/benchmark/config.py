@@ -19,7 +19,7 @@ from lgmd_gym.camera.spec import check_camera
 from lgmd_gym.camera.worlds import SPLIT_WORLDS, WORLDS
 from lgmd_gym.envs.appearance import MIXED, Appearance
 from lgmd_gym.envs.families.scenario import Scenario
-from lgmd_gym.envs.traffic.registration import KINDS
+from lgmd_gym.envs.registration import TRAFFIC_KINDS
 from lgmd_gym.errors import as_tuple, check_items, check_keys, check_known, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
 
@@ -96,8 +96,8 @@ class RunConfig:
         }
         Appearance(road=self.road)  # checks it
         if self.suite == TRAFFIC:
-            kinds = tuple(KINDS) if self.kinds is None else self.kinds
-            values["kinds"] = _names("kinds", kinds, "kind of traffic", KINDS)
+            kinds = tuple(TRAFFIC_KINDS) if self.kinds is None else self.kinds
+            values["kinds"] = _names("kinds", kinds, "kind of traffic", TRAFFIC_KINDS)
         for name, value in values.items():
             object.__setattr__(self, name, value)
 

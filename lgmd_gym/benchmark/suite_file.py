@@ -45,8 +45,15 @@ from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, Suite, find_suite
 from lgmd_gym.benchmark.trust import check_named
 from lgmd_gym.envs.families import FAMILIES
 from lgmd_gym.envs.families.scenario import Scenario
-from lgmd_gym.envs.own_families import import_families, is_own
-from lgmd_gym.envs.registration import APPEARANCE, RANDOM, SCENARIO, SCENARIO_ARGUMENT, make_source
+from lgmd_gym.envs.registration import (
+    APPEARANCE,
+    RANDOM,
+    SCENARIO,
+    SCENARIO_ARGUMENT,
+    import_families,
+    is_own,
+    make_source,
+)
 from lgmd_gym.errors import check_items, check_keys, check_known, check_path, check_text, counted
 from lgmd_gym.openscenario import read, read_all
 

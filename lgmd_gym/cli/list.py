@@ -53,7 +53,7 @@ def run(options: List) -> int:
 def suites() -> Table:
     """Return the suites with their number of cases per family."""
     from lgmd_gym.benchmark.suites import SUITES, TRAFFIC
-    from lgmd_gym.envs.traffic.registration import KINDS
+    from lgmd_gym.envs.registration import TRAFFIC_KINDS
 
     table = Table("suite", "cases", "description", title="suites")
     for name, suite in SUITES.items():
@@ -64,7 +64,7 @@ def suites() -> Table:
         families = ", ".join(f"{family} {count}" for family, count in counts.items())
         table.add_row(name, str(len(suite.cases)), _entry(suite.about, "families", families))
     description = "IDM traffic on highway-env's roads; the agent can only brake; false activations per 100 km"
-    table.add_row(TRAFFIC, "one per\nseed", _entry(description, "kinds", ", ".join(KINDS)))
+    table.add_row(TRAFFIC, "one per\nseed", _entry(description, "kinds", ", ".join(TRAFFIC_KINDS)))
     return table
 
 

@@ -3,8 +3,7 @@
 import numpy as np
 
 from lgmd_gym.envs.decisions import Clock
-from lgmd_gym.envs.dynamics.arrays import Arrays
-from lgmd_gym.envs.dynamics.episode import Physics, step_environment
+from lgmd_gym.envs.dynamics.episode import Arrays, Physics, step_environment
 from lgmd_gym.envs.scene import SceneArrays, write_scene
 from lgmd_gym.kernels import kernel
 

@@ -8,7 +8,7 @@ from lgmd_gym.engine.episodes import Prepared
 from lgmd_gym.engine.simulation import Simulation
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.episode_source import FixedScenario
-from lgmd_gym.envs.simulation.road import BrakingRoad
+from lgmd_gym.envs.highway.road import BrakingRoad
 
 
 class TopViews:

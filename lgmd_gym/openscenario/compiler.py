@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from math import hypot, inf, pi, remainder
 from pathlib import Path
 
-from lgmd_gym.envs.dynamics.bend import Bend
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Bend, Segment
 from lgmd_gym.envs.families.scenario import AFTERMATH, START_TTC, Actor, Scenario
 from lgmd_gym.openscenario.catalogs import Catalogs
 from lgmd_gym.openscenario.entities import Mover, read_entities

@@ -12,8 +12,7 @@ from xml.etree import ElementTree as ET
 
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.camera import CLEAR
-from lgmd_gym.envs.dynamics.bend import Bend
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Bend, Segment
 from lgmd_gym.envs.families.scenario import Actor, Scenario
 from lgmd_gym.errors import check_path, check_type
 from lgmd_gym.openscenario.compiler import DURATION

@@ -3,8 +3,8 @@
 from math import pi
 from xml.etree import ElementTree as ET
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose
 from lgmd_gym.envs.dynamics.path import Path
+from lgmd_gym.envs.dynamics.script import Bend, Pose
 from lgmd_gym.envs.families.scenario import LANE_WIDTH, RoadPlan
 
 BEHIND, AHEAD, ARM = 300.0, 6000.0, 250.0  # [m], extent of straight roads, and of crossing roads

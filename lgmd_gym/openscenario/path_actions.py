@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from math import cos, inf, pi
 
-from lgmd_gym.envs.dynamics.steered_path import rear_axle_path
+from lgmd_gym.envs.dynamics.path import rear_axle_path
 from lgmd_gym.openscenario.entities import Mover, reads_front_axle
 from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.paths import Place, Track

@@ -5,8 +5,8 @@ from functools import cached_property
 from math import cos, hypot, inf, sin
 from typing import NamedTuple
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose
 from lgmd_gym.envs.dynamics.path import Path
+from lgmd_gym.envs.dynamics.script import Bend, Pose
 
 _SHORTEST = 1e-9  # [m], below which a section of a path is dropped
 

@@ -7,7 +7,7 @@ from heapq import heappop, heappush
 from pathlib import Path
 from typing import NamedTuple
 
-from lgmd_gym.envs.dynamics.bend import Bend
+from lgmd_gym.envs.dynamics.script import Bend
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.openscenario.nodes import Element, Node, parse_file
 from lgmd_gym.openscenario.paths import Place, Track

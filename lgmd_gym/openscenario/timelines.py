@@ -5,7 +5,7 @@ from dataclasses import replace
 from math import inf, sqrt
 from typing import NamedTuple
 
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Segment
 
 _CLOSE = 1e-9  # [m/s], [m] or [s]
 

@@ -2,7 +2,7 @@
 
 from math import atan2, pi, remainder
 
-from lgmd_gym.envs.dynamics.bend import Bend
+from lgmd_gym.envs.dynamics.script import Bend
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.openscenario.catalogs import Catalogs
 from lgmd_gym.openscenario.entities import Mover

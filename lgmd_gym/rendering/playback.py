@@ -15,7 +15,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, find_case
 from lgmd_gym.clips import VideoWriter
 from lgmd_gym.envs import env_id
-from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
+from lgmd_gym.envs.registration import TRAFFIC_KINDS, traffic_id
 from lgmd_gym.errors import unknown_name
 from lgmd_gym.rendering.dashboard import SIZE
 from lgmd_gym.rendering.display import checked_overlays
@@ -61,7 +61,7 @@ def make_target(target: str | Case, arguments: dict[str, Any], **options: Any) -
     if isinstance(target, Case):
         chosen = {**dict(target.arguments), **arguments}
         return gym.make(env_id(target.family), **options, **chosen)
-    traffic = {f"{TRAFFIC}/{kind}": traffic_id(kind) for kind in KINDS}
+    traffic = {f"{TRAFFIC}/{kind}": traffic_id(kind) for kind in TRAFFIC_KINDS}
     target = traffic.get(target, target)
     if target in traffic.values() and arguments:
         raise ValueError(f"{target} must have no scenario arguments, got {', '.join(arguments)}; remove them")

@@ -13,7 +13,7 @@ from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
 from lgmd_gym.camera import CameraSpec
 from lgmd_gym.camera.spec import check_camera
-from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
+from lgmd_gym.envs.registration import TRAFFIC_KINDS, traffic_id
 from lgmd_gym.errors import (
     check_items,
     check_keys,
@@ -221,7 +221,7 @@ class TrainConfig:
         traffic, follow from the seed; the seeds below `SEED_STRIDE` are those of validation and test.
         """
         has_levels = "split" in gym.spec(self.env_id).kwargs and "split" not in self.env_kwargs
-        return SEED_STRIDE * (self.seed + (not has_levels or self.env_id in map(traffic_id, KINDS)))
+        return SEED_STRIDE * (self.seed + (not has_levels or self.env_id in map(traffic_id, TRAFFIC_KINDS)))
 
     def features_of(self, split: str) -> FeatureConfig:
         """Return the inputs and timing of the policy; rewards are scaled on "train" only."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from lgmd_gym.envs.families.distribution import EXTRA_FAMILIES, check_families
-from lgmd_gym.envs.traffic.registration import KINDS
+from lgmd_gym.envs.registration import TRAFFIC_KINDS
 from lgmd_gym.errors import check_known, check_whole, shown
 
 LEVELS_EXAMPLE = f"400:{','.join(EXTRA_FAMILIES[:2])}"
@@ -40,7 +40,7 @@ def parse_traffic(text: str) -> ExtraEpisodes:
     """
     count, kinds = _split("extra_traffic", text, TRAFFIC_EXAMPLE)
     for kind in kinds:
-        check_known("kind of traffic", kind, KINDS)
+        check_known("kind of traffic", kind, TRAFFIC_KINDS)
     _check_once("extra_traffic", text, "kind", kinds)
     return ExtraEpisodes(count, tuple(kinds))
 

@@ -14,7 +14,7 @@ import lgmd_gym
 from lgmd_gym.agents import HOLD
 from lgmd_gym.agents.policies.features import FRAME
 from lgmd_gym.camera import BirdsEye
-from lgmd_gym.envs.traffic.registration import KINDS
+from lgmd_gym.envs.registration import TRAFFIC_KINDS
 from lgmd_gym.sensing.cameras import make_cameras
 from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
 from lgmd_gym.training.extra_episodes import ExtraEpisodes, parse_levels, parse_traffic
@@ -86,7 +86,7 @@ def _traffic_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
     sets = []
     if config.traffic_episodes:
         option = f" --traffic-episodes {config.traffic_episodes}"
-        usual = ExtraEpisodes(config.traffic_episodes, tuple(KINDS))
+        usual = ExtraEpisodes(config.traffic_episodes, tuple(TRAFFIC_KINDS))
         sets.append(_traffic_set(config, split, 0, usual, option))
     option = f" --extra-traffic {' '.join(config.extra_traffic)}"
     for number, text in enumerate(config.extra_traffic, 1):

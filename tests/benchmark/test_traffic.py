@@ -21,8 +21,8 @@ from lgmd_gym.benchmark.traffic.rows import KEYS, BrakingEvent, measure
 from lgmd_gym.benchmark.traffic.schedule import CameraSchedule
 from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.dynamics.brake import draw_brake
+from lgmd_gym.envs.registration import TRAFFIC_KINDS, register_traffic, traffic_id
 from lgmd_gym.envs.traffic.emergencies import Emergencies
-from lgmd_gym.envs.traffic.registration import KINDS, register_traffic, traffic_id
 
 SENSORS = SensorConfig()
 SHORT = {"duration": 12}
@@ -62,8 +62,8 @@ def merge():
 @pytest.fixture
 def wall_kinds(monkeypatch):
     """Registers an empty road as "empty" and one with a stationary car 50 m ahead as "wall"."""
-    monkeypatch.setitem(KINDS, "empty", "support.traffic:EmptyHighway")
-    monkeypatch.setitem(KINDS, "wall", "support.traffic:BlockedHighway")
+    monkeypatch.setitem(TRAFFIC_KINDS, "empty", "support.traffic:EmptyHighway")
+    monkeypatch.setitem(TRAFFIC_KINDS, "wall", "support.traffic:BlockedHighway")
     register_traffic()
     yield
     for kind in ("empty", "wall"):
@@ -213,7 +213,9 @@ def test_rows_of_a_batch_equal_those_of_single_drives():
     assert batch[-1]["brakes"] > 0
 
 
-@pytest.mark.parametrize("kind", ["wall", *(pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS)])
+@pytest.mark.parametrize(
+    "kind", ["wall", *(pytest.param(kind, marks=pytest.mark.slow) for kind in TRAFFIC_KINDS)]
+)
 def test_cameras_that_are_not_read_do_not_change_the_row(monkeypatch, wall_kinds, kind):
     """The rule brakes for the stationary car of "wall"."""
     task = TrafficTask((Drive(kind, 0, ("nested-fields",)),), SENSORS)
@@ -224,7 +226,7 @@ def test_cameras_that_are_not_read_do_not_change_the_row(monkeypatch, wall_kinds
 
 
 def test_failure_in_one_drive_leaves_the_others(monkeypatch, wall_kinds):
-    monkeypatch.setitem(KINDS, "empty", "support.traffic:Missing")
+    monkeypatch.setitem(TRAFFIC_KINDS, "empty", "support.traffic:Missing")
     drives = (Drive("empty", 0, ("no-brake",)), Drive("wall", 0, ("no-brake",)))
     failed, played = run_traffic_task(TrafficTask(drives, SENSORS))
     assert "Missing" in failed["error"]

@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 from support.records import bodies, brake_of, record, records
 
-from lgmd_gym.envs.dynamics.bend import Pose, arc
 from lgmd_gym.envs.dynamics.bodies import BOX, EGO_STATE, ROAD_MARKING, STEP_START
 from lgmd_gym.envs.dynamics.brake import DELAY_LINE
-from lgmd_gym.envs.dynamics.contact import Contact, Rectangle, first_touch, touched_side
-from lgmd_gym.envs.dynamics.episode import EPISODE, first_contact_of, step_bodies
+from lgmd_gym.envs.dynamics.contact import (
+    Contact,
+    PathMotion,
+    Rectangle,
+    first_touch,
+    gap_on_path,
+    time_on_paths,
+    touched_side,
+)
+from lgmd_gym.envs.dynamics.episode import EPISODE, StepMotion, first_contact_of, step_bodies
 from lgmd_gym.envs.dynamics.path import path_table, pose_at
-from lgmd_gym.envs.dynamics.refined_contact import StepMotion
-from lgmd_gym.envs.dynamics.swept_contact import PathMotion, gap_on_path, time_on_paths
+from lgmd_gym.envs.dynamics.script import Pose, arc
 
 NO_SEGMENTS = np.zeros((0, 4))
 ORIGIN = Pose(0.0, 0.0, 0.0)

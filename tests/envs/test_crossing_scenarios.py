@@ -10,7 +10,7 @@ import pytest
 from numba import config
 from support.scenarios import check_actor, invalid, scenario
 
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Segment
 
 
 @pytest.mark.parametrize(("side", "sign"), [("right", 1), ("left", -1)])

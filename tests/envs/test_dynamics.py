@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from lgmd_gym.envs.dynamics.brake import BrakeParams, DelayLine
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch, touched_side
-from lgmd_gym.envs.dynamics.longitudinal import advance, time_to_stop
-from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
+from lgmd_gym.envs.dynamics.longitudinal import SpeedProfile, advance, time_to_stop
+from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.families.scenario import Actor, Scenario
 
 

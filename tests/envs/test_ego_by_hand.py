@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from support.records import bodies, brake_of, record
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose, arc
 from lgmd_gym.envs.dynamics.bodies import BOX, EGO_STATE, move, step_actor, step_ego
 from lgmd_gym.envs.dynamics.brake import DELAY_LINE, next_part, put_demand
 from lgmd_gym.envs.dynamics.path import path_table
+from lgmd_gym.envs.dynamics.script import Bend, Pose, arc
 
 NO_SEGMENTS = np.zeros((0, 4))
 ORIGIN = Pose(0.0, 0.0, 0.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from support.records import bodies, record
 
-from lgmd_gym.envs.dynamics.bend import Pose
 from lgmd_gym.envs.dynamics.bodies import ROAD_MARKING
 from lgmd_gym.envs.dynamics.episode import EPISODE, is_terminated, is_truncated
+from lgmd_gym.envs.dynamics.script import Pose
 
 NO_SEGMENTS = np.zeros((0, 4))
 ORIGIN = Pose(0.0, 0.0, 0.0)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from support.records import bodies, record
 
-from lgmd_gym.envs.dynamics.bend import Pose, arc
 from lgmd_gym.envs.dynamics.bodies import (
     BICYCLE,
     BOX,
@@ -20,6 +19,7 @@ from lgmd_gym.envs.dynamics.bodies import (
 from lgmd_gym.envs.dynamics.brake import BRAKE, BrakeParams
 from lgmd_gym.envs.dynamics.episode import EPISODE
 from lgmd_gym.envs.dynamics.path import path_table, pose_at
+from lgmd_gym.envs.dynamics.script import Pose, arc
 from lgmd_gym.envs.info import INFO, write_info
 from lgmd_gym.envs.reward import REWARD, RewardParams, step_reward
 from lgmd_gym.envs.surrogate_safety import (

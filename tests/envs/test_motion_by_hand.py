@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 from support.records import record
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose, arc, turn
-from lgmd_gym.envs.dynamics.longitudinal import advance, time_to_stop
+from lgmd_gym.envs.dynamics.longitudinal import (
+    SCRIPT_FIELDS,
+    advance,
+    segment_table,
+    step_script,
+    time_to_stop,
+)
 from lgmd_gym.envs.dynamics.path import path_table, pose_at
-from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.dynamics.speed_profile import SCRIPT_FIELDS, segment_table, step_script
+from lgmd_gym.envs.dynamics.script import Bend, Pose, Segment, arc, turn
 from lgmd_gym.envs.dynamics.units import check_speed
 from lgmd_gym.errors import check_within
 

@@ -5,8 +5,8 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose, arc, lane_change, turn
 from lgmd_gym.envs.dynamics.path import Path
+from lgmd_gym.envs.dynamics.script import Bend, Pose, arc, lane_change, turn
 
 ORIGIN = Pose(0.0, 0.0, 0.0)
 

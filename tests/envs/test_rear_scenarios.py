@@ -9,7 +9,7 @@ from math import pi
 import pytest
 from support.scenarios import check_actor, invalid, scenario
 
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.families.scenario import RoadPlan
 
 

@@ -7,8 +7,8 @@ import pytest
 from support.reference_physics import PASSED_DISTANCE, Body, Ego, Motion
 
 from lgmd_gym.envs import FAMILIES, BrakingEnv, make_scenario
-from lgmd_gym.envs.dynamics.bend import Pose
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
+from lgmd_gym.envs.dynamics.script import Pose
 
 
 class ReferenceEpisode:

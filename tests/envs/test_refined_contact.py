@@ -7,10 +7,9 @@ import pytest
 from support.records import bodies, records
 
 from lgmd_gym.envs import BrakingEnv
-from lgmd_gym.envs.dynamics.bend import arc
 from lgmd_gym.envs.dynamics.bodies import STEP_START
-from lgmd_gym.envs.dynamics.refined_contact import StepMotion, progress
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.episode import StepMotion, progress
+from lgmd_gym.envs.dynamics.script import Segment, arc
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.scenario import Actor, Scenario
 

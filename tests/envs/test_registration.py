@@ -13,7 +13,7 @@ import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym import LGMDObservation
 from lgmd_gym.envs import FAMILIES, env_id
 from lgmd_gym.envs.families.family import family
-from lgmd_gym.envs.traffic.registration import KINDS, find_kind, traffic_id
+from lgmd_gym.envs.registration import TRAFFIC_KINDS, find_kind, traffic_id
 
 TRAFFIC_IDS = {
     "LGMD/Traffic-Highway-v0",
@@ -28,7 +28,7 @@ def test_registered_ids():
     ids = {name for name in gym.registry if name.startswith("LGMD/")}
     random = {"LGMD/RandomBraking-v0", "LGMD/RandomBrakingEasy-v0"}
     assert ids == {*map(env_id, FAMILIES), "LGMD/Scenario-v0"} | random | TRAFFIC_IDS
-    assert {traffic_id(kind) for kind in KINDS} == TRAFFIC_IDS
+    assert {traffic_id(kind) for kind in TRAFFIC_KINDS} == TRAFFIC_IDS
 
 
 def test_registration_does_not_import_highway_env():

@@ -4,9 +4,8 @@ from math import cos, hypot, pi, sin
 
 import pytest
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose, arc, turn
-from lgmd_gym.envs.dynamics.path import Path
-from lgmd_gym.envs.dynamics.steered_path import rear_axle_path
+from lgmd_gym.envs.dynamics.path import Path, rear_axle_path
+from lgmd_gym.envs.dynamics.script import Bend, Pose, arc, turn
 
 WHEELBASE = 2.67
 PATHS = {

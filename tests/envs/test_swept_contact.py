@@ -6,10 +6,9 @@ from math import hypot, inf
 import numpy as np
 import pytest
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose
-from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
+from lgmd_gym.envs.dynamics.contact import PathMotion, Rectangle, first_touch, gap_on_path, time_on_paths
 from lgmd_gym.envs.dynamics.path import Path
-from lgmd_gym.envs.dynamics.swept_contact import PathMotion, gap_on_path, time_on_paths
+from lgmd_gym.envs.dynamics.script import Bend, Pose
 
 TIME_HORIZON, TIME_STEP = 10.0, 0.1  # [s]
 GAP_HORIZON, GAP_STEP = 300.0, 1.0  # [m]

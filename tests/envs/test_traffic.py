@@ -17,12 +17,10 @@ from support.records import records
 from support.traffic import BRAKE, HOLD, BlockedHighway, EmptyHighway, car_states, run_for
 
 from lgmd_gym.envs.dynamics.brake import draw_brake
-from lgmd_gym.envs.traffic.contacts import contact_time
-from lgmd_gym.envs.traffic.drivers import TrafficCar
-from lgmd_gym.envs.traffic.kernels import TAU_PURSUIT, idm, steer
+from lgmd_gym.envs.registration import TRAFFIC_KINDS, find_kind, make_traffic
+from lgmd_gym.envs.traffic.cars import TrafficCar
+from lgmd_gym.envs.traffic.kernels import CAR, TAU_PURSUIT, contact_time, idm, neighbours, steer
 from lgmd_gym.envs.traffic.lanes import LaneTable
-from lgmd_gym.envs.traffic.places import CAR, neighbours
-from lgmd_gym.envs.traffic.registration import KINDS, find_kind, make_traffic
 from lgmd_gym.envs.traffic.road import TrafficRoad
 
 TESTS = Path(__file__).parents[1]
@@ -36,7 +34,7 @@ def test_traffic_does_not_depend_on_the_process_or_on_other_environments():
     try:
         IntersectionEnv()  # changes the class of highway-env's cars
         assert IDMVehicle.DISTANCE_WANTED == 7
-        assert sorted(car_states(list(KINDS)[::-1])) == sorted(other.splitlines())
+        assert sorted(car_states(list(TRAFFIC_KINDS)[::-1])) == sorted(other.splitlines())
     finally:
         IDMVehicle.DISTANCE_WANTED, IDMVehicle.COMFORT_ACC_MAX, IDMVehicle.COMFORT_ACC_MIN = before
 
@@ -80,7 +78,7 @@ def lane_changes(road):
     "kind",
     [
         pytest.param(kind, marks=[] if kind in ("highway", "intersection") else [pytest.mark.slow])
-        for kind in KINDS
+        for kind in TRAFFIC_KINDS
     ],
 )
 def test_cars_move_as_on_a_road_of_highway_env(kind):
@@ -107,7 +105,7 @@ def test_cars_move_as_on_a_road_of_highway_env(kind):
     assert changes > 0 or kind in ("two-way", "intersection", "roundabout"), "no lane change"
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", TRAFFIC_KINDS)
 def test_drivers_and_neighbour_searches_equal_highway_env(kind):
     """Neighbours, lanes, IDM accelerations and steering angles equal those of the original methods."""
     env = make_traffic(kind, camera=None)
@@ -134,7 +132,7 @@ def test_drivers_and_neighbour_searches_equal_highway_env(kind):
             assert car.speed >= 0.0
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", TRAFFIC_KINDS)
 def test_episode_moves_within_its_spaces(kind):
     env = make_traffic(kind, camera=None, config={"duration": 8})
     observation, _ = env.reset(seed=2)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from support.traffic import run_for
 
-from lgmd_gym.envs.traffic.drivers import HEADWAYS
-from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
+from lgmd_gym.envs.registration import TRAFFIC_KINDS, make_traffic
+from lgmd_gym.envs.traffic.cars import HEADWAYS
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", TRAFFIC_KINDS)
 def test_drivers_draw_their_headways_from_the_seed(kind):
     wanted = []
     for seed in (1, 1, 2):

@@ -7,9 +7,9 @@ import pytest
 from support.traffic import BlockedHighway, run_for
 
 from lgmd_gym.envs.dynamics.bodies import BODY
+from lgmd_gym.envs.registration import make_traffic
+from lgmd_gym.envs.surrogate_safety import outline_after, required_deceleration
 from lgmd_gym.envs.traffic.emergencies import simulate_driver
-from lgmd_gym.envs.traffic.need import outline_after, required_deceleration
-from lgmd_gym.envs.traffic.registration import make_traffic
 
 EGO = {"speed": 20.0, "length": 4.0, "width": 2.0}
 

@@ -9,8 +9,7 @@ from math import pi, sqrt
 import pytest
 from support.scenarios import check_actor, invalid, scenario, shape
 
-from lgmd_gym.envs.dynamics.bend import Bend
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Bend, Segment
 
 
 def kmh(value):

@@ -12,8 +12,7 @@ from lgmd_gym.benchmark.task import Result
 from lgmd_gym.cli import main as cli
 from lgmd_gym.clips import VideoReader
 from lgmd_gym.envs import FAMILIES
-from lgmd_gym.envs.registration import RANDOM_TASKS
-from lgmd_gym.envs.traffic.registration import KINDS
+from lgmd_gym.envs.registration import RANDOM_TASKS, TRAFFIC_KINDS
 from lgmd_gym.report.gallery.build import AgentOutcome, evaluate_agents, make_gallery, render_page
 from lgmd_gym.report.gallery.cards import ROADS, camera_sheet, parse_docstring, road_sheet, scenario_cards
 
@@ -70,8 +69,8 @@ def test_outcome_of_rows(rows, text, passed):
 
 def test_every_family_and_kind_of_traffic_has_a_card():
     cards = {card.name: card for card in scenario_cards()}
-    assert set(cards) == {*FAMILIES, "RandomBraking", "RandomBrakingEasy", *KINDS}
-    assert {name for name, card in cards.items() if card.traffic} == set(KINDS)
+    assert set(cards) == {*FAMILIES, "RandomBraking", "RandomBrakingEasy", *TRAFFIC_KINDS}
+    assert {name for name, card in cards.items() if card.traffic} == set(TRAFFIC_KINDS)
     docstring = cards["CCRs"].docstring
     assert "(Car-to-Car Rear stationary)" in docstring.summary
     assert [argument.name for argument in docstring.arguments][:2] == ["ego_speed", "lateral_offset"]

@@ -26,18 +26,15 @@ MODULES = {
             "longitudinal",
             "brake",
             "bodies",
-            "speed_profile",
             "path",
-            "bend",
+            "script",
             "units",
             "episode",
         ),
         _under("tests/envs", *_HAND, "test_path", "test_formulas", "test_drawn_brake"),
         ("__deepcopy__", "DelayLine", "SpeedProfile", "step_environment"),
     ),
-    "contact": Module(
-        _under("envs/dynamics", "contact", "swept_contact"), ("tests/envs/test_contact_by_hand.py",)
-    ),
+    "contact": Module(_under("envs/dynamics", "contact"), ("tests/envs/test_contact_by_hand.py",)),
     "scenarios": Module(
         _under("envs/families", "adjacent", "crossing", "obstacles", "rear", "scenario", "turning"),
         (*_under("tests/envs", *(f"test_{name}_scenarios" for name in _FAMILIES), "test_scenario_data"),),

@@ -20,8 +20,7 @@ from support.openscenario import (
     world_position,
 )
 
-from lgmd_gym.envs.dynamics.bend import Bend
-from lgmd_gym.envs.dynamics.segment import Segment
+from lgmd_gym.envs.dynamics.script import Bend, Segment
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from support.openscenario import (
     write,
 )
 
-from lgmd_gym.envs.dynamics.bend import Bend
+from lgmd_gym.envs.dynamics.script import Bend
 from lgmd_gym.openscenario.catalogs import Catalogs
 from lgmd_gym.openscenario.entities import Body, Mover
 from lgmd_gym.openscenario.paths import Place, Track, section

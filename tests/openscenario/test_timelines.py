@@ -4,8 +4,8 @@ from math import inf
 
 import pytest
 
-from lgmd_gym.envs.dynamics.segment import Segment
-from lgmd_gym.envs.dynamics.speed_profile import SpeedProfile
+from lgmd_gym.envs.dynamics.longitudinal import SpeedProfile
+from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.openscenario.timelines import Piece, Timeline, synchronise
 
 

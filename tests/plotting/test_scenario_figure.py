@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lgmd_gym.envs import Actor, RoadPlan, Scenario, Segment, make_scenario
-from lgmd_gym.envs.dynamics.bend import Bend
+from lgmd_gym.envs.dynamics.script import Bend
 from lgmd_gym.envs.motion import record_motion
 from lgmd_gym.plotting.scenario_figure import scenario_figure
 

@@ -5,8 +5,8 @@ from collections import deque
 from copy import copy
 from math import asin, atan, copysign, cos, hypot, inf, sin, sqrt, tan
 
-from lgmd_gym.envs.dynamics.bend import Pose
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
+from lgmd_gym.envs.dynamics.script import Pose
 
 GAUSS = ((0.5 - 0.15**0.5, 5 / 18), (0.5, 8 / 18), (0.5 + 0.15**0.5, 5 / 18))
 MAX_SPEED, REGAIN_TIME, PASSED_DISTANCE = 40.0, 0.5, 2.0

@@ -7,9 +7,9 @@ from lgmd_gym.benchmark.traffic.batch import IN_LABORATORY
 from lgmd_gym.benchmark.traffic.observer import Observer
 from lgmd_gym.benchmark.traffic.recording import record_traffic
 from lgmd_gym.benchmark.traffic.replay import Replay
-from lgmd_gym.envs.traffic.drivers import TrafficCar
+from lgmd_gym.envs.registration import TRAFFIC_KINDS, make_traffic
+from lgmd_gym.envs.traffic.cars import TrafficCar
 from lgmd_gym.envs.traffic.kinds import HighwayTraffic
-from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
 
 HOLD, BRAKE = np.array([0.0], np.float32), np.array([-1.0], np.float32)
 
@@ -70,7 +70,7 @@ class Recorded:
         return replay
 
 
-def car_states(kinds=tuple(KINDS)):
+def car_states(kinds=tuple(TRAFFIC_KINDS)):
     """Return positions and speeds of all cars after three seconds as strings in full precision."""
     lines = []
     for kind in kinds:

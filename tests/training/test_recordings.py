@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.recordings import offline_config, synthetic_episode
 
-from lgmd_gym.envs.traffic.registration import KINDS, traffic_id
+from lgmd_gym.envs.registration import TRAFFIC_KINDS, traffic_id
 from lgmd_gym.training import recordings, train
 from lgmd_gym.training.offline.episodes import EpisodeRecorder
 from lgmd_gym.training.offline.level_recorder import LevelRecorder
@@ -117,7 +117,7 @@ def test_interrupted_recording_resumes_at_the_missing_file(tmp_path, monkeypatch
 def test_recorder_is_that_of_the_engine_where_it_has_the_id(tmp_path):
     engine, traffic = (
         recording_sets(offline_config(tmp_path, env_id), "train")[0].record.__self__
-        for env_id in ("LGMD/RandomBraking-v0", traffic_id(next(iter(KINDS))))
+        for env_id in ("LGMD/RandomBraking-v0", traffic_id(next(iter(TRAFFIC_KINDS))))
     )
     assert isinstance(engine, LevelRecorder)
     assert isinstance(traffic, EpisodeRecorder)
@@ -166,7 +166,7 @@ def test_extra_traffic_has_seeds_and_kinds_of_its_own(tmp_path):
     extra = traffic["extra-traffic1-train"]
     assert extra.record.__self__.kinds == ("merge", "two-way")
     assert extra.settings == {"kinds": ["merge", "two-way"]}
-    assert traffic["traffic-train"].record.__self__.kinds == tuple(KINDS)
+    assert traffic["traffic-train"].record.__self__.kinds == tuple(TRAFFIC_KINDS)
     assert extra.option == " --extra-traffic 9:merge,two-way 4:merge"
 
 

@@ -15,7 +15,7 @@ from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_tas
 from lgmd_gym.benchmark.traffic.rows import traffic_case
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.appearance import Appearance
-from lgmd_gym.envs.traffic.registration import traffic_id
+from lgmd_gym.envs.registration import traffic_id
 from lgmd_gym.processes.pool import TaskMap
 
 DRIVES_PER_TASK = 10  # two seeds of every kind; more drives delay the rows and use more memory

@@ -7,9 +7,9 @@ from typing import Any
 
 from lgmd_gym.benchmark.traffic.reader import Moment, SceneReader
 from lgmd_gym.envs.appearance import Appearance
+from lgmd_gym.envs.registration import make_traffic
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON, Emergencies, simulate_driver
 from lgmd_gym.envs.traffic.env import JAM_SPEED, TrafficEnv
-from lgmd_gym.envs.traffic.registration import make_traffic
 from lgmd_gym.sensing.sensor_array import SensorArray
 
 SNAPSHOT_EVERY = 300  # decisions between two snapshots; one snapshot takes as long as about 10 decisions
@@ -83,7 +83,7 @@ def record_traffic(
     """Record one episode of traffic without an agent.
 
     Args:
-        kind: Kind of traffic, a name in `lgmd_gym.envs.traffic.registration.KINDS`.
+        kind: Kind of traffic, a name in `lgmd_gym.envs.registration.TRAFFIC_KINDS`.
         seed: Seed of the traffic.
         sensors: Cameras that will draw the frames.
         index: Index of the episode among the environments of the cameras.

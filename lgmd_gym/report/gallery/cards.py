@@ -19,8 +19,7 @@ from lgmd_gym.camera.params import CONDITIONS, PRESETS
 from lgmd_gym.clips import VideoWriter
 from lgmd_gym.envs import FAMILIES, env_id
 from lgmd_gym.envs.episode_source import RandomLevels
-from lgmd_gym.envs.registration import RANDOM_TASKS, RandomTask
-from lgmd_gym.envs.traffic.registration import KINDS, find_kind
+from lgmd_gym.envs.registration import RANDOM_TASKS, TRAFFIC_KINDS, RandomTask, find_kind
 from lgmd_gym.errors import check_known
 from lgmd_gym.rendering.playback import make_target
 from lgmd_gym.rendering.view import LGMDView
@@ -116,7 +115,7 @@ def scenario_cards(names: tuple[str, ...] = ()) -> list[ScenarioCard]:
     cards = {name: ScenarioCard(name, env_id(name), parse_docstring(FAMILIES[name])) for name in FAMILIES}
     for name, task in RANDOM_TASKS.items():
         cards[name] = ScenarioCard(name, env_id(name), _docstring_of(task))
-    for kind in KINDS:
+    for kind in TRAFFIC_KINDS:
         cards[kind] = ScenarioCard(kind, f"traffic/{kind}", parse_docstring(find_kind(kind)), traffic=True)
     for name in names:
         check_known("scenario family or kind of traffic", name, cards)

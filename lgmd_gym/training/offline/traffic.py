@@ -18,9 +18,9 @@ from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.camera import CONDITIONS, CameraSpec
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.families.distribution import draw_camera_fields
+from lgmd_gym.envs.registration import TRAFFIC_KINDS, make_traffic
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, Emergencies, simulate_driver
-from lgmd_gym.envs.traffic.registration import KINDS, make_traffic
 from lgmd_gym.neuron import NeuronSpec
 from lgmd_gym.training.offline.episodes import (
     TRAFFIC,
@@ -49,7 +49,7 @@ class TrafficRecorder:
 
     split: str
     camera: CameraSpec
-    kinds: tuple[str, ...] = tuple(KINDS)
+    kinds: tuple[str, ...] = tuple(TRAFFIC_KINDS)
     shrink: int | None = None
     params: NeuronSpec = None
 

@@ -1,9 +1,13 @@
-"""Bends: sections of a path with linearly changing curvature, and sequences of them."""
+"""Scripts of road users as plain data: bends of their paths, and segments of their speeds."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import MISSING, dataclass
+from functools import partial
 from typing import NamedTuple
 
+from lgmd_gym.envs.dynamics.units import check_speed
 from lgmd_gym.errors import check_finite, check_within, shown
+from lgmd_gym.fields import Record, number, record, value
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,3 +98,45 @@ def turn(angle: float, radius: float, easing: float) -> tuple[Bend, ...]:
     rest = abs(angle) * radius - easing
     middle = (Bend(rest, curvature),) if rest > 1e-9 else ()
     return (Bend(easing, 0.0, curvature), *middle, Bend(easing, curvature, 0.0))
+
+
+@record
+class Segment(Record):
+    """A scripted change of speed: acceleration from `start` until `final_speed` is reached."""
+
+    start: float = number(MISSING, "[0, 10000]", "s", "Time at which the acceleration begins.")
+    acceleration: float = number(
+        MISSING,
+        "[-12, 12]",
+        "m/s²",
+        "Full acceleration, negative for braking; it must lead to `final_speed`.",
+    )
+    build_up: float = number(0.0, "[0, 10]", "s", "Time from `start` to full acceleration, a linear ramp.")
+    final_speed: float = value(
+        0.0, partial(check_speed, zero=True), "Speed at the end of the segment, in [0, 40].", unit="m/s"
+    )
+
+
+def check_profile(speed: float, profile: Sequence[Segment]) -> None:
+    """Check the segments of a scripted speed.
+
+    Args:
+        speed: Speed before the first segment [m/s].
+        profile: Segments; each begins at the final speed of the previous one.
+
+    Raises:
+        ValueError: If the segments are not in order of their start, or if the acceleration of one does not
+            lead to its final speed.
+    """
+    starts = [segment.start for segment in profile]
+    if starts != sorted(starts):
+        raise ValueError(f"profile segments must be in order of their start, got starts {starts}")
+    for segment in profile:
+        change = segment.final_speed - speed
+        if change != 0.0 and change * segment.acceleration <= 0.0:
+            raise ValueError(
+                f"a profile segment with acceleration {segment.acceleration:g} m/s² does not lead from "
+                f"{speed:g} to final_speed {segment.final_speed:g} m/s; use an acceleration "
+                f"{'> 0' if change > 0.0 else '< 0'}"
+            )
+        speed = segment.final_speed

@@ -1,11 +1,10 @@
 """`PhysicsState`: the state of one or more episodes as arrays."""
 
 from math import cos, sin
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.bend import Bend, Pose
 from lgmd_gym.envs.dynamics.bodies import (
     BICYCLE,
     BODY,
@@ -20,11 +19,12 @@ from lgmd_gym.envs.dynamics.bodies import (
 )
 from lgmd_gym.envs.dynamics.brake import DELAY_LINE
 from lgmd_gym.envs.dynamics.episode import EPISODE
+from lgmd_gym.envs.dynamics.longitudinal import segment_table
 from lgmd_gym.envs.dynamics.path import path_table
-from lgmd_gym.envs.dynamics.speed_profile import segment_table
+from lgmd_gym.envs.dynamics.script import Bend, Pose
 from lgmd_gym.envs.families.scenario import LANE_WIDTH, Actor, Scenario
 
-KINDS = {
+BODY_KINDS = {
     "car": CAR,
     "box": BOX,
     "road_marking": ROAD_MARKING,
@@ -70,43 +70,45 @@ def place(scenario: Scenario, rng: np.random.Generator) -> Placement:
     shaded = list(zip(scenario.actors, drawn, strict=True))
     # highway-env keeps cars and other objects in two lists, and the camera reads them in this order.
     shaded.sort(key=lambda item: item[0].kind != "car")
+    bodies = np.zeros(1 + len(shaded), BODY)
+    ego = bodies[0]
+    ego["x"], ego["y"], ego["heading"], ego["speed"] = *start, scenario.ego_speed
+    ego["length"], ego["width"], ego["height"] = scenario.ego_length, scenario.ego_width, EGO_HEIGHT
+    ego["reference"], ego["kind"] = scenario.ego_reference, EGO
     tables = [_path_of(start, scenario.ego_reference, scenario.ego_path)]
     scripts = [segment_table(scenario.ego_profile)]
-    size = (scenario.ego_length, scenario.ego_width, EGO_HEIGHT)
-    rows: list[tuple[Any, ...]] = [(*start, scenario.ego_speed, *size, 0.0, scenario.ego_reference, EGO)]
-    for actor, shade in shaded:
+    for body, (actor, shade) in zip(bodies[1:], shaded, strict=True):
         centre = start.x + scenario.ego_length / 2 + actor.gap + actor.length / 2
         pose = Pose(centre, start.y - actor.lateral_offset, -actor.heading)
         tables.append(_path_of(pose, actor.reference, actor.path))
         scripts.append(segment_table(actor.profile))
-        grey = shade if actor.shade is None else int(actor.shade)
-        size = (actor.length, actor.width, actor.height)
-        rows.append((*pose, actor.speed, *size, grey, actor.reference, KINDS[actor.kind]))
+        body["x"], body["y"], body["heading"] = pose
+        for name in ("speed", "length", "width", "height", "reference"):
+            body[name] = getattr(actor, name)
+        body["shade"] = shade if actor.shade is None else int(actor.shade)
+        body["kind"] = BODY_KINDS[actor.kind]
+    bodies["script_speed"] = bodies["speed"]
+    bodies["segment_end"] = np.cumsum([len(script) for script in scripts])
+    bodies["segment"][1:] = bodies["segment_end"][:-1]
+    bodies["path_end"] = np.cumsum([len(table) for table in tables])
+    bodies["path"][1:] = bodies["path_end"][:-1]
     solid = [actor for actor in scenario.actors if actor.kind != "road_marking"]
     target = 1 + next(i for i, (actor, _) in enumerate(shaded) if actor is solid[0]) if solid else 0
     return Placement(
-        scenario, start, tuple(actor for actor, _ in shaded), _bodies(rows, scripts, tables),
-        np.concatenate(scripts), np.concatenate(tables), target,
-    )  # fmt: skip
+        scenario=scenario,
+        start=start,
+        actors=tuple(actor for actor, _ in shaded),
+        bodies=bodies,
+        segments=np.concatenate(scripts),
+        paths=np.concatenate(tables),
+        target=target,
+    )
 
 
 def _path_of(centre: Pose, reference: float, bends: tuple[Bend, ...]) -> np.ndarray:
     """Return the cells of the path of the point `reference` [m] behind a body's centre."""
     x, y = centre.x - reference * cos(centre.heading), centre.y - reference * sin(centre.heading)
     return path_table(Pose(x, y, centre.heading), bends)
-
-
-def _bodies(rows: list[tuple[Any, ...]], scripts: list[np.ndarray], tables: list[np.ndarray]) -> np.ndarray:
-    bodies = np.zeros(len(rows), BODY)
-    names = ("x", "y", "heading", "speed", "length", "width", "height", "shade", "reference", "kind")
-    for name, column in zip(names, zip(*rows, strict=True), strict=True):
-        bodies[name] = column
-    bodies["script_speed"] = bodies["speed"]
-    bodies["segment_end"] = np.cumsum([len(script) for script in scripts])
-    bodies["segment"][1:] = bodies["segment_end"][:-1]
-    bodies["path_end"] = np.cumsum([len(table) for table in tables])
-    bodies["path"][1:] = bodies["path_end"][:-1]
-    return bodies
 
 
 class PhysicsState:
@@ -151,18 +153,24 @@ class PhysicsState:
         """
         scenario, count = placement.scenario, len(placement.bodies)
         grown = self._reserve(
-            bodies=count, before=count + 1, segments=len(placement.segments), paths=len(placement.paths),
-            pending=max_demands, parts=max_demands + 1,
-        )  # fmt: skip
+            bodies=count,
+            before=count + 1,
+            segments=len(placement.segments),
+            paths=len(placement.paths),
+            pending=max_demands,
+            parts=max_demands + 1,
+        )
         self.bodies[index, :count] = placement.bodies
         self.segments[index, : len(placement.segments)] = placement.segments
         self.paths[index, : len(placement.paths)] = placement.paths
-        self.lines[index] = (0.0, 0.0, 0.0, 0)
-        self.egos[index] = (1, 0.0)
-        self.episodes[index] = (
-            count, placement.target, 0, 0, 0, np.inf, np.inf, 0.0, scenario.duration, scenario.top_speed,
-            scenario.ego_speed, 0.0,
-        )  # fmt: skip
+        for records in (self.lines, self.egos, self.episodes):
+            records[index] = 0
+        self.egos["on_script"][index] = 1
+        episodes = self.episodes
+        episodes["bodies"][index], episodes["target"][index] = count, placement.target
+        episodes["impact_speed"][index] = episodes["relative_impact_speed"][index] = np.inf
+        episodes["duration"][index], episodes["top_speed"][index] = scenario.duration, scenario.top_speed
+        episodes["last_speed"][index] = scenario.ego_speed
         return grown
 
     def save(self, index: int) -> dict[str, np.ndarray]:

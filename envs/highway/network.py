@@ -6,8 +6,8 @@ from math import cos, pi, sin
 from highway_env.road.lane import AbstractLane, CircularLane, LineType, StraightLane
 from highway_env.road.road import RoadNetwork
 
-from lgmd_gym.envs.dynamics.bend import Pose
 from lgmd_gym.envs.dynamics.path import Path
+from lgmd_gym.envs.dynamics.script import Pose
 from lgmd_gym.envs.families.scenario import LANE_WIDTH, RoadPlan
 
 ROAD_START, ROAD_END = -300.0, 6000.0  # [m], beyond the extent of every scenario
