@@ -10,6 +10,7 @@ from reference_returns import AGENTS, EXAMPLE, Returns, arguments_of
 
 from lgmd_gym.envs import env_id
 from lgmd_gym.envs.braking import BrakingEnv
+from lgmd_gym.envs.families import LEVELS
 from lgmd_gym.envs.families.data import scenario_from_data
 from lgmd_gym.envs.registration import RANDOM_TASKS, SCENARIO, traffic_id
 from lgmd_gym.envs.traffic.env import TrafficEnv
@@ -105,6 +106,8 @@ def _example(name: str) -> str:
 
 def returns_table(returns: Sequence[Returns]) -> str:
     """Return the results of the reference agents as a Markdown table."""
+    if not returns:
+        return "Not measured yet."
     rows = [
         (
             f"`{item.agent}`",
@@ -134,11 +137,11 @@ def overview_tables(returns: Mapping[str, Sequence[Returns]]) -> str:
         elif card.name in (*RANDOM_TASKS, SCENARIO):
             group = "Random and own scenarios"
         else:
-            group = "Non-threats" if card.docstring.summary.endswith(_NO_THREAT) else "Threats"
-        means = {item.agent: f"{item.mean:.1f}" for item in returns[id_of(card)]}
+            group = "Threats" if LEVELS[card.name].threat else "Non-threats"
+        means = {item.agent: f"{item.mean:.1f}" for item in returns.get(id_of(card), ())}
         link = f"[{id_of(card)}](_generated/environments/{card.name}.md)"
         scene = card.docstring.summary.removesuffix(_NO_THREAT).rstrip(".")
-        groups[group].append((link, scene, *(means[agent] for agent in AGENTS)))
+        groups[group].append((link, scene, *(means.get(agent, "–") for agent in AGENTS)))
     headings = ("id", "scene", *(f"`{agent}`" for agent in AGENTS))
     return "\n\n".join(f"## {group}\n\n{table(headings, rows)}" for group, rows in groups.items()) + "\n"
 

@@ -39,7 +39,7 @@ def main(out: Path) -> None:
     missing = [card for card in cards if not (static / f"{card.name}.mp4").exists()]
     Parallel(n_jobs=2)(delayed(_record)(card, static) for card in missing)
     for card in cards:
-        page = environment_page(card, returns[id_of(card)])
+        page = environment_page(card, returns.get(id_of(card), ()))
         (pages / f"{card.name}.md").write_text(page, encoding="utf-8")
     for cls in (BrakingEnv, TrafficEnv):
         page = f"# {cls.__name__}\n\n{as_markdown(cls)}\n"

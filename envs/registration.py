@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
     from lgmd_gym.envs.episode_source import EpisodeSource
     from lgmd_gym.envs.families.scenario import Scenario
+    from lgmd_gym.envs.traffic.env import TrafficEnv
     from lgmd_gym.neuron import NeuronSpec
 
 RANDOM = "RandomBraking"
@@ -69,6 +70,16 @@ RANDOM_TASKS = {
     ),
 }
 """Ids `LGMD/<name>-v0` of random levels."""
+
+
+# Entry points rather than classes, so that registering the ids does not import highway-env.
+TRAFFIC_KINDS: dict[str, str] = {
+    "highway": "lgmd_gym.envs.traffic.kinds:HighwayTraffic",
+    "merge": "lgmd_gym.envs.traffic.kinds:MergeTraffic",
+    "two-way": "lgmd_gym.envs.traffic.kinds:TwoWayTraffic",
+    "intersection": "lgmd_gym.envs.traffic.kinds:IntersectionTraffic",
+    "roundabout": "lgmd_gym.envs.traffic.kinds:RoundaboutTraffic",
+}
 
 
 def env_id(family: str) -> str:
@@ -249,21 +260,6 @@ def _families_of(module: str) -> list[str]:
 
 def _module_of(family: str) -> str:
     return str(getattr(FAMILIES[family], "__module__", ""))
-
-
-if TYPE_CHECKING:
-    from lgmd_gym.camera import CameraSpec
-    from lgmd_gym.envs.traffic.env import TrafficEnv
-    from lgmd_gym.neuron import NeuronSpec
-
-# Entry points rather than classes, so that registering the ids does not import highway-env.
-TRAFFIC_KINDS: dict[str, str] = {
-    "highway": "lgmd_gym.envs.traffic.kinds:HighwayTraffic",
-    "merge": "lgmd_gym.envs.traffic.kinds:MergeTraffic",
-    "two-way": "lgmd_gym.envs.traffic.kinds:TwoWayTraffic",
-    "intersection": "lgmd_gym.envs.traffic.kinds:IntersectionTraffic",
-    "roundabout": "lgmd_gym.envs.traffic.kinds:RoundaboutTraffic",
-}
 
 
 def traffic_id(kind: str) -> str:

@@ -1,12 +1,11 @@
 """Reward of the braking environments: progress, minus contact, needless braking and jerk."""
 
-from dataclasses import astuple, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from lgmd_gym.envs.dynamics.bodies import ego_braking
-from lgmd_gym.errors import check_within
+from lgmd_gym.fields import Record, number, record
 from lgmd_gym.kernels import kernel
 
 REWARD = np.dtype(
@@ -15,34 +14,33 @@ REWARD = np.dtype(
 """`RewardParams` for the compiled functions."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RewardParams:
-    """Weights of the reward, each >= 0; see `BrakingEnv` for the formula.
+@record
+class RewardParams(Record):
+    """Weights of the reward; see `BrakingEnv` for the formula."""
 
-    Attributes:
-        contact: Cost of a contact.
-        impact: Additional cost of a contact at a relative impact speed of at least the scripted speed; below,
-            proportional to the square of the relative impact speed, as the energy is.
-        progress: Gain per second at the scripted speed [1/s].
-        brake: Cost of full braking while no contact is within `need_ttc` [1/s].
-        jerk: Cost of a change of the acceleration by `max_deceleration`.
-        need_ttc: Time to contact below which braking has no cost [s]; T0 of the protocols.
-    """
-
-    contact: float = 10.0
-    impact: float = 10.0
-    progress: float = 1.0
-    brake: float = 2.0
-    jerk: float = 0.05
-    need_ttc: float = 4.0
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            check_within(item.name, getattr(self, item.name), 0.0, 1e6)
+    contact: float = number(10.0, "[0, 1e6]", "", "Cost of a contact.")
+    impact: float = number(
+        10.0,
+        "[0, 1e6]",
+        "",
+        "Additional cost of a contact at a relative impact speed of at least the scripted speed; below, "
+        "proportional to the square of the relative impact speed, as the energy is.",
+    )
+    progress: float = number(1.0, "[0, 1e6]", "1/s", "Gain per second at the scripted speed.")
+    brake: float = number(
+        2.0, "[0, 1e6]", "1/s", "Cost of full braking while no contact is within `need_ttc`."
+    )
+    jerk: float = number(0.05, "[0, 1e6]", "", "Cost of a change of the acceleration by `max_deceleration`.")
+    need_ttc: float = number(
+        4.0, "[0, 1e6]", "s", "Time to contact below which braking has no cost; T0 of the protocols."
+    )
 
     def record(self) -> np.ndarray:
         """Return the weights as a `REWARD` record of shape ()."""
-        return np.array(astuple(self), REWARD)
+        weights = np.zeros((), REWARD)
+        for name, value in self.to_dict().items():
+            weights[name] = value
+        return weights
 
 
 @kernel(exact=True)

@@ -1,6 +1,8 @@
 """`RandomLevels`: levels, splits and the random distribution."""
 
+import json
 from dataclasses import replace
+from hashlib import sha256
 
 import gymnasium as gym
 import numpy as np
@@ -14,10 +16,12 @@ from lgmd_gym.envs import FAMILIES
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.episode_source import RandomLevels
 from lgmd_gym.envs.families import LEVELS as DECLARED
+from lgmd_gym.envs.families.data import scenario_to_data
 from lgmd_gym.envs.families.distribution import (
     ALL_FAMILIES,
     EXTRA_FAMILIES,
     LEVELS,
+    SPLITS,
     draw_scenario,
     level_generator,
 )
@@ -229,6 +233,29 @@ def test_levels_of_all_families_are_those_of_before():
         chosen = [RandomLevels(start_level=level, num_levels=1, families=families) for level in range(6)]
         assert [source.first for source in chosen] == levels
         assert [source.draw(np.random.default_rng(0)).placement.scenario for source in chosen] == levels
+
+
+@pytest.mark.parametrize(
+    ("families", "digest"),
+    [(ALL_FAMILIES, "7ad893cc8e61ce15"), ((*ALL_FAMILIES, *EXTRA_FAMILIES), "2b590284d0581e5e")],
+)
+def test_scenarios_of_levels_are_pinned(families, digest):
+    """The hash changes if a family, its order, its weight or one of its arguments does."""
+    data = [
+        scenario_to_data(draw_scenario(level_generator(split, level), families))
+        for split in SPLITS
+        for level in range(300)
+    ]
+    assert sha256(json.dumps(rounded(data)).encode()).hexdigest()[:16] == digest
+
+
+def rounded(item):
+    """Return plain data with floats of 9 digits, which do not depend on the C library."""
+    if isinstance(item, dict):
+        return {key: rounded(value) for key, value in item.items()}
+    if isinstance(item, list):
+        return [rounded(value) for value in item]
+    return f"{item:.9g}" if isinstance(item, float) else item
 
 
 @pytest.mark.parametrize(

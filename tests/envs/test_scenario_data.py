@@ -11,7 +11,7 @@ from lgmd_gym.envs.dynamics.bodies import BICYCLE, CAR, EGO, PEDESTRIAN
 from lgmd_gym.envs.dynamics.longitudinal import SpeedProfile
 from lgmd_gym.envs.dynamics.physics_state import place
 from lgmd_gym.envs.dynamics.script import Segment
-from lgmd_gym.envs.families.family import FAMILIES, make_scenario
+from lgmd_gym.envs.families.family import make_scenario
 from lgmd_gym.envs.families.road_users import run_up
 from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
 
@@ -89,10 +89,6 @@ def test_default_speeds(name, ego_kmh, target_kmh):
     made = make_scenario(name)
     speeds = {"ego": made.ego_speed, "target": made.actors[0].speed if made.actors else 0.0}
     assert speeds == pytest.approx({"ego": ego_kmh / 3.6, "target": target_kmh / 3.6}, rel=1e-3)
-
-
-def test_every_family_has_default_speeds():
-    assert {name for name, *_ in DEFAULTS} == set(FAMILIES)
 
 
 def test_default_distances():

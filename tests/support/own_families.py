@@ -5,6 +5,7 @@ import sys
 import gymnasium as gym
 
 from lgmd_gym.envs import FAMILIES, env_id
+from lgmd_gym.envs.families import LEVELS
 
 MODULE = '''
 from dataclasses import dataclass, replace
@@ -60,5 +61,7 @@ def forget_families():
     """Remove the families that are not of this package, and the module of the user."""
     for name in [name for name, made in FAMILIES.items() if not made.__module__.startswith("lgmd_gym.")]:
         del FAMILIES[name]
+        for level in [level.name for level in LEVELS.values() if level.family == name]:
+            del LEVELS[level]
         gym.registry.pop(env_id(name), None)
     sys.modules.pop("my_scenarios", None)
