@@ -212,7 +212,7 @@ def test_metadata_is_not_shared_between_instances():
         (lambda: make_scenario("CCRb", gap=20.0, headway=1.0), "pass one"),
         (lambda: make_scenario("CCRm", ego_speed=5.0), "target_speed must be below ego_speed 5"),
         (lambda: make_scenario("AdjacentPass", lateral_offset=1.0), "for a car in the ego's path use CCRs"),
-        (lambda: make_scenario("CCRs", shade=300), r"shade must be a whole number in \[0, 255\], got 300"),
+        (lambda: make_scenario("CCRs", shade=300), r"shade must be in \[0, 255\], got 300"),
         (lambda: BrakingEnv(make_scenario("CCRs"), config={"simulation_freq": 60}), "'simulation_frequency'"),
         (lambda: BrakingEnv(make_scenario("CCRs"), config={"policy_frequency": 7}), "7 Hz does not divide"),
         (lambda: BrakingEnv(make_scenario("CCRs"), config={"reward": {"brakes": 1}}), "'brake'"),
