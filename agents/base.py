@@ -1,11 +1,12 @@
-"""Base class of all agents, and the two demands of an agent that only brakes."""
+"""Base class of all agents: one agent in N environments, and its use in a single one."""
 
+import copy
 import inspect
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
 
-from lgmd_gym.agents.batch import BatchAgent
 from lgmd_gym.errors import check_within
 
 if TYPE_CHECKING:
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
 BRAKE = -1.0  # demand for full braking
 HOLD = 0.0  # demand for the scripted speed
 FPS = 30.0  # frame and decision rate for which all agents are tuned [Hz]
+TRACE = "lgmd/trace"  # key of the infos
+
+Observations = Mapping[str, np.ndarray]
+"""Observations of `LGMDObservation` by name, arrays of shape (N, …)."""
 
 
 def to_action(demand: float) -> np.ndarray:
@@ -22,22 +27,78 @@ def to_action(demand: float) -> np.ndarray:
     return np.array([check_within("demand", demand, -1.0, 1.0)], dtype=np.float32)
 
 
-class Agent:
-    """Base class: maps an observation to a longitudinal demand.
+class Infos(Protocol):
+    """Infos of N environments: a mapping of arrays of shape (N,), and the info of each environment.
 
-    An agent reads the observation and the `info` keys under `lgmd/`. All other keys of `info` are ground
-    truth, which only oracles read. Subclasses implement `demand`.
+    ``lgmd/trace`` is absent, or a sequence of `TraceFrame` of arrays, of shape (N,) and (N, cameras): the
+    camera frames since the last decision, oldest first. The `time` of a frame is NaN in environments that
+    have fewer frames.
+    """
+
+    def __getitem__(self, key: str, /) -> Any: ...
+
+    def __contains__(self, key: object, /) -> bool: ...
+
+    def row(self, index: int, /) -> dict[str, Any]:
+        """Return the info of one environment, as a single environment returns it."""
+        ...
+
+
+class InfoArrays(dict[str, Any]):
+    """`Infos` from arrays by name; arrays of `lgmd/trace` as described there."""
+
+    def row(self, index: int) -> dict[str, Any]:
+        """Return the info of one environment."""
+        info = {key: _plain(values[index]) for key, values in self.items() if key != TRACE}
+        if TRACE in self:
+            frames = (frame for frame in self[TRACE] if not np.isnan(frame.time[index]))
+            info[TRACE] = [_frame(frame, lambda values: _plain(values[index])) for frame in frames]
+        return info
+
+
+class _SingleInfo:
+    """`Infos` of one environment."""
+
+    def __init__(self, info: dict[str, Any]) -> None:
+        self._info = info
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._info
+
+    def __getitem__(self, key: str) -> Any:
+        value = self._info[key]
+        if key == TRACE:
+            return [_frame(frame, lambda item: np.asarray(item)[None]) for frame in value]
+        return np.asarray([value])
+
+    def row(self, index: int) -> dict[str, Any]:
+        return self._info
+
+
+class BatchAgent:
+    """Base class of agents: maps the observations of N environments to longitudinal demands.
+
+    An agent reads the observations and the keys of the infos under `lgmd/`. All other keys are ground truth,
+    which only oracles read. Its demands in one environment depend neither on N nor on the others. Subclasses
+    implement `demands`, and `initial` if they have a state.
 
     Attributes:
         name: Name in agent strings, rows and tables.
-        include_frame: Whether the observation must contain the camera frames.
-        reads_neuron: Whether its demand depends on the neuron.
+        include_frame: Whether the observations must contain the camera frames.
+        reads_neuron: Whether its demands depend on the neuron.
+        num_envs: Number of environments N.
+        state: State by name, arrays of shape (N, …); see `initial`.
+        alerts: Whether the agent warns, after the last `act`, bool, shape (N,); by default the alerts of the
+            neurons.
+        failures: Exceptions of a user's agent in the last `act`, by environment.
     """
 
     name = "agent"
     include_frame = False
     reads_neuron = True
-    _alert = False
+
+    def __init__(self) -> None:
+        self._allocate(1)
 
     @property
     def camera(self) -> "CameraSpec | None":
@@ -54,74 +115,165 @@ class Agent:
         """Return the options of the agent's string with their defaults."""
         return {item.name: item.default for item in inspect.signature(cls).parameters.values()}
 
+    def initial(self) -> dict[str, Any]:
+        """Return the state of one environment at the start of an episode: numbers or arrays by name."""
+        return {}
+
+    def for_envs(self, num_envs: int) -> Self:
+        """Return the same agent, with a state of its own, for `num_envs` environments."""
+        agent = copy.copy(self)
+        agent._allocate(num_envs)
+        return agent
+
+    def reset(
+        self, mask: np.ndarray | None = None, seeds: Sequence[int | None] | np.ndarray | None = None
+    ) -> None:
+        """Start new episodes.
+
+        Args:
+            mask: Selection of the environments, bool, shape (N,); None for all.
+            seeds: Seeds of random agents, one per environment; those of other environments are not read.
+        """
+        selected = np.ones(self.num_envs, np.bool_) if mask is None else mask
+        for name, value in self.initial().items():
+            self.state[name][selected] = value
+        self.alerts = self.alerts & ~selected
+
+    def act(self, observations: Observations, infos: Infos, active: np.ndarray | None = None) -> np.ndarray:
+        """Return the demands for one observation of every active environment.
+
+        Args:
+            observations: Observations, arrays of shape (N, …). The rows of other environments are undefined.
+            infos: Infos, see `Infos`.
+            active: Selection of the environments, bool, shape (N,); None for all.
+
+        Returns:
+            Demands in [-1, 1], float64, shape (N,), rounded to the float32 of an action. The rows of other
+            environments are undefined.
+        """
+        if active is None:
+            active = np.ones(self.num_envs, np.bool_)
+        if "lgmd/alert" in infos:
+            self.alerts = np.array(infos["lgmd/alert"], np.bool_)
+        demands = self.demands(observations, infos, active)
+        return np.asarray(demands, np.float32).astype(np.float64)
+
+    def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return the longitudinal demands in [-1, 1], shape (N,); arguments as of `act`."""
+        raise NotImplementedError
+
+    def _allocate(self, num_envs: int) -> None:
+        """Make the state of new episodes in `num_envs` environments."""
+        self.num_envs = num_envs
+        self.failures: dict[int, BaseException] = {}
+        self.alerts = np.zeros(num_envs, np.bool_)
+        self.state = {
+            name: np.repeat(np.asarray(value)[None], num_envs, axis=0)
+            for name, value in self.initial().items()
+        }
+
+
+class LatchingAgent(BatchAgent):
+    """Base class: brakes fully once `brake_conditions` returns True, and latches until the episode ends."""
+
+    def initial(self) -> dict[str, Any]:
+        """Return a released brake."""
+        return {"latched": False}
+
+    def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return `BRAKE` for the environments in which the agent has latched, else `HOLD`."""
+        latched = self.brake_conditions(observations, infos, active) | self.state["latched"]
+        self.alerts = self.state["latched"] = latched
+        return np.where(latched, BRAKE, HOLD)
+
+    def brake_conditions(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return whether to begin braking, bool, shape (N,); called once per decision, in order."""
+        raise NotImplementedError
+
+
+class Actor(Protocol):
+    """What drives in a single environment; an `Agent` is one."""
+
     @property
     def alert(self) -> bool:
-        """Whether the agent warns; by default the alert of the neuron."""
-        return self._alert
+        """Whether it warns."""
+        ...
+
+    def reset(self, seed: int | None = None) -> None:
+        """Start a new episode."""
+        ...
+
+    def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
+        """Return the action for an observation."""
+        ...
+
+
+class Agent:
+    """An agent in a single environment.
+
+    Args:
+        agent: The agent, which must have one environment.
+
+    Attributes:
+        agent: The agent.
+        name: Name in agent strings, rows and tables.
+    """
+
+    def __init__(self, agent: BatchAgent) -> None:
+        self.agent = agent
+        self.name = agent.name
+
+    @property
+    def include_frame(self) -> bool:
+        """Whether the observation must contain the camera frames."""
+        return self.agent.include_frame
+
+    @property
+    def reads_neuron(self) -> bool:
+        """Whether the demand depends on the neuron."""
+        return self.agent.reads_neuron
+
+    @property
+    def camera(self) -> "CameraSpec | None":
+        """Cameras of the agent, used unless the user specifies others; None for no preference."""
+        return self.agent.camera
+
+    @property
+    def neuron(self) -> "NeuronSpec":
+        """Neuron parameters for the agent's own cameras; None for those of the paper."""
+        return self.agent.neuron
+
+    @property
+    def alert(self) -> bool:
+        """Whether the agent warns."""
+        return bool(self.agent.alerts[0])
 
     def reset(self, seed: int | None = None) -> None:
         """Start a new episode; `seed` seeds random agents."""
-        self._alert = False
-
-    def cameras_in_use(
-        self, speed: np.ndarray, yaw_rate: np.ndarray, potential: np.ndarray | None = None
-    ) -> np.ndarray | None:
-        """Return when the agent reads which cameras, so that the others are not drawn; None for always all.
-
-        The benchmark in traffic calls this method with the motion of an episode in which the agent does not
-        brake. The answer to the first call, without `potential`, are the cameras whose readings matter on
-        their own. In the second call, `potential` holds these readings, and the answer adds the cameras that
-        matter because of them. All other readings may be arbitrary. Cameras are drawn for some time before
-        they are read, for the filters of their neurons.
-
-        Args:
-            speed: Ego speed at each decision, which is also each camera frame, shape (decisions,) [m/s].
-            yaw_rate: Mean yaw rate of each decision, + to the right, shape (decisions,) [rad/s].
-            potential: Membrane potentials, shape (decisions, cameras), valid where the first answer is True.
-
-        Returns:
-            Whether a reading can affect the agent, bool, shape (decisions, cameras), or None.
-        """
-        return None
+        self.agent.reset(seeds=[seed])
 
     def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
         """Return the action for an observation: float32, shape (1,), in [-1, 1]."""
-        self._alert = bool(info.get("lgmd/alert", False))
-        return to_action(self.demand(observation, info))
-
-    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Return the longitudinal demand in [-1, 1]."""
-        raise NotImplementedError
-
-    def batch(self, num_envs: int) -> BatchAgent | None:
-        """Return this agent for `num_envs` environments with one camera frame per decision.
-
-        None, the default, for an agent that acts in one environment only; a caller with several environments
-        makes one agent for each.
-        """
-        return None
+        observations = {name: np.asarray(values)[None] for name, values in observation.items()}
+        demands = self.agent.act(observations, _SingleInfo(info))
+        for error in self.agent.failures.values():
+            raise error
+        return to_action(float(demands[0]))
 
 
-class LatchingAgent(Agent):
-    """Base class: brakes fully once `brake_condition` returns True, and latches until the episode ends."""
+def rows_of(observations: Observations, index: int) -> dict[str, np.ndarray]:
+    """Return the observation of one environment."""
+    return {name: values[index] for name, values in observations.items()}
 
-    _latched = False
 
-    @property
-    def alert(self) -> bool:
-        """Whether the agent brakes."""
-        return self._latched
+def _frame(frame: Any, function: Callable[[Any], Any]) -> Any:
+    """Return a `TraceFrame` with a function applied to its arrays."""
+    response = frame.response._make(map(function, frame.response))
+    return frame._replace(time=function(frame.time), ego_speed=function(frame.ego_speed), response=response)
 
-    def reset(self, seed: int | None = None) -> None:
-        """Release the brake and clear all state."""
-        super().reset(seed)
-        self._latched = False
 
-    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Return `BRAKE` once the agent has latched, else `HOLD`."""
-        self._latched = self.brake_condition(observation, info) or self._latched
-        return BRAKE if self._latched else HOLD
-
-    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
-        """Return whether to begin braking; called once per decision, in order."""
-        raise NotImplementedError
+def _plain(value: Any) -> Any:
+    """Return a scalar as a Python number, and a copy of an array."""
+    if isinstance(value, np.generic):
+        return value.item()
+    return value.copy() if isinstance(value, np.ndarray) else value

@@ -1,46 +1,37 @@
 """Agents that ignore the observation: the counterfactual without braking and two lower bounds."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.base import BRAKE, FPS, HOLD, Agent
-from lgmd_gym.agents.batch import BatchAgent
+from lgmd_gym.agents.base import BRAKE, FPS, HOLD, BatchAgent, Infos, Observations
 from lgmd_gym.errors import check_positive
 
 
-class NoBrake(Agent):
+class NoBrake(BatchAgent):
     """Never brakes. A contact of this agent defines a threat."""
 
     name = "no-brake"
     reads_neuron = False
 
-    def batch(self, num_envs: int) -> BatchAgent:
-        """Return this agent for `num_envs` environments."""
-        return _ConstantBatch(num_envs, HOLD)
-
-    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Return `HOLD`."""
-        return HOLD
+    def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return `HOLD` for all environments."""
+        return np.full(self.num_envs, HOLD)
 
 
-class AlwaysBrake(Agent):
+class AlwaysBrake(BatchAgent):
     """Brakes fully from the first decision: avoids every contact and brakes prematurely in every episode."""
 
     name = "always-brake"
     reads_neuron = False
 
-    def batch(self, num_envs: int) -> BatchAgent:
-        """Return this agent for `num_envs` environments."""
-        return _ConstantBatch(num_envs, BRAKE)
-
-    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Return `BRAKE`."""
-        return BRAKE
+    def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return `BRAKE` for all environments."""
+        return np.full(self.num_envs, BRAKE)
 
 
-class RandomBrake(Agent):
+class RandomBrake(BatchAgent):
     """Brakes fully from a random time on, as a chance-level baseline. The onset time T ~ Exp(rate).
 
     Args:
@@ -54,59 +45,23 @@ class RandomBrake(Agent):
     def __init__(self, rate: float = 0.2, fps: float = FPS) -> None:
         self.rate = check_positive("rate", rate)
         self.fps = check_positive("fps", fps)
-        self.reset()
+        super().__init__()
 
-    def batch(self, num_envs: int) -> BatchAgent:
-        """Return this agent for `num_envs` environments."""
-        return _RandomBrakeBatch(self, num_envs)
+    def initial(self) -> dict[str, Any]:
+        """Return an onset time, which `reset` draws [s], and the number of decisions."""
+        return {"onset": 0.0, "decisions": 0}
 
-    def reset(self, seed: int | None = None) -> None:
-        """Draw a new onset time from `seed`."""
-        super().reset(seed)
-        self._onset = self.draw_onset(seed)
-        self._decisions = 0
+    def reset(
+        self, mask: np.ndarray | None = None, seeds: Sequence[int | None] | np.ndarray | None = None
+    ) -> None:
+        """Draw a new onset time in each selected environment from its seed."""
+        super().reset(mask, seeds)
+        for index in range(self.num_envs) if mask is None else np.flatnonzero(mask).tolist():
+            rng = np.random.default_rng(None if seeds is None else seeds[index])
+            self.state["onset"][index] = rng.exponential(1.0 / self.rate)
 
-    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
         """Return `BRAKE` from the onset time on, `HOLD` before."""
-        time = self._decisions / self.fps
-        self._decisions += 1
-        return BRAKE if time >= self._onset else HOLD
-
-    def draw_onset(self, seed: int | None) -> float:
-        """Return the onset time for a seed [s]."""
-        return np.random.default_rng(seed).exponential(1.0 / self.rate)
-
-
-class _ConstantBatch(BatchAgent):
-    """The same demand in N environments."""
-
-    def __init__(self, num_envs: int, demand: float) -> None:
-        super().__init__(num_envs)
-        self._demands = np.full(num_envs, demand)
-
-    def reset(self, index: int, seed: int | None = None) -> None:
-        """Do nothing: the agent has no state."""
-
-    def demands(
-        self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any], active: np.ndarray
-    ) -> np.ndarray:
-        return self._demands
-
-
-class _RandomBrakeBatch(BatchAgent):
-    """`RandomBrake` in N environments."""
-
-    def __init__(self, agent: RandomBrake, num_envs: int) -> None:
-        super().__init__(num_envs)
-        self._agent = agent
-        self._onsets, self._decisions = np.zeros(num_envs), np.zeros(num_envs, np.int64)
-
-    def reset(self, index: int, seed: int | None = None) -> None:
-        self._onsets[index], self._decisions[index] = self._agent.draw_onset(seed), 0
-
-    def demands(
-        self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any], active: np.ndarray
-    ) -> np.ndarray:
-        times = self._decisions / self._agent.fps
-        self._decisions += 1
-        return np.where(times >= self._onsets, BRAKE, HOLD)
+        times = self.state["decisions"] / self.fps
+        self.state["decisions"] += 1
+        return np.where(times >= self.state["onset"], BRAKE, HOLD)

@@ -4,15 +4,13 @@ The defaults come from `lgmd-gym tune --cameras fovea tele wide` on the splits t
 for `FrameDifference`, 24 for `FlowDivergence`); docs/benchmark.md compares them with rules on the neuron.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.base import FPS
-from lgmd_gym.agents.filters import ConsecutiveFrames, YawRateGate
-from lgmd_gym.agents.params import RuleParams, parameter
-from lgmd_gym.agents.rule import Rule, SensorReading, sensor_readings
+from lgmd_gym.agents.base import FPS, Infos, Observations
+from lgmd_gym.agents.rules import COUNT, POSITIVE, Reading, Rule, RuleParams, readings
+from lgmd_gym.fields import number, record, whole
 from lgmd_gym.processes.extras import missing_extra
 
 
@@ -26,50 +24,62 @@ class ImageRule(Rule):
 
     include_frame = True
     reads_neuron = False
+    _previous: np.ndarray | None = None  # last frame of each environment, uint8 (N, height, width)
 
     @property
     def camera(self) -> dict[str, Any]:
         """The preset `fovea`, turned along the path."""
         return {"name": "fovea", "gaze": "path"}
 
-    def reset(self, seed: int | None = None) -> None:
-        """Release the brake and clear all state."""
-        super().reset(seed)
-        self._streak, self._previous = ConsecutiveFrames(self.params.frames), None
-        self._gate = YawRateGate(self.params.yaw_rate, self.params.settle)
+    def initial(self) -> dict[str, Any]:
+        """Return the number of frames at the level, the state of the gate, and no previous frame."""
+        return super().initial() | {"streak": 0, "closed": 0, "has_previous": False, "measure": 0.0}
 
-    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
-        """Measure the latest two frames; return whether the rule's condition holds."""
-        frame = np.ascontiguousarray(observation["frame"][:, :, 0])
-        self._value = 0.0 if self._previous is None else self.measure(self._previous, frame)
-        self._previous = frame
-        latest = tuple(sensor_readings(observation, info))[-1:]  # empty if the decision has no new frame
-        return any(map(self.should_brake, latest))
+    def brake_conditions(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Measure the latest two frames; return whether the rule's condition holds for the latest reading."""
+        frames = np.ascontiguousarray(observations["frame"][:, :, :, 0])
+        if self._previous is None:
+            self._previous = np.zeros_like(frames)
+        for index in np.flatnonzero(active).tolist():
+            known = self.state["has_previous"][index]
+            value = self.measure(self._previous[index], frames[index]) if known else 0.0
+            self.state["measure"][index] = value
+        self._previous[active], self.state["has_previous"][active] = frames[active], True
+        found = list(readings(observations, infos))
+        if not found:  # no environment has a new frame in this decision
+            return np.zeros(self.num_envs, np.bool_)
+        return self._process(found[-1]._replace(due=np.any([reading.due for reading in found], axis=0)))
 
-    def should_brake(self, reading: SensorReading) -> bool:
+    def should_brake(self, reading: Reading) -> np.ndarray:
         """Return whether the measure has reached the level for the required number of frames."""
-        return self._streak.update(self._gate.update(reading.yaw_rate) and self._value >= self.params.level)
+        reached = self.gate(reading.yaw_rate) & (self.state["measure"] >= self.params.level)
+        return self.consecutive("streak", reached, self.params.frames)
+
+    def _allocate(self, num_envs: int) -> None:
+        super()._allocate(num_envs)
+        self._previous = None
 
     def measure(self, previous: np.ndarray, frame: np.ndarray) -> float:
         """Return the measure of two successive frames, uint8 (height, width)."""
         raise NotImplementedError
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@record
 class FrameDifferenceParams(RuleParams):
-    """Parameters of `FrameDifference`.
+    """Parameters of `FrameDifference`."""
 
-    Attributes:
-        level: Threshold of the mean absolute frame difference, > 0 [grey levels].
-        frames: Number of consecutive camera frames at or above the level, >= 1.
-        yaw_rate: Absolute yaw rate above which the rule is inactive, > 0 [rad/s].
-        settle: Number of latest camera frames that must be free of such yaw rates, >= 1.
-    """
-
-    level: float = parameter(4.78, 0.5, 20.0)
-    frames: int = parameter(8, 1, 12)
-    yaw_rate: float = parameter(0.0384, 0.01, 0.3)
-    settle: int = parameter(60, 1, 60)
+    level: float = number(
+        4.78, POSITIVE, "grey levels", "Threshold of the mean absolute frame difference.", search=(0.5, 20.0)
+    )
+    frames: int = whole(
+        8, COUNT, "", "Number of consecutive camera frames at or above the level.", search=(1, 12)
+    )
+    yaw_rate: float = number(
+        0.0384, POSITIVE, "rad/s", "Absolute yaw rate above which the rule is inactive.", search=(0.01, 0.3)
+    )
+    settle: int = whole(
+        60, COUNT, "", "Number of latest camera frames that must be free of such yaw rates.", search=(1, 60)
+    )
 
 
 class FrameDifference(ImageRule):
@@ -86,21 +96,26 @@ class FrameDifference(ImageRule):
         return float(np.abs(frame.astype(np.int16) - previous).mean())
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@record
 class FlowDivergenceParams(RuleParams):
-    """Parameters of `FlowDivergence`.
+    """Parameters of `FlowDivergence`."""
 
-    Attributes:
-        level: Threshold of the mean divergence, > 0 [1/s]; 2/τ for a plane that fills the field of view.
-        frames: Number of consecutive camera frames at or above the level, >= 1.
-        yaw_rate: Absolute yaw rate above which the rule is inactive, > 0 [rad/s].
-        settle: Number of latest camera frames that must be free of such yaw rates, >= 1.
-    """
-
-    level: float = parameter(0.454, 0.05, 3.0)
-    frames: int = parameter(4, 1, 12)
-    yaw_rate: float = parameter(0.0713, 0.01, 0.3)
-    settle: int = parameter(25, 1, 60)
+    level: float = number(
+        0.454,
+        POSITIVE,
+        "1/s",
+        "Threshold of the mean divergence; 2/τ for a plane that fills the field of view.",
+        search=(0.05, 3.0),
+    )
+    frames: int = whole(
+        4, COUNT, "", "Number of consecutive camera frames at or above the level.", search=(1, 12)
+    )
+    yaw_rate: float = number(
+        0.0713, POSITIVE, "rad/s", "Absolute yaw rate above which the rule is inactive.", search=(0.01, 0.3)
+    )
+    settle: int = whole(
+        25, COUNT, "", "Number of latest camera frames that must be free of such yaw rates.", search=(1, 60)
+    )
 
 
 class FlowDivergence(ImageRule):

@@ -1,11 +1,11 @@
 """Oracles: agents on ground truth, as references without errors of perception."""
 
-from math import exp, hypot, inf, isfinite
+from math import inf
 from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.base import FPS, LatchingAgent
+from lgmd_gym.agents.base import FPS, Infos, LatchingAgent, Observations
 from lgmd_gym.agents.zones import CAMERA_SETBACK, FULL_DECELERATION, stopping_distance
 from lgmd_gym.errors import check_positive
 
@@ -29,10 +29,11 @@ class TTCOracle(LatchingAgent):
 
     def __init__(self, ttc: float = 2.0) -> None:
         self.ttc = check_positive("ttc", ttc)
+        super().__init__()
 
-    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
+    def brake_conditions(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
         """Return whether the time to contact is at or below the threshold; False without a contact ahead."""
-        return bool(info["ttc"] <= self.ttc)
+        return np.asarray(infos["ttc"]) <= self.ttc
 
 
 class StoppingDistanceOracle(LatchingAgent):
@@ -60,35 +61,40 @@ class StoppingDistanceOracle(LatchingAgent):
         self.deceleration = check_positive("deceleration", deceleration)
         self.reaction = check_positive("reaction", reaction)
         self.margin = check_positive("margin", margin)
-        self._previous_target_speed = inf
+        super().__init__()
 
-    def reset(self, seed: int | None = None) -> None:
-        """Release the brake and clear all state."""
-        super().reset(seed)
-        self._previous_target_speed = inf
+    def initial(self) -> dict[str, Any]:
+        """Return a released brake and no previous target speed."""
+        return super().initial() | {"target_speed": inf}
 
-    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
-        """Return whether the gap is at or below the required distance."""
-        speed, target_speed, gap = info["ego_speed"], info["target_speed"], info["gap"]
-        target_deceleration = (self._previous_target_speed - target_speed) / DECISION_INTERVAL
-        self._previous_target_speed = target_speed
-        if not (isfinite(gap) and isfinite(target_speed)) or speed <= target_speed:
-            return False
-        required = stopping_distance(speed - target_speed, self.deceleration, self.reaction)
-        if 1.0 < target_deceleration < inf:  # both cars come to a standstill
+    def brake_conditions(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return whether the gaps are at or below the required distances."""
+        speed, target_speed, gap = _floats(infos, "ego_speed", "target_speed", "gap")
+        previous, self.state["target_speed"] = self.state["target_speed"], target_speed
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # undefined values are inf
+            deceleration = (previous - target_speed) / DECISION_INTERVAL
+            closing = np.isfinite(gap) & np.isfinite(target_speed) & (speed > target_speed)
+            required = stopping_distance(speed - target_speed, self.deceleration, self.reaction)
             ego_distance = stopping_distance(speed, self.deceleration, self.reaction)
-            required = max(required, ego_distance - target_speed**2 / (2 * target_deceleration))
-        return bool(gap <= required + self.margin)
+            both_stop = np.maximum(required, ego_distance - target_speed**2 / (2 * deceleration))
+            braking = (deceleration > 1.0) & (deceleration < inf)  # both cars come to a standstill
+            return closing & (gap <= np.where(braking, both_stop, required) + self.margin)
 
 
-def _visual_angle(info: dict[str, Any]) -> tuple[float, float]:
-    """Return the target's visual angle θ at the lens [rad] and θ′ [rad/s]; zeros without a target."""
-    if not (isfinite(info["gap"]) and isfinite(info["target_speed"])):
-        return 0.0, 0.0
-    distance, half_width = info["gap"] + CAMERA_SETBACK, TARGET_WIDTH / 2
-    closing_speed = info["ego_speed"] - info["target_speed"]
-    theta = 2 * float(np.arctan2(half_width, distance))
-    return theta, 2 * half_width * closing_speed / hypot(distance, half_width) ** 2
+def _floats(infos: Infos, *names: str) -> tuple[np.ndarray, ...]:
+    """Return values of the infos, float64, shape (N,) each."""
+    return tuple(np.asarray(infos[name], np.float64) for name in names)
+
+
+def _visual_angle(infos: Infos) -> tuple[np.ndarray, np.ndarray]:
+    """Return the targets' visual angles θ at the lens [rad] and θ′ [rad/s]; zeros without a target."""
+    speed, target_speed, gap = _floats(infos, "ego_speed", "target_speed", "gap")
+    known, half_width = np.isfinite(gap) & np.isfinite(target_speed), TARGET_WIDTH / 2
+    distance = np.where(known, gap, 0.0) + CAMERA_SETBACK
+    closing_speed = speed - np.where(known, target_speed, 0.0)
+    theta = 2 * np.arctan2(half_width, distance)
+    rate = 2 * half_width * closing_speed / np.hypot(distance, half_width) ** 2
+    return np.where(known, theta, 0.0), np.where(known, rate, 0.0)
 
 
 class EtaOracle(LatchingAgent):
@@ -109,11 +115,12 @@ class EtaOracle(LatchingAgent):
 
     def __init__(self, threshold: float = 0.03, alpha: float = 2.0) -> None:
         self.threshold, self.alpha = check_positive("threshold", threshold), check_positive("alpha", alpha)
+        super().__init__()
 
-    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
+    def brake_conditions(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
         """Return whether η is at or above the threshold."""
-        theta, rate = _visual_angle(info)
-        return rate * exp(-self.alpha * theta) >= self.threshold
+        theta, rate = _visual_angle(infos)
+        return rate * np.exp(-self.alpha * theta) >= self.threshold
 
 
 class TauOracle(LatchingAgent):
@@ -132,8 +139,10 @@ class TauOracle(LatchingAgent):
 
     def __init__(self, tau: float = 1.8) -> None:
         self.tau = check_positive("tau", tau)
+        super().__init__()
 
-    def brake_condition(self, observation: dict[str, Any], info: dict[str, Any]) -> bool:
+    def brake_conditions(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
         """Return whether τ is at or below the threshold; False unless θ grows."""
-        theta, rate = _visual_angle(info)
-        return rate > 0.0 and theta / rate <= self.tau
+        theta, rate = _visual_angle(infos)
+        grows = rate > 0.0
+        return grows & (theta / np.where(grows, rate, 1.0) <= self.tau)

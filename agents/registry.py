@@ -1,32 +1,29 @@
 """Registry of agents: `AGENTS` maps names to classes, `make_agent` builds an agent from a string."""
 
-from typing import Any
+from typing import Any, TypeVar
 
-from lgmd_gym.agents.adapter import make_user_agent
-from lgmd_gym.agents.base import Agent
+from lgmd_gym.agents.base import Agent, BatchAgent
 from lgmd_gym.agents.baselines import AlwaysBrake, NoBrake, RandomBrake
-from lgmd_gym.agents.field_rules import DangerZone, NestedFields
 from lgmd_gym.agents.image_rules import FlowDivergence, FrameDifference
-from lgmd_gym.agents.options import check_options, parse_agent, parse_options
 from lgmd_gym.agents.oracles import EtaOracle, StoppingDistanceOracle, TauOracle, TTCOracle
 from lgmd_gym.agents.policies.policy import Policy, shipped_policies
-from lgmd_gym.agents.rule import Rule
-from lgmd_gym.agents.spike_rules import AdaptiveThreshold, Graded, SpeedGated, SpikeThreshold
-from lgmd_gym.agents.stopping_zone import StoppingZone
+from lgmd_gym.agents.rules import AdaptiveThreshold, DangerZone, Rule, SpikeThreshold, StoppingZone
+from lgmd_gym.agents.user_agents import check_options, make_user_agent, parse_agent, parse_options
 from lgmd_gym.errors import check_keys, check_known, check_text, shown
 
-AGENTS: dict[str, type[Agent]] = {}
+AGENTS: dict[str, type[BatchAgent]] = {}
+_A = TypeVar("_A", bound=type[BatchAgent])
 
 
-def register_agent(agent: type[Agent]) -> type[Agent]:
+def register_agent(agent: _A) -> _A:
     """Add an agent class to `AGENTS` under its `name`; usable as a class decorator.
 
     Raises:
         ValueError: If the name is taken.
     """
     given: Any = agent
-    if not isinstance(given, type) or not issubclass(given, Agent):
-        raise TypeError(f"agent must be a subclass of Agent, got {shown(agent)}")
+    if not isinstance(given, type) or not issubclass(given, BatchAgent):
+        raise TypeError(f"agent must be a subclass of BatchAgent, got {shown(agent)}")
     if agent.name in AGENTS:
         raise ValueError(f"agent {agent.name!r} is already registered; choose another name")
     AGENTS[agent.name] = agent
@@ -35,8 +32,8 @@ def register_agent(agent: type[Agent]) -> type[Agent]:
 
 for _group in (
     (NoBrake, AlwaysBrake, RandomBrake),
-    (SpikeThreshold, AdaptiveThreshold, Graded, SpeedGated),
-    (NestedFields, DangerZone, StoppingZone),
+    (SpikeThreshold, AdaptiveThreshold),
+    (DangerZone, StoppingZone),
     (FrameDifference, FlowDivergence),
     (TTCOracle, StoppingDistanceOracle, EtaOracle, TauOracle),
 ):
@@ -45,7 +42,12 @@ for _group in (
 
 
 def make_agent(text: str) -> Agent:
-    """Return the agent for a string.
+    """Return the agent for a string, in a single environment; arguments and errors as of `make_agents`."""
+    return Agent(make_agents(text, 1))
+
+
+def make_agents(text: str, num_envs: int) -> BatchAgent:
+    """Return the agent for a string, in N environments.
 
     Args:
         text: "NAME[:OPTION=VALUE,…]" for a registered agent, as in "spike-threshold:threshold=45,frames=2";
@@ -53,6 +55,7 @@ def make_agent(text: str) -> Agent:
             user's class with a method `act`; "policy:NAME" or "policy:FILE.zip" for a learned policy, with
             ":margin=X" for a margin of its log odds. A file whose card does not describe the network is
             unpickled and can run arbitrary code.
+        num_envs: Number of environments N.
 
     Raises:
         ValueError: For an unknown agent or option, or a value out of bounds.
@@ -65,15 +68,15 @@ def make_agent(text: str) -> Agent:
     if name == Policy.name:
         file, options = _split_policy(rest)
         check_keys("option of agent policy", options, ("margin",))
-        return Policy(file, **options)
+        return Policy(file, **options).for_envs(num_envs)
     if _is_user_class(name, rest):
-        return make_user_agent(text)
+        return make_user_agent(text).for_envs(num_envs)
     name, options = parse_agent(text)
     check_known("agent", name, AGENTS, "an agent of your own is MODULE:CLASS")
     agent: Any = AGENTS[name]
     if not issubclass(agent, Rule):  # the parameters of a rule check their own names
         check_options(name, agent, options)
-    return agent(**options)
+    return agent(**options).for_envs(num_envs)
 
 
 def outside_code(text: str) -> str | None:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 
 import lgmd_gym  # noqa: F401  (registers the environments)
-from lgmd_gym.agents import Agent, make_agent
+from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.episode import rollout
 from lgmd_gym.envs import FAMILIES, env_id
 from lgmd_gym.envs.registration import RANDOM_TASKS, SCENARIO, TRAFFIC_KINDS, traffic_id
@@ -49,17 +49,16 @@ class Returns(NamedTuple):
     duration: float
 
 
-class RandomActions(Agent):
+class RandomActions:
     """Draws every action from the action space."""
 
-    name = "random"
+    alert = False
 
     def __init__(self, space: gym.Space[Any]) -> None:
         self.space = space
 
     def reset(self, seed: int | None = None) -> None:
         """Seed the action space."""
-        super().reset(seed)
         self.space.seed(seed)
 
     def act(self, observation: dict[str, Any], info: dict[str, Any]) -> Any:

@@ -1,89 +1,113 @@
-"""`PolicyCard`: what a stable-baselines3 file does not contain: cameras, inputs and demands of its policy."""
+"""`PolicyCard`: what a stable-baselines3 file does not contain: cameras, inputs and demands of its policy.
 
+`save_policy` and `save_card` write cards for models that were trained by hand, with rl-zoo or its callbacks.
+"""
+
+import inspect
 import json
 import zipfile
 import zlib
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import MISSING, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lgmd_gym.agents.base import FPS
 from lgmd_gym.agents.policies.features import FeatureConfig
-from lgmd_gym.agents.policies.network import WEIGHTS, NetworkSpec
-from lgmd_gym.errors import check_items, check_keys, check_text, check_type, check_within, shown
+from lgmd_gym.agents.policies.network import WEIGHTS, NetworkSpec, describe_network
+from lgmd_gym.agents.policies.normalizer import NORMALIZER_SUFFIX, save_normalizer
+from lgmd_gym.errors import (
+    check_items,
+    check_mapping,
+    check_path,
+    check_type,
+    check_within,
+    shown,
+)
+from lgmd_gym.fields import Record, optional, record, text, value
+from lgmd_gym.processes.extras import missing_extra
+from lgmd_gym.processes.files import complete_file
 
 if TYPE_CHECKING:
+    from stable_baselines3.common.base_class import BaseAlgorithm
+
     from lgmd_gym.camera import CameraSpec
 
+NORMALIZER = f"-vecnormalize{NORMALIZER_SUFFIX}"  # end of the name of the file with the statistics
 CARD = "lgmd_gym.json"  # member of the zip file of a policy of `lgmd-gym train`
 _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PolicyCard:
-    """Description of a policy, as JSON in `FILE.json` beside the model `FILE.zip`.
+def _check_cameras(name: str, camera: Any) -> Any:
+    from lgmd_gym.sensing.cameras import make_cameras  # imports numba, which takes half a second
 
-    Attributes:
-        algo: Class of stable-baselines3 that reads the model, such as "ppo".
-        camera: Cameras of the training, as in the argument `camera` of the environments.
-        neuron: Neuron parameters that differ from the defaults; None for the defaults.
-        features: Arguments of `PolicyWrapper` in the training; None without it, for observations as the
-            environment returns them.
-        demands: Demand of each discrete action, in [-1, 1]; None for a continuous demand.
-        vec_normalize: Statistics of a `VecNormalize`, beside the card: a file .npz of `save_card`, or one of
-            `VecNormalize.save`, which is unpickled; None for a training without it.
-        network: Network, with which loading executes no code of the file; None to unpickle the file.
+    make_cameras(camera)
+    return camera
 
-    Raises:
-        ValueError: For a value of another type or out of range.
-    """
 
-    algo: str
-    camera: "CameraSpec"
-    neuron: dict[str, Any] | None = None
-    features: FeatureConfig | None = None
-    demands: tuple[float, ...] | None = None
-    vec_normalize: str | None = None
-    network: NetworkSpec | None = None
+def _check_neuron(name: str, neuron: Any) -> Any:
+    from lgmd_gym.neuron import LGMDParams
 
-    def __post_init__(self) -> None:
-        from lgmd_gym.neuron import LGMDParams
-        from lgmd_gym.sensing.cameras import make_cameras  # imports numba, which takes half a second
+    LGMDParams.make(neuron)
+    return neuron
 
-        check_text("algo", self.algo)
-        make_cameras(self.camera)
-        LGMDParams.make(self.neuron)
-        if self.demands is not None:
-            demands = check_items("demands", self.demands, object, "numbers") or None
-            for demand in demands or ():
-                check_within("demand", demand, -1.0, 1.0)
-            object.__setattr__(self, "demands", demands)
-        if self.vec_normalize is not None:
-            check_text("vec_normalize", self.vec_normalize)
 
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> "PolicyCard":
-        """Return the card for plain values.
+def _check_demands(name: str, demands: Any) -> tuple[float, ...] | None:
+    items = check_items(name, demands, object, "numbers")
+    for demand in items:
+        check_within("demand", demand, -1.0, 1.0)
+    return items or None
 
-        Raises:
-            ValueError: If `algo` or `camera` is missing, a key is unknown, or a value is invalid.
-        """
-        missing = [key for key in ("algo", "camera") if key not in values]
-        if missing:
-            raise ValueError(f"{', '.join(missing)} missing")
-        check_keys("key of the card", values, cls.__dataclass_fields__)
-        features = values.get("features")
-        if features is not None:
-            features = FeatureConfig.from_dict(check_type("features", features, dict))
-        network = values.get("network")
-        if network is not None:
-            network = NetworkSpec.from_dict(check_type("network", network, dict))
-        return cls(**{**values, "features": features, "network": network})
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the card as plain values."""
-        features = None if self.features is None else self.features.to_dict()
-        return asdict(self) | {"features": features}
+def _check_features(name: str, features: Any) -> FeatureConfig:
+    return FeatureConfig.make(check_type(name, features, dict, FeatureConfig))
+
+
+def _check_network(name: str, network: Any) -> NetworkSpec:
+    return NetworkSpec.make(check_type(name, network, dict, NetworkSpec))
+
+
+@record
+class PolicyCard(Record):
+    """Description of a policy, as JSON in `FILE.json` beside the model `FILE.zip`."""
+
+    label = "card"
+
+    algo: str = text(MISSING, 'Class of stable-baselines3 that reads the model, such as "ppo"')
+    camera: "CameraSpec" = value(
+        MISSING, _check_cameras, "Cameras of the training, as in the argument `camera` of the environments"
+    )
+    neuron: dict[str, Any] | None = optional(
+        value(None, _check_neuron, "Neuron parameters that differ from the defaults; None for the defaults")
+    )
+    features: FeatureConfig | None = optional(
+        value(
+            None,
+            _check_features,
+            "Arguments of `PolicyWrapper` in the training; None without it, for observations as the "
+            "environment returns them",
+        )
+    )
+    demands: tuple[float, ...] | None = optional(
+        value(
+            None,
+            _check_demands,
+            "Demand of each discrete action, in [-1, 1]; None for a continuous demand",
+        )
+    )
+    vec_normalize: str | None = optional(
+        text(
+            None,
+            "Statistics of a `VecNormalize`, beside the card: a file .npz of `save_card`, or one of "
+            "`VecNormalize.save`, which is unpickled; None for a training without it",
+        )
+    )
+    network: NetworkSpec | None = optional(
+        value(
+            None,
+            _check_network,
+            "Network, with which loading executes no code of the file; None to unpickle the file",
+        )
+    )
 
 
 def card_file(path: Path) -> Path:
@@ -130,8 +154,11 @@ def policy_card(path: Path) -> PolicyCard:
     values = read_card(path)
     try:
         if "config" in values:  # of `lgmd-gym train`
-            values = {key: value for key, value in values.items() if key in PolicyCard.__dataclass_fields__}
-        return PolicyCard.from_dict(values)
+            values = {name: item for name, item in values.items() if name in PolicyCard.__dataclass_fields__}
+        missing = [name for name in ("algo", "camera") if name not in values]
+        if missing:
+            raise ValueError(f"{', '.join(missing)} missing")
+        return PolicyCard.make(values)
     except (AttributeError, TypeError, ValueError) as error:
         raise ValueError(f"policy {shown(str(path))}: the card is damaged ({error})") from None
 
@@ -140,3 +167,130 @@ def write_card(path: Path, card: dict[str, Any]) -> None:
     """Add a card to the zip file of a stable-baselines3 model."""
     with zipfile.ZipFile(path, "a") as file:
         file.writestr(CARD, json.dumps(card, indent=1))
+
+
+def save_policy(model: "BaseAlgorithm", file: str | Path, env: Any = None) -> Path:
+    """Save a model of stable-baselines3 as an agent: FILE.zip, its card FILE.json, and the normalisation.
+
+    The agent string is "policy:FILE.zip".
+
+    Args:
+        model: Trained model with the inputs of `LGMDObservation` or `PolicyWrapper`.
+        file: Zip file to write.
+        env: Training environment, see `save_card`; that of the model if None.
+
+    Returns:
+        Path of the zip file.
+
+    Raises:
+        ValueError: If the model has no environment, or a card cannot describe it.
+    """
+    path = check_path("file", file)
+    path = path if path.suffix == ".zip" else path.with_name(f"{path.name}.zip")
+    env = model.get_env() if env is None else env
+    if env is None:
+        raise ValueError("the model has no environment; pass the training environment as env")
+    card = replace(save_card(path, env, type(model).__name__.lower()), network=describe_network(model))
+    _write(path, card)
+    model.save(path)
+    return path
+
+
+def save_card(file: str | Path, env: Any, algo: str, vec_normalize: str | None = None) -> PolicyCard:
+    """Write the card FILE.json for a model FILE.zip, for example of `EvalCallback` or rl-zoo.
+
+    Args:
+        file: Zip file of the model, which need not exist yet.
+        env: Environment like that of the training: one of Gymnasium, or a `VecEnv` of stable-baselines3. The
+            statistics of a `VecNormalize` around it are written to FILE-vecnormalize.npz.
+        algo: Class of stable-baselines3 that reads the model, such as "ppo".
+        vec_normalize: Name of an existing file of `VecNormalize.save` in the folder of the card.
+
+    Raises:
+        ValueError: If the observations, actions or rate of the environment cannot be those of an agent.
+    """
+    path = check_path("file", file)
+    normalizer = _normalizer(env)
+    if normalizer is not None and vec_normalize is None:
+        vec_normalize = f"{path.stem}{NORMALIZER}"
+        save_normalizer(normalizer, path.with_name(vec_normalize))
+    card = PolicyCard(algo=algo, vec_normalize=vec_normalize, **_values(env))
+    _write(path, card)
+    return card
+
+
+def _write(path: Path, card: PolicyCard) -> None:
+    with complete_file(card_file(path)) as part:
+        part.write_text(json.dumps(card.to_dict(), indent=1) + "\n", "utf-8")
+
+
+def _normalizer(env: Any) -> Any:
+    """Return the `VecNormalize` around an environment, or None."""
+    try:
+        from stable_baselines3.common.vec_env import VecEnv, VecFrameStack, VecNormalize
+        from stable_baselines3.common.vec_env import unwrap_vec_wrapper as unwrap
+    except ImportError:
+        raise missing_extra("a card", "train") from None
+    if not isinstance(env, VecEnv):
+        return None
+    if unwrap(env, VecFrameStack) is not None:
+        raise ValueError("a card cannot describe VecFrameStack; use PolicyWrapper(env, history=N) instead")
+    return unwrap(env, VecNormalize)
+
+
+def _values(env: Any) -> dict[str, Any]:
+    """Return the fields of the card that follow from the specification of an environment."""
+    from lgmd_gym.camera.spec import plain_values
+
+    spec: Any = env.get_attr("spec")[0] if hasattr(env, "get_attr") else getattr(env, "spec", None)
+    if spec is None:
+        raise ValueError(f"the environment {shown(env)} has no spec; make it with gym.make")
+    wrappers = {item.name: item.kwargs or {} for item in spec.additional_wrappers}
+    sensors = wrappers.get("LGMDObservation", spec.kwargs)
+    config = check_mapping("config", spec.kwargs.get("config"))
+    demands = _demands(env, config)
+    _check_rates(env, spec.kwargs, config)
+    features = wrappers.get("PolicyWrapper")
+    return {
+        "camera": plain_values(sensors.get("camera", "fovea")),
+        "neuron": plain_values(sensors.get("params")),
+        "features": None if features is None else FeatureConfig.make(features),
+        "demands": demands,
+    }
+
+
+def _check_rates(env: Any, arguments: dict[str, Any], config: dict[str, Any]) -> None:
+    """Raise ValueError if the decisions or the frames of an environment have another rate than for agents."""
+    rate = config.get("policy_frequency", _attribute(env, "config", {}).get("policy_frequency", FPS))
+    if rate != FPS:
+        raise ValueError(
+            f"policy_frequency {rate:g} Hz is not that of agents, {FPS:g} Hz; set {FPS:g} and train with "
+            f"PolicyWrapper(env, repeat={max(round(FPS / rate), 1)}) instead"
+        )
+    fps = arguments.get("fps") or _attribute(env, "fps", FPS)
+    if fps != FPS:
+        raise ValueError(f"fps {fps:g} Hz is not that of agents, {FPS:g} Hz; train without fps")
+
+
+def _attribute(env: Any, name: str, default: Any) -> Any:
+    """Return an attribute of an environment, or of the first one of a `VecEnv`; the default without it."""
+    try:
+        return env.get_attr(name)[0] if hasattr(env, "get_attr") else env.get_wrapper_attr(name)
+    except AttributeError:
+        return default
+
+
+def _demands(env: Any, config: dict[str, Any]) -> tuple[float, ...] | None:
+    from lgmd_gym.envs.spaces import DiscreteDemand
+
+    action = check_mapping("action", config.get("action"))
+    space = env.action_space
+    if not hasattr(space, "n"):
+        if space.shape != (1,) or space.low[0] != -1.0 or space.high[0] != 1.0:
+            raise ValueError(f"the action must be one demand in [-1, 1], got {space}")
+        return None
+    default = inspect.signature(DiscreteDemand).parameters["demands"].default
+    demands = tuple(action.get("demands", default))
+    if action.get("type") != "DiscreteDemand" or len(demands) != space.n:
+        raise ValueError(f"the actions of {space} are not demands; use the action type DiscreteDemand")
+    return demands

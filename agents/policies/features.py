@@ -1,14 +1,52 @@
-"""Inputs of learned policies: scaled observations with a history."""
+"""Inputs of learned policies: scaled observations with a history, and levels of the fields of cameras."""
 
-from collections import deque
-from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.agents.policies.zone_features import ZONE_INPUTS, ZoneFeatures, check_zone_shape
+from lgmd_gym.agents.base import FPS, Observations
+from lgmd_gym.agents.rules import excitation
+from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, NUM_MOTION_FIELDS
 from lgmd_gym.agents.zones import NUM_FIELDS
-from lgmd_gym.errors import check_flag, check_items, check_keys, check_known, check_positive, check_whole
+from lgmd_gym.errors import check_items, check_known
+from lgmd_gym.fields import Record, flag, number, record, value, whole
+
+TIME_CONSTANTS_S = (0.1, 0.4, 1.2)
+NUM_LEVELS = 1 + len(TIME_CONSTANTS_S)  # features per field
+POTENTIALS = ("membrane_potential", "column_potential")  # converted to excitations
+NORM = 3.4  # about log(1 + 2 · 15), so that the features of `zones` are in [0, 1.01]
+GAINS = 1.0 / (1.0 + FPS * np.array(TIME_CONSTANTS_S)[:, None])
+
+
+class FieldInput(NamedTuple):
+    """Definition of a policy input.
+
+    Attributes:
+        source: Observation that it is computed from.
+        factor: Factor of the values before the logarithm.
+        first: First of its values: a camera, or a column of `column_potential`.
+        last: Last one + 1.
+    """
+
+    source: str
+    factor: float
+    first: int = 0
+    last: int = NUM_FIELDS
+
+    @property
+    def size(self) -> int:
+        """Number of features."""
+        return NUM_LEVELS * (self.last - self.first)
+
+
+ZONE_INPUTS = {
+    "zones": FieldInput("membrane_potential", 2.0),  # as excitation k/(n σ3), at most 15
+    "zones_spikes": FieldInput("spike_frequency", 0.1),  # [spikes/s]; ten spikes per frame at 30 Hz are 300
+    "zones_ffi": FieldInput("ffi", 2.0),  # [grey levels]
+    "sides": FieldInput("membrane_potential", 2.0, NUM_FIELDS, NUM_MOTION_FIELDS),  # LGMD and DSN
+    "sides_ffi": FieldInput("ffi", 2.0, NUM_FIELDS, NUM_MOTION_FIELDS),
+    "columns": FieldInput("column_potential", 2.0, 0, NUM_COLUMNS),
+}
 
 # Offset and scale of each observation: (value - offset) / scale is near [-1, 1].
 SCALES = {
@@ -34,53 +72,54 @@ DEFAULT_INPUTS = tuple(name for name in (*SCALES, *DERIVED_INPUTS) if name != "k
 MAX_HISTORY = 1000  # decisions; also the limit of `repeat` and `shrink`
 
 
-@dataclass(frozen=True)
-class FeatureConfig:
-    """Inputs, decision rate and latch of a learned policy.
+def _check_inputs(name: str, inputs: Any) -> tuple[str, ...]:
+    names = check_items(name, inputs, str, "names")
+    if not names:
+        raise ValueError(f"{name} must contain at least one policy input, got none")
+    for item in names:
+        check_known("policy input", item, INPUTS)
+        if names.count(item) > 1:
+            raise ValueError(f"{name} must contain each policy input once, got {item!r} twice")
+    return names
 
-    Attributes:
-        inputs: Observation keys, among them `frame` and `known_deceleration`, and inputs derived from them:
-            `speed_change`, the change since the last decision; `spike_peak`, the decaying peak of the spike
-            frequency; with the cameras of `stopping-zone`, `zones`, `zones_spikes` and `zones_ffi`; and with
-            those of `all-round` also `sides`, `sides_ffi` and `columns` (see `ZoneFeatures`).
-        history: Number of decisions in the history, including the present one, >= 1; inputs of zones,
-            sides and columns contain averages over time and have no history.
-        repeat: Number of environment decisions per decision of the policy, >= 1. At 30 Hz, 3 gives 10 Hz.
-        shrink: Side of the pixel blocks that frames are averaged over, >= 1 [px].
-        latch: Whether the first demand of -0.5 or less is held until the episode ends.
-        reward_scale: Factor on training rewards, > 0. Contacts cost up to 20, and the loss of DQN is linear
-            beyond 1.
-    """
 
-    inputs: tuple[str, ...] = DEFAULT_INPUTS
-    history: int = 6
-    repeat: int = 3
-    shrink: int = 2
-    latch: bool = False
-    reward_scale: float = 1.0
+@record
+class FeatureConfig(Record):
+    """Inputs, decision rate and latch of a learned policy."""
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "inputs", check_items("inputs", self.inputs, str, "names"))
-        if not self.inputs:
-            raise ValueError("inputs must contain at least one policy input, got none")
-        for name in self.inputs:
-            check_known("policy input", name, INPUTS)
-            if self.inputs.count(name) > 1:
-                raise ValueError(f"inputs must contain each policy input once, got {name!r} twice")
-        for name in ("history", "repeat", "shrink"):
-            object.__setattr__(self, name, check_whole(name, getattr(self, name), 1, MAX_HISTORY))
-        object.__setattr__(self, "latch", check_flag("latch", self.latch))
-        object.__setattr__(self, "reward_scale", check_positive("reward_scale", self.reward_scale))
+    label = "policy"
 
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> "FeatureConfig":
-        """Return the configuration from plain values; unknown keys raise ValueError."""
-        check_keys("policy feature", values, cls.__dataclass_fields__)
-        return cls(**values)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the configuration as plain values."""
-        return asdict(self) | {"inputs": list(self.inputs)}
+    inputs: tuple[str, ...] = value(
+        DEFAULT_INPUTS,
+        _check_inputs,
+        "Observation keys, among them `frame` and `known_deceleration`, and inputs derived from them: "
+        "`speed_change`, the change since the last decision; `spike_peak`, the decaying peak of the spike "
+        "frequency; with the cameras of `stopping-zone`, `zones`, `zones_spikes` and `zones_ffi`; and with "
+        "those of `all-round` also `sides`, `sides_ffi` and `columns` (see `FeatureHistory`)",
+    )
+    history: int = whole(
+        6,
+        f"[1, {MAX_HISTORY}]",
+        "",
+        "Number of decisions in the history, including the present one; inputs of zones, sides and columns "
+        "contain averages over time and have no history",
+    )
+    repeat: int = whole(
+        3,
+        f"[1, {MAX_HISTORY}]",
+        "",
+        "Number of environment decisions per decision of the policy; at 30 Hz, 3 gives 10 Hz",
+    )
+    shrink: int = whole(
+        2, f"[1, {MAX_HISTORY}]", "px", "Side of the pixel blocks that frames are averaged over"
+    )
+    latch: bool = flag(False, "Whether the first demand of -0.5 or less is held until the episode ends")
+    reward_scale: float = number(
+        1.0,
+        "(0, inf)",
+        "",
+        "Factor on training rewards: contacts cost up to 20, and the loss of DQN is linear beyond 1",
+    )
 
     @property
     def cameras_of(self) -> str | None:
@@ -90,9 +129,9 @@ class FeatureConfig:
             return None
         return "stopping-zone" if max(required) == NUM_FIELDS else "all-round"
 
-    def latches(self, demand: float) -> bool:
-        """Return whether a demand in [-1, 1] is held until the episode ends."""
-        return self.latch and demand <= LATCH_DEMAND
+    def latches(self, demands: Any) -> Any:
+        """Return whether demands in [-1, 1] are held until the episode ends, bool, shape (N,)."""
+        return (demands <= LATCH_DEMAND) & self.latch
 
     def box_arguments(self, shapes: dict[str, tuple[int, ...]]) -> dict[str, tuple[Any, ...]]:
         """Return low, high, shape and dtype of a Gymnasium `Box` for each input.
@@ -134,76 +173,172 @@ def source_observation(name: str) -> str:
 
 
 class FeatureHistory:
-    """Features of a policy over its last decisions.
+    """Features of a policy over its last decisions, in N environments.
 
     Call `update` at every decision of the environment and `stack` at every decision of the policy.
 
+    For each field of a camera, `zones` and similar inputs have four features, see `levels_of`: the weaker
+    level of the last two frames, then the averages of the level with time constants of 0.1, 0.4 and 1.2 s,
+    which begin at 0.
+
     Args:
         features: Configuration of the policy.
+        num_envs: Number of environments N.
     """
 
-    def __init__(self, features: FeatureConfig) -> None:
+    def __init__(self, features: FeatureConfig, num_envs: int = 1) -> None:
         self.features = features
+        self._zones = [name for name in features.inputs if name in ZONE_INPUTS]
         self._required = {source_observation(name) for name in features.inputs}
-        self._required.discard(FRAME)  # `update` does not process frames
-        self.reset()
+        self._kept = {source_observation(name) for name in features.inputs if name not in ZONE_INPUTS}
+        self._state: dict[str, np.ndarray] = {}  # arrays of shape (N, …), made at the first observation
+        self._updated = np.zeros(num_envs, np.bool_)  # environments with an observation
+        self._stacked = np.zeros(num_envs, np.bool_)  # environments with a history
 
-    def reset(self) -> None:
-        """Clear the history; the first features of the next episode fill it."""
-        self._history: dict[str, deque[np.ndarray]] = {}
-        self._observation: dict[str, Any] = {}
-        self._speed: np.ndarray | None = None
-        self._peak: np.ndarray | None = None
-        names = [name for name in self.features.inputs if name in ZONE_INPUTS]
-        self._zones = {name: ZoneFeatures(name) for name in names}
+    def reset(self, mask: np.ndarray | None = None) -> None:
+        """Clear the histories of some environments, or of all; their next features fill them."""
+        selected = slice(None) if mask is None else mask
+        self._updated[selected] = self._stacked[selected] = False
 
-    def update(self, observation: dict[str, Any]) -> None:
-        """Process an observation of `LGMDObservation`.
+    def update(self, observations: Observations, rows: np.ndarray | None = None) -> None:
+        """Process observations of `LGMDObservation`.
+
+        Args:
+            observations: Observations, shape (N, …) each.
+            rows: Indices of the environments to update; None for all.
 
         Raises:
             ValueError: If an observation is missing, or comes from other cameras than an input requires.
         """
+        rows = np.arange(len(self._updated)) if rows is None else rows
         for name in self._required:
-            if name not in observation:
-                raise ValueError(f"the policy requires the observation {name!r}, got {sorted(observation)}")
-        self._observation = observation
+            if name not in observations:
+                raise ValueError(f"the policy requires the observation {name!r}, got {sorted(observations)}")
+        for name in self._kept:
+            self._write(f"observation/{name}", rows, np.asarray(observations[name])[rows])
+        first = ~self._updated[rows]
         if "spike_peak" in self.features.inputs:
-            frequency = np.asarray(observation["spike_frequency"])
-            self._peak = frequency if self._peak is None else np.maximum(frequency, PEAK_DECAY * self._peak)
-        for zones in self._zones.values():
-            zones.update(observation[zones.source])
+            frequency = np.asarray(observations["spike_frequency"])[rows]
+            decayed = PEAK_DECAY * self._read("peak", rows, frequency)
+            self._write("peak", rows, np.where(first[:, None], frequency, np.maximum(frequency, decayed)))
+        for name in self._zones:
+            level = levels_of(name, np.asarray(observations[ZONE_INPUTS[name].source])[rows])
+            self._update_zone(name, rows, level, first[:, None])
+        self._updated[rows] = True
 
-    def stack(self) -> dict[str, np.ndarray]:
-        """Append the present features to the history and return the history of each input."""
-        stacked = {}
-        for name in self.features.inputs:
-            value = self._feature(name)
-            length = self.features.history_of(name)
-            filled = deque([value] * length, length)
-            history = self._history.setdefault(name, filled)
-            history.append(value)
-            stacked[name] = np.concatenate(history, axis=-1)
+    def stack(self, rows: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """Append the present features to the histories and return the histories of each input.
+
+        Args:
+            rows: Indices of M environments; None for all.
+
+        Returns:
+            Features, oldest first, arrays of shape (M, …).
+        """
+        rows = np.arange(len(self._updated)) if rows is None else rows
+        stacked = {name: self._append(name, rows, self._feature(name, rows)) for name in self.features.inputs}
+        self._stacked[rows] = True
         return stacked
 
-    def _feature(self, name: str) -> np.ndarray:
+    def _append(self, name: str, rows: np.ndarray, feature: np.ndarray) -> np.ndarray:
+        """Append features to the histories of an input and return these."""
+        length = self.features.history_of(name)
+        if length == 1:
+            return feature
+        filled = np.repeat(feature[:, None], length, axis=1)
+        history = self._read(f"history/{name}", rows, filled)
+        appended = np.concatenate([history[:, 1:], feature[:, None]], axis=1)
+        first = ~self._stacked[rows].reshape(-1, *[1] * feature.ndim)
+        history = np.where(first, filled, appended)
+        self._write(f"history/{name}", rows, history)
+        return np.concatenate(list(np.moveaxis(history, 1, 0)), axis=-1)
+
+    def _feature(self, name: str, rows: np.ndarray) -> np.ndarray:
+        """Return the present feature of some environments."""
         if name in ZONE_INPUTS:
-            return self._zones[name].collect().astype(np.float32)
-        value = np.asarray(self._observation[source_observation(name)])
+            level, last, averages = (
+                self._state[f"{part}/{name}"][rows] for part in ("level", "last", "mean")
+            )
+            averages = averages.reshape(len(rows), -1)
+            return np.concatenate([weaker(level, last), averages], axis=1).astype(np.float32)
+        value = self._state[f"observation/{source_observation(name)}"][rows]
         if name == FRAME:
-            return shrink_frame(value, self.features.shrink)
+            return shrink_frames(value, self.features.shrink)
         if name == "speed_change":
-            value, self._speed = value - (value if self._speed is None else self._speed), value
+            last = np.where(self._stacked[rows, None], self._read("speed", rows, value), value)
+            self._write("speed", rows, value)
+            value = value - last
         elif name == "spike_peak":
-            value = np.asarray(self._peak)
+            value = self._state["peak"][rows]
         offset, scale = SCALES.get(name) or (0.0, DERIVED_INPUTS[name][1])
         return np.clip((value - offset) / scale, -CLIP, CLIP).astype(np.float32)
 
+    def _update_zone(self, name: str, rows: np.ndarray, level: np.ndarray, first: np.ndarray) -> None:
+        """Process the levels of the fields of an input, shape (M, fields)."""
+        last = np.where(first, level, self._read(f"level/{name}", rows, level))
+        before = np.zeros((len(rows), NUM_LEVELS - 1, level.shape[1]))
+        averages = np.where(first[:, None], 0.0, self._read(f"mean/{name}", rows, before))
+        averages += GAINS * (level[:, None] - averages)
+        for part, values in (("last", last), ("level", level), ("mean", averages)):
+            self._write(f"{part}/{name}", rows, values)
 
-def shrink_frame(frame: np.ndarray, side: int) -> np.ndarray:
-    """Return a frame, uint8 (height, width, channels), with each block of `side` × `side` px averaged."""
+    def _read(self, name: str, rows: np.ndarray, default: np.ndarray) -> np.ndarray:
+        """Return an array of the state for some environments; the default before the first `_write`."""
+        return self._state[name][rows] if name in self._state else default
+
+    def _write(self, name: str, rows: np.ndarray, values: np.ndarray) -> None:
+        """Set an array of the state for some environments."""
+        if name not in self._state:
+            self._state[name] = np.zeros((len(self._updated), *values.shape[1:]), values.dtype)
+        self._state[name][rows] = values
+
+
+def shrink_frames(frames: np.ndarray, side: int) -> np.ndarray:
+    """Return frames, uint8 (N, height, width, channels), with blocks of `side` × `side` px averaged."""
     if side == 1:
-        return frame
-    height, width, channels = frame.shape
+        return frames
+    count, height, width, channels = frames.shape
     rows, columns = height // side, width // side
-    blocks = frame[: rows * side, : columns * side].reshape(rows, side, columns, side, channels)
-    return np.round(blocks.mean(axis=(1, 3), dtype=np.float32)).astype(np.uint8)
+    blocks = frames[:, : rows * side, : columns * side].reshape(count, rows, side, columns, side, channels)
+    return np.round(blocks.mean(axis=(2, 4), dtype=np.float32)).astype(np.uint8)
+
+
+def levels_of(name: str, signal: np.ndarray) -> np.ndarray:
+    """Return the levels of the fields of an input: its signal on a logarithmic scale, float64, (..., fields).
+
+    Membrane potentials K are converted to excitations log(K / (1 - K)). That of a direction-selective
+    neuron is negative for motion to the left, and so is its level.
+
+    Args:
+        name: A key of `ZONE_INPUTS`.
+        signal: Observation of the neurons, shape (..., cameras) or (..., columns).
+
+    Raises:
+        ValueError: If the observation comes from other cameras than the input requires.
+    """
+    check_zone_shape(name, signal.shape[-1:])
+    field = ZONE_INPUTS[name]
+    values = signal[..., field.first : field.last].astype(np.float64)
+    if field.source in POTENTIALS:
+        values = excitation(values)
+    return np.copysign(np.log1p(field.factor * np.abs(values)), values) / NORM
+
+
+def weaker(level: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Return the level with the smaller magnitude, of two frames, so that a single frame is not enough."""
+    return np.where(np.abs(level) <= np.abs(last), level, last)
+
+
+def check_zone_shape(name: str, shape: tuple[int, ...]) -> None:
+    """Raise ValueError unless an observation comes from the cameras that an input requires."""
+    if ZONE_INPUTS[name].source == "column_potential":
+        agent, allowed, kind = "all-round", (NUM_COLUMNS,), "columns"
+    elif ZONE_INPUTS[name].last == NUM_FIELDS:
+        agent, allowed, kind = "stopping-zone", (NUM_FIELDS, NUM_ALL_ROUND), "cameras"
+    else:
+        agent, allowed, kind = "all-round", (NUM_ALL_ROUND,), "cameras"
+    if shape not in [(count,) for count in allowed]:
+        raise ValueError(
+            f"policy input {name!r} requires the {allowed[0]} {kind} of {agent}, got {shape[0]}; "
+            f"train with --sensors-of {agent}"
+        )

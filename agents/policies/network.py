@@ -4,7 +4,7 @@ import io
 import json
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import MISSING
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,8 @@ import numpy as np
 from gymnasium import spaces
 
 from lgmd_gym.agents.policies.features import FRAME
-from lgmd_gym.errors import check_items, check_keys, check_known, check_text, check_type, check_whole
+from lgmd_gym.errors import check_items, check_keys, check_known, check_type, check_whole
+from lgmd_gym.fields import Record, record, text, value
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -27,40 +28,38 @@ PLAIN_KWARGS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NetworkSpec:
-    """Description of a network of stable-baselines3.
-
-    Attributes:
-        policy: stable-baselines3's name of the policy class, such as "MultiInputPolicy".
-        inputs: Shape of each input. The input `frame` is uint8, others are float32.
-        policy_kwargs: Arguments of the policy class; the activation function by its name in `torch.nn`.
-
-    Raises:
-        ValueError: For a value of another type or out of range.
-    """
-
-    policy: str
-    inputs: dict[str, tuple[int, ...]]
-    policy_kwargs: dict[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        check_text("policy", self.policy)
-        inputs = {
-            name: tuple(check_whole(f"shape of {name}", side, 1, MAX_UNITS) for side in _items(name, shape))
-            for name, shape in check_type("inputs", self.inputs, dict).items()
-        }
-        object.__setattr__(self, "inputs", inputs)
-        check_keys(
-            "key of policy_kwargs", check_type("policy_kwargs", self.policy_kwargs, dict), PLAIN_KWARGS
+def _check_inputs(name: str, inputs: Any) -> dict[str, tuple[int, ...]]:
+    return {
+        key: tuple(
+            check_whole(f"shape of {key}", side, 1, MAX_UNITS)
+            for side in check_items(f"shape of {key}", shape, object, "whole numbers")
         )
-        _check_units(self.policy_kwargs)
+        for key, shape in check_type(name, inputs, dict).items()
+    }
 
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> "NetworkSpec":
-        """Return the description for plain values; unknown keys raise ValueError."""
-        check_keys("key of network", values, cls.__dataclass_fields__)
-        return cls(**values)
+
+def _check_kwargs(name: str, kwargs: Any) -> dict[str, Any]:
+    given = {} if kwargs is None else check_type(name, kwargs, dict)
+    check_keys(f"key of {name}", given, PLAIN_KWARGS)
+    _check_units(given)
+    return given
+
+
+@record
+class NetworkSpec(Record):
+    """Description of a network of stable-baselines3."""
+
+    label = "network"
+
+    policy: str = text(MISSING, 'stable-baselines3\'s name of the policy class, such as "MultiInputPolicy"')
+    inputs: dict[str, tuple[int, ...]] = value(
+        MISSING, _check_inputs, "Shape of each input; the input `frame` is uint8, others are float32"
+    )
+    policy_kwargs: dict[str, Any] = value(
+        None,
+        _check_kwargs,
+        "Arguments of the policy class; the activation function by its name in `torch.nn`",
+    )
 
     @property
     def observation_space(self) -> spaces.Dict:
@@ -148,10 +147,6 @@ def _box(name: str, shape: tuple[int, ...]) -> spaces.Box:
 
 def _actions(count: int | None) -> spaces.Space:
     return spaces.Box(-1.0, 1.0, (1,)) if count is None else spaces.Discrete(count)
-
-
-def _items(name: str, shape: Any) -> tuple[Any, ...]:
-    return check_items(f"shape of {name}", shape, object, "whole numbers")
 
 
 def _check_units(value: Any) -> None:

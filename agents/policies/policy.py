@@ -1,16 +1,15 @@
 """`Policy`: a stable-baselines3 model as an agent."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from lgmd_gym.agents.base import Agent
-from lgmd_gym.agents.batch import BatchAgent
-from lgmd_gym.agents.policies.batch import PolicyBatch
+from lgmd_gym.agents.base import BatchAgent, Infos, Observations
 from lgmd_gym.agents.policies.card import PolicyCard, policy_card
-from lgmd_gym.agents.policies.features import FRAME, SCALES, FeatureConfig
-from lgmd_gym.agents.policies.inputs import PolicyInputs, announce_pickle, load_normalizer, make_inputs
+from lgmd_gym.agents.policies.features import FRAME, SCALES, FeatureConfig, FeatureHistory
+from lgmd_gym.agents.policies.normalizer import announce_pickle, load_normalizer
 from lgmd_gym.errors import check_path, check_text, check_within, shown, unknown_name
 from lgmd_gym.processes.extras import missing_extra
 
@@ -22,10 +21,73 @@ NOT_NEURONS = (FRAME, "ego_speed", "speed_change", "ego_yaw_rate", "known_decele
 RAW_INPUTS = (*SCALES, FRAME)  # observations of `LGMDObservation`
 SHIPPED = Path(__file__).parent  # folder of the policies in this package
 MAX_MARGIN = 20.0  # of log odds; the sensible range is about -4 to 4
+# The outputs of a network depend on the size of the batch, because the order of float32 sums does. The
+# differences are near 1e-6. A lead of the best action beyond this limit does not depend on them.
+SAFE_LEAD = 1e-3
 
 
-class Policy(Agent):
+class PolicyInputs(Protocol):
+    """Inputs of a policy in N environments; `FeatureHistory` is one."""
+
+    def reset(self, mask: np.ndarray | None = None) -> None:
+        """Begin new episodes."""
+        ...
+
+    def update(self, observations: Observations, rows: np.ndarray | None = None) -> None:
+        """Process the observations of a decision of some environments."""
+        ...
+
+    def stack(self, rows: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """Return the inputs of a decision of the policy in some environments."""
+        ...
+
+
+class RawInputs:
+    """Observations as the environment returns them.
+
+    Args:
+        names: Names of the observations.
+    """
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._names = names
+        self._observations: Observations = {}
+
+    def reset(self, mask: np.ndarray | None = None) -> None:
+        """Do nothing: there is no history."""
+
+    def update(self, observations: Observations, rows: np.ndarray | None = None) -> None:
+        """Keep observations of `LGMDObservation`."""
+        self._observations = observations
+
+    def stack(self, rows: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """Return the last observations."""
+        selected = slice(None) if rows is None else rows
+        return {name: np.array(self._observations[name][selected]) for name in self._names}
+
+
+class NormalizedInputs:
+    """Inputs with the statistics of a `VecNormalize`, which do not change.
+
+    Args:
+        inputs: Inputs of the training environment within the `VecNormalize`.
+        normalizer: A `Normalizer` or `VecNormalize`.
+    """
+
+    def __init__(self, inputs: PolicyInputs, normalizer: Any) -> None:
+        self._inputs, self._normalizer = inputs, normalizer
+        self.reset, self.update = inputs.reset, inputs.update
+
+    def stack(self, rows: np.ndarray | None = None) -> dict[str, np.ndarray]:
+        """Return the normalised inputs."""
+        return self._normalizer.normalize_obs(self._inputs.stack(rows))
+
+
+class Policy(BatchAgent):
     """Agent that acts with a trained stable-baselines3 model, without exploration.
+
+    The network runs once for all environments. Where the two best actions are almost equal, and for
+    continuous actions, it runs for each environment by itself, so that demands do not depend on N.
 
     The file is a model of stable-baselines3 with a card (`PolicyCard`), inside it or beside it: the cameras,
     features and demands. With a card that describes the network, as of `lgmd-gym train`, loading reads the
@@ -65,8 +127,7 @@ class Policy(Agent):
         self.features = raw if self.card.features is None else self.card.features
         name = self.card.vec_normalize
         self._normalizer = None if name is None else load_normalizer(file.parent / name)
-        self._inputs = self.make_inputs()
-        self.reset()
+        super().__init__()
 
     def _check_network(self, file: Path, names: tuple[str, ...]) -> None:
         """Raise ValueError unless the inputs, cameras and actions of the network are those of the card."""
@@ -99,11 +160,6 @@ class Policy(Agent):
             )
         layer.bias.data[int(np.argmin(demands))] -= margin
 
-    def make_inputs(self) -> PolicyInputs:
-        """Return the inputs of the policy in one environment."""
-        names = tuple(self.network.observation_space.spaces)
-        return make_inputs(self.card.features, names, self._normalizer)
-
     @property
     def camera(self) -> "CameraSpec":
         """Cameras of the training."""
@@ -124,37 +180,84 @@ class Policy(Agent):
         """Whether outputs of neurons are among the inputs."""
         return any(name not in NOT_NEURONS for name in self.features.inputs)
 
-    @property
-    def alert(self) -> bool:
-        """Whether the policy brakes; the alerts of individual neurons are not used."""
-        return self._demand < 0.0
+    def initial(self) -> dict[str, Any]:
+        """Return a released brake and the number of decisions."""
+        return {"demand": 0.0, "decisions": 0}
 
-    def reset(self, seed: int | None = None) -> None:
-        """Clear the history and release the brake."""
-        super().reset(seed)
-        self._inputs.reset()
-        self._decisions = 0
-        self._demand = 0.0
+    def reset(
+        self, mask: np.ndarray | None = None, seeds: Sequence[int | None] | np.ndarray | None = None
+    ) -> None:
+        """Clear the histories and release the brakes."""
+        super().reset(mask, seeds)
+        self._inputs.reset(mask)
 
-    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
-        """Return a new demand at every `repeat`-th call, else the last one; hold a latched demand."""
-        if self.features.latches(self._demand):
-            return self._demand
-        self._inputs.update(observation)
-        if self._decisions % self.features.repeat == 0:
-            self._demand = self.decide(self._inputs.stack())
-        self._decisions += 1
-        return self._demand
+    def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return new demands at every `repeat`-th call, else the last ones; hold latched demands.
 
-    def decide(self, inputs: dict[str, np.ndarray]) -> float:
-        """Return the demand for the inputs of one decision."""
-        action, _ = self.network.predict(inputs, deterministic=True)
+        The alerts are the activations of the brake; those of individual neurons are not used.
+        """
+        demands, decisions = self.state["demand"], self.state["decisions"]
+        rows = np.flatnonzero(active & ~self.features.latches(demands))
+        if len(rows):
+            self._inputs.update(observations, rows)
+            due = rows[decisions[rows] % self.features.repeat == 0]
+            if len(due):
+                demands[due] = self.decide(self._inputs.stack(due))
+            decisions[rows] += 1
+        self.alerts = demands < 0.0
+        return demands
+
+    def decide(self, inputs: dict[str, np.ndarray]) -> list[float]:
+        """Return the demands for the inputs of several environments, arrays of shape (M, …)."""
+        count = len(next(iter(inputs.values())))
+        values = action_values(self.network, inputs) if self.card.demands and count > 1 else None
+        if values is None or values.shape[1] < 2:
+            return [self._decide_alone(inputs, row) for row in range(count)]
+        second, best = np.sort(values, axis=1)[:, -2:].T
+        safe = best - second > SAFE_LEAD * np.maximum(1.0, np.abs(values).max(axis=1))
+        actions = zip(values.argmax(axis=1).tolist(), safe.tolist(), strict=True)
+        demands = self.card.demands or ()
+        return [
+            demands[action] if certain else self._decide_alone(inputs, row)
+            for row, (action, certain) in enumerate(actions)
+        ]
+
+    def _decide_alone(self, inputs: dict[str, np.ndarray], row: int) -> float:
+        """Return the demand for the inputs of one environment, by themselves."""
+        alone = {name: values[row] for name, values in inputs.items()}
+        action, _ = self.network.predict(alone, deterministic=True)
         demands = self.card.demands
         return demands[int(action)] if demands else float(np.reshape(action, -1)[0])
 
-    def batch(self, num_envs: int) -> BatchAgent:
-        """Return this policy for `num_envs` environments."""
-        return PolicyBatch(self, num_envs)
+    def _allocate(self, num_envs: int) -> None:
+        super()._allocate(num_envs)
+        features, names = self.card.features, tuple(self.network.observation_space.spaces)
+        inputs = RawInputs(names) if features is None else FeatureHistory(features, num_envs)
+        self._inputs: PolicyInputs = inputs
+        if self._normalizer is not None:
+            self._inputs = NormalizedInputs(inputs, self._normalizer)
+
+
+def action_values(network: Any, inputs: dict[str, np.ndarray]) -> np.ndarray | None:
+    """Return the values that a stable-baselines3 policy maximises over its discrete actions.
+
+    Args:
+        network: A policy with discrete actions.
+        inputs: Batch of observations.
+
+    Returns:
+        Logits or Q values, shape (N, actions), or None if the policy has neither.
+    """
+    import torch
+
+    with torch.no_grad():
+        network.set_training_mode(False)
+        tensors, _ = network.obs_to_tensor(inputs)
+        if hasattr(network, "q_net"):
+            return network.q_net(tensors).numpy()
+        if hasattr(network, "get_distribution"):
+            return network.get_distribution(tensors).distribution.logits.numpy()
+    return None
 
 
 def shipped_policies() -> list[str]:

@@ -23,7 +23,7 @@ import numpy as np
 import torch
 from recorded_levels import level_files
 
-from lgmd_gym.agents import make_agent
+from lgmd_gym.agents import make_agents
 from lgmd_gym.agents.policies.policy import Policy
 from lgmd_gym.camera.spec import plain_values
 from lgmd_gym.statistics.intervals import Rate
@@ -83,7 +83,7 @@ def frontier_row(
 
 def main(folder: Path, name: str, margins: Sequence[float] = MARGINS, rate_hz: float = 30.0) -> None:
     """Print the table of a policy."""
-    policy = make_agent(name)
+    policy = make_agents(name, 1)
     if not isinstance(policy, Policy):
         raise SystemExit(f"{name} is not a policy; use policy:NAME or policy:FILE.zip")
     sets = sorted(item.name for item in (folder / "episodes").glob("*validation"))

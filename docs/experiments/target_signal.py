@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from lgmd_gym.agents.policies.zone_features import response_of
+from lgmd_gym.agents.rules import excitation
 from lgmd_gym.agents.sides import DETECTORS, NUM_SIDE_FIELDS, SIDE_COLUMNS, side_cameras
 from lgmd_gym.training.offline.episodes import RecordedEpisode, record_parallel
 from lgmd_gym.training.offline.level_recorder import LevelRecorder
@@ -114,7 +114,7 @@ def features(episode: RecordedEpisode, time: int, detectors: Sequence[int]) -> n
     """Return the mean responses of the columns over the last frames before a decision, and the motion."""
     shape = (-1, len(DETECTORS), NUM_SIDE_FIELDS * SIDE_COLUMNS)
     columns = episode.observations["column_potential"][: time + 1].astype(np.float64).reshape(shape)
-    responses = response_of(columns[:, list(detectors)]).reshape(time + 1, -1)
+    responses = excitation(columns[:, list(detectors)]).reshape(time + 1, -1)
     levels = np.copysign(np.log1p(2.0 * np.abs(responses)), responses)
     means = [levels[-count:].mean(0) for count in WINDOWS]
     motion = [episode.observations[name][time] for name in ("ego_speed", "ego_yaw_rate")]

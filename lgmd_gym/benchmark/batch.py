@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.agent_slots import BatchSlots, SingleSlots
+from lgmd_gym.agents import Agent, BatchAgent, make_agent
+from lgmd_gym.benchmark.agent_slots import AgentSlots
 from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.fcw_driver import FCWDriver
 from lgmd_gym.benchmark.recorder import SeriesRecorder
@@ -71,7 +71,7 @@ class BatchPlayer:
         self._recorder = SeriesRecorder(num_envs, self._simulation.rates.policy)
         params = LGMDParams.make(self._sensor_config.params)
         self._views = Views(self._simulation, params, self._sensor_config.include_frame)
-        self._slots = self._make_slots(task, agent)
+        self._slots = AgentSlots(self._make_agent(task, agent), self._views)
         self._queue = EpisodeQueue([source] * num_envs, ahead=False)
         self._tasks: list[Task | None] = [None] * num_envs
         self._episodes: list[Prepared | None] = [None] * num_envs
@@ -161,21 +161,10 @@ class BatchPlayer:
         simulation.weights[:] = env.weights
         return simulation
 
-    def _make_slots(self, task: Task, agent: Any) -> BatchSlots | SingleSlots:
+    def _make_agent(self, task: Task, agent: Agent) -> BatchAgent:
         rates, limits = self._simulation.rates, self._simulation.brakes["max_deceleration"]
-
-        def with_driver(agent: Any, envs: slice) -> Any:
-            if not task.has_driver:
-                return agent
-            return FCWDriver(agent, lambda: limits[envs], rates.policy)
-
-        every = slice(None)
-        batch = with_driver(agent, every).batch(len(limits)) if rates.steps == rates.stride else None
-        if batch is not None:
-            return BatchSlots(batch, self._views)
-        return SingleSlots(
-            lambda index: with_driver(make_agent(task.agent), slice(index, index + 1)), self._views
-        )
+        batch = agent.agent.for_envs(len(limits))
+        return FCWDriver(batch, lambda: limits, rates.policy) if task.has_driver else batch
 
 
 _players: dict[Hashable, BatchPlayer] = {}  # at most one, because it is large

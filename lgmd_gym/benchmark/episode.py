@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 import numpy as np
 
-from lgmd_gym.agents import Agent
+from lgmd_gym.agents.base import Actor
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.recorder import SeriesRecorder
 from lgmd_gym.benchmark.sensors import SensorConfig
@@ -92,7 +92,7 @@ def make_env(case: Case, sensor_config: SensorConfig, arguments: Mapping[str, An
     return gym.make(env_id(case.family), trace=True, **sensor_config.for_agent().arguments | chosen)
 
 
-def rollout(env: gym.Env, agent: Agent, seed: int) -> Iterator[tuple[Step, np.ndarray]]:
+def rollout(env: gym.Env, agent: Actor, seed: int) -> Iterator[tuple[Step, np.ndarray]]:
     """Yield every step of an episode, including the final one, and the agent's action on it.
 
     Args:
@@ -111,7 +111,7 @@ def rollout(env: gym.Env, agent: Agent, seed: int) -> Iterator[tuple[Step, np.nd
         step = Step(observation, info, float(reward), terminated or truncated)
 
 
-def play(env: gym.Env, agent: Agent, seed: int) -> Episode:
+def play(env: gym.Env, agent: Actor, seed: int) -> Episode:
     """Run one episode to its end.
 
     Args:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents import make_agent
+from lgmd_gym.agents import Agent, make_agent
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import Episode, make_env, play
 from lgmd_gym.benchmark.fcw_driver import FCWDriver
@@ -83,7 +83,7 @@ class Result:
 def run_task(task: Task) -> Result:
     """Run a task by itself; an exception in the agent or the environment becomes an error row."""
     try:
-        agent: Any = make_agent(task.agent)
+        agent = make_agent(task.agent)
         sensor_config = task.sensor_config.for_agent(agent)
         episode = _play(task, agent, sensor_config)
     except (Exception, SystemExit):  # an agent that calls exit() would end the worker process
@@ -112,14 +112,13 @@ def error_result(task: Task, error: str) -> Result:
     return Result(row)
 
 
-def _play(task: Task, agent: Any, sensor_config: SensorConfig) -> Episode:
+def _play(task: Task, agent: Agent, sensor_config: SensorConfig) -> Episode:
     env = make_env(task.case, sensor_config, task.arguments)
     try:
         if task.has_driver:
             base: Any = env.unwrapped
-            agent = FCWDriver(
-                agent, lambda: np.array([base.brake.max_deceleration]), base.config["policy_frequency"]
-            )
+            limits = lambda: np.array([base.brake.max_deceleration])  # noqa: E731
+            agent = Agent(FCWDriver(agent.agent, limits, base.config["policy_frequency"]))
         return play(env, agent, task.seed)
     finally:
         env.close()

@@ -119,9 +119,9 @@ def _print_result(result: "EpisodeResult") -> None:
 
 def _is_of_agent(agent: "Agent", error: Exception) -> bool:
     """Return whether an exception passed through the module of a user's agent."""
-    from lgmd_gym.agents.adapter import AgentAdapter
+    from lgmd_gym.agents.user_agents import UserAgents
 
-    if not isinstance(agent, AgentAdapter):
+    if not isinstance(agent.agent, UserAgents):
         return False
-    module = getattr(sys.modules[type(agent.agent).__module__], "__file__", None)
+    module = getattr(sys.modules[type(agent.agent.objects[0]).__module__], "__file__", None)
     return any(frame.f_code.co_filename == module for frame, _ in walk_tb(error.__traceback__))

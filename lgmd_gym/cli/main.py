@@ -33,7 +33,7 @@ Examples:
   lgmd-gym drive LGMD/CCRs-v0 --video out.mp4  record one approach as a video
   lgmd-gym compare runs/A runs/B               compare two runs in pairs
   lgmd-gym video CLIP.mp4                      plot the spikes for a video clip
-  lgmd-gym tune --agent nested-fields          search the parameters of a rule
+  lgmd-gym tune --agent stopping-zone          search the parameters of a rule
 
 Arguments are in SI units; case names contain speeds in km/h. Every command has its own --help.
 lgmd-gym --version prints the version."""

@@ -20,9 +20,8 @@ class Tune:
     """Search the parameters of a rule on training levels of LGMD/RandomBraking-v0 and false-reaction cases.
 
     Validation levels choose between the defaults and the best trials; test levels and protocol suites are
-    not used. A trial takes seconds for a latching rule with fixed sensors, because the sensor outputs are
-    recorded once. It takes about a minute with --cameras, --camera-geometry or --neuron, and minutes for a
-    rule that does not latch (graded).
+    not used. A trial takes seconds with fixed sensors, because the sensor outputs are recorded once, and
+    about a minute with --cameras, --camera-geometry or --neuron.
     """
 
     agent: str = "stopping-zone"

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.rule import excitation
+from lgmd_gym.agents.rules import excitation
 from lgmd_gym.agents.zones import CAMERA_SETBACK, FULL_DECELERATION, stopping_distance
 from lgmd_gym.neuron import LGMD
 

@@ -31,7 +31,7 @@ def agent_note(text: str, trusted: bool = True) -> str:
         agent = make_agent(text)
     except Exception:  # any error of the user's module or constructor
         return "A class from outside this package, which cannot be loaded."
-    return _first_sentence(type(getattr(agent, "agent", agent)))
+    return _first_sentence(type(getattr(agent.agent, "objects", [agent.agent])[0]))
 
 
 def _first_sentence(kind: type) -> str:

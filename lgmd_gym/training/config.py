@@ -168,7 +168,7 @@ class TrainConfig:
         values = read_hyperparams(algo, env_id, file)
         if check_items("inputs", inputs, str, "names"):
             values["features"] |= {"inputs": inputs}
-        features = values["features"] = FeatureConfig.from_dict(values["features"])
+        features = values["features"] = FeatureConfig.make(values["features"])
         defaults = {"demands": DEMANDS[algo], "eval_episodes": 600 if algo == OFFLINE else 96}
         agent = features.cameras_of
         if agent is not None:
@@ -179,7 +179,7 @@ class TrainConfig:
     def from_dict(cls, values: dict[str, Any]) -> "TrainConfig":
         """Return the configuration that `to_dict` returned; unknown keys raise ValueError."""
         check_keys("training option", values, (item.name for item in fields(cls)))
-        return cls(**{**values, "features": FeatureConfig.from_dict(values.get("features", {}))})
+        return cls(**{**values, "features": FeatureConfig.make(values.get("features", {}))})
 
     def to_dict(self) -> dict[str, Any]:
         """Return the configuration as plain values."""

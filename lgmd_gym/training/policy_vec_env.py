@@ -35,7 +35,7 @@ class PolicyVecEnv(EngineVecEnv):
             raise ValueError(f"envs must have autoreset_mode 'Disabled', got {mode.value!r}")
         super().__init__(envs, policy_space(envs.single_observation_space, features))
         self.features = features
-        self._histories = [FeatureHistory(features) for _ in range(envs.num_envs)]
+        self._history = FeatureHistory(features, envs.num_envs)
         self._rewards = np.zeros(envs.num_envs)
 
     def reset(self) -> dict[str, np.ndarray]:
@@ -44,12 +44,12 @@ class PolicyVecEnv(EngineVecEnv):
         Raises:
             ValueError: If options were set; the environments have none.
         """
-        return self._stack(self._restart(np.ones(self.num_envs, np.bool_), self._take_seeds()))
+        return self._restart(np.ones(self.num_envs, np.bool_), self._take_seeds())
 
     def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Advance each environment by one decision; return observations, rewards, ends and infos."""
         demands = self.envs.read_demands(self._actions)
-        latched = np.array([self.features.latches(demand) for demand in demands.tolist()])
+        latched = self.features.latches(demands)
         self._rewards[:] = 0.0
         self._hold(demands, ~latched)
         self._brake(demands, latched)
@@ -57,7 +57,7 @@ class PolicyVecEnv(EngineVecEnv):
         done, terminated = outcome.terminated | outcome.truncated, outcome.terminated | latched
         rewards = (self.features.reward_scale * self._rewards).astype(np.float32)
         self._count(rewards)
-        observations = self._stack(range(self.num_envs))
+        observations = self._history.stack()
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         if done.any():
             # The policy decides nothing after it latches its brake, so a truncation is a termination.
@@ -69,9 +69,7 @@ class PolicyVecEnv(EngineVecEnv):
         running = active.copy()
         for _ in range(self.features.repeat):
             self._step(demands, running, rendering=True)
-            observations = self.envs.read_observations()
-            for index in np.flatnonzero(running).tolist():
-                self._histories[index].update(_row(observations, index))
+            self._history.update(self.envs.read_observations(), np.flatnonzero(running))
             running &= ~self._ended()
 
     def _brake(self, demands: np.ndarray, latched: np.ndarray) -> None:
@@ -105,23 +103,16 @@ class PolicyVecEnv(EngineVecEnv):
             infos[index]["terminal_observation"] = _row(observations, index)
             infos[index]["TimeLimit.truncated"] = bool(truncated[index])
             infos[index]["episode"] = self._statistics(index)
-        first = self._stack(self._restart(done, None))
-        for name, values in first.items():
+        for name, values in self._restart(done, None).items():
             observations[name][ended] = values
 
-    def _restart(self, selected: np.ndarray, seeds: Any) -> list[int]:
-        """Start new episodes in the selected environments; return their indices."""
+    def _restart(self, selected: np.ndarray, seeds: Any) -> dict[str, np.ndarray]:
+        """Start new episodes in the selected environments; return their inputs."""
         observations, _ = self.envs.reset(seed=seeds, options={"reset_mask": selected})
-        indices = np.flatnonzero(selected).tolist()
-        for index in indices:
-            self._histories[index].reset()
-            self._histories[index].update(_row(observations, index))
-        return indices
-
-    def _stack(self, indices: Any) -> dict[str, np.ndarray]:
-        """Return the inputs of the policy in some environments."""
-        rows = [self._histories[index].stack() for index in indices]
-        return {name: np.stack([row[name] for row in rows]) for name in self.features.inputs}
+        rows = np.flatnonzero(selected)
+        self._history.reset(selected)
+        self._history.update(observations, rows)
+        return self._history.stack(rows)
 
 
 def _row(observations: dict[str, np.ndarray], index: int) -> dict[str, np.ndarray]:

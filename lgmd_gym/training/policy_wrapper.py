@@ -7,8 +7,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 
-from lgmd_gym.agents.policies.features import FeatureConfig, FeatureHistory, source_observation
-from lgmd_gym.agents.policies.zone_features import ZONE_INPUTS
+from lgmd_gym.agents.policies.features import ZONE_INPUTS, FeatureConfig, FeatureHistory, source_observation
 
 REMEDIES = {
     "frame": "make the environment with include_frame=True",
@@ -36,7 +35,7 @@ class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
     def __init__(self, env: gym.Env, **features: Any) -> None:
         RecordConstructorArgs.__init__(self, **features)
         gym.Wrapper.__init__(self, env)
-        self.features = FeatureConfig.from_dict(features)
+        self.features = FeatureConfig.make(features)
         self._history = FeatureHistory(self.features)
         self.observation_space = policy_space(env.observation_space, self.features)
 
@@ -46,8 +45,8 @@ class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
         """Reset the environment and fill the history with the first observation."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._history.reset()
-        self._history.update(observation)
-        return self._history.stack(), info
+        self._update(observation)
+        return self._stack(), info
 
     def step(self, action: Any) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
         """Repeat an action for `repeat` steps, or until the episode ends if it latches."""
@@ -59,12 +58,18 @@ class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
             observation, reward, terminated, truncated, info = self.env.step(action)
             reward_sum, steps = reward_sum + float(reward), steps + 1
             if not latched:
-                self._history.update(observation)
+                self._update(observation)
             if terminated or truncated or (steps >= self.features.repeat and not latched):
                 break
         if latched:  # the policy decides nothing after this, so a truncation counts as a termination
             terminated, truncated = True, False
-        return self._history.stack(), self.features.reward_scale * reward_sum, terminated, truncated, info
+        return self._stack(), self.features.reward_scale * reward_sum, terminated, truncated, info
+
+    def _update(self, observation: dict[str, Any]) -> None:
+        self._history.update({name: np.asarray(values)[None] for name, values in observation.items()})
+
+    def _stack(self) -> dict[str, np.ndarray]:
+        return {name: values[0] for name, values in self._history.stack().items()}
 
     def _demand(self, action: Any) -> float:
         """Return the longitudinal demand of an action."""

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from joblib import delayed
 
-from lgmd_gym.agents import BRAKE, HOLD, Agent, Rule, make_agent
+from lgmd_gym.agents import BRAKE, HOLD, Agent, Rule, make_agent, to_action
+from lgmd_gym.agents.base import Actor
 from lgmd_gym.benchmark.case import level_case
 from lgmd_gym.benchmark.episode import Episode, make_env, play
 from lgmd_gym.benchmark.metrics import Counterfactual
@@ -90,29 +91,39 @@ class NoBrakeRecording:
     steps: list[tuple[dict[str, Any], dict[str, Any]]]
 
 
-class ObservationRecorder(Agent):
+class ObservationRecorder:
     """Agent that never brakes and records its observations."""
+
+    alert = False
 
     def __init__(self) -> None:
         self.steps: list[tuple[dict[str, Any], dict[str, Any]]] = []
 
-    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def reset(self, seed: int | None = None) -> None:
+        """Do nothing."""
+
+    def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
         """Record the observation and return `HOLD`."""
         sensor_info = {key: value for key, value in info.items() if key.startswith("lgmd/")}
         self.steps.append((observation, sensor_info))
-        return HOLD
+        return to_action(HOLD)
 
 
-class FixedOnsetBrake(Agent):
+class FixedOnsetBrake:
     """Agent that brakes fully from the decision with index `onset` on; never for None."""
+
+    alert = False
 
     def __init__(self, onset: int | None) -> None:
         self._onset, self._decision = inf if onset is None else onset, -1
 
-    def demand(self, observation: dict[str, Any], info: dict[str, Any]) -> float:
+    def reset(self, seed: int | None = None) -> None:
+        """Do nothing."""
+
+    def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
         """Return `BRAKE` from the onset on, `HOLD` before."""
         self._decision += 1
-        return BRAKE if self._decision >= self._onset else HOLD
+        return to_action(BRAKE if self._decision >= self._onset else HOLD)
 
 
 class Objective:
@@ -194,7 +205,7 @@ class Objective:
 
 def is_latching(agent: Agent) -> bool:
     """Return whether an agent brakes fully to the end of the episode once it brakes."""
-    return isinstance(agent, Rule) and agent.latching
+    return isinstance(agent.agent, Rule)
 
 
 def record(task: Task) -> NoBrakeRecording:
@@ -224,7 +235,7 @@ def simulate_no_brake(task: Task) -> Counterfactual:
     return Counterfactual.of(_simulate(task, FixedOnsetBrake(None)))
 
 
-def _simulate(task: Task, agent: Agent) -> Episode:
+def _simulate(task: Task, agent: Actor) -> Episode:
     env = make_env(task.case, task.sensor_config, task.arguments)
     try:
         return play(env, agent, task.seed)

@@ -1,13 +1,15 @@
 """Search space: a rule's parameters and, on request, its camera, camera geometry and neuron parameters."""
 
-from dataclasses import Field, dataclass, fields
+from dataclasses import dataclass, fields
 from math import inf
 from typing import Any
 
 from lgmd_gym.agents import AGENTS, Rule, make_agent
+from lgmd_gym.agents.rules import CAMERA
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.camera import PRESETS
 from lgmd_gym.errors import check_flag, check_items, check_known
+from lgmd_gym.fields import Declaration, declarations
 from lgmd_gym.neuron import LGMDParams
 
 CAMERA_KEY, NEURON_PREFIX = "camera", "neuron."  # keys of a proposal in addition to the rule's parameters
@@ -70,7 +72,7 @@ class SearchSpace:
         """Return the parameters that an Optuna trial suggests."""
         proposal: Proposal = {}
         for item in self._searched_fields():
-            low, high = item.metadata["search_range"]
+            low, high = item.search or (item.default, item.default)
             suggest = trial.suggest_int if isinstance(item.default, int) else trial.suggest_float
             proposal[item.name] = suggest(item.name, low, high)
         if self.cameras:
@@ -97,9 +99,9 @@ class SearchSpace:
                 shifts.append((name, shifted, {name: shifted}))
         return shifts
 
-    def _searched_fields(self) -> list[Field[Any]]:
-        items = fields(rule_class(self.agent).Params)
-        return [item for item in items if self.camera_geometry or not item.metadata["affects_camera"]]
+    def _searched_fields(self) -> list[Declaration]:
+        items = declarations(rule_class(self.agent).Params)
+        return [item for item in items if self.camera_geometry or item.group != CAMERA]
 
 
 def rule_options(proposal: Proposal) -> Proposal:

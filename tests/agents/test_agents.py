@@ -8,6 +8,7 @@ from support.agents import make_step, run_agent
 import lgmd_gym  # noqa: F401
 from lgmd_gym.agents import AGENTS, Rule, make_agent
 from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.fields import declarations
 
 RULES = [name for name in AGENTS if issubclass(AGENTS[name], Rule)]
 
@@ -83,8 +84,8 @@ def test_ground_truth_does_not_change_the_actions(name):
 def test_default_parameters_are_within_their_search_ranges():
     wrong = []
     for name in RULES:
-        for item in AGENTS[name].Params.__dataclass_fields__.values():
-            low, high = item.metadata["search_range"]
+        for item in declarations(AGENTS[name].Params):
+            low, high = item.search
             if not low <= item.default <= high:
                 wrong.append(f"{name}: {item.name} = {item.default} outside [{low}, {high}]")
     assert wrong == []

@@ -1,25 +1,28 @@
-"""Agents in a batch of environments act like one agent per environment, to the bit."""
+"""Agents in N environments: no demand depends on the other environments, on N, or on those that wait."""
 
 import numpy as np
 import pytest
 from support.agents import NeuronResponse, TraceFrame
 
-from lgmd_gym.agents import AGENTS, make_agent
-from lgmd_gym.agents.policies import batch as policy_batch
+from lgmd_gym.agents import AGENTS, make_agents
+from lgmd_gym.agents.base import InfoArrays
+from lgmd_gym.agents.policies import policy as policies
 from lgmd_gym.agents.zones import LOW_ZONES, NUM_ZONES
 
-BATCH_AGENTS = [name for name in AGENTS if make_agent(name).batch(1) is not None]
 OPTIONS = {
-    "graded": ":fall=0.5",
     "random-brake": ":rate=1",
-    "nested-fields": ":level=1,frames=2",
+    "danger-zone": ":level=2,frames=2",
+    "adaptive-threshold": ":threshold=20,gain=2",
     "stopping-zone": ":reach=0.75,ground=2,upright_frames=2",
+    "frame-difference": ":level=1.3,frames=2,settle=1",
+    "stopping-distance-oracle": ":margin=0.5",
+    "tau-oracle": ":tau=5",
 }
-NUM_ENVS = 7
+NUM_ENVS = 5
 
 
 def random_step(rng, agent):
-    """Return a batch of random observations and infos near the thresholds of the rules."""
+    """Return random observations and infos near the thresholds of the agents, with up to two frames."""
     cameras = len(agent.camera) if isinstance(agent.camera, list) else 1
     excitation = rng.gamma(1.5, 1.5, (NUM_ENVS, cameras))
     potential = 1.0 / (1.0 + np.exp(-excitation))
@@ -32,17 +35,26 @@ def random_step(rng, agent):
         "ffi": rng.uniform(0.0, 9.0, (NUM_ENVS, cameras)).astype(np.float32),
         "ego_speed": speeds[:, None].astype(np.float32),
         "ego_yaw_rate": (turning * 0.1).astype(np.float32),
+        "frame": (20 + rng.integers(0, 4, (NUM_ENVS, 12, 16, 1))).astype(np.uint8),
     }
+    second = np.where(rng.random(NUM_ENVS) < 0.5, 1 / 30, np.nan)  # not all have a second frame
+    response = NeuronResponse(frequency, potential)
+    other = NeuronResponse(np.roll(frequency, 1, axis=0), np.roll(potential, 1, axis=0))
+    frames = [TraceFrame(np.zeros(NUM_ENVS), speeds, other), TraceFrame(second, speeds, response)]
     infos = {
         "lgmd/alert": (frequency >= 30.0).any(axis=1),
-        "lgmd/trace": (TraceFrame(NeuronResponse(frequency, potential), speeds),),
+        "lgmd/trace": frames,
+        "ttc": rng.uniform(1.9, 8.0, NUM_ENVS),
+        "gap": np.where(rng.random(NUM_ENVS) < 0.2, np.inf, rng.uniform(10.0, 900.0, NUM_ENVS)),
+        "ego_speed": speeds,
+        "target_speed": rng.uniform(0.0, 30.0, NUM_ENVS),
     }
     return observations, infos
 
 
-def approach_step(rng, step):
+def approach_step(rng, agent, step):
     """Return a random step in which the fields of `stopping-zone` are excited one after the other."""
-    observations, infos = random_step(rng, make_agent("stopping-zone"))
+    observations, infos = random_step(rng, agent)
     phase = 8.0 * ((step + 13 * np.arange(NUM_ENVS)) % 70)[:, None] / 70
     zones = np.array([*range(NUM_ZONES), *range(NUM_ZONES), *LOW_ZONES])
     entered = phase > NUM_ZONES - 1 - zones
@@ -52,71 +64,101 @@ def approach_step(rng, step):
     return observations, infos
 
 
-def single_step(observations, infos, index, trace):
-    """Return the observation and info of one environment."""
-    observation = {key: values[index] for key, values in observations.items()}
-    info = {"lgmd/alert": bool(infos["lgmd/alert"][index])}
-    if trace:
-        (frame,) = infos["lgmd/trace"]
-        response = NeuronResponse(*(values[index] for values in frame.response))
-        info["lgmd/trace"] = [TraceFrame(response, float(frame.ego_speed[index]))]
-    return observation, info
+def select(values, index):
+    """Return the row of one environment of nested arrays, with its axis."""
+    if isinstance(values, dict):
+        return {key: select(item, index) for key, item in values.items()}
+    if isinstance(values, list):
+        frames = [TraceFrame(*(select(item, index) for item in frame)) for frame in values]
+        return [frame for frame in frames if not np.isnan(frame.time[0])]
+    if isinstance(values, NeuronResponse):
+        return NeuronResponse(*(select(item, index) for item in values))
+    return values[index : index + 1]
 
 
-def check_batch(name, steps, trace=True, draw=None):
-    """Compare a batch with single agents, and return the demands, shape (steps, environments)."""
+def check_rows(name, steps, trace=True, draw=None):
+    """Compare the rows of N environments with N = 1, and return the demands, shape (steps, N)."""
     rng = np.random.default_rng(5)
-    agents = [make_agent(name) for _ in range(NUM_ENVS)]
-    batch = make_agent(name).batch(NUM_ENVS)
-    for index, agent in enumerate(agents):
-        agent.reset(index)
-        batch.reset(index, index)
-    active, demands = np.ones(NUM_ENVS, np.bool_), []
+    together, alone = make_agents(name, NUM_ENVS), [make_agents(name, 1) for _ in range(NUM_ENVS)]
+    seeds, demands = np.arange(NUM_ENVS), []
+    started = np.ones(NUM_ENVS, np.bool_)
     for step in range(steps):
-        observations, infos = draw(rng, step) if draw else random_step(rng, agents[0])
-        given = infos if trace else {"lgmd/alert": infos["lgmd/alert"]}
-        actions = batch.act_batch(observations, given, active)
-        assert (actions.shape, actions.dtype) == ((NUM_ENVS, 1), np.float32)
-        for index in range(NUM_ENVS):
-            single = agents[index].act(*single_step(observations, infos, index, trace))
-            assert single[0] == actions[index, 0], (step, index)
-            assert agents[index].alert == batch.alerts[index], (step, index)
-        demands.append(actions[:, 0])
-        for index in np.flatnonzero(rng.random(NUM_ENVS) < 0.03):  # start new episodes
-            seed = int(rng.integers(100))
-            agents[index].reset(seed)
-            batch.reset(index, seed)
-    return np.array(demands)
-
-
-def test_rules_and_baselines_have_batches():
-    assert set(BATCH_AGENTS) == {
-        "no-brake", "always-brake", "random-brake", "spike-threshold", "adaptive-threshold", "graded",
-        "speed-gated", "nested-fields", "danger-zone", "stopping-zone",
-    }  # fmt: skip
+        together.reset(started, seeds)
+        for index in np.flatnonzero(started):
+            alone[index].reset(seeds=seeds[index : index + 1])
+        observations, infos = draw(rng, together, step) if draw else random_step(rng, together)
+        if not trace:
+            del infos["lgmd/trace"]
+        active = rng.random(NUM_ENVS) < 0.9
+        acted = together.act(observations, InfoArrays(infos), active)
+        assert (acted.shape, acted.dtype) == ((NUM_ENVS,), np.float64)
+        for index in np.flatnonzero(active):
+            single = alone[index]
+            given = InfoArrays(select(infos, index))
+            assert single.act(select(observations, index), given)[0] == acted[index], (step, index)
+            assert single.alerts[0] == together.alerts[index], (step, index)
+        demands.append(acted[active])
+        started, seeds = (rng.random(NUM_ENVS) < 0.03) | ~active, rng.integers(100, size=NUM_ENVS)
+    return np.concatenate(demands)
 
 
 @pytest.mark.parametrize("trace", [True, False])
-@pytest.mark.parametrize("name", BATCH_AGENTS)
-def test_batch_equals_single_agents_on_random_sequences(name, trace):
-    demands = check_batch(name + OPTIONS.get(name, ""), 400, trace)
-    if name not in ("no-brake", "always-brake"):
+@pytest.mark.parametrize("name", AGENTS)
+def test_rows_of_several_environments_equal_those_of_one(name, trace):
+    if name == "flow-divergence":
+        pytest.importorskip("cv2")
+    demands = check_rows(name + OPTIONS.get(name, ""), 300, trace)
+    if name not in ("no-brake", "always-brake", "flow-divergence"):
         assert 0.02 < np.mean(demands < 0.0) < 0.999, "the sequences hardly test the rule"
 
 
-@pytest.mark.parametrize("lead", [policy_batch.SAFE_LEAD, 1e9])
-def test_batch_of_a_policy_equals_single_policies(monkeypatch, lead):
+@pytest.mark.parametrize("lead", [policies.SAFE_LEAD, 1e9])
+def test_demands_of_a_policy_do_not_depend_on_the_number_of_environments(monkeypatch, lead):
     pytest.importorskip("stable_baselines3")
-    monkeypatch.setattr(policy_batch, "SAFE_LEAD", lead)
-    demands = check_batch("policy:zones", 120, draw=approach_step)
+    monkeypatch.setattr(policies, "SAFE_LEAD", lead)
+    demands = check_rows("policy:zones", 120, draw=approach_step)
     assert 0.02 < np.mean(demands < 0.0) < 0.999
 
 
-def test_policy_decides_for_several_environments_at_once(monkeypatch):
+def test_a_policy_decides_for_several_environments_at_once(monkeypatch):
     pytest.importorskip("stable_baselines3")
-    policy = make_agent("policy:zones")
-    batch, calls = policy.batch(NUM_ENVS), []
-    monkeypatch.setattr(policy, "decide", lambda inputs: calls.append(inputs) or 0.0)
+    policy, calls = make_agents("policy:zones", NUM_ENVS), []
+    monkeypatch.setattr(policy, "_decide_alone", lambda inputs, row: calls.append(row) or 0.0)
     observations, infos = random_step(np.random.default_rng(0), policy)
-    batch.act_batch(observations, infos, np.ones(NUM_ENVS, np.bool_))
+    policy.act(observations, InfoArrays(infos))
     assert len(calls) < NUM_ENVS
+
+
+class Counter:
+    """A user's class for one environment; it fails in its third decision with the seed 1."""
+
+    def __init__(self, step=0.1):
+        self.step, self.count, self.seed = step, 0, None
+
+    def reset(self, seed):
+        self.seed = seed
+
+    def act(self, observation, info):
+        assert info["lgmd/trace"][0].ego_speed == info["ego_speed"] == observation["ego_speed"][0]
+        self.count += 1
+        if self.seed == 1 and self.count == 3:
+            raise RuntimeError("internal failure")
+        return -self.step * self.count
+
+
+def test_a_class_for_one_environment_has_one_object_for_each():
+    agents = make_agents(f"{__name__}:Counter:step=0.25", 3)
+    speeds, response = np.array([1.0, 2.0, 3.0]), NeuronResponse(np.zeros((3, 1)), np.zeros((3, 1)))
+    observations = {"ego_speed": speeds[:, None]}
+    trace = [TraceFrame(np.zeros(3), speeds, response)]
+    infos = InfoArrays({"ego_speed": speeds, "lgmd/trace": trace})
+    agents.reset(seeds=[0, 1, 2])
+    first = agents.objects[0]
+    assert agents.act(observations, infos).tolist() == [-0.25] * 3
+    assert agents.act(observations, infos, np.array([True, True, False]))[:2].tolist() == [-0.5, -0.5]
+    agents.reset(np.array([True, False, False]), [5, 5, 5])
+    assert agents.objects[0] is not first  # one that has acted is made anew
+    assert agents.objects[0].seed == 5
+    assert agents.act(observations, infos)[[0, 2]].tolist() == [-0.25, -0.5]
+    assert [str(error) for error in agents.failures.values()] == ["internal failure"]
+    assert list(agents.failures) == [1]

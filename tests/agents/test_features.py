@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 from support.agents import to_potential, zone_levels
 
-from lgmd_gym.agents.policies.features import CLIP, PEAK_DECAY, FeatureConfig, FeatureHistory, shrink_frame
-from lgmd_gym.agents.policies.zone_features import TIME_CONSTANTS_S, ZONE_INPUTS
+from lgmd_gym.agents.policies.features import (
+    CLIP,
+    PEAK_DECAY,
+    TIME_CONSTANTS_S,
+    ZONE_INPUTS,
+    FeatureConfig,
+    FeatureHistory,
+    shrink_frames,
+)
 from lgmd_gym.agents.sides import (
     NUM_ALL_ROUND,
     NUM_COLUMNS,
@@ -23,8 +30,12 @@ def observe(frequency, speed=10.0):
 def stack(history, *observations):
     """Pass observations of the environment, then return the features of one decision of the policy."""
     for observation in observations:
-        history.update(observation)
-    return history.stack()
+        update(history, observation)
+    return {name: values[0] for name, values in history.stack().items()}
+
+
+def update(history, observation):
+    history.update({name: values[None] for name, values in observation.items()})
 
 
 def test_features_are_scaled_clipped_and_stacked():
@@ -155,17 +166,17 @@ def test_cameras_of_all_round_are_in_the_order_of_the_features():
 def test_missing_or_other_observations_are_rejected():
     two_cameras = observe(1.0) | {"membrane_potential": np.array([0.5, 0.6]), "ego_yaw_rate": np.zeros(1)}
     with pytest.raises(ValueError, match="requires the 17 cameras of stopping-zone, got 2; train with"):
-        zone_history().update(two_cameras)
+        update(zone_history(), two_cameras)
     with pytest.raises(ValueError, match="'sides_ffi' requires the 35 cameras of all-round, got 17; train"):
-        zone_history("sides_ffi").update(observe_zones(zone_levels()))
+        update(zone_history("sides_ffi"), observe_zones(zone_levels()))
     with pytest.raises(ValueError, match="requires the observation 'ffi', got"):
-        FeatureHistory(FeatureConfig(inputs=("ffi",))).update(observe(1.0))
+        update(FeatureHistory(FeatureConfig(inputs=("ffi",))), observe(1.0))
 
 
 def test_shrink_frame_averages_blocks():
     frame = np.zeros((4, 6, 1), np.uint8)
     frame[:2, 2:4] = 100
-    small = shrink_frame(frame, 2)
+    small = shrink_frames(frame[None], 2)[0]
     assert small.shape == (2, 3, 1)
     assert small[0, 1, 0] == 100
     assert small.sum() == 100
@@ -179,15 +190,15 @@ def test_shrink_frame_averages_blocks():
             "unknown policy input 'spike_frequncy'; did you mean 'spike_frequency'",
         ),
         ({"inputs": []}, "inputs must contain at least one policy input, got none"),
-        ({"histry": 3}, "unknown policy feature 'histry'; did you mean 'history'"),
-        ({"history": 0}, "history must be a whole number in \\[1, 1000\\], got 0"),
+        ({"histry": 3}, "unknown policy field 'histry'; did you mean 'history'"),
+        ({"history": 0}, "history must be in \\[1, 1000\\], got 0"),
         ({"latch": 1}, "latch must be true or false, got 1"),
-        ({"reward_scale": 0.0}, "reward_scale must be a number > 0, got 0.0"),
+        ({"reward_scale": 0.0}, "reward_scale must be in \\(0, inf\\), got 0.0"),
     ],
 )
 def test_invalid_features_are_rejected(values, message):
     with pytest.raises(ValueError, match=message):
-        FeatureConfig.from_dict(values)
+        FeatureConfig.make(values)
 
 
 def test_blocks_larger_than_the_frame_are_rejected():

@@ -3,7 +3,6 @@
 import json
 
 import gymnasium as gym
-import numpy as np
 import pytest
 from gymnasium.wrappers import RescaleAction
 
@@ -55,25 +54,23 @@ def test_the_agent_acts_as_the_model_in_its_environment(saved, capsys):
     model, envs, path = saved
     agent = make_agent(f"policy:{path}")
     assert capsys.readouterr().err == ""  # nothing is unpickled
-    config = {"config": DISCRETE} if agent.card.demands else {}
+    config = {"config": DISCRETE} if agent.agent.card.demands else {}
     own = gym.make("LGMD/CCRs-v0", ego_speed=8.0, camera=agent.camera, **config)
-    own = own if agent.card.features is None else PolicyWrapper(own, **agent.card.features.to_dict())
+    features = agent.agent.card.features
+    own = own if features is None else PolicyWrapper(own, **features.to_dict())
     env = gym.make("LGMD/CCRs-v0", ego_speed=8.0, camera=agent.camera)
-    batch, normalizer, demands = agent.batch(1), unwrap_vec_normalize(envs), []
+    normalizer, demands = unwrap_vec_normalize(envs), []
     (inputs, _), (observation, info) = own.reset(seed=3), env.reset(seed=3)
     agent.reset(3)
-    batch.reset(0)
     for _ in range(20):
         inputs = normalizer.normalize_obs(inputs) if normalizer else inputs
         action, _ = model.predict(inputs, deterministic=True)
-        demand = agent.card.demands[int(action)] if agent.card.demands else float(action[0])
+        demand = agent.agent.card.demands[int(action)] if agent.agent.card.demands else float(action[0])
         demands.append(float(agent.act(observation, info)[0]))
         assert demands[-1] == pytest.approx(demand, abs=1e-6)
-        of_batch = batch.demands({key: x[None] for key, x in observation.items()}, {}, np.array([True]))
-        assert of_batch[0] == pytest.approx(demand, abs=1e-6)
         inputs, *_ = own.step(action)
         observation, _, _, _, info = env.step([demand])
-    assert agent.card.demands or len(set(demands)) > 1
+    assert agent.agent.card.demands or len(set(demands)) > 1
 
 
 def test_a_margin_requires_two_demands(saved):
@@ -87,8 +84,8 @@ def test_a_margin_requires_two_demands(saved):
 
 def test_the_card_describes_the_training(saved):
     _, envs, path = saved
-    card = make_agent(f"policy:{path}").card
-    assert card == PolicyCard.from_dict(json.loads(path.with_suffix(".json").read_text()))
+    card = make_agent(f"policy:{path}").agent.card
+    assert card == PolicyCard.make(json.loads(path.with_suffix(".json").read_text()))
     assert (card.vec_normalize is not None) == (unwrap_vec_normalize(envs) is not None)
     cameras = card.camera if isinstance(card.camera, list) else [card.camera]
     shape = envs.observation_space["spike_frequency"].shape
@@ -127,7 +124,7 @@ def test_a_file_without_card_names_the_remedy(model, tmp_path):
     ({"vec_normalize": "nix.pkl"}, "vec_normalize .*nix.pkl' cannot be read: No such file"),
     ({"vec_normalize": "nix.npz"}, "vec_normalize .*nix.npz' cannot be read: No such file"),
     ({"vec_normalize": "model.json"}, "vec_normalize .* cannot be loaded"),
-    ({"cameras": "fovea"}, "unknown key of the card 'cameras'; did you mean 'camera'?"),
+    ({"cameras": "fovea"}, "unknown card field 'cameras'; did you mean 'camera'?"),
     ({"demands": [2.0]}, r"demand must be in \[-1, 1\], got 2.0"),
     ({"neuron": {"t_ff": 1}}, "unknown LGMD parameter 't_ff'"),
 ])  # fmt: skip
@@ -146,7 +143,7 @@ def test_cards_of_other_environments(tmp_path):
     env = gym.make("LGMD/CCRs-v0", camera=lens, params=lgmd_gym.LGMDParams(t_sf=40.0))
     card = save_card(file, env, "ppo", vec_normalize="stats.pkl")
     assert (card.neuron["t_sf"], card.vec_normalize) == (40.0, "stats.pkl")
-    again = PolicyCard.from_dict(json.loads(file.with_suffix(".json").read_text()))
+    again = PolicyCard.make(json.loads(file.with_suffix(".json").read_text()))
     assert CameraParams.make(again.camera) == lens
 
 

@@ -14,8 +14,8 @@ from gymnasium import spaces
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.card import CARD, write_card
-from lgmd_gym.agents.policies.inputs import announce_pickle
 from lgmd_gym.agents.policies.network import NetworkSpec, describe_network
+from lgmd_gym.agents.policies.normalizer import announce_pickle
 from lgmd_gym.agents.policies.policy import SHIPPED
 
 pytest.importorskip("stable_baselines3")
@@ -62,9 +62,9 @@ def test_the_network_of_the_card_acts_as_the_model(name, tmp_path):
     state = torch.get_rng_state()
     spec = describe_network(model)
     algo, count = type(model).__name__.lower(), getattr(model.action_space, "n", None)
-    network = NetworkSpec.from_dict(json.loads(json.dumps({
-        "policy": spec.policy, "inputs": spec.inputs, "policy_kwargs": spec.policy_kwargs
-    }))).load(tmp_path / "model.zip", algo, count)  # fmt: skip
+    network = NetworkSpec.make(json.loads(json.dumps(spec.to_dict()))).load(
+        tmp_path / "model.zip", algo, count
+    )
     assert torch.equal(torch.get_rng_state(), state)  # saving a policy does not change the rest of a training
     assert not network.training
     space, actions = spaces.Dict(ego_speed=SPEED, frame=FRAME), []
@@ -117,8 +117,8 @@ def attack(path, **changes):
 def test_a_pickle_in_the_file_of_a_described_network_is_not_executed(tmp_path, capfd):
     agent = make_agent(f"policy:{attack(tmp_path / 'policy.zip')}")
     assert capfd.readouterr().err == ""
-    shipped = make_agent("policy:zones").network.state_dict()
-    assert all(torch.equal(value, shipped[name]) for name, value in agent.network.state_dict().items())
+    shipped = make_agent("policy:zones").agent.network.state_dict()
+    assert all(torch.equal(value, shipped[name]) for name, value in agent.agent.network.state_dict().items())
 
 
 def test_a_line_precedes_the_execution_of_a_pickle(tmp_path, capfd):
@@ -155,7 +155,7 @@ INPUTS = {"ego_speed": [1], "ego_yaw_rate": [1], "zones": [68]}
     ({"policy_kwargs": {"nett_arch": [8]}}, "did you mean 'net_arch'"),
     ({"policy_kwargs": {"activation_fn": "Relu"}}, "did you mean 'ReLU'"),
     ({"policy": "MultiInput"}, "did you mean 'MultiInputPolicy'"),
-    ({"name": 7}, "unknown key of network 'name'"),
+    ({"name": 7}, "unknown network field 'name'"),
 ])  # fmt: skip
 def test_a_wrong_description_is_refused(tmp_path, capfd, changes, words):
     path = attack(tmp_path / "policy.zip", network=NETWORK | {"inputs": INPUTS} | changes)
@@ -168,6 +168,6 @@ def test_a_wrong_description_is_refused(tmp_path, capfd, changes, words):
 
 def test_worker_processes_print_no_line(tmp_path, capsys, monkeypatch):
     worker = SimpleNamespace(name="worker")
-    monkeypatch.setattr("lgmd_gym.agents.policies.inputs.current_process", lambda: worker)
+    monkeypatch.setattr("lgmd_gym.agents.policies.normalizer.current_process", lambda: worker)
     announce_pickle(tmp_path / "policy.zip")
     assert capsys.readouterr().err == ""

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.agents import any_brake, frequency_reading, zone_reading
+from support.agents import any_brake, reading, should_brake, zone_reading
 from support.roads import straight_env
 
 from lgmd_gym.agents import make_agent
@@ -46,12 +46,12 @@ def test_fields_cover_the_rows_of_their_zones(speed):
 def test_a_ground_field_with_an_upright_and_a_low_field_brakes():
     agent = make_agent("stopping-zone:frames=2,upright_frames=2,low_frames=2")
     both = zone_reading(**THREAT)
-    assert not agent.should_brake(both)
-    assert agent.should_brake(both)
+    assert not should_brake(agent, both)
+    assert should_brake(agent, both)
     for missing in THREAT:
         agent.reset(0)
-        reading = zone_reading(**{name: level for name, level in THREAT.items() if name != missing})
-        assert not any_brake(agent, [reading] * 30)
+        others = zone_reading(**{name: level for name, level in THREAT.items() if name != missing})
+        assert not any_brake(agent, [others] * 30)
 
 
 @pytest.mark.parametrize("name", ["ground", "upright", "low"])
@@ -75,9 +75,9 @@ def test_upright_and_low_excitations_count_for_the_frames_of_memory(pause, expec
 @pytest.mark.parametrize("reach", REACHES)
 def test_every_zone_brakes_on_its_own_fields_and_the_nearest_low_field(reach):
     low = {0.28: 0.75, 0.4: 0.75, 0.55: 0.75, 1.8: 1.35}.get(reach, reach)
-    reading = zone_reading(ground={reach: 5.0}, upright={reach: 1.0}, low={low: 2.0})
-    assert any_brake(make_agent("stopping-zone:reach=1.8"), [reading] * 10)
-    assert any_brake(make_agent("stopping-zone:reach=0.75"), [reading] * 10) == (reach <= 0.75)
+    zone = zone_reading(ground={reach: 5.0}, upright={reach: 1.0}, low={low: 2.0})
+    assert any_brake(make_agent("stopping-zone:reach=1.8"), [zone] * 10)
+    assert any_brake(make_agent("stopping-zone:reach=0.75"), [zone] * 10) == (reach <= 0.75)
     for other in REACHES:
         mixed = zone_reading(ground={reach: 5.0}, upright={other: 1.0}, low={low: 2.0})
         assert any_brake(make_agent("stopping-zone:reach=1.8"), [mixed] * 10) == (other == reach)
@@ -86,7 +86,7 @@ def test_every_zone_brakes_on_its_own_fields_and_the_nearest_low_field(reach):
 def test_the_rule_is_inactive_in_turns_and_at_a_crawl():
     agent = make_agent("stopping-zone:yaw_rate=0.05,crawl=1")
     assert not any_brake(agent, [zone_reading(yaw_rate=-0.06, **THREAT)] * 10)
-    assert agent.should_brake(zone_reading(yaw_rate=0.04, **THREAT))  # the streaks are kept
+    assert should_brake(agent, zone_reading(yaw_rate=0.04, **THREAT))  # the streaks are kept
     agent.reset(0)
     assert not any_brake(agent, [zone_reading(speed=1.0, **THREAT)] * 10)
     assert any_brake(agent, [zone_reading(speed=1.01, **THREAT)] * 2)
@@ -94,10 +94,9 @@ def test_the_rule_is_inactive_in_turns_and_at_a_crawl():
 
 @pytest.mark.parametrize(("name", "cameras"), [("stopping-zone", 17), ("danger-zone", 1)])
 def test_other_cameras_are_rejected(name, cameras):
-    reading = frequency_reading(0.0)
-    reading = reading._replace(membrane_potential=np.full(3, 0.5))
+    three = reading(0.0, np.full(3, 0.5), 8.0, 0.0)
     with pytest.raises(ValueError, match=f"{name} requires its own {cameras} cameras, got 3; leave --camera"):
-        make_agent(name).should_brake(reading)
+        should_brake(make_agent(name), three)
 
 
 def play(agent, case):

@@ -1,8 +1,9 @@
 """Cases, cameras and the episodes that they define."""
 
+import numpy as np
 import pytest
 
-from lgmd_gym.agents import AGENTS, Agent
+from lgmd_gym.agents import AGENTS, BatchAgent, make_agent
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import make_env, play
 from lgmd_gym.benchmark.metrics import Counterfactual
@@ -71,7 +72,7 @@ def test_unknown_suite_and_case_suggest_the_nearest_name():
 
 def test_played_episode_has_contact_at_the_expected_time_and_speed():
     env = make_env(SLOW_APPROACH, SensorConfig())
-    played = play(env, AGENTS["no-brake"](), 0)
+    played = play(env, make_agent("no-brake"), 0)
     assert played.collision
     assert played.relative_impact_speed == pytest.approx(5.556)
     assert Counterfactual.of(played).contact_time == pytest.approx(5.0, abs=0.05)
@@ -80,15 +81,15 @@ def test_played_episode_has_contact_at_the_expected_time_and_speed():
     assert {len(values) for values in played.series.values()} == {len(played.series["time"])}
 
 
-class Broken(Agent):
+class Broken(BatchAgent):
     """Raises an exception in the middle of an episode."""
 
     name = "broken"
 
-    def demand(self, observation, info):
-        if info["ttc"] < 4:
+    def demands(self, observations, infos, active):
+        if infos["ttc"] < 4:
             raise RuntimeError("internal failure")
-        return 0.0
+        return np.zeros(1)
 
 
 def test_exception_of_an_agent_becomes_an_error_row(monkeypatch):

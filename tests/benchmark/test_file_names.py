@@ -12,7 +12,7 @@ from lgmd_gym.benchmark.file_names import case_name, series_name
     [
         ("stopping-zone", "clear", "quick_CCRs_v10__stopping-zone__seed3"),
         ("policy:zones", "fog", "quick_CCRs_v10__policy_zones__seed3__fog"),
-        ("graded:gain=2,floor=1", "clear", "quick_CCRs_v10__graded_gain=2_floor=1__seed3"),
+        ("my-rule:gain=2,floor=1", "clear", "quick_CCRs_v10__my-rule_gain=2_floor=1__seed3"),
     ],
 )
 def test_usual_names_have_no_digest(agent, condition, name):

@@ -8,17 +8,13 @@ import numpy as np
 import pytest
 from support.traffic import Recorded
 
-from lgmd_gym.agents import BRAKE, HOLD, Agent, make_agent, to_action
-from lgmd_gym.agents.field_rules import FieldRule
-from lgmd_gym.agents.rule import excitation
+from lgmd_gym.agents import BRAKE, HOLD, make_agent, to_action
 from lgmd_gym.benchmark.episode import Step, rollout
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.traffic.batch import IN_LABORATORY, Drive, TrafficTask, run_traffic_task
-from lgmd_gym.benchmark.traffic.observer import Observer
-from lgmd_gym.benchmark.traffic.recording import fork, look_ahead, record_traffic
+from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
+from lgmd_gym.benchmark.traffic.recording import fork, look_ahead
 from lgmd_gym.benchmark.traffic.replay import RESEED, LiveEpisode
 from lgmd_gym.benchmark.traffic.rows import KEYS, BrakingEvent, measure
-from lgmd_gym.benchmark.traffic.schedule import CameraSchedule
 from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.dynamics.brake import draw_brake
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, register_traffic, traffic_id
@@ -28,25 +24,23 @@ SENSORS = SensorConfig()
 SHORT = {"duration": 12}
 
 
-class BrakeDuring(Agent):
+class BrakeDuring:
     """Brakes in the given intervals [s], and not at all after a reset that follows a standstill."""
 
-    name = "brake-during"
+    alert = False
 
     def __init__(self, *intervals, level=BRAKE):
-        super().__init__()
         self.intervals, self.level, self.reset_seeds = intervals, level, []
 
     def reset(self, seed=None):
-        super().reset(seed)
         self.decision = 0
         self.reset_seeds.append(seed)
 
-    def demand(self, observation, info):
+    def act(self, observation, info):
         time = self.decision / 30
         self.decision += 1
         brakes = any(start <= time < end for start, end in self.intervals)
-        return self.level if brakes and len(self.reset_seeds) == 1 else HOLD
+        return to_action(self.level if brakes and len(self.reset_seeds) == 1 else HOLD)
 
 
 def without_trace(info):
@@ -163,42 +157,6 @@ def test_live_episode_continues_in_the_world_of_the_recording():
         assert same_inputs(step, Step(observation, info, 0.0, terminated or truncated))
 
 
-def scheduled_steps(kind, seed, agent, config):
-    """Return the recording, the schedule and the steps of an agent whose unread cameras are not drawn."""
-    observer = Observer(SENSORS.for_agent(agent))
-    recording = record_traffic(kind, seed, observer.sensors, 0, observer.fps, IN_LABORATORY, config)
-    schedule = CameraSchedule(recording.moments, [agent], len(observer.sensors.names))
-    observer.play_first_pass([recording.moments], [schedule])
-    schedule.plan_second_pass()
-    steps = [
-        observer.observe([moment], [schedule], decision)[0]
-        for decision, moment in enumerate(recording.moments)
-    ]
-    return recording, schedule, steps
-
-
-def potentials(steps):
-    return np.array([step.info["lgmd/trace"][0].response.membrane_potential for step in steps])
-
-
-def motion(recording):
-    """Return speed and yaw rate at every decision."""
-    speed = np.array([moment.speed for moment in recording.moments])
-    return speed, np.array([moment.yaw_rate for moment in recording.moments], np.float32)
-
-
-@pytest.mark.parametrize(("kind", "seed"), [("two-way", 1), ("intersection", 1)])
-def test_readings_of_warmed_up_neurons_equal_those_with_all_cameras(kind, seed):
-    agent, config = make_agent("nested-fields"), {"duration": 14}
-    recording, schedule, steps = scheduled_steps(kind, seed, agent, config)
-    every = Recorded(kind, seed, SENSORS.for_agent(agent), config).steps
-    expected, found = excitation(potentials(every)), excitation(potentials(steps))
-    read = agent.cameras_in_use(*motion(recording), potentials(every))
-    drawn = np.mean(schedule.first | schedule.second)
-    assert 0.05 < np.mean(read) <= drawn < 0.6
-    assert np.abs(found - expected)[read].max() < 1e-4
-
-
 def test_rows_of_a_batch_equal_those_of_single_drives():
     agents = ("stopping-zone", "spike-threshold")
     drives = (Drive("merge", 1, agents[:1]), Drive("intersection", 1, agents))
@@ -211,18 +169,6 @@ def test_rows_of_a_batch_equal_those_of_single_drives():
     assert [row["error"] for row in batch] == [None] * 3
     assert batch == single
     assert batch[-1]["brakes"] > 0
-
-
-@pytest.mark.parametrize(
-    "kind", ["wall", *(pytest.param(kind, marks=pytest.mark.slow) for kind in TRAFFIC_KINDS)]
-)
-def test_cameras_that_are_not_read_do_not_change_the_row(monkeypatch, wall_kinds, kind):
-    """The rule brakes for the stationary car of "wall"."""
-    task = TrafficTask((Drive(kind, 0, ("nested-fields",)),), SENSORS)
-    (scheduled,) = run_traffic_task(task)
-    monkeypatch.setattr(FieldRule, "cameras_in_use", lambda *arguments: None)
-    assert run_traffic_task(task) == [scheduled]
-    assert scheduled["brakes"] > 0 or kind != "wall"
 
 
 def test_failure_in_one_drive_leaves_the_others(monkeypatch, wall_kinds):

@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 from support.runs import interrupt, new_run, read_rows, sorted_rows
 
-from lgmd_gym.agents import AGENTS, Agent
+from lgmd_gym.agents import AGENTS, BatchAgent
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.traffic.rows import KEYS
 from lgmd_gym.benchmark.traffic.summary import COLUMNS, traffic_summaries, write_traffic_summary
@@ -77,8 +77,8 @@ def test_upper_bound_of_no_false_activation_in_300_km():
 
 
 def test_run_writes_rows_as_they_finish(tmp_path, monkeypatch):
-    class Faulty(Agent):
-        def demand(self, observation, info):
+    class Faulty(BatchAgent):
+        def demands(self, observations, infos, active):
             raise RuntimeError("internal failure")
 
     monkeypatch.setitem(AGENTS, "faulty", Faulty)

@@ -15,7 +15,7 @@ from lgmd_gym.cli import main as cli
 from lgmd_gym.cli.console import fit, make_console
 
 AGENTS = ["no-brake", "spike-threshold", "policy:runs/train-sac/policy.zip", "my_agents.rules:MyLongAgent",
-          "stopping-zone", "nested-fields", "ttc-oracle", "adaptive-threshold"]  # fmt: skip
+          "stopping-zone", "danger-zone", "ttc-oracle", "adaptive-threshold"]  # fmt: skip
 
 
 def scores():
@@ -105,7 +105,7 @@ def test_short_names_are_in_one_piece_at_80_columns(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     for make in (scores, traffic, arms):
         text = printed(make()[0], capsys)
-        assert all(name in text for name in ("spike-threshold", "adaptive-threshold", "nested-fields"))
+        assert all(name in text for name in ("spike-threshold", "adaptive-threshold", "danger-zone"))
 
 
 def test_a_table_with_many_columns_is_divided_below_its_names(capsys):

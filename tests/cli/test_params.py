@@ -26,7 +26,7 @@ def demands(name, params):
 
 def test_agents_that_do_not_read_the_neuron():
     assert {"no-brake", "ttc-oracle", "frame-difference"} <= set(BLIND)
-    assert {"spike-threshold", "stopping-zone", "nested-fields"}.isdisjoint(BLIND)
+    assert {"spike-threshold", "stopping-zone", "danger-zone"}.isdisjoint(BLIND)
 
 
 @pytest.mark.parametrize("name", BLIND)

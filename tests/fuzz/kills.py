@@ -121,7 +121,7 @@ def parameters_of(folder):
 BENCH = "bench --suite tiny.toml --agents spike-threshold ttc-oracle"
 OFFLINE = "train --algo offline --camera fovea --jobs 2 --eval-episodes 8 --hyperparams offline.yml"
 PPO = "train --algo ppo --camera fovea --eval-freq 64 --eval-episodes 2 --hyperparams ppo.yml"
-TUNE = "tune --agent nested-fields --trials 3 --levels 8 --seeds 0 --study out --best best.toml"
+TUNE = "tune --agent danger-zone --trials 3 --levels 8 --seeds 0 --study out --best best.toml"
 COMMANDS = {
     "bench": Command(
         f"{BENCH} --seeds 8 --no-plots --no-report --out out",

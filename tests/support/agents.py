@@ -4,13 +4,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.agents.rule import SensorReading
+from lgmd_gym.agents.rules import Reading
 from lgmd_gym.agents.zones import LOW_ZONES, NUM_FIELDS, NUM_ZONES, REACHES
 
 
 class TraceFrame(NamedTuple):
+    time: Any
+    ego_speed: Any
     response: Any
-    ego_speed: float
 
 
 class NeuronResponse(NamedTuple):
@@ -35,7 +36,7 @@ def make_step(*frequencies, trace=False, cameras=1, potential=0.5, speed=8.0, ya
     if trace:
         potentials = observation["membrane_potential"]
         responses = [NeuronResponse(np.full(cameras, value), potentials) for value in frequencies]
-        info["lgmd/trace"] = [TraceFrame(response, speed) for response in responses]
+        info["lgmd/trace"] = [TraceFrame(k / 30, speed, item) for k, item in enumerate(responses)]
     return observation, info
 
 
@@ -49,9 +50,15 @@ def to_potential(excitation):
     return 1.0 / (1.0 + np.exp(-np.asarray(excitation, float)))
 
 
+def reading(frequency, potential, speed, yaw_rate):
+    """Return the reading of one environment."""
+    values = (np.array([value], float) for value in (frequency, potential, speed, yaw_rate))
+    return Reading(*values, due=np.ones(1, bool))
+
+
 def frequency_reading(frequency, speed=8.0, yaw_rate=0.0):
     """Return the reading of one camera with a spike frequency [spikes/s]."""
-    return SensorReading(np.array([frequency]), np.full(1, 0.5), speed, yaw_rate)
+    return reading(frequency, [0.5], speed, yaw_rate)
 
 
 def zone_levels(ground=None, upright=None, low=None):
@@ -70,10 +77,16 @@ def zone_levels(ground=None, upright=None, low=None):
 
 def zone_reading(speed=13.0, yaw_rate=0.0, **levels):
     """Return the reading of the cameras of `stopping-zone`; `levels` are those of `zone_levels`."""
-    return SensorReading(np.zeros(NUM_FIELDS), to_potential(zone_levels(**levels)), speed, yaw_rate)
+    return reading(0.0, to_potential(zone_levels(**levels)), speed, yaw_rate)
 
 
 def any_brake(rule, readings):
     """Pass all readings to a rule; return whether its condition held for any of them."""
-    conditions = [rule.should_brake(reading) for reading in readings]  # the rule counts frames
+    conditions = [should_brake(rule, reading) for reading in readings]  # the rule counts frames
     return any(conditions)
+
+
+def should_brake(rule, reading):
+    """Return whether the condition of a rule in one environment holds."""
+    (condition,) = rule.agent.should_brake(reading)
+    return bool(condition)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lgmd_gym.agents.policies.zone_features import NUM_LEVELS, ZONE_INPUTS, ZoneFeatures
+from lgmd_gym.agents.policies.features import NUM_LEVELS, ZONE_INPUTS, FeatureConfig, FeatureHistory
 from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, NUM_MOTION_FIELDS, all_round_cameras
 from lgmd_gym.agents.zones import NUM_FIELDS
 from lgmd_gym.training.offline.mirror import mirror_input, mirror_of
@@ -53,7 +53,8 @@ def test_features_of_a_mirrored_sequence_are_the_mirrored_features(name):
     count = field.size // NUM_LEVELS
     order, signs = single.order[:count], single.signs[:count]
     length = NUM_COLUMNS if name == "columns" else NUM_ALL_ROUND
-    original, image = ZoneFeatures(name), ZoneFeatures(name)
+    config = FeatureConfig(inputs=(name,))
+    original, image = FeatureHistory(config), FeatureHistory(config)
     for _ in range(20):
         response = rng.normal(size=count) if name != "sides_ffi" else rng.uniform(0.0, 3.0, count)
         response[signs > 0] = np.abs(response[signs > 0])
@@ -62,9 +63,9 @@ def test_features_of_a_mirrored_sequence_are_the_mirrored_features(name):
             signal[field.first : field.last] = (
                 values if name == "sides_ffi" else 1.0 / (1.0 + np.exp(-values))
             )
-            features.update(signal)
-        expected = mirror_input(name, original.collect()[None])[0]
-        assert np.allclose(image.collect(), expected, atol=1e-6)
+            features.update({field.source: signal[None]})
+        expected = mirror_input(name, original.stack()[name])
+        assert np.allclose(image.stack()[name], expected, atol=1e-6)
 
 
 def test_ego_motion_and_forward_fields():

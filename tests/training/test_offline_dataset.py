@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from support.recordings import offline_config, synthetic_episode
 
-from lgmd_gym.agents.policies.features import SCALES, FeatureConfig, FeatureHistory
-from lgmd_gym.agents.policies.zone_features import ZONE_INPUTS
+from lgmd_gym.agents.policies.features import SCALES, ZONE_INPUTS, FeatureConfig, FeatureHistory
 from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS
 from lgmd_gym.agents.zones import NUM_FIELDS
 from lgmd_gym.training.offline.dataset import OfflineDataset

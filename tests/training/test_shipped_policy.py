@@ -7,10 +7,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.policies.batch import action_values
+from lgmd_gym.agents import make_agent, make_agents
 from lgmd_gym.agents.policies.card import read_card
-from lgmd_gym.agents.policies.policy import find_policy
+from lgmd_gym.agents.policies.policy import action_values, find_policy
 from lgmd_gym.agents.registry import outside_code
 from lgmd_gym.agents.sides import NUM_COLUMNS, all_round_cameras
 from lgmd_gym.agents.zones import zone_cameras
@@ -104,7 +103,7 @@ def test_policy_does_not_react_to_own_acceleration(acceleration, name):
 
 
 def test_a_margin_shifts_the_log_odds_of_braking():
-    steady, later = make_agent("policy:zones"), make_agent("policy:zones:margin=2.5")
+    steady, later = make_agents("policy:zones", 1), make_agents("policy:zones:margin=2.5", 1)
     assert (later.name, outside_code(later.name)) == ("policy:zones:margin=2.5", None)
     rng = np.random.default_rng(0)
     inputs = {
@@ -117,8 +116,8 @@ def test_a_margin_shifts_the_log_odds_of_braking():
         values = action_values(policy.network, inputs)
         odds.append(values[:, brake] - values[:, 1 - brake])
     np.testing.assert_allclose(odds[1], odds[0] - 2.5, atol=1e-4)
-    values = action_values(make_agent("policy:zones").network, inputs)
+    values = action_values(make_agents("policy:zones", 1).network, inputs)
     np.testing.assert_array_equal(values[:, brake] - values[:, 1 - brake], odds[0])
     for index in range(50):
-        row = {name: values[index] for name, values in inputs.items()}
-        assert (later.decide(row) < 0.0) == (odds[1][index] > 0.0)
+        row = {name: values[index : index + 1] for name, values in inputs.items()}
+        assert (later.decide(row)[0] < 0.0) == (odds[1][index] > 0.0)

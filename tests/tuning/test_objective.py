@@ -91,7 +91,6 @@ def test_episodes_are_in_worlds_of_the_split(split):
 
 def test_only_latching_rules_are_replayed():
     assert is_latching(make_agent("spike-threshold"))
-    assert not is_latching(make_agent("graded"))
     assert not is_latching(make_agent("ttc-oracle"))
 
 

@@ -19,7 +19,7 @@ class ThresholdObjective:
 
     def evaluate(self, agent, sensor_config):
         self.evaluated.append((agent, sensor_config))
-        threshold = make_agent(agent).params.threshold
+        threshold = make_agent(agent).agent.params.threshold
         return ObjectiveValue(1.0 - abs(threshold - 100.0) / 300.0, 0.0, 10, 10)
 
 
@@ -42,7 +42,7 @@ def test_a_study_starts_at_the_defaults_finds_the_maximum_and_resumes(tmp_path):
     assert len(train.evaluated) == 23
     assert any(line.startswith("trial 22:") for line in lines)
     assert abs(best["threshold"] - 100.0) < 35.0
-    assert make_agent(agent_string("spike-threshold", best)).params.threshold == best["threshold"]
+    assert make_agent(agent_string("spike-threshold", best)).agent.params.threshold == best["threshold"]
 
 
 @pytest.mark.parametrize(("first", "then"), [(1, 2), pytest.param(5, 9, marks=pytest.mark.slow)])
@@ -105,7 +105,7 @@ def test_validation_chooses_between_the_defaults_and_the_best_trials(tmp_path):
     class DefaultIsBest(ThresholdObjective):
         def evaluate(self, agent, sensor_config):
             self.evaluated.append(agent)
-            threshold = make_agent(agent).params.threshold
+            threshold = make_agent(agent).agent.params.threshold
             return ObjectiveValue(1.0 - abs(threshold - 30.0) / 300.0, 0.0, 10, 10)
 
     validation, space = DefaultIsBest(), SearchSpace(agent="spike-threshold")

@@ -47,7 +47,7 @@ def test_shifts_include_the_camera_geometry_but_not_the_camera_preset():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"agent": "nested-fild"}, "unknown rule 'nested-fild'; did you mean 'nested-fields'"),
+        ({"agent": "stoping-zone"}, "unknown rule 'stoping-zone'; did you mean 'stopping-zone'"),
         ({"agent": "no-brake"}, "unknown rule 'no-brake'"),
         ({"cameras": ("telle",)}, "unknown camera 'telle'; did you mean 'tele'"),
         ({"agent": "stopping-zone", "cameras": ("tele",)}, "has several cameras of its own, got cameras"),

@@ -12,7 +12,6 @@ from lgmd_gym.benchmark.traffic.reader import Moment
 from lgmd_gym.benchmark.traffic.recording import record_traffic
 from lgmd_gym.benchmark.traffic.replay import Replay
 from lgmd_gym.benchmark.traffic.rows import KEYS, measure, traffic_case
-from lgmd_gym.benchmark.traffic.schedule import WARM_UP, CameraSchedule
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.camera.worlds import LABORATORY, check_world
 from lgmd_gym.envs.appearance import Appearance
@@ -86,7 +85,6 @@ class _PlayedDrive:
         rows: Rows of the finished agents, by agent.
         replays: Unfinished replays, by agent.
         moments: Moments of the recording; none if it failed.
-        schedule: Schedule of the cameras.
     """
 
     def __init__(
@@ -103,22 +101,16 @@ class _PlayedDrive:
         self.replays: dict[str, Replay] = {}
         self.moments: tuple[Moment, ...] = ()
         self._agents, self._condition, self._label = agents, task.condition, sensor_config.label
-        num_cameras = len(observer.sensors.names)
-        self.schedule = CameraSchedule((), (), num_cameras)
         try:
             recording = record_traffic(
                 drive.kind, drive.seed, observer.sensors, index, observer.fps, drive.appearance
             )
             playing = {name: make_agent(name) for name in agents}
-            self.schedule = CameraSchedule(recording.moments, list(playing.values()), num_cameras)
         except Exception:
             self.fail()
             return
         self.moments = recording.moments
-        warm_up = None if self.schedule.first is None else WARM_UP
-        self.replays = {
-            name: Replay(recording, agent, sensor_config, warm_up) for name, agent in playing.items()
-        }
+        self.replays = {name: Replay(recording, agent, sensor_config) for name, agent in playing.items()}
 
     def process(self, step: Step) -> None:
         """Give the step of the next decision to the agents."""
@@ -157,15 +149,11 @@ def _play(task: TrafficTask, sensor_config: SensorConfig, agents: set[str]) -> l
         _PlayedDrive(drive, names, task, sensor_config, observer, index)
         for index, (drive, names) in enumerate(chosen)
     ]
-    schedules = [drive.schedule for drive in drives]
     try:
-        observer.play_first_pass([drive.moments for drive in drives], schedules)
-        for schedule in schedules:
-            schedule.plan_second_pass()
         decision = 0
         while any(drive.replays for drive in drives):
             moments = [drive.moments[decision] if drive.replays else None for drive in drives]
-            for drive, step in zip(drives, observer.observe(moments, schedules, decision), strict=True):
+            for drive, step in zip(drives, observer.observe(moments), strict=True):
                 if step is not None:
                     drive.process(step)
             decision += 1

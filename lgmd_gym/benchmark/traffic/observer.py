@@ -8,7 +8,6 @@ import numpy as np
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.reader import Moment, SceneFrame
-from lgmd_gym.benchmark.traffic.schedule import CameraSchedule
 from lgmd_gym.camera import BIRDSEYE
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.neuron import LGMDParams
@@ -41,28 +40,15 @@ class Observer:
         self._keys = signal_keys(self.sensors.names)
         self._top_views = [k for k, name in enumerate(self.sensors.names) if name == BIRDSEYE]
 
-    def observe(
-        self,
-        moments: Sequence[Moment | None],
-        schedules: Sequence[CameraSchedule] | None = None,
-        decision: int = 0,
-    ) -> list[Step | None]:
+    def observe(self, moments: Sequence[Moment | None]) -> list[Step | None]:
         """Process the frames of one decision of every episode and return its steps.
 
         Args:
             moments: The moment of every episode; None for an episode that is not played.
-            schedules: Schedules whose second pass to play; None to draw all cameras.
-            decision: Index of the decision, for the schedules.
         """
         traces: list[list[TraceFrame]] = [[] for _ in moments]
-        if schedules is not None:
-            for index, moment in enumerate(moments):
-                if moment is not None:
-                    self._enable(index, schedules[index].second, decision)
         for number in range(max(len(moment.frames) for moment in moments if moment)):
             for index in self._process(moments, number):
-                if schedules is not None:
-                    schedules[index].restore(decision, self.sensors.responses, index)
                 frame = moments[index].frames[number]  # type: ignore[union-attr]
                 traces[index].append(TraceFrame(frame.time, frame.speed, self.sensors.response_of(index)))
         return [
@@ -70,32 +56,7 @@ class Observer:
             for index, moment in enumerate(moments)
         ]
 
-    def play_first_pass(
-        self, episodes: Sequence[Sequence[Moment]], schedules: Sequence[CameraSchedule]
-    ) -> None:
-        """Draw the cameras of the first pass and store their outputs in the schedules.
-
-        Args:
-            episodes: The moments of every episode.
-            schedules: The schedule of every episode.
-        """
-        played = [
-            moments if schedule.first is not None else ()
-            for moments, schedule in zip(episodes, schedules, strict=True)
-        ]
-        for decision in range(max(map(len, played), default=0)):
-            moments = [item[decision] if decision < len(item) else None for item in played]
-            for index, moment in enumerate(moments):
-                if moment is not None:
-                    self._enable(index, schedules[index].first, decision)
-            for index in self._process(moments):
-                schedules[index].store(self.sensors.responses, index)
-        self.sensors.reset()
-
-    def _enable(self, index: int, cameras: np.ndarray | None, decision: int) -> None:
-        self.sensors.enabled[index] = True if cameras is None else cameras[decision]
-
-    def _process(self, moments: Sequence[Moment | None], number: int = 0) -> list[int]:
+    def _process(self, moments: Sequence[Moment | None], number: int) -> list[int]:
         """Draw one frame of every episode, step the neurons, and return the episodes that have this frame.
 
         Args:
@@ -103,12 +64,10 @@ class Observer:
             number: Number of the frame in the decision.
         """
         shown = np.zeros(self.sensors.num_envs, np.bool_)
-        used: list[bool] = self.sensors.enabled.any(axis=1).tolist()  # type: ignore[assignment]
         for index, moment in enumerate(moments):
             if moment is not None and number < len(moment.frames):
                 shown[index] = True
-                if used[index]:
-                    self._show(index, moment.frames[number])
+                self._show(index, moment.frames[number])
         self.sensors.process(0, self.sensors.num_envs, shown)
         return np.flatnonzero(shown).tolist()
 

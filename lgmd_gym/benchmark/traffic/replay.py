@@ -1,6 +1,7 @@
 """Replay of one agent on a recording of traffic; simulated live from its first braking on."""
 
-from lgmd_gym.agents import HOLD, Agent
+from lgmd_gym.agents import HOLD
+from lgmd_gym.agents.base import Actor
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.observer import Observer
@@ -21,23 +22,15 @@ class LiveEpisode:
         recording: The recording.
         decision: The decision.
         sensor_config: Camera and neuron parameters.
-        warm_up: Number of recorded decisions before it from which the neurons start; None for all.
     """
 
-    def __init__(
-        self,
-        recording: TrafficRecording,
-        decision: int,
-        sensor_config: SensorConfig,
-        warm_up: int | None = None,
-    ) -> None:
+    def __init__(self, recording: TrafficRecording, decision: int, sensor_config: SensorConfig) -> None:
         self.env = recording.fork(decision)
         self._observer = Observer(sensor_config)
         sensors = self._observer.sensors
         sensors.set_camera_fields(0, self.env.camera_fields)
         sensors.set_road(0, self.env.road)
-        first = 0 if warm_up is None else max(decision - warm_up, 0)
-        for moment in recording.moments[first : decision + 1]:
+        for moment in recording.moments[: decision + 1]:
             (self.start,) = self._observer.observe([moment])
         self._reader = SceneReader(self.env, sensors, 0, recording.fps, decision)
 
@@ -63,22 +56,14 @@ class Replay:
         recording: Recording to replay.
         agent: Agent to run.
         sensor_config: Camera and neuron parameters.
-        warm_up: See `LiveEpisode`.
 
     Attributes:
         log: Events so far.
         done: Whether the episode has ended.
     """
 
-    def __init__(
-        self,
-        recording: TrafficRecording,
-        agent: Agent,
-        sensor_config: SensorConfig,
-        warm_up: int | None = None,
-    ) -> None:
-        self.recording, self.agent = recording, agent
-        self.sensor_config, self.warm_up = sensor_config, warm_up
+    def __init__(self, recording: TrafficRecording, agent: Actor, sensor_config: SensorConfig) -> None:
+        self.recording, self.agent, self.sensor_config = recording, agent, sensor_config
         self.log = EpisodeLog()
         self.done = False
         self._live: LiveEpisode | None = None
@@ -92,7 +77,7 @@ class Replay:
         demand = self._process(step)
         if self.done or demand == HOLD:
             return
-        self._live = LiveEpisode(self.recording, self._decision - 1, self.sensor_config, self.warm_up)
+        self._live = LiveEpisode(self.recording, self._decision - 1, self.sensor_config)
         while not self.done:
             demand = self._process(self._live.step(demand))
 

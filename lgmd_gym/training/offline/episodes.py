@@ -14,7 +14,7 @@ import gymnasium as gym
 import numpy as np
 from joblib import delayed
 
-from lgmd_gym.agents.policies.features import FRAME, SCALES, shrink_frame
+from lgmd_gym.agents.policies.features import FRAME, SCALES, shrink_frames
 from lgmd_gym.processes.pool import run_parallel
 from lgmd_gym.training.offline.braking_outcomes import STRIDE, BrakingOutcome, braking_outcomes
 
@@ -100,7 +100,9 @@ def select_signals(observation: Observation, shrink: int | None) -> Observation:
         shrink: Side of the pixel squares that become one pixel of the recorded frame [px]; None for no frame.
     """
     signals = {name: observation[name] for name in SIGNALS if name in observation}
-    return signals if shrink is None else signals | {FRAME: shrink_frame(observation[FRAME], shrink)}
+    return (
+        signals if shrink is None else signals | {FRAME: shrink_frames(observation[FRAME][None], shrink)[0]}
+    )
 
 
 def stack(observations: list[Observation]) -> Observation:

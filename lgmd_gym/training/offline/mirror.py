@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgmd_gym.agents.policies.zone_features import NUM_LEVELS, ZONE_INPUTS
+from lgmd_gym.agents.policies.features import NUM_LEVELS, ZONE_INPUTS
 from lgmd_gym.agents.sides import (
     DETECTORS,
     FORWARD_COLUMNS,

@@ -7,16 +7,14 @@ import numpy as np
 from lgmd_gym.agents.policies.features import (
     CLIP,
     FRAME,
-    SCALES,
-    FeatureConfig,
-    FeatureHistory,
-    source_observation,
-)
-from lgmd_gym.agents.policies.zone_features import (
     GAINS,
     NUM_LEVELS,
+    SCALES,
     ZONE_INPUTS,
+    FeatureConfig,
+    FeatureHistory,
     levels_of,
+    source_observation,
     weaker,
 )
 from lgmd_gym.training.offline.episodes import Observation
@@ -55,7 +53,7 @@ def policy_inputs(
 def _zone_inputs(
     observations: Observation, features: FeatureConfig, zone_type: type[np.floating]
 ) -> dict[str, np.ndarray]:
-    """Return the outputs of `ZoneFeatures`; one loop over time computes the averages of all inputs."""
+    """Return the features of fields; one loop over time computes the averages of all inputs."""
     names = [name for name in features.inputs if name in ZONE_INPUTS]
     if not names:
         return {}
@@ -87,7 +85,7 @@ def _other_inputs(
     history = FeatureHistory(replace(features, inputs=names, history=1))
     rows = []
     for time in range(len(next(iter(observations.values())))):
-        history.update({name: values[time] for name, values in observations.items()})
+        history.update({name: values[time][None] for name, values in observations.items()})
         if time % features.repeat == 0:
             rows.append(history.stack())
-    return {name: np.stack([row[name] for row in rows]) for name in names}
+    return {name: np.concatenate([row[name] for row in rows]) for name in names}

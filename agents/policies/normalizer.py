@@ -1,4 +1,4 @@
-"""Inputs of a policy at each decision: features, raw observations, and the normalisation of the training."""
+"""Normalisation of a policy's inputs: the statistics of a `VecNormalize` of the training."""
 
 import pickle
 import sys
@@ -6,84 +6,14 @@ from collections.abc import Mapping
 from functools import cache
 from multiprocessing import current_process
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.policies.features import FeatureConfig, FeatureHistory
 from lgmd_gym.errors import shown
 from lgmd_gym.processes.files import complete_file
 
 NORMALIZER_SUFFIX = ".npz"
-
-
-class PolicyInputs(Protocol):
-    """Inputs of a policy in one environment; `FeatureHistory` is one."""
-
-    def reset(self) -> None:
-        """Begin a new episode."""
-        ...
-
-    def update(self, observation: dict[str, Any]) -> None:
-        """Process the observation of a decision of the environment."""
-        ...
-
-    def stack(self) -> dict[str, np.ndarray]:
-        """Return the inputs of a decision of the policy."""
-        ...
-
-
-class RawInputs:
-    """Observations as the environment returns them.
-
-    Args:
-        names: Names of the observations.
-    """
-
-    def __init__(self, names: tuple[str, ...]) -> None:
-        self._names = names
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the last observation."""
-        self._observation: dict[str, Any] = {}
-
-    def update(self, observation: dict[str, Any]) -> None:
-        """Keep an observation of `LGMDObservation`."""
-        self._observation = observation
-
-    def stack(self) -> dict[str, np.ndarray]:
-        """Return the last observation."""
-        return {name: np.array(self._observation[name]) for name in self._names}
-
-
-class NormalizedInputs:
-    """Inputs with the statistics of a `VecNormalize`, which do not change.
-
-    Args:
-        inputs: Inputs of the training environment within the `VecNormalize`.
-        normalizer: A `Normalizer` or `VecNormalize`.
-    """
-
-    def __init__(self, inputs: PolicyInputs, normalizer: Any) -> None:
-        self._inputs, self._normalizer = inputs, normalizer
-        self.reset, self.update = inputs.reset, inputs.update
-
-    def stack(self) -> dict[str, np.ndarray]:
-        """Return the normalised inputs."""
-        return self._normalizer.normalize_obs(self._inputs.stack())
-
-
-def make_inputs(features: FeatureConfig | None, names: tuple[str, ...], normalizer: Any) -> PolicyInputs:
-    """Return the inputs of one environment.
-
-    Args:
-        features: Features of the policy; None for raw observations.
-        names: Names of the raw observations.
-        normalizer: A `Normalizer` or `VecNormalize`, or None.
-    """
-    inputs = RawInputs(names) if features is None else FeatureHistory(features)
-    return inputs if normalizer is None else NormalizedInputs(inputs, normalizer)
 
 
 @cache
