@@ -85,10 +85,10 @@ def test_inputs_of_an_episode_equal_those_of_a_feature_history(repeat):
     found, history = policy_inputs(observations, features, np.float32), FeatureHistory(features)
     assert set(found) == set(inputs)
     for time in range(40):
-        history.update({name: values[time] for name, values in observations.items()})
+        history.update({name: values[time : time + 1] for name, values in observations.items()})
         if time % repeat == 0:
             for name, expected in history.stack().items():
-                assert found[name][time // repeat] == pytest.approx(expected, abs=1e-6)
+                assert found[name][time // repeat] == pytest.approx(expected[0], abs=1e-6)
     for name, rounded in policy_inputs(observations, features).items():
         assert rounded.dtype == (np.float16 if name in ZONE_INPUTS else np.float32)
         assert rounded == pytest.approx(found[name], abs=5e-4)
