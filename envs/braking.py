@@ -14,11 +14,11 @@ from lgmd_gym.envs.decisions import (
     start_decisions,
     start_episodes,
 )
-from lgmd_gym.envs.dynamics.physics_state import PhysicsState
 from lgmd_gym.envs.episode_source import EpisodeSource, FixedScenario
 from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.highway.road import BrakingRoad, EgoCar
 from lgmd_gym.envs.info import INFO_KEYS
+from lgmd_gym.envs.physics_state import PhysicsState
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.scene import SceneArrays, write_scene
 from lgmd_gym.envs.spaces import EgoState, make_action

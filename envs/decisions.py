@@ -10,8 +10,8 @@ import numpy as np
 
 from lgmd_gym.envs.dynamics.brake import put_demand
 from lgmd_gym.envs.dynamics.episode import Arrays, Physics, is_terminated, is_truncated
-from lgmd_gym.envs.dynamics.physics_state import PhysicsState
 from lgmd_gym.envs.info import INFO, write_info
+from lgmd_gym.envs.physics_state import PhysicsState
 from lgmd_gym.envs.reward import step_reward
 from lgmd_gym.envs.surrogate_safety import is_approached
 from lgmd_gym.kernels import kernel

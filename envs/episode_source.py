@@ -11,7 +11,6 @@ from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.camera.worlds import LABORATORY, draw_world
 from lgmd_gym.envs.appearance import Appearance, brake_of, world_number
 from lgmd_gym.envs.dynamics.brake import BrakeParams
-from lgmd_gym.envs.dynamics.physics_state import Placement, place
 from lgmd_gym.envs.families.distribution import (
     LEVELS,
     check_families,
@@ -23,6 +22,7 @@ from lgmd_gym.envs.families.distribution import (
 )
 from lgmd_gym.envs.families.scenario import Scenario, free_lane
 from lgmd_gym.envs.highway.network import road_network
+from lgmd_gym.envs.physics_state import Placement, place
 
 
 class Draw(NamedTuple):

@@ -13,13 +13,11 @@ from lgmd_gym.envs.families.data import scenario_from_data
 from lgmd_gym.envs.families.family import Family
 from lgmd_gym.envs.families.family import family as add_family
 from lgmd_gym.errors import check_keys, check_known, check_text, shown, unknown_name
-from lgmd_gym.processes.user_modules import import_user_module
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import CameraSpec
     from lgmd_gym.envs.episode_source import EpisodeSource
     from lgmd_gym.envs.families.scenario import Scenario
-    from lgmd_gym.envs.traffic.env import TrafficEnv
     from lgmd_gym.neuron import NeuronSpec
 
 RANDOM = "RandomBraking"
@@ -223,6 +221,8 @@ def import_families(modules: Iterable[str]) -> None:
     Raises:
         ValueError: If a module cannot be imported, or defines no such family.
     """
+    from lgmd_gym.processes.user_modules import import_user_module
+
     for text in modules:
         module_name, _, name = check_text("module", text).partition(":")
         module = import_user_module(module_name, f"module {shown(module_name)}")
@@ -275,14 +275,14 @@ def register_traffic() -> None:
             gym.register(traffic_id(kind), entry_point=f"{__name__}:make_traffic", kwargs=arguments)
 
 
-def find_kind(kind: str) -> "type[TrafficEnv]":
-    """Return the environment class of a kind of traffic.
+def find_kind(kind: str) -> Any:
+    """Return the environment class of a kind of traffic, a subclass of `TrafficEnv`.
 
     Raises:
         ValueError: If the kind is unknown.
     """
     check_known("kind of traffic", kind, TRAFFIC_KINDS)
-    return load_env_creator(TRAFFIC_KINDS[kind])  # type: ignore[return-value]
+    return load_env_creator(TRAFFIC_KINDS[kind])
 
 
 def make_traffic(

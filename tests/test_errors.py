@@ -58,10 +58,10 @@ def test_values_are_shown_in_one_short_line():
         (lambda: envs.make_scenario("CCRs", lateral_offset=[]), "lateral_offset must be a number"),
         (lambda: envs.make_scenario("LaneClosure", left=0), "left must be true or false, got 0"),
         (lambda: envs.make_scenario("AdjacentPass", cars=1.5), "cars must be a whole number in"),
-        (lambda: envs.make_scenario("SteelPlate", shade=None), "shade must be a whole number in"),
+        (lambda: envs.make_scenario("SteelPlate", shade=None), "shade must be a number, got None"),
         (lambda: envs.make_scenario([]), "unknown scenario []"),
         (lambda: envs.Actor(gap=3.0, profile=[1]), "profile must be a list of Segment, got [1]"),
-        (lambda: envs.RoadPlan(lanes="2"), "lanes must be a whole number in"),
+        (lambda: envs.RoadPlan(lanes="2"), "lanes must be a number, got '2'"),
         (
             lambda: envs.Scenario(family="x", ego_speed=5.0, duration=1.0, actors="car"),
             "actors must be a list",

@@ -1,11 +1,10 @@
 """Declaration of a scenario family: its function, the bounds of its arguments, and its random levels.
 
-Example:
-    >>> @family("Wall", Level("Wall", 2.0, lambda rng: {"ego_speed": rng.uniform(5.0, 20.0)}), threat=True)
-    ... def approach_wall(ego_speed: Annotated[float, speed("Ego speed")] = 10.0) -> Scenario:
-    ...     '''The ego approaches a wall.'''
-    ...     wall = Actor(gap=5.0 * ego_speed, kind="box", length=0.3, width=4.0)
-    ...     return Scenario(family="Wall", ego_speed=ego_speed, duration=11.0, actors=(wall,))
+For example::
+
+    @family("Wall", Level("Wall", 2.0, lambda rng: {"ego_speed": rng.uniform(5.0, 20.0)}), threat=True)
+    def approach_wall(ego_speed: Annotated[float, speed("Ego speed")] = 10.0) -> Scenario:
+        ...
 """
 
 import inspect

@@ -16,8 +16,8 @@ from lgmd_gym.envs.decisions import (
     start_episodes,
 )
 from lgmd_gym.envs.dynamics.brake import BRAKE, BrakeParams
-from lgmd_gym.envs.dynamics.physics_state import PhysicsState
 from lgmd_gym.envs.episode_source import Draw
+from lgmd_gym.envs.physics_state import PhysicsState
 from lgmd_gym.envs.reward import REWARD
 from lgmd_gym.envs.scene import SceneArrays
 from lgmd_gym.kernels.threads import Threads

@@ -9,11 +9,11 @@ import pytest
 
 from lgmd_gym.envs.dynamics.bodies import BICYCLE, CAR, EGO, PEDESTRIAN
 from lgmd_gym.envs.dynamics.longitudinal import SpeedProfile
-from lgmd_gym.envs.dynamics.physics_state import place
 from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.families.family import make_scenario
 from lgmd_gym.envs.families.road_users import run_up
 from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
+from lgmd_gym.envs.physics_state import place
 
 
 def test_highest_scripted_speed():

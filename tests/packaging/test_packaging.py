@@ -46,7 +46,7 @@ UPWARD = ["lgmd_gym.benchmark imports lgmd_gym.report.outputs"]
 # Within these folders, the sub-folders in the same order; "" is the folder's own files.
 ORDER_WITHIN = {
     "benchmark": ("analysis", ""),
-    "envs": ("traffic", "", "simulation", "families", "dynamics"),
+    "envs": ("traffic", "", "highway", "families", "dynamics"),
     "training": ("", "offline"),
 }
 
