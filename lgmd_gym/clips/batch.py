@@ -191,9 +191,11 @@ class ClipResult:
 
 
 def make_jobs(
-    paths: Sequence[str | Path], crashes: Path | None = None, crash_frame: int | None = None,
+    paths: Sequence[str | Path],
+    crashes: Path | None = None,
+    crash_frame: int | None = None,
     events: Path | None = None,
-) -> list[ClipJob]:  # fmt: skip
+) -> list[ClipJob]:
     """Return one job per clip.
 
     Args:
@@ -219,8 +221,10 @@ def make_jobs(
         annotations = {clips[0]: crash_frame}
     infos = [probe(clip) for clip in clips]
     of_clip = {} if events is None else read_events(events, infos)
-    return [_job(info, info.path in annotations, annotations.get(info.path), of_clip.get(info.path))
-            for info in infos]  # fmt: skip
+    return [
+        _job(info, info.path in annotations, annotations.get(info.path), of_clip.get(info.path))
+        for info in infos
+    ]
 
 
 def _job(info: VideoInfo, annotated: bool, crash: int | None, event: ClipEvent | None) -> ClipJob:
@@ -232,9 +236,15 @@ def _job(info: VideoInfo, annotated: bool, crash: int | None, event: ClipEvent |
 
 
 def process_clip(
-    job: ClipJob, config: PlaybackConfig, folder: Path, *, suffix: str = "", overlay: bool = False,
-    figure: bool = True, on_progress: Callable[[float], object] | None = None,
-) -> ClipResult:  # fmt: skip
+    job: ClipJob,
+    config: PlaybackConfig,
+    folder: Path,
+    *,
+    suffix: str = "",
+    overlay: bool = False,
+    figure: bool = True,
+    on_progress: Callable[[float], object] | None = None,
+) -> ClipResult:
     """Run the neuron on one clip and write trace.csv, and optionally trace.png and overlay.mp4.
 
     Args:

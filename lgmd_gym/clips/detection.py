@@ -90,9 +90,12 @@ def find_onsets(alarm: np.ndarray, fps: float) -> np.ndarray:
 
 
 def detect(
-    clip: str, frequency: Sequence[float] | np.ndarray, alarm: Sequence[bool] | np.ndarray, fps: float,
+    clip: str,
+    frequency: Sequence[float] | np.ndarray,
+    alarm: Sequence[bool] | np.ndarray,
+    fps: float,
     crash_s: float | None,
-) -> ClipDetection:  # fmt: skip
+) -> ClipDetection:
     """Return the alarms of a clip relative to its crash.
 
     Args:

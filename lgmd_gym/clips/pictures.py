@@ -228,5 +228,14 @@ def _annotate(axis: Any, at: tuple[float, float], text: str, colour: str = "0.4"
     units = ("data", "axes fraction") if data == "x" else ("axes fraction", "data")
     side = "left" if data == "x" else "right"
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
-    axis.annotate(text, at, xycoords=units, va="top" if data == "x" else "bottom", ha=side, color=colour,
-                  fontsize=8, bbox=box, zorder=4)  # fmt: skip
+    axis.annotate(
+        text,
+        at,
+        xycoords=units,
+        va="top" if data == "x" else "bottom",
+        ha=side,
+        color=colour,
+        fontsize=8,
+        bbox=box,
+        zorder=4,
+    )

@@ -13,10 +13,19 @@ from lgmd_gym.clips.video import VideoReader, luma
 from lgmd_gym.errors import check_known
 from lgmd_gym.neuron import LGMD, LGMDParams, Response
 
+RESPONSE_SIGNALS = [
+    "spike_frequency",
+    "spikes",
+    "membrane_potential",
+    "adapted_potential",
+    "ffi",
+    "inhibition_weight",
+]
 TRACE_COLUMNS = (
-    "frame", "time_s", "duplicate", "spike_frequency", "spikes", "membrane_potential", "adapted_potential",
-    "ffi", "inhibition_weight", "excitation_latency_ms", "alert", "onset",
-)  # fmt: skip
+    *("frame", "time_s", "duplicate"),
+    *RESPONSE_SIGNALS,
+    *("excitation_latency_ms", "alert", "onset"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,8 +114,7 @@ class ClipFrame(NamedTuple):
     def row(self) -> list[str]:
         """Return the values of `TRACE_COLUMNS`."""
         r = self.response
-        numbers = (r.spike_frequency, r.spikes, r.membrane_potential, r.adapted_potential, r.ffi,
-                   r.inhibition_weight, r.excitation_latency)  # fmt: skip
+        numbers = [*(getattr(r, name) for name in RESPONSE_SIGNALS), r.excitation_latency]
         head = [str(self.frame), f"{self.time:.4f}", str(int(self.duplicate))]
         return [*head, *(f"{value:.6g}" for value in numbers), str(int(r.alert)), str(int(self.onset))]
 

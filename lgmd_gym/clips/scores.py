@@ -60,9 +60,14 @@ class ScoredClip(NamedTuple):
 
     @classmethod
     def of(
-        cls, name: str, scores: np.ndarray, fps: float, event_s: float | None, start_s: float = 0.0,
+        cls,
+        name: str,
+        scores: np.ndarray,
+        fps: float,
+        event_s: float | None,
+        start_s: float = 0.0,
         end_s: float | None = None,
-    ) -> "ScoredClip":  # fmt: skip
+    ) -> "ScoredClip":
         """Return the evaluated frames of a whole clip.
 
         Args:
@@ -332,9 +337,13 @@ def _false_alarms(negatives: Sequence[ScoredClip], levels: np.ndarray) -> np.nda
 
 
 def _chance(
-    rng: np.random.Generator, events: Sequence[ScoredClip], negatives: Sequence[ScoredClip],
-    levels: np.ndarray, false: np.ndarray, cap: float,
-) -> np.ndarray:  # fmt: skip
+    rng: np.random.Generator,
+    events: Sequence[ScoredClip],
+    negatives: Sequence[ScoredClip],
+    levels: np.ndarray,
+    false: np.ndarray,
+    cap: float,
+) -> np.ndarray:
     """Return the figures of events at random times, shape (figures, draws); no draws without negatives."""
     if not negatives:
         return np.full((len(FIGURES), 0), np.nan)

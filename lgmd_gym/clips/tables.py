@@ -34,12 +34,23 @@ CONFIG_CAPTION = (
     "chance. A ranking on the same clips that the configurations were selected on is optimistic."
 )
 CLIP_COLUMNS = (
-    "frames", "peak\nspikes/s", "first\nalarm s", "onsets", "in alarm\n%", "dupli-\ncates", "× real\ntime",
-)  # fmt: skip
+    "frames",
+    "peak\nspikes/s",
+    "first\nalarm s",
+    "onsets",
+    "in alarm\n%",
+    "dupli-\ncates",
+    "× real\ntime",
+)
 DETECTION_COLUMNS = (
-    "crash\ns", "onset before\nthe crash", "lead\ns", "earlier frames\nin alarm", "onsets in\nearlier s",
-    "chance of\nan onset", "peak\nspikes/s",
-)  # fmt: skip
+    "crash\ns",
+    "onset before\nthe crash",
+    "lead\ns",
+    "earlier frames\nin alarm",
+    "onsets in\nearlier s",
+    "chance of\nan onset",
+    "peak\nspikes/s",
+)
 CONFIG_COLUMNS = ("hits", "chance", "p", "lead\ns", "earlier in\nalarm %", "clips without\ncrash or alarm")
 
 
@@ -51,9 +62,15 @@ def clip_table(results: Sequence[ClipResult]) -> Table:
         first = "–" if s.first_alarm is None else f"{s.first_alarm:.2f}"
         alarm, speed = 100.0 * s.alarms / max(s.frames, 1), s.frames / s.fps / item.seconds
         table.add_row(
-            item.clip.name, str(s.frames), f"{s.peak:.0f}", first, str(s.onsets), f"{alarm:.0f}",
-            str(item.duplicates or "–"), f"{speed:.0f}",
-        )  # fmt: skip
+            item.clip.name,
+            str(s.frames),
+            f"{s.peak:.0f}",
+            first,
+            str(s.onsets),
+            f"{alarm:.0f}",
+            str(item.duplicates or "–"),
+            f"{speed:.0f}",
+        )
     return table
 
 
@@ -63,9 +80,13 @@ def detection_table(title: str, detections: Sequence[ClipDetection]) -> Table:
     for item in detections:
         hit = "–" if item.crash_s is None else "no" if item.lead_s is None else "yes"
         table.add_row(
-            item.clip, _seconds(item.crash_s, "none"), hit, _seconds(item.lead_s),
-            *_chance_cells(item), f"{item.peak:.0f}",
-        )  # fmt: skip
+            item.clip,
+            _seconds(item.crash_s, "none"),
+            hit,
+            _seconds(item.lead_s),
+            *_chance_cells(item),
+            f"{item.peak:.0f}",
+        )
     total = summarize_detections(detections)
     hits, lead = f"{total.hits.k} of {total.hits.n}", _seconds(total.lead_s)
     table.add_section()
@@ -87,10 +108,15 @@ def config_table(detections: Mapping[str, Sequence[ClipDetection]], descriptions
         total = summarize_detections(items)
         alarm = 100.0 * total.alarm_frames.k / max(total.alarm_frames.n, 1)
         table.add_row(
-            name, descriptions[name], f"{total.hits.k}/{total.hits.n}", _interval(total.chance),
-            f"{total.p_value:.1g}", _seconds(total.lead_s), f"{alarm:.0f}",
+            name,
+            descriptions[name],
+            f"{total.hits.k}/{total.hits.n}",
+            _interval(total.chance),
+            f"{total.p_value:.1g}",
+            _seconds(total.lead_s),
+            f"{alarm:.0f}",
             f"{total.silent_clips.k}/{total.silent_clips.n}",
-        )  # fmt: skip
+        )
     return table
 
 
@@ -130,9 +156,18 @@ CAPTION = (
     "first alarm to the event [s], of the events with an alarm; mTTA: its mean over all recalls. Chance: "
     "events at random times of clips without an event; p: probability of at least this value by chance."
 )
-SCORE_COLUMNS = (
-    "configuration", "figure", "value", "low", "high", "clips", "chance", "p", "threshold", "cap"
-)  # fmt: skip
+SCORE_COLUMNS = [
+    "configuration",
+    "figure",
+    "value",
+    "low",
+    "high",
+    "clips",
+    "chance",
+    "p",
+    "threshold",
+    "cap",
+]
 _TIMES = FIGURES[FIGURES.index(TTA_CAP) :]
 
 
@@ -145,19 +180,23 @@ def score_table(title: str, result: Anticipation) -> Table:
     for score in result.scores:
         interval = "–" if score.low is None else f"{_number(score, score.low)} – {_number(score, score.high)}"
         table.add_row(
-            score.name, _number(score, score.value), interval, str(score.n),
-            _number(score, score.chance), _p_value(score.p_value),
-        )  # fmt: skip
+            score.name,
+            _number(score, score.value),
+            interval,
+            str(score.n),
+            _number(score, score.chance),
+            _p_value(score.p_value),
+        )
     return table
 
 
 def write_scores(path: Path, results: Mapping[str, Anticipation]) -> None:
     """Write one row per configuration and figure to a CSV file; times are in seconds, undefined is empty."""
     rows = [
-        (name, score.name, score.value, score.low, score.high, score.n, score.chance, score.p_value,
-         _finite(result.threshold), result.cap)
-        for name, result in results.items() for score in result.scores
-    ]  # fmt: skip
+        (name, *score, _finite(result.threshold), result.cap)
+        for name, result in results.items()
+        for score in result.scores
+    ]
     _write(path, SCORE_COLUMNS, rows)
 
 
@@ -165,17 +204,18 @@ def write_clip_scores(
     path: Path, clips: Mapping[str, Sequence[ScoredClip]], results: Mapping[str, Anticipation]
 ) -> None:
     """Write one row per configuration and clip: the highest scores, and the time to accident at the cap."""
-    columns = ("configuration", "clip", "event", "evaluated_s", "highest_score",
-               *(f"score_at_{tau:.1f}_s" for tau in HORIZONS_S), "tta_at_cap_s")  # fmt: skip
+    score_columns = [f"score_at_{tau:.1f}_s" for tau in HORIZONS_S]
+    head = ("configuration", "clip", "event", "evaluated_s", "highest_score")
     rows = []
     for name, items in clips.items():
         threshold = results[name].threshold
         for clip in items:
             at = [window_score(clip.scores, clip.fps, tau) if clip.event else None for tau in HORIZONS_S]
             highest = float(clip.scores.max()) if len(clip.scores) else None
-            rows.append((name, clip.name, int(clip.event), len(clip.scores) / clip.fps, highest, *at,
-                         clip.time_to_event(threshold)))  # fmt: skip
-    _write(path, columns, rows)
+            evaluated = len(clip.scores) / clip.fps
+            row = (name, clip.name, int(clip.event), evaluated, highest, *at, clip.time_to_event(threshold))
+            rows.append(row)
+    _write(path, [*head, *score_columns, "tta_at_cap_s"], rows)
 
 
 def _description(result: Anticipation) -> str:

@@ -144,9 +144,8 @@ MAX_SIZE = 16384  # [px]
 MIN_SIZE = 3  # width of the neuron's neighbourhood [px]
 _MOST_MISSING = 2.0  # a file that ends up to this many frames early counts as complete
 # Rotation in the file's metadata [deg, counterclockwise] to the filters that undo it.
-_UPRIGHT = {
-    90: ("transpose=cclock",), -90: ("transpose=clock",), 180: ("hflip", "vflip"), -180: ("hflip", "vflip")
-}  # fmt: skip
+_UPRIGHT = {90: ("transpose=cclock",), -90: ("transpose=clock",), 180: ("hflip", "vflip")}
+_UPRIGHT[-180] = _UPRIGHT[180]
 
 
 class TruncatedVideoError(ValueError):

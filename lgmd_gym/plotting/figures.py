@@ -42,8 +42,14 @@ def episode_figure(
             gap.plot(series["time"], series["gap"], **line)
             _mark_end(speed, gap, series, line["color"])
         frequency.axhline(alert_level, color="0.5", linestyle="--", linewidth=1.0)
-        frequency.annotate(f"T_sf = {alert_level:g}", (0.01, alert_level), xycoords=("axes fraction", "data"),
-                           va="bottom", color="0.4", fontsize=8)  # fmt: skip
+        frequency.annotate(
+            f"T_sf = {alert_level:g}",
+            (0.01, alert_level),
+            xycoords=("axes fraction", "data"),
+            va="bottom",
+            color="0.4",
+            fontsize=8,
+        )
         frequency.set(ylabel="spike frequency\n[spikes/s]", ylim=(0, None))
         speed.set(ylabel="ego speed [km/h]", ylim=(0, None))
         gap.set(ylabel="gap [m]", xlabel="time [s]   (× contact, ● end without contact)", ylim=(0, None))

@@ -72,8 +72,16 @@ def _draw_view(axis: Any, motion: "Motion", index: int) -> None:
         axis.plot(way[:, 0], -way[:, 1], color=colour, linewidth=0.8, alpha=0.6)
         corners = motion.positions[index, body] + _corners(motion.sizes[body], motion.headings[index, body])
         axis.fill(corners[:, 0], -corners[:, 1], color=colour, linewidth=0, zorder=3)
-        axis.annotate(f"{body}" if body else "ego", (x, -y), color="white", ha="center", va="center",
-                      fontsize=7, zorder=4, clip_on=True)  # fmt: skip
+        axis.annotate(
+            f"{body}" if body else "ego",
+            (x, -y),
+            color="white",
+            ha="center",
+            va="center",
+            fontsize=7,
+            zorder=4,
+            clip_on=True,
+        )
 
 
 def _draw_lanes(axis: Any, motion: "Motion", ego: np.ndarray) -> None:

@@ -119,9 +119,14 @@ def render_page(
         groups[_group(card, outcomes[card.name])].append(card)
     example = next((card.name for card in cards if card.name == "CCRs"), cards[0].name)
     return environment.get_template("gallery.html").render(
-        groups=groups, outcomes=outcomes, sheets=sheets, agent=agent, seeds=seeds, example=example,
+        groups=groups,
+        outcomes=outcomes,
+        sheets=sheets,
+        agent=agent,
+        seeds=seeds,
+        example=example,
         version=__version__,
-    )  # fmt: skip
+    )
 
 
 def _group(card: ScenarioCard, outcomes: Mapping[str, AgentOutcome]) -> str:
