@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from lgmd_gym.cli.console import make_console
-from lgmd_gym.cli.values import File, Names
+from lgmd_gym.cli.values import File
 
 if TYPE_CHECKING:
     from lgmd_gym.clips.batch import ClipJob, ClipResult
@@ -19,42 +19,21 @@ if TYPE_CHECKING:
 class Paper:
     """Repeat the experiments of the LGMD paper; write figures and a table of its claims.
 
-    The paper's crash and near-miss clips are not included in this package; pass a folder of your own. With
-    --realism, compare statistics of simulated drives with those of the clips instead.
+    The paper's crash and near-miss clips are not included in this package; pass a folder of your own.
     """
 
     out: File = None
-    """Run folder; must not exist. Default: runs/paper-DATE-TIME, or runs/realism-DATE-TIME."""
+    """Run folder; must not exist. Default: runs/paper-DATE-TIME."""
     clips: File = None
-    """Folder of driving clips; requires --crashes, except with --realism."""
+    """Folder of driving clips; requires --crashes."""
     crashes: File = None
     """CSV file with the columns clip,crash_frame (empty for no crash)."""
     picture: File = None
     """Image for the shifting panorama. Default: a random image with a natural spectrum."""
-    realism: bool = False
-    """Compare simulated drives with the clips: realism.md, realism.csv, drives.csv, realism.png."""
-    clip_hfov_deg: float = 90.0
-    """With --realism: horizontal field of view of the clips [degrees]; 90 has the pixels per degree of a
-    dash camera of 120 to 140 degrees on the diagonal in the centre of the frame."""
-    ignore_bottom: float = 0.0
-    """With --realism: share of the height, at the bottom, that is left out: bonnets and captions."""
-    night: Names = None
-    """With --realism: clips at night. Default: those with a median grey below 75."""
-    seeds: int = 3
-    """With --realism: seeds of every simulated drive."""
-    worlds: int = 20
-    """With --realism: number of training worlds of the simulated drives; 0 for the plain laboratory."""
 
 
 def run(options: Paper) -> int:
     """Run the paper's experiments and print its claims; return 2 if a clip is truncated, else 0."""
-    if options.realism:
-        from lgmd_gym.cli import realism
-
-        return realism.run(options)
-    for name in ("clip_hfov_deg", "ignore_bottom", "night", "seeds", "worlds"):
-        if getattr(options, name) != getattr(Paper, name):
-            raise ValueError(f"--{name.replace('_', '-')} requires --realism")
     if (options.clips is None) != (options.crashes is None):
         raise ValueError(
             "--clips and --crashes must be used together: a folder, and a CSV with clip,crash_frame"

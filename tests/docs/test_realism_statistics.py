@@ -5,11 +5,12 @@ from math import atan, degrees, radians, tan
 import gymnasium as gym
 import numpy as np
 import pytest
+from support.examples import load
 
-from lgmd_gym.paper.realism_drives import Optics
-from lgmd_gym.paper.realism_fields import Fields, field_cameras, field_samples, resample
-from lgmd_gym.paper.realism_statistics import STATISTICS, drive_statistics, spectrum_slope
-
+module = load("realism/drive_statistics")
+Fields, Optics, STATISTICS = module.Fields, module.Optics, module.STATISTICS
+field_cameras, field_samples, resample = module.field_cameras, module.field_samples, module.resample
+drive_statistics, spectrum_slope = module.drive_statistics, module.spectrum_slope
 OPTICS = Optics((60, 100), 30, 90.0)
 RNG = np.random.default_rng(0)
 

@@ -1,25 +1,27 @@
-"""Comparison of simulated drives with clips, and `lgmd-gym paper --realism`."""
+"""The experiment `realism`: comparison of simulated drives with clips."""
 
 import csv
+import re
+from importlib import import_module
 
 import numpy as np
 import pytest
 from PIL import Image
 from support.clips import write_lossless
+from support.examples import load
 
-from lgmd_gym.cli import main as cli
-from lgmd_gym.cli import realism as command
-from lgmd_gym.paper import realism_drives
-from lgmd_gym.paper.realism import DriveValues, compare, normalized_distance
-from lgmd_gym.paper.realism_drives import GROUPS, ROADS, Drives, Optics, drive_frames, simulated_drives
-from lgmd_gym.paper.realism_statistics import STATISTICS
-from lgmd_gym.paper.realism_tables import summary_line
-
+command = load("realism/realism")
+comparison, drives = import_module("comparison"), import_module("drives")
+compare, normalized_distance = comparison.compare, comparison.normalized_distance
+DriveValues, STATISTICS = comparison.DriveValues, comparison.STATISTICS
+Drives, Optics, GROUPS, ROADS = drives.Drives, drives.Optics, drives.GROUPS, drives.ROADS
+drive_frames, simulated_drives = drives.drive_frames, drives.simulated_drives
+summary_line = command.summary_line
 OPTICS = Optics((60, 100), 30, 90.0)
 
 
 def run(*arguments):
-    return cli.run(["paper", "--realism", *map(str, arguments)])
+    command.main([str(item) for item in arguments])
 
 
 def rows_of(path):
@@ -48,8 +50,8 @@ def clips(tmp_path):
 @pytest.fixture
 def short_drives(monkeypatch):
     """Two environments of half a second."""
-    monkeypatch.setattr(realism_drives, "MAX_SECONDS", 0.5)
-    monkeypatch.setattr(realism_drives, "ROADS", ROADS[:2])
+    monkeypatch.setattr(drives, "MAX_SECONDS", 0.5)
+    monkeypatch.setattr(drives, "ROADS", ROADS[:2])
 
 
 def drive(group, real, value):
@@ -159,7 +161,7 @@ def test_frames_end_with_the_episode():
 @pytest.mark.usefixtures("short_drives")
 def test_command(clips, tmp_path, capsys):
     out = tmp_path / "run"
-    assert run("--clips", clips, "--seeds", 2, "--out", out) == 0
+    run("--clips", clips, "--seeds", 2, "--out", out)
     printed = capsys.readouterr().out
     assert "day: 2 real clips, 4 simulated drives" in printed
     assert "night: 1 real clips, 4 simulated drives" in printed
@@ -188,7 +190,7 @@ def test_command(clips, tmp_path, capsys):
 @pytest.mark.usefixtures("short_drives")
 def test_command_in_the_laboratory(clips, tmp_path):
     out = tmp_path / "run"
-    assert run("--clips", clips, "--seeds", 1, "--worlds", 0, "--out", out) == 0
+    run("--clips", clips, "--seeds", 1, "--worlds", 0, "--out", out)
     names = [row["name"] for row in rows_of(out / "drives.csv") if row["kind"] == "simulated"]
     assert len(names) == 4
     assert all(" world=laboratory " in name for name in names)
@@ -202,7 +204,7 @@ def test_an_ignored_bonnet_does_not_change_the_group(tmp_path):
     pictures[:, 0, 0] = np.arange(20)
     write_lossless(tmp_path / "dim.mkv", list(pictures))
     out = tmp_path / "run"
-    assert run("--clips", tmp_path, "--ignore-bottom", 0.2, "--seeds", 1, "--out", out) == 0
+    run("--clips", tmp_path, "--ignore-bottom", 0.2, "--seeds", 1, "--out", out)
     row = rows_of(out / "drives.csv")[0]
     assert (row["name"], row["group"], row["p50"]) == ("dim.mkv", "day", "60")
 
@@ -215,10 +217,10 @@ def test_crashes_and_named_nights(clips, tmp_path, monkeypatch):
         lengths[len(lengths)] = len(list(frames))
         return dict.fromkeys(STATISTICS, 100.0)
 
-    monkeypatch.setattr("lgmd_gym.paper.realism.drive_statistics", statistics)
+    monkeypatch.setattr(comparison, "drive_statistics", statistics)
     (tmp_path / "crashes.csv").write_text("clip,crash_frame\ndusk,17\nnoon,\n")
     out = tmp_path / "run"
-    assert run("--clips", clips, "--crashes", tmp_path / "crashes.csv", "--night", "noon", "--out", out) == 0
+    run("--clips", clips, "--crashes", tmp_path / "crashes.csv", "--night", "noon", "--out", out)
     groups = {row["name"]: row["group"] for row in rows_of(out / "drives.csv") if row["kind"] == "real"}
     assert groups == {"dark.mkv": "day", "dusk.mkv": "day", "noon.mkv": "night"}
     assert [lengths[index] for index in range(3)] == [30, 17, 30]
@@ -227,31 +229,26 @@ def test_crashes_and_named_nights(clips, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--realism"], "--realism requires --clips"),
-        (["--realism", "--clips", "{clips}", "--seeds", "0"], "seeds must be a whole number >= 1"),
+        (["--seeds", "0"], "seeds must be a whole number >= 1"),
         (
-            ["--realism", "--clips", "{clips}", "--worlds", "6001"],
+            ["--worlds", "6001"],
             "worlds must be a whole number in [0, 6000]",
         ),
-        (["--worlds", "0"], "--worlds requires --realism"),
-        (["--realism", "--clips", "{clips}", "--clip-hfov-deg", "180"], "clip_hfov_deg must be in [10, 160]"),
-        (["--realism", "--clips", "{clips}", "--ignore-bottom", "0.6"], "ignore_bottom must be in [0, 0.5]"),
-        (["--realism", "--clips", "{clips}", "--night", "duck"], "did you mean 'dusk'?"),
-        (["--realism", "--clips", "{clips}", "--ignore-bottom", "0.3"], "at least 50×50 px, got 100×42"),
-        (["--realism", "--clips", "{clips}", "--picture", "x.png"], "does not use --picture"),
-        (["--seeds", "4"], "--seeds requires --realism"),
-        (["--night", "dusk"], "--night requires --realism"),
+        (["--clip-hfov-deg", "180"], "clip_hfov_deg must be in [10, 160]"),
+        (["--ignore-bottom", "0.6"], "ignore_bottom must be in [0, 0.5]"),
+        (["--night", "duck"], "did you mean 'dusk'?"),
+        (["--ignore-bottom", "0.3"], "at least 50×50 px, got 100×42"),
     ],
 )
-def test_refused_options(arguments, message, clips, tmp_path, capsys, monkeypatch):
+def test_refused_options(arguments, message, clips, tmp_path, monkeypatch):
     monkeypatch.setattr(command, "simulated_values", None)
     out = tmp_path / "run"
-    assert cli.run(["paper", *(item.format(clips=clips) for item in arguments), "--out", str(out)]) == 2
-    assert message in capsys.readouterr().err
+    with pytest.raises(ValueError, match=re.escape(message)):
+        run("--clips", clips, *arguments, "--out", out)
     assert not out.exists()
 
 
-def test_a_clip_that_crashes_at_once_is_named(clips, tmp_path, capsys):
+def test_a_clip_that_crashes_at_once_is_named(clips, tmp_path):
     (tmp_path / "crashes.csv").write_text("clip,crash_frame\ndusk,5\n")
-    assert run("--clips", clips, "--crashes", tmp_path / "crashes.csv", "--out", tmp_path / "run") == 2
-    assert "clip dusk.mkv: a drive must have at least 10 different frames, got 5" in capsys.readouterr().err
+    with pytest.raises(ValueError, match=r"clip dusk\.mkv: a drive must have .* different frames, got 5"):
+        run("--clips", clips, "--crashes", tmp_path / "crashes.csv", "--out", tmp_path / "run")

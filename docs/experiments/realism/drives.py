@@ -1,4 +1,4 @@
-"""The simulated drives that `lgmd-gym paper --realism` compares with real clips."""
+"""The simulated drives that are compared with real clips."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -6,12 +6,12 @@ from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
+from drive_statistics import STATISTICS, drive_statistics
+from drives import GROUPS, Drives, Optics, drive_frames
 
 from lgmd_gym.clips import VideoReader, luma
 from lgmd_gym.clips.batch import ClipJob
 from lgmd_gym.errors import check_keys
-from lgmd_gym.paper.realism_drives import GROUPS, Drives, Optics, drive_frames
-from lgmd_gym.paper.realism_statistics import STATISTICS, drive_statistics
 
 NIGHT_MEDIAN = 75  # median grey below which a clip counts as night, unless clips are named
 RANGE = (5.0, 95.0)  # percentiles of the simulated values between which a real value counts as inside
