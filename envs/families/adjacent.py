@@ -8,19 +8,22 @@ import numpy as np
 from lgmd_gym.envs.dynamics.script import Bend, Pose, lane_change
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.families.arguments import (
+    EITHER,
     FAST_KMH,
     ChangeLength,
     EgoSpeed,
     Headway,
     OtherShade,
     Shade,
-    either,
+    between,
+    draw,
     fast,
     grey,
+    kmh,
+    maybe,
+    one,
     speed,
-    speed_kmh,
     truth,
-    uniform,
     within,
 )
 from lgmd_gym.envs.families.family import Level, family
@@ -52,8 +55,8 @@ TOP_KMH = 140.0  # of cars that overtake on a motorway, in random levels
 
 
 def _queue(rng: np.random.Generator) -> dict[str, Any]:
-    offset = uniform(rng, 3.0, 3.7) * (1.0 if either(rng) else -1.0)
-    return {"ego_speed": speed_kmh(rng), "lateral_offset": offset, "cars": int(rng.integers(1, 7))}
+    offset = between(3.0, 3.7)(rng) * one(1.0, -1.0)(rng)
+    return {"ego_speed": kmh()(rng), "lateral_offset": offset, "cars": int(rng.integers(1, 7))}
 
 
 @family("AdjacentPass", Level("AdjacentPass", 1.0, _queue), Level("FastAdjacentPass", 0.3, fast(_queue)))
@@ -86,29 +89,20 @@ def pass_standing(
     return Scenario(family="AdjacentPass", ego_speed=ego_speed, duration=duration, actors=queue)
 
 
-@family(
-    "PassBetween",
-    Level(
-        "PassBetween",
-        1.0,
-        lambda rng: {"ego_speed": speed_kmh(rng, 30.0), "inner_gap": uniform(rng, 4.0, 5.0)},
-    ),
-)
+@family("PassBetween", Level("PassBetween", 1.0, draw(ego_speed=kmh(30.0), inner_gap=between(4.0, 5.0))))
 def pass_between(
     ego_speed: EgoSpeed = 80 * KMH,
     wheel_gap: Annotated[
         float | None,
-        optional(
-            within(
-                "[2, 10]",
-                "m",
-                "Distance between the facing outer sides of the parked cars' closest front tyres; 4.5 m "
-                "without `wheel_gap` and `inner_gap`",
-            )
+        maybe(
+            "[2, 10]",
+            "m",
+            "Distance between the facing outer sides of the parked cars' closest front tyres; 4.5 m "
+            "without `wheel_gap` and `inner_gap`",
         ),
     ] = None,
     inner_gap: Annotated[
-        float | None, optional(within("[2, 10]", "m", "Distance between the inner sides of the parked cars"))
+        float | None, maybe("[2, 10]", "m", "Distance between the inner sides of the parked cars")
     ] = None,
     shade: Annotated[int | None, grey("the parked cars")] = None,
 ) -> Scenario:
@@ -129,17 +123,17 @@ def pass_between(
     return Scenario(family="PassBetween", ego_speed=ego_speed, duration=duration, actors=parked)
 
 
-def _overtaken(rng: np.random.Generator) -> dict[str, Any]:
-    return {"ego_speed": speed_kmh(rng, 30.0), "excess": speed_kmh(rng, 10.0, 40.0)}
-
-
 def _overtaken_fast(rng: np.random.Generator) -> dict[str, Any]:
-    ego_speed = speed_kmh(rng, *FAST_KMH)
+    ego_speed = kmh(*FAST_KMH)(rng)
     fastest = max(TOP_KMH * KMH - ego_speed, 11.0 * KMH)
-    return {"ego_speed": ego_speed, "excess": uniform(rng, 10.0 * KMH, fastest)}
+    return {"ego_speed": ego_speed, "excess": between(10.0 * KMH, fastest)(rng)}
 
 
-@family("Overtaken", Level("Overtaken", 1.0, _overtaken), Level("FastOvertaken", 0.5, _overtaken_fast))
+@family(
+    "Overtaken",
+    Level("Overtaken", 1.0, draw(ego_speed=kmh(30.0), excess=kmh(10.0, 40.0))),
+    Level("FastOvertaken", 0.5, _overtaken_fast),
+)
 def being_overtaken(
     ego_speed: EgoSpeed = 80 * KMH,
     excess: Annotated[float, within("[0.1, 40]", "m/s", "Speed of the other car minus ego speed")] = 30 * KMH,
@@ -152,14 +146,7 @@ def being_overtaken(
     return Scenario(family="Overtaken", ego_speed=ego_speed, duration=10.0, actors=(other,))
 
 
-@family(
-    "Oncoming",
-    Level(
-        "Oncoming",
-        1.0,
-        lambda rng: {"ego_speed": speed_kmh(rng, 30.0), "oncoming_speed": speed_kmh(rng, 30.0)},
-    ),
-)
+@family("Oncoming", Level("Oncoming", 1.0, draw(ego_speed=kmh(30.0), oncoming_speed=kmh(30.0))))
 def meet_oncoming(
     ego_speed: EgoSpeed = 80 * KMH,
     oncoming_speed: Annotated[float, speed("Speed of the other car")] = 80 * KMH,
@@ -176,11 +163,7 @@ def meet_oncoming(
     Level(
         "CCFhos",
         3.0,
-        lambda rng: {
-            "ego_speed": speed_kmh(rng, 30.0),
-            "target_speed": speed_kmh(rng, 30.0),
-            "impact_location": uniform(rng, 0.0, 1.0),
-        },
+        draw(ego_speed=kmh(30.0), target_speed=kmh(30.0), impact_location=between(0.0, 1.0)),
     ),
     threat=True,
     twin=True,
@@ -215,12 +198,12 @@ def meet_in_lane(
 
 
 def _lane_change(rng: np.random.Generator) -> dict[str, Any]:
-    oncoming = speed_kmh(rng, 40.0)
+    oncoming = kmh(40.0)(rng)
     return {
-        "ego_speed": speed_kmh(rng, 30.0),
+        "ego_speed": kmh(30.0)(rng),
         "target_speed": oncoming,
-        "change_length": oncoming * uniform(rng, 2.7, 4.0),
-        "following_distance": uniform(rng, 10.0, 25.0),
+        "change_length": oncoming * between(2.7, 4.0)(rng),
+        "following_distance": between(10.0, 25.0)(rng),
     }
 
 
@@ -259,10 +242,7 @@ def meet_overtaking(
     return _on_two_way_road("CCFhol", ego_speed, contact + AFTERMATH, target, overtaken)
 
 
-@family(
-    "CutIn",
-    Level("CutIn", 1.0, lambda rng: {"ego_speed": speed_kmh(rng, 30.0), "gap": uniform(rng, 10.0, 25.0)}),
-)
+@family("CutIn", Level("CutIn", 1.0, draw(ego_speed=kmh(30.0), gap=between(10.0, 25.0))))
 def cut_in(
     ego_speed: EgoSpeed = 50 * KMH,
     gap: Annotated[
@@ -298,10 +278,7 @@ def cut_in(
     return Scenario(family="CutIn", ego_speed=ego_speed, duration=duration, actors=(other,))
 
 
-@family(
-    "CutOut",
-    Level("CutOut", 1.0, lambda rng: {"ego_speed": speed_kmh(rng, 30.0), "headway": uniform(rng, 1.2, 2.5)}),
-)
+@family("CutOut", Level("CutOut", 1.0, draw(ego_speed=kmh(30.0), headway=between(1.2, 2.5))))
 def cut_out(
     ego_speed: Annotated[float, speed("Speed of both cars")] = 50 * KMH,
     headway: Headway = 1.5,
@@ -318,10 +295,7 @@ def cut_out(
     return Scenario(family="CutOut", ego_speed=ego_speed, duration=9.0, actors=(lead,))
 
 
-@family(
-    "LaneClosure",
-    Level("LaneClosure", 1.0, lambda rng: {"ego_speed": speed_kmh(rng, 25.0, 55.0), "left": either(rng)}),
-)
+@family("LaneClosure", Level("LaneClosure", 1.0, draw(ego_speed=kmh(25.0, 55.0), left=EITHER)))
 def change_lane_before_sign(
     ego_speed: Annotated[float, within(f"[{20 * KMH}, {60 * KMH}]", "m/s", "Ego speed; 20 to 60 km/h")] = 40
     * KMH,

@@ -11,6 +11,8 @@ from lgmd_gym.fields import choice, flag, number, optional, value, whole
 
 DrawArguments = Callable[[np.random.Generator], dict[str, Any]]
 """Draws the arguments of a family."""
+Sampler = Callable[[np.random.Generator], Any]
+"""Draws one argument."""
 SPEED_KMH = (10.0, 80.0)
 FAST_KMH = (80.0, 130.0)  # of a motorway
 HEADWAY = (0.5, 3.0)  # [s]; in FMVSS 127 a lead car brakes 12 m ahead at 80 km/h, a headway of 0.54 s
@@ -38,6 +40,11 @@ def grey(of: str) -> Any:
     return optional(whole(None, "[0, 255]", doc=f"Grey level of {of}; None to draw it from the seed"))
 
 
+def maybe(bounds: str, unit: str, doc: str) -> Any:
+    """Declare a number or None."""
+    return optional(within(bounds, unit, doc))
+
+
 def truth(doc: str) -> Any:
     """Declare a bool."""
     return flag(None, doc)
@@ -55,36 +62,34 @@ RiderShade = Annotated[int | None, grey("the rider's clothes")]
 OtherShade = Annotated[int | None, grey("the other car")]
 LeadShade = Annotated[int | None, grey("the lead car")]
 Headway = Annotated[float, within("[0.3, 10]", "s", "Time headway")]
-Deceleration = Annotated[float, within("[0.5, 10]", "m/s²", "Full deceleration of the other")]
 ChangeLength = Annotated[float, within("[10, 200]", "m", "Length of the lane change along the road")]
 LeftCurve = Annotated[bool, truth("Whether the curve turns left; otherwise right")]
 
 
-def uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """DrawArguments a number."""
-    return float(rng.uniform(low, high))
+def between(low: float, high: float) -> Sampler:
+    """Return a sampler of a number."""
+    return lambda rng: float(rng.uniform(low, high))
 
 
-def speed_kmh(rng: np.random.Generator, low: float = SPEED_KMH[0], high: float = SPEED_KMH[1]) -> float:
-    """DrawArguments a speed between limits in km/h, and return it in m/s."""
-    return uniform(rng, low, high) * KMH
+def kmh(low: float = SPEED_KMH[0], high: float = SPEED_KMH[1]) -> Sampler:
+    """Return a sampler of a speed between limits in km/h, in m/s."""
+    return lambda rng: float(rng.uniform(low, high)) * KMH
 
 
-def either(rng: np.random.Generator) -> bool:
-    """DrawArguments True or False."""
-    return bool(rng.random() < 0.5)
+def one(first: Any, second: Any) -> Sampler:
+    """Return a sampler of one of two values."""
+    return lambda rng: first if rng.random() < 0.5 else second
 
 
-def side(rng: np.random.Generator) -> str:
-    """DrawArguments "left" or "right"."""
-    return "left" if either(rng) else "right"
+def draw(**samplers: Sampler) -> DrawArguments:
+    """Return a function that draws arguments, each from its sampler, in this order."""
+    return lambda rng: {name: sample(rng) for name, sample in samplers.items()}
 
 
-def ego_speed(low: float = SPEED_KMH[0], high: float = SPEED_KMH[1]) -> DrawArguments:
-    """Return a function that draws the ego speed alone, between limits in km/h."""
-    return lambda rng: {"ego_speed": speed_kmh(rng, low, high)}
+def fast(drawn: DrawArguments) -> DrawArguments:
+    """Return a function that draws the same arguments with the ego speed of a motorway."""
+    return lambda rng: drawn(rng) | {"ego_speed": kmh(*FAST_KMH)(rng)}
 
 
-def fast(draw: DrawArguments) -> DrawArguments:
-    """Return a draw with the ego speed of a motorway."""
-    return lambda rng: draw(rng) | {"ego_speed": speed_kmh(rng, *FAST_KMH)}
+EITHER = one(True, False)
+"""Sampler of True or False."""

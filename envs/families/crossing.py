@@ -1,23 +1,22 @@
 """Crossing vehicles: Euro NCAP's CCCscp and CMCscp, and a crossing car that clears in time."""
 
 from math import pi
-from typing import Annotated, Any
-
-import numpy as np
+from typing import Annotated
 
 from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.arguments import (
+    EITHER,
     EgoSpeed,
     RiderShade,
     Shade,
-    either,
+    between,
+    draw,
+    kmh,
+    one,
     one_of,
-    side,
     speed,
-    speed_kmh,
     truth,
-    uniform,
     within,
 )
 from lgmd_gym.envs.families.family import Level, family
@@ -43,19 +42,10 @@ TargetSpeed = Annotated[float, speed("Target speed")]
 Side = Annotated[str, one_of(tuple(SIDES), 'Side from which the target comes, "right" or "left"')]
 
 
-def _crossing(rng: np.random.Generator) -> dict[str, Any]:
-    return {
-        "ego_speed": speed_kmh(rng, 20.0, 60.0),
-        "target_speed": speed_kmh(rng, 20.0, 60.0),
-        "side": side(rng),
-    }
+_CROSSING = {"ego_speed": kmh(20.0, 60.0), "target_speed": kmh(20.0, 60.0), "side": one("left", "right")}
 
 
-def _maybe_obstructed(rng: np.random.Generator) -> dict[str, Any]:
-    return _crossing(rng) | {"obstructed": either(rng)}
-
-
-@family("CCCscp", Level("CCCscp", 8.0, _maybe_obstructed), threat=True, twin=True)
+@family("CCCscp", Level("CCCscp", 8.0, draw(**_CROSSING, obstructed=EITHER)), threat=True, twin=True)
 def cross_straight(
     ego_speed: Annotated[float, speed("Scripted ego speed")] = 30 * KMH,
     target_speed: TargetSpeed = 30 * KMH,
@@ -97,7 +87,7 @@ def cross_straight(
     )
 
 
-@family("CMCscp", Level("CMCscp", 3.0, _maybe_obstructed), threat=True, twin=True)
+@family("CMCscp", Level("CMCscp", 3.0, draw(**_CROSSING, obstructed=EITHER)), threat=True, twin=True)
 def motorcycle_crosses(
     ego_speed: EgoSpeed = 30 * KMH,
     target_speed: Annotated[float, speed("Speed of the motorcycle")] = 30 * KMH,
@@ -133,10 +123,7 @@ def motorcycle_crosses(
     )
 
 
-@family(
-    "CrossingClears",
-    Level("CrossingClears", 1.0, lambda rng: _crossing(rng) | {"clear_by": uniform(rng, 1.2, 2.5)}),
-)
+@family("CrossingClears", Level("CrossingClears", 1.0, draw(**_CROSSING, clear_by=between(1.2, 2.5))))
 def cross_and_clear(
     ego_speed: EgoSpeed = 40 * KMH,
     target_speed: TargetSpeed = 40 * KMH,

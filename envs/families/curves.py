@@ -13,17 +13,19 @@ import numpy as np
 from lgmd_gym.envs.dynamics.script import Bend, Pose, Segment, arc
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.arguments import (
+    EITHER,
     EgoSpeed,
     Headway,
     LeftCurve,
     OtherShade,
     Shade,
-    either,
+    between,
+    draw,
     grey,
+    kmh,
+    one,
     one_of,
     speed,
-    speed_kmh,
-    uniform,
     within,
 )
 from lgmd_gym.envs.families.family import Level, family
@@ -65,16 +67,16 @@ Radius = Annotated[float, within("[15, 500]", "m", "Radius of the ego's path")]
 
 def _curve(rng: np.random.Generator) -> dict[str, Any]:
     """Draw a speed, and a radius that is uniform on a logarithmic scale."""
-    ego_speed = speed_kmh(rng, *LEVEL_SPEED_KMH)
+    ego_speed = kmh(*LEVEL_SPEED_KMH)(rng)
     lowest = max(LEVEL_RADIUS[0], 1.01 * ego_speed**2 / MAX_LATERAL)
-    radius = exp(uniform(rng, log(lowest), log(LEVEL_RADIUS[1])))
-    return {"ego_speed": ego_speed, "radius": radius, "left": either(rng)}
+    radius = exp(between(log(lowest), log(LEVEL_RADIUS[1]))(rng))
+    return {"ego_speed": ego_speed, "radius": radius, "left": EITHER(rng)}
 
 
 def _standing(rng: np.random.Generator) -> dict[str, Any]:
     return _curve(rng) | {
-        "lateral_offset": uniform(rng, -0.4, 0.4),
-        "entry": uniform(rng, 0.0, 3.0) if rng.random() < 0.4 else 0.0,
+        "lateral_offset": between(-0.4, 0.4)(rng),
+        "entry": between(0.0, 3.0)(rng) if rng.random() < 0.4 else 0.0,
     }
 
 
@@ -103,9 +105,9 @@ def approach_standing_in_curve(
 
 
 def _beside(rng: np.random.Generator) -> dict[str, Any]:
-    oncoming = uniform(rng, 20.0, 100.0) * KMH if either(rng) else 0.0
-    to_left = oncoming > 0.0 or either(rng)
-    offset = uniform(rng, 3.2, 4.0) if to_left else -uniform(rng, 2.9, 4.0)
+    oncoming = kmh(20.0, 100.0)(rng) if EITHER(rng) else 0.0
+    to_left = oncoming > 0.0 or EITHER(rng)
+    offset = between(3.2, 4.0)(rng) if to_left else -between(2.9, 4.0)(rng)
     return _curve(rng) | {"lateral_offset": offset, "oncoming_speed": oncoming}
 
 
@@ -140,9 +142,9 @@ def pass_cars_in_curve(
 
 
 def _rail(rng: np.random.Generator) -> dict[str, Any]:
-    radius = uniform(rng, 40.0, 200.0)
+    radius = between(40.0, 200.0)(rng)
     top = min(80.0, (3.5 * radius) ** 0.5 / KMH)
-    return {"ego_speed": speed_kmh(rng, 20.0, top), "radius": radius, "left": either(rng)}
+    return {"ego_speed": kmh(20.0, top)(rng), "radius": radius, "left": EITHER(rng)}
 
 
 @family("CurveGuardRail", Level("CurveGuardRail", 1.0, _rail))
@@ -160,7 +162,7 @@ def drive_along_rail(
     return _in_curve("CurveGuardRail", ego_speed, duration, entry, curve, *rails)
 
 
-@family("CurveObjectOutside", Level("CurveObjectOutside", 1.0, lambda rng: {"left": either(rng)}))
+@family("CurveObjectOutside", Level("CurveObjectOutside", 1.0, draw(left=EITHER)))
 def curve_with_car_outside(
     left: LeftCurve = True, shade: Annotated[int | None, grey("the stationary car")] = None
 ) -> Scenario:
@@ -201,16 +203,15 @@ def curve_with_car_outside(
     )
 
 
-def _neighbour(rng: np.random.Generator) -> dict[str, Any]:
-    return {
-        "ego_speed": speed_kmh(rng, 30.0),
-        "headway": uniform(rng, 0.8, 2.0),
-        "deceleration": uniform(rng, 2.0, 6.0),
-        "radius": uniform(rng, 150.0, 400.0) if either(rng) else 0.0,
-    }
+_NEIGHBOUR = draw(
+    ego_speed=kmh(30.0),
+    headway=between(0.8, 2.0),
+    deceleration=between(2.0, 6.0),
+    radius=lambda rng: between(150.0, 400.0)(rng) if EITHER(rng) else 0.0,
+)
 
 
-@family("AdjacentBraking", Level("AdjacentBraking", 1.0, _neighbour))
+@family("AdjacentBraking", Level("AdjacentBraking", 1.0, _NEIGHBOUR))
 def neighbour_brakes(
     ego_speed: Annotated[float, speed("Speed of both cars before the braking")] = 72.4 * KMH,
     radius: Annotated[
@@ -246,15 +247,10 @@ def neighbour_brakes(
     return _in_curve("AdjacentBraking", ego_speed, duration, entry, arc(bend_radius, -pi / 2), other)
 
 
-def _at_curve(rng: np.random.Generator) -> dict[str, Any]:
-    return {
-        "ego_speed": speed_kmh(rng, 30.0),
-        "place": "entrance" if either(rng) else "exit",
-        "radius": uniform(rng, 150.0, 400.0),
-    }
+_AT_CURVE = draw(ego_speed=kmh(30.0), place=one("entrance", "exit"), radius=between(150.0, 400.0))
 
 
-@family("CurveStandingCar", Level("CurveStandingCar", 1.0, _at_curve))
+@family("CurveStandingCar", Level("CurveStandingCar", 1.0, _AT_CURVE))
 def car_at_curve(
     ego_speed: EgoSpeed = 72.4 * KMH,
     place: Annotated[

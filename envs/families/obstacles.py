@@ -1,11 +1,9 @@
 """Marks, shadows and dots on an otherwise empty road: driving without a threat."""
 
-from typing import Annotated, Any
-
-import numpy as np
+from typing import Annotated
 
 from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.envs.families.arguments import EgoSpeed, ego_speed, fast, speed_kmh, uniform, within
+from lgmd_gym.envs.families.arguments import EgoSpeed, between, draw, fast, kmh, within
 from lgmd_gym.envs.families.family import Level, family
 from lgmd_gym.envs.families.scenario import BRIDGE_SHADOW, START_TTC, Actor, Scenario, bridge_shadow
 from lgmd_gym.fields import whole
@@ -15,7 +13,11 @@ DOT, DOT_SHADE = 0.1, 230  # [m], size of a raised pavement marker; white cerami
 DOT_ROWS, DOTS_PER_ROW, DOT_SPACING, ROW_SPACING = 4, 6, 0.5, 2.0  # [m]
 
 
-@family("EmptyRoad", Level("EmptyRoad", 1.0, ego_speed()), Level("FastEmptyRoad", 0.5, fast(ego_speed())))
+@family(
+    "EmptyRoad",
+    Level("EmptyRoad", 1.0, draw(ego_speed=kmh())),
+    Level("FastEmptyRoad", 0.5, fast(draw(ego_speed=kmh()))),
+)
 def drive_alone(ego_speed: EgoSpeed = 50 * KMH) -> Scenario:
     """The ego drives on an empty road; only lane lines and road texture move; not a threat."""
     return Scenario(family="EmptyRoad", ego_speed=ego_speed, duration=10.0)
@@ -23,11 +25,7 @@ def drive_alone(ego_speed: EgoSpeed = 50 * KMH) -> Scenario:
 
 @family(
     "SteelPlate",
-    Level(
-        "SteelPlate",
-        1.0,
-        lambda rng: {"ego_speed": speed_kmh(rng, 30.0), "shade": int(rng.integers(110, 200))},
-    ),
+    Level("SteelPlate", 1.0, draw(ego_speed=kmh(30.0), shade=lambda rng: int(rng.integers(110, 200)))),
 )
 def drive_over_plate(
     ego_speed: EgoSpeed = 80 * KMH,
@@ -43,11 +41,10 @@ def drive_over_plate(
     return Scenario(family="SteelPlate", ego_speed=ego_speed, duration=START_TTC + 2.0, actors=(plate,))
 
 
-def _shadow(rng: np.random.Generator) -> dict[str, Any]:
-    return {"ego_speed": speed_kmh(rng, 30.0), "length": uniform(rng, 5.0, 20.0)}
+_SHADOW = draw(ego_speed=kmh(30.0), length=between(5.0, 20.0))
 
 
-@family("BridgeShadow", Level("BridgeShadow", 1.0, _shadow), Level("FastBridgeShadow", 0.2, fast(_shadow)))
+@family("BridgeShadow", Level("BridgeShadow", 1.0, _SHADOW), Level("FastBridgeShadow", 0.2, fast(_SHADOW)))
 def drive_through_shadow(
     ego_speed: EgoSpeed = 80 * KMH,
     length: Annotated[float, within("[1, 100]", "m", "Length of the shadow along the road")] = 12.0,
@@ -59,7 +56,7 @@ def drive_through_shadow(
     return Scenario(family="BridgeShadow", ego_speed=ego_speed, duration=duration, actors=(shadow,))
 
 
-@family("BottsDots", Level("BottsDots", 1.0, ego_speed(30.0)))
+@family("BottsDots", Level("BottsDots", 1.0, draw(ego_speed=kmh(30.0))))
 def drive_over_dots(ego_speed: EgoSpeed = 72.4 * KMH) -> Scenario:
     """The ego drives over four rows of raised pavement markers (Botts' dots) in its lane; not a threat.
 

@@ -9,20 +9,24 @@ import numpy as np
 from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.arguments import (
+    EITHER,
     HEADWAY,
+    DrawArguments,
     EgoSpeed,
     Headway,
     LeadShade,
     RiderShade,
     Shade,
-    either,
+    between,
+    draw,
     fast,
     grey,
+    kmh,
+    maybe,
+    one,
     slower,
     speed,
-    speed_kmh,
     truth,
-    uniform,
     within,
 )
 from lgmd_gym.envs.families.family import Level, family
@@ -40,37 +44,27 @@ from lgmd_gym.envs.families.scenario import (
     bridge_shadow,
 )
 from lgmd_gym.errors import check_within, shown
-from lgmd_gym.fields import optional
 
 LEAD_IN = (
     3.0  # [s] at constant distance before the lead car brakes; T0 is 1 s before (AEB C2C v4.3.1, 8.2.2.3)
 )
 RELEASE = 2.5  # [m/s²], deceleration and acceleration of a lead car that brakes and releases
-BOX_KMH = (20.0, 100.0)  # ego speeds of random levels
 
 Offset = Annotated[
     float | None,
-    optional(
-        within("[-20, 20]", "m", "Target centreline minus ego centreline, + left; 0 if no position is given")
-    ),
+    maybe("[-20, 20]", "m", "Target centreline minus ego centreline, + left; 0 if no position is given"),
 ]
 Overlap = Annotated[
     float | None,
-    optional(
-        within(
-            "[-1, 1]", "", "Overlapped share of the ego's width; its sign is the side, + left; ±1 is aligned"
-        )
-    ),
+    maybe("[-1, 1]", "", "Overlapped share of the ego's width; its sign is the side, + left; ±1 is aligned"),
 ]
 ImpactLocation = Annotated[
     float | None,
-    optional(
-        within(
-            "[-0.25, 1.25]",
-            "",
-            "Position of the target's centre across the ego's width; 0.5 is aligned, larger values are to "
-            "the left",
-        )
+    maybe(
+        "[-0.25, 1.25]",
+        "",
+        "Position of the target's centre across the ego's width; 0.5 is aligned, larger values are to "
+        "the left",
     ),
 ]
 MotorcycleLocation = Annotated[
@@ -81,12 +75,8 @@ MotorcycleLocation = Annotated[
         "Position of the motorcycle's centre across the ego's width; 0 is the right side and 1 the left",
     ),
 ]
-Gap = Annotated[
-    float | None, optional(within("[1, 200]", "m", "Initial distance; 40 m without `gap` and `headway`"))
-]
-FreeHeadway = Annotated[
-    float | None, optional(within("[0.3, 10]", "s", "Alternative to `gap`: initial time headway"))
-]
+Gap = Annotated[float | None, maybe("[1, 200]", "m", "Initial distance; 40 m without `gap` and `headway`")]
+FreeHeadway = Annotated[float | None, maybe("[0.3, 10]", "s", "Alternative to `gap`: initial time headway")]
 BuildUp = Annotated[float, within("[0, 5]", "s", "Time from the onset to the full deceleration")]
 Beside = Annotated[
     bool, truth("Whether a second car does the same next to the target, in the lane to the left")
@@ -95,39 +85,30 @@ Beside = Annotated[
 
 def _overlap(rng: np.random.Generator) -> float:
     """Draw 1 (aligned) with probability 0.5, otherwise an overlap of 0.4 to 1 on either side."""
-    if either(rng):
+    if EITHER(rng):
         return 1.0
-    return uniform(rng, 0.4, 1.0) * (1.0 if either(rng) else -1.0)
-
-
-def _standing(rng: np.random.Generator) -> dict[str, Any]:
-    return {"ego_speed": speed_kmh(rng), "overlap": _overlap(rng)}
+    return between(0.4, 1.0)(rng) * one(1.0, -1.0)(rng)
 
 
 def _moving(rng: np.random.Generator) -> dict[str, Any]:
-    ego_speed = speed_kmh(rng, 30.0)
-    return {
-        "ego_speed": ego_speed,
-        "target_speed": ego_speed * uniform(rng, 0.2, 0.7),
-        "overlap": _overlap(rng),
-    }
+    ego_speed = kmh(30.0)(rng)
+    target_speed = ego_speed * between(0.2, 0.7)(rng)
+    return {"ego_speed": ego_speed, "target_speed": target_speed, "overlap": _overlap(rng)}
 
 
-def _braking(rng: np.random.Generator) -> dict[str, Any]:
-    return {
-        "ego_speed": speed_kmh(rng, 30.0),
-        "headway": uniform(rng, *HEADWAY),
-        "deceleration": uniform(rng, 2.0, 6.0),
-        "build_up": uniform(rng, 0.3, 1.0),
-        "overlap": _overlap(rng),
-    }
+_STANDING = draw(ego_speed=kmh(), overlap=_overlap)
+_BRAKING = draw(
+    ego_speed=kmh(30.0),
+    headway=between(*HEADWAY),
+    deceleration=between(2.0, 6.0),
+    build_up=between(0.3, 1.0),
+    overlap=_overlap,
+)
+_FOLLOWING = draw(ego_speed=kmh(), headway=between(*HEADWAY))
+_RELEASING = draw(ego_speed=kmh(40.0), headway=between(1.5, 2.5), speed_drop=between(2.0, 5.0))
 
 
-def _motorcycle(rng: np.random.Generator) -> dict[str, Any]:
-    return {"ego_speed": speed_kmh(rng), "impact_location": uniform(rng, 0.1, 0.9)}
-
-
-@family("CCRs", Level("CCRs", 15.0, _standing), Level("FastCCRs", 3.0, fast(_standing)), threat=True)
+@family("CCRs", Level("CCRs", 15.0, _STANDING), Level("FastCCRs", 3.0, fast(_STANDING)), threat=True)
 def approach_standing(
     ego_speed: EgoSpeed = 50 * KMH,
     lateral_offset: Offset = None,
@@ -181,7 +162,7 @@ def approach_slower(
     return _scenario("CCRm", ego_speed, target, beside)
 
 
-@family("CCRb", Level("CCRb", 13.0, _braking), Level("FastCCRb", 2.0, fast(_braking)), threat=True)
+@family("CCRb", Level("CCRb", 13.0, _BRAKING), Level("FastCCRb", 2.0, fast(_BRAKING)), threat=True)
 def follow_braking(
     ego_speed: Annotated[float, speed("Initial speed of both cars")] = 50 * KMH,
     gap: Gap = None,
@@ -211,7 +192,11 @@ def follow_braking(
     return _scenario("CCRb", ego_speed, target, beside, contact)
 
 
-@family("CMRs", Level("CMRs", 4.0, _motorcycle), threat=True)
+@family(
+    "CMRs",
+    Level("CMRs", 4.0, draw(ego_speed=kmh(), impact_location=between(0.1, 0.9))),
+    threat=True,
+)
 def approach_standing_motorcycle(
     ego_speed: EgoSpeed = 50 * KMH, impact_location: MotorcycleLocation = 0.5, shade: RiderShade = None
 ) -> Scenario:
@@ -225,7 +210,7 @@ def approach_standing_motorcycle(
 
 @family(
     "CMRb",
-    Level("CMRb", 4.0, lambda rng: _motorcycle(rng) | {"headway": uniform(rng, *HEADWAY)}),
+    Level("CMRb", 4.0, draw(ego_speed=kmh(), impact_location=between(0.1, 0.9), headway=between(*HEADWAY))),
     threat=True,
 )
 def follow_braking_motorcycle(
@@ -247,11 +232,7 @@ def follow_braking_motorcycle(
     return _with_motorcycle("CMRb", made)
 
 
-def _following(rng: np.random.Generator) -> dict[str, Any]:
-    return {"ego_speed": speed_kmh(rng), "headway": uniform(rng, *HEADWAY)}
-
-
-@family("Following", Level("Following", 1.0, _following), Level("FastFollowing", 0.5, fast(_following)))
+@family("Following", Level("Following", 1.0, _FOLLOWING), Level("FastFollowing", 0.5, fast(_FOLLOWING)))
 def follow_steadily(
     ego_speed: Annotated[float, speed("Speed of both cars")] = 50 * KMH,
     headway: Headway = 2.0,
@@ -262,26 +243,18 @@ def follow_steadily(
     return Scenario(family="Following", ego_speed=ego_speed, duration=10.0, actors=(lead,))
 
 
-def _release(rng: np.random.Generator) -> dict[str, Any]:
-    return {
-        "ego_speed": speed_kmh(rng, 40.0),
-        "headway": uniform(rng, 1.5, 2.5),
-        "speed_drop": uniform(rng, 2.0, 5.0),
-    }
-
-
 def _close_release(rng: np.random.Generator) -> dict[str, Any]:
     """Draw a short headway, and a brake tap that takes 10 to 60 % of it."""
-    ego_speed, headway = speed_kmh(rng, 40.0, 100.0), uniform(rng, 1.0, 2.0)
-    lost = uniform(rng, 0.1, 0.6) * ego_speed * headway
+    ego_speed, headway = kmh(40.0, 100.0)(rng), between(1.0, 2.0)(rng)
+    lost = between(0.1, 0.6)(rng) * ego_speed * headway
     return {"ego_speed": ego_speed, "headway": headway, "speed_drop": min((RELEASE * lost) ** 0.5, 6.0)}
 
 
 @family(
     "BrakeRelease",
-    Level("BrakeRelease", 1.0, _release),
+    Level("BrakeRelease", 1.0, _RELEASING),
     Level("CloseBrakeRelease", 1.0, _close_release),
-    Level("FastBrakeRelease", 0.5, fast(_release)),
+    Level("FastBrakeRelease", 0.5, fast(_RELEASING)),
 )
 def lead_brakes_and_releases(
     ego_speed: Annotated[float, speed("Initial speed of both cars")] = 50 * KMH,
@@ -315,20 +288,20 @@ def lead_brakes_and_releases(
     return Scenario(family="BrakeRelease", ego_speed=ego_speed, duration=10.0, actors=tuple(actors))
 
 
-def _box(rng: np.random.Generator, widest: float = 2.5) -> dict[str, Any]:
-    return {
-        "ego_speed": speed_kmh(rng, *BOX_KMH),
-        "width": uniform(rng, 0.3, widest),
-        "height": uniform(rng, 0.6, 2.5),
-        "length": uniform(rng, 0.3, 5.0),
-        "lateral_offset": uniform(rng, -0.5, 0.5),
-    }
+def _box(widest: float) -> DrawArguments:
+    return draw(
+        ego_speed=kmh(20.0, 100.0),
+        width=between(0.3, widest),
+        height=between(0.6, 2.5),
+        length=between(0.3, 5.0),
+        lateral_offset=between(-0.5, 0.5),
+    )
 
 
 @family(
     "StandingBox",
-    Level("StandingBox", 2.0, _box),
-    Level("NarrowBox", 2.0, lambda rng: _box(rng, widest=1.2)),
+    Level("StandingBox", 2.0, _box(2.5)),
+    Level("NarrowBox", 2.0, _box(1.2)),
     threat=True,
 )
 def approach_box(

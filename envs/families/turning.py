@@ -6,20 +6,20 @@ from functools import lru_cache
 from math import cos, pi, radians, sin, tan
 from typing import Annotated, Any
 
-import numpy as np
-
 from lgmd_gym.envs.dynamics.script import Bend, Pose, Segment, turn
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.families.arguments import (
+    EITHER,
     ClothesShade,
     LeadShade,
     RiderShade,
     Shade,
-    either,
+    draw,
     grey,
+    kmh,
+    one,
     one_of,
     speed,
-    speed_kmh,
     truth,
 )
 from lgmd_gym.envs.families.family import Level, family
@@ -56,19 +56,11 @@ TurningSpeed = Annotated[
 ]
 
 
-def _oncoming(rng: np.random.Generator) -> dict[str, Any]:
-    return {"ego_speed": speed_kmh(rng, 10.0, 25.0), "target_speed": speed_kmh(rng, 30.0, 80.0)}
+_ONCOMING = draw(ego_speed=kmh(10.0, 25.0), target_speed=kmh(30.0, 80.0))
+_PEDESTRIAN = draw(ego_speed=kmh(10.0, 20.0), left=EITHER, direction=one("same", "opposite"))
 
 
-def _pedestrian(rng: np.random.Generator) -> dict[str, Any]:
-    return {
-        "ego_speed": speed_kmh(rng, 10.0, 20.0),
-        "left": either(rng),
-        "direction": "same" if either(rng) else "opposite",
-    }
-
-
-@family("CCFtap", Level("CCFtap", 4.0, _oncoming), threat=True, twin=True)
+@family("CCFtap", Level("CCFtap", 4.0, _ONCOMING), threat=True, twin=True)
 def turn_across_car(
     ego_speed: TurningSpeed = 15 * KMH,
     target_speed: Annotated[float, speed("Target speed")] = 45 * KMH,
@@ -82,7 +74,7 @@ def turn_across_car(
     return _turn_across("CCFtap", TARGET_CAR, ego_speed, target_speed, shade)
 
 
-@family("CMFtap", Level("CMFtap", 2.0, _oncoming), threat=True, twin=True)
+@family("CMFtap", Level("CMFtap", 2.0, _ONCOMING), threat=True, twin=True)
 def turn_across_motorcycle(
     ego_speed: TurningSpeed = 15 * KMH,
     target_speed: Annotated[float, speed("Speed of the motorcycle")] = 45 * KMH,
@@ -96,7 +88,7 @@ def turn_across_motorcycle(
     return _turn_across("CMFtap", MOTORCYCLE, ego_speed, target_speed, shade)
 
 
-@family("CPTA", Level("CPTA", 2.0, _pedestrian), threat=True, twin=True)
+@family("CPTA", Level("CPTA", 2.0, _PEDESTRIAN), threat=True, twin=True)
 def turn_towards_pedestrian(
     ego_speed: TurningSpeed = 10 * KMH,
     left: Annotated[bool, truth("Whether the ego turns left; otherwise right")] = True,
@@ -135,7 +127,7 @@ def turn_towards_pedestrian(
     return ego.scenario("CPTA", ego_speed, walker)
 
 
-@family("TurnBeforeOncoming", Level("TurnBeforeOncoming", 1.0, lambda rng: {"left": either(rng)}))
+@family("TurnBeforeOncoming", Level("TurnBeforeOncoming", 1.0, draw(left=EITHER)))
 def turn_before_oncoming(
     left: Annotated[
         bool, truth("Whether the ego turns left, across the front of the other car; otherwise right")
@@ -167,7 +159,7 @@ def turn_before_oncoming(
     )
 
 
-@family("LeadTurnsOff", Level("LeadTurnsOff", 1.0, lambda rng: {"left": either(rng)}))
+@family("LeadTurnsOff", Level("LeadTurnsOff", 1.0, draw(left=EITHER)))
 def lead_turns_off(
     left: Annotated[bool, truth("Whether the lead car turns left; otherwise right")] = False,
     shade: LeadShade = None,

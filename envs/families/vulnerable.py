@@ -2,21 +2,22 @@
 
 from dataclasses import replace
 from math import pi
-from typing import Annotated, Any
-
-import numpy as np
+from typing import Annotated
 
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.arguments import (
+    EITHER,
     ClothesShade,
+    DrawArguments,
     EgoSpeed,
     RiderShade,
-    either,
+    Sampler,
+    between,
+    draw,
+    kmh,
     slower,
     speed,
-    speed_kmh,
     truth,
-    uniform,
     within,
 )
 from lgmd_gym.envs.families.family import Level, family
@@ -62,27 +63,25 @@ Child = Annotated[bool, truth("Whether the pedestrian is a child")]
 Clearance = Annotated[float, within("[0.2, 10]", "m", "Distance between the sides of ego and road user")]
 
 
-def _walker(rng: np.random.Generator, low: float = 3.0, high: float = 8.0) -> dict[str, Any]:
-    return {
-        "ego_speed": speed_kmh(rng, 10.0, 60.0),
-        "walking_speed": speed_kmh(rng, low, high),
-        "impact_location": uniform(rng, 0.1, 0.9),
-    }
+def _walker(low: float = 3.0, high: float = 8.0, **more: Sampler) -> DrawArguments:
+    location = between(0.1, 0.9)
+    return draw(ego_speed=kmh(10.0, 60.0), walking_speed=kmh(low, high), impact_location=location, **more)
 
 
-def _rider(rng: np.random.Generator, low: float, high: float) -> dict[str, Any]:
-    return {
-        "ego_speed": speed_kmh(rng, 10.0, 60.0),
-        "bicycle_speed": speed_kmh(rng, low, high),
-        "impact_location": uniform(rng, 0.1, 0.9),
-    }
+def _rider(low: float, high: float, **more: Sampler) -> DrawArguments:
+    location = between(0.1, 0.9)
+    return draw(ego_speed=kmh(10.0, 60.0), bicycle_speed=kmh(low, high), impact_location=location, **more)
 
 
-def _passed(rng: np.random.Generator) -> dict[str, Any]:
-    return {"ego_speed": speed_kmh(rng, 20.0, 50.0), "clearance": uniform(rng, 1.0, 1.5)}
+def _from(lowest: float, drawn: DrawArguments) -> DrawArguments:
+    """Return a function that draws the same arguments with an ego speed above a limit in km/h."""
+    return lambda rng: drawn(rng) | {"ego_speed": kmh(lowest)(rng)}
 
 
-@family("CPNA", Level("CPNA", 5.0, lambda rng: _walker(rng) | {"child": either(rng)}), threat=True, twin=True)
+_PASSED = {"ego_speed": kmh(20.0, 50.0), "clearance": between(1.0, 1.5)}
+
+
+@family("CPNA", Level("CPNA", 5.0, _walker(child=EITHER)), threat=True, twin=True)
 def pedestrian_from_right(
     ego_speed: EgoSpeed = 40 * KMH,
     walking_speed: Walking = 5 * KMH,
@@ -99,7 +98,7 @@ def pedestrian_from_right(
     return _crossing_pedestrian("CPNA", ego_speed, walking_speed, impact_location, child, shade)
 
 
-@family("CPFA", Level("CPFA", 4.0, lambda rng: _walker(rng, 5.0, 10.0)), threat=True, twin=True)
+@family("CPFA", Level("CPFA", 4.0, _walker(5.0, 10.0)), threat=True, twin=True)
 def pedestrian_from_left(
     ego_speed: EgoSpeed = 40 * KMH,
     walking_speed: Walking = 8 * KMH,
@@ -117,7 +116,7 @@ def pedestrian_from_left(
     )
 
 
-@family("CPNCO", Level("CPNCO", 3.0, _walker), threat=True, twin=True)
+@family("CPNCO", Level("CPNCO", 3.0, _walker()), threat=True, twin=True)
 def child_between_cars(
     ego_speed: EgoSpeed = 40 * KMH,
     walking_speed: Walking = 5 * KMH,
@@ -135,12 +134,7 @@ def child_between_cars(
     return replace(made, actors=(*made.actors, *parked))
 
 
-@family(
-    "CBNA",
-    Level("CBNA", 3.0, lambda rng: _rider(rng, 10.0, 20.0) | {"obstructed": either(rng)}),
-    threat=True,
-    twin=True,
-)
+@family("CBNA", Level("CBNA", 3.0, _rider(10.0, 20.0, obstructed=EITHER)), threat=True, twin=True)
 def bicycle_from_right(
     ego_speed: EgoSpeed = 40 * KMH,
     bicycle_speed: Riding = 15 * KMH,
@@ -158,7 +152,7 @@ def bicycle_from_right(
     return _crossing_bicycle("CBNA", ego_speed, bicycle_speed, impact_location, shade, "right", 17.0, cars)
 
 
-@family("CBNAO", Level("CBNAO", 2.0, lambda rng: _rider(rng, 8.0, 15.0)), threat=True, twin=True)
+@family("CBNAO", Level("CBNAO", 2.0, _rider(8.0, 15.0)), threat=True, twin=True)
 def bicycle_behind_cars(
     ego_speed: EgoSpeed = 40 * KMH,
     bicycle_speed: Riding = 10 * KMH,
@@ -174,7 +168,7 @@ def bicycle_behind_cars(
     return _crossing_bicycle("CBNAO", ego_speed, bicycle_speed, impact_location, shade, "right", 4.5, cars)
 
 
-@family("CBFA", Level("CBFA", 2.0, lambda rng: _rider(rng, 15.0, 25.0)), threat=True, twin=True)
+@family("CBFA", Level("CBFA", 2.0, _rider(15.0, 25.0)), threat=True, twin=True)
 def bicycle_from_left(
     ego_speed: EgoSpeed = 40 * KMH,
     bicycle_speed: Riding = 20 * KMH,
@@ -190,12 +184,7 @@ def bicycle_from_left(
     return _crossing_bicycle("CBFA", ego_speed, bicycle_speed, impact_location, shade, "left", 22.0, cars)
 
 
-@family(
-    "CPLA",
-    Level("CPLA", 4.0, lambda rng: _walker(rng) | {"ego_speed": speed_kmh(rng, 20.0)}),
-    threat=True,
-    twin=True,
-)
+@family("CPLA", Level("CPLA", 4.0, _from(20.0, _walker())), threat=True, twin=True)
 def pedestrian_ahead(
     ego_speed: EgoSpeed = 40 * KMH,
     walking_speed: Annotated[float, slower("Pedestrian speed", zero=True)] = 5 * KMH,
@@ -210,12 +199,7 @@ def pedestrian_ahead(
     return _ahead("CPLA", ADULT, ego_speed, "walking_speed", walking_speed, impact_location, shade)
 
 
-@family(
-    "CBLA",
-    Level("CBLA", 3.0, lambda rng: _rider(rng, 10.0, 20.0) | {"ego_speed": speed_kmh(rng, 25.0)}),
-    threat=True,
-    twin=True,
-)
+@family("CBLA", Level("CBLA", 3.0, _from(25.0, _rider(10.0, 20.0))), threat=True, twin=True)
 def bicycle_ahead(
     ego_speed: EgoSpeed = 50 * KMH,
     bicycle_speed: Annotated[float, slower("Bicycle speed", zero=True)] = 15 * KMH,
@@ -229,11 +213,12 @@ def bicycle_ahead(
     return _ahead("CBLA", BICYCLE, ego_speed, "bicycle_speed", bicycle_speed, impact_location, shade)
 
 
-def _reversing(rng: np.random.Generator) -> dict[str, Any]:
-    return {"ego_speed": speed_kmh(rng, 4.0, 8.0), "moving": either(rng), "child": either(rng)}
-
-
-@family("CPRA", Level("CPRA", 1.0, _reversing), threat=True, twin=True)
+@family(
+    "CPRA",
+    Level("CPRA", 1.0, draw(ego_speed=kmh(4.0, 8.0), moving=EITHER, child=EITHER)),
+    threat=True,
+    twin=True,
+)
 def pedestrian_behind(
     ego_speed: Annotated[float, speed("Speed of the reversing ego")] = 4 * KMH,
     moving: Annotated[bool, truth("Whether the pedestrian crosses; otherwise it stands")] = True,
@@ -256,7 +241,7 @@ def pedestrian_behind(
     return _on_two_way_road("CPRA", ego_speed, walker)
 
 
-@family("PedestrianPass", Level("PedestrianPass", 1.0, _passed))
+@family("PedestrianPass", Level("PedestrianPass", 1.0, draw(**_PASSED)))
 def pass_pedestrian(
     ego_speed: EgoSpeed = 30 * KMH,
     clearance: Clearance = 1.0,
@@ -280,10 +265,7 @@ def pass_pedestrian(
     return Scenario(family="PedestrianPass", ego_speed=ego_speed, duration=duration, actors=(walker,))
 
 
-@family(
-    "BicyclePass",
-    Level("BicyclePass", 1.0, lambda rng: _passed(rng) | {"bicycle_speed": speed_kmh(rng, 5.0, 20.0)}),
-)
+@family("BicyclePass", Level("BicyclePass", 1.0, draw(**_PASSED, bicycle_speed=kmh(5.0, 20.0))))
 def pass_oncoming_bicycle(
     ego_speed: EgoSpeed = 30 * KMH,
     clearance: Clearance = 1.0,
