@@ -7,7 +7,7 @@ import pytest
 import lgmd_gym
 from lgmd_gym import agents, benchmark, camera, envs, errors
 from lgmd_gym.benchmark.case import Case
-from lgmd_gym.benchmark.suite_file import get_suite
+from lgmd_gym.benchmark.suites import get_suite
 from lgmd_gym.clips import VideoWriter, find_clips, luma
 from lgmd_gym.engine import BrakingVectorEnv
 from lgmd_gym.training import TrainConfig
@@ -98,7 +98,7 @@ def test_values_are_shown_in_one_short_line():
             "camera must be a preset name, CameraParams or a",
         ),
         (lambda: benchmark.Executor(jobs=True), "jobs must be a whole number in [1, 1024], got True"),
-        (lambda: Case("a/b", "CCRs", fcw_driver=1), "fcw_driver must be true or false, got 1"),
+        (lambda: Case("a", "CCRs", "b", fcw_driver=1), "fcw_driver must be true or false, got 1"),
         (lambda: get_suite(["quick"]), "suite must be a string, got ['quick']"),
         (lambda: TrainConfig(algo="ppo", demands="x"), "demands must be a list of numbers, got 'x'"),
         (lambda: VideoWriter("x.mp4", fps=float("nan")), "fps must be finite, got nan"),

@@ -20,8 +20,8 @@ from joblib import Parallel, delayed
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.analysis.tables import rate_text
+from lgmd_gym.benchmark.case import Row
 from lgmd_gym.benchmark.config import RunConfig
-from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.summary import rate_of

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from lgmd_gym.benchmark import get_suite
 from lgmd_gym.benchmark.analysis.tables import rate_text
-from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.stored_run import StoredRun, read_run
+from lgmd_gym.benchmark.case import Row
+from lgmd_gym.benchmark.run_folder import StoredRun, read_run
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import Sample, summarise, without_fcw_driver
 from lgmd_gym.benchmark.traffic.summary import summarise_traffic
@@ -77,8 +77,8 @@ def family_table(agents: Sequence[str], runs: Sequence[StoredRun]) -> list[str]:
         check_agents(agents, run)
         rows = without_fcw_driver(run.rows)
         where = run.config.suite + ("" if run.config.worlds else ", laboratory")
-        for family in sorted({row["case"].split("/")[1] for row in rows}):
-            of_family = [row for row in rows if row["case"].split("/")[1] == family]
+        for family in sorted({row["family"] for row in rows}):
+            of_family = [row for row in rows if row["family"] == family]
             cells = [score(agent, [row for row in of_family if row["agent"] == agent]) for agent in agents]
             lines.append([where, family, *cells])
     return markdown(lines)

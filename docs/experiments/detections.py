@@ -10,15 +10,57 @@ contacts avoided. Cases with an FCW driver are left out. The table is in Markdow
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from all_scores import check_agents, markdown
 
-from lgmd_gym.benchmark.analysis.detections import detected_rows
 from lgmd_gym.benchmark.analysis.tables import rate_text
-from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.stored_run import StoredRun, read_run
+from lgmd_gym.benchmark.case import Row
+from lgmd_gym.benchmark.protocols.car_to_car_2023 import SUFFIX
+from lgmd_gym.benchmark.run_folder import StoredRun, read_run
 from lgmd_gym.benchmark.summary import summarise, without_fcw_driver
+
+
+def detected_rows(run: StoredRun, without_target: StoredRun) -> list[Row]:
+    """Return the rows of a run in which `avoided` is False where the agent also brakes without the target.
+
+    Args:
+        run: Run of a suite, "ncap2023" for example.
+        without_target: Run of the same suite without targets, "ncap2023-without-target", otherwise with the
+            same configuration; it may have further agents. An agent brakes where it has a false activation.
+
+    Raises:
+        ValueError: If the second run is of another suite, has another configuration, or lacks an episode of
+            the first one.
+    """
+    expected = f"{run.config.suite}{SUFFIX}"
+    if without_target.config.suite != expected:
+        raise ValueError(
+            f"a run of {expected} is required beside one of {run.config.suite}, got one of "
+            f"{without_target.config.suite}"
+        )
+    same = {"suite": expected, "agents": without_target.config.agents}
+    if replace(run.config, **same) != without_target.config:
+        raise ValueError(
+            f"the runs of {run.config.suite} and {expected} have other settings; run both with the same "
+            "seeds, worlds, conditions, road, camera and params"
+        )
+    # A failed episode (false_activation is None) is no evidence.
+    quiet = {_key(row): row["false_activation"] is False for row in without_target.rows}
+    for row in run.rows:
+        if _key(row) not in quiet:
+            raise ValueError(
+                f"the run of {expected} lacks {row['case']} of {row['agent']}, seed {row['seed']}; run both "
+                "suites with the same agents, and to the end"
+            )
+    return [{**row, "avoided": row["avoided"] and quiet[_key(row)]} for row in run.rows]
+
+
+def _key(row: Row) -> tuple[object, ...]:
+    """Return what a row has in common with that of the same case without its target."""
+    case = row["case"].removeprefix(row["suite"])
+    return row["agent"], case, row["seed"], row["condition"], row["world"]
 
 
 def lines(agents: Sequence[str], run: StoredRun, without_target: StoredRun) -> list[list[str]]:
@@ -31,18 +73,14 @@ def lines(agents: Sequence[str], run: StoredRun, without_target: StoredRun) -> l
     run = run._replace(rows=[row for row in run.rows if row["agent"] in agents])
     pairs = list(zip(run.rows, detected_rows(run, without_target), strict=True))
     pairs = [pair for pair in pairs if without_fcw_driver([pair[0]])]
-    families = sorted({_family(row) for row, _ in pairs})
-    groups = {name: [pair for pair in pairs if _family(pair[0]) == name] for name in families} | {
+    families = sorted({row["family"] for row, _ in pairs})
+    groups = {name: [pair for pair in pairs if pair[0]["family"] == name] for name in families} | {
         "all": pairs
     }
     return [
         [str(run.config.suite), name, *(_cell(agent, group) for agent in agents)]
         for name, group in groups.items()
     ]
-
-
-def _family(row: Row) -> str:
-    return row["case"].split("/")[1]
 
 
 def _cell(agent: str, pairs: Sequence[tuple[Row, Row]]) -> str:

@@ -9,15 +9,192 @@ is within the field of view.
 
 import argparse
 from collections.abc import Callable, Iterable
+from math import atan2, cos, degrees, hypot, pi, sin
 from pathlib import Path
 from statistics import median
+from typing import Any, NamedTuple
 
+import numpy as np
 from joblib import Parallel, delayed
 
-from lgmd_gym.benchmark.frontier import Frontier, frontier
+from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.suites import find_suite
-from lgmd_gym.camera import CameraParams
+from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.plotting.style import saved_figure
+
+HOLD, BRAKE = np.zeros(1, np.float32), -np.ones(1, np.float32)
+CHANGED = 4.0  # grey levels by which the target must change a pixel that counts
+VISIBLE_PX = 4  # changed pixels from which the target counts as visible
+
+
+class TargetView(NamedTuple):
+    """The target in the frame of one decision.
+
+    Attributes:
+        distance: Distance of the target's centre from the lens [m].
+        bearing_deg: Bearing of the target's centre from the optical axis, + to the right [degrees].
+        width_deg: Angle between the target's outermost corners [degrees].
+        pixels: Number of pixels that the target changes by at least 4 grey levels.
+        contrast: Mean change of these pixels [grey levels]; 0 without any.
+    """
+
+    distance: float
+    bearing_deg: float
+    width_deg: float
+    pixels: int
+    contrast: float
+
+
+class Frontier(NamedTuple):
+    """The last decision of a case at which full braking avoids the contact.
+
+    Attributes:
+        case: Name of the case.
+        family: Scenario family.
+        avoidable: Whether full braking avoids the contact. If not, the other values are for the last decision
+            at which it stops the ego before the contact, or for the first decision if there is none.
+        time_left: Time from that decision to the contact of `no-brake` [s].
+        view: TargetView at that decision.
+        growth_deg_s: Rate of change of the target's angular width over the last frame [degrees/s].
+        drift_deg_s: Rate of change of its bearing [degrees/s].
+        seen_s: Time since the target became visible for good [s]; 0 if it is not visible yet.
+    """
+
+    case: str
+    family: str
+    avoidable: bool
+    time_left: float
+    view: TargetView
+    growth_deg_s: float
+    drift_deg_s: float
+    seen_s: float
+
+    def growth_px(self, camera: CameraParams, fps: float = 30.0) -> float:
+        """Return the growth of the target's width per frame in the middle of a camera's image [px]."""
+        return self.growth_deg_s / fps * camera.pixels_per_degree
+
+
+def frontier(case: Case, camera: str | CameraParams = "wide", seed: int = 0) -> Frontier | None:
+    """Return the frontier of a case in the laboratory; None for a case without contact.
+
+    Args:
+        case: The case.
+        camera: Camera whose frames give visibility and contrast; its optics do not change the angles.
+        seed: Seed of the environment, which draws grey levels and the start on the road.
+    """
+    env = BrakingEnv(case.scenario)
+    rate = env.config["policy_frequency"]
+    contact = _decisions_until_end(env, seed)
+    if contact is None:
+        return None
+    avoided = _last(contact, lambda start: not _brake_from(env, seed, start)["collision"])
+    stopped = avoided or _last(contact, lambda start: _brake_from(env, seed, start)["impact_speed"] == 0.0)
+    last = stopped or 1
+    condition = case.argument("condition", "clear")
+    views = _views(env, seed, last, EgoCamera(camera, condition=condition))
+    hidden = [number for number, view in enumerate(views) if view.pixels < VISIBLE_PX]
+    here, before = views[-1], views[-2]
+    return Frontier(
+        case.name,
+        case.family,
+        avoided is not None,
+        (contact - last) / rate,
+        here,
+        (here.width_deg - before.width_deg) * rate,
+        (here.bearing_deg - before.bearing_deg) * rate,
+        max(last - 1 - hidden[-1], 0) / rate if hidden else last / rate,
+    )
+
+
+def _decisions_until_end(env: BrakingEnv, seed: int) -> int | None:
+    """Return the number of decisions up to the contact without braking; None without a contact."""
+    env.reset(seed=seed)
+    count, ended, info = 0, False, {}
+    while not ended:
+        _, _, terminated, truncated, info = env.step(HOLD)
+        count, ended = count + 1, terminated or truncated
+    return count if info["collision"] else None
+
+
+def _brake_from(env: BrakingEnv, seed: int, start: int) -> dict[str, Any]:
+    """Return the last info of an episode with full braking from a decision on."""
+    env.reset(seed=seed)
+    count, ended, info = 0, False, {}
+    while not ended:
+        _, _, terminated, truncated, info = env.step(BRAKE if count >= start else HOLD)
+        count, ended = count + 1, terminated or truncated
+    return info
+
+
+def _last(contact: int, holds: Callable[[int], bool]) -> int | None:
+    """Return the last decision from 1 on for which a condition holds, by bisection; None if never.
+
+    Args:
+        contact: Number of decisions up to the contact.
+        holds: The condition, true up to a decision and false after it.
+    """
+    if not holds(1):
+        return None
+    low, high = 1, contact
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def _views(env: BrakingEnv, seed: int, last: int, camera: EgoCamera) -> list[TargetView]:
+    """Return the views from the start to a decision without braking."""
+    env.reset(seed=seed)
+    views = [_view(env, camera)]
+    for _ in range(last):
+        env.step(HOLD)
+        views.append(_view(env, camera))
+    return views
+
+
+def _view(env: BrakingEnv, camera: EgoCamera) -> TargetView:
+    """Return the view of the present state."""
+    road, ego = env.road, env.ego
+    target = road.items[int(road.physics[1]["target"][0])]
+    ahead = ego.LENGTH / 2 - camera.params.mount_setback
+    x, y = ego.position[0] + ahead * cos(ego.heading), ego.position[1] + ahead * sin(ego.heading)
+
+    def bearing(point_x: float, point_y: float) -> float:
+        angle = atan2(point_y - y, point_x - x) - ego.heading
+        return (angle + pi) % (2.0 * pi) - pi
+
+    c, s = cos(target.heading), sin(target.heading)
+    corners = [
+        bearing(
+            target.position[0] + i * target.LENGTH / 2 * c - j * target.WIDTH / 2 * s,
+            target.position[1] + i * target.LENGTH / 2 * s + j * target.WIDTH / 2 * c,
+        )
+        for i in (-1, 1)
+        for j in (-1, 1)
+    ]
+    change = _change(env, camera, target)
+    counted = change[change >= CHANGED]
+    return TargetView(
+        hypot(target.position[0] - x, target.position[1] - y),
+        degrees(bearing(*target.position)),
+        degrees(max(corners) - min(corners)),
+        int(counted.size),
+        float(counted.mean()) if counted.size else 0.0,
+    )
+
+
+def _change(env: BrakingEnv, camera: EgoCamera, target: Any) -> np.ndarray:
+    """Return by how much the target changes each pixel [grey levels]."""
+    road = env.road
+    vehicles, objects = road.vehicles, road.objects
+    present = camera.render(env).astype(np.float64)
+    road.vehicles = [item for item in vehicles if item is not target]
+    road.objects = [item for item in objects if item is not target]
+    absent = camera.render(env).astype(np.float64)
+    road.vehicles, road.objects = vehicles, objects
+    return np.abs(present - absent)
+
 
 COLUMNS: tuple[tuple[str, Callable[[Frontier], float], str], ...] = (
     ("time left [s]", lambda item: item.time_left, "{:.2f}"),

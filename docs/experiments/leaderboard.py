@@ -17,7 +17,8 @@ from all_scores import column, table
 from lgmd_gym import benchmark
 from lgmd_gym.benchmark import RunConfig
 from lgmd_gym.benchmark.analysis.tables import rate_text
-from lgmd_gym.benchmark.stored_run import StoredRun, make_plan, read_run
+from lgmd_gym.benchmark.plan import make_plan
+from lgmd_gym.benchmark.run_folder import StoredRun, read_run
 from lgmd_gym.benchmark.summary import summarise
 from lgmd_gym.errors import counted
 from lgmd_gym.processes.pool import Executor

@@ -30,8 +30,7 @@ def counts(cases: Iterable[Case]) -> Counter[str]:
     The files name locations and turns with the family, such as CPNA-25, CPRA_Cm and CPTAfs.
     """
     return Counter(
-        "".join(re.findall(r"^(?:CPTA|[A-Za-z]+)", case.name.split("/")[1]))
-        + (" warned" if case.fcw_driver else "")
+        "".join(re.findall(r"^(?:CPTA|[A-Za-z]+)", case.family)) + (" warned" if case.fcw_driver else "")
         for case in cases
     )
 

@@ -12,9 +12,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from lgmd_gym.benchmark.analysis.protocol_limits import relative_impact
-from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.stored_run import StoredRun, read_run
+from lgmd_gym.benchmark.case import Row, relative_impact
+from lgmd_gym.benchmark.run_folder import StoredRun, read_run
 from lgmd_gym.envs.dynamics.units import KMH
 
 CELLS = {

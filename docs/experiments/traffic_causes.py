@@ -28,11 +28,11 @@ from all_scores import check_agents
 from joblib import Parallel, delayed
 
 from lgmd_gym.agents import HOLD, make_agent
+from lgmd_gym.benchmark.case import Row
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.metrics import NUISANCE
-from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.run_folder import StoredRun, read_run
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.stored_run import StoredRun, read_run
 from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.traffic.replay import EVENT_PAUSE
 from lgmd_gym.camera.worlds import LABORATORY
@@ -83,7 +83,7 @@ def first_event(config: RunConfig, agent_name: str, row: Row) -> Onset:
     Raises:
         RuntimeError: If there is no such event.
     """
-    agent, kind = make_agent(agent_name), row["case"].split("/")[1]
+    agent, kind = make_agent(agent_name), row["family"]
     sensors = SensorConfig(config.camera, config.params).for_agent(agent)
     world = LABORATORY if row["world"] is None else row["world"]
     place = {"world": world, "condition": row["condition"], "road": config.road}
@@ -139,7 +139,7 @@ def play(run: StoredRun, agent: str, jobs: int) -> list[tuple[str, Onset]]:
     if not only_false:
         raise ValueError(f"the run has no drive in which all braking events of {agent} are false")
     onsets = Parallel(n_jobs=jobs)(delayed(first_event)(run.config, agent, row) for row in only_false)
-    return [(row["case"].split("/")[1], onset) for row, onset in zip(only_false, onsets, strict=True)]
+    return [(row["family"], onset) for row, onset in zip(only_false, onsets, strict=True)]
 
 
 if __name__ == "__main__":

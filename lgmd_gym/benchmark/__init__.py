@@ -6,7 +6,8 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, cast
 
 from lgmd_gym.benchmark.config import RunConfig
-from lgmd_gym.benchmark.suite_file import Source, get_suite
+from lgmd_gym.benchmark.extensions import OUTPUTS, provided
+from lgmd_gym.benchmark.suites import Source, get_suite
 from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.errors import shown
 from lgmd_gym.processes.pool import SERIAL, Executor
@@ -35,7 +36,7 @@ def run(
         report: Whether to write report.html.
 
     Returns:
-        One row per episode, including `no-brake`, with the columns `lgmd_gym.benchmark.rows.KEYS`;
+        One row per episode, including `no-brake`, with the columns `lgmd_gym.benchmark.metrics.KEYS`;
         for the suite "traffic", `lgmd_gym.benchmark.traffic.rows.KEYS`.
 
     Raises:
@@ -61,13 +62,12 @@ def run(
     import pandas as pd
 
     from lgmd_gym.benchmark.runner import Run
-    from lgmd_gym.report.outputs import write_outputs
 
     with TemporaryDirectory() as spare:
         benchmark = Run.new(config, Path(folder or Path(spare) / "run"), executor)
         complete = benchmark.play()
         if folder is not None:
-            write_outputs(benchmark.folder.path, plots, report, trust=True)
+            provided(OUTPUTS)(benchmark.folder.path, plots, report, trust=True)
         if not complete:
             kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
             raise RuntimeError(f"{benchmark.stop_reason}: {kept}")

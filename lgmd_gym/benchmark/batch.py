@@ -8,10 +8,10 @@ import numpy as np
 
 from lgmd_gym.agents import Agent, BatchAgent, make_agent
 from lgmd_gym.benchmark.agent_slots import AgentSlots
+from lgmd_gym.benchmark.case import key_of
 from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.fcw_driver import FCWDriver
 from lgmd_gym.benchmark.recorder import SeriesRecorder
-from lgmd_gym.benchmark.rows import key_of
 from lgmd_gym.benchmark.task import Result, Task, error_result, make_result, run_task
 from lgmd_gym.benchmark.units import Unit, group_key, make_once
 from lgmd_gym.benchmark.views import Views
@@ -62,7 +62,7 @@ class BatchPlayer:
         arguments = task.arguments
         agent = make_agent(task.agent)
         self._sensor_config = task.sensor_config.for_agent(agent)
-        source = make_source(task.case.family, _scenario_arguments(arguments))
+        source = make_source(task.case.environment, _scenario_arguments(arguments))
         self._env = env = BrakingEnv(source, config=arguments.get("config"))
         if BIRDSEYE in make_cameras(self._sensor_config.arguments["camera"]):
             raise ValueError("the engine does not draw top views")
@@ -106,7 +106,7 @@ class BatchPlayer:
         for index in np.flatnonzero(~self._active).tolist()[: len(waiting)]:
             task = waiting.popleft()
             arguments = _scenario_arguments(task.arguments)
-            self._queue.sources[index] = make_source(task.case.family, arguments)
+            self._queue.sources[index] = make_source(task.case.environment, arguments)
             self._queue.seed(index, task.seed)
             prepared = self._queue.next(index)
             draw = prepared.draw

@@ -1,19 +1,24 @@
-"""The configuration of a run, stored as `run.toml` in its folder."""
+"""The configuration of a run, stored as `run.toml` in its folder, and its provenance."""
 
+import os
+import platform
+import subprocess
+import time
 from collections.abc import Collection, Iterable
 from dataclasses import asdict, dataclass, fields
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from lgmd_gym.benchmark.data_file import read_data
-from lgmd_gym.benchmark.folder import provenance
-from lgmd_gym.benchmark.scenario_file import OWN
+from lgmd_gym._version import __version__
+from lgmd_gym.benchmark.case import NO_BRAKE, TRAFFIC, RowKey, Suite, traffic_case
+from lgmd_gym.benchmark.case_table import read_data
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.suite_file import Source, copy_suite, is_file
-from lgmd_gym.benchmark.suites import TRAFFIC
-from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.benchmark.suites import OWN, Source, copy_suite, get_suite, is_file
 from lgmd_gym.camera import CLEAR, CONDITIONS, CameraSpec
 from lgmd_gym.camera.spec import check_camera
 from lgmd_gym.camera.worlds import SPLIT_WORLDS, WORLDS
@@ -22,6 +27,56 @@ from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.registration import TRAFFIC_KINDS
 from lgmd_gym.errors import as_tuple, check_items, check_keys, check_known, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
+
+PACKAGES = ("numpy", "numba", "gymnasium", "highway-env", "joblib")
+
+
+def provenance() -> dict[str, Any]:
+    """Return the versions, commit, processor and date of this run."""
+    return {
+        "lgmd_gym": __version__,
+        "commit": _commit(),
+        "python": platform.python_version(),
+        "packages": {name: _version(name) for name in PACKAGES},
+        "processor": _processor(),
+        "cpus": os.cpu_count(),
+        "finished": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+    }
+
+
+@cache
+def _commit() -> str | None:
+    """Return the commit of the source tree that holds this package; None for an installed package."""
+    if not (Path(__file__).parents[2] / "pyproject.toml").is_file():
+        return None
+    try:
+        described = subprocess.run(
+            ["git", "describe", "--always", "--dirty"],
+            cwd=Path(__file__).parent,
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return described.stdout.strip() or None
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
+
 
 RUN_FILE = "run.toml"
 _WORLD_STEP = 7  # worlds between the first seeds of one case and of the next
@@ -128,6 +183,23 @@ class RunConfig:
             ValueError: If the condition is unknown or the camera supports none.
         """
         return self.sensor_config.with_condition(CLEAR if condition == MIXED else condition)
+
+    def get_suite(self) -> Suite:
+        """Return the suite; that of traffic has no fixed cases."""
+        if self.suite == TRAFFIC:
+            return Suite(name=TRAFFIC, cases=(), about="recorded traffic")
+        return get_suite(self.suite, self.modules)
+
+    def row_keys(self, suite: Suite) -> set[RowKey]:
+        """Return the keys of all rows of a complete run; of cases, those of `no-brake` included."""
+        seeds, conditions = self.seed_range, self.conditions
+        if self.suite == TRAFFIC:
+            return {
+                (agent, traffic_case(kind, seed).name, seed, condition)
+                for agent, kind, seed, condition in product(self.agents, self.kinds or (), seeds, conditions)
+            }
+        cases = [case.name for case in suite.cases]
+        return set(product({NO_BRAKE, *self.agents}, cases, seeds, conditions))
 
     @property
     def own_suite(self) -> bool:

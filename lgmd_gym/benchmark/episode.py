@@ -89,7 +89,7 @@ def make_env(case: Case, sensor_config: SensorConfig, arguments: Mapping[str, An
         arguments: Arguments of the environment; None for those of the case.
     """
     chosen = dict(case.arguments) if arguments is None else dict(arguments)
-    return gym.make(env_id(case.family), trace=True, **sensor_config.for_agent().arguments | chosen)
+    return gym.make(env_id(case.environment), trace=True, **sensor_config.for_agent().arguments | chosen)
 
 
 def rollout(env: gym.Env, agent: Actor, seed: int) -> Iterator[tuple[Step, np.ndarray]]:

@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.benchmark.case import CASE_KEYS, ID_KEYS, Case, Row, new_row, relative_impact
 from lgmd_gym.benchmark.episode import Episode
+from lgmd_gym.camera import CLEAR
 
 GRAVITY = 9.80665  # [m/s²]
 NUISANCE = 0.25 * GRAVITY  # 49 CFR 571.127 S5.3: a false activation exceeds this beyond the driver's braking
@@ -45,11 +47,11 @@ class Counterfactual:
         return cls(episode.collision, contact, episode.relative_impact_speed)
 
     @classmethod
-    def of_row(cls, row: dict[str, Any]) -> "Counterfactual":
+    def of_row(cls, row: Row) -> "Counterfactual":
         """Return the counterfactual given by a `no-brake` row."""
         if not row["collision"]:
             return cls(False, inf, inf)
-        return cls(True, row["duration"], row["relative_impact_speed"])
+        return cls(True, row["duration"], relative_impact(row))
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,3 +308,33 @@ def duration(pair: PairedEpisode) -> Value:
 def fps(pair: PairedEpisode) -> Value:
     """Camera frame rate."""
     return number(pair.episode.fps)
+
+
+# Every key of a row of a suite of cases, in order.
+KEYS = (*ID_KEYS, *CASE_KEYS, "world", "camera", *METRICS, "error")
+
+
+def make_row(
+    agent: str,
+    case: Case,
+    seed: int,
+    episode: Episode,
+    counterfactual: Counterfactual,
+    premature: float = PREMATURE,
+    condition: str = CLEAR,
+    camera: str | None = None,
+) -> Row:
+    """Return the row of one episode.
+
+    Args:
+        agent: Agent string.
+        case: Case of the episode.
+        seed: Seed of the episode.
+        episode: Episode to measure.
+        counterfactual: Outcome of `no-brake`, which defines a threat.
+        premature: Lead before the counterfactual contact beyond which braking is premature [s].
+        condition: Camera condition.
+        camera: Camera names.
+    """
+    pair = PairedEpisode.of(episode, counterfactual, premature)
+    return new_row(KEYS, agent, case, seed, condition, world=episode.world, camera=camera, **measure(pair))

@@ -1,24 +1,49 @@
 """The episodes of a run and their order."""
 
+import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import product
+from typing import Any
 
 import gymnasium as gym
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.batch import play_unit
+from lgmd_gym.benchmark.case import TRAFFIC, Row, key_of, traffic_case
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.episode import make_env
 from lgmd_gym.benchmark.metrics import Counterfactual
-from lgmd_gym.benchmark.rows import Row, RowKey, key_of
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.suite_file import get_suite
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
-from lgmd_gym.benchmark.units import make_units
-from lgmd_gym.benchmark.warm_up import compile_kernels
+from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
+from lgmd_gym.benchmark.units import Unit, make_units
+from lgmd_gym.camera.render.context import draw_cameras
+from lgmd_gym.camera.worlds import LABORATORY
+from lgmd_gym.engine.kernels import advance
+from lgmd_gym.envs.appearance import Appearance
+from lgmd_gym.envs.registration import traffic_id
 from lgmd_gym.processes.pool import TaskMap
+
+
+def compile_kernels(task: Task) -> None:
+    """Play a task in this process and drop its result, unless numba has the kernels in its cache.
+
+    Args:
+        task: A short task; its errors are left to the workers.
+    """
+    if all(map(_is_cached, (draw_cameras, advance))):
+        return
+    with contextlib.suppress(Exception, SystemExit):
+        next(play_unit(Unit("", [task])))
+
+
+def _is_cached(kernel: Any) -> bool:
+    """Return whether numba's cache has a kernel for the present source."""
+    if kernel.signatures:
+        return True
+    file = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+    return bool(file is not None and file._load_index())
 
 
 class Plan(ABC):
@@ -28,27 +53,21 @@ class Plan(ABC):
         config: Configuration of the run.
 
     Attributes:
-        suite: Name of the suite.
+        suite: The suite.
         sensor_configs: Camera and neuron parameters by condition.
 
     Raises:
         ValueError: If the suite is unknown or a camera does not support a condition.
     """
 
-    suite: str
-
     def __init__(self, config: RunConfig) -> None:
-        self.config = config
+        self.config, self.suite = config, config.get_suite()
         self.sensor_configs = {name: config.sensors(name) for name in config.conditions}
 
     @property
     def total(self) -> int:
         """Number of episodes."""
-        return len(self.keys())
-
-    @abstractmethod
-    def keys(self) -> set[RowKey]:
-        """Return the keys of all rows of the complete run."""
+        return len(self.config.row_keys(self.suite))
 
     @abstractmethod
     def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
@@ -79,16 +98,6 @@ class CasePlan(Plan):
     `no-brake` is run first, even if it is not among the agents: it defines the counterfactual.
     """
 
-    def __init__(self, config: RunConfig) -> None:
-        super().__init__(config)
-        suite = get_suite(config.suite, config.modules)
-        self.suite, self.cases = suite.name, suite.cases
-
-    def keys(self) -> set[RowKey]:
-        """Return the keys of all rows, those of `no-brake` included."""
-        config, cases = self.config, [case.name for case in self.cases]
-        return set(product({NO_BRAKE, *config.agents}, cases, config.seed_range, config.conditions))
-
     def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
         """Run the missing episodes, `no-brake` first, and yield their results as they finish."""
         done = {key_of(row): row for row in rows}
@@ -98,7 +107,7 @@ class CasePlan(Plan):
         first = [
             self._first_task(index, seed, condition)
             for condition in self.sensor_configs
-            for index in range(len(self.cases))
+            for index in range(len(self.suite.cases))
             for seed in self.config.seed_range
         ]
         for result in self._play(run_tasks, [task for task in first if task.key not in done]):
@@ -123,7 +132,7 @@ class CasePlan(Plan):
         config = self.config
         return Task(
             NO_BRAKE,
-            self.cases[index],
+            self.suite.cases[index],
             seed,
             self.sensor_configs[condition],
             condition=condition,
@@ -135,4 +144,43 @@ class CasePlan(Plan):
         return run_tasks.flatten(play_unit, make_units(tasks, run_tasks.workers, self.config.agents))
 
     def _make_env(self, sensor_config: SensorConfig) -> gym.Env:
-        return make_env(self.cases[0], sensor_config)
+        return make_env(self.suite.cases[0], sensor_config)
+
+
+DRIVES_PER_TASK = 10  # two seeds of every kind; more drives delay the rows and use more memory
+
+
+class TrafficPlan(Plan):
+    """The episodes of the traffic suite."""
+
+    def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
+        """Run the missing episodes and yield their results as they finish.
+
+        Seeds come before kinds, so that an interrupted run holds a balanced sample.
+        """
+        done = {key_of(row) for row in rows}
+        tasks = []
+        for condition, sensor_config in self.sensor_configs.items():
+            drives = []
+            for seed in self.config.seed_range:
+                for index, kind in enumerate(self.config.kinds or ()):
+                    key = (traffic_case(kind, seed).name, seed, condition)
+                    agents = tuple(agent for agent in self.config.agents if (agent, *key) not in done)
+                    if agents:
+                        world = self.config.world(seed, index)
+                        chosen = LABORATORY if world is None else world
+                        appearance = Appearance(world=chosen, condition=condition, road=self.config.road)
+                        drives.append(Drive(kind, seed, agents, appearance))
+            for first in range(0, len(drives), DRIVES_PER_TASK):
+                batch = tuple(drives[first : first + DRIVES_PER_TASK])
+                tasks.append(TrafficTask(batch, sensor_config, condition))
+        for rows_of_task in run_tasks(run_traffic_task, tasks):
+            yield from map(Result, rows_of_task)
+
+    def _make_env(self, sensor_config: SensorConfig) -> gym.Env:
+        return gym.make(traffic_id((self.config.kinds or ())[0]), **sensor_config.arguments)
+
+
+def make_plan(config: RunConfig) -> Plan:
+    """Return the plan of a configuration."""
+    return TrafficPlan(config) if config.suite == TRAFFIC else CasePlan(config)

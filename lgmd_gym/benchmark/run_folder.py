@@ -1,18 +1,178 @@
-"""Run folders: created once, appended to as episodes finish, never overwritten."""
+"""Run folders: created once, appended to as episodes finish, never overwritten; read and checked."""
 
 import json
 import os
+import re
 from errno import ENOSPC
+from hashlib import blake2b
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lgmd_gym._version import __version__
-from lgmd_gym.benchmark.folder import provenance, replace_file
-from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.stored_run import ROWS_FILE, read_run, read_settings, rows_file
-from lgmd_gym.processes.files import FolderLock, new_folder
+from lgmd_gym.benchmark.case import ID_KEYS, TRAFFIC, Row, RowKey, key_of
+from lgmd_gym.benchmark.config import RUN_FILE, RunConfig, provenance
+from lgmd_gym.camera import CLEAR
+from lgmd_gym.processes.files import FolderLock, new_folder, replace_file
+
+_MAX_BYTES = 220  # file systems allow 255 with the suffix
+# These texts stay distinct with "_" for their separators: a case with slashes, and an agent with options.
+_CASE = re.compile(r"[^_:,]+")
+_AGENT = re.compile(r"[^_/:,]+(:[^_/:,]+(,[^_/:,]+)*)?")
+
+
+def series_name(key: tuple[str, str, int, str]) -> str:
+    """Return the file stem of the time series of a row, given its `key_of`; different for every key."""
+    agent, case, seed, condition = key
+    usual = _CASE.fullmatch(case) and _AGENT.fullmatch(agent)
+    return _stem((case, agent, f"seed{seed}", condition), bool(usual))
+
+
+def case_name(case: str, condition: str) -> str:
+    """Return the file stem of the plot of a case under a condition; different for every pair."""
+    return _stem((case, condition), bool(_CASE.fullmatch(case)))
+
+
+def _stem(parts: tuple[str, ...], usual: bool) -> str:
+    """Return the parts as a file name; a digest distinguishes names that are unusual or too long."""
+    shown = parts[:-1] if parts[-1] == CLEAR else parts
+    stem = re.sub("[/:,]", "_", "__".join(shown))
+    encoded = stem.encode(errors="surrogateescape")
+    if usual and len(encoded) <= _MAX_BYTES:
+        return stem
+    digest = blake2b(json.dumps(parts).encode(), digest_size=6).hexdigest()
+    return f"{encoded[:_MAX_BYTES].decode(errors='ignore')}-{digest}"
+
+
+ROWS_FILE = "episodes.jsonl"
+MAX_LISTED = 10  # line numbers that a message lists
+
+
+class StoredRun(NamedTuple):
+    """Contents of a run folder.
+
+    Attributes:
+        config: Configuration of the run.
+        rows: Rows in the order of the file; each belongs to the run, and none occurs twice.
+        truncated: Whether an incomplete last line was skipped.
+    """
+
+    config: RunConfig
+    rows: list[Row]
+    truncated: bool
+
+
+def read_run(path: Path) -> StoredRun:
+    """Read and check the configuration and the rows of a run folder.
+
+    Raises:
+        ValueError: If the folder contains no run or a damaged one, a row of another run, or an episode twice.
+    """
+    file = rows_file(path)
+    rows, truncated = _parse(file)
+    config = RunConfig.load(path / RUN_FILE)
+    _check_rows(file, rows, config)
+    return StoredRun(config, rows, truncated)
+
+
+def read_case_rows(path: Path) -> list[Row]:
+    """Return the rows of a run folder; raise ValueError for a traffic run."""
+    run = read_run(path)
+    if run.config.suite == TRAFFIC:
+        raise ValueError(f"{str(path)!r} is a traffic run; its summary.csv holds the rates per 100 km")
+    return run.rows
+
+
+def rows_file(path: Path) -> Path:
+    """Return the path of `episodes.jsonl` in a run folder.
+
+    Raises:
+        ValueError: If there is no such file.
+    """
+    file = path / ROWS_FILE
+    if not file.is_file():
+        raise ValueError(f"{str(path)!r} contains no run (no {ROWS_FILE}); start one with --out")
+    return file
+
+
+def read_settings(path: Path) -> dict[str, Any]:
+    """Return the contents of `run.json` of a run folder.
+
+    Raises:
+        ValueError: If it is missing or damaged.
+    """
+    file = path / "run.json"
+    try:
+        settings = json.loads(file.read_text(encoding="utf-8"))
+        if not isinstance(settings, dict):
+            raise ValueError
+    except (OSError, ValueError):
+        raise ValueError(f"{str(file)!r} is missing or damaged; start a new run") from None
+    return settings
+
+
+def read_series(path: Path, name: str) -> dict[str, np.ndarray] | None:
+    """Return the time series in `traces/<name>.npz` of a run folder, or None if there is no such file.
+
+    Raises:
+        ValueError: If the file is damaged.
+    """
+    file = path / "traces" / f"{name}.npz"
+    if not file.exists():
+        return None
+    try:
+        with np.load(file) as series:
+            return dict(series)
+    except Exception:  # errors of the archive, its compression or its arrays, or of the file system
+        raise ValueError(f"{str(file)!r} is damaged; remove it to leave its episode out") from None
+
+
+def _parse(file: Path) -> tuple[list[Row], bool]:
+    """Return the rows of a file, and whether an incomplete last line was skipped."""
+    rows = []
+    lines = file.read_bytes().splitlines(keepends=True)
+    for number, line in enumerate(lines, start=1):
+        try:
+            if not line.endswith(b"\n"):
+                raise ValueError
+            rows.append(json.loads(line))
+        except ValueError:
+            if number < len(lines):
+                raise _damaged(file, number) from None
+            return rows, True
+    return rows, False
+
+
+def _damaged(file: Path, number: int) -> ValueError:
+    return ValueError(f"{str(file)!r} is damaged in line {number}; start a new run")
+
+
+def _check_rows(file: Path, rows: list[Row], config: RunConfig) -> None:
+    """Raise ValueError for rows without an identity, rows of another run, and repeated rows."""
+    suite = config.get_suite()
+    planned, lines, faults = config.row_keys(suite), dict[RowKey, int](), dict[int, str]()
+    for number, row in enumerate(rows, start=1):
+        if not isinstance(row, dict) or not {*ID_KEYS, "error"} <= row.keys():
+            raise _damaged(file, number)
+        key = key_of(row)
+        try:
+            is_planned = key in planned
+        except TypeError:  # a list or table in the place of a name
+            raise _damaged(file, number) from None
+        if row["suite"] != suite.name or not is_planned:
+            faults[number] = f"does not belong to the run: {', '.join(map(str, key))}"
+        elif row.keys() != rows[0].keys():
+            faults[number] = "has other columns than line 1, as from another version"
+        elif key in lines:
+            faults[number] = f"repeats the episode of line {lines[key]}"
+        lines.setdefault(key, number)
+    if faults:
+        number, fault = next(iter(faults.items()))
+        others = [str(other) for other in faults if other != number]
+        listed = ", ".join(others[:MAX_LISTED]) + (", ..." if len(others) > MAX_LISTED else "")
+        more = f" (also to be checked: {len(others)} lines, {listed})" if others else ""
+        raise ValueError(f"{str(file)!r} line {number} {fault}{more}; remove such lines or start a new run")
 
 
 class RunFolder:

@@ -1,22 +1,98 @@
 """A benchmark run, which writes each row when its episode finishes."""
 
 import contextlib
+import re
+import sys
 import time
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from lgmd_gym.benchmark.config import RUN_FILE, RunConfig
-from lgmd_gym.benchmark.failures import EARLY, failing_agent
-from lgmd_gym.benchmark.file_names import series_name
-from lgmd_gym.benchmark.folder import provenance
-from lgmd_gym.benchmark.rows import Row, key_of
-from lgmd_gym.benchmark.run_folder import RunFolder
-from lgmd_gym.benchmark.stored_run import make_plan
+import lgmd_gym
+from lgmd_gym.agents.registry import outside_code
+from lgmd_gym.benchmark.case import Row, key_of
+from lgmd_gym.benchmark.config import RUN_FILE, RunConfig, provenance
+from lgmd_gym.benchmark.plan import make_plan
+from lgmd_gym.benchmark.run_folder import RunFolder, series_name
 from lgmd_gym.benchmark.task import NO_BRAKE, Result
-from lgmd_gym.benchmark.trust import check_trust
+from lgmd_gym.errors import counted
 from lgmd_gym.processes.pool import SERIAL, Executor, PoolLostError
 
+MAX_FAILURES = 5  # kinds of failure that are described
+EARLY = 8  # an agent whose first episodes all fail ends the run after this number
+
+_PACKAGE = str(Path(lgmd_gym.__file__).parent)
+_FRAME = re.compile(r'^  File "(.+)", line (\d+), in (.+)$', re.MULTILINE)
+
+
+def failure_lines(rows: Iterable[Row]) -> list[str]:
+    """Return a line for each agent and exception: the number of episodes, the exception and its place.
+
+    Args:
+        rows: Rows of a run; those without error are skipped.
+    """
+    failed = [row for row in rows if row["error"] is not None]
+    kinds = Counter((row["agent"], describe_failure(row["error"])) for row in failed)
+    most = kinds.most_common(MAX_FAILURES)
+    lines = [f"{agent}: {text} ({counted(count, 'episode')})" for (agent, text), count in most]
+    if len(kinds) > MAX_FAILURES:
+        lines.append(f"{len(kinds) - MAX_FAILURES} other failures")
+    return lines
+
+
+def failing_agent(rows: Iterable[Row]) -> str:
+    """Return the first agent with at least `EARLY` rows, all of them failed; "" if there is none."""
+    failed, succeeded = Counter(), set()
+    for row in rows:
+        if row["error"] is None:
+            succeeded.add(row["agent"])
+        else:
+            failed[row["agent"]] += 1
+    return next((agent for agent, n in failed.items() if n >= EARLY and agent not in succeeded), "")
+
+
+def describe_failure(error: str) -> str:
+    """Return the exception of a traceback and its place in code outside this package."""
+    exception = error.strip().splitlines()[-1].strip()
+    frames = _FRAME.findall(error)
+    own = [frame for frame in frames if not frame[0].startswith(_PACKAGE) and "site-packages" not in frame[0]]
+    place = ""
+    if frames:
+        file, line, function = (own or frames)[-1]
+        place = f" at {_short(file)}:{line} in {function}"
+    return f"{exception}{place}"
+
+
+def _short(file: str) -> str:
+    """Return a path relative to the working directory, if it is in it."""
+    path = Path(file)
+    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else file
+
+
 INTERRUPTED = "interrupted"
+
+
+def check_trust(agents: Iterable[str], source: Path, trust: bool) -> None:
+    """Print the modules and policy files that agents load, one line each to stderr.
+
+    Args:
+        agents: Agent strings.
+        source: File that names the agents.
+        trust: Whether the user trusts this file.
+
+    Raises:
+        ValueError: If the user does not trust the file and an agent loads code from outside this package.
+    """
+    for agent in agents:
+        code = outside_code(agent)
+        if code is None:
+            continue
+        if not trust:
+            raise ValueError(
+                f"{str(source)!r} names agent {agent!r}, which runs the code of {code}; if you trust it, "
+                "add --trust"
+            )
+        print(f"lgmd-gym: loading {code}, named in {str(source)!r}", file=sys.stderr)
 
 
 class Run:

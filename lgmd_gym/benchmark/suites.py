@@ -1,162 +1,88 @@
-"""Suites: named, frozen lists of cases. Case names are in km/h, arguments in SI units."""
+"""Suites: the shipped ones, and a user's own as TOML or JSON, strictly checked.
 
-from dataclasses import dataclass
+Case names are in km/h, arguments in SI units. A suite file:
 
-from lgmd_gym.benchmark.case import Case, level_case, make_case, speed_cases
-from lgmd_gym.benchmark.protocols.car_to_car_2023 import braking_lead, ncap2023
-from lgmd_gym.benchmark.protocols.frontal_2026 import ncap2026, ncap2026_extended, ncap2026_robustness
-from lgmd_gym.benchmark.protocols.regulations import (
-    fmvss127,
-    fmvss127_pedestrian,
-    nhtsa_manoeuvres,
-    r152,
-    r152_vru,
+name = "mine"
+about = "dark cars, by day"
+module = "my_scenarios"             # or "my_scenarios:MyFamily", see `import_families`; optional
+
+[[cases]]
+family = "CCRs"
+speeds_kmh = [10, 20, 30]           # cases mine/CCRs/v10/dark, ...; arguments in SI units
+name = "dark"
+arguments = { shade = 40 }
+
+[[cases]]
+family = "CutIn"                    # all combinations: mine/CutIn/v70/gap6m/excess-10.8kmh, ...
+sweep.ego_speed = { start = 19.444, stop = 25.0, step = 2.778 }     # includes 25.0
+sweep.gap = [6, 8, 10]
+sweep.excess = [-3.0, -6.0]
+
+[[cases]]
+family = "CCRm"
+name = "warned"                     # mine/CCRm/warned
+fcw_driver = true
+arguments = { ego_speed = 13.89, target_speed = 5.56 }
+
+[[cases]]
+family = "parked"                   # any name
+name = "v30"                        # mine/parked/v30
+arguments = { condition = "night" }
+[cases.scenario]                    # a scenario of one's own, see `lgmd_gym.envs.families.data`
+ego_speed = 8.33
+duration = 9.0
+actors = [{ gap = 40.0, lateral_offset = 1.0 }]
+
+
+Scenario files: one scenario as TOML or JSON, a family with arguments or explicit actors.
+
+family = "CutIn"                    # a family of this package or of `module`
+arguments = { ego_speed = 19.44, gap = 8.0, excess = -5.56 }    # optional, in SI units
+name = "close"                      # last part of the case's name; optional
+module = "my_scenarios"             # see `import_families`; optional
+
+or
+
+[scenario]                          # see `lgmd_gym.envs.families.data`
+ego_speed = 19.44
+duration = 9.0
+actors = [{ gap = 40.0, lateral_offset = 1.0 }]
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from lgmd_gym.benchmark.case import TRAFFIC, Case, Suite, file_name, scenario_case
+from lgmd_gym.benchmark.case_table import check_table, read_cases, read_data, read_name
+from lgmd_gym.benchmark.extensions import provided
+from lgmd_gym.benchmark.protocols import load_suites
+from lgmd_gym.envs.dynamics.units import KMH
+from lgmd_gym.envs.families import FAMILIES
+from lgmd_gym.envs.families.scenario import Scenario
+from lgmd_gym.envs.registration import (
+    RANDOM,
+    SCENARIO,
+    SCENARIO_ARGUMENT,
+    import_families,
+    is_own,
+    make_source,
 )
-from lgmd_gym.benchmark.protocols.vulnerable_2023 import ncap2023_vru
-from lgmd_gym.benchmark.protocols.without_target import SUFFIX, without_targets
-from lgmd_gym.errors import check_known, check_text, unknown_name
-
-TRAFFIC = "traffic"  # the suite without cases, see `lgmd_gym.benchmark.traffic`
-RANDOM_LEVELS = 60
-SIDES = ("left", "right")
-
-
-@dataclass(frozen=True, slots=True)
-class Suite:
-    """A named list of cases.
-
-    Attributes:
-        name: Name of the suite, the first part of every case name.
-        cases: Cases in the order in which they run.
-        about: One line on its source and limits.
-    """
-
-    name: str
-    cases: tuple[Case, ...]
-    about: str
-
-
-def _quick() -> tuple[Case, ...]:
-    """Return a few cases of the simplest families, for a first run."""
-    return (
-        *speed_cases("quick", "CCRs", [10, 20, 30, 40, 50]),
-        *speed_cases("quick", "CCRm", [30, 50, 70]),
-        *braking_lead("quick"),
-        *speed_cases("quick", "AdjacentPass", [50]),
-        *speed_cases("quick", "Following", [30, 50, 80]),
-        *speed_cases("quick", "EmptyRoad", [30, 50, 80]),
-    )
-
-
-def _speeds() -> tuple[Case, ...]:
-    """Return aligned approaches and driving without a threat over the whole range of speeds."""
-    return (
-        *speed_cases("speeds", "CCRs", list(range(10, 85, 5))),
-        *speed_cases("speeds", "CCRm", list(range(30, 85, 10))),
-        *braking_lead("speeds"),
-        *speed_cases("speeds", "AdjacentPass", list(range(30, 90, 10))),
-        *speed_cases("speeds", "Following", list(range(30, 120, 20))),
-        *speed_cases("speeds", "EmptyRoad", list(range(30, 120, 20))),
-    )
-
-
-def _false_reaction() -> tuple[Case, ...]:
-    """Return cases in which braking is a false activation."""
-    suite = "false-reaction"
-    turns: list[Case] = []
-    for family in ("TurnBeforeOncoming", "LeadTurnsOff", "CurveObjectOutside"):
-        for side in SIDES:
-            turns.append(make_case(suite, family, side, left=side == "left"))
-    return (
-        *turns,
-        *(make_case(suite, "LaneClosure", f"v40/{side}", left=side == "left") for side in SIDES),
-        *speed_cases(suite, "PassBetween", [60], inner_gap=4.5),  # GB 39901-2025
-        *speed_cases(suite, "PassBetween", [80], wheel_gap=4.5),  # 49 CFR 571.127 S9.3
-        *speed_cases(suite, "SteelPlate", [60, 80]),
-        *speed_cases(suite, "Overtaken", [50, 80, 110]),
-        *speed_cases(suite, "Oncoming", [50, 80]),
-        *speed_cases(suite, "AdjacentPass", [40, 60, 80], tail="/queue6", cars=6),
-        *speed_cases(suite, "AdjacentPass", [40, 60, 80], tail="/right", lateral_offset=-3.5),
-        *speed_cases(suite, "Following", [30, 50, 80, 100]),
-        *speed_cases(suite, "CutOut", [50, 80]),
-        *speed_cases(suite, "BridgeShadow", [50, 80]),
-        *speed_cases(suite, "EmptyRoad", [30, 50, 80, 110]),
-        *(make_case(suite, "CurveGuardRail", f"v50/{side}", left=side == "left") for side in SIDES),
-    )
-
-
-def _near_miss() -> tuple[Case, ...]:
-    """Return near misses that resolve without braking."""
-    suite = "near-miss"
-    return (
-        *speed_cases(suite, "BrakeRelease", [50, 80]),
-        *speed_cases(suite, "BrakeRelease", [50, 80], tail="/shadow", shadow_length=12.0),
-        *speed_cases(suite, "CutIn", [50, 80]),
-        *speed_cases(suite, "CrossingClears", [30, 40, 50], tail="/right", side="right"),
-        *speed_cases(suite, "CrossingClears", [30, 40, 50], tail="/left", side="left"),
-        *speed_cases(suite, "PedestrianPass", [30, 50]),
-        *speed_cases(suite, "BicyclePass", [30, 50]),
-    )
-
-
-_ALL = (
-    Suite("quick", _quick(), "a few cases of the simplest families, for a first run"),
-    Suite("speeds", _speeds(), "aligned approaches and driving without a threat at all speeds"),
-    Suite(
-        "ncap2023",
-        ncap2023(),
-        "Euro NCAP AEB Car-to-Car 2023: CCRs, CCRm, CCRb, CCCscp, CCFtap, CCFhos, CCFhol",
-    ),
-    Suite("ncap2023-vru", ncap2023_vru(), "Euro NCAP AEB VRU 2023: pedestrians, bicycles, CMFtap, by day"),
-    Suite(
-        "ncap2026",
-        ncap2026(),
-        "Euro NCAP Frontal Collisions 2026: standard range",
-    ),
-    Suite("ncap2026-extended", ncap2026_extended(), "Euro NCAP Frontal Collisions 2026: extended range"),
-    Suite(
-        "ncap2026-robustness",
-        ncap2026_robustness(),
-        "Euro NCAP Frontal Collisions 2026: public part of the robustness layer",
-    ),
-    Suite(
-        "r152",
-        r152(),
-        "UN R152 car-to-car tests, for the impact-speed limits of 5.2.1.4 only",
-    ),
-    Suite(
-        "fmvss127",
-        fmvss127(),
-        "49 CFR 571.127 lead-vehicle tests without manual braking, without its warning requirement",
-    ),
-    Suite("r152-vru", r152_vru(), "UN R152 pedestrian and bicycle tests, for the impact-speed limits only"),
-    Suite(
-        "fmvss127-pedestrian",
-        fmvss127_pedestrian(),
-        "49 CFR 571.127 pedestrian tests by day and with the lower and the upper beam",
-    ),
-    Suite(
-        "nhtsa-false-activation",
-        nhtsa_manoeuvres(),
-        "seven track manoeuvres of NHTSA in which braking is a false activation",
-    ),
-    Suite("false-reaction", _false_reaction(), "driving in which braking is a false activation"),
-    Suite("near-miss", _near_miss(), "near misses that resolve without braking"),
-    *(
-        Suite(
-            name + SUFFIX,
-            without_targets(name, cases),
-            f"the cases of {name} without their targets, in the same worlds; braking is a false activation",
-        )
-        for name, cases in (("ncap2023", ncap2023()), ("ncap2023-vru", ncap2023_vru()))
-    ),
-    Suite(
-        "random",
-        tuple(level_case("random", "test", number) for number in range(RANDOM_LEVELS)),
-        "test levels of RandomBraking, light and weather included; levels are fixed, so use --seeds 1",
-    ),
+from lgmd_gym.errors import (
+    check_items,
+    check_keys,
+    check_known,
+    check_path,
+    check_text,
+    counted,
+    unknown_name,
 )
-SUITES: dict[str, Suite] = {suite.name: suite for suite in _ALL}
+from lgmd_gym.processes.files import check_output_file, complete_file
+
+SUITES = load_suites()
 
 
 def find_suite(name: str) -> Suite:
@@ -179,3 +105,330 @@ def find_case(name: str) -> Case:
     known = {case.name: case for suite in SUITES.values() for case in suite.cases}
     check_known("case", name, known, "lgmd-gym list cases prints all names")
     return known[name]
+
+
+TEMPLATE = """\
+# A scenario of lgmd-gym. Units: m, m/s, s, rad; 70 km/h is 19.44 m/s, 50 km/h is 13.89 m/s.
+#   lgmd-gym scenario show FILE      draw it
+#   lgmd-gym drive FILE              run one episode
+#   lgmd-gym bench --suite FILE      run agents on it
+# For sweeps, write a suite file with [[cases]] tables.
+
+# name = "close"                     # last part of the case's name; without it the speed, as in "v70"
+
+# Either a family with arguments (lgmd-gym list envs):
+# family = "CutIn"
+# arguments = { ego_speed = 19.44, gap = 8.0, excess = -5.56 }
+
+# or the ego's script and all actors:
+family = "own"                       # any name
+
+[scenario]
+ego_speed = 19.44
+duration = 12.0                      # the episode ends earlier at contact or standstill
+# ego_profile = [{ start = 2.0, acceleration = -1.0, final_speed = 15.0 }]
+# ego_path = [{ length = 50.0 }, { length = 30.0, curvature = 0.01 }]
+# road = { kind = "straight", lanes = 3, ego_lane = 1 }     # or "two-way", "curve", "crossing"
+
+[[scenario.actors]]                  # the first actor is the target of the benchmark's rows
+gap = 30.0                           # from the ego's front bumper to the actor's rear
+lateral_offset = 3.5                 # centre to centre, + left; a lane is 3.5 m wide
+speed = 13.89
+# A lane change to the right, 44 m long, after 50 m straight ahead; curvature in 1/m, + left:
+path = [
+    { length = 50.0 },
+    { length = 11.0, end_curvature = -0.0145 },
+    { length = 11.0, curvature = -0.0145, end_curvature = 0.0 },
+    { length = 11.0, end_curvature = 0.0145 },
+    { length = 11.0, curvature = 0.0145, end_curvature = 0.0 },
+]
+# heading = 0.0                      # relative to the ego's, + left
+# shade = 40                         # grey level in [0, 255]; without it drawn from the seed
+
+[[scenario.actors]]
+gap = 60.0
+speed = 19.44
+length = 12.0                        # a truck; the default is a car of 4.023 x 1.712 x 1.427 m
+width = 2.5
+height = 3.5
+# kind = "car"                       # or "box", "road_marking", "pedestrian", "bicycle", "motorcycle"
+profile = [{ start = 4.0, acceleration = -3.0, final_speed = 8.0 }]     # build_up = 0.5: a ramp
+"""
+
+
+def write_template(path: Path | str, force: bool = False) -> Path:
+    """Write the template of a scenario file; return its path.
+
+    Args:
+        path: File to write (".toml").
+        force: Whether to replace an existing file.
+
+    Raises:
+        ValueError: If the file exists or cannot be created, or its name does not end in ".toml".
+    """
+    path = check_path("path", path)
+    if path.suffix != ".toml":
+        raise ValueError(f"a scenario template must have the suffix .toml, got {path.name!r}")
+    check_output_file(path, "scenario file", force)
+    with complete_file(path) as part:
+        part.write_text(TEMPLATE, encoding="utf-8")
+    return path
+
+
+SCENARIO_KEYS = ("name", "module", "family", "arguments", "scenario", "fcw_driver")
+OWN = "scenarios"  # name of a suite of scenarios without a file
+
+
+def is_scenario(values: dict[str, Any]) -> bool:
+    """Return whether the values of a file are those of a scenario file instead of a suite file."""
+    return "cases" not in values and ("family" in values or "scenario" in values)
+
+
+def read_scenario(path: Path, values: dict[str, Any]) -> Case:
+    """Return the case `stem/family/name` of a scenario file; without a name it contains the ego's speed.
+
+    Raises:
+        ValueError: If a key is unknown or a value is invalid.
+    """
+    for key in ("sweep", "speeds_kmh"):
+        if key in values:
+            raise ValueError(
+                f"a scenario file has one scenario; write {key} in a [[cases]] table of a suite file"
+            )
+    check_table("a scenario file", values, SCENARIO_KEYS)
+    suite, given = file_name(path.stem), values.get("scenario")
+    table = {key: value for key, value in values.items() if key != "module"}
+    if "family" not in table:
+        table["family"] = given.get("family", suite) if isinstance(given, dict) else suite
+    (case,) = read_cases(suite, {"name": "unnamed"} | table)
+    if "name" in values:
+        return case
+    return replace(case, variant=speed_name(case.scenario))
+
+
+def own_case(scenario: Scenario) -> Case:
+    """Return the case `scenarios/family/v70` of a scenario, with the ego's speed in km/h."""
+    return scenario_case(OWN, speed_name(scenario), scenario)
+
+
+def distinct(cases: Sequence[Case]) -> tuple[Case, ...]:
+    """Return cases of the suite `scenarios`; the second of equal names gets "/2", and so on."""
+    seen: dict[tuple[str, str], int] = {}
+    named = []
+    for case in cases:
+        key = case.family, case.variant
+        seen[key] = seen.get(key, 0) + 1
+        variant = case.variant if seen[key] == 1 else f"{case.variant}/{seen[key]}"
+        named.append(replace(case, suite=OWN, variant=variant))
+    return tuple(named)
+
+
+def speed_name(scenario: Scenario) -> str:
+    """Return the ego's initial speed in km/h as part of a name, such as "v70"."""
+    return f"v{scenario.ego_speed / KMH:.3g}"
+
+
+SUITE_KEYS = ("name", "about", "module", "cases")
+DATA_FILES = (".toml", ".json")
+OPENSCENARIO = ".xosc"
+FILES = (*DATA_FILES, OPENSCENARIO)
+FILE_KIND = "suite or scenario file"
+MAX_LISTED = 10  # cases that a message lists
+Source = str | Scenario | tuple[str | Scenario, ...]
+"""What `get_suite` reads: a name, a path, a scenario, or several paths and scenarios."""
+
+
+def is_file(suite: Source) -> bool:
+    """Return whether a suite is given by files, a folder or scenarios instead of a name."""
+    if not isinstance(suite, str) or suite.endswith(FILES):
+        return True
+    try:
+        return bool(suite) and suite not in (*SUITES, TRAFFIC) and Path(suite).is_dir()
+    except (OSError, ValueError):  # no path, such as a very long name
+        return False
+
+
+def get_suite(source: Source, modules: tuple[str, ...] = ()) -> Suite:
+    """Return a suite.
+
+    Args:
+        source: Name of a suite; path of a suite file or scenario file (".toml" or ".json") or of an
+            OpenSCENARIO file (".xosc"); path of a folder with OpenSCENARIO files; a `Scenario`; or several
+            paths and scenarios.
+        modules: Modules with scenario families of the user, see `import_families`; code from outside this
+            package runs only if it is named here.
+
+    Raises:
+        ValueError: If the name is unknown, a file is not a valid suite or scenario, or a module cannot be
+            imported.
+    """
+    import_families(modules)
+    if isinstance(source, tuple):
+        return _combine(source, modules)
+    if isinstance(source, Scenario):
+        return _combine((source,), modules)
+    if check_text("suite", source).endswith(DATA_FILES):
+        return load_suite(check_path("suite", source), modules)
+    return _read_scenarios([source]) if is_file(source) else find_suite(source)
+
+
+def _read_scenarios(paths: list[str]) -> Suite:
+    """Return the suite of OpenSCENARIO files and folders."""
+    return provided(OPENSCENARIO)(paths)
+
+
+def find_own_case(source: Source, name: str | None = None, modules: tuple[str, ...] = ()) -> Case:
+    """Return one case of a suite that is given by files or scenarios.
+
+    Args:
+        source: See `get_suite`.
+        name: Name of the case, with or without the name of the suite; None if there is only one.
+        modules: See `get_suite`.
+
+    Raises:
+        ValueError: See `get_suite`; or if the name is unknown, or missing although there are several cases.
+    """
+    suite = get_suite(source, modules)
+    cases = {case.name: case for case in suite.cases}
+    if name is not None:
+        full = name if name in cases else f"{suite.name}/{name}"
+        return cases[check_known("case", full, cases)]
+    if len(cases) > 1:
+        listed = ", ".join([*cases][:MAX_LISTED]) + (", ..." if len(cases) > MAX_LISTED else "")
+        raise ValueError(f"{suite.name!r} has {len(cases)} cases; choose one with --case NAME: {listed}")
+    return suite.cases[0]
+
+
+def _combine(sources: tuple[str | Scenario, ...], modules: tuple[str, ...]) -> Suite:
+    """Return the suite of several files, folders and scenarios."""
+    for source in sources:
+        if not isinstance(source, Scenario) and not is_file(check_text("suite", source)):
+            raise ValueError(
+                f"of several suites each must be a file {FILES}, a folder or a Scenario, got {source!r}"
+            )
+    texts = [source for source in sources if isinstance(source, str) and not source.endswith(DATA_FILES)]
+    if len(texts) == len(sources):
+        return _read_scenarios(texts)
+    cases: list[Case] = []
+    for source in sources:
+        cases += [own_case(source)] if isinstance(source, Scenario) else get_suite(source, modules).cases
+    return Suite(name=OWN, cases=distinct(cases), about=counted(len(cases), "scenario"))
+
+
+def declared_modules(suite: str) -> tuple[str, ...]:
+    """Return the modules that a suite or scenario file names; none for others. They are not imported.
+
+    Raises:
+        ValueError: If the file cannot be read, or `module` is not a string or a list of strings.
+    """
+    if not suite.endswith(DATA_FILES):
+        return ()
+    path = check_path("suite", suite)
+    return _modules_of(path, read_data(path, FILE_KIND))
+
+
+def _modules_of(path: Path, values: dict[str, Any]) -> tuple[str, ...]:
+    given = values.get("module", [])
+    try:
+        return check_items("module", [given] if isinstance(given, str) else given, str, "strings")
+    except ValueError as error:
+        raise ValueError(f"{FILE_KIND} {str(path)!r}: {error}") from None
+
+
+def load_suite(path: Path, modules: tuple[str, ...] = ()) -> Suite:
+    """Read a suite or scenario file and build every case once, to find invalid values before an episode.
+
+    Args:
+        path: Suite file or scenario file.
+        modules: See `get_suite`; they must include those that the file names.
+
+    Raises:
+        ValueError: If the file cannot be read, a key, family or argument is unknown, a value is out of
+            range, a case is defined twice, or the file names another module.
+    """
+    values = read_data(path, FILE_KIND)
+    declared = _modules_of(path, values)
+    _check_named(declared, modules, path)
+    import_families(declared)
+    kind = "scenario file" if is_scenario(values) else "suite file"
+    try:
+        if is_scenario(values):
+            case = read_scenario(path, values)
+            _check_cases((case,))
+            return Suite(name=case.suite, cases=(case,), about=f"scenario file {path.name}")
+        check_keys("key of a suite", values, SUITE_KEYS)
+        name = read_name(values, "name")
+        if name in SUITES or name == TRAFFIC:
+            raise ValueError(f"name {name!r} is the name of a shipped suite; choose another")
+        tables = values.get("cases")
+        if not isinstance(tables, list) or not tables:
+            raise ValueError("cases must contain at least one [[cases]] table")
+        cases = tuple(case for table in tables for case in read_cases(name, table))
+        _check_cases(cases)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{kind} {str(path)!r}: {error}") from None
+    return Suite(name=name, cases=cases, about=str(values.get("about", "user suite")))
+
+
+def _check_cases(cases: tuple[Case, ...]) -> None:
+    """Raise ValueError if two cases have the same name, or the scenario of one is invalid."""
+    names: set[str] = set()
+    for case in cases:
+        if case.name in names:
+            raise ValueError(f"case {case.name!r} is defined twice; rename one of them")
+        names.add(case.name)
+        try:
+            make_source(case.environment, dict(case.arguments))
+        except (TypeError, ValueError) as error:
+            text = str(error)
+            if case.environment not in (*FAMILIES, RANDOM, SCENARIO) and not text.endswith("?"):
+                text += "; a family of your own requires module = 'my_scenarios' in the file"
+            raise ValueError(f"case {case.name!r}: {text}") from None
+
+
+def copy_suite(source: Source | Path, target: Path, modules: tuple[str, ...] = ()) -> None:
+    """Write a suite given by files or scenarios to a suite file, with one table per case.
+
+    The scenarios of OpenSCENARIO files and of the user's families become data, so that neither a run nor its
+    worker processes need their sources again.
+    """
+    suite = get_suite(str(source) if isinstance(source, Path) else source, modules)
+    tables = []
+    for case in map(_with_data, suite.cases):
+        arguments = dict(case.arguments)
+        scenario = arguments.pop(SCENARIO_ARGUMENT, None) if case.environment == SCENARIO else None
+        family = case.environment if scenario is None else case.family
+        table: dict[str, Any] = {"family": family, "name": case.variant}
+        table |= {"fcw_driver": True} if case.fcw_driver else {}
+        table |= {"arguments": arguments} if arguments else {}
+        tables.append(table | ({} if scenario is None else {"scenario": scenario}))
+    text = tomli_w.dumps({"name": suite.name, "about": suite.about, "cases": tables})
+    target.write_text(text, encoding="utf-8")
+
+
+def _with_data(case: Case) -> Case:
+    """Return a case of a user's family as a case with a given scenario."""
+    if case.environment not in FAMILIES or not is_own(case.environment):
+        return case
+    return scenario_case(case.suite, case.variant, case.scenario, case.fcw_driver, **case.appearance)
+
+
+def _check_named(declared: Iterable[str], named: Iterable[str], source: Path) -> None:
+    """Check that the user has named the modules with scenario families that a file declares.
+
+    Args:
+        declared: "MODULE" or "MODULE:NAME" in the file.
+        named: Those that the user has named.
+        source: The file.
+
+    Raises:
+        ValueError: If the user has not named one.
+    """
+    known = {text.partition(":")[0] for text in named}
+    for text in declared:
+        module = text.partition(":")[0]
+        if module not in known:
+            raise ValueError(
+                f"{str(source)!r} names module {module!r}, whose code would run; if you trust it, add "
+                f"--module {module} or --trust (in Python, modules=[{module!r}])"
+            )

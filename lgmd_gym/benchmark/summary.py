@@ -1,13 +1,12 @@
-"""Summaries of a run's rows, with an interval for every rate."""
+"""CSV files of a run's rows: one line per episode, and summaries with an interval for every rate."""
 
 import csv
-import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.case import Row, case_order
 from lgmd_gym.errors import counted
 from lgmd_gym.processes.files import complete_file
 from lgmd_gym.statistics.intervals import Mean, Rate, cluster_mean
@@ -110,6 +109,12 @@ def cases_and_worlds(rows: Iterable[Row]) -> tuple[list[str], list[int | None]]:
     return [case for case, _ in pairs], [world for _, world in pairs]
 
 
+def interval_text(item: Sequence[Any], style: str, scale: float = 1.0) -> str:
+    """Return a value with its interval, if it has one."""
+    value, *bounds = (f"{scale * x:{style}}" for x in item[:3] if x is not None)
+    return f"{value} [{','.join(bounds)}]" if bounds else value
+
+
 def summaries(rows: Iterable[Row], group: Callable[[Row], str]) -> list[AgentSummary]:
     """Return one summary per agent and group, see `by_agent`."""
     return [summarise(agent, name, part) for (agent, name), part in by_agent(rows, group).items()]
@@ -129,12 +134,6 @@ def by_condition(rows: Iterable[Row]) -> dict[str, list[Row]]:
     for row in rows:
         parts.setdefault(row["condition"], []).append(row)
     return parts
-
-
-def case_order(case: str) -> list[tuple[int, str]]:
-    """Return a sort key that compares numbers in a case name by value: v5 before v10."""
-    parts = re.split(r"(\d+)", case)
-    return [(int(part), "") if part.isdigit() else (0, part) for part in parts]
 
 
 def without_fcw_driver(rows: Iterable[Row]) -> list[Row]:
@@ -190,3 +189,71 @@ def _bound(rate: Rate, bound: str) -> str:
 
 def _round(value: float | None) -> str:
     return "" if value is None else f"{value:.4f}"
+
+
+FILE = "episodes.csv"
+# Key of a row -> unit at the end of its column name; keys that are absent have no unit or name it themselves.
+UNITS = {
+    "test_speed": "m_s",
+    "test_target_speed": "m_s",
+    "ego_speed": "m_s",
+    "target_speed": "m_s",
+    "impact_speed": "m_s",
+    "relative_impact_speed": "m_s",
+    "speed_reduction": "m_s",
+    "ttc_at_alert": "s",
+    "distance_at_alert": "m",
+    "warning_lead_time": "s",
+    "ttc_at_brake": "s",
+    "distance_at_brake": "m",
+    "drac_at_brake": "m_s2",
+    "max_drac": "m_s2",
+    "min_ttc": "s",
+    "stopping_margin": "m",
+    "peak_deceleration": "m_s2",
+    "distance": "m",
+    "duration": "s",
+    "moving_time": "s",
+    "needed_time": "s",
+    "fps": "hz",
+}
+
+
+def column_name(key: str) -> str:
+    """Return the column of a row key.
+
+    Example:
+        >>> column_name("impact_speed"), column_name("case"), column_name("theta_at_alert_deg")
+        ('impact_speed_m_s', 'case', 'theta_at_alert_deg')
+    """
+    return f"{key}_{UNITS[key]}" if key in UNITS else key
+
+
+def write_episodes(rows: Sequence[Row], path: Path) -> None:
+    """Write rows to a CSV file, one line each, ordered by condition, case, agent and seed.
+
+    Null is an empty field, booleans are `true` and `false`, and `error` is the last line of the traceback.
+
+    Args:
+        rows: Rows of one run, at least one.
+        path: File to write; an existing one is replaced.
+    """
+    keys = list(rows[0])
+    lines = ([_field(key, row[key]) for key in keys] for row in sorted(rows, key=_order))
+    write_csv(path, [column_name(key) for key in keys], lines)
+
+
+def _order(row: Row) -> tuple[Any, ...]:
+    """Return the place of a row, which does not depend on the time at which its episode finished."""
+    return row["condition"], case_order(row["case"]), row["agent"], row["seed"]
+
+
+def _field(key: str, value: Any) -> Any:
+    """Return a value as the field of a CSV file."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if key == "error":
+        return next(reversed(str(value).strip().splitlines()), "")
+    return value

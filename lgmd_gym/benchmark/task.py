@@ -7,17 +7,14 @@ from typing import Any
 import numpy as np
 
 from lgmd_gym.agents import Agent, make_agent
-from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.case import NO_BRAKE, Case, Row, RowKey, new_row
 from lgmd_gym.benchmark.episode import Episode, make_env, play
 from lgmd_gym.benchmark.fcw_driver import FCWDriver
-from lgmd_gym.benchmark.metrics import Counterfactual
-from lgmd_gym.benchmark.rows import KEYS, Row, RowKey, make_row, new_row
+from lgmd_gym.benchmark.metrics import KEYS, Counterfactual, make_row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.registration import RANDOM
-
-NO_BRAKE = "no-brake"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +47,7 @@ class Task:
         chosen: dict[str, Any] = {} if self.road is None else {"road": self.road}
         if self.world is None:
             chosen["world"] = LABORATORY
-        elif self.case.family != RANDOM:  # a level has a world and a condition of its own
+        elif self.case.environment != RANDOM:  # a level has a world and a condition of its own
             chosen |= {"world": self.world, "condition": self.condition}
         return chosen | dict(self.case.arguments)
 

@@ -87,11 +87,10 @@ class Bench:
 
 def run(options: Bench) -> int:
     """Run a suite and print its summary; return 0 if complete, 1 for failed episodes, 130 for Ctrl-C."""
-    from lgmd_gym.benchmark.failures import failure_lines
-    from lgmd_gym.benchmark.runner import INTERRUPTED
-    from lgmd_gym.benchmark.stored_run import ROWS_FILE
+    from lgmd_gym.benchmark.run_folder import ROWS_FILE
+    from lgmd_gym.benchmark.runner import INTERRUPTED, failure_lines
     from lgmd_gym.processes.pool import Executor
-    from lgmd_gym.report.outputs import write_outputs
+    from lgmd_gym.report.page import write_outputs
 
     console = make_console()
     executor = Executor(options.jobs, _cluster(options))
@@ -127,7 +126,7 @@ def run(options: Bench) -> int:
 def _print_stop(benchmark: "Run", console: Console) -> None:
     """Print why a run stopped early, and how to go on."""
     from lgmd_gym.agents.registry import outside_code
-    from lgmd_gym.benchmark.failures import failing_agent
+    from lgmd_gym.benchmark.runner import failing_agent
 
     kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
     resume = f"continue with lgmd-gym bench --resume {benchmark.folder.path}"
@@ -165,8 +164,7 @@ def _resume(options: Bench, executor: "Executor", console: Console) -> "Run":
 def _new(options: Bench, executor: "Executor") -> "Run":
     from lgmd_gym.agents.registry import make_agent
     from lgmd_gym.benchmark.config import RunConfig
-    from lgmd_gym.benchmark.runner import Run
-    from lgmd_gym.benchmark.trust import check_trust
+    from lgmd_gym.benchmark.runner import Run, check_trust
 
     names = (
         "suite",
@@ -205,12 +203,12 @@ def _print_tables(benchmark: "Run", console: Console) -> None:
     from lgmd_gym.benchmark.suites import TRAFFIC
     from lgmd_gym.benchmark.summary import by_condition
     from lgmd_gym.benchmark.task import NO_BRAKE
-    from lgmd_gym.benchmark.traffic.tables import traffic_table
+    from lgmd_gym.benchmark.traffic.summary import traffic_table
 
     config, suite = benchmark.config, benchmark.plan.suite
     for condition, rows in by_condition(benchmark.rows).items():
         title = f"{_title(benchmark)}, {condition}"
-        if suite == TRAFFIC:
+        if suite.name == TRAFFIC:
             console.print(traffic_table(rows, list(config.agents), title))
             console.print(traffic_table(rows, list(config.agents), "by kind of traffic", by_kind=True))
             continue
@@ -231,7 +229,7 @@ def _title(benchmark: "Run") -> str:
     camera = f"camera {config.sensor_config.label}{rate}"
     worlds = f"up to {counted(config.worlds, 'world')}" if config.worlds else "the laboratory"
     seeds = f"{counted(config.seeds, 'seed')}{first} in {worlds}"
-    return f"{benchmark.plan.suite}: {camera}, T_sf = {level:g} spikes/s, {seeds}"
+    return f"{benchmark.plan.suite.name}: {camera}, T_sf = {level:g} spikes/s, {seeds}"
 
 
 @contextmanager
@@ -250,7 +248,7 @@ def _progress(benchmark: "Run") -> Iterator[Callable[[dict[str, Any]], None]]:
     tally = Tally(time.perf_counter())
     for row in benchmark.rows:
         tally.add(row, new=False)
-    done, total, suite = len(benchmark.rows), benchmark.total, benchmark.plan.suite
+    done, total, suite = len(benchmark.rows), benchmark.total, benchmark.plan.suite.name
     with Progress(*columns, console=Console(stderr=True), speed_estimate_period=60.0) as bar:
         task = bar.add_task(suite, total=total, completed=done, rate="", tally="")
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from lgmd_gym.benchmark.folder import provenance
+from lgmd_gym.benchmark.config import provenance
 from lgmd_gym.clips.batch import (
     ClipJob,
     ClipResult,

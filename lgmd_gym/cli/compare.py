@@ -43,9 +43,7 @@ def run(options: Compare) -> int:
 
 
 def _compare_pairs(options: Compare, console: Console) -> None:
-    from lgmd_gym.benchmark.analysis.compare import compare_runs
-    from lgmd_gym.benchmark.analysis.compare_tables import comparison_table
-    from lgmd_gym.benchmark.analysis.plots import difference_figure
+    from lgmd_gym.benchmark.analysis.compare import compare_runs, comparison_table, difference_figure
     from lgmd_gym.processes.files import check_new_file
 
     if options.out is not None:
@@ -59,8 +57,7 @@ def _compare_pairs(options: Compare, console: Console) -> None:
 
 
 def _compare_arms(options: Compare, arms: tuple[str, ...], console: Console) -> None:
-    from lgmd_gym.benchmark.analysis.compare_tables import arm_table
-    from lgmd_gym.benchmark.analysis.trainings import compare_arms
+    from lgmd_gym.benchmark.analysis.arms import arm_table, compare_arms
 
     others = {"a second run": options.run_b, "--agents": options.agents, "--out": options.out}
     if given := [name for name, value in others.items() if value is not None]:

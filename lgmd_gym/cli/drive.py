@@ -67,7 +67,7 @@ class Drive:
 def run(options: Drive) -> int:
     """Run one episode and print how it ended."""
     from lgmd_gym.agents import make_agent
-    from lgmd_gym.benchmark.failures import describe_failure
+    from lgmd_gym.benchmark.runner import describe_failure
     from lgmd_gym.benchmark.sensors import SensorConfig
     from lgmd_gym.rendering.playback import play_episode
 

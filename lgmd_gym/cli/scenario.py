@@ -69,7 +69,7 @@ def run(options: Scenario) -> int:
 
 
 def _new(options: Scenario) -> int:
-    from lgmd_gym.benchmark.scenario_template import write_template
+    from lgmd_gym.benchmark.suites import write_template
 
     if len(options.targets) > 1:
         raise ValueError(f"scenario new writes one file, got {len(options.targets)}: {options.targets}")
@@ -79,10 +79,9 @@ def _new(options: Scenario) -> int:
 
 
 def _show(options: Scenario) -> int:
-    from lgmd_gym.benchmark.case import Case
+    from lgmd_gym.benchmark.case import Case, file_name
     from lgmd_gym.envs.motion import record_motion
-    from lgmd_gym.openscenario.names import file_name
-    from lgmd_gym.plotting.scenario_figure import scenario_figure
+    from lgmd_gym.plotting.figures import scenario_figure
     from lgmd_gym.processes.files import check_output_file
     from lgmd_gym.rendering.playback import make_target
 

@@ -98,7 +98,7 @@ def chosen_modules(sources: tuple[str, ...], named: tuple[str, ...] | None, trus
         named: Modules of `--module`.
         trust: Whether to add those that the files name; each is printed to stderr.
     """
-    from lgmd_gym.benchmark.suite_file import declared_modules
+    from lgmd_gym.benchmark.suites import declared_modules
 
     modules = list(named or ())
     for source in sources if trust else ():
@@ -121,7 +121,7 @@ def find_target(target: str, case: str | None, named: tuple[str, ...] | None, tr
     Raises:
         ValueError: See `find_own_case`; or for a name of a case although the target is no file.
     """
-    from lgmd_gym.benchmark.suite_file import find_own_case, is_file
+    from lgmd_gym.benchmark.suites import find_own_case, is_file
     from lgmd_gym.envs import import_families
 
     modules = chosen_modules((target,), named, trust)

@@ -5,6 +5,9 @@ are not used: scenariogeneration only writes files and needs SciPy, pyxodr needs
 the ASAM checkers (asam-qc-openscenarioxml, asam-qc-opendrive) find faults but resolve no positions.
 """
 
-from lgmd_gym.openscenario.reader import read, read_all
+from lgmd_gym.benchmark.extensions import provide
+from lgmd_gym.openscenario.reader import SUFFIX, read, read_all
 
 __all__ = ["read", "read_all"]
+
+provide(SUFFIX, read_all)

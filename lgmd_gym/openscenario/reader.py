@@ -1,18 +1,82 @@
 """Reading of OpenSCENARIO XML 1.1 to 1.3 as suites."""
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from os.path import normpath
 from pathlib import Path
 
-from lgmd_gym.benchmark.case import Case, scenario_case
-from lgmd_gym.benchmark.suites import Suite
+from lgmd_gym.benchmark.case import Case, Suite, file_name, scenario_case
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.errors import check_path, counted
 from lgmd_gym.openscenario.compiler import Compiled, compile_scenario
-from lgmd_gym.openscenario.names import file_name, variants
 from lgmd_gym.openscenario.nodes import Element, Node, parse_file
 from lgmd_gym.openscenario.parameters import Assignment, declare, variations
+
+_SHORT = (
+    (re.compile(r"Ego_(final_?|init_?)?speed(_kph)?", re.I), "v"),
+    (re.compile(r"\w+_(final_?|init_?)?speed(_kph)?", re.I), "target"),
+    (re.compile(r"ImpactLocation", re.I), "impact"),
+    (re.compile(r"\w*overlap", re.I), "overlap"),
+    (re.compile(r"\w*headway", re.I), "headway"),
+    (re.compile(r"\w*deceleration", re.I), "decel"),
+    (re.compile(r"ImpactSide", re.I), "side"),
+)
+_FIRST = ("v", "target", "overlap", "impact", "headway", "decel")
+
+
+def short_name(parameter: str) -> str:
+    """Return the short name of a parameter, such as "v" for the ego's speed."""
+    for pattern, short in _SHORT:
+        if pattern.fullmatch(parameter):
+            return short
+    return file_name(parameter.split("_")[-1]).lower()
+
+
+def variants(cells: Sequence[dict[str, str]], speeds: Sequence[float]) -> list[str]:
+    """Return a name for each cell; all names are different.
+
+    A name contains the ego's speed in km/h and the values of the parameters that, together with it,
+    distinguish the cells; parameters that vary along with them are left out.
+
+    Args:
+        cells: Values of the varied parameters of each cell; the keys of all cells are the same.
+        speeds: Initial ego speed of each cell [m/s].
+    """
+    parts: list[list[str]] = [[f"v{_number(speed * 3.6)}"] for speed in speeds]
+    names = list(cells[0]) if cells else []
+    names.sort(key=lambda name: _rank(name, cells[0][name]))
+    for name in names:
+        if short_name(name) == "v" or len({cell[name] for cell in cells}) == 1:
+            continue
+        longer = [[*part, _text(name, cell[name])] for part, cell in zip(parts, cells, strict=True)]
+        if len({*map(tuple, longer)}) > len({*map(tuple, parts)}):
+            parts = longer
+    found = ["/".join(part) for part in parts]
+    seen: dict[str, int] = {}
+    for index, name in enumerate(found):
+        seen[name] = seen.get(name, 0) + 1
+        if seen[name] > 1:
+            found[index] = f"{name}/{seen[name]}"
+    return found
+
+
+def _rank(name: str, value: str) -> int:
+    """Return the place of a parameter in names: known ones first, paths of files last."""
+    short = short_name(name)
+    return _FIRST.index(short) if short in _FIRST else len(_FIRST) + ("/" in value)
+
+
+def _text(name: str, value: str) -> str:
+    try:
+        return f"{short_name(name)}{_number(float(value))}"
+    except ValueError:
+        return file_name(value.rsplit("/", 1)[-1].rsplit("_", 1)[-1]).lower()
+
+
+def _number(value: float) -> str:
+    return f"{round(value, 6):g}"
+
 
 SUFFIX = ".xosc"
 FAMILY = "Scenario_ID"  # parameter that names the family
@@ -55,7 +119,8 @@ def read(path: str | Path) -> Suite:
     """
     path = check_path("path", path)
     suite = file_name(path.stem)
-    return Suite(suite, tuple(_case(suite, cell) for cell in read_cells(path)), f"OpenSCENARIO {path.name}")
+    cases = tuple(_case(suite, cell) for cell in read_cells(path))
+    return Suite(name=suite, cases=cases, about=f"OpenSCENARIO {path.name}")
 
 
 def read_all(paths: Sequence[str | Path]) -> Suite:
@@ -83,7 +148,7 @@ def read_all(paths: Sequence[str | Path]) -> Suite:
     for file, parts in zip(files, stems, strict=True):
         inside = "/".join(file_name(part) for part in parts[common:])
         cases += [_case(suite, cell, f"{inside}/") for cell in read_cells(file)]
-    return Suite(suite, tuple(cases), f"OpenSCENARIO, {counted(len(files), 'file')}")
+    return Suite(name=suite, cases=tuple(cases), about=f"OpenSCENARIO, {counted(len(files), 'file')}")
 
 
 def find_files(path: Path) -> list[Path]:

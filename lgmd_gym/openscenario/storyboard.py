@@ -3,13 +3,11 @@
 from dataclasses import dataclass, field
 from math import inf
 
-from lgmd_gym.openscenario.actions import Run, global_action, private_action
+from lgmd_gym.openscenario.actions import Run, global_action, private_action, settle
 from lgmd_gym.openscenario.conditions import States, Trigger, read_trigger
-from lgmd_gym.openscenario.entities import Mover
 from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.parameters import declare
-from lgmd_gym.openscenario.path_actions import settle
-from lgmd_gym.openscenario.world import World
+from lgmd_gym.openscenario.world import Mover, World
 
 
 @dataclass(eq=False)

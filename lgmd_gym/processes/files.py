@@ -221,3 +221,9 @@ def _sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def replace_file(file: Path, text: str) -> None:
+    """Write a file atomically: an interruption leaves either the old or the new contents."""
+    with complete_file(file) as part:
+        part.write_text(text, encoding="utf-8")

@@ -60,7 +60,7 @@ def make_target(target: str | Case, arguments: dict[str, Any], **options: Any) -
     """
     if isinstance(target, Case):
         chosen = {**dict(target.arguments), **arguments}
-        return gym.make(env_id(target.family), **options, **chosen)
+        return gym.make(env_id(target.environment), **options, **chosen)
     traffic = {f"{TRAFFIC}/{kind}": traffic_id(kind) for kind in TRAFFIC_KINDS}
     target = traffic.get(target, target)
     if target in traffic.values() and arguments:

@@ -1,7 +1,13 @@
-"""Conclusion of a run in plain English, generated from its rows."""
+"""Conclusion of a run in plain English, and one sentence on each agent."""
 
-from lgmd_gym.benchmark.analysis.protocol_limits import LIMIT_CHECKS, R152_SUITES, limit_results, meets_r152
-from lgmd_gym.benchmark.rows import Row
+import inspect
+import re
+
+from lgmd_gym.agents.policies.card import policy_card, read_card
+from lgmd_gym.agents.policies.policy import Policy, find_policy
+from lgmd_gym.agents.registry import AGENTS, make_agent
+from lgmd_gym.benchmark.analysis.tables import limit_results
+from lgmd_gym.benchmark.case import Row, Suite
 from lgmd_gym.benchmark.summary import (
     INTERVAL_TEXT,
     AgentSummary,
@@ -20,13 +26,13 @@ CAVEAT = (
 )
 
 
-def conclusion(rows: list[Row], agents: list[str], suite: str) -> str:
+def conclusion(rows: list[Row], agents: list[str], suite: Suite) -> str:
     """Return one paragraph: sample, avoided threats, false activations and limits of each agent.
 
     Args:
         rows: Rows of a suite of cases. Rows with an FCW driver count for the limits only.
         agents: Agents in the order of the report.
-        suite: Name of the suite, which selects the protocol limits.
+        suite: The suite, with the limits of its protocol.
     """
     conditions = by_condition(rows)
     braking = [agent for agent in agents if agent != NO_BRAKE]
@@ -42,12 +48,12 @@ def conclusion(rows: list[Row], agents: list[str], suite: str) -> str:
     return " ".join([*sentences, CAVEAT])
 
 
-def _sample_sentence(rows: list[Row], suite: str) -> str:
+def _sample_sentence(rows: list[Row], suite: Suite) -> str:
     """Return the sizes of the run, and in how many episodes `no-brake` has contact."""
     complete = [row for row in without_fcw_driver(rows) if row["error"] is None]
     base = [row for row in complete if row["agent"] == NO_BRAKE]
     threats = sum(bool(row["threat"]) for row in base)
-    start = f"The run contains {counted(len(rows), 'episode')} of suite {suite} ({Sample.of(rows)})."
+    start = f"The run contains {counted(len(rows), 'episode')} of suite {suite.name} ({Sample.of(rows)})."
     contacts = f" Without braking, {threats} of {counted(len(base), 'episode')} end in contact (threats)."
     return f"{start}{contacts if base else ''} Brackets contain the {INTERVAL_TEXT}."
 
@@ -93,11 +99,11 @@ def _of(rate: Rate, noun: str) -> str:
     return f"{rate.k} of {counted(rate.n, noun)} [{bounds}]"
 
 
-def _limit_sentences(rows: list[Row], agents: list[str], suite: str) -> list[str]:
+def _limit_sentences(rows: list[Row], agents: list[str], suite: Suite) -> list[str]:
     """Return which agents meet the limits of the protocol in simulation; empty without limits."""
-    if suite not in LIMIT_CHECKS:
+    if suite.limit is None:
         return []
-    results = {agent: limit_results(rows, agent, LIMIT_CHECKS[suite]) for agent in agents}
+    results = {agent: limit_results(rows, agent, suite) for agent in agents}
     tested = {agent: items for agent, items in results.items() if items}
     if not tested:
         return ["No episode allows a comparison with the limits of the protocol."]
@@ -106,7 +112,59 @@ def _limit_sentences(rows: list[Row], agents: list[str], suite: str) -> list[str
         for agent, items in tested.items()
     ]
     sentences = [f"Cases in which every run meets the limit of the protocol in simulation: {', '.join(met)}."]
-    if suite in R152_SUITES:
-        names = ", ".join(agent for agent in tested if meets_r152(rows, agent)) or "none"
-        sentences.append(f"Agents that meet the impact speed limits of UN R152 in simulation: {names}.")
+    if suite.verdict is not None:
+        requirement, meets = suite.verdict
+        names = ", ".join(agent for agent in tested if meets(rows, agent)) or "none"
+        sentences.append(f"Agents that meet {requirement} in simulation: {names}.")
     return sentences
+
+
+SENTENCE_END = re.compile(r"(?<=[^.].[.!?])(?=\s|$)")
+
+
+def agent_note(text: str, trusted: bool = True) -> str:
+    """Return one sentence on an agent: the summary of its class, or the card of its policy.
+
+    The card of a policy is data; reading it does not load the model.
+
+    Args:
+        text: Agent string, see `lgmd_gym.agents.make_agent`.
+        trusted: Whether a class from outside this package may be loaded.
+    """
+    name, _, rest = text.partition(":")
+    if name == Policy.name:
+        return _policy_note(rest)
+    if name in AGENTS:
+        return _first_sentence(AGENTS[name])
+    if not trusted:
+        return "A class from outside this package, which was not loaded."
+    try:
+        agent = make_agent(text)
+    except Exception:  # any error of the user's module or constructor
+        return "A class from outside this package, which cannot be loaded."
+    return _first_sentence(type(getattr(agent.agent, "objects", [agent.agent])[0]))
+
+
+def _first_sentence(kind: type) -> str:
+    """Return the first sentence of a class docstring on one line, without Markdown marks."""
+    text = inspect.getdoc(kind) if kind.__doc__ else None
+    paragraph = " ".join((text or "").split("\n\n")[0].split()).replace("`", "")
+    return SENTENCE_END.split(paragraph)[0] or "A class from outside this package, without a docstring."
+
+
+def _policy_note(path: str) -> str:
+    """Return the algorithm, cameras, inputs and demands of a policy."""
+    try:
+        file = find_policy(path)
+        card, training = policy_card(file), read_card(file).get("config")
+    except ValueError:
+        return "A learned policy, whose card cannot be read."
+    cameras = len(card.camera) if isinstance(card.camera, list | tuple) else 1
+    inputs = (
+        "the observations of the environment" if card.features is None else ", ".join(card.features.inputs)
+    )
+    demands = f"{len(card.demands)} levels of demand" if card.demands else "a continuous demand"
+    sensors = counted(cameras, "camera")
+    algo = training.get("algo") if isinstance(training, dict) else card.algo
+    method = "offline training" if algo == "offline" else str(algo).upper()
+    return f"Learned policy ({method}) with {sensors}, the inputs {inputs}, and {demands}."

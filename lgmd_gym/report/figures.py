@@ -1,16 +1,17 @@
-"""Figures of a report that are drawn from its rows: SVG panels and the data in them."""
+"""Figures of a report that are drawn from its rows: SVG panels, Euro NCAP grids, and their data."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import fmean
 from typing import Any, NamedTuple
 
 from lgmd_gym.benchmark.analysis.tables import agent_summaries
-from lgmd_gym.benchmark.folder import replace_file
-from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.case import Row, Suite, relative_impact
+from lgmd_gym.benchmark.protocols.car_to_car_2023 import OVERLAPS, colour_weight
 from lgmd_gym.benchmark.summary import AgentSummary, without_fcw_driver, write_csv
 from lgmd_gym.envs.dynamics.units import KMH
-from lgmd_gym.report.svg import RULE, Axis, Element, Panel, element, file_text
+from lgmd_gym.processes.files import replace_file
+from lgmd_gym.report.svg import INK, RULE, SOFT, Axis, Element, Panel, element, file_text, label, new_panel
 from lgmd_gym.statistics.intervals import Rate
 
 MAX_SPEEDS = 25  # test speeds of a family from which they are rounded to `COARSE`
@@ -78,18 +79,15 @@ class ImpactPoint(NamedTuple):
     highest: float  # [km/h]
 
 
-def impact_figure(
-    rows: list[Row], agents: list[str], families: Mapping[str, str], condition: str
-) -> ReportFigure | None:
+def impact_figure(rows: list[Row], agents: list[str], condition: str) -> ReportFigure | None:
     """Return impact speed over test speed, one panel per scenario family; None without a threat.
 
     Args:
         rows: Rows of one condition.
         agents: Agents in the order of their marks.
-        families: Family of each case, by name.
         condition: Camera condition.
     """
-    points = impact_points(rows, agents, families, condition)
+    points = impact_points(rows, agents, condition)
     if not points:
         return None
     shown = sorted({point.family for point in points})[:MAX_PANELS]
@@ -99,14 +97,12 @@ def impact_figure(
     return ReportFigure(f"impact-speed-{condition}", title, panels, agents, IMPACT_COLUMNS, lines)
 
 
-def impact_points(
-    rows: list[Row], agents: list[str], families: Mapping[str, str], condition: str
-) -> list[ImpactPoint]:
+def impact_points(rows: list[Row], agents: list[str], condition: str) -> list[ImpactPoint]:
     """Return one point per family, agent and test speed, over the threats without an error or FCW driver."""
     groups: dict[str, list[Row]] = {}
     for row in without_fcw_driver(rows):
         if row["threat"] and row["error"] is None:
-            groups.setdefault(families[row["case"]], []).append(row)
+            groups.setdefault(row["family"], []).append(row)
     points = []
     for family, part in sorted(groups.items()):
         speeds = {round(row["ego_speed"] / KMH) for row in part}
@@ -201,3 +197,175 @@ def _rate_line(item: AgentSummary, condition: str) -> list[Any]:
         for value in (rate.n, rate.k, f"{rate.low:.4f}", f"{rate.high:.4f}")
     ]
     return [condition, item.agent, *rates]
+
+
+PAIRED = ("CCCscp", "CCFtap", "CMCscp", "CMFtap")  # families with grids of ego and target speeds
+AXES = {"overlap": "overlap [%]", "location": "impact location [%]", "target": "target speed [km/h]"}
+
+
+class GridCell(NamedTuple):
+    """Result of one case over all seeds."""
+
+    colour: str  # CSS class: of the Euro NCAP colour, "contact" or "premature"
+    text: str  # highest relative impact speed [km/h]; "*" marks premature braking
+    tooltip: str
+    impact_kmh: float  # highest relative impact speed; 0 without contact
+    contacts: int  # runs with contact
+    premature: int  # runs with premature braking
+    runs: int
+
+
+class CaseGrid(NamedTuple):
+    """Grid of one scenario family and one agent; the cell is None where the suite has no case."""
+
+    title: str
+    axis: str  # quantity of the columns
+    columns: list[int]
+    lines: list[tuple[str, list[GridCell | None]]]
+    agent: str
+    family: str
+
+
+def case_grids(rows: list[Row], agent: str, suite: Suite) -> list[CaseGrid]:
+    """Return the grids of an agent in a Euro NCAP suite; none for other suites."""
+    if suite.colour is None:
+        return []
+    sides = {(case.family, case.argument("side")) for case in suite.cases}
+    sided = [family for family, side in sides if side == "right" and (family, "left") in sides]
+    grids: dict[tuple[str, str], dict[tuple[str, int], list[Row]]] = {}
+    for row in rows:
+        position = _position(row, sided)
+        if row["agent"] == agent and row["error"] is None and position is not None:
+            family, axis, head, column = position
+            grids.setdefault((family, axis), {}).setdefault((head, column), []).append(row)
+    return [
+        _grid(agent, family, axis, cells, suite.colour) for (family, axis), cells in sorted(grids.items())
+    ]
+
+
+def _position(row: Row, sided: list[str]) -> tuple[str, str, str, int] | None:
+    """Return title, axis, row heading and column of a row; None for a case without a grid.
+
+    `sided` are the families with a grid for each side of the target.
+    """
+    family, target = row["family"], row["test_target_speed"]
+    speed = "from stop" if row["test_speed"] is None else f"{row['test_speed'] / KMH:.0f}"
+    for axis, place in (("overlap", row["overlap"]), ("location", row["impact_location"])):
+        if place is not None:
+            title = family + (" at night" if row["light"] == "night" else "")
+            return title, axis, speed + (" warned" if row["fcw_driver"] else ""), round(100 * place)
+    if family in PAIRED and target is not None:
+        title = family + (f" from the {row['target_side']}" if family in sided else "")
+        return title, "target", speed, round(target / KMH)
+    return None
+
+
+def _grid(
+    agent: str,
+    family: str,
+    axis: str,
+    cells: dict[tuple[str, int], list[Row]],
+    colour: Callable[[Row], str],
+) -> CaseGrid:
+    heads = sorted({head for head, _ in cells}, key=_head_speed)
+    columns = sorted({column for _, column in cells})
+    if axis == "overlap":
+        columns.sort(key=OVERLAPS.index)
+    lines = [(head, [_cell(cells.get((head, column)), colour) for column in columns]) for head in heads]
+    return CaseGrid(f"{family}: {agent}", AXES[axis], columns, lines, agent, family)
+
+
+def _cell(rows: list[Row] | None, colour_of: Callable[[Row], str]) -> GridCell | None:
+    """Return the cell of one case: highest impact speed, and the colour of the seed that earns least."""
+    if rows is None:
+        return None
+    worst = max(rows, key=relative_impact)
+    colours = [colour_of(row) for row in sorted(rows, key=relative_impact, reverse=True)]
+    colour = min(colours, key=colour_weight)
+    contacts = sum(bool(row["collision"]) for row in rows)
+    premature = sum(bool(row["premature_brake"]) for row in rows)
+    impact = relative_impact(worst) / KMH
+    text = f"{impact:.0f}" if contacts else "0" + ("*" if premature else "")
+    counts = f"contact in {contacts} of {len(rows)} runs, premature braking in {premature}"
+    tooltip = f"{worst['case']}: {colour}, {counts}"
+    return GridCell(colour, text, tooltip, impact, contacts, premature, len(rows))
+
+
+def _head_speed(head: str) -> int:
+    """Return the speed in a row heading [km/h]; 0 for a start from standstill."""
+    digits = head.split()[0]
+    return int(digits) if digits.isdigit() else 0
+
+
+CELL, LINE, HEAD, TOP = 34.0, 24.0, 66.0, 50.0  # width and height of a cell, row headings, title [px]
+# For colour-blind readers and grey prints, lightness falls to red, and a letter repeats the colour.
+CELL_COLOURS = {
+    "green": ("#8fd3bd", "G"),
+    "yellow": ("#f5e58a", "Y"),
+    "orange": ("#f0a552", "O"),
+    "brown": ("#9a6233", "B"),
+    "red": ("#8c1c3a", "R"),
+    "contact": ("#b3a2c7", "C"),
+    "premature": ("#c4c0b8", "P"),
+}
+DARK_CELLS = ("brown", "red")
+COLUMNS = (
+    "condition",
+    "agent",
+    "family",
+    "ego_speed_km_h",
+    "column",
+    "column_value",
+    "colour",
+    "runs",
+    "contacts",
+    "premature",
+    "highest_relative_impact_speed_km_h",
+)
+
+
+def grid_figure(grids: list[CaseGrid], condition: str) -> ReportFigure | None:
+    """Return the grids of all agents under one condition; None without a grid."""
+    if not grids:
+        return None
+    lines = [
+        (condition, grid.agent, grid.family, head, grid.axis, column, cell.colour, *_values(cell))
+        for grid in grids
+        for head, cells in grid.lines
+        for column, cell in zip(grid.columns, cells, strict=True)
+        if cell is not None
+    ]
+    title = f"Euro NCAP grids, {condition}"
+    return ReportFigure(f"grids-{condition}", title, list(map(_panel, grids)), [], COLUMNS, lines)
+
+
+def _values(cell: GridCell) -> tuple[int, int, int, str]:
+    return cell.runs, cell.contacts, cell.premature, f"{cell.impact_kmh:.3f}"
+
+
+def _panel(grid: CaseGrid) -> Element:
+    """Draw one grid: a row per ego speed, and the quantity of the columns below the title."""
+    size = max(HEAD + CELL * len(grid.columns) + 8, 240.0), TOP + LINE * len(grid.lines) + 10
+    root = new_panel(grid.title, size, agent=grid.agent, family=grid.family)
+    label(root, 4, 14, grid.title, font_size=12, font_weight=600)
+    label(root, HEAD, 28, grid.axis, font_size=10, class_="soft", fill=SOFT)
+    for index, column in enumerate(grid.columns):
+        label(root, HEAD + CELL * (index + 0.5), TOP - 6, str(column), "middle")
+    for row, (head, cells) in enumerate(grid.lines):
+        y = TOP + LINE * row
+        label(root, HEAD - 5, y + LINE / 2 + 4, head, "end")
+        for index, cell in enumerate(cells):
+            if cell is not None:
+                _draw_cell(root, HEAD + CELL * index, y, cell)
+    return root
+
+
+def _draw_cell(root: Element, x: float, y: float, cell: GridCell) -> None:
+    colour, letter = CELL_COLOURS[cell.colour]
+    text_colour = "#ffffff" if cell.colour in DARK_CELLS else INK
+    group = element(root, "g")
+    element(group, "title", cell.tooltip)
+    element(group, "rect", x=x + 1, y=y + 1, width=CELL - 2, height=LINE - 2, fill=colour)
+    style = {"class_": "cell", "fill": text_colour}
+    label(group, x + CELL / 2, y + LINE / 2 + 4, cell.text, "middle", **style)
+    label(group, x + CELL - 4, y + 9, letter, "end", font_size=8, **style)

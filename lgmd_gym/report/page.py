@@ -1,11 +1,9 @@
-"""The report page: its sections, rendered with `page.html`."""
+"""Output files of a run folder: tables, plots, and the report page, rendered with `page.html`."""
 
 from pathlib import Path
 from typing import Any
 
-from lgmd_gym.benchmark.analysis.froc import LEAD_TIME
-from lgmd_gym.benchmark.analysis.ncap_points import SUITE_POINTS
-from lgmd_gym.benchmark.analysis.protocol_limits import R152_SUITES, meets_r152
+from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, load_traces, write_froc
 from lgmd_gym.benchmark.analysis.tables import (
     agent_summaries,
     limit_lines,
@@ -13,25 +11,43 @@ from lgmd_gym.benchmark.analysis.tables import (
     rate_text,
     success_lines,
 )
-from lgmd_gym.benchmark.case import Case
-from lgmd_gym.benchmark.folder import replace_file
-from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.summary import INTERVAL_TEXT, Sample, by_condition, without_fcw_driver
+from lgmd_gym.benchmark.case import Row
+from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.run_folder import case_name, read_run, read_series, rows_file, series_name
+from lgmd_gym.benchmark.suites import TRAFFIC, get_suite
+from lgmd_gym.benchmark.summary import (
+    FILE,
+    INTERVAL_TEXT,
+    Sample,
+    by_condition,
+    without_fcw_driver,
+    write_episodes,
+    write_summary,
+)
 from lgmd_gym.benchmark.task import NO_BRAKE
-from lgmd_gym.envs.registration import SCENARIO
-from lgmd_gym.report.agent_notes import agent_note
-from lgmd_gym.report.case_grids import case_grids
-from lgmd_gym.report.conclusion import conclusion
-from lgmd_gym.report.data import ReportData
-from lgmd_gym.report.figures import MAX_PANELS, ReportFigure, avoidance_figure, impact_figure
-from lgmd_gym.report.grid_figure import CELL_COLOURS, DARK_CELLS, grid_figure
+from lgmd_gym.benchmark.traffic.summary import write_traffic_summary
+from lgmd_gym.neuron import LGMDParams
+from lgmd_gym.plotting.figures import episode_figure
+from lgmd_gym.processes.files import FolderLock, replace_file
+from lgmd_gym.report.conclusion import agent_note, conclusion
+from lgmd_gym.report.figures import (
+    CELL_COLOURS,
+    DARK_CELLS,
+    MAX_PANELS,
+    ReportFigure,
+    avoidance_figure,
+    case_grids,
+    grid_figure,
+    impact_figure,
+)
 from lgmd_gym.report.sections import (
+    ReportData,
     comparison_section,
     episode_section,
     false_activation_section,
     froc_section,
+    illustrated_agent,
 )
-from lgmd_gym.report.selection import illustrated_agent
 from lgmd_gym.report.svg import DARK_CSS, legend_mark, to_text
 from lgmd_gym.statistics.intervals import Rate
 
@@ -68,7 +84,7 @@ def _render(data: ReportData) -> str:
     )
     environment.filters |= {"band": band, "rate_band": rate_band, "rate": rate_text, "kmh": mean_kmh}
     environment.filters["svg"] = to_text
-    families = {case.name: _family(case) for case in data.cases.values()}
+    families = {case.name: case.family for case in data.suite.cases}
     return environment.get_template("page.html").render(
         data=data,
         interval=INTERVAL_TEXT,
@@ -81,7 +97,7 @@ def _render(data: ReportData) -> str:
         dark_cells=DARK_CELLS,
         dark_css=DARK_CSS,
         failed=sum(row["error"] is not None for row in data.rows),
-        conditions=[_condition(data, name, rows, families) for name, rows in by_condition(data.rows).items()],
+        conditions=[_condition(data, name, rows) for name, rows in by_condition(data.rows).items()],
         froc=froc_section(data),
         lead_time=LEAD_TIME,
         comparisons=comparison_section(data),
@@ -104,17 +120,11 @@ def rate_band(rate: Rate, lower_is_better: bool = False) -> str:
     return band(1.0 - share if lower_is_better else share)
 
 
-def _family(case: Case) -> str:
-    """Return the family of a case; that of a case with a given scenario is in its name."""
-    return case.name.split("/")[1] if case.family == SCENARIO else case.family
-
-
-def _condition(data: ReportData, name: str, rows: list[Row], families: dict[str, str]) -> dict[str, Any]:
+def _condition(data: ReportData, name: str, rows: list[Row]) -> dict[str, Any]:
     """Return the tables and figures of one camera condition."""
     braking = [agent for agent in data.agents if agent != NO_BRAKE]
-    points = SUITE_POINTS.get(data.suite)
-    judged = data.agents if data.suite in R152_SUITES else None
-    met = judged and [agent for agent in judged if meets_r152(rows, agent)]
+    points, verdict = data.suite.points, data.suite.verdict
+    met = verdict and [agent for agent in data.agents if verdict[1](rows, agent)]
     grids = [grid for agent in braking for grid in case_grids(rows, agent, data.suite)]
     return {
         "name": name,
@@ -124,7 +134,7 @@ def _condition(data: ReportData, name: str, rows: list[Row], families: dict[str,
         "meet_r152": met,
         "points": [(agent, points(rows, agent)) for agent in braking] if points else [],
         "avoidance": _saved(data, avoidance_figure(rows, data.agents, name)),
-        "impacts": _saved(data, impact_figure(rows, data.agents, families, name)),
+        "impacts": _saved(data, impact_figure(rows, data.agents, name)),
         "grids": _saved(data, grid_figure(grids, name)),
         "cases": success_lines(rows, data.agents),
     }
@@ -135,3 +145,69 @@ def _saved(data: ReportData, figure: ReportFigure | None) -> ReportFigure | None
     if figure is not None:
         figure.write(data.figures)
     return figure
+
+
+def write_outputs(path: Path, plots: bool = True, report: bool = True, trust: bool = False) -> list[Path]:
+    """Write episodes.csv and summary.csv into a run folder, and for a suite of cases its plots and report.
+
+    A suite of cases also gets plots/, froc.csv, figures/ and report.html. Files of an earlier call are
+    replaced.
+
+    The folder is locked meanwhile: an older state of the run does not replace the outputs of a newer one.
+
+    Args:
+        path: Run folder; a run without rows gets no files.
+        plots: Whether to draw one PNG per case.
+        report: Whether to write report.html and its figures/.
+        trust: See `write_report`.
+
+    Returns:
+        The files written.
+
+    Raises:
+        ValueError: If the folder contains no run or a damaged one, or another process writes to it.
+    """
+    rows_file(path)
+    lock = FolderLock(path)
+    try:
+        return _write(path, plots, report, trust)
+    finally:
+        lock.release()
+
+
+def _write(path: Path, plots: bool, report: bool, trust: bool) -> list[Path]:
+    config, rows, _ = read_run(path)
+    if not rows:
+        return []
+    files = [path / FILE, path / "summary.csv"]
+    write_episodes(rows, files[0])
+    if config.suite == TRAFFIC:
+        write_traffic_summary(rows, files[1])
+        return files
+    write_summary(rows, files[1])
+    if plots:
+        files += _plot_cases(path, config)
+    traces = load_traces(path)
+    if traces:
+        files.append(path / "froc.csv")
+        write_froc(files[-1], froc_curves(traces), LEAD_TIME)
+    if report:
+        files.append(write_report(path, trust))
+    return files
+
+
+def _plot_cases(path: Path, config: RunConfig) -> list[Path]:
+    """Draw one figure per case: all agents with the first seed."""
+    alert_level = LGMDParams.make(config.params).t_sf
+    folder, seed, files = path / "plots", config.first_seed, []
+    folder.mkdir(exist_ok=True)
+    for condition in config.conditions:
+        for case in get_suite(config.suite).cases:
+            names = {agent: series_name((agent, case.name, seed, condition)) for agent in config.agents}
+            loaded = {agent: read_series(path, name) for agent, name in names.items()}
+            episodes = {agent: series for agent, series in loaded.items() if series is not None}
+            if episodes:
+                files.append(folder / f"{case_name(case.name, condition)}.png")
+                title = f"{case.name}, seed {seed}, {condition}"
+                episode_figure(files[-1], title, episodes, alert_level)
+    return files

@@ -1,21 +1,201 @@
-"""Sections of the report on stored time series and paired differences, with their figures and data files."""
+"""Contents of a run folder, and the report's sections on stored time series and paired differences."""
 
+import base64
+import io
 import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
-from typing import Any
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
 
-from lgmd_gym.benchmark.analysis.compare import Comparison, compare_agents
-from lgmd_gym.benchmark.analysis.compare_tables import change_text
-from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, load_traces, write_froc
-from lgmd_gym.benchmark.analysis.plots import difference_figure, froc_figure, trace_figure
-from lgmd_gym.benchmark.rows import Row
+import numpy as np
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.registry import outside_code
+from lgmd_gym.benchmark.analysis.compare import Comparison, change_text, compare_agents, difference_figure
+from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, froc_figure, load_traces, write_froc
+from lgmd_gym.benchmark.case import Row, Suite, case_order, key_of, relative_impact
+from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.episode import make_env, rollout
+from lgmd_gym.benchmark.metrics import brake_onset
+from lgmd_gym.benchmark.run_folder import read_run, read_series, read_settings, series_name
+from lgmd_gym.benchmark.suites import get_suite
 from lgmd_gym.benchmark.summary import by_condition, without_fcw_driver, write_csv
-from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.benchmark.task import NO_BRAKE, Task
 from lgmd_gym.neuron import LGMDParams
-from lgmd_gym.report.data import ReportData
-from lgmd_gym.report.images import CapturedFrame, key_decisions, save_figure
-from lgmd_gym.report.selection import extreme_episodes, hardest_false_activations, illustrated_agent
+from lgmd_gym.plotting.figures import trace_figure
+from lgmd_gym.processes.files import complete_file
+
+
+class CapturedFrame(NamedTuple):
+    """Camera frame as a data URI, and its caption."""
+
+    uri: str
+    caption: str
+
+
+def save_figure(file: Path, draw: Callable[[BinaryIO], Any]) -> str:
+    """Write the SVG that a function draws to a file, and return it as a data URI."""
+    drawn = io.BytesIO()
+    draw(drawn)
+    with complete_file(file) as part:
+        part.write_bytes(drawn.getvalue())
+    return _data_uri("image/svg+xml", lambda copy: copy.write(drawn.getvalue()))
+
+
+def frame_uri(frame: np.ndarray) -> str:
+    """Return a grey frame, uint8 of shape (height, width), as the data URI of a PNG."""
+    from PIL import Image
+
+    image = Image.fromarray(frame)
+    return _data_uri("image/png", lambda file: image.save(file, "PNG", optimize=True))
+
+
+def _data_uri(kind: str, write: Callable[[BinaryIO], Any]) -> str:
+    file = io.BytesIO()
+    write(file)
+    return f"data:{kind};base64,{base64.b64encode(file.getvalue()).decode()}"
+
+
+def key_decisions(series: Mapping[str, np.ndarray]) -> dict[str, int]:
+    """Return the indices of the start, the first alert, the onset of braking and the end, by caption."""
+    alerts = np.flatnonzero(series["alert"])
+    onset = brake_onset(series["deceleration"])
+    decisions = {"start": 0}
+    if alerts.size:
+        decisions["first alert"] = int(alerts[0])
+    if onset is not None:
+        decisions["braking begins"] = onset
+    return decisions | {"end": len(series["time"]) - 1}
+
+
+def capture_frames(task: Task, decisions: Mapping[str, int]) -> list[CapturedFrame]:
+    """Repeat an episode and return frames of the first camera.
+
+    Args:
+        task: The episode, without an FCW driver.
+        decisions: Index of the decision of each frame, by caption.
+    """
+    actor = make_agent(task.agent)
+    env = make_env(task.case, task.sensor_config.for_agent(actor), task.arguments)
+    frames, last = [], max(decisions.values())
+    try:
+        for decision, (step, _) in enumerate(rollout(env, actor, task.seed)):
+            if labels := [label for label, index in decisions.items() if index == decision]:
+                time = decision / env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
+                gap = f", gap {step.info['gap']:.1f} m" if np.isfinite(step.info["gap"]) else ""
+                frame = next(iter(env.get_wrapper_attr("frames").values()))
+                frames.append(CapturedFrame(frame_uri(frame), f"{' / '.join(labels)}: {time:.2f} s{gap}"))
+            if decision == last:
+                break
+    finally:
+        env.close()
+    return frames
+
+
+@dataclass(frozen=True)
+class ReportData:
+    """Contents of a run folder."""
+
+    path: Path
+    config: RunConfig
+    settings: dict[str, Any]  # contents of run.json
+    suite: Suite
+    rows: list[Row]
+    agents: list[str]  # no-brake first
+    trust: bool  # whether agents from outside this package may be loaded
+
+    @classmethod
+    def load(cls, path: Path, trust: bool = False) -> "ReportData":
+        """Read a run folder.
+
+        Raises:
+            ValueError: If the folder contains no run or a damaged one.
+        """
+        run = read_run(path)
+        config, suite = run.config, get_suite(run.config.suite)
+        agents = list(dict.fromkeys([NO_BRAKE, *config.agents]))
+        return cls(path, config, read_settings(path), suite, run.rows, agents, trust)
+
+    @property
+    def figures(self) -> Path:
+        """Folder of the figures and their data."""
+        return self.path / "figures"
+
+    @property
+    def agents_not_loaded(self) -> list[str]:
+        """Agents whose code is outside this package and not trusted."""
+        return [] if self.trust else [agent for agent in self.agents if outside_code(agent)]
+
+    def series(self, row: Row) -> dict[str, np.ndarray] | None:
+        """Return the time series of a row; None if they are not stored."""
+        return read_series(self.path, series_name(key_of(row)))
+
+    def frames(self, row: Row, decisions: dict[str, int]) -> list[CapturedFrame]:
+        """Return camera frames of a row's episode, see `capture_frames`; none of `agents_not_loaded`."""
+        if row["agent"] in self.agents_not_loaded:
+            return []
+        case, condition = self.suite.by_name[row["case"]], row["condition"]
+        task = Task(
+            row["agent"], case, row["seed"], self.config.sensors(condition), condition=condition,
+            world=row["world"], road=self.config.road,
+        )  # fmt: skip
+        return capture_frames(task, decisions)
+
+
+MAX_FALSE_ACTIVATIONS = 12
+AGENTS_WITHOUT_NEURON = (NO_BRAKE, "always-brake", "random-brake", "ttc-oracle")
+
+# Description -> filter of the rows, and the value that the shown row maximises (the first one on ties).
+EXTREMES: dict[str, tuple[Callable[[Row], bool], Callable[[Row], float]]] = {
+    "smallest stopping margin": (
+        lambda row: row["avoided"] and row["stopping_margin"] is not None,
+        lambda row: -row["stopping_margin"],
+    ),
+    "fastest avoided threat": (lambda row: row["avoided"], lambda row: row["ego_speed"]),
+    "hardest contact": (lambda row: row["collision"], relative_impact),
+    "premature braking": (lambda row: row["premature_brake"], lambda row: 0.0),
+    "hardest false activation": (lambda row: row["false_activation"], lambda row: row["peak_deceleration"]),
+    "fastest non-threat without false activation": (
+        lambda row: not row["threat"] and not row["false_activation"],
+        lambda row: row["ego_speed"],
+    ),
+}
+
+
+def neuron_agents(agents: list[str]) -> list[str]:
+    """Return the agents that depend on the neuron or the camera."""
+    return [agent for agent in agents if agent.split(":")[0] not in AGENTS_WITHOUT_NEURON]
+
+
+def illustrated_agent(agents: list[str]) -> str:
+    """Return the first agent that depends on the neuron; without one, the first that can brake."""
+    braking = [agent for agent in agents if agent != NO_BRAKE]
+    return [*neuron_agents(agents), *braking, NO_BRAKE][0]
+
+
+def extreme_episodes(rows: list[Row], agent: str, seed: int) -> dict[str, Row]:
+    """Return the extreme episodes of one agent and seed, by description; absent kinds are left out."""
+    of_agent = [row for row in rows if row["agent"] == agent and row["seed"] == seed and row["error"] is None]
+    of_agent.sort(key=lambda row: case_order(row["case"]))
+    extremes = {
+        description: max(filter(matches, of_agent), key=rank, default=None)
+        for description, (matches, rank) in EXTREMES.items()
+    }
+    return {description: row for description, row in extremes.items() if row is not None}
+
+
+def hardest_false_activations(rows: list[Row], agents: list[str], seed: int) -> list[Row]:
+    """Return the false activations of one seed by agents that depend on the neuron, the hardest first."""
+    candidates = neuron_agents(agents)
+    false = [
+        row for row in rows if row["agent"] in candidates and row["seed"] == seed and row["false_activation"]
+    ]
+    false.sort(key=lambda row: (-row["peak_deceleration"], row["case"], row["agent"]))
+    return false[:MAX_FALSE_ACTIVATIONS]
+
 
 DIFFERENCE_COLUMNS = (
     *("condition", "agent_a", "agent_b", "quantity", "unit", "mean_a", "mean_b", "difference"),

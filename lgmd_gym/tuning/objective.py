@@ -17,10 +17,9 @@ from joblib import delayed
 
 from lgmd_gym.agents import BRAKE, HOLD, Agent, Rule, make_agent, to_action
 from lgmd_gym.agents.base import Actor
-from lgmd_gym.benchmark.case import level_case
+from lgmd_gym.benchmark.case import Row, level_case
 from lgmd_gym.benchmark.episode import Episode, make_env, play
-from lgmd_gym.benchmark.metrics import Counterfactual
-from lgmd_gym.benchmark.rows import Row, make_row
+from lgmd_gym.benchmark.metrics import Counterfactual, make_row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task

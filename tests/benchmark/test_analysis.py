@@ -9,12 +9,23 @@ import pytest
 from support.rows import threat_row
 
 from lgmd_gym import benchmark
-from lgmd_gym.benchmark.analysis.compare import compare_rows, compare_runs
-from lgmd_gym.benchmark.analysis.compare_tables import change_text, comparison_table
-from lgmd_gym.benchmark.analysis.froc import OpenLoopTrace, alarm_onsets, froc_curves, load_traces
-from lgmd_gym.benchmark.analysis.plots import difference_figure, froc_figure, trace_figure
+from lgmd_gym.benchmark.analysis.compare import (
+    change_text,
+    compare_rows,
+    compare_runs,
+    comparison_table,
+    difference_figure,
+)
+from lgmd_gym.benchmark.analysis.froc import (
+    OpenLoopTrace,
+    alarm_onsets,
+    froc_curves,
+    froc_figure,
+    load_traces,
+)
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.cli import main as cli
+from lgmd_gym.plotting.figures import trace_figure
 from lgmd_gym.report import write_report
 from lgmd_gym.statistics.intervals import wilson
 

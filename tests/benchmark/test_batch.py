@@ -12,14 +12,12 @@ from support.runs import new_run, read_rows, sorted_rows
 from lgmd_gym.agents import AGENTS
 from lgmd_gym.benchmark import batch
 from lgmd_gym.benchmark.batch import BatchPlayer, play_unit
-from lgmd_gym.benchmark.case import level_case
+from lgmd_gym.benchmark.case import key_of, level_case
 from lgmd_gym.benchmark.config import RunConfig
-from lgmd_gym.benchmark.file_names import series_name
 from lgmd_gym.benchmark.metrics import Counterfactual
-from lgmd_gym.benchmark.rows import key_of
+from lgmd_gym.benchmark.run_folder import read_series, series_name
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.stored_run import read_series
 from lgmd_gym.benchmark.suites import find_case
 from lgmd_gym.benchmark.task import Task, run_task
 from lgmd_gym.benchmark.units import make_units
@@ -285,7 +283,7 @@ def test_run_gives_the_rows_and_series_of_single_tasks(tmp_path, jobs):
     run = new_run(tmp_path / "run", jobs=jobs, suite="r152", agents=agents, seeds=1, worlds=4)
     assert run.play()
     expected = []
-    for index, case in enumerate(run.plan.cases):
+    for index, case in enumerate(run.plan.suite.cases):
         task = Task("no-brake", case, 0, SensorConfig(), world=run.config.world(0, index))
         first = run_task(task)
         expected.append(first)

@@ -5,8 +5,7 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from lgmd_gym.statistics.effective_size import effective_size, t_quantile
-from lgmd_gym.statistics.intervals import Rate, wilson
+from lgmd_gym.statistics.intervals import Rate, effective_size, t_quantile, wilson
 
 
 def grid(cases, worlds, repeats=1):

@@ -13,7 +13,7 @@ from lgmd_gym.benchmark.suites import SUITES, find_case, find_suite
 from lgmd_gym.benchmark.task import Task, run_task
 from lgmd_gym.camera import CameraParams
 
-SLOW_APPROACH = Case("test/CCRs/v20", "CCRs", (("ego_speed", 5.556),))
+SLOW_APPROACH = Case("test", "CCRs", "v20", (("ego_speed", 5.556),))
 THREAT = Counterfactual(True, 5.0, 10.0)
 
 

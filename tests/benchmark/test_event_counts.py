@@ -5,9 +5,7 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from lgmd_gym.statistics.effective_size import Z95, t_quantile
-from lgmd_gym.statistics.event_counts import count_interval
-from lgmd_gym.statistics.intervals import poisson_interval
+from lgmd_gym.statistics.intervals import Z95, count_interval, poisson_interval, t_quantile
 
 
 def test_counts_that_vary_less_than_a_poisson_process_have_its_interval():

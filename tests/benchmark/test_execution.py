@@ -10,7 +10,7 @@ from support.runs import new_run, read_rows, sorted_keys
 
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.runner import Run
-from lgmd_gym.benchmark.suite_file import copy_suite, get_suite, load_suite
+from lgmd_gym.benchmark.suites import copy_suite, get_suite, load_suite
 from lgmd_gym.cli import main as cli
 from lgmd_gym.processes import pool
 

@@ -3,7 +3,7 @@
 import pytest
 
 from lgmd_gym import benchmark
-from lgmd_gym.benchmark.failures import EARLY, MAX_FAILURES, failing_agent, failure_lines
+from lgmd_gym.benchmark.runner import EARLY, MAX_FAILURES, failing_agent, failure_lines
 from lgmd_gym.cli import main as cli
 
 MODULE = """

@@ -4,7 +4,7 @@ from itertools import product
 
 import pytest
 
-from lgmd_gym.benchmark.file_names import case_name, series_name
+from lgmd_gym.benchmark.run_folder import case_name, series_name
 
 
 @pytest.mark.parametrize(

@@ -10,13 +10,13 @@ from support.rows import threat_row
 from lgmd_gym.benchmark.analysis.tables import case_table, limit_table, score_tables
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import Episode
-from lgmd_gym.benchmark.metrics import METRICS, Counterfactual, brake_onset, metric
+from lgmd_gym.benchmark.metrics import KEYS, METRICS, Counterfactual, brake_onset, make_row, metric
 from lgmd_gym.benchmark.recorder import SERIES
-from lgmd_gym.benchmark.rows import KEYS, make_row
+from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.benchmark.summary import COLUMNS, Sample, summaries, summarise, write_summary
 from lgmd_gym.statistics.intervals import wilson
 
-SLOW_APPROACH = Case("test/CCRs/v20", "CCRs", (("ego_speed", 5.556),))
+SLOW_APPROACH = Case("test", "CCRs", "v20", (("ego_speed", 5.556),))
 THREAT = Counterfactual(True, 5.0, 10.0)
 NO_THREAT = Counterfactual(False, float("inf"), float("inf"))
 
@@ -123,7 +123,7 @@ def test_summary_separates_threats_from_non_threats():
 
 def test_summary_orders_cases_by_number(tmp_path):
     rows = [
-        make_row("a", replace(SLOW_APPROACH, name=f"t/CCRs/v{speed}"), 0, episode([0, 0]), THREAT)
+        make_row("a", replace(SLOW_APPROACH, suite="t", variant=f"v{speed}"), 0, episode([0, 0]), THREAT)
         for speed in (50, 5, 10)
     ]
     cases = ["t/CCRs/v5", "t/CCRs/v10", "t/CCRs/v50"]
@@ -155,7 +155,9 @@ def test_rates_cluster_by_case_and_world(worlds, trials, text):
     (table,) = score_tables(rows, ["a"], "title")
     assert table.caption.startswith(f"{text}; k/n [95 % interval, clustered by case and world, in %]")
     assert case_table(rows, ["a"]).caption == text
-    assert limit_table([row | impact() for row in rows], ["a"], "fmvss127").caption.startswith(f"{text}; ")
+    assert limit_table([row | impact() for row in rows], ["a"], SUITES["fmvss127"]).caption.startswith(
+        f"{text}; "
+    )
 
 
 def impact():

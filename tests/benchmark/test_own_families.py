@@ -11,7 +11,7 @@ from support.runs import interrupt, new_run, read_rows
 
 from lgmd_gym.benchmark.plan import CasePlan
 from lgmd_gym.benchmark.runner import Run
-from lgmd_gym.benchmark.suite_file import get_suite
+from lgmd_gym.benchmark.suites import get_suite
 from lgmd_gym.cli import main as cli
 from lgmd_gym.envs import FAMILIES, import_families, make_scenario, register_family
 
@@ -115,7 +115,7 @@ def test_run_folder_and_tasks_do_not_need_the_module(folder):
     forget_families()
     (folder / "my_scenarios.py").unlink()
     assert isinstance(run.plan, CasePlan)
-    assert "my_scenarios" not in str(pickle.dumps(run.plan.cases))
+    assert "my_scenarios" not in str(pickle.dumps(run.plan.suite))
     assert not run.play(interrupt)
     again = Run.resume(folder / "run")
     assert again.play()

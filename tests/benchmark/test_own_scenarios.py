@@ -14,8 +14,7 @@ from support.runs import new_run, read_rows
 from lgmd_gym import benchmark
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark import RunConfig, get_suite
-from lgmd_gym.benchmark.suite_file import copy_suite, find_own_case
-from lgmd_gym.benchmark.suites import find_case
+from lgmd_gym.benchmark.suites import copy_suite, find_case, find_own_case
 from lgmd_gym.cli import main as cli
 from lgmd_gym.envs import Actor, Scenario, make_scenario
 from lgmd_gym.openscenario.export import export_case

@@ -7,20 +7,20 @@ import pytest
 from support.rows import suite_rows, threat_row
 
 from lgmd_gym.benchmark.analysis.compare import compare_rows
-from lgmd_gym.benchmark.analysis.ncap_points import points_2023, points_2026, row_colour_2023, row_colour_2026
-from lgmd_gym.benchmark.analysis.protocol_limits import (
-    check_fmvss127,
+from lgmd_gym.benchmark.analysis.tables import limit_results, limit_table, score_tables
+from lgmd_gym.benchmark.protocols.car_to_car_2023 import points_2023, row_colour_2023
+from lgmd_gym.benchmark.protocols.frontal_2026 import (
     check_green,
-    check_r152,
     colour_2026,
-    limit_results,
-    meets_r152,
-    r152_limit,
+    points_2026,
+    row_colour_2026,
 )
-from lgmd_gym.benchmark.analysis.tables import limit_table, score_tables
+from lgmd_gym.benchmark.protocols.regulations import check_fmvss127, check_r152, meets_r152, r152_limit
+from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.benchmark.summary import write_summary
 from lgmd_gym.envs.dynamics.units import KMH
 
+R152 = SUITES["r152"]
 # UN R152 Rev.2, 5.2.1.4, M1: relative speed, limits laden and unladen [km/h].
 R152_TABLE = [
     (10, 0, 0),
@@ -50,7 +50,8 @@ def impact_row(case, ego, target, impact, **values):
     """Return a row with speeds in km/h; an impact speed of 0 is no contact."""
     speeds = {"ego_speed": ego * KMH, "target_speed": target * KMH}
     speeds |= {"relative_impact_speed": impact * KMH if impact else None, "collision": bool(impact)}
-    return threat_row(case=f"r152/{case}", **(speeds | values))
+    suite = "r152-vru" if case.startswith(("CP", "CB")) else "r152"
+    return threat_row(case=f"{suite}/{case}", **(speeds | values))
 
 
 def test_r152_limits_match_the_regulation():
@@ -99,10 +100,10 @@ def test_premature_braking_fails_r152():
 def test_r152_allows_a_tenth_of_the_runs_to_fail(failed, met):
     rows = [impact_row("CCRs/v20", 20, 0, 5 if seed < failed else 0, seed=seed) for seed in range(10)]
     assert meets_r152(rows, "a") is met
-    (result,) = limit_results(rows, "a", check_r152)
+    (result,) = limit_results(rows, "a", R152)
     assert (result.case, result.met.k, result.met.n) == ("r152/CCRs/v20", 10 - failed, 10)
     assert result.worst == pytest.approx(5 * KMH if failed else 0)
-    table = limit_table(rows, ["a"], "r152")
+    table = limit_table(rows, ["a"], R152)
     assert table.caption.endswith("in simulation: a" if met else "in simulation: none")
     assert [list(column.cells) for column in table.columns] == [
         ["CCRs/v20"],
@@ -132,9 +133,9 @@ def test_limit_results_leave_out_errors_and_non_threats():
         impact_row("CCRs/v20", 20, 0, 9, error="Traceback"),
         impact_row("CCRs/v20", 20, 0, 9, threat=False),
     ]
-    (result,) = limit_results(rows, "a", check_r152)
+    (result,) = limit_results(rows, "a", R152)
     assert (result.met.k, result.met.n) == (1, 1)
-    assert limit_results(rows, "other agent", check_r152) == []
+    assert limit_results(rows, "other agent", R152) == []
 
 
 def test_agent_without_runs_does_not_meet_r152():
@@ -142,7 +143,7 @@ def test_agent_without_runs_does_not_meet_r152():
 
 
 def test_suite_without_limits_has_no_limit_table():
-    assert limit_table([impact_row("CCRs/v20", 20, 0, 0)], ["a"], "quick") is None
+    assert limit_table([impact_row("CCRs/v20", 20, 0, 0)], ["a"], SUITES["quick"]) is None
 
 
 def test_contact_and_colour_checks():

@@ -11,19 +11,18 @@ from support.runs import interrupt, new_run, read_rows, sorted_rows
 
 from lgmd_gym.benchmark import RunConfig
 from lgmd_gym.benchmark import run as run_benchmark
+from lgmd_gym.benchmark.analysis.arms import compare_arms
 from lgmd_gym.benchmark.analysis.compare import compare_runs
-from lgmd_gym.benchmark.analysis.trainings import compare_arms
-from lgmd_gym.benchmark.rows import KEYS
+from lgmd_gym.benchmark.metrics import KEYS
+from lgmd_gym.benchmark.run_folder import read_run
 from lgmd_gym.benchmark.runner import Run
-from lgmd_gym.benchmark.stored_run import read_run
 from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.benchmark.summary import write_csv
 from lgmd_gym.cli import main as cli
 from lgmd_gym.plotting.style import saved_figure
 from lgmd_gym.processes.files import FolderLock
 from lgmd_gym.processes.pool import Executor
-from lgmd_gym.report.outputs import write_outputs
-from lgmd_gym.report.page import write_report
+from lgmd_gym.report.page import write_outputs, write_report
 
 BOUNDS = ("no-brake", "always-brake", "ttc-oracle", "spike-threshold")
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lgmd_gym.benchmark.stored_run import read_series
+from lgmd_gym.benchmark.run_folder import read_series
 
 
 @pytest.mark.parametrize("kind", ["cut off", "changed", "folder"])

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.analysis.protocol_limits import LIMIT_CHECKS
 from lgmd_gym.benchmark.episode import Episode
-from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.metrics import Counterfactual, make_row
 from lgmd_gym.benchmark.recorder import GROUND_TRUTH, SERIES
-from lgmd_gym.benchmark.rows import make_row
 from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.envs.dynamics.units import KMH
@@ -77,7 +75,7 @@ def violations(case):
         "the oracle has no false activation": not oracle["false_activation"],
     }
     if case.suite in ("r152", "fmvss127"):
-        met = LIMIT_CHECKS[case.suite]
+        met = SUITES[case.suite].limit
         expectations["the oracle meets the limit, always-brake does not"] = met(oracle)[0] > met(always)[0]
     return [f"{case.name}: {expectation}" for expectation, met in expectations.items() if not met]
 

@@ -5,7 +5,7 @@ import json
 import pytest
 import tomli_w
 
-from lgmd_gym.benchmark.suite_file import copy_suite, load_suite
+from lgmd_gym.benchmark.suites import copy_suite, load_suite
 
 
 @pytest.fixture

@@ -11,15 +11,19 @@ from support.runs import interrupt, new_run, read_rows, sorted_rows
 from lgmd_gym.agents import AGENTS, BatchAgent
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.traffic.rows import KEYS
-from lgmd_gym.benchmark.traffic.summary import COLUMNS, traffic_summaries, write_traffic_summary
-from lgmd_gym.benchmark.traffic.tables import traffic_table
+from lgmd_gym.benchmark.traffic.summary import (
+    COLUMNS,
+    traffic_summaries,
+    traffic_table,
+    write_traffic_summary,
+)
 
 SHORT = {"duration": 12}
 
 
 def row(agent="a", kind="merge", **values):
     """Return a row with zeros for all counts and lengths."""
-    identity = {"agent": agent, "case": f"traffic/{kind}/s0", "condition": "clear"}
+    identity = {"agent": agent, "case": f"traffic/{kind}/s0", "family": kind, "condition": "clear"}
     counts = ("alerts", "brakes", "false_activations", "stops")
     zeros = dict.fromkeys((*counts, "peak_deceleration", "distance", "moving_time", "needed_time"), 0)
     return dict.fromkeys(KEYS) | identity | zeros | {"collision": False, "threat": False} | values

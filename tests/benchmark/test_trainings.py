@@ -8,8 +8,7 @@ import pytest
 from support.rows import threat_row
 
 from lgmd_gym import benchmark
-from lgmd_gym.benchmark.analysis.compare_tables import arm_table
-from lgmd_gym.benchmark.analysis.trainings import Arm, arm_results, compare_arms, parse_arm
+from lgmd_gym.benchmark.analysis.arms import Arm, arm_results, arm_table, compare_arms, parse_arm
 from lgmd_gym.cli import main as cli
 from lgmd_gym.statistics.bootstrap import interquartile_mean
 from lgmd_gym.statistics.intervals import wilson

@@ -3,15 +3,16 @@
 from dataclasses import replace
 
 import pytest
+from support.examples import load
 from support.rows import threat_row
 
 from lgmd_gym.benchmark import RunConfig
-from lgmd_gym.benchmark.analysis.detections import detected_rows
-from lgmd_gym.benchmark.stored_run import StoredRun
+from lgmd_gym.benchmark.run_folder import StoredRun
 from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.envs.families.distribution import EXTRA_FAMILIES, draw_scenario, level_generator
 from lgmd_gym.envs.families.scenario import without_target
 
+detected_rows = load("detections").detected_rows
 CONFIG = RunConfig(suite="ncap2023", agents=("no-brake",), seeds=1)
 
 
@@ -19,7 +20,7 @@ CONFIG = RunConfig(suite="ncap2023", agents=("no-brake",), seeds=1)
 def test_each_case_is_a_threat_without_its_target(suite):
     cases, threats = SUITES[f"{suite}-without-target"].cases, SUITES[suite].cases
     for case, with_target in zip(cases, threats, strict=True):
-        assert case.name.split("/")[1:] == with_target.name.split("/")[1:]
+        assert (case.family, case.variant) == (with_target.family, with_target.variant)
         assert case.fcw_driver is with_target.fcw_driver
         assert case.scenario == without_target(with_target.scenario)
         assert case.scenario.actors == with_target.scenario.actors[1:]

@@ -9,7 +9,7 @@ from support.rows import threat_row
 
 from lgmd_gym.benchmark.analysis.tables import case_table, score_tables
 from lgmd_gym.benchmark.traffic.rows import KEYS
-from lgmd_gym.benchmark.traffic.tables import traffic_table
+from lgmd_gym.benchmark.traffic.summary import traffic_table
 from lgmd_gym.cli.console import activity, make_console
 from lgmd_gym.cli.doctor import FAULT, Finding, print_findings
 

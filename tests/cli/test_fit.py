@@ -5,12 +5,11 @@ from rich.table import Table
 from rich.text import Text
 from support.rows import threat_row
 
-from lgmd_gym.benchmark.analysis.compare_tables import arm_table
+from lgmd_gym.benchmark.analysis.arms import ArmResult, Estimate, arm_table
 from lgmd_gym.benchmark.analysis.tables import case_table, score_tables
-from lgmd_gym.benchmark.analysis.trainings import ArmResult, Estimate
 from lgmd_gym.benchmark.summary import Sample
 from lgmd_gym.benchmark.traffic.rows import KEYS
-from lgmd_gym.benchmark.traffic.tables import traffic_table
+from lgmd_gym.benchmark.traffic.summary import traffic_table
 from lgmd_gym.cli import main as cli
 from lgmd_gym.cli.console import fit, make_console
 

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from lgmd_gym.benchmark import get_suite
-from lgmd_gym.benchmark.scenario_template import TEMPLATE
+from lgmd_gym.benchmark.suites import TEMPLATE
 from lgmd_gym.cli import main as cli
 
 

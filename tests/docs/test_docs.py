@@ -14,8 +14,8 @@ from support.own_families import forget_families
 
 from lgmd_gym import __version__
 from lgmd_gym.agents import AGENTS
-from lgmd_gym.benchmark.rows import KEYS
-from lgmd_gym.benchmark.suite_file import load_suite
+from lgmd_gym.benchmark.metrics import KEYS
+from lgmd_gym.benchmark.suites import load_suite
 from lgmd_gym.cli import main as cli
 from lgmd_gym.clips import VideoWriter
 from lgmd_gym.training import TrainConfig

@@ -10,9 +10,8 @@ from support.rows import threat_row
 
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.benchmark import RunConfig, get_suite
-from lgmd_gym.benchmark.case import Case
-from lgmd_gym.benchmark.stored_run import StoredRun
-from lgmd_gym.benchmark.suites import Suite
+from lgmd_gym.benchmark.case import Case, Suite
+from lgmd_gym.benchmark.run_folder import StoredRun
 from lgmd_gym.training.offline.storage import save
 from lgmd_gym.training.recordings import FORMAT
 
@@ -180,8 +179,8 @@ def test_protocol_counts(tmp_path, monkeypatch):
         file.parent.mkdir(parents=True, exist_ok=True)
         file.touch()
     families = ("CPNA-25", "CPTAfs", "CPRA_Cm", "CCRs")
-    cells = tuple(Case(f"x/{family}/v10", "Scenario", fcw_driver=family == "CCRs") for family in families)
-    monkeypatch.setattr(script, "read", lambda path: Suite("x", cells, ""))
+    cells = tuple(Case("x", family, "v10", fcw_driver=family == "CCRs") for family in families)
+    monkeypatch.setattr(script, "read", lambda path: Suite(name="x", cases=cells, about=""))
     lines = script.table(tmp_path)
     assert lines[0] == "| family | ncap2023 | ncap2023-vru | ncap2026 | ncap2026-extended |"
     assert "| CPNA | 0 / 1 | 22 / 1 | 36 / 1 | 24 / 1 |" in lines

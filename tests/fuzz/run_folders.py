@@ -19,7 +19,7 @@ from support.fuzz import run_cases
 from support.runs import SMALL_SUITE, interrupt, new_run
 
 from lgmd_gym.cli import main as cli
-from lgmd_gym.report.outputs import write_outputs
+from lgmd_gym.report.page import write_outputs
 
 VALUES = ("null", "true", "-1", "1e400", '""', '"x"', "[]", "{}", "nan")
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lgmd_gym.benchmark.rows import KEYS
+from lgmd_gym.benchmark.metrics import KEYS
 from lgmd_gym.benchmark.task import Result
 from lgmd_gym.cli import main as cli
 from lgmd_gym.clips import VideoReader

@@ -23,8 +23,7 @@ from support.openscenario import (
 )
 
 from lgmd_gym.cli.main import run as run_command
-from lgmd_gym.openscenario.check import check_file, check_files, play
-from lgmd_gym.openscenario.intent import intent_of
+from lgmd_gym.openscenario.check import check_file, check_files, intent_of, play
 
 FILES = os.environ.get("LGMD_OPENSCENARIO_FILES")  # a copy of the Euro NCAP scenarios by Vector Informatik
 EGO = private("Ego", f"<TeleportAction><Position>{lane_position(100)}</Position></TeleportAction>", speed(10))

@@ -59,7 +59,7 @@ def outcome(scenario):
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_family_survives_a_round_trip(tmp_path, family):
-    case = Case(f"mine/{family}/x", family)
+    case = Case("mine", family, "x")
     back = exported(tmp_path, case)
     assert back.name.startswith(f"case/{family}/v")
     np.testing.assert_allclose(outcome(back.scenario), outcome(case.scenario), rtol=0, atol=1e-6)
@@ -135,7 +135,7 @@ def schema():
 @pytest.mark.parametrize("family", FAMILIES)
 def test_exports_are_valid_against_the_official_schema(tmp_path, family, schema):
     etree = pytest.importorskip("lxml.etree")
-    path, _ = export_case(Case(f"mine/{family}/x", family), tmp_path / "case.xosc")
+    path, _ = export_case(Case("mine", family, "x"), tmp_path / "case.xosc")
     schema.assertValid(etree.parse(str(path)))
 
 
@@ -143,7 +143,7 @@ def test_exports_are_valid_against_the_official_schema(tmp_path, family, schema)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_roads_are_valid_against_the_official_schema(tmp_path, family):
     xmlschema = pytest.importorskip("xmlschema")
-    _, path = export_case(Case(f"mine/{family}/x", family), tmp_path / "case.xosc")
+    _, path = export_case(Case("mine", family, "x"), tmp_path / "case.xosc")
     xmlschema.XMLSchema11(Path(OPENDRIVE) / "opendrive_17_core.xsd").validate(str(path))
 
 
@@ -186,7 +186,7 @@ def test_errors_are_one_line(tmp_path, monkeypatch, capsys, arguments, message):
 
 
 def test_conditions_without_weather_are_refused(tmp_path):
-    case = Case("mine/CCRs/x", "CCRs", (("condition", "low_sun"),))
+    case = Case("mine", "CCRs", "x", (("condition", "low_sun"),))
     with pytest.raises(
         ValueError, match="OpenSCENARIO has no weather for the condition 'low_sun'; known: night"
     ):

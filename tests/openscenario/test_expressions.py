@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from lgmd_gym.openscenario.expressions import evaluate, format_value
+from lgmd_gym.openscenario.nodes import evaluate, format_value
 
 PARAMETERS = {"v": "36", "name": "CCRs", "flag": "true", "x_1": "-2.5"}
 

@@ -33,7 +33,7 @@ from support.openscenario import (
 
 from lgmd_gym.envs import Actor, RoadPlan, Scenario
 from lgmd_gym.openscenario import read, read_all
-from lgmd_gym.openscenario.names import variants
+from lgmd_gym.openscenario.reader import variants
 
 
 def test_a_scenario_is_a_suite_of_one_case(tmp_path):

@@ -16,11 +16,10 @@ from support.openscenario import (
 )
 
 from lgmd_gym.envs.dynamics.script import Bend
-from lgmd_gym.openscenario.catalogs import Catalogs
-from lgmd_gym.openscenario.entities import Body, Mover
-from lgmd_gym.openscenario.paths import Place, Track, section
+from lgmd_gym.openscenario.motion import Place, Track, section
+from lgmd_gym.openscenario.parameters import Catalogs
 from lgmd_gym.openscenario.roads import read_roads
-from lgmd_gym.openscenario.world import World
+from lgmd_gym.openscenario.world import Body, Mover, World
 
 CAR = Body(kind="car", length=4.0, width=2.0, height=1.5, reference=0.0)
 

@@ -21,7 +21,7 @@ from support.openscenario import (
     value_condition,
 )
 
-from lgmd_gym.openscenario.entity_conditions import meets
+from lgmd_gym.openscenario.conditions import meets
 
 ONE_GROUP = "</ConditionGroup></StartTrigger>"
 

@@ -14,7 +14,7 @@ from support.openscenario import (
 )
 
 from lgmd_gym.benchmark import Executor, RunConfig, run
-from lgmd_gym.benchmark.suite_file import copy_suite, get_suite
+from lgmd_gym.benchmark.suites import copy_suite, get_suite
 from lgmd_gym.envs import Actor, Scenario
 from lgmd_gym.envs.families.data import scenario_to_data
 from lgmd_gym.openscenario import read, read_all

@@ -6,7 +6,7 @@ import pytest
 
 from lgmd_gym.envs.dynamics.longitudinal import SpeedProfile
 from lgmd_gym.envs.dynamics.script import Segment
-from lgmd_gym.openscenario.timelines import Piece, Timeline, synchronise
+from lgmd_gym.openscenario.motion import Piece, Timeline, synchronise
 
 
 def test_ramp_of_speed():

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numba
 import pytest
 
-from lgmd_gym.benchmark import warm_up
+from lgmd_gym.benchmark import plan as plans
 from lgmd_gym.benchmark.plan import CasePlan
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.kernels import compilation
@@ -126,12 +126,12 @@ def test_kernels_are_compiled_before_the_workers_start(monkeypatch, tmp_path):
     from lgmd_gym.benchmark import RunConfig
 
     played = []
-    monkeypatch.setattr(warm_up, "play_unit", lambda unit: iter([played.append(unit)]))
+    monkeypatch.setattr(plans, "play_unit", lambda unit: iter([played.append(unit)]))
     config = RunConfig(suite="quick", agents=("no-brake",), seeds=1)
     run_with(2, tmp_path, config)
-    cached = all(map(warm_up._is_cached, (warm_up.draw_cameras, warm_up.advance)))
+    cached = all(map(plans._is_cached, (plans.draw_cameras, plans.advance)))
     assert len(played) == (not cached)
-    monkeypatch.setattr(warm_up, "_is_cached", lambda kernel: False)
+    monkeypatch.setattr(plans, "_is_cached", lambda kernel: False)
     played.clear()
     run_with(1, tmp_path, config)
     assert played == []
@@ -147,6 +147,6 @@ def test_a_kernel_that_was_compiled_is_cached(tmp_path, monkeypatch):
     )
     monkeypatch.syspath_prepend(tmp_path)
     twice = importlib.import_module("one_kernel").twice
-    assert not warm_up._is_cached(twice)
+    assert not plans._is_cached(twice)
     twice(1)
-    assert warm_up._is_cached(twice)
+    assert plans._is_cached(twice)

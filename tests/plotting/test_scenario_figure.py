@@ -6,7 +6,7 @@ import pytest
 from lgmd_gym.envs import Actor, RoadPlan, Scenario, Segment, make_scenario
 from lgmd_gym.envs.dynamics.script import Bend
 from lgmd_gym.envs.motion import record_motion
-from lgmd_gym.plotting.scenario_figure import scenario_figure
+from lgmd_gym.plotting.figures import scenario_figure
 
 BRAKING = Segment(start=1.0, acceleration=-2.0, final_speed=4.0)
 PASS = Scenario(

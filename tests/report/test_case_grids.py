@@ -2,8 +2,9 @@
 
 from support.rows import suite_rows, threat_row
 
-from lgmd_gym.report.case_grids import case_grids
-from lgmd_gym.report.selection import extreme_episodes, hardest_false_activations, illustrated_agent
+from lgmd_gym.benchmark.suites import SUITES
+from lgmd_gym.report.figures import case_grids
+from lgmd_gym.report.sections import extreme_episodes, hardest_false_activations, illustrated_agent
 
 
 def test_case_grids_of_ncap2023():
@@ -11,7 +12,7 @@ def test_case_grids_of_ncap2023():
         "ncap2023", lambda case, _: case.endswith(("CCRs/v50/overlap75", "CCRs/v40/overlap100"))
     )
     rows = [row | {"premature_brake": row["case"].endswith("CCRs/v10/overlap-50")} for row in rows]
-    crossing, turning, moving, standing = case_grids(rows, "a", "ncap2023")
+    crossing, turning, moving, standing = case_grids(rows, "a", SUITES["ncap2023"])
     titles = [grid.title for grid in (crossing, turning, moving, standing)]
     assert titles == ["CCCscp: a", "CCFtap: a", "CCRm: a", "CCRs: a"]
     assert (turning.columns, [head for head, _ in turning.lines]) == ([30, 45, 60], ["10", "15", "20"])
@@ -28,12 +29,12 @@ def test_case_grids_of_ncap2023():
     ]
     assert (cells["50"][3].colour, cells["50"][3].text) == ("red", "50")
     assert (cells["10"][0].colour, cells["10"][0].text) == ("premature", "0*")
-    assert case_grids(rows, "a", "quick") == []
+    assert case_grids(rows, "a", SUITES["quick"]) == []
 
 
 def test_case_grids_of_ncap2026_have_lights_and_sides():
     rows = suite_rows("ncap2026", lambda case, _: case.endswith("CPNA/v30/location75-night"))
-    grids = {grid.title: grid for grid in case_grids(rows, "a", "ncap2026")}
+    grids = {grid.title: grid for grid in case_grids(rows, "a", SUITES["ncap2026"])}
     assert {"CPNA: a", "CPNA at night: a", "CCCscp from the left: a", "CMCscp from the right: a"} <= set(
         grids
     )
@@ -56,7 +57,7 @@ def test_a_cell_has_the_highest_impact_speed_and_the_colour_of_the_seed_that_ear
         threat_row(seed=1, **values, collision=False, premature_brake=True),
     ]
     for order in (rows, rows[::-1]):
-        ((_, (cell,)),) = case_grids(order, "a", "ncap2023")[0].lines
+        ((_, (cell,)),) = case_grids(order, "a", SUITES["ncap2023"])[0].lines
         assert (cell.colour, cell.text) == ("premature", "5")
 
 

@@ -3,9 +3,11 @@
 import pytest
 from support.rows import suite_rows, threat_row
 
-from lgmd_gym.report.agent_notes import agent_note
-from lgmd_gym.report.conclusion import CAVEAT, conclusion
+from lgmd_gym.benchmark.case import Suite
+from lgmd_gym.benchmark.suites import SUITES
+from lgmd_gym.report.conclusion import CAVEAT, agent_note, conclusion
 
+SUITE = Suite(name="suite", cases=(), about="")
 AGENTS = ["no-brake", "rule"]
 
 
@@ -66,7 +68,7 @@ def run(threats, non_threats, contacts=0, false=0):
     ids=["all", "none", "mixed", "no non-threat", "no threat"],
 )
 def test_avoided_and_false_activations_have_their_n_and_interval(numbers, sentence):
-    text = conclusion(run(**numbers), AGENTS, "suite")
+    text = conclusion(run(**numbers), AGENTS, SUITE)
     assert sentence in text
     total = numbers["threats"] + numbers["non_threats"]
     assert f"Without braking, {numbers['threats']} of {total} episode" in text
@@ -80,42 +82,42 @@ def test_avoided_and_false_activations_have_their_n_and_interval(numbers, senten
 def test_failed_episodes_are_counted_and_left_out():
     rows = run(2, 1)
     rows += [row("rule", 9, error="x"), row("rule", 8, error="x")]
-    text = conclusion(rows, AGENTS, "suite")
+    text = conclusion(rows, AGENTS, SUITE)
     assert "2 episodes failed and are left out." in text
     assert "avoided 2 of 2 threats" in text
-    assert "failed" not in conclusion(run(2, 1), AGENTS, "suite")
+    assert "failed" not in conclusion(run(2, 1), AGENTS, SUITE)
 
 
 def test_an_agent_without_a_completed_episode():
     rows = [item for item in run(1, 0) if item["agent"] == "no-brake"] + [row("rule", 0, error="x")]
-    assert "rule has no completed episode." in conclusion(rows, AGENTS, "suite")
+    assert "rule has no completed episode." in conclusion(rows, AGENTS, SUITE)
 
 
 def test_an_agent_that_completed_one_kind_of_episodes_only():
     rows = [item for item in run(2, 1) if item["agent"] == "no-brake" or item["threat"]]
-    text = conclusion(rows, AGENTS, "suite")
+    text = conclusion(rows, AGENTS, SUITE)
     assert "[34 to 100 %] and completed no episode without a threat." in text
 
 
 def test_premature_braking_is_named_beside_the_avoided_threats():
     rows = run(2, 1)
     rows[1] |= {"avoided": False, "premature_brake": True}
-    text = conclusion(rows, AGENTS, "suite")
+    text = conclusion(rows, AGENTS, SUITE)
     assert "avoided 1 of 2 threats [9 to 91 %] with premature braking in 1 other and" in text
-    assert "premature" not in conclusion(run(2, 1), AGENTS, "suite")
+    assert "premature" not in conclusion(run(2, 1), AGENTS, SUITE)
 
 
 def test_every_condition_has_its_sentences():
     rows = run(2, 1) + [item | {"condition": "rain"} for item in run(2, 1, contacts=2)]
-    text = conclusion(rows, AGENTS, "suite")
+    text = conclusion(rows, AGENTS, SUITE)
     assert "Condition clear: rule avoided 2 of 2" in text
     assert "Condition rain: rule avoided 0 of 2" in text
-    assert "Condition" not in conclusion(run(2, 1), AGENTS, "suite")
+    assert "Condition" not in conclusion(run(2, 1), AGENTS, SUITE)
 
 
 def test_episodes_with_an_fcw_driver_are_not_in_the_totals():
     rows = [*run(2, 1), row("rule", 7, fcw_driver=True, collision=True, avoided=False)]
-    assert "rule avoided 2 of 2 threats" in conclusion(rows, AGENTS, "suite")
+    assert "rule avoided 2 of 2 threats" in conclusion(rows, AGENTS, SUITE)
 
 
 def test_limits_of_the_protocol():
@@ -124,12 +126,12 @@ def test_limits_of_the_protocol():
         for item in suite_rows("r152", lambda case, _: "CCRs/v60" in case)
     ]
     rows += [item | {"seed": 1, "collision": False, "relative_impact_speed": None} for item in rows]
-    text = conclusion(rows, ["no-brake", "a"], "r152")
+    text = conclusion(rows, ["no-brake", "a"], SUITES["r152"])
     assert "Cases in which every run meets the limit of the protocol in simulation: a " in text
     met, cases = text.split("in simulation: a ")[1].split(".")[0].split(" of ")
     assert int(met) == int(cases) - 1
     assert "Agents that meet the impact speed limits of UN R152 in simulation: " in text
-    assert "limit" not in conclusion(run(1, 1), AGENTS, "suite")
+    assert "limit" not in conclusion(run(1, 1), AGENTS, SUITE)
 
 
 @pytest.mark.parametrize(

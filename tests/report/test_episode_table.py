@@ -5,8 +5,8 @@ import re
 
 from support.rows import threat_row
 
-from lgmd_gym.benchmark.episode_table import UNITS, column_name, write_episodes
-from lgmd_gym.benchmark.rows import KEYS
+from lgmd_gym.benchmark.metrics import KEYS
+from lgmd_gym.benchmark.summary import UNITS, column_name, write_episodes
 from lgmd_gym.benchmark.traffic.rows import KEYS as TRAFFIC_KEYS
 
 # Names, flags, counts, values with their unit in the key, and grey levels or returns without a unit.
@@ -14,6 +14,7 @@ WITHOUT_UNIT = {
     *("agent", "suite", "case", "fcw_driver", "seed", "condition", "world", "camera", "side", "error"),
     *("threat", "collision", "avoided", "false_activation", "premature_brake"),
     *("alerts", "brakes", "false_activations", "stops"),
+    *("family", "overlap", "impact_location", "target_side", "light", "load"),
     *("theta_at_alert_deg", "l_over_v_ms", "target_shade", "episode_return"),
 }
 

@@ -135,14 +135,14 @@ def test_report_without_a_common_episode_of_two_agents(report_folder, user_agent
 def test_impact_points_of_many_speeds_are_grouped():
     row = {"agent": "a", "fcw_driver": False, "threat": True, "error": None, "collision": False}
     rows = [
-        row | {"case": "s/F/x", "ego_speed": kmh / 3.6, "impact_speed": None} for kmh in range(MAX_SPEEDS + 1)
+        row | {"family": "F", "ego_speed": kmh / 3.6, "impact_speed": None} for kmh in range(MAX_SPEEDS + 1)
     ]
-    points = impact_points(rows, ["a"], {"s/F/x": "F"}, "clear")
+    points = impact_points(rows, ["a"], "clear")
     assert [point.speed for point in points] == [0, 5, 10, 15, 20, 25]
     assert sum(point.threats for point in points) == MAX_SPEEDS + 1
-    assert len(impact_points(rows[:-1], ["a"], {"s/F/x": "F"}, "clear")) == MAX_SPEEDS
+    assert len(impact_points(rows[:-1], ["a"], "clear")) == MAX_SPEEDS
     failed = [item | {"error": "x"} for item in rows]
-    assert impact_points(failed, ["a"], {"s/F/x": "F"}, "clear") == []
+    assert impact_points(failed, ["a"], "clear") == []
 
 
 def test_no_avoidance_figure_without_both_kinds_of_episodes():

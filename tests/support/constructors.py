@@ -10,8 +10,7 @@ import lgmd_gym
 from lgmd_gym import agents, benchmark, camera, engine, envs, neuron
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.benchmark.case import Case
-from lgmd_gym.benchmark.suite_file import get_suite
-from lgmd_gym.benchmark.suites import find_suite
+from lgmd_gym.benchmark.suites import find_suite, get_suite
 from lgmd_gym.clips import VideoReader, VideoWriter, find_clips, luma
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.reward import RewardParams

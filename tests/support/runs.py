@@ -2,8 +2,8 @@
 
 import json
 
+from lgmd_gym.benchmark.case import key_of
 from lgmd_gym.benchmark.config import RunConfig
-from lgmd_gym.benchmark.rows import key_of
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.processes.pool import Executor
 

@@ -3,15 +3,24 @@
 from collections.abc import Iterable, Sequence
 from itertools import combinations
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from lgmd_gym.benchmark.rows import Row, key_of
-from lgmd_gym.benchmark.stored_run import read_run
-from lgmd_gym.benchmark.suites import TRAFFIC
-from lgmd_gym.benchmark.summary import Sample, cases_and_worlds, without_fcw_driver
+from rich.table import Table
+
+from lgmd_gym.benchmark.case import Row, key_of
+from lgmd_gym.benchmark.run_folder import read_case_rows
+from lgmd_gym.benchmark.summary import Sample, cases_and_worlds, interval_text, without_fcw_driver
 from lgmd_gym.benchmark.task import NO_BRAKE
-from lgmd_gym.errors import check_known
+from lgmd_gym.errors import check_known, counted
+from lgmd_gym.plotting.style import COLOURS, FigureFile, saved_figure
 from lgmd_gym.statistics.intervals import Mean, Rate, cluster_mean
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DIFFERENCE_CAPTION = (
+    "B − A [95 % interval, bootstrap over cases and worlds]; number of pairs in which B is higher/lower, of n"
+)
 
 
 class Quantity(NamedTuple):
@@ -159,14 +168,6 @@ def paired_difference(quantity: Quantity, pairs: list[tuple[Row, Row]]) -> Diffe
     )
 
 
-def read_case_rows(path: Path) -> list[Row]:
-    """Return the rows of a run folder; raise ValueError for a traffic run."""
-    run = read_run(path)
-    if run.config.suite == TRAFFIC:
-        raise ValueError(f"{str(path)!r} is a traffic run; its summary.csv holds the rates per 100 km")
-    return run.rows
-
-
 def _agent_pairs(
     rows_a: list[Row], rows_b: list[Row], agents: Sequence[str] | None, within: bool
 ) -> list[tuple[str, str]]:
@@ -188,3 +189,81 @@ def _agent_pairs(
             f"no pair of agents in {', '.join(agents_a)} and {', '.join(agents_b)}; name two with --agents"
         )
     return pairs
+
+
+def comparison_table(comparison: Comparison) -> Table:
+    """Return a table with one line per quantity: A, B, their difference, and how many pairs differ."""
+    caption = f"{comparison.sample}; {DIFFERENCE_CAPTION}"
+    if comparison.unpaired:
+        episodes = counted(comparison.unpaired, "episode")
+        caption += f"; {episodes} without a pair (missing, failed, or threat to one only)"
+    title = f"A = {comparison.name_a}   B = {comparison.name_b}   {comparison.pairs} pairs"
+    table = Table(title=f"{title} {comparison.condition}".rstrip(), caption=caption)
+    table.add_column("quantity")
+    for heading in ("A", "B", "B − A", "higher/lower\nof n"):
+        table.add_column(heading, justify="right")
+    for item in comparison.differences:
+        pairs = f"{item.higher}/{item.lower} of {item.change.n}"
+        cells = (
+            f"{item.name} [{item.unit}]",
+            f"{item.mean_a:.2f}",
+            f"{item.mean_b:.2f}",
+            change_text(item),
+            pairs,
+        )
+        table.add_row(*cells)
+    return table
+
+
+def change_text(item: Difference) -> str:
+    """Return a difference with its interval, or with the share of pairs that may differ if all are equal."""
+    change = item.change
+    if item.deviating_high is not None:
+        share = f"{100 * item.deviating_high:.0f} %"
+        return f"{change.value:+.2f} in all pairs (95 %: at most {share} of pairs differ)"
+    if change.low is None:
+        return f"{change.value:+.2f} (one case, no interval)"
+    return interval_text(change, "+.2f")
+
+
+def difference_figure(file: FigureFile, comparisons: list[Comparison]) -> "Figure":
+    """Plot paired differences with their 95 % intervals, one panel per quantity; save and return the figure.
+
+    Args:
+        file: Destination.
+        comparisons: One line each.
+    """
+    names = list(dict.fromkeys(item.name for comparison in comparisons for item in comparison.differences))
+    columns = min(3, len(names))
+    rows = -(-len(names) // columns)
+    size = (10.0, rows * (1.1 + 0.42 * len(comparisons)))
+    with saved_figure(file, rows, columns, figsize=size, squeeze=False) as (figure, axes):
+        for axis in axes.flat[len(names) :]:
+            axis.set_visible(False)
+        for index, (name, axis) in enumerate(zip(names, axes.flat, strict=False)):
+            _plot_differences(axis, name, comparisons, labels=index % columns == 0)
+    return figure
+
+
+def _plot_differences(axis: Any, name: str, comparisons: list[Comparison], labels: bool) -> None:
+    """Plot one quantity; comparison i is at y = i."""
+    axis.axvline(0.0, color="0.4", linewidth=1.0)
+    unit = ""
+    for height, comparison in enumerate(comparisons):
+        item = next((item for item in comparison.differences if item.name == name), None)
+        if item is None:
+            continue
+        unit, change = item.unit, item.change
+        if change.low is not None and change.high is not None:
+            ends = [change.low, change.high]
+            axis.plot(ends, [height, height], color=COLOURS[2], linewidth=2.5, solid_capstyle="butt")
+        axis.plot(change.value, height, "o", color=COLOURS[2], markersize=5)
+    axis.set_title(name, fontsize=9)
+    axis.set_xlabel(f"B − A [{unit}]", fontsize=8)
+    axis.set_ylim(len(comparisons) - 0.5, -0.5)
+    texts = [_comparison_label(comparison) for comparison in comparisons] if labels else []
+    axis.set_yticks(range(len(comparisons)), texts, fontsize=7)
+
+
+def _comparison_label(item: Comparison) -> str:
+    return f"{item.name_b}\n− {item.name_a}" + (f"\n{item.condition}" if item.condition else "")

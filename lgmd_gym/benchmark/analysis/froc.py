@@ -12,17 +12,20 @@ from dataclasses import dataclass
 from itertools import compress
 from math import inf
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.benchmark.file_names import series_name
+from lgmd_gym.benchmark.case import key_of
 from lgmd_gym.benchmark.metrics import PREMATURE
-from lgmd_gym.benchmark.rows import key_of
-from lgmd_gym.benchmark.stored_run import read_run, read_series
+from lgmd_gym.benchmark.run_folder import read_run, read_series, series_name
 from lgmd_gym.benchmark.summary import write_csv
 from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.plotting.style import COLOURS, FigureFile, saved_figure
 from lgmd_gym.statistics.intervals import Rate, poisson_interval
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 REARM_TIME = 1.0  # time below the threshold after which the next alarm is a new event [s]
 LEAD_TIME = 1.0  # latest start of a detection before contact [s]
@@ -31,6 +34,8 @@ THRESHOLDS = tuple(float(level) for level in range(5, 305, 5))
 ASPHALT = 104.0  # mean grey level of the asphalt by day
 LOW_CONTRAST = 0.35  # Weber contrast |grey - asphalt| / asphalt
 CONTRAST_CLASSES = ("dark", "like asphalt", "light")
+FALSE_PER_KM_TICKS = (0.0, 0.5, 1.0, 3.0, 10.0, 30.0, 100.0)  # linear below 1, logarithmic above
+LABELLED_THRESHOLDS = (15.0, 30.0, 60.0, 120.0)  # [spikes/s]
 COLUMNS = (
     *("condition", "contrast", "lead", "threshold", "threats", "detected", "detected_low", "detected_high"),
     *("false_alarms", "km", "false_per_km", "false_low", "false_high", "chance"),
@@ -208,3 +213,52 @@ def _csv_values(point: FrocPoint) -> list[float]:
     detected = (rate.n, rate.k, rate.low, rate.high)
     false = (point.false_alarms, km, point.false_per_km, point.false_low, point.false_high)
     return [round(value, 4) for value in (point.threshold, *detected, *false, point.chance)]
+
+
+def froc_figure(file: FigureFile, curves: dict[str, list[FrocCurve]], lead_time: float) -> "Figure":
+    """Plot detections against false alarms per km, one panel per condition; save and return the figure.
+
+    Args:
+        file: Destination.
+        curves: Curves by condition; one line each.
+        lead_time: Latest start of a detection before contact [s].
+    """
+    size = (1.0 + 4.6 * len(curves), 3.9)
+    with saved_figure(file, 1, len(curves), figsize=size, squeeze=False, sharey=True) as (figure, axes):
+        for axis, (condition, of_condition) in zip(axes[0], curves.items(), strict=True):
+            for colour, curve in zip(COLOURS, of_condition, strict=False):
+                _plot_froc(axis, curve, colour)
+            distance = of_condition[0].points[0].distance / 1000
+            axis.set_title(f"{condition}; {distance:.2f} km without threat", fontsize=9)
+            axis.set_xscale("symlog", linthresh=1.0)
+            highest = max(point.false_per_km for curve in of_condition for point in curve.points)
+            axis.set_xticks(FALSE_PER_KM_TICKS, [f"{tick:g}" for tick in FALSE_PER_KM_TICKS])
+            axis.set_xticks([], minor=True)
+            top = next((x for x in FALSE_PER_KM_TICKS if x >= max(highest, 1.0)), FALSE_PER_KM_TICKS[-1])
+            axis.set(xlim=(-0.05, 1.05 * top), ylim=(-0.02, 1.02), xlabel="false alarms per km")
+            axis.legend(fontsize=7, loc="center right")
+        axes[0][0].set_ylabel(f"threats with an alarm 4 to {lead_time:g} s before contact")
+    return figure
+
+
+def _plot_froc(axis: Any, curve: FrocCurve, colour: str) -> None:
+    points = curve.points
+    false_per_km = [point.false_per_km for point in points]
+    detected = [point.detected.k / max(point.detected.n, 1) for point in points]
+    label = f"{curve.contrast} (n = {points[0].detected.n})"
+    axis.plot(false_per_km, detected, "o-", color=colour, markersize=2.5, linewidth=1.2, label=label)
+    if curve.contrast == "all":
+        chance = [point.chance for point in points]
+        axis.plot(false_per_km, chance, ":", color="0.5", linewidth=1.2, label="chance: random windows")
+        _label_thresholds(axis, points, list(zip(false_per_km, detected, strict=True)))
+
+
+def _label_thresholds(axis: Any, points: tuple[FrocPoint, ...], positions: list[tuple[float, float]]) -> None:
+    """Write some thresholds next to their points; equal points share a label."""
+    labels: dict[tuple[float, float], list[str]] = {}
+    for point, position in zip(points, positions, strict=True):
+        if point.threshold in LABELLED_THRESHOLDS:
+            labels.setdefault(position, []).append(f"{point.threshold:g}")
+    for position, texts in labels.items():
+        offset = {"xytext": (3, -8), "textcoords": "offset points"}
+        axis.annotate(", ".join(texts), position, fontsize=7, **offset)

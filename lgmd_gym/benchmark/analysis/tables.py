@@ -4,18 +4,12 @@ from typing import NamedTuple
 
 from rich.table import Table
 
-from lgmd_gym.benchmark.analysis.protocol_limits import (
-    LIMIT_CHECKS,
-    R152_SUITES,
-    limit_results,
-    meets_r152,
-)
-from lgmd_gym.benchmark.rows import Row
+from lgmd_gym.benchmark.case import Row, Suite, case_order, relative_impact
 from lgmd_gym.benchmark.summary import (
     INTERVAL_TEXT,
     AgentSummary,
     Sample,
-    case_order,
+    cases_and_worlds,
     summaries,
     without_fcw_driver,
 )
@@ -33,6 +27,16 @@ LIMIT_CAPTION = (
 )
 
 
+class LimitResult(NamedTuple):
+    """Number of runs of one agent in one case that meet the limit."""
+
+    agent: str
+    case: str
+    limit: str
+    met: Rate
+    worst: float  # highest relative impact speed [m/s]
+
+
 class CaseCell(NamedTuple):
     """Table cell: its text and the share of successful episodes; empty by default."""
 
@@ -48,16 +52,28 @@ class CaseLine(NamedTuple):
     cells: list[CaseCell]
 
 
-def limit_lines(rows: list[Row], agents: list[str], suite: str) -> list[CaseLine]:
-    """Return the runs that meet the protocol's limit, per case; empty for suites without limits."""
-    if suite not in LIMIT_CHECKS:
+def limit_results(rows: list[Row], agent: str, suite: Suite) -> list[LimitResult]:
+    """Return the result of an agent per case, over its threats without an error; none without limits."""
+    if suite.limit is None:
         return []
-    check = LIMIT_CHECKS[suite]
-    by_agent = {agent: {item.case: item for item in limit_results(rows, agent, check)} for agent in agents}
+    threats = [row for row in rows if row["agent"] == agent and row["error"] is None and row["threat"]]
+    results = []
+    for case in sorted({row["case"] for row in threats}, key=case_order):
+        of_case = [row for row in threats if row["case"] == case]
+        met, limits = zip(*map(suite.limit, of_case), strict=True)
+        limit, worst = " / ".join(sorted(set(limits))), max(map(relative_impact, of_case))
+        rate = Rate.clustered(met, *cases_and_worlds(of_case))
+        results.append(LimitResult(agent, case, limit, rate, worst))
+    return results
+
+
+def limit_lines(rows: list[Row], agents: list[str], suite: Suite) -> list[CaseLine]:
+    """Return the runs that meet the protocol's limit, per case; empty for suites without limits."""
+    by_agent = {agent: {item.case: item for item in limit_results(rows, agent, suite)} for agent in agents}
     limits = {case: item.limit for results in by_agent.values() for case, item in results.items()}
-    lines = []
+    lines, short = [], _short_names(rows)
     for case in sorted(limits, key=case_order):
-        line = CaseLine(case.split("/", 1)[1], limits[case], [])
+        line = CaseLine(short[case], limits[case], [])
         for results in by_agent.values():
             if (item := results.get(case)) is None:
                 line.cells.append(CaseCell())
@@ -71,10 +87,16 @@ def limit_lines(rows: list[Row], agents: list[str], suite: str) -> list[CaseLine
 def success_lines(rows: list[Row], agents: list[str]) -> list[CaseLine]:
     """Return, per case, how many of n threats were avoided and non-threats had no false activation."""
     by_cell = {(item.agent, item.group): item for item in summaries(rows, lambda row: row["case"])}
+    short = _short_names(rows)
     return [
-        CaseLine(case.split("/", 1)[1], "", [_success(by_cell.get((agent, case))) for agent in agents])
-        for case in sorted({row["case"] for row in rows}, key=case_order)
+        CaseLine(short[case], "", [_success(by_cell.get((agent, case))) for agent in agents])
+        for case in sorted(short, key=case_order)
     ]
+
+
+def _short_names(rows: list[Row]) -> dict[str, str]:
+    """Return the name of each case without that of its suite."""
+    return {row["case"]: row["case"].removeprefix(f"{row['suite']}/") for row in rows}
 
 
 def _success(item: AgentSummary | None) -> CaseCell:
@@ -117,7 +139,7 @@ def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
     return table
 
 
-def table_by_case(rows: list[Row], agents: list[str], suite: str) -> Table:
+def table_by_case(rows: list[Row], agents: list[str], suite: Suite) -> Table:
     """Return the results per case, compared with the protocol's limits if the suite has limits."""
     return limit_table(rows, agents, suite) or case_table(rows, agents)
 
@@ -135,17 +157,18 @@ def case_table(rows: list[Row], agents: list[str]) -> Table:
     return table
 
 
-def limit_table(rows: list[Row], agents: list[str], suite: str) -> Table | None:
+def limit_table(rows: list[Row], agents: list[str], suite: Suite) -> Table | None:
     """Return a table of the runs that meet the protocol's limit per case; None for suites without limits."""
-    if suite not in LIMIT_CHECKS:
+    if suite.limit is None:
         return None
     threatened = {row["agent"] for row in rows if row["threat"] and row["error"] is None}
     shown = [agent for agent in agents if agent in threatened]
     caption = f"{Sample.of(rows)}; {LIMIT_CAPTION}"
-    if suite in R152_SUITES:
-        met = ", ".join(agent for agent in shown if meets_r152(rows, agent)) or "none"
-        caption += f"\nmeets the impact speed limits of UN R152 in simulation: {met}"
-    table = Table(title=f"{suite}: limits of the protocol", caption=caption)
+    if suite.verdict is not None:
+        requirement, meets = suite.verdict
+        met = ", ".join(agent for agent in shown if meets(rows, agent)) or "none"
+        caption += f"\nmeets {requirement} in simulation: {met}"
+    table = Table(title=f"{suite.name}: limits of the protocol", caption=caption)
     table.add_column("case", overflow="fold")
     table.add_column("limit")
     _add_agent_columns(table, shown)

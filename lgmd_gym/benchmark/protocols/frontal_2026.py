@@ -3,6 +3,9 @@
 An impact location of p per cent places the target's centre, a pedestrian's hip or a bicycle's crankshaft
 (p - 50) per cent of the ego's width from the ego's centreline, + left, as in the OpenSCENARIO files of the
 protocol. The grids are those of these files.
+
+Colours and points (5.3) are derived from the protocol; they are no official rating. They cover the standard
+range of the car-to-car rear scenarios, without the extended range and the robustness layer.
 """
 
 from collections.abc import Iterable
@@ -11,8 +14,17 @@ from itertools import product
 from math import radians
 from typing import Any
 
-from lgmd_gym.benchmark.case import Case, make_case, speed_cases, to_mps
-from lgmd_gym.benchmark.protocols.car_to_car_2023 import turns
+from lgmd_gym.benchmark.case import Case, Points, Row, Suite, make_case, relative_impact, speed_cases, to_mps
+from lgmd_gym.benchmark.protocols.car_to_car_2023 import (
+    GATE,
+    PREMATURE,
+    UNKNOWN_COLOUR,
+    completed,
+    is_gated,
+    mean_weights,
+    turns,
+)
+from lgmd_gym.envs.dynamics.units import KMH
 
 LOCATIONS = (100, 75, 50, 25, 0)  # per cent of the ego's width; the extended range adds 125 and -25
 LIGHTS = ("day", "night")
@@ -28,6 +40,15 @@ FAST_SCP = tuple(
 FAST_TAP = (*((speed, 80) for speed in (10, 15, 20, 25)), (25, 30), (25, 45), (25, 60))
 BRAKING: dict[str, Any] = {"headway": 1.0, "deceleration": 4.0}  # of CCRb and CMRb
 CROSSING = range(10, 70, 10)
+# Euro NCAP Frontal Collisions 2026, 5.3.1: ego speed -> upper edges of the colours, relative impact speed,
+# both in km/h. An edge belongs to the worse colour.
+BANDS_2026 = {
+    20: (("green", 0.0),),
+    30: (("green", 0.0), ("brown", 10.0)),
+    40: (("green", 0.0), ("orange", 10.0), ("brown", 20.0)),
+    50: (("green", 0.0), ("yellow", 10.0), ("orange", 20.0), ("brown", 30.0)),
+}
+MAXIMA_2026 = {"CCRs": 1.2, "CCRm": 2.4, "CCRb": 1.6}  # points of the standard range
 
 
 def ncap2026() -> tuple[Case, ...]:
@@ -177,3 +198,75 @@ def _head_on(suite: str, speeds: Iterable[tuple[int, int]], locations: Iterable[
         for per_cent, (ego, target) in product(locations, speeds)
         for case in _cells(suite, "CCFhos", [ego], [per_cent], target_speed=to_mps(target))
     ]
+
+
+def colour_2026(ego_kmh: float, impact_kmh: float) -> str:
+    """Return the Euro NCAP 2026 colour of a relative impact speed.
+
+    Args:
+        ego_kmh: Ego speed of the test [km/h].
+        impact_kmh: Relative impact speed [km/h]; 0 without contact.
+
+    Example:
+        >>> [colour_2026(50, speed) for speed in (0, 9.9, 10, 35)]
+        ['green', 'yellow', 'orange', 'red']
+    """
+    if impact_kmh <= 0.0:
+        return "green"
+    bands = BANDS_2026[min(max(10 * int(ego_kmh / 10 + 1e-6), 20), 50)]
+    return next((colour for colour, edge in bands if impact_kmh < edge), "red")
+
+
+def check_green(row: Row) -> tuple[bool, str]:
+    """Check a row of a suite ncap2026 for green, no contact; premature braking fails, as in `check_r152`."""
+    return not row["collision"] and not row["premature_brake"], "green"
+
+
+def row_colour_2026(row: Row) -> str:
+    """Return the colour of a row of a suite ncap2026, `UNKNOWN_COLOUR` or `PREMATURE`.
+
+    The colours of contacts are public for CCRs, CCRm and CCRb.
+    """
+    if row["premature_brake"]:
+        return PREMATURE
+    if row["collision"] and row["family"] not in MAXIMA_2026:
+        return UNKNOWN_COLOUR
+    return colour_2026(row["ego_speed"] / KMH, relative_impact(row) / KMH)
+
+
+def points_2026(rows: list[Row], agent: str) -> list[Points]:
+    """Return the points of an agent in the standard range of suite ncap2026."""
+    rows = completed(rows, agent)
+    cells, gated = mean_weights(rows, row_colour_2026), is_gated(rows)
+    note = f"contact in CCRs at {GATE:g} km/h or below: no points" if gated else ""
+    points = []
+    for scenario, maximum in MAXIMA_2026.items():
+        weights = [weight for (family, *_), weight in cells.items() if family == scenario]
+        earned = maximum * sum(weights) / len(weights) if weights and not gated else 0.0
+        points.append(Points(scenario, earned, maximum, True, note))
+    return points
+
+
+SUITES = (
+    Suite(
+        name="ncap2026",
+        cases=ncap2026(),
+        about="Euro NCAP Frontal Collisions 2026: standard range",
+        limit=check_green,
+        colour=row_colour_2026,
+        points=points_2026,
+    ),
+    Suite(
+        name="ncap2026-extended",
+        cases=ncap2026_extended(),
+        about="Euro NCAP Frontal Collisions 2026: extended range",
+        limit=check_green,
+        colour=row_colour_2026,
+    ),
+    Suite(
+        name="ncap2026-robustness",
+        cases=ncap2026_robustness(),
+        about="Euro NCAP Frontal Collisions 2026: public part of the robustness layer",
+        limit=check_green,
+    ),
+)

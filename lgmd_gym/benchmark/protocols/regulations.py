@@ -1,7 +1,21 @@
-"""UN R152 Rev.2 and 49 CFR 571.127 (FMVSS 127)."""
+"""UN R152 Rev.2, 49 CFR 571.127 (FMVSS 127) and NHTSA's manoeuvres, with limits of rows; not a rating."""
 
-from lgmd_gym.benchmark.case import Case, make_case, speed_cases, to_mps
+from dataclasses import replace
+from typing import Any
 
+from lgmd_gym.benchmark.case import Case, Row, Suite, make_case, relative_impact, speed_cases, to_mps
+from lgmd_gym.envs.dynamics.units import KMH
+
+# UN R152 Rev.2, 5.2.1.4, 5.2.2 and 5.2.3, M1, by target: relative speeds, and the highest relative impact
+# speeds at maximum mass and in running order, all in km/h. Between two columns the limit of the higher speed
+# holds.
+R152_LIMITS = {
+    "car": ((40, 42, 45, 50, 55, 60), (0, 10, 15, 25, 30, 35), (0, 0, 15, 25, 30, 35)),
+    "pedestrian": ((40, 42, 45, 50, 55, 60), (0, 10, 15, 25, 30, 35), (0, 0, 15, 25, 30, 35)),
+    "bicycle": ((38, 40, 45, 50, 55, 60), (0, 10, 25, 30, 35, 40), (0, 0, 25, 30, 35, 40)),
+}
+R152_FAILURES = {"car": 0.10, "pedestrian": 0.10, "bicycle": 0.20}  # highest share of failed runs (6.10.1)
+R152_TARGETS = {"CPNA": "pedestrian", "CBNA": "bicycle"}  # by family; a car in the others
 R152_TARGET = 20  # km/h, UN R152 6.5
 STANDING = {"walking_speed": 0.0, "impact_location": 0.25}
 ALONG = {"walking_speed": to_mps(5), "impact_location": 0.25}
@@ -15,8 +29,22 @@ def r152() -> tuple[Case, ...]:
     states differ only in their limits.
     """
     return (
-        *speed_cases("r152", "CCRs", [20, 40, 42, 60]),
-        *speed_cases("r152", "CCRm", [30, 60], target_speed=to_mps(R152_TARGET)),
+        *_loaded("r152", "CCRs", [20, 40, 42, 60], laden=40),
+        *_loaded("r152", "CCRm", [30, 60], target_speed=to_mps(R152_TARGET)),
+    )
+
+
+def _loaded(
+    suite: str, family: str, speeds: list[int], laden: int | None = None, **arguments: Any
+) -> tuple[Case, ...]:
+    """Return cases in running order, except for one speed at maximum mass.
+
+    The regulation tests this speed laden only and the others in both states; unladen is the stricter one.
+    """
+    cases = speed_cases(suite, family, speeds, **arguments)
+    return tuple(
+        replace(case, load="laden" if speed == laden else "unladen")
+        for case, speed in zip(cases, speeds, strict=True)
     )
 
 
@@ -55,8 +83,8 @@ def r152_vru() -> tuple[Case, ...]:
     """
     suite = "r152-vru"
     return (
-        *speed_cases(suite, "CPNA", [20, 40, 42, 60], walking_speed=to_mps(5), child=True),
-        *speed_cases(suite, "CBNA", [20, 38, 40, 60], bicycle_speed=to_mps(15), obstructed=False),
+        *_loaded(suite, "CPNA", [20, 40, 42, 60], 40, walking_speed=to_mps(5), child=True),
+        *_loaded(suite, "CBNA", [20, 38, 40, 60], 38, bicycle_speed=to_mps(15), obstructed=False),
     )
 
 
@@ -101,3 +129,99 @@ def nhtsa_manoeuvres() -> tuple[Case, ...]:
         ):
             rows.append(make_case(suite, family, f"{mph}mph{variant}", ego_speed=to_mps(kmh), **arguments))
     return tuple(rows)
+
+
+def r152_limit(relative_kmh: float, load: str, target: str = "car") -> float:
+    """Return the highest relative impact speed that UN R152 allows an M1 car [km/h].
+
+    Args:
+        relative_kmh: Relative speed at the start, in [0, 60] [km/h].
+        load: "laden" (maximum mass) or "unladen" (running order).
+        target: "car", "pedestrian" or "bicycle".
+
+    Raises:
+        ValueError: Above 60 km/h, where the regulation sets no limit.
+    """
+    speeds, laden, unladen = R152_LIMITS[target]
+    for speed, limit in zip(speeds, laden if load == "laden" else unladen, strict=True):
+        if relative_kmh <= speed + 1e-6:
+            return float(limit)
+    raise ValueError(f"relative_kmh must be at most 60, the highest speed in UN R152, got {relative_kmh:g}")
+
+
+def check_r152(row: Row) -> tuple[bool, str]:
+    """Compare a row of suite r152 or r152-vru with the impact speed limit of its relative speed and load.
+
+    The relative speed to a crossing pedestrian or bicycle is that of the ego. Premature braking fails,
+    because it begins before the start of the test (T0).
+    """
+    load, target = row["load"] or "unladen", _r152_target(row)
+    along = (row["target_speed"] or 0.0) if target == "car" else 0.0
+    limit = r152_limit(round((row["ego_speed"] - along) / KMH, 3), load, target)
+    met = relative_impact(row) / KMH <= limit + 1e-9 and not row["premature_brake"]
+    return met, f"≤ {limit:g} km/h {load}"
+
+
+def check_fmvss127(row: Row) -> tuple[bool, str]:
+    """Check a row of suite fmvss127 or fmvss127-pedestrian for contact and for premature braking.
+
+    49 CFR 571.127 S5.1.3 and S5.2.3 require that the brakes are applied when a collision is imminent, and
+    that no contact follows. Until then the test speed is maintained: from a time to collision of 5.0 s on
+    (S7.2, S7.3.2, S7.4.2) or 4.0 s (S8.2), or from 3 s before the lead vehicle brakes (S7.5.2). The standard
+    sets no time for "imminent"; as in `check_r152`, braking more than 4 s before the contact of `no-brake`
+    fails.
+    """
+    return not row["collision"] and not row["premature_brake"], "no contact"
+
+
+def meets_r152(rows: list[Row], agent: str) -> bool:
+    """Return whether an agent meets the impact speed limits of UN R152 in simulation.
+
+    As in 6.10.1, at most 10 % of all runs with cars and with pedestrians, and 20 % with bicycles, may fail.
+    """
+    threats = [row for row in rows if row["agent"] == agent and row["error"] is None and row["threat"]]
+    for target, share in R152_FAILURES.items():
+        met = [check_r152(row)[0] for row in threats if _r152_target(row) == target]
+        if len(met) - sum(met) > share * len(met):
+            return False
+    return bool(threats)
+
+
+def _r152_target(row: Row) -> str:
+    return R152_TARGETS.get(row["family"], "car")
+
+
+VERDICT = "the impact speed limits of UN R152", meets_r152
+SUITES = (
+    Suite(
+        name="r152",
+        cases=r152(),
+        about="UN R152 car-to-car tests, for the impact-speed limits of 5.2.1.4 only",
+        limit=check_r152,
+        verdict=VERDICT,
+    ),
+    Suite(
+        name="fmvss127",
+        cases=fmvss127(),
+        about="49 CFR 571.127 lead-vehicle tests without manual braking, without its warning requirement",
+        limit=check_fmvss127,
+    ),
+    Suite(
+        name="r152-vru",
+        cases=r152_vru(),
+        about="UN R152 pedestrian and bicycle tests, for the impact-speed limits only",
+        limit=check_r152,
+        verdict=VERDICT,
+    ),
+    Suite(
+        name="fmvss127-pedestrian",
+        cases=fmvss127_pedestrian(),
+        about="49 CFR 571.127 pedestrian tests by day and with the lower and the upper beam",
+        limit=check_fmvss127,
+    ),
+    Suite(
+        name="nhtsa-false-activation",
+        cases=nhtsa_manoeuvres(),
+        about="seven track manoeuvres of NHTSA in which braking is a false activation",
+    ),
+)

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from lgmd_gym.benchmark.case import Case, make_case, speed_cases, to_mps
-from lgmd_gym.benchmark.protocols.car_to_car_2023 import turns
+from lgmd_gym.benchmark.case import Case, Suite, make_case, speed_cases, to_mps
+from lgmd_gym.benchmark.protocols.car_to_car_2023 import row_colour_2023, turns, without_targets
 
 CROSSING = list(range(10, 65, 5))  # ego speeds [km/h]
 
@@ -59,3 +59,12 @@ def _reversing(suite: str) -> tuple[Case, ...]:
         for speed in (4, 8):
             rows += _located(suite, "CPRA", [speed], per_cent, moving=False, child=speed == child_speed)
     return tuple(rows)
+
+
+_VRU = Suite(
+    name="ncap2023-vru",
+    cases=ncap2023_vru(),
+    about="Euro NCAP AEB VRU 2023: pedestrians, bicycles, CMFtap, by day",
+    colour=row_colour_2023,
+)
+SUITES = (_VRU, without_targets(_VRU))

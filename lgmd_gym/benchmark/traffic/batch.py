@@ -4,14 +4,14 @@ import traceback
 from dataclasses import dataclass
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.case import Row, new_row, traffic_case
 from lgmd_gym.benchmark.episode import Step
-from lgmd_gym.benchmark.rows import Row, new_row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.observer import Observer
 from lgmd_gym.benchmark.traffic.reader import Moment
 from lgmd_gym.benchmark.traffic.recording import record_traffic
 from lgmd_gym.benchmark.traffic.replay import Replay
-from lgmd_gym.benchmark.traffic.rows import KEYS, measure, traffic_case
+from lgmd_gym.benchmark.traffic.rows import KEYS, measure
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.camera.worlds import LABORATORY, check_world
 from lgmd_gym.envs.appearance import Appearance

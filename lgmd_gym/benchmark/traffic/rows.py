@@ -4,17 +4,29 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
 
-from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.case import ID_KEYS, EpisodeRow
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.metrics import NUISANCE
-from lgmd_gym.benchmark.rows import ID_KEYS, WORLD
-from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.traffic.recording import TrafficRecording
 
-# Every key of a row, in order; null where undefined. SI units.
+
+class TrafficRow(EpisodeRow):
+    """Row of the traffic suite, whose family is the kind of traffic; `side` is that of the contact."""
+
+    side: str | None
+    alerts: int
+    brakes: int
+    false_activations: int
+    stops: int
+    moving_time: float
+    needed_time: float
+
+
+# Every key of a row, in order.
 KEYS = (
     *ID_KEYS,
-    WORLD,
+    "family",
+    "world",
     "camera",
     "threat",
     "collision",
@@ -82,11 +94,6 @@ class EpisodeLog:
     end: Step | None = None
     duration: float = 0.0
     peak: float = 0.0
-
-
-def traffic_case(kind: str, seed: int) -> Case:
-    """Return the case of one seed of a kind of traffic, such as "traffic/highway/s3"."""
-    return Case(f"{TRAFFIC}/{kind}/s{seed}", kind)
 
 
 def measure(recording: TrafficRecording, log: EpisodeLog) -> dict[str, Any]:

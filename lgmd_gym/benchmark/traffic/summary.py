@@ -4,10 +4,13 @@ from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.summary import by_agent, by_condition, cases_and_worlds, rate_of, write_csv
-from lgmd_gym.statistics.event_counts import count_interval
-from lgmd_gym.statistics.intervals import Rate
+from rich.table import Table
+
+from lgmd_gym.benchmark.case import Row
+from lgmd_gym.benchmark.summary import Sample, by_agent, by_condition, cases_and_worlds, rate_of, write_csv
+from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON
+from lgmd_gym.errors import counted
+from lgmd_gym.statistics.intervals import Rate, count_interval
 
 PER = 100_000.0  # [m], reference distance of the rates
 COLUMNS = (
@@ -111,7 +114,7 @@ def summarise_traffic(agent: str, kind: str, rows: list[Row]) -> TrafficSummary:
 
 def traffic_summaries(rows: list[Row], by_kind: bool = False) -> list[TrafficSummary]:
     """Return one summary per agent, or per agent and kind of traffic."""
-    parts = by_agent(rows, (lambda row: row["case"].split("/")[1]) if by_kind else (lambda row: ""))
+    parts = by_agent(rows, (lambda row: row["family"]) if by_kind else (lambda row: ""))
     return [summarise_traffic(agent, kind, part) for (agent, kind), part in parts.items()]
 
 
@@ -149,4 +152,59 @@ def _line(item: TrafficSummary, condition: str) -> list[Any]:
         item.rear_ended,
         f"{item.peak:.4f}",
         item.errors,
+    ]
+
+
+CAPTION = (
+    f"false: without it, no contact and no required deceleration of {EMERGENCY:g} m/s² within {HORIZON:g} s; "
+    "[95 % interval, clustered by drive and world]; needed: share of the time in motion in which a brake is "
+    "not false; contacts (of these rear-ended)"
+)
+HEADINGS = (
+    "km",
+    "false activations\nper 100 km",
+    "false/\nbrakes",
+    "needed,\n% of time",
+    "avoided",
+    "contacts",
+)
+
+
+def traffic_table(rows: list[Row], agents: list[str], title: str, by_kind: bool = False) -> Table:
+    """Return a table with one line per agent, or per agent and kind of traffic.
+
+    Args:
+        rows: Rows of the traffic suite.
+        agents: Agents in the order of the lines.
+        title: Title of the table.
+        by_kind: Whether each kind of traffic has its own line, below that of its agent.
+    """
+    table = Table(title=title, caption=f"{Sample.of(rows)}; {CAPTION}")
+    table.add_column("agent\n  traffic" if by_kind else "agent", overflow="fold", min_width=15)
+    for heading in HEADINGS:
+        table.add_column(heading, justify="right")
+    order = {agent: index for index, agent in enumerate(agents)}
+    items = traffic_summaries(rows, by_kind)
+    agent = None
+    for item in sorted(items, key=lambda item: order.get(item.agent, len(order))):
+        if by_kind and item.agent != agent:
+            table.add_row(agent := item.agent)
+        table.add_row(*_cells(item, by_kind))
+    return table
+
+
+def _cells(item: TrafficSummary, by_kind: bool) -> list[str]:
+    low, high = item.interval
+    rate = "–"
+    if item.distance > 0.0:
+        rate = f"{item.per_100km(item.false_activations):.1f} [{low:.1f}–{high:.1f}]"
+    return [
+        (f"  {item.kind}" if by_kind else item.agent)
+        + (f" ({counted(item.errors, 'error')})" if item.errors else ""),
+        f"{item.distance / 1000:.1f}",
+        rate,
+        f"{item.false_activations}/{item.brakes}",
+        "–" if item.needed_share is None else f"{100.0 * item.needed_share:.1f}",
+        f"{item.avoided.k}/{item.avoided.n}",
+        f"{item.contacts} ({item.rear_ended})",
     ]

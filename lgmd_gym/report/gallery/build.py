@@ -13,9 +13,8 @@ from PIL import Image
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym._version import __version__
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.case import Case, Row
 from lgmd_gym.benchmark.config import DEFAULT_AGENTS
-from lgmd_gym.benchmark.rows import Row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
 from lgmd_gym.camera.params import CONDITIONS
@@ -75,8 +74,9 @@ def evaluate_agents(card: ScenarioCard, agents: Sequence[str], seeds: int) -> di
     """Return the outcome of each agent and of no-brake; empty for traffic."""
     if card.traffic:
         return {}
-    name, task = f"gallery/{card.name}/default", RANDOM_TASKS.get(card.name)
-    case = Case(name, RANDOM, tuple(task.arguments.items())) if task else Case(name, card.name)
+    task = RANDOM_TASKS.get(card.name)
+    arguments, environment = (tuple(task.arguments.items()), RANDOM) if task else ((), "")
+    case = Case("gallery", card.name, "default", arguments, environment)
     results = [run_task(Task(NO_BRAKE, case, seed, SensorConfig())) for seed in range(seeds)]
     outcomes = {NO_BRAKE: AgentOutcome.of([result.row for result in results])}
     for agent in agents:

@@ -3,10 +3,12 @@
 from math import atan, degrees
 
 import pytest
+from support.examples import load
 
 from lgmd_gym.benchmark.case import make_case
-from lgmd_gym.benchmark.frontier import frontier
 from lgmd_gym.camera import CameraParams
+
+frontier = load("frontier").frontier
 
 KMH = 1 / 3.6
 

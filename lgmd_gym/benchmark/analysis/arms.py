@@ -11,14 +11,20 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from rich.table import Table
 
-from lgmd_gym.benchmark.analysis.compare import read_case_rows
-from lgmd_gym.benchmark.rows import Row
-from lgmd_gym.benchmark.summary import Sample, cases_and_worlds, without_fcw_driver
+from lgmd_gym.benchmark.case import Row
+from lgmd_gym.benchmark.run_folder import read_case_rows
+from lgmd_gym.benchmark.summary import (
+    INTERVAL_TEXT,
+    Sample,
+    cases_and_worlds,
+    interval_text,
+    without_fcw_driver,
+)
 from lgmd_gym.errors import counted, unknown_name
 from lgmd_gym.statistics.bootstrap import StratifiedBootstrap, interquartile_mean
-from lgmd_gym.statistics.effective_size import effective_size
-from lgmd_gym.statistics.intervals import wilson
+from lgmd_gym.statistics.intervals import effective_size, wilson
 
 RETURN = "episode_return"
 SHARES = {
@@ -27,6 +33,14 @@ SHARES = {
     "false_activation": False,
 }  # row key -> whether over threats
 MIN_TRAININGS = 5  # fewest training runs, apart from one, for which intervals are given
+
+
+ARM_CAPTION = (
+    "runs: trainings; return: interquartile mean over them [95 % interval, bootstrap over trainings and "
+    "cases; of one training over cases only, of two to four none], below it the lowest and highest training; "
+    f"difference: to the first arm, paired by case; shares: means over trainings [{INTERVAL_TEXT}]"
+)
+SHARE_HEADINGS = {"avoided": "avoided", "premature_brake": "premature", "false_activation": "false"}
 
 
 class Estimate(NamedTuple):
@@ -216,3 +230,25 @@ def _case_means(
 
 def _episodes(rows: Sequence[Row]) -> list[tuple[str, int]]:
     return sorted((row["case"], row["seed"]) for row in rows)
+
+
+def arm_table(results: Sequence[ArmResult], title: str) -> Table:
+    """Return a table with one line per arm; all arms have the same condition."""
+    keys = [key for key in SHARE_HEADINGS if key in results[0].shares]
+    table = Table(title=title, caption=f"{results[0].sample}; {ARM_CAPTION}")
+    table.add_column("arm", min_width=15, overflow="fold")
+    for heading in ("runs", "return", "difference\nto the first"):
+        table.add_column(heading, justify="right")
+    for key in keys:
+        heading = f"{SHARE_HEADINGS[key]},\n% of {results[0].shares[key].n}"
+        table.add_column(heading, justify="right")
+    for result in results:
+        mean_return = interval_text(result.mean_return, ".1f")
+        if result.trainings > 1:
+            low, high = result.return_range
+            mean_return += f"\n{low:.1f} to\n{high:.1f}"
+        difference = "–" if result.difference is None else interval_text(result.difference, "+.1f")
+        shares = (interval_text(result.shares[key], ".0f", 100.0) for key in keys)
+        cells = (result.name, str(result.trainings), mean_return, difference, *shares)
+        table.add_row(*cells)
+    return table
