@@ -28,16 +28,17 @@ ALL_FAMILIES = (
 A level keeps its number, family and arguments: names are neither added, removed nor moved. 41 % of the
 threats are rear ends of cars.
 """
-_FIRST_EXTRAS = (
+FIRST_EXTRAS = (
     *("CCRsCurve", "StandingBox", "NarrowBox", "FastCCRs", "FastCCRm", "FastCCRb"),
     *("CurvePass", "CloseBrakeRelease", "FastOvertaken", "FastEmptyRoad", "FastFollowing"),
     *("FastBrakeRelease", "FastAdjacentPass", "FastBridgeShadow"),
     *(f"{name}WithoutTarget" for name in (*ALL_FAMILIES, "CCRsCurve")),
 )
+"""Names of the first extra levels, in the order of their draws; those that are added later follow by name."""
 _EXTRAS = DECLARED.keys() - {*ALL_FAMILIES}
 EXTRA_FAMILIES = (
-    *(name for name in _FIRST_EXTRAS if name in _EXTRAS),
-    *sorted(_EXTRAS - {*_FIRST_EXTRAS}),
+    *(name for name in FIRST_EXTRAS if name in _EXTRAS),
+    *sorted(_EXTRAS - {*FIRST_EXTRAS}),
 )
 """Families and variants that levels contain only where they are named: those that were added later, those at
 the speeds of a motorway ("Fast…"), and threats without their target ("…WithoutTarget").
