@@ -4,8 +4,7 @@ import os
 
 import pytest
 from hypothesis import settings
-from support import moviepy_stand_in
-from support.clips import write_lossless
+from support.clips import install_moviepy, write_lossless
 
 from lgmd_gym.paper.backgrounds import Plain, Screen
 from lgmd_gym.paper.stimuli import Looming, stimulus_frames
@@ -32,4 +31,4 @@ def clip(tmp_path_factory, looming):
 @pytest.fixture
 def moviepy(monkeypatch):
     """Let Gymnasium's `RecordVideo` write videos without moviepy."""
-    moviepy_stand_in.install(monkeypatch)
+    install_moviepy(monkeypatch)

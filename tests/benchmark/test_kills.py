@@ -8,7 +8,7 @@ import sys
 import time
 
 import pytest
-from support import kills
+from support import processes as kills
 from support.runs import read_rows, sorted_rows
 
 from lgmd_gym.cli import main as cli

@@ -12,7 +12,7 @@ PEAK = """
 import sys
 import gymnasium as gym, numpy as np, lgmd_gym
 sys.path.insert(0, sys.argv[1])
-from support.peak_memory import peak_memory
+from support.processes import peak_memory
 num_envs, threads = int(sys.argv[2]), int(sys.argv[3])
 envs = gym.make_vec("LGMD/RandomBraking-v0", num_envs=num_envs, threads=threads, autoreset_mode="SameStep")
 envs.reset(seed=0)

@@ -23,7 +23,7 @@ import numpy as np
 
 sys.path[:0] = [str(Path(__file__).parents[1])]
 
-from support import kills
+from support import processes as kills
 from support.clips import make_test_clip
 from support.fuzz import run_cases
 from support.recordings import OFFLINE_YAML

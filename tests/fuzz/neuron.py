@@ -12,8 +12,7 @@ sys.path[:0] = [str(Path(__file__).parents[1])]
 
 from golden.sequences import KINDS
 from support.fuzz import run_cases
-from support.neuron_comparison import compare
-from support.neurons import PRESETS
+from support.neurons import PRESETS, compare
 
 CHANGES = {
     "n_p": lambda rng: int(rng.integers(0, 6)),

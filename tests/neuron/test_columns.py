@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.motion import square
+from support.neurons import square
 
 from lgmd_gym import LGMD
 from lgmd_gym.neuron import DSN, LPLC2, SustainedEdges

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 from golden.sequences import KINDS, grating, looming, natural, random
-from support.neuron_comparison import compare
-from support.neurons import PRESETS
+from support.neurons import PRESETS, compare
 
 from lgmd_gym.neuron import LGMD, LGMDParams
 from lgmd_gym.neuron.lgmd import kernels

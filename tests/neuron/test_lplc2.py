@@ -6,7 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
-from support.motion import motion_maps, square
+from support.neurons import motion_maps, square
 
 from lgmd_gym.neuron import LPLC2, LGMDParams, LPLC2Params
 

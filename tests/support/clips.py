@@ -1,9 +1,16 @@
-"""Video clips for tests, made with the ffmpeg program of imageio-ffmpeg."""
+"""Video clips for tests, made with the ffmpeg program of imageio-ffmpeg; a stand-in for moviepy.
+
+moviepy requires an old version of pillow with known vulnerabilities, so it is not installed for tests.
+"""
 
 import subprocess
+import sys
+from types import ModuleType
 
 import numpy as np
 from imageio_ffmpeg import get_ffmpeg_exe
+
+from lgmd_gym.clips.video import VideoWriter
 
 
 def ffmpeg(*arguments):
@@ -32,3 +39,25 @@ def truncate(path, fraction):
     data = path.read_bytes()
     path.write_bytes(data[: int(len(data) * fraction)])
     return path
+
+
+MODULES = ("moviepy", "moviepy.video", "moviepy.video.io", "moviepy.video.io.ImageSequenceClip")
+
+
+class ImageSequenceClip:
+    """The part of moviepy's class that `RecordVideo` uses."""
+
+    def __init__(self, frames, fps):
+        self._frames, self._fps = frames, fps
+
+    def write_videofile(self, path, logger=None):
+        with VideoWriter(path, self._fps) as writer:
+            for frame in self._frames:
+                writer.write(frame)
+
+
+def install_moviepy(monkeypatch):
+    """Make `import moviepy` find a stand-in until the end of a test."""
+    for name in MODULES:
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+    sys.modules[MODULES[-1]].ImageSequenceClip = ImageSequenceClip

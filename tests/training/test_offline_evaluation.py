@@ -6,8 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 import torch
-from support.offline_learners import dataset, learner, spike_episodes
-from support.recordings import offline_config, synthetic_episode
+from support.recordings import dataset, learner, offline_config, spike_episodes, synthetic_episode
 
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.training.offline import learner as learner_module

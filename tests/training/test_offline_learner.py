@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from support.offline_learners import FEATURES, dataset, learner, spike_episodes
-from support.recordings import synthetic_episode
+from support.recordings import FEATURES, dataset, learner, spike_episodes, synthetic_episode
 
 from lgmd_gym.training.offline.ensemble import check_without_frames
 from lgmd_gym.training.offline.evaluation import evaluate

@@ -196,7 +196,7 @@ def test_memory_does_not_depend_on_the_length_of_a_clip(tmp_path):
     """Peak memory for one minute and for five, in new processes; trace and figure included."""
     code = (
         "import sys; from lgmd_gym.cli import main; sys.path.insert(0, sys.argv[1]); "
-        "from support.peak_memory import peak_memory; code = main.run(sys.argv[2:]); "
+        "from support.processes import peak_memory; code = main.run(sys.argv[2:]); "
         "print(peak_memory(), code)"
     )
     peaks = []

@@ -1,4 +1,4 @@
-"""Commands that are stopped by signals, and what they leave: processes and shared memory."""
+"""Commands that are stopped by signals, what they leave, and the peak memory of a process."""
 
 import os
 import re
@@ -60,3 +60,11 @@ def wait_until_gone(tag, owners, limit=15.0):
     while left := processes(tag) + segments(owners):
         assert time.monotonic() < end, f"left after {limit:g} s: {left}"
         time.sleep(0.1)
+
+
+def peak_memory():
+    """Return the peak memory of this process so far [MiB].
+
+    The maximum of `getrusage` includes the memory of the parent process at the start of this one.
+    """
+    return int(re.search(r"VmHWM:\s+(\d+)", Path("/proc/self/status").read_text())[1]) / 1024
