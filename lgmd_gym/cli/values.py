@@ -17,7 +17,6 @@ Names = Annotated[tuple[str, ...] | None, arg(metavar="NAME [NAME ...]")]
 Count = Annotated[int | None, arg(metavar="N")]
 Number = Annotated[float | None, arg(metavar="X")]
 File = Annotated[Path | None, arg(metavar="PATH")]
-SecondFile = Annotated[Path | None, arg(metavar="[PATH]")]
 
 
 def refuse_unused(options: Any, flag: str, used: Collection[str]) -> None:
