@@ -49,7 +49,7 @@ def run_folder(out: Path, settings: dict[str, Any]) -> Iterator[Path]:
 
 def make_clip_folders(out: Path, jobs: Sequence[ClipJob]) -> list[Path]:
     """Create one folder per clip, numbered for clips of the same name."""
-    folders = []
+    folders: list[Path] = []
     for job in jobs:
         folder, number = out / job.clip.stem, 1
         while folder.exists():
@@ -71,7 +71,8 @@ def process_clips(
     figure: bool = True,
 ) -> list[ClipResult]:
     """Process every clip with one configuration into its folder and show a progress bar."""
-    results, frames_before = [], 0
+    results: list[ClipResult] = []
+    frames_before = 0
     with progress_bar(name, sum(job.info.frames for job in jobs)) as set_progress:
         for job, folder in zip(jobs, folders, strict=True):
 

@@ -94,7 +94,8 @@ def check_versions() -> list[Finding]:
     from packaging.requirements import Requirement
 
     found = [Finding("python", OK, f"{platform.python_version()} on {platform.platform()}")]
-    unmet, met = [], []
+    unmet: list[str] = []
+    met: list[str] = []
     for line in requires(PACKAGE) or []:
         requirement = Requirement(line)
         if requirement.marker is not None and not requirement.marker.evaluate({"extra": ""}):
@@ -138,7 +139,7 @@ def check_cache() -> list[Finding]:
         from lgmd_gym.neuron.lgmd import kernels
     except RuntimeError as error:  # numba: "no locator available"
         return [Finding("numba cache", FAULT, str(error), fix)]
-    found = []
+    found: list[Finding] = []
     for folder in sorted({_cache_folder(module) for module in (kernels, raster)}):
         try:
             Path(folder).mkdir(parents=True, exist_ok=True)

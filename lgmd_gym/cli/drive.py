@@ -22,7 +22,7 @@ from lgmd_gym.cli.values import (
 
 if TYPE_CHECKING:
     from lgmd_gym.agents import Agent
-    from lgmd_gym.rendering.playback import EpisodeResult
+    from lgmd_gym.rendering.playback import PlaybackResult
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +104,7 @@ def run(options: Drive) -> int:
     return 0
 
 
-def _print_result(result: "EpisodeResult") -> None:
+def _print_result(result: "PlaybackResult") -> None:
     """Print how an episode ended."""
     from lgmd_gym.envs.dynamics.units import KMH
 

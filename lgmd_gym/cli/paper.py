@@ -88,7 +88,8 @@ def _process_all_configs(
     from lgmd_gym.clips.playback import PLAYBACK_CONFIGS
 
     folders = clips.make_clip_folders(out, jobs)
-    results, detections = [], {}
+    results: list[ClipResult] = []
+    detections: dict[str, list[ClipDetection]] = {}
     for name, config in PLAYBACK_CONFIGS.items():
         batch = clips.process_clips(jobs, folders, name, config, f"-{name}")
         results += batch

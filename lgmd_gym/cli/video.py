@@ -13,6 +13,7 @@ from lgmd_gym.cli.values import Count, File, Number, read_params
 
 if TYPE_CHECKING:
     from lgmd_gym.clips.batch import ClipJob, ClipResult
+    from lgmd_gym.clips.detection import ClipDetection
     from lgmd_gym.clips.playback import PlaybackConfig
     from lgmd_gym.clips.scores import ScoredClip
 
@@ -97,7 +98,9 @@ def _process_all(
     from lgmd_gym.clips.tables import score_table, write_clip_scores, write_scores
 
     folders = clips.make_clip_folders(folder, jobs)
-    console, results, detections = make_console(), [], {}
+    console = make_console()
+    results: list[ClipResult] = []
+    detections: dict[str, list[ClipDetection]] = {}
     scored: dict[str, list[ScoredClip]] = {}
     for name, config in configs.items():
         suffix = f"-{name}" if len(configs) > 1 else ""

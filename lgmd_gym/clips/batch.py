@@ -72,7 +72,8 @@ def read_events(path: Path, clips: Sequence[VideoInfo]) -> dict[Path, ClipEvent]
             the same clip twice, or contains a time outside the clip, or an event outside the evaluated part.
     """
     rows = _rows(path, "event file", EVENT_COLUMNS[:2], EVENT_COLUMNS)
-    infos, events = {info.path: info for info in clips}, {}
+    infos = {info.path: info for info in clips}
+    events: dict[Path, ClipEvent] = {}
     for number, row in enumerate(rows, start=2):
         where = f"{path} line {number}"
         clip = _clip(row["file"], list(infos), events, where)

@@ -81,9 +81,15 @@ class OverlayWriter:
         self._writer.close()
 
     def _text(
-        self, pen: ImageDraw.ImageDraw, at: tuple[float, float], text: str, size: int, **style: Any
+        self,
+        pen: ImageDraw.ImageDraw,
+        at: tuple[float, float],
+        text: str,
+        size: int,
+        fill: tuple[int, int, int] = TEXT,
+        anchor: str = "la",
     ) -> None:
-        pen.text(at, text, font=self._fonts[size], **{"fill": TEXT, **style})
+        pen.text(at, text, font=self._fonts[size], fill=fill, anchor=anchor)
 
     def _draw_indicators(self, pen: ImageDraw.ImageDraw, frame: ClipFrame) -> None:
         """Draw the alert indicator, and from the crash on the crash indicator."""

@@ -186,7 +186,8 @@ def figures(
     at = cap_level(alarms, total, cap)
     seen = np.isfinite(events.lead)
     with np.errstate(invalid="ignore", divide="ignore"):
-        recalls, precisions = [], []
+        recalls: list[np.ndarray] = []
+        precisions: list[np.ndarray] = []
         for hit in events.hit:
             counted = np.isfinite(hit[:, 0])
             hits, n = weights[:, counted] @ hit[counted], weights[:, counted].sum(axis=1, keepdims=True)
@@ -366,7 +367,7 @@ def _random_pieces(
     rng: np.random.Generator, events: Sequence[ScoredClip], negatives: Sequence[ScoredClip]
 ) -> list[ScoredClip]:
     """Return pieces of random clips without an event, each as long as the evaluated part of an event."""
-    pieces = []
+    pieces: list[ScoredClip] = []
     for _ in range(PIECES):
         event, clip = events[int(rng.integers(len(events)))], negatives[int(rng.integers(len(negatives)))]
         length = min(round(len(event.scores) / event.fps * clip.fps), len(clip.scores))

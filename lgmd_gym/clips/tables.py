@@ -206,7 +206,7 @@ def write_clip_scores(
     """Write one row per configuration and clip: the highest scores, and the time to accident at the cap."""
     score_columns = [f"score_at_{tau:.1f}_s" for tau in HORIZONS_S]
     head = ("configuration", "clip", "event", "evaluated_s", "highest_score")
-    rows = []
+    rows: list[Sequence[object]] = []
     for name, items in clips.items():
         threshold = results[name].threshold
         for clip in items:

@@ -3,6 +3,7 @@
 import json
 from importlib.metadata import distributions
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlparse
 
 PACKAGE = "lgmd-gym"
@@ -37,8 +38,8 @@ def install_command(extra: str) -> str:
 def _source() -> tuple[Path | None, bool]:
     """Return the clone from which the package was installed, or None, and whether it is editable."""
     for item in distributions(name=PACKAGE):
-        source = json.loads(item.read_text("direct_url.json") or "{}")
-        url = urlparse(source.get("url", ""))
+        source: dict[str, Any] = json.loads(item.read_text("direct_url.json") or "{}")
+        url = urlparse(str(source.get("url", "")))
         folder = Path(unquote(url.path))
         if url.scheme == "file" and "dir_info" in source and (folder / "pyproject.toml").is_file():
             return folder, bool(source["dir_info"].get("editable", False))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from multiprocessing import resource_tracker
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from lgmd_gym._version import __version__
 from lgmd_gym.errors import check_text, check_whole
@@ -83,6 +83,10 @@ class PoolLostError(RuntimeError):
     """Raised when the workers are lost, and with them their unfinished tasks."""
 
 
+_Task = TypeVar("_Task")
+_Result = TypeVar("_Result")
+
+
 class TaskMap:
     """Maps a function over tasks and yields the results as they finish.
 
@@ -94,15 +98,17 @@ class TaskMap:
     def __init__(self, parallel: "Parallel", workers: int) -> None:
         self._parallel, self.workers = parallel, workers
 
-    def __call__(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
+    def __call__(self, function: Callable[[_Task], _Result], tasks: Iterable[_Task]) -> Iterator[_Result]:
         """Yield the results of `function`, which other processes import by name."""
         from joblib import delayed
 
         with signals_blocked():  # the call starts the workers
-            results = self._parallel(delayed(function)(task) for task in tasks)
-        yield from results  # type: ignore[misc]
+            results: Any = self._parallel(delayed(function)(task) for task in tasks)
+        yield from results
 
-    def flatten(self, function: Callable[[Any], Iterator[Any]], tasks: Iterable[Any]) -> Iterator[Any]:
+    def flatten(
+        self, function: Callable[[_Task], Iterator[_Result]], tasks: Iterable[_Task]
+    ) -> Iterator[_Result]:
         """Yield every item of the iterators that `function` returns.
 
         Items arrive one by one from this process, and the items of a task together from other processes.
@@ -113,7 +119,7 @@ class TaskMap:
             yield from chain.from_iterable(self(partial(_collect, function), tasks))
 
 
-def _collect(function: Callable[[Any], Iterator[Any]], task: Any) -> list[Any]:
+def _collect(function: Callable[[_Task], Iterator[_Result]], task: _Task) -> list[_Result]:
     return list(function(task))
 
 

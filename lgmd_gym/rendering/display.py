@@ -54,7 +54,7 @@ class DisplayState:
             alert: Alert of the agent; None for that of the neuron.
         """
         ego = env.vehicle
-        action = getattr(ego, "action", None) or {}
+        action: dict[str, float] = getattr(ego, "action", None) or {}
         return cls(
             time=float(env.time),
             speed=float(info.get("ego_speed", ego.speed)),
@@ -96,7 +96,7 @@ def danger_zone_edges(camera: EgoCamera, ego: Any) -> list[np.ndarray]:
     """
     ahead = np.geomspace(*ZONE_REACH, 40)
     heading = float(ego.heading)
-    edges = []
+    edges: list[np.ndarray] = []
     for side in (-0.5 * ZONE_WIDTH, 0.5 * ZONE_WIDTH):
         x = ego.position[0] + ahead * cos(heading) - side * sin(heading)
         y = ego.position[1] + ahead * sin(heading) + side * cos(heading)
@@ -117,7 +117,7 @@ def target_boxes(camera: EgoCamera, env: Any) -> list[tuple[float, float, float,
     """
     ego, road = env.vehicle, env.road
     height, width = camera.shape
-    boxes = []
+    boxes: list[tuple[float, tuple[float, float, float, float]]] = []
     for body in (*road.vehicles, *road.objects):
         if body is ego or not getattr(body, "solid", True):
             continue

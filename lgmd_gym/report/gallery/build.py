@@ -50,7 +50,7 @@ class AgentOutcome(NamedTuple):
         if any(row["error"] is not None for row in rows):
             return cls("failed", False, bool(threats))
         non_threats = [row for row in rows if not row["threat"]]
-        parts = []
+        parts: list[str] = []
         if threats:
             parts.append(f"avoided {sum(row['avoided'] for row in threats)}/{len(threats)}")
             impacts = [3.6 * row["relative_impact_speed"] for row in threats if row["collision"]]
@@ -113,7 +113,7 @@ def render_page(
     environment = Environment(
         loader=PackageLoader("lgmd_gym.report.gallery", "."), autoescape=True, undefined=StrictUndefined
     )
-    environment.filters |= {"code": _code, "paragraphs": _paragraphs}
+    environment.filters.update(code=_code, paragraphs=_paragraphs)
     groups: dict[str, list[ScenarioCard]] = {"threats": [], "non-threats": [], "traffic": []}
     for card in cards:
         groups[_group(card, outcomes[card.name])].append(card)
@@ -189,13 +189,13 @@ def _write(
     media = folder / "media"
     media.mkdir()
     agents = list(dict.fromkeys([*DEFAULT_AGENTS, agent]))
-    outcomes = {}
+    outcomes: dict[str, dict[str, AgentOutcome]] = {}
     for number, card in enumerate(cards, 1):
         record_video(card, agent, media / card.name)
         outcomes[card.name] = evaluate_agents(card, agents, seeds)
         text = "traffic" if card.traffic else outcomes[card.name][agent].text
         on_progress(f"{number}/{len(cards)}  {card.target}: {text}")
-    sheets = {}
+    sheets: dict[str, ImageSheet] = {}
     if with_sheets:
         on_progress("cameras and roads")
         sheets["cameras"] = _save_sheet(media, "camera", camera_sheet())
