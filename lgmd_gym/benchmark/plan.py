@@ -18,7 +18,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
 from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
 from lgmd_gym.benchmark.units import Unit, make_units
-from lgmd_gym.camera.render.context import draw_cameras
+from lgmd_gym.camera.render.raster import draw_cameras
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.engine.kernels import advance
 from lgmd_gym.envs.appearance import Appearance

@@ -12,9 +12,9 @@ from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.pose import MOUNT, mount_of
 from lgmd_gym.camera.render.buffers import Views
-from lgmd_gym.camera.render.bundle import Bundle
-from lgmd_gym.camera.render.context import SharedTables, Workspace, draw_cameras, tables_key
-from lgmd_gym.camera.render.exposure import STATE_SIZE
+from lgmd_gym.camera.render.raster import SharedTables, Workspace, draw_cameras, tables_key
+from lgmd_gym.camera.render.sensor import STATE_SIZE
+from lgmd_gym.kernels.bundle import Bundle
 
 
 class _Prepared(NamedTuple):

@@ -8,7 +8,7 @@ from lgmd_gym.camera.batch import CameraBatch
 from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pinhole import project
 from lgmd_gym.camera.render.buffers import Buffers
-from lgmd_gym.camera.render.context import Workspace
+from lgmd_gym.camera.render.raster import Workspace
 from lgmd_gym.camera.road_pool import RoadPool, road_key
 from lgmd_gym.camera.scene_table import SceneTable, view_of
 from lgmd_gym.camera.spec import CameraItem

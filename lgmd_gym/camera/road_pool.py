@@ -10,9 +10,9 @@ import numpy as np
 from lgmd_gym.camera.objects import OBJECT
 from lgmd_gym.camera.params import CameraParams
 from lgmd_gym.camera.pose import seed_of
-from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.road_geometry import LINE, RoadGeometry, network_of, road_geometry
 from lgmd_gym.camera.worlds import draw_world
+from lgmd_gym.kernels.bundle import Bundle
 
 RoadKey: TypeAlias = tuple[float, int, bool, bool, int | None]
 """What the geometry depends on besides the lanes: the arguments of `road_geometry`."""

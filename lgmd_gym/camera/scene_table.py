@@ -11,8 +11,8 @@ from lgmd_gym.camera.body_motion import MAX_DEG, PITCH, ROLL, YAW
 from lgmd_gym.camera.bounds import MIN_STOP
 from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, View, read_objects
 from lgmd_gym.camera.params import ROADS, CameraParams
-from lgmd_gym.camera.render.bundle import Bundle
 from lgmd_gym.camera.scene import SCENE, Ego, read_scene
+from lgmd_gym.kernels.bundle import Bundle
 
 _MAX_SPREAD = math.radians(170.0)
 _MAX_DECELERATION = 12.0  # bound of the deceleration in `pose` [m/s²]

@@ -8,8 +8,8 @@ import numpy as np
 
 from lgmd_gym.camera import CameraParams
 from lgmd_gym.camera.batch import CameraBatch
-from lgmd_gym.camera.render.bundle import Bundle
-from lgmd_gym.camera.render.context import Workspace
+from lgmd_gym.camera.render.raster import Workspace
+from lgmd_gym.kernels.bundle import Bundle
 from lgmd_gym.neuron import FrameNeuron
 from lgmd_gym.sensing.kernels import collect_outputs, count_turns, select_cameras
 

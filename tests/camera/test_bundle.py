@@ -7,7 +7,7 @@ import pickle
 import numba as nb
 import numpy as np
 
-from lgmd_gym.camera.render.bundle import Bundle
+from lgmd_gym.kernels.bundle import Bundle
 
 
 @nb.njit

@@ -4,7 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from support.reference_camera import worst_error
+from reference.camera import worst_error
 from support.roads import box_record, lens_x, ring_road, set_roadside, straight_env
 
 from lgmd_gym.camera import CameraParams, objects

@@ -6,7 +6,7 @@ from support.roads import add_car, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.effects import look_of
-from lgmd_gym.camera.render.weather import light_at
+from lgmd_gym.camera.render.light import light_at
 
 
 def test_fog_night_and_noise_change_contrast_light_and_deviation():

@@ -4,14 +4,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.reference_camera import worst_error
-from support.reference_geometry import camera_axes
+from reference.camera import worst_error
+from reference.geometry import camera_axes
 from support.roads import FIGURES, add_car, add_figure, add_obstacle, box_record, lens_x, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.effects import look_of
 from lgmd_gym.camera.objects import FIGURES as KINDS
-from lgmd_gym.camera.render.figure_builder import (
+from lgmd_gym.camera.render.figures import pose_figure
+from lgmd_gym.camera.render.models.builder import (
     ANKLE,
     ARM,
     CRANK,
@@ -24,8 +25,7 @@ from lgmd_gym.camera.render.figure_builder import (
     TOE,
     WHEEL,
 )
-from lgmd_gym.camera.render.figure_models import figure_tables
-from lgmd_gym.camera.render.figure_motion import pose_figure
+from lgmd_gym.camera.render.models.figures import figure_tables
 
 MODELS = {kind: model for kind, (model, _) in KINDS.items()}
 

@@ -5,7 +5,7 @@ import pytest
 from support.roads import EGO_LENGTH, add_car, lens_x, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
-from lgmd_gym.camera.render.texture_sampling import distance_ahead
+from lgmd_gym.camera.render.texture import distance_ahead
 
 PLAIN = {"texture": 0.0, "roadside": 0.0, "vehicles": "box"}
 

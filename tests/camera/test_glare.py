@@ -4,7 +4,7 @@ import numpy as np
 from support.roads import add_car, lens_x, straight_env
 
 from lgmd_gym.camera import EgoCamera
-from lgmd_gym.camera.render.glare import BUDGET_PX
+from lgmd_gym.camera.render.light import BUDGET_PX
 
 
 def test_oncoming_headlights_glare_at_night():

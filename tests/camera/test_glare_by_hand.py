@@ -8,7 +8,7 @@ from support.records import lens_of, record
 
 from lgmd_gym.camera.objects import BODY_MODELS, MODEL_CAR, MODEL_LAMP, MODEL_MOTORCYCLE, MODEL_TRUCK, OBJECT
 from lgmd_gym.camera.pinhole import project
-from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare
+from lgmd_gym.camera.render.light import BUDGET_PX, add_glare
 from lgmd_gym.camera.render.models import all_models
 
 

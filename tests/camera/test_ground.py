@@ -7,11 +7,10 @@ from support.roads import straight_env
 from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.effects import beam_profile, look_of
 from lgmd_gym.camera.pinhole import LENS
-from lgmd_gym.camera.render.buffers import Tables, View
+from lgmd_gym.camera.render.buffers import Horizon, Tables, View
 from lgmd_gym.camera.render.ground import shade_row
-from lgmd_gym.camera.render.horizon import Horizon
+from lgmd_gym.camera.render.light import veil_at
 from lgmd_gym.camera.render.texture import TEXEL_M, ground_texture
-from lgmd_gym.camera.render.veil import veil_at
 
 
 def view_of(p, yaw, x=31.7, y=-4.2, pitch=-0.05):
@@ -22,7 +21,15 @@ def view_of(p, yaw, x=31.7, y=-4.2, pitch=-0.05):
     lens["cos_pitch"], lens["sin_pitch"] = np.cos(pitch), np.sin(pitch)
     lens["centre_v"], lens["centre_u"] = 0.5 * np.array(p.shape)
     empty = np.zeros((0, 0), np.float32)
-    return View(lens[()], look_of(p)[()], beam_profile(p), empty, np.zeros(2))
+    return View(
+        lens=lens[()],
+        look=look_of(p)[()],
+        beam=beam_profile(p),
+        sky=empty,
+        sky_aim=np.zeros(2),
+        noise_start=0,
+        exposure=np.zeros(0),
+    )
 
 
 def level_horizon(row):

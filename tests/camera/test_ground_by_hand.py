@@ -10,10 +10,8 @@ from support.records import lens_of, records
 from lgmd_gym.camera import CameraParams
 from lgmd_gym.camera.effects import look_of
 from lgmd_gym.camera.render.buffers import GroundLayer
-from lgmd_gym.camera.render.ground import PAINT
-from lgmd_gym.camera.render.markings import add_lines
-from lgmd_gym.camera.render.texture import TEXEL_M
-from lgmd_gym.camera.render.texture_sampling import bend_of, bent_texels, distance_ahead, texture_line
+from lgmd_gym.camera.render.ground import PAINT, add_lines
+from lgmd_gym.camera.render.texture import TEXEL_M, bend_of, bent_texels, distance_ahead, texture_line
 from lgmd_gym.camera.road_geometry import LINE
 from lgmd_gym.kernels import kernel
 from lgmd_gym.kernels.simd import as_floats, lane_numbers, splat, store

@@ -5,7 +5,7 @@ from math import atan, inf, tan
 import pytest
 from support.records import lens_of
 
-from lgmd_gym.camera.render.markings import ViewedLine, _separate_stripes, _visible_part
+from lgmd_gym.camera.render.ground import ViewedLine, _separate_stripes, _visible_part
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from support.roads import add_car, lens_x, straight_env
 
 from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera.objects import OBJECT
-from lgmd_gym.camera.render.blur import blur_steps, lens_before
+from lgmd_gym.camera.render.sensor import blur_steps, lens_before
 
 
 def test_still_scene_has_no_motion_blur():

@@ -6,7 +6,7 @@ from support.roads import add_car, lens_x, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.effects import look_of
-from lgmd_gym.camera.render.veil import veil_at
+from lgmd_gym.camera.render.light import veil_at
 
 NIGHT = {"light": "night", "roadside": 0.0}
 

@@ -6,7 +6,7 @@ from support.records import lens_of
 from support.roads import box_record
 
 from lgmd_gym.camera.objects import MODEL_MARK, MODEL_TREE
-from lgmd_gym.camera.render.order import order_objects, visible
+from lgmd_gym.camera.render.solids import order_objects, visible
 
 
 def drawing_order(*records, **lens):

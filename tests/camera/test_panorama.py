@@ -11,8 +11,8 @@ from support.roads import straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.pinhole import project
-from lgmd_gym.camera.render.horizon import horizon_of
-from lgmd_gym.camera.render.panorama import draw_panorama, natural_panorama
+from lgmd_gym.camera.render.buffers import horizon_of
+from lgmd_gym.camera.render.sky import draw_panorama, natural_panorama
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from support.roads import add_car, lens_x, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
-from lgmd_gym.camera.render.edges import add_edge
+from lgmd_gym.camera.render.coverage import add_edge
 
 OPTIONS = st.fixed_dictionaries(
     {

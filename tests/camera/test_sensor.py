@@ -11,15 +11,16 @@ from support.roads import add_mark, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.effects import look_of, noise_table
-from lgmd_gym.camera.render.exposure import (
+from lgmd_gym.camera.render.sensor import (
     CONTRAST_GREY,
     CONTRAST_MEAN,
     STATE_SIZE,
     adapt_contrast,
     adapt_exposure,
+    expose,
+    fixed_tone,
     follow_exposure,
 )
-from lgmd_gym.camera.render.sensor import expose, fixed_tone
 from lgmd_gym.camera.scene import SCENE
 
 BRIDGE = {"size": (200.0, 60.0), "shade": 10.0}

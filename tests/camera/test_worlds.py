@@ -14,7 +14,7 @@ from lgmd_gym.camera import CONDITIONS
 from lgmd_gym.camera.effects import LOOK, in_world, look_of, sun_of
 from lgmd_gym.camera.objects import MODEL_BEAM, MODEL_CROWN, MODEL_DECK, OBJECT
 from lgmd_gym.camera.pinhole import project
-from lgmd_gym.camera.render.glare import add_sun_glare
+from lgmd_gym.camera.render.light import add_sun_glare
 from lgmd_gym.camera.worlds import ASPHALTS, SPLIT_WORLDS, VERGES, WORLDS, World, draw_world
 
 MANY = [draw_world(number) for number in range(400)]

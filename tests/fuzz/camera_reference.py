@@ -11,8 +11,8 @@ from pathlib import Path
 sys.path[:0] = [str(Path(__file__).parents[1])]
 
 from fuzz.camera import draw_camera, draw_scene
+from reference.camera import separate_objects, worst_error
 from support.fuzz import run_cases
-from support.reference_camera import separate_objects, worst_error
 
 
 def check(env, params):

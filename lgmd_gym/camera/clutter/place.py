@@ -6,12 +6,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from lgmd_gym.camera.clutter.across import ACROSS
-from lgmd_gym.camera.clutter.beside import BESIDE
-from lgmd_gym.camera.clutter.on_lane import ON_LANE, queues
-from lgmd_gym.camera.clutter.parts import records_of
+from lgmd_gym.camera.clutter.kinds import ACROSS, BESIDE, ON_LANE, queues
 from lgmd_gym.camera.clutter.settings import Clutter
-from lgmd_gym.camera.clutter.sites import Sites, edge_places, lane_places, with_road_width
+from lgmd_gym.camera.clutter.sites import Sites, edge_places, lane_places, records_of, with_road_width
 from lgmd_gym.camera.objects import MODEL_MARK, OBJECT
 from lgmd_gym.camera.roadside import is_clear
 from lgmd_gym.errors import check_type, check_whole

@@ -1,4 +1,4 @@
-"""The arrays that the kernels of a frame share, by name."""
+"""The arrays that the kernels of a frame share, by name, and the horizon."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from lgmd_gym.camera.objects import MAX_DRAWN
 from lgmd_gym.camera.pinhole import LENS
-from lgmd_gym.camera.render.figure_builder import MAX_JOINTS
+from lgmd_gym.camera.render.models.builder import MAX_JOINTS
+from lgmd_gym.kernels import kernel
 
 
 class Views(NamedTuple):
@@ -30,13 +31,29 @@ class Views(NamedTuple):
 
 
 class View(NamedTuple):
-    """One camera, posed: a row of `Views`, and a `LENS` record."""
+    """One camera, posed: a `LENS` record, and a row of `Views`."""
 
     lens: np.ndarray
     look: np.ndarray
     beam: np.ndarray
     sky: np.ndarray
     sky_aim: np.ndarray
+    noise_start: int
+    exposure: np.ndarray
+
+
+@kernel
+def at_lens(view, lens):
+    """Return a view with another `LENS` record."""
+    return View(
+        lens=lens,
+        look=view.look,
+        beam=view.beam,
+        sky=view.sky,
+        sky_aim=view.sky_aim,
+        noise_start=view.noise_start,
+        exposure=view.exposure,
+    )
 
 
 class Tables(NamedTuple):
@@ -143,3 +160,29 @@ def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
         directions=np.zeros((2, width)),
         outlines=np.zeros((5, width), dtype=np.float32),
     )
+
+
+class Horizon(NamedTuple):
+    """Row coordinates of the horizon [px].
+
+    Attributes:
+        left: At the left side of the frame.
+        slope: Change per column.
+        top: At the side where it is higher in the image.
+        bottom: At the other side.
+    """
+
+    left: float
+    slope: float
+    top: float
+    bottom: float
+
+
+@kernel
+def horizon_of(lens):
+    """Return the `Horizon` of a lens."""
+    middle = lens.centre_v + lens.focal * lens.sin_pitch / lens.cos_pitch / lens.cos_roll
+    slope = -lens.sin_roll / lens.cos_roll
+    rise = abs(slope) * lens.centre_u
+    left = middle - slope * lens.centre_u
+    return Horizon(left=left, slope=slope, top=middle - rise, bottom=middle + rise)

@@ -1,4 +1,7 @@
-"""Kernels of the ground: asphalt, verge and everything flat on them.
+"""The ground in a frame: visible band, road and paint, and the shading of its rows.
+
+A narrow field below the horizon contains a few metres of road, and most objects of a roadside are beyond it.
+What these kernels exclude would add nothing to the frame, so that frames are the same to the bit.
 
 A row of the image is a straight line over the texture, also if the lens rolls. Without roll, it is at one
 distance ahead, and its pixels are evenly spaced. The level of the rip-map, the fog and the headlights are
@@ -12,9 +15,10 @@ from typing import Any, NamedTuple
 import numba as nb
 import numpy as np
 
+from lgmd_gym.camera.pose import half_frame, side_tangent
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, sum_differences, winding
-from lgmd_gym.camera.render.ground_band import ground_band
-from lgmd_gym.camera.render.texture_sampling import (
+from lgmd_gym.camera.render.light import row_air, through_air
+from lgmd_gym.camera.render.texture import (
     bend_of,
     bent_texels,
     distance_ahead,
@@ -22,7 +26,6 @@ from lgmd_gym.camera.render.texture_sampling import (
     sample,
     texture_line,
 )
-from lgmd_gym.camera.render.weather import row_air, through_air
 from lgmd_gym.kernels import kernel
 from lgmd_gym.kernels.simd import (
     LANES,
@@ -38,6 +41,46 @@ from lgmd_gym.kernels.simd import (
     splat,
     store_part,
 )
+
+_MARGIN_M = 0.2  # of the height of an object
+_MARGIN = 1.1  # factor on the height
+
+
+@kernel
+def ground_band(lens):
+    """Return least and greatest distance ahead of the ground in the frame [m]; infinite above the horizon.
+
+    The frame is the upright rectangle around the rolled one.
+    """
+    t = half_frame(lens)[1] / lens.focal
+    upper, lower = lens.sin_pitch + t * lens.cos_pitch, t * lens.cos_pitch - lens.sin_pitch
+    near = lens.z * (lens.cos_pitch + t * lens.sin_pitch) / lower if lower > 1e-9 else math.inf
+    far = lens.z * (lens.cos_pitch - t * lens.sin_pitch) / -upper if upper < -1e-9 else math.inf
+    return near, far
+
+
+@kernel
+def outside_band(lens, ahead, radius):
+    """Return whether a circle on the ground, its centre at a distance ahead [m], is outside the frame."""
+    near, far = ground_band(lens)
+    return ahead + radius < near or ahead - radius > far
+
+
+@kernel
+def above_or_below(lens, obj):
+    """Return whether an object on the ground is entirely above or below the frame, with its soft shadow."""
+    ahead = (obj.x - lens.x) * lens.cos_yaw + (obj.y - lens.y) * lens.sin_yaw
+    # With its shadow, see `order.visible`.
+    radius = 0.5 * math.sqrt(obj.length**2 + obj.width**2) + 0.4 + 0.1 * obj.height
+    if ahead - radius > ground_band(lens)[1]:
+        return True
+    # The plane through the lens and the lower side of the frame, at the highest and farthest point.
+    t = half_frame(lens)[1] / lens.focal
+    lower = t * lens.cos_pitch - lens.sin_pitch
+    top = _MARGIN * obj.height + _MARGIN_M
+    farthest = ahead + radius if lower > 0.0 else ahead - radius
+    return (lens.z - top) * (lens.cos_pitch + t * lens.sin_pitch) - lower * farthest > 0.0
+
 
 # Channels of the ground layer; int64, because kernels are compiled anew for each literal argument.
 ROAD, PAINT, SHADOW, CAST = np.int64(0), np.int64(1), np.int64(2), np.int64(3)
@@ -106,10 +149,15 @@ class Surface(NamedTuple):
 def _surface_of(look):
     """Return the `Surface` of a `LOOK` record, once per row: in loops, compilers read records again."""
     return Surface(
-        splat(nb.float32(look.asphalt)), splat(nb.float32(look.asphalt_gain)),
-        splat(nb.float32(look.verge)), splat(nb.float32(look.verge_gain)), splat(nb.float32(look.paint)),
-        splat(nb.float32(look.shadow_limit)), splat(nb.float32(look.cast)), look.cast > 0.0,
-    )  # fmt: skip
+        asphalt=splat(nb.float32(look.asphalt)),
+        asphalt_gain=splat(nb.float32(look.asphalt_gain)),
+        verge=splat(nb.float32(look.verge)),
+        verge_gain=splat(nb.float32(look.verge_gain)),
+        paint=splat(nb.float32(look.paint)),
+        shadow_limit=splat(nb.float32(look.shadow_limit)),
+        cast=splat(nb.float32(look.cast)),
+        sunny=look.cast > 0.0,
+    )
 
 
 @kernel(inline=True)
@@ -176,8 +224,11 @@ def shade_row(image, row, horizon, coverage, view, tables):
             # As shares of the ground in these pixels.
             inverse = one / maximum(share, least)
             coverages = (
-                cover_road * inverse, cover_paint * inverse, cover_shadow * inverse, cover_cast * inverse,
-            )  # fmt: skip
+                cover_road * inverse,
+                cover_paint * inverse,
+                cover_shadow * inverse,
+                cover_cast * inverse,
+            )
         at_x, at_y = x, y
         if bent:
             away_x, away_y = bent_texels(bend, t)
@@ -192,3 +243,125 @@ def shade_row(image, row, horizon, coverage, view, tables):
     # Edges at the right side of the frame.
     for j in range(width, width + 2):
         road[row, j] = paint[row, j] = shadow[row, j] = cast[row, j] = nb.float32(0.0)
+
+
+_FAR = 2000.0  # markings end at this distance [m]
+
+
+class ViewedLine(NamedTuple):
+    """Start [m] and unit direction of a straight line, ahead of and across the lens; its width [m]."""
+
+    ahead: float
+    across: float
+    d_ahead: float
+    d_across: float
+    width: float
+
+
+@kernel
+def _add_stroke(layer, lens, line, a, b, weight):
+    """Add the part [a, b] of a `ViewedLine` [m]; `weight` is 1, or the share that is painted."""
+    ha, hc = -0.5 * line.width * line.d_across, 0.5 * line.width * line.d_ahead
+    cos, sin, corners = lens.cos_pitch, lens.sin_pitch, layer.corners
+    for i in range(4):
+        t = a if i < 2 else b
+        side = -1.0 if i == 0 or i == 3 else 1.0
+        forward = line.ahead + t * line.d_ahead + side * ha
+        corners[i, 0] = forward * cos - lens.z * sin
+        corners[i, 1] = line.across + t * line.d_across + side * hc
+        corners[i, 2] = forward * sin + lens.z * cos
+    add_quad(layer, PAINT, lens, weight)
+
+
+@kernel
+def _visible_part(lens, line, length):
+    """Return the part [a, b] of a line between the near plane, the far end and the sides of the view [m].
+
+    The lower side of the frame also bounds it: a narrow view begins tens of metres ahead.
+    """
+    ahead, across, d_ahead, d_across, width = line
+    tan = side_tangent(lens)
+    low = half_frame(lens)[1] / lens.focal
+    rise, drop = low * lens.cos_pitch - lens.sin_pitch, lens.z * (lens.cos_pitch + low * lens.sin_pitch)
+    a, b = 0.0, length
+    for side in range(5 if tan >= 0.0 else 0):
+        if side == 0:
+            p, q = ahead + 0.5, d_ahead
+        elif side == 1:
+            p, q = _FAR - ahead, -d_ahead
+        elif side == 2:
+            p, q = tan * ahead + across + 2.0, tan * d_ahead + d_across
+        elif side == 3:
+            p, q = tan * ahead - across + 2.0, tan * d_ahead - d_across
+        else:
+            p, q = rise * ahead - drop + abs(rise) * width, rise * d_ahead
+        # Keep where p + q·t >= 0.
+        if abs(q) < 1e-12:
+            if p < 0.0:
+                return 1.0, 0.0
+        elif q > 0.0:
+            a = max(a, -p / q)
+        else:
+            b = min(b, -p / q)
+    return a, b
+
+
+@kernel
+def _separate_stripes(lens, line, a, b, period):
+    """Return the part of [a, b] drawn as separate stripes: up to three periods per pixel [m]."""
+    along, across = abs(line.d_ahead), abs(line.d_across)
+    f, h = lens.focal, lens.z
+    # along·Z²/(f·h) + across·Z/f = 3 periods, solved for the distance ahead Z.
+    p, q, r = along / (f * h), across / f, 3.0 * period
+    limit = (math.sqrt(q * q + 4.0 * p * r) - q) / (2.0 * p) if p > 1e-9 else r / max(q, 1e-9)
+    if abs(line.d_ahead) < 1e-9:
+        return (a, b) if line.ahead < limit else (b, b)
+    t = (limit - line.ahead) / line.d_ahead
+    # The near part is striped, in either direction of the line.
+    return (a, min(max(t, a), b)) if line.d_ahead > 0.0 else (min(max(t, a), b), b)
+
+
+@kernel
+def _add_striped(layer, lens, line, s0, a, b, look):
+    """Add the part [a, b] of a striped line that starts s0 along its lane [m]; far stripes as their mean."""
+    dash, period = look.dash, look.dash_period
+    near_a, near_b = _separate_stripes(lens, line, a, b, period)
+    if near_a > a:
+        _add_stroke(layer, lens, line, a, near_a, dash / period)
+    if near_b < b:
+        _add_stroke(layer, lens, line, near_b, b, dash / period)
+    k = math.floor((s0 + near_a) / period)
+    while k * period < s0 + near_b:
+        start = max(k * period - s0, near_a)
+        end = min(k * period + dash - s0, near_b)
+        if end > start:
+            _add_stroke(layer, lens, line, start, end, 1.0)
+        k += 1
+
+
+@kernel
+def add_lines(layer, lens, lines, look):
+    """Add all markings, `RoadGeometry.lines`, to the ground layer, in the style of a `LOOK` record."""
+    c, s = lens.cos_yaw, lens.sin_yaw
+    for i in range(lines.shape[0]):
+        piece = lines[i]
+        x0, y0 = piece.x0 - lens.x, piece.y0 - lens.y
+        dx, dy = piece.x1 - piece.x0, piece.y1 - piece.y0
+        length = math.sqrt(dx * dx + dy * dy)
+        if not length > 0.0:
+            continue
+        dx, dy = dx / length, dy / length
+        line = ViewedLine(
+            ahead=x0 * c + y0 * s,
+            across=y0 * c - x0 * s,
+            d_ahead=dx * c + dy * s,
+            d_across=dy * c - dx * s,
+            width=look.line_width,
+        )
+        a, b = _visible_part(lens, line, length)
+        if not b > a:
+            continue
+        if piece.striped == 0.0:
+            _add_stroke(layer, lens, line, a, b, 1.0)
+        else:
+            _add_striped(layer, lens, line, piece.start, a, b, look)

@@ -1,31 +1,52 @@
-"""The kernel that renders frames: sky, ground, solids from far to near, glare, sensor."""
+"""The kernels that pose and draw the cameras of many environments, their tables and scratch memory."""
 
 import math
+from typing import Any
 
 import numba as nb
+import numpy as np
 
-from lgmd_gym.camera.objects import MODEL_MARK, is_figure, light_of_code
-from lgmd_gym.camera.render.blur import add_weighted, blur_steps, lens_before, move_objects, overwrite
-from lgmd_gym.camera.render.buffers import Buffers, GroundLayer, SolidLayer, Tables, View, Views
-from lgmd_gym.camera.render.cast_shadows import add_cast_shadows
-from lgmd_gym.camera.render.exposure import adapt_contrast, adapt_exposure
+from lgmd_gym.camera.aim import STOPPING
+from lgmd_gym.camera.effects import noise_table
+from lgmd_gym.camera.objects import MAX_DRAWN, MODEL_MARK, OBJECT, choose_objects, is_figure, light_of_code
+from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.pose import noise_start, pose_lens
+from lgmd_gym.camera.render.buffers import (
+    Buffers,
+    GroundLayer,
+    SolidLayer,
+    Tables,
+    View,
+    Views,
+    at_lens,
+    horizon_of,
+    make_buffers,
+)
 from lgmd_gym.camera.render.figures import draw_figure
-from lgmd_gym.camera.render.glare import BUDGET_PX, add_glare, add_sun_glare
-from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, shade_row
-from lgmd_gym.camera.render.ground_band import above_or_below
-from lgmd_gym.camera.render.horizon import horizon_of
-from lgmd_gym.camera.render.markings import add_lines
-from lgmd_gym.camera.render.models import Models
-from lgmd_gym.camera.render.order import distance, first_from, order_objects, visible
-from lgmd_gym.camera.render.panorama import draw_panorama
-from lgmd_gym.camera.render.sensor import expose, fixed_tone
-from lgmd_gym.camera.render.shadows import add_shadow
-from lgmd_gym.camera.render.sky import draw_sky
-from lgmd_gym.camera.render.solids import Air, draw_object
-from lgmd_gym.camera.render.veil import add_sky_veil
-from lgmd_gym.camera.render.weather import light_at
+from lgmd_gym.camera.render.ground import ROAD, above_or_below, add_ground_quad, add_lines, shade_row
+from lgmd_gym.camera.render.light import BUDGET_PX, add_glare, add_sky_veil, add_sun_glare, aim_beam, light_at
+from lgmd_gym.camera.render.models import Models, all_models
+from lgmd_gym.camera.render.sensor import (
+    adapt_contrast,
+    adapt_exposure,
+    add_weighted,
+    blur_steps,
+    expose,
+    fixed_tone,
+    follow_exposure,
+    lens_before,
+    move_objects,
+    overwrite,
+)
+from lgmd_gym.camera.render.shadows import add_cast_shadows, add_shadow
+from lgmd_gym.camera.render.sky import draw_panorama, draw_sky, panorama_table, skyline
+from lgmd_gym.camera.render.solids import Air, distance, draw_object, first_from, order_objects, visible
+from lgmd_gym.camera.render.texture import ground_texture
+from lgmd_gym.camera.road_geometry import RoadGeometry
 from lgmd_gym.camera.roadside import PLANT_RANGE
+from lgmd_gym.camera.worlds import draw_world
 from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.bundle import Bundle
 
 
 @kernel
@@ -114,17 +135,18 @@ def draw_solids(image, view, models, objects, order, n, layer):
         # Objects fade in over the last sixth of their range.
         opacity = min(1.0, 6.0 * (1.0 - away / obj.range))
         clear = math.exp(-away * look.extinction) if look.extinction > 0.0 else 1.0
+        air = Air(light=light, transmission=clear, opacity=opacity, away=away)
         if is_figure(obj.model):
-            draw_figure(image, view, obj, models.figures, Air(light, clear, opacity, away), layer)
+            draw_figure(image, view, obj, models.figures, air, layer)
         else:
-            draw_object(image, view, obj, models, Air(light, clear, opacity, away), layer)
+            draw_object(image, view, obj, models, air, layer)
         if look.night > 0.0:
             budget = add_glare(image, lens, obj, models.lamps[obj.model], clear * opacity, budget)
 
 
 @kernel
 def draw_light(view, road, tables, models, objects, count, buffers):
-    """Draw the light at one time of the exposure to `buffers.image`; see `draw_frames`."""
+    """Draw the light at one time of the exposure to `buffers.image`; see `draw_frame`."""
     image, lens, order = buffers.image, view.lens, buffers.order
     cast_shadows = view.look.cast > 0.0
     vehicles = count
@@ -132,13 +154,18 @@ def draw_light(view, road, tables, models, objects, count, buffers):
     n = order_objects(lens, objects, count, order, buffers.distances, buffers.extents)
     horizon = horizon_of(lens)
     draw_distance(image, view, tables, horizon, buffers)
-    ground = GroundLayer(buffers.ground, buffers.corners, buffers.uv, buffers.quad)
+    ground = GroundLayer(coverage=buffers.ground, corners=buffers.corners, uv=buffers.uv, quad=buffers.quad)
     add_flats(ground, view, road, objects, order, n)
     if cast_shadows:
         add_cast_shadows(ground, view, objects, vehicles, road.roadside)
     draw_ground(image, view, buffers.ground, tables, horizon)
     solids = SolidLayer(
-        buffers.solids, buffers.corners, buffers.uv, buffers.axes, buffers.greys, buffers.joints
+        coverage=buffers.solids,
+        corners=buffers.corners,
+        uv=buffers.uv,
+        axes=buffers.axes,
+        greys=buffers.greys,
+        joints=buffers.joints,
     )
     draw_solids(image, view, models, objects, order, n, solids)
     if view.look.glare > 0.0:
@@ -146,42 +173,170 @@ def draw_light(view, road, tables, models, objects, count, buffers):
 
 
 @kernel
-def draw_frames(out, lenses, views, road, tables, models, objects, count, buffers):
-    """Draw one frame of each of several cameras on one car.
+def draw_frame(frame, view, opening, road, tables, models, objects, count, buffers):
+    """Draw one frame.
 
     Args:
-        out: Frames, uint8, shape (cameras, height, width).
-        lenses: `LENS` records at the end and at the start of the exposure, shape (cameras, 2).
-        views: The fields of `Views` (plain tuples are cheaper to pass from Python than named ones).
+        frame: Frame, uint8, shape (height, width).
+        view: `View` at the end of the exposure.
+        opening: `LENS` record at the start of the exposure.
         road: `RoadGeometry`.
-        tables: The fields of `Tables`.
-        models: The fields of `Models`.
+        tables: `Tables`.
+        models: `Models`.
         objects: `OBJECT` records, shape (512,); the roadside is appended to them.
         count: Number of objects.
-        buffers: The fields of `Buffers`.
+        buffers: `Buffers`.
     """
-    views, tables, models, buffers = Views(*views), Tables(*tables), Models(*models), Buffers(*buffers)
-    image, total, moment = buffers.image, buffers.exposure, buffers.lens[0]
-    for k in range(out.shape[0]):
-        end, start = lenses[k, 0], lenses[k, 1]
-        look, beam, sky, sky_aim = views.looks[k], views.beams[k], views.skies[k], views.sky_aims[k]
-        steps = blur_steps(end, start, look.shutter_s, objects, count) if look.shutter_s > 0.0 else 1
-        if steps == 1:
-            view = View(end, look, beam, sky, sky_aim)
-            draw_light(view, road, tables, models, objects, count, buffers)
-        else:
-            total[:] = nb.float32(0.0)
-            for step in range(steps):
-                ago = (step + 0.5) / steps
-                lens_before(end, start, ago, moment)
-                move_objects(objects, count, -ago * look.shutter_s)
-                view = View(moment, look, beam, sky, sky_aim)
-                draw_light(view, road, tables, models, objects, count, buffers)
-                move_objects(objects, count, ago * look.shutter_s)
-                add_weighted(total, image, nb.float32(1.0 / steps))
-            overwrite(image, total)
-        gain = adapt_exposure(views.exposures[k], image, look) if look.auto_exposure_s > 0.0 else 1.0
-        tone = fixed_tone(look)
-        if look.contrast_s > 0.0:
-            tone = adapt_contrast(views.exposures[k], image, look, gain, tone[0])
-        expose(out[k], image, look, gain, tone, tables.noise, views.noise_starts[k])
+    image, total, moment, look = buffers.image, buffers.exposure, buffers.lens[0], view.look
+    end, steps = view.lens, 1
+    if look.shutter_s > 0.0:
+        steps = blur_steps(end, opening, look.shutter_s, objects, count)
+    if steps > 1:
+        total[:] = nb.float32(0.0)
+    for step in range(steps):
+        lens, back = end, 0.0
+        if steps > 1:
+            ago = (step + 0.5) / steps
+            lens_before(end, opening, ago, moment)
+            lens, back = moment, ago * look.shutter_s
+            move_objects(objects, count, -back)
+        draw_light(at_lens(view, lens), road, tables, models, objects, count, buffers)
+        if steps > 1:
+            move_objects(objects, count, back)
+            add_weighted(total, image, nb.float32(1.0 / steps))
+    if steps > 1:
+        overwrite(image, total)
+    gain = adapt_exposure(view.exposure, image, look) if look.auto_exposure_s > 0.0 else 1.0
+    tone = fixed_tone(look)
+    if look.contrast_s > 0.0:
+        tone = adapt_contrast(view.exposure, image, look, gain, tone[0])
+    expose(frame, image, look, gain, tone, tables.noise, view.noise_start)
+
+
+_MAX_JOINED = 8  # tables that a workspace remembers
+
+
+def tables_key(p: CameraParams) -> tuple[Any, ...]:
+    """Return the parameters that cameras of one frame size must have in common to share `SharedTables`."""
+    world = draw_world(p.world)
+    key = (world.asphalt, world.verge, world.skyline) if world.drawn else (p.seed, p.linear_light)
+    if p.panorama != "skyline":
+        # The table of a panorama includes light and fog, at the resolution of the lens.
+        key = *key, p.panorama, p.seed, p.light, p.visibility_m, p.focal_px
+    return key
+
+
+class SharedTables:
+    """Lookup tables for the cameras with one `tables_key`; copies share the arrays.
+
+    Attributes:
+        bundle: The fields of `Tables`, then those of `Models`.
+    """
+
+    def __init__(self, p: CameraParams) -> None:
+        self._params = p
+        world = draw_world(p.world)
+        grounds = (world.asphalt, world.verge) if world.drawn else (("asphalt", p.seed), ("verge", p.seed))
+        asphalt, verge = (ground_texture(*ground) for ground in grounds)
+        tables = Tables(
+            asphalt=asphalt.data,
+            verge=verge.data,
+            level_start=asphalt.level_start,
+            skyline=skyline(100_000 + world.skyline if world.drawn else p.seed),
+            noise=noise_table(0 if world.drawn else p.seed),
+            panorama=panorama_table(p),
+        )
+        self.bundle = Bundle(tuple(tables), tuple(all_models(linear=p.linear_light)))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "SharedTables":
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return SharedTables, (self._params,)
+
+
+class Workspace:
+    """Scratch memory of one thread for frames of one size.
+
+    Attributes:
+        buffers: `Buffers`; `image` is the light of the last frame before the sensor.
+    """
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.buffers: Buffers = make_buffers(shape, len(all_models(linear=False).corners_used))
+        self._arrays = np.zeros(MAX_DRAWN, OBJECT), tuple(self.buffers)
+        self._shape = shape
+        self._scene: tuple[Bundle, ...] = ()
+        self._joined: dict[Bundle, Bundle] = {}
+
+    def join(self, batch: Bundle, scene_table: Bundle, roads: Bundle, tables: Bundle) -> Bundle:
+        """Return the inputs of `draw_cameras`; they are remembered until a road has to move."""
+        scene = batch, scene_table, roads
+        if scene != self._scene or len(self._joined) > _MAX_JOINED:
+            self._scene, self._joined = scene, {}
+        joined = self._joined.get(tables)
+        if joined is None:
+            joined = Bundle(batch.arrays, scene_table.arrays, roads.arrays, tables.arrays, self._arrays)
+            self._joined[tables] = joined
+        return joined
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Workspace, (self._shape,)
+
+
+@kernel(arrays=True)
+def draw_cameras(first, last, tables_index, frames, selected, inputs):
+    """Pose and draw the selected cameras of the environments first..last-1.
+
+    Arrays of shape (environments, members, …) hold one row per camera of this frame size.
+
+    Args:
+        first: First environment.
+        last: Last environment + 1.
+        tables_index: Index of `tables`; cameras with other tables are skipped.
+        frames: Frames to draw, uint8, shape (environments, members, height, width).
+        selected: Cameras to draw, bool, shape (environments, members).
+        inputs: Native bundle of five: that of a `CameraBatch`, of a `SceneTable`, of a `RoadPool`, of
+            `SharedTables`, and as scratch memory, `OBJECT` records of shape (512,) and the fields of
+            `Buffers`.
+    """
+    batch, scene_table, roads, tables, space = inputs.arrays
+    tables_indices, cameras, mounts, lenses, views = batch
+    scenes, objects, counts = scene_table
+    surface, lines, roadside, spans = roads
+    chosen, buffers = space
+    views, buffers = Views(*views), Buffers(*buffers)
+    tables, models = Tables(*tables[0]), Models(*tables[1])
+    for env in range(first, last):
+        scene = scenes[env]
+        for k in range(cameras.shape[0]):
+            if not selected[env, k] or tables_indices[env, k] != tables_index:
+                continue
+            mount, lens, span = mounts[env, k], lenses[env, k, 0], spans[env, cameras[k]]
+            pose_lens(mount, scene, 0.0, lens)
+            if mount.shutter_s > 0.0:
+                pose_lens(mount, scene, mount.shutter_s, lenses[env, k, 1])
+            if mount.noisy != 0:
+                views.noise_starts[env, k] = noise_start(mount, scene, lens)
+            views.looks[env, k].paved = float(span[6])
+            if mount.gaze == STOPPING and views.looks[env, k].night > 0.0:
+                aim_beam(views.beams[env, k], lens)
+            if views.looks[env, k].auto_exposure_s > 0.0 or views.looks[env, k].contrast_s > 0.0:
+                follow_exposure(views.exposures[env, k], scene, views.looks[env, k])
+            count = choose_objects(lens, mount, objects[env], counts[env], chosen)
+            road = RoadGeometry(
+                surface=surface[span[0] : span[1]],
+                lines=lines[span[2] : span[3]],
+                roadside=roadside[span[4] : span[5]],
+                paved=span[6] != 0,
+            )
+            view = View(
+                lens=lens,
+                look=views.looks[env, k],
+                beam=views.beams[env, k],
+                sky=views.skies[env, k],
+                sky_aim=views.sky_aims[env, k],
+                noise_start=views.noise_starts[env, k],
+                exposure=views.exposures[env, k],
+            )
+            draw_frame(frames[env, k], view, lenses[env, k, 1], road, tables, models, chosen, count, buffers)

@@ -1,4 +1,12 @@
-"""Kernels of the shadows of objects and of marks on the ground."""
+"""Soft shadows below objects, marks on the ground, and shadows that the sun casts.
+
+The shadow of a box is the convex hull of its outline at two heights, each shifted away from the sun. That of
+a tree's crown is an ellipse, drawn out along the same direction.
+"""
+
+import math
+
+import numpy as np
 
 from lgmd_gym.camera.effects import ASPHALT_GREY, PAINT_GREY
 from lgmd_gym.camera.objects import (
@@ -6,15 +14,17 @@ from lgmd_gym.camera.objects import (
     MODEL_BOX,
     MODEL_DECK,
     MODEL_MARK,
+    MODEL_PEDESTRIAN,
     MODEL_POST,
     MODEL_RAIL,
     MODEL_TREE,
     is_figure,
     light_of_code,
 )
-from lgmd_gym.camera.render.ground import PAINT, SHADOW, add_ground_quad
-from lgmd_gym.camera.render.ground_band import outside_band
-from lgmd_gym.camera.render.order import distance
+from lgmd_gym.camera.pose import side_tangent
+from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
+from lgmd_gym.camera.render.ground import CAST, PAINT, SHADOW, add_ground_quad, outside_band
+from lgmd_gym.camera.render.solids import distance, first_from
 from lgmd_gym.kernels import kernel
 
 # Legs and wheels keep less of the sky's light from the road than a body close above it.
@@ -84,3 +94,149 @@ def add_shadow(layer, lens, obj, look):
     for ring in range(int(look.under_rings)):
         grow = max(spread * (look.under_first + look.under_step * ring), inmost)
         _add_footprint(layer, SHADOW, lens, obj, centre, grow, dark)
+
+
+_FADE_START, _FADE_END = 100.0, 150.0  # shadows fade out between these distances from the lens [m]
+_CROWN = np.array([(math.cos(0.25 * math.pi * k), math.sin(0.25 * math.pi * k)) for k in range(8)])
+"""Corners of the octagon that a tree's crown is drawn as."""
+_FIGURE_BOXES = np.array(
+    [
+        [(0.22, 0.22, 0.0, 0.52, 1.0), (0.2, 0.45, 0.5, 0.97, 1.0)],
+        [(0.5, 0.06, 0.0, 0.4, 0.6), (0.17, 0.4, 0.2, 1.0, 1.0)],
+        [(0.48, 0.2, 0.0, 0.55, 1.0), (0.2, 0.4, 0.5, 1.0, 1.0)],
+    ]
+)
+"""The shadow of a figure is that of two boxes, legs or wheels, then body: half of length and width, lower and
+upper end, as shares of length, width and height of the figure, and weight."""
+_MOST_SHIFT = 8.0  # length of a shadow per height; at lower elevations of the sun, shadows end there
+
+
+@kernel
+def add_cast_shadows(layer, view, objects, count, roadside):
+    """Add the cast shadows of the first `count` objects and of the roadside within range.
+
+    Marks have none. Boxes and barriers have their soft shadow only.
+    """
+    lens, look = view.lens, view.look
+    stretch = min(1.0 / look.sun_z, _MOST_SHIFT)
+    away = (-look.sun_x * stretch, -look.sun_y * stretch)
+    for i in range(count):
+        if objects[i].model != MODEL_MARK:
+            _add_shadow_of(layer, lens, objects[i], away)
+    n, low = roadside.shape[0], first_from(roadside, lens.x - _FADE_END)
+    while low < n and roadside[low].x < lens.x + _FADE_END:
+        if roadside[low].model != MODEL_MARK:
+            _add_shadow_of(layer, lens, roadside[low], away)
+        low += 1
+
+
+@kernel
+def _add_shadow_of(layer, lens, obj, away):
+    """Add the shadow of one object; `away` is the shift of a point 1 m above the ground [m]."""
+    if obj.model == MODEL_BOX or obj.model == MODEL_BARRIER:
+        return
+    dx, dy = obj.x - lens.x, obj.y - lens.y
+    distance = math.sqrt(dx * dx + dy * dy)
+    if distance > _FADE_END:
+        return
+    # A circle around the object and its shadow.
+    shift = obj.height * math.sqrt(away[0] * away[0] + away[1] * away[1])
+    mx, my = dx + 0.5 * obj.height * away[0], dy + 0.5 * obj.height * away[1]
+    radius = 0.5 * (obj.length + obj.width + shift)
+    ahead, across = mx * lens.cos_yaw + my * lens.sin_yaw, my * lens.cos_yaw - mx * lens.sin_yaw
+    if outside_band(lens, ahead, radius):
+        return
+    tan = side_tangent(lens)
+    if tan >= 0.0 and (
+        ahead < -radius or abs(across) > max(ahead, 0.0) * tan + radius * math.sqrt(1.0 + tan * tan)
+    ):
+        return
+    weight = min(1.0, (_FADE_END - distance) / (_FADE_END - _FADE_START))
+    if obj.model == MODEL_TREE:
+        n = _crown_outline(layer, lens, obj, away)
+        _add_outline(layer, lens, n, weight)
+        trunk = 0.06 * obj.width
+        n = _box_outline(layer, lens, obj, away, (trunk, trunk), (0.0, 0.3 * obj.height))
+        _add_outline(layer, lens, n, weight)
+        return
+    if is_figure(obj.model):
+        for k in range(2):
+            box = _FIGURE_BOXES[obj.model - MODEL_PEDESTRIAN, k]
+            sides, heights = (
+                (box[0] * obj.length, box[1] * obj.width),
+                (box[2] * obj.height, box[3] * obj.height),
+            )
+            n = _box_outline(layer, lens, obj, away, sides, heights)
+            _add_outline(layer, lens, n, box[4] * weight)
+        return
+    sides = (0.5 * obj.length, 0.5 * obj.width)
+    n = _box_outline(layer, lens, obj, away, sides, (obj.base, obj.height))
+    _add_outline(layer, lens, n, weight)
+
+
+@kernel
+def _write_corner(layer, lens, i, x, y):
+    """Write corner i, relative to the lens on the ground [m], in camera axes."""
+    ahead = x * lens.cos_yaw + y * lens.sin_yaw
+    layer.corners[i, 0] = ahead * lens.cos_pitch - lens.z * lens.sin_pitch
+    layer.corners[i, 1] = y * lens.cos_yaw - x * lens.sin_yaw
+    layer.corners[i, 2] = ahead * lens.sin_pitch + lens.z * lens.cos_pitch
+
+
+@kernel
+def _box_outline(layer, lens, obj, away, sides, heights):
+    """Write the outline of a box's shadow; returns the number of its corners.
+
+    `sides` are half the length and half the width of the box, `heights` its lower and upper end [m].
+    """
+    hx, hy = sides
+    low, high = heights
+    dx, dy = obj.x - lens.x, obj.y - lens.y
+    along, across = away[0] * obj.cos + away[1] * obj.sin, away[1] * obj.cos - away[0] * obj.sin
+    n = 0
+    for k in range(4):
+        # Corners in turn; the edges that begin and end here face (-1, 0), (0, 1), (1, 0), (0, -1) in turn.
+        lx = -hx if k == 0 or k == 1 else hx
+        ly = -hy if k == 0 or k == 3 else hy
+        before = -across if k == 0 else -along if k == 1 else across if k == 2 else along
+        after = -along if k == 0 else across if k == 1 else along if k == 2 else -across
+        # An edge that faces away from the sun is shifted by the upper height, another by the lower one.
+        for part in range(2):
+            facing = before if part == 0 else after
+            if part == 1 and (before > 0.0) == (after > 0.0):
+                continue
+            height = high if facing > 0.0 else low
+            x = dx + lx * obj.cos - ly * obj.sin + height * away[0]
+            y = dy + lx * obj.sin + ly * obj.cos + height * away[1]
+            _write_corner(layer, lens, n, x, y)
+            n += 1
+    return n
+
+
+@kernel
+def _crown_outline(layer, lens, obj, away):
+    """Write the outline of the shadow of a tree's crown; returns the number of its corners."""
+    middle, half = 0.6 * obj.height, 0.37 * obj.height
+    x, y = obj.x - lens.x + middle * away[0], obj.y - lens.y + middle * away[1]
+    radius = 0.46 * obj.width
+    shift = math.sqrt(away[0] * away[0] + away[1] * away[1])
+    c, s = (away[0] / shift, away[1] / shift) if shift > 1e-9 else (1.0, 0.0)
+    long = math.sqrt(radius * radius + (half * shift) ** 2)
+    for k in range(_CROWN.shape[0]):
+        a, b = long * _CROWN[k, 0], radius * _CROWN[k, 1]
+        _write_corner(layer, lens, k, x + a * c - b * s, y + a * s + b * c)
+    return _CROWN.shape[0]
+
+
+@kernel
+def _add_outline(layer, lens, n, weight):
+    """Add the polygon of the first n corners, of either winding."""
+    deepest = layer.corners[0, 0]
+    for k in range(1, n):
+        deepest = max(deepest, layer.corners[k, 0])
+    if deepest < NEAR:
+        return
+    m = clip_and_project(lens, layer.corners, n, layer.uv)
+    if m >= 3:
+        signed = weight if winding(layer.uv, m) > 0.0 else -weight
+        add_polygon(layer.coverage, CAST, layer.uv, m, signed, 0.0)

@@ -1,7 +1,7 @@
 """Camera axes and polygons of the reference camera."""
 
 import numpy as np
-from support.reference_ground import inside
+from reference.ground import inside
 
 from lgmd_gym.camera.render.coverage import NEAR
 

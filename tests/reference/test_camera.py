@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from support.reference_camera import separate_boxes, worst_error
+from reference.camera import separate_boxes, worst_error
 from support.roads import add_car, add_mark, add_obstacle, box_record, lens_x, set_roadside, straight_env
 
 from lgmd_gym.camera import CameraParams, EgoCamera
 
+pytestmark = pytest.mark.slow
 SMALL = {"shape": (21, 34), "hfov_deg": 70.0}
 
 

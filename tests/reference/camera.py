@@ -7,9 +7,9 @@ import math
 from types import SimpleNamespace
 
 import numpy as np
-from support.reference_air import row_slope, veil
-from support.reference_ground import ground_light
-from support.reference_solids import ordered_solids
+from reference.air import row_slope, veil
+from reference.ground import ground_light
+from reference.solids import ordered_solids
 
 from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera import objects as kinds

@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from support.reference_air import beam, veil
+from reference.air import beam, veil
 
 from lgmd_gym.camera import objects as kinds
 from lgmd_gym.camera.effects import ASPHALT_GREY, PAINT_GREY

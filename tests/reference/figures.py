@@ -3,13 +3,13 @@
 import math
 
 import numpy as np
-from support.reference_air import beam
-from support.reference_geometry import camera_axes, covered
+from reference.air import beam
+from reference.geometry import camera_axes, covered
 
 from lgmd_gym.camera.objects import MODEL_BICYCLE, MODEL_PEDESTRIAN
-from lgmd_gym.camera.render import figure_builder as names
-from lgmd_gym.camera.render.figure_models import figure_tables
-from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
+from lgmd_gym.camera.render.models import builder as names
+from lgmd_gym.camera.render.models.builder import BODY, LAMP, TAIL
+from lgmd_gym.camera.render.models.figures import figure_tables
 
 
 def figure_layers(scene, item, rays, veil):

@@ -6,36 +6,30 @@ from typing import NamedTuple
 import numpy as np
 
 from lgmd_gym.camera.effects import WHITE
-from lgmd_gym.camera.render.body_models import SMALL, SUV, VAN, add_body
-from lgmd_gym.camera.render.car_model import add_car
-from lgmd_gym.camera.render.clutter_models import (
-    add_hedge,
-    add_house,
-    add_power_pole,
-    add_sign,
-    add_thicket,
-    add_wall,
-)
-from lgmd_gym.camera.render.figure_models import FigureTables, figure_tables
-from lgmd_gym.camera.render.long_models import add_bus, add_trailer
-from lgmd_gym.camera.render.model_builder import BODY, ModelBuilder
-from lgmd_gym.camera.render.overhead_models import (
+from lgmd_gym.camera.render.models.builder import BODY, ModelBuilder
+from lgmd_gym.camera.render.models.figures import FigureTables, figure_tables
+from lgmd_gym.camera.render.models.roadside import (
+    add_barrier,
     add_beam,
     add_board,
+    add_crown,
     add_deck,
+    add_hedge,
+    add_house,
     add_lamp,
     add_panel,
-    add_signal,
-)
-from lgmd_gym.camera.render.plain_models import (
-    add_barrier,
-    add_crown,
     add_plain_box,
     add_post,
+    add_power_pole,
     add_rail,
+    add_sign,
+    add_signal,
+    add_thicket,
     add_tree,
     add_truck,
+    add_wall,
 )
+from lgmd_gym.camera.render.models.vehicles import SMALL, SUV, VAN, add_body, add_bus, add_car, add_trailer
 
 _MAX_CORNERS = 8
 

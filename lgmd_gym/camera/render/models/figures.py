@@ -1,4 +1,4 @@
-"""The figures: a pedestrian, a bicycle and a motorcycle with their riders.
+"""Models of pedestrians and two-wheelers.
 
 The boxes are those of the targets of ISO 19206-2 (adult, child), -4 and -5; the height of a two-wheeler
 includes its rider. A child is the figure of the adult in its own box. Test dummies have a black shirt and
@@ -12,12 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from lgmd_gym.camera.effects import WHITE
-from lgmd_gym.camera.render.figure_builder import (
+from lgmd_gym.camera.render.models.builder import (
     AHEAD,
     ANKLE,
     ANY,
     ARM,
     BEHIND,
+    BODY,
     CRANK,
     DAY_LAMP,
     ELBOW,
@@ -26,6 +27,7 @@ from lgmd_gym.camera.render.figure_builder import (
     HAND,
     HIP,
     KNEE,
+    LAMP,
     LEG,
     MAX_PARTS,
     PART,
@@ -34,11 +36,11 @@ from lgmd_gym.camera.render.figure_builder import (
     REFLECTOR,
     SHOULDER,
     SPOKE,
+    TAIL,
     TOE,
     Figure,
     Place,
 )
-from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
 
 SKIN, NECK, DARK, TROUSERS, SHOES, TYRE, STEEL = 150.0, 118.0, 30.0, 42.0, 28.0, 24.0, 70.0  # grey levels
 _SIDES = ((0, 1.0), (1, -1.0))  # left and right: index, sign of the lateral position
@@ -105,9 +107,16 @@ def _add_head(f: Figure, chin: int, crown: int, rank: float) -> None:
     f.limb(chin, crown, (0.082, 0.1), SKIN, (0.0, 0.0, rank), wide=(0.064, 0.08), cap=1.25)
     for seen, higher in ((ANY, -0.001), (HAIR, 0.001)):  # hair behind the face, then over its back
         f.limb(
-            nape, top, (0.075, 0.088), DARK, (0.0, 0.0, rank + higher),
-            wide=(0.078, 0.084), cap=1.0, fine=5.0, seen=seen,
-        )  # fmt: skip
+            nape,
+            top,
+            (0.075, 0.088),
+            DARK,
+            (0.0, 0.0, rank + higher),
+            wide=(0.078, 0.084),
+            cap=1.0,
+            fine=5.0,
+            seen=seen,
+        )
 
 
 def _add_rider(
@@ -122,9 +131,15 @@ def _add_rider(
         f.limb(chin, crown, (0.125, 0.13), helmet, (0.0, 0.0, 0.14), wide=(0.112, 0.115), cap=1.0)
         visor = f.joint(head[1][0] + 0.075, 0.0, head[1][1] - 0.02)
         f.limb(
-            visor, visor, (0.06, 0.06), 20.0, (0.0, 0.0, 0.15),
-            wide=(0.09, 0.09), fine=8.0, seen=AHEAD,
-        )  # fmt: skip
+            visor,
+            visor,
+            (0.06, 0.06),
+            20.0,
+            (0.0, 0.0, 0.15),
+            wide=(0.09, 0.09),
+            fine=8.0,
+            seen=AHEAD,
+        )
         return
     _add_head(f, chin, crown, 0.14)
 

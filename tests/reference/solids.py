@@ -5,13 +5,13 @@ import math
 import warnings
 
 import numpy as np
-from support.reference_air import beam, row_slope, veil
-from support.reference_figures import figure_layers
-from support.reference_geometry import camera_axes, covered
+from reference.air import beam, row_slope, veil
+from reference.figures import figure_layers
+from reference.geometry import camera_axes, covered
 
 from lgmd_gym.camera.objects import MODEL_MARK, is_figure, is_picture
-from lgmd_gym.camera.render.model_builder import BODY, LAMP, TAIL
 from lgmd_gym.camera.render.models import all_models
+from lgmd_gym.camera.render.models.builder import BODY, LAMP, TAIL
 
 
 def ordered_solids(scene, rays, row, column):
