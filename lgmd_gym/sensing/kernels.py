@@ -1,4 +1,7 @@
-"""Kernels that select the cameras to process, and collect the outputs of their neurons."""
+"""Kernels that select the cameras to process, and collect the outputs of their neurons.
+
+Their arrays arrive in one piece, see `Bundle`.
+"""
 
 from lgmd_gym.kernels import kernel
 from lgmd_gym.neuron.scalars import ALERT, FREQUENCY, K_HAT, LATENCY, SPIKES, F, K, W

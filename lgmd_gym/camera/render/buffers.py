@@ -19,7 +19,7 @@ class Views(NamedTuple):
         skies: The last sky, float32, shape (cameras, height, width).
         sky_aims: Yaw, pitch and roll of the last sky, float64, shape (cameras, 3).
         noise_starts: Index of the frame's first number in the noise table, int64, shape (cameras,).
-        exposures: State of exposure and contrast control, see `exposure`, float64, shape (cameras, 7).
+        exposures: State of exposure and contrast control, see `sensor`, float64, shape (cameras, 7).
     """
 
     looks: np.ndarray
@@ -40,20 +40,6 @@ class View(NamedTuple):
     sky_aim: np.ndarray
     noise_start: int
     exposure: np.ndarray
-
-
-@kernel
-def at_lens(view, lens):
-    """Return a view with another `LENS` record."""
-    return View(
-        lens=lens,
-        look=view.look,
-        beam=view.beam,
-        sky=view.sky,
-        sky_aim=view.sky_aim,
-        noise_start=view.noise_start,
-        exposure=view.exposure,
-    )
 
 
 class Tables(NamedTuple):

@@ -70,7 +70,7 @@ def outside_band(lens, ahead, radius):
 def above_or_below(lens, obj):
     """Return whether an object on the ground is entirely above or below the frame, with its soft shadow."""
     ahead = (obj.x - lens.x) * lens.cos_yaw + (obj.y - lens.y) * lens.sin_yaw
-    # With its shadow, see `order.visible`.
+    # With its shadow, see `solids.visible`.
     radius = 0.5 * math.sqrt(obj.length**2 + obj.width**2) + 0.4 + 0.1 * obj.height
     if ahead - radius > ground_band(lens)[1]:
         return True

@@ -18,7 +18,6 @@ from lgmd_gym.camera.render.buffers import (
     Tables,
     View,
     Views,
-    at_lens,
     horizon_of,
     make_buffers,
 )
@@ -200,7 +199,16 @@ def draw_frame(frame, view, opening, road, tables, models, objects, count, buffe
             lens_before(end, opening, ago, moment)
             lens, back = moment, ago * look.shutter_s
             move_objects(objects, count, -back)
-        draw_light(at_lens(view, lens), road, tables, models, objects, count, buffers)
+        present = View(
+            lens=lens,
+            look=look,
+            beam=view.beam,
+            sky=view.sky,
+            sky_aim=view.sky_aim,
+            noise_start=view.noise_start,
+            exposure=view.exposure,
+        )
+        draw_light(present, road, tables, models, objects, count, buffers)
         if steps > 1:
             move_objects(objects, count, back)
             add_weighted(total, image, nb.float32(1.0 / steps))

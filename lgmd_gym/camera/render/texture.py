@@ -1,7 +1,7 @@
 """Ground textures: noise with features, filtered copies, and samples of them along the rows of a frame.
 
 A texture is an array of deviations in units of its standard deviation, shape (texels along x, along y),
-periodic in both directions; see `texture.TEXEL_M` for the size of a texel.
+periodic in both directions; see `TEXEL_M` for the size of a texel.
 
 A texture is a tile of grey deviations with natural (1/f) statistics, periodic in both directions, with all
 its box averages over 2^i x 2^j texels (a rip-map). The footprints of far pixels are metres long and
