@@ -4,16 +4,12 @@ A family is declared in one place, see `family`: its function, the bounds and me
 how often and with which arguments random levels contain it.
 """
 
-# Imported to register their families; the order is that of the documentation only.
-from lgmd_gym.envs.families import (  # noqa: F401, I001
-    rear,
-    crossing,
-    vulnerable,
-    turning,
-    adjacent,
-    obstacles,
-    curves,
-)
+from importlib import import_module
+
 from lgmd_gym.envs.families.family import FAMILIES, LEVELS, Level, family, make_scenario
 
 __all__ = ["FAMILIES", "LEVELS", "Level", "family", "make_scenario"]
+
+# Each module registers its families, in the order of the documentation; that of levels is in `distribution`.
+for _module in ("rear", "crossing", "vulnerable", "turning", "adjacent", "obstacles", "curves"):
+    import_module(f"{__name__}.{_module}")

@@ -1,6 +1,8 @@
 """Random distribution over the scenario families, divided into numbered levels for training and tuning."""
 
+from bisect import bisect_right
 from collections.abc import Collection, Sequence
+from itertools import accumulate
 from numbers import Real
 from typing import Any
 
@@ -122,7 +124,7 @@ def draw_scenario(rng: np.random.Generator, families: Collection[str] = ALL_FAMI
     threat = bool(rng.random() < THREAT_SHARE)
     levels = [DECLARED[name] for name in (*ALL_FAMILIES, *EXTRA_FAMILIES) if name in families]
     drawn: list[Level] = [level for level in levels if level.threat is threat] or levels
-    weights = np.cumsum([level.weight for level in drawn])
-    level = drawn[int(np.searchsorted(weights, rng.random() * weights[-1], side="right"))]
+    weights = list(accumulate(level.weight for level in drawn))
+    level = drawn[bisect_right(weights, rng.random() * weights[-1])]
     scenario = make_scenario(level.family, **level.draw(rng))
     return scenario if level.has_target else without_target(scenario)

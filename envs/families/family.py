@@ -120,7 +120,7 @@ def make_scenario(name: str, **arguments: object) -> Scenario:
     return made
 
 
-def _checked(function: _F) -> _F:
+def _checked(function: Family) -> Any:
     """Return a function that checks its declared arguments, with their documentation in its docstring."""
     if isinstance(function, type):
         return function
