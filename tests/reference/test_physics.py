@@ -4,11 +4,13 @@ from math import cos, inf, sin
 
 import numpy as np
 import pytest
-from support.reference_physics import PASSED_DISTANCE, Body, Ego, Motion
+from reference.physics import PASSED_DISTANCE, Body, Ego, Motion
 
 from lgmd_gym.envs import FAMILIES, BrakingEnv, make_scenario
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.script import Pose
+
+pytestmark = pytest.mark.slow
 
 
 class ReferenceEpisode:
