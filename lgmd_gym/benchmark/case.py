@@ -116,7 +116,7 @@ class EpisodeRow(TypedDict):
     family: str
     threat: bool
     collision: bool
-    avoided: bool | None
+    avoided: bool
     impact_speed: float | None
     relative_impact_speed: float | None
     peak_deceleration: float
@@ -130,7 +130,8 @@ class Row(EpisodeRow):
     """Row of a suite of cases: the fields of the case, and the metrics, whose docstrings define them.
 
     `test_speed` is null for a start from standstill and for levels. `light` is the camera condition that the
-    case prescribes, null for that of the run.
+    case prescribes, null for that of the run. `avoided` and `speed_reduction` are null without a threat; the
+    types are those of a threat without an error.
     """
 
     test_speed: float | None
@@ -143,7 +144,7 @@ class Row(EpisodeRow):
     ego_speed: float
     target_speed: float | None
     target_shade: float | None
-    speed_reduction: float | None
+    speed_reduction: float
     ttc_at_alert: float | None
     distance_at_alert: float | None
     theta_at_alert_deg: float | None

@@ -153,17 +153,22 @@ DRIVES_PER_TASK = 10  # two seeds of every kind; more drives delay the rows and 
 class TrafficPlan(Plan):
     """The episodes of the traffic suite."""
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of traffic."""
+        return self.config.kinds or ()
+
     def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
         """Run the missing episodes and yield their results as they finish.
 
         Seeds come before kinds, so that an interrupted run holds a balanced sample.
         """
         done = {key_of(row) for row in rows}
-        tasks = []
+        tasks = list[TrafficTask]()
         for condition, sensor_config in self.sensor_configs.items():
-            drives = []
+            drives = list[Drive]()
             for seed in self.config.seed_range:
-                for index, kind in enumerate(self.config.kinds or ()):
+                for index, kind in enumerate(self.kinds):
                     key = (traffic_case(kind, seed).name, seed, condition)
                     agents = tuple(agent for agent in self.config.agents if (agent, *key) not in done)
                     if agents:
@@ -178,7 +183,7 @@ class TrafficPlan(Plan):
             yield from map(Result, rows_of_task)
 
     def _make_env(self, sensor_config: SensorConfig) -> gym.Env:
-        return gym.make(traffic_id((self.config.kinds or ())[0]), **sensor_config.arguments)
+        return gym.make(traffic_id(self.kinds[0]), **sensor_config.arguments)
 
 
 def make_plan(config: RunConfig) -> Plan:

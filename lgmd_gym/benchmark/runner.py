@@ -32,7 +32,7 @@ def failure_lines(rows: Iterable[Row]) -> list[str]:
         rows: Rows of a run; those without error are skipped.
     """
     failed = [row for row in rows if row["error"] is not None]
-    kinds = Counter((row["agent"], describe_failure(row["error"])) for row in failed)
+    kinds = Counter((row["agent"], describe_failure(row["error"] or "")) for row in failed)
     most = kinds.most_common(MAX_FAILURES)
     lines = [f"{agent}: {text} ({counted(count, 'episode')})" for (agent, text), count in most]
     if len(kinds) > MAX_FAILURES:
@@ -42,7 +42,7 @@ def failure_lines(rows: Iterable[Row]) -> list[str]:
 
 def failing_agent(rows: Iterable[Row]) -> str:
     """Return the first agent with at least `EARLY` rows, all of them failed; "" if there is none."""
-    failed, succeeded = Counter(), set()
+    failed, succeeded = Counter[str](), set[str]()
     for row in rows:
         if row["error"] is None:
             succeeded.add(row["agent"])

@@ -52,7 +52,7 @@ actors = [{ gap = 40.0, lateral_offset = 1.0 }]
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import tomli_w
 
@@ -199,7 +199,8 @@ def read_scenario(path: Path, values: dict[str, Any]) -> Case:
     suite, given = file_name(path.stem), values.get("scenario")
     table = {key: value for key, value in values.items() if key != "module"}
     if "family" not in table:
-        table["family"] = given.get("family", suite) if isinstance(given, dict) else suite
+        given = cast(dict[str, Any], given) if isinstance(given, dict) else {}
+        table["family"] = given.get("family", suite)
     (case,) = read_cases(suite, {"name": "unnamed"} | table)
     if "name" in values:
         return case
@@ -214,7 +215,7 @@ def own_case(scenario: Scenario) -> Case:
 def distinct(cases: Sequence[Case]) -> tuple[Case, ...]:
     """Return cases of the suite `scenarios`; the second of equal names gets "/2", and so on."""
     seen: dict[tuple[str, str], int] = {}
-    named = []
+    named = list[Case]()
     for case in cases:
         key = case.family, case.variant
         seen[key] = seen.get(key, 0) + 1
@@ -360,10 +361,10 @@ def load_suite(path: Path, modules: tuple[str, ...] = ()) -> Suite:
         name = read_name(values, "name")
         if name in SUITES or name == TRAFFIC:
             raise ValueError(f"name {name!r} is the name of a shipped suite; choose another")
-        tables = values.get("cases")
+        tables: Any = values.get("cases")
         if not isinstance(tables, list) or not tables:
             raise ValueError("cases must contain at least one [[cases]] table")
-        cases = tuple(case for table in tables for case in read_cases(name, table))
+        cases = tuple(case for table in cast(list[Any], tables) for case in read_cases(name, table))
         _check_cases(cases)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{kind} {str(path)!r}: {error}") from None
@@ -393,7 +394,7 @@ def copy_suite(source: Source | Path, target: Path, modules: tuple[str, ...] = (
     worker processes need their sources again.
     """
     suite = get_suite(str(source) if isinstance(source, Path) else source, modules)
-    tables = []
+    tables = list[dict[str, Any]]()
     for case in map(_with_data, suite.cases):
         arguments = dict(case.arguments)
         scenario = arguments.pop(SCENARIO_ARGUMENT, None) if case.environment == SCENARIO else None

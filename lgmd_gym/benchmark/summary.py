@@ -4,9 +4,9 @@ import csv
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar, cast
 
-from lgmd_gym.benchmark.case import Row, case_order
+from lgmd_gym.benchmark.case import EpisodeRow, Row, case_order
 from lgmd_gym.errors import counted
 from lgmd_gym.processes.files import complete_file
 from lgmd_gym.statistics.intervals import Mean, Rate, cluster_mean
@@ -34,6 +34,7 @@ COLUMNS = (
 )
 
 
+_R = TypeVar("_R", bound=EpisodeRow)
 INTERVAL_TEXT = "95 % interval, clustered by case and world"
 
 
@@ -44,7 +45,7 @@ class Sample(NamedTuple):
     worlds: int
 
     @classmethod
-    def of(cls, rows: Iterable[Row]) -> "Sample":
+    def of(cls, rows: Iterable[EpisodeRow]) -> "Sample":
         """Return the numbers of distinct cases and worlds of rows."""
         pairs = [(row["case"], row.get("world")) for row in rows]
         return cls(len({case for case, _ in pairs}), len({world for _, world in pairs}))
@@ -98,12 +99,12 @@ def summarise(agent: str, group: str, rows: list[Row]) -> AgentSummary:
     )
 
 
-def rate_of(rows: Sequence[Row], key: str) -> Rate:
+def rate_of(rows: Sequence[EpisodeRow], key: str) -> Rate:
     """Return the rate of a boolean row key, with an interval that clusters by case and world."""
-    return Rate.clustered([row[key] for row in rows], *cases_and_worlds(rows))
+    return Rate.clustered([cast(Any, row)[key] for row in rows], *cases_and_worlds(rows))
 
 
-def cases_and_worlds(rows: Iterable[Row]) -> tuple[list[str], list[int | None]]:
+def cases_and_worlds(rows: Iterable[EpisodeRow]) -> tuple[list[str], list[int | None]]:
     """Return the case and the world of each row; None for the laboratory world."""
     pairs = [(row["case"], row.get("world")) for row in rows]
     return [case for case, _ in pairs], [world for _, world in pairs]
@@ -120,17 +121,17 @@ def summaries(rows: Iterable[Row], group: Callable[[Row], str]) -> list[AgentSum
     return [summarise(agent, name, part) for (agent, name), part in by_agent(rows, group).items()]
 
 
-def by_agent(rows: Iterable[Row], group: Callable[[Row], str]) -> dict[tuple[str, str], list[Row]]:
+def by_agent(rows: Iterable[_R], group: Callable[[_R], str]) -> dict[tuple[str, str], list[_R]]:
     """Return the rows of each agent and group, ordered by case and agent, not by time of completion."""
-    parts: dict[tuple[str, str], list[Row]] = {}
+    parts: dict[tuple[str, str], list[_R]] = {}
     for row in sorted(rows, key=lambda row: (case_order(row["case"]), row["agent"])):
         parts.setdefault((row["agent"], group(row)), []).append(row)
     return parts
 
 
-def by_condition(rows: Iterable[Row]) -> dict[str, list[Row]]:
+def by_condition(rows: Iterable[_R]) -> dict[str, list[_R]]:
     """Return the rows of each camera condition, in order of appearance."""
-    parts: dict[str, list[Row]] = {}
+    parts: dict[str, list[_R]] = {}
     for row in rows:
         parts.setdefault(row["condition"], []).append(row)
     return parts
@@ -229,7 +230,7 @@ def column_name(key: str) -> str:
     return f"{key}_{UNITS[key]}" if key in UNITS else key
 
 
-def write_episodes(rows: Sequence[Row], path: Path) -> None:
+def write_episodes(rows: Sequence[EpisodeRow], path: Path) -> None:
     """Write rows to a CSV file, one line each, ordered by condition, case, agent and seed.
 
     Null is an empty field, booleans are `true` and `false`, and `error` is the last line of the traceback.
@@ -239,11 +240,11 @@ def write_episodes(rows: Sequence[Row], path: Path) -> None:
         path: File to write; an existing one is replaced.
     """
     keys = list(rows[0])
-    lines = ([_field(key, row[key]) for key in keys] for row in sorted(rows, key=_order))
+    lines = ([_field(key, cast(Any, row)[key]) for key in keys] for row in sorted(rows, key=_order))
     write_csv(path, [column_name(key) for key in keys], lines)
 
 
-def _order(row: Row) -> tuple[Any, ...]:
+def _order(row: EpisodeRow) -> tuple[Any, ...]:
     """Return the place of a row, which does not depend on the time at which its episode finished."""
     return row["condition"], case_order(row["case"]), row["agent"], row["seed"]
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from rich.console import Console
 
@@ -23,6 +23,7 @@ from lgmd_gym.cli.values import (
 from lgmd_gym.errors import counted
 
 if TYPE_CHECKING:
+    from lgmd_gym.benchmark.case import Row
     from lgmd_gym.benchmark.runner import Run
     from lgmd_gym.processes.pool import Executor
 
@@ -233,7 +234,7 @@ def _title(benchmark: "Run") -> str:
 
 
 @contextmanager
-def _progress(benchmark: "Run") -> Iterator[Callable[[dict[str, Any]], None]]:
+def _progress(benchmark: "Run") -> Iterator["Callable[[Row], None]"]:
     """Show a progress bar on stderr; yield the function that counts a row."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -252,7 +253,7 @@ def _progress(benchmark: "Run") -> Iterator[Callable[[dict[str, Any]], None]]:
     with Progress(*columns, console=Console(stderr=True), speed_estimate_period=60.0) as bar:
         task = bar.add_task(suite, total=total, completed=done, rate="", tally="")
 
-        def count(row: dict[str, Any]) -> None:
+        def count(row: "Row") -> None:
             tally.add(row)
             rate = f"{tally.rate(time.perf_counter()):.1f}/s"
             bar.update(task, advance=1, rate=rate, tally=str(tally))
@@ -271,7 +272,7 @@ class Tally:
         self.start, self.played = start, 0
         self.avoided = self.threats = self.false = self.non_threats = self.failed = 0
 
-    def add(self, row: dict[str, Any], new: bool = True) -> None:
+    def add(self, row: "Row", new: bool = True) -> None:
         """Count one row; `new` if it was run in this session."""
         self.played += new
         if row["error"] is not None:
@@ -283,7 +284,9 @@ class Tally:
             self.avoided += bool(row["avoided"])
         else:
             self.non_threats += 1
-            self.false += bool(row.get("false_activation", row.get("false_activations")))
+            self.false += bool(
+                cast(Any, row).get("false_activation", cast(Any, row).get("false_activations"))
+            )
 
     def rate(self, now: float) -> float:
         """Return the episodes per second since the start [1/s]."""

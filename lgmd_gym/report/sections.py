@@ -152,7 +152,7 @@ AGENTS_WITHOUT_NEURON = (NO_BRAKE, "always-brake", "random-brake", "ttc-oracle")
 EXTREMES: dict[str, tuple[Callable[[Row], bool], Callable[[Row], float]]] = {
     "smallest stopping margin": (
         lambda row: row["avoided"] and row["stopping_margin"] is not None,
-        lambda row: -row["stopping_margin"],
+        lambda row: -(row["stopping_margin"] or 0.0),
     ),
     "fastest avoided threat": (lambda row: row["avoided"], lambda row: row["ego_speed"]),
     "hardest contact": (lambda row: row["collision"], relative_impact),
@@ -241,7 +241,7 @@ def episode_section(data: ReportData) -> list[dict[str, Any]]:
     agent, episodes = illustrated_agent(data.agents), []
     for rows in by_condition(without_fcw_driver(data.rows)).values():
         for description, row in extreme_episodes(rows, agent, data.config.first_seed).items():
-            by_agent = {name: data.series(row | {"agent": name}) for name in data.agents}
+            by_agent = {name: data.series({**row, "agent": name}) for name in data.agents}
             stored = {name: series for name, series in by_agent.items() if series is not None}
             if agent in stored:
                 name = f"episode-{row['condition']}-{re.sub('[^a-z]+', '-', description)}"

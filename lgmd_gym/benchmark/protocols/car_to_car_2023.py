@@ -181,7 +181,7 @@ def points_2023(rows: list[Row], agent: str) -> list[Points]:
     """Return the points of an agent in suite ncap2023; lower bounds except for CCRb."""
     rows = completed(rows, agent)
     cells = mean_weights(rows, row_colour_2023)
-    points = []
+    points = list[Points]()
     for scenario, maxima in MAXIMA_2023.items():
         family, warned = scenario.removesuffix(WARNED), scenario.endswith(WARNED)
         earned = 0.0

@@ -239,7 +239,7 @@ def points_2026(rows: list[Row], agent: str) -> list[Points]:
     rows = completed(rows, agent)
     cells, gated = mean_weights(rows, row_colour_2026), is_gated(rows)
     note = f"contact in CCRs at {GATE:g} km/h or below: no points" if gated else ""
-    points = []
+    points = list[Points]()
     for scenario, maximum in MAXIMA_2026.items():
         weights = [weight for (family, *_), weight in cells.items() if family == scenario]
         earned = maximum * sum(weights) / len(weights) if weights and not gated else 0.0

@@ -1,13 +1,15 @@
 """Summaries of the traffic suite: false activations per 100 km, with a clustered interval."""
 
+from collections.abc import Sequence
 from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from rich.table import Table
 
-from lgmd_gym.benchmark.case import Row
+from lgmd_gym.benchmark.case import EpisodeRow
 from lgmd_gym.benchmark.summary import Sample, by_agent, by_condition, cases_and_worlds, rate_of, write_csv
+from lgmd_gym.benchmark.traffic.rows import TrafficRow
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON
 from lgmd_gym.errors import counted
 from lgmd_gym.statistics.intervals import Rate, count_interval
@@ -89,10 +91,11 @@ class TrafficSummary(NamedTuple):
         return (self.per_100km(low) if low else 0.0), self.per_100km(high)
 
 
-def summarise_traffic(agent: str, kind: str, rows: list[Row]) -> TrafficSummary:
+def summarise_traffic(agent: str, kind: str, rows: Sequence[TrafficRow]) -> TrafficSummary:
     """Return the summary of one agent's rows."""
     played = [row for row in rows if row["error"] is None]
-    events, distances = ([row[key] for row in played] for key in ("false_activations", "distance"))
+    events = [row["false_activations"] for row in played]
+    distances = [row["distance"] for row in played]
     return TrafficSummary(
         agent,
         kind,
@@ -112,13 +115,14 @@ def summarise_traffic(agent: str, kind: str, rows: list[Row]) -> TrafficSummary:
     )
 
 
-def traffic_summaries(rows: list[Row], by_kind: bool = False) -> list[TrafficSummary]:
+def traffic_summaries(rows: Sequence[EpisodeRow], by_kind: bool = False) -> list[TrafficSummary]:
     """Return one summary per agent, or per agent and kind of traffic."""
-    parts = by_agent(rows, (lambda row: row["family"]) if by_kind else (lambda row: ""))
+    drives = cast(Sequence[TrafficRow], rows)
+    parts = by_agent(drives, (lambda row: row["family"]) if by_kind else (lambda row: ""))
     return [summarise_traffic(agent, kind, part) for (agent, kind), part in parts.items()]
 
 
-def write_traffic_summary(rows: list[Row], path: Path) -> None:
+def write_traffic_summary(rows: Sequence[EpisodeRow], path: Path) -> None:
     """Write a CSV file with one line per condition, agent and kind of traffic, and one for all kinds."""
     conditions = sorted(by_condition(rows).items())
     lines = [
@@ -170,7 +174,7 @@ HEADINGS = (
 )
 
 
-def traffic_table(rows: list[Row], agents: list[str], title: str, by_kind: bool = False) -> Table:
+def traffic_table(rows: Sequence[EpisodeRow], agents: list[str], title: str, by_kind: bool = False) -> Table:
     """Return a table with one line per agent, or per agent and kind of traffic.
 
     Args:

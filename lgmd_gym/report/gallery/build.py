@@ -13,7 +13,7 @@ from PIL import Image
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym._version import __version__
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.case import Case, Row
+from lgmd_gym.benchmark.case import Case, Row, relative_impact
 from lgmd_gym.benchmark.config import DEFAULT_AGENTS
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
@@ -53,7 +53,7 @@ class AgentOutcome(NamedTuple):
         parts: list[str] = []
         if threats:
             parts.append(f"avoided {sum(row['avoided'] for row in threats)}/{len(threats)}")
-            impacts = [3.6 * row["relative_impact_speed"] for row in threats if row["collision"]]
+            impacts = [3.6 * relative_impact(row) for row in threats if row["collision"]]
             if impacts:
                 parts.append(f"contact at {median(impacts):.0f} km/h")
             if any(row["premature_brake"] for row in threats):
