@@ -88,7 +88,7 @@ def test_outcomes_of_the_easy_task_are_of_its_levels(monkeypatch):
         "lgmd_gym.report.gallery.build.run_task", lambda task: cases.append(task.case) or Result(row())
     )
     evaluate_agents(scenario_cards(("RandomBrakingEasy",))[0], ["no-brake"], seeds=2)
-    assert [case.family for case in cases] == ["RandomBraking"] * 2
+    assert [case.environment for case in cases] == ["RandomBraking"] * 2
     assert dict(cases[0].arguments) == RANDOM_TASKS["RandomBrakingEasy"].arguments
 
 

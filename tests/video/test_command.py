@@ -166,7 +166,7 @@ INVALID = [  # (arguments, part of the message)
     (["good.mkv", "--size", "2", "9"], "each 3 to 16384 px, got (2, 9)"),
     (["good.mkv", "--roi", "0", "0", "99", "9"], "(0, 0, 99, 9)"),
     (["good.mkv", "--drop-duplicates", "1"], "drop_duplicates must be in [0, 1), got 1"),
-    (["good.mkv", "--threshold", "-3"], "t_sf must be > 0"),
+    (["good.mkv", "--threshold", "-3"], "LGMD t_sf must be in (0, inf) spikes/s, got -3"),
     (["good.mkv", "--params", "nowhere.toml"], "params file 'nowhere.toml' cannot be read"),
     (["good.mkv", "--out", "/proc/nowhere/run"], "/proc/nowhere/run"),
     ([], "a clip is required"),
