@@ -258,11 +258,21 @@ class FrameNeuron:
 
     def _response(self) -> Response:
         if self.num is None:
-            outputs = dict(zip(Response._fields, self._scalars[0, RESPONSE].tolist(), strict=True))
-            return Response(**outputs | {"spikes": int(outputs["spikes"]), "alert": outputs["alert"] > 0.0})
-        columns = dict(zip(Response._fields, self._scalars[:, RESPONSE].T.copy(), strict=True))
-        spikes, alert = columns["spikes"].astype(np.int64), columns["alert"] > 0.0
-        return Response(**columns | {"spikes": spikes, "alert": alert})
+            frequency, spikes, k, k_hat, f, w, latency, alert = self._scalars[0, RESPONSE].tolist()
+            spikes = int(spikes)
+        else:
+            frequency, spikes, k, k_hat, f, w, latency, alert = self._scalars[:, RESPONSE].T.copy()
+            spikes = spikes.astype(np.int64)
+        return Response(
+            spike_frequency=frequency,
+            spikes=spikes,
+            membrane_potential=k,
+            adapted_potential=k_hat,
+            ffi=f,
+            inhibition_weight=w,
+            excitation_latency=latency,
+            alert=alert > 0.0,
+        )
 
     def _use_floats(self) -> None:
         """Process frames as float32 from now on: a frame of another dtype than uint8 was given."""

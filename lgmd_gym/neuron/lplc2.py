@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from lgmd_gym.fields import flag, record, whole
@@ -138,7 +137,7 @@ def _integrate(image, table):
             table[y + 1, x + 1] = table[y, x + 1] + row
 
 
-@njit(inline="always")
+@kernel(exact=True, inline=True, arrays=True)
 def _box(table, y0, x0, y1, x1):
     """Return the sum over rows y0..y1-1 and columns x0..x1-1."""
     return table[y1, x1] - table[y0, x1] - table[y1, x0] + table[y0, x0]

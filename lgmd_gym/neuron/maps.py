@@ -10,19 +10,17 @@ state, see `scalars`, (N, ...); and the shift of each neuron, + for a turn to th
 
 import math
 
-from numba import njit
-
 from lgmd_gym.kernels import kernel
 from lgmd_gym.kernels.simd import LANES
 from lgmd_gym.neuron.scalars import AGE
 
 
-@njit(inline="always")
+@kernel(exact=True, inline=True, arrays=True)
 def _is_shifted(n, active, scalars, pixels):
     return active[n] and pixels[n] != 0 and scalars[n, AGE] > 0.0
 
 
-@njit(inline="always")
+@kernel(exact=True, inline=True, arrays=True)
 def _column(step, width, pixels):
     """Return the column that is written in a step, so that no value is read after it is overwritten."""
     return step if pixels > 0 else width - 1 - step

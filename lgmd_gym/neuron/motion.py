@@ -7,7 +7,6 @@ import math
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from lgmd_gym.fields import Record, number, record
@@ -120,7 +119,7 @@ def filter_light(frame, mean, on, off, gain):
             on[y, x], off[y, x] = max(change, np.float32(0.0)), max(-change, np.float32(0.0))
 
 
-@njit(inline="always")
+@kernel(exact=True, inline=True, arrays=True)
 def _compressed(correlation):
     """Return the signed square root."""
     return math.copysign(math.sqrt(abs(correlation)), correlation)

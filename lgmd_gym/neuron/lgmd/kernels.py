@@ -22,7 +22,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from lgmd_gym.kernels import kernel
@@ -58,7 +57,7 @@ def supports(params: LGMDParams) -> bool:
     return params.on_off_residue == 0.0 and params.delay == "recursive" and params.n_p <= 2
 
 
-@njit(inline="always")
+@kernel(exact=True, inline=True, arrays=True)
 def _at(row, stride):
     """Return the index of the first pixel of a row of a bordered map."""
     return LANES + row * stride
@@ -120,7 +119,7 @@ def _clear_tiny(values, first, last) -> None:
         store(values, i, clear_below(load(values, i), tiny))
 
 
-@njit(inline="always")
+@kernel(exact=True, inline=True, arrays=True)
 def _delayed(memory, i, gain, value):
     """Update a low-pass filter (eq. 4) and return its value."""
     old = load(memory, i)
