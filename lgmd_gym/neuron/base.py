@@ -1,7 +1,7 @@
 """FrameNeuron: base class of the neuron models, with steps of one or N neurons."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,7 @@ from lgmd_gym.neuron.lgmd.params import LGMDParams
 from lgmd_gym.neuron.maps import column_potentials
 from lgmd_gym.neuron.scalars import RESPONSE
 from lgmd_gym.neuron.validation import (
+    Frames,
     checked_fps,
     checked_frames,
     checked_num,
@@ -53,6 +54,10 @@ class Layer(NamedTuple):
     signed: bool = False
 
 
+Map: TypeAlias = NDArray[Any]  # float32 unless stated otherwise
+Output: TypeAlias = Any  # Python scalar of a single neuron, array of shape (N,) of several
+
+
 class Response(NamedTuple):
     """Outputs of a neuron for one frame: Python scalars, or arrays of shape (N,) for N neurons.
 
@@ -69,14 +74,14 @@ class Response(NamedTuple):
         alert: Whether `spike_frequency` >= t_sf ("Coll" in eq. 12); bool.
     """
 
-    spike_frequency: Any
-    spikes: Any
-    membrane_potential: Any
-    adapted_potential: Any
-    ffi: Any
-    inhibition_weight: Any
-    excitation_latency: Any
-    alert: Any
+    spike_frequency: Output
+    spikes: Output
+    membrane_potential: Output
+    adapted_potential: Output
+    ffi: Output
+    inhibition_weight: Output
+    excitation_latency: Output
+    alert: Output
 
 
 class FrameNeuron:
@@ -95,7 +100,7 @@ class FrameNeuron:
     _shown: ClassVar[Mapping[str, Layer]] = {}  # `shown_layers`
     _initial: NDArray[np.float64]  # scalar state before the first frame
     _scalars: NDArray[np.float64]  # scalar state of each neuron
-    _maps: tuple[NDArray[Any], ...]  # state of each neuron that is 0 before the first frame
+    _maps: tuple[Map, ...]  # state of each neuron that is 0 before the first frame
 
     def __init__(self, shape: tuple[int, int], fps: float, num: int | None, threads: int | None) -> None:
         self.shape = checked_shape(shape)
@@ -104,7 +109,7 @@ class FrameNeuron:
         self._threads = Threads(checked_threads(threads))
         self._count = 1 if self.num is None else self.num
         self._frames_shape = self.shape if self.num is None else (self.num, *self.shape)
-        self._frames_dtype: np.dtype[Any] = _UINT8
+        self._frames_dtype: np.dtype[np.uint8 | np.float32] = _UINT8
         self._all_active = np.ones(self._count, np.bool_)
 
     def step(
@@ -145,7 +150,7 @@ class FrameNeuron:
             self._threads.run(self.step_range, self._count, (frames, selected))
         return self._response()
 
-    def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
+    def step_range(self, first: int, last: int, frames: Frames, active: NDArray[np.bool_]) -> None:
         """Step the active neurons among first..last-1, without a check of the arguments.
 
         Threads may step disjoint ranges at once.
@@ -162,7 +167,7 @@ class FrameNeuron:
         self,
         first: int,
         last: int,
-        frames: NDArray[Any],
+        frames: Frames,
         active: NDArray[np.bool_],
         turns_px: NDArray[np.int64],
     ) -> None:

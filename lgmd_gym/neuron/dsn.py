@@ -1,7 +1,7 @@
 """DSN: a neuron that is selective to the direction of horizontal motion."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from lgmd_gym.neuron.motion import (
 )
 from lgmd_gym.neuron.registry import register
 from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
+from lgmd_gym.neuron.validation import Frames
 
 
 @record
@@ -70,7 +71,7 @@ class DSN(MotionNeuron):
         self,
         shape: tuple[int, int],
         fps: float = 30.0,
-        params: DSNParams | Mapping[str, Any] | None = None,
+        params: DSNParams | Mapping[str, object] | None = None,
         num: int | None = None,
         *,
         spikes: NeuronSpec = None,
@@ -80,7 +81,7 @@ class DSN(MotionNeuron):
         super().__init__(shape, fps, num, threads, self.params, spikes)
         self._maps = tuple(np.zeros((self._count, *self.shape), np.float32) for _ in range(6))
 
-    def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
+    def step_range(self, first: int, last: int, frames: Frames, active: NDArray[np.bool_]) -> None:
         """Step the active neurons among first..last-1; see `FrameNeuron.step_range`."""
         _step(first, last, frames, active, self._scalars, self._const, self._gains, *self._maps)
 

@@ -1,7 +1,7 @@
 """SustainedEdges: a detector of edges that stand still in the frame."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.motion import ModelParams, MotionNeuron, start
 from lgmd_gym.neuron.registry import register
 from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
+from lgmd_gym.neuron.validation import Frames
 
 
 @record
@@ -72,7 +73,7 @@ class SustainedEdges(MotionNeuron):
         self,
         shape: tuple[int, int],
         fps: float = 30.0,
-        params: SustainedEdgesParams | Mapping[str, Any] | None = None,
+        params: SustainedEdgesParams | Mapping[str, object] | None = None,
         num: int | None = None,
         *,
         spikes: NeuronSpec = None,
@@ -82,7 +83,7 @@ class SustainedEdges(MotionNeuron):
         super().__init__(shape, fps, num, threads, self.params, spikes)
         self._maps = tuple(np.zeros((self._count, *self.shape), np.float32) for _ in range(2))
 
-    def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
+    def step_range(self, first: int, last: int, frames: Frames, active: NDArray[np.bool_]) -> None:
         """Step the active detectors among first..last-1; see `FrameNeuron.step_range`."""
         _step(first, last, frames, active, self._scalars, self._const, self._gains[0], *self._maps)
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from lgmd_gym.neuron.motion import (
 )
 from lgmd_gym.neuron.registry import register
 from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
+from lgmd_gym.neuron.validation import Frames
 
 
 @record
@@ -91,7 +92,7 @@ class LPLC2(MotionNeuron):
         self,
         shape: tuple[int, int],
         fps: float = 30.0,
-        params: LPLC2Params | Mapping[str, Any] | None = None,
+        params: LPLC2Params | Mapping[str, object] | None = None,
         num: int | None = None,
         *,
         spikes: NeuronSpec = None,
@@ -113,7 +114,7 @@ class LPLC2(MotionNeuron):
             np.zeros((self._count, 2, height + 1, width + 1)),
         )
 
-    def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
+    def step_range(self, first: int, last: int, frames: Frames, active: NDArray[np.bool_]) -> None:
         """Step the active arrays among first..last-1; see `FrameNeuron.step_range`."""
         _step(first, last, frames, active, self._scalars, self._const, self._gains, self._sizes, *self._maps)
 

@@ -4,7 +4,7 @@ Equation numbers are those in the docstring of `LPLC2`.
 """
 
 import math
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from lgmd_gym.neuron.base import FrameNeuron, Signal, spiking_signals
 from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.maps import shift_light, shift_rows
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
+from lgmd_gym.neuron.validation import Frames
 
 
 @record
@@ -89,7 +90,7 @@ class MotionNeuron(FrameNeuron):
         self,
         first: int,
         last: int,
-        frames: NDArray[Any],
+        frames: Frames,
         active: NDArray[np.bool_],
         turns_px: NDArray[np.int64],
     ) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from lgmd_gym.errors import check_keys, check_known, check_text, shown
 from lgmd_gym.neuron.base import FrameNeuron, Layer, Response, Signal
 from lgmd_gym.neuron.lgmd.params import LGMDParams
+from lgmd_gym.neuron.validation import Frames
 
 
 class Model(Protocol):
@@ -30,7 +31,7 @@ class Model(Protocol):
 
     signals: Mapping[str, Signal]
 
-    def step(self, frames: NDArray[np.uint8], active: NDArray[np.bool_]) -> Mapping[str, ArrayLike]:
+    def step(self, frames: Frames, active: NDArray[np.bool_]) -> Mapping[str, ArrayLike]:
         """Process one frame per active neuron; the others keep their state, and their outputs are ignored.
 
         Args:
@@ -49,14 +50,14 @@ class Model(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _Registered:
-    factory: Callable[..., Any]
+    factory: Callable[..., object]
     takes_params: bool
 
 
 _MODELS: dict[str, _Registered] = {}
 
 
-def register(name: str, factory: Callable[..., Any], *, takes_params: bool = False) -> None:
+def register(name: str, factory: Callable[..., object], *, takes_params: bool = False) -> None:
     """Register a neuron model, which cameras then use by its name.
 
     Args:
@@ -183,7 +184,7 @@ class _Adapter(FrameNeuron):
         arrays = {name: np.array(values, np.float32) for name, values in maps.items()}
         return {name: values[0] for name, values in arrays.items()} if self.num is None else arrays
 
-    def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
+    def step_range(self, first: int, last: int, frames: Frames, active: NDArray[np.bool_]) -> None:
         """Step the active neurons among first..last-1; see `FrameNeuron.step_range`."""
         selected = self._among(first, last, active)
         if not selected.any():
@@ -201,7 +202,7 @@ class _Adapter(FrameNeuron):
         self,
         first: int,
         last: int,
-        frames: NDArray[Any],
+        frames: Frames,
         active: NDArray[np.bool_],
         turns_px: NDArray[np.int64],
     ) -> None:
@@ -232,11 +233,12 @@ class _Adapter(FrameNeuron):
         Raises:
             ValueError: If there are none, one has another name than an output, or its bounds are wrong.
         """
-        signals = getattr(self.model, "signals", None)
-        if not isinstance(signals, Mapping) or not signals:
+        given: object = getattr(self.model, "signals", None)
+        if not isinstance(given, Mapping) or not given:
             raise ValueError(f"neuron {self._name!r} must have signals, a mapping of names to Signal")
+        signals = cast(Mapping[str, object], given)
         check_keys(f"signal of neuron {self._name!r}", signals, Response._fields)
-        for key, signal in cast(Mapping[str, Any], signals).items():
+        for key, signal in signals.items():
             if not isinstance(signal, Signal) or not signal.low <= signal.high:
                 raise ValueError(
                     f"signal {key!r} of neuron {self._name!r} must be Signal(low, high) with low <= high, "

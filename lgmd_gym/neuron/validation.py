@@ -1,23 +1,25 @@
 """Checks of the arguments and frames of `LGMD`."""
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lgmd_gym.errors import as_tuple, check_finite, check_size, check_whole, check_within, is_integer, shown
 
+Frames: TypeAlias = NDArray[np.uint8 | np.float32]
+Real: TypeAlias = NDArray[Any]  # of bools, integers or floats
 MAX_PIXELS = 2**31  # of all neurons, bounds the memory
 MAX_SIDE = 16384  # [px]
 MAX_THREADS = 1024
 
 
-def checked_shape(shape: Any) -> tuple[int, int]:
+def checked_shape(shape: object) -> tuple[int, int]:
     """Return (height, width) as integers."""
     return check_size("shape", shape, 1, MAX_SIDE)
 
 
-def checked_fps(fps: Any) -> float:
+def checked_fps(fps: object) -> float:
     """Return the frame rate [Hz] as a finite float > 0."""
     value = check_finite("fps", fps)
     if not value > 0.0:
@@ -43,7 +45,7 @@ def checked_threads(threads: int | None) -> int:
     return 1 if threads is None else check_whole("threads", threads, 1, MAX_THREADS)
 
 
-def checked_array(name: str, values: Any) -> NDArray[Any]:
+def checked_array(name: str, values: object) -> Real:
     """Return an array of bools or real numbers."""
     try:
         array = np.asarray(values)
@@ -54,7 +56,7 @@ def checked_array(name: str, values: Any) -> NDArray[Any]:
     return array
 
 
-def checked_mask(mask: Any, shape: tuple[int, int]) -> NDArray[np.float32]:
+def checked_mask(mask: object, shape: tuple[int, int]) -> NDArray[np.float32]:
     """Return pixel weights as float32 of `shape`, in [0, 1] and not all 0."""
     weight = checked_array("mask", mask)
     if weight.shape != shape:
@@ -109,9 +111,7 @@ def checked_selection(name: str, selection: ArrayLike, count: int) -> NDArray[np
     return np.ascontiguousarray(selected)
 
 
-def checked_frames(
-    frames: Any, shape: tuple[int, ...], active: NDArray[np.bool_] | None = None
-) -> NDArray[Any]:
+def checked_frames(frames: object, shape: tuple[int, ...], active: NDArray[np.bool_] | None = None) -> Frames:
     """Return frames as contiguous uint8 or float32; contiguous uint8 frames are not copied.
 
     Args:
@@ -160,7 +160,7 @@ def _shape_message(given: tuple[int, ...], expected: tuple[int, ...]) -> str:
     return message
 
 
-def checked_turns(turn_px: Any, count: int) -> NDArray[np.int64]:
+def checked_turns(turn_px: object, count: int) -> NDArray[np.int64]:
     """Return the turn of each view [px], int64 of shape (count,); a scalar applies to all."""
     turns = checked_array("turn_px", turn_px)
     if turns.dtype.kind not in "ui" or turns.shape not in ((), (count,)):

@@ -3,7 +3,8 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,6 +27,12 @@ from lgmd_gym.paper.experiments import (
 from lgmd_gym.paper.stimuli import stimulus_frames
 from lgmd_gym.plotting.style import COLOURS, STYLE, load_pyplot
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.gridspec import SubplotSpec
+    from matplotlib.image import AxesImage
+
 ALARM_LEVEL = 30.0  # T_sf [spikes/s]
 MODEL_COLOURS = dict(zip(MODELS, COLOURS, strict=False))
 
@@ -45,7 +52,7 @@ def paper_figures(results: ExperimentResults, folder: Path) -> list[Path]:
     return paths
 
 
-def _gratings(plt: Any, results: ExperimentResults) -> Any:
+def _gratings(plt: ModuleType, results: ExperimentResults) -> "Figure":
     """Draw six gratings, and the highest K of three models over contrast, spatial and temporal frequency."""
     models = ("paper", "fixed inhibition", "neither adaptation nor silencing")
     figure = plt.figure(figsize=(11.0, 7.6), layout="constrained")
@@ -79,9 +86,9 @@ def _gratings(plt: Any, results: ExperimentResults) -> Any:
 
 
 def _heat_map(
-    axis: Any, responses: list[GratingResponse], values: tuple[float, ...],
+    axis: "Axes", responses: list[GratingResponse], values: tuple[float, ...],
     key: Callable[[GratingResponse], float], model: str,
-) -> Any:  # fmt: skip
+) -> "AxesImage":  # fmt: skip
     """Draw the highest K of a model, with F̂ as text, over a property of the gratings and their frequency."""
     table = np.zeros((len(values), len(TEMPORAL)))
     axis.grid(visible=False)
@@ -95,13 +102,13 @@ def _heat_map(
     return axis.imshow(table, vmin=0.5, vmax=1.0, cmap="OrRd", aspect="auto")
 
 
-def _looming(plt: Any, results: ExperimentResults) -> Any:
+def _looming(plt: ModuleType, results: ExperimentResults) -> "Figure":
     """Draw a square that looms in gratings: frames, spike frequency and F̂, one column per contrast."""
     contrasts = list(dict.fromkeys(item.contrast for item in results.looming))
     figure = plt.figure(figsize=(11.0, 7.4), layout="constrained")
     figure.suptitle("A square looms in a drifting grating, l/|v| = 100 ms, 30 Hz")
     grid = figure.add_gridspec(3, len(contrasts), height_ratios=(0.9, 1.2, 0.8))
-    shared: list[Any] = [None, None]
+    shared: list[Axes | None] = [None, None]
     for column, contrast in enumerate(contrasts):
         items = [item for item in results.looming if item.contrast == contrast]
         _strip(figure, grid[0, column], items[0].response, f"grating of contrast {contrast:g}")
@@ -125,7 +132,7 @@ def _looming(plt: Any, results: ExperimentResults) -> Any:
     return figure
 
 
-def _panorama(plt: Any, results: ExperimentResults) -> Any:
+def _panorama(plt: ModuleType, results: ExperimentResults) -> "Figure":
     """Draw objects that approach, recede and translate in a shifting panorama, one column each."""
     names = ("approaching, dark", "receding", "passing at 0.108 m/s", "passing at 0.3 m/s")
     figure = plt.figure(figsize=(12.0, 8.0), layout="constrained")
@@ -158,7 +165,7 @@ def _panorama(plt: Any, results: ExperimentResults) -> Any:
     return figure
 
 
-def _biology(plt: Any, results: ExperimentResults) -> Any:
+def _biology(plt: ModuleType, results: ExperimentResults) -> "Figure":
     """Draw peak time and angle over l/|v|, approaches aligned at contact, and spikes by kind of motion."""
     figure, axes = plt.subplots(2, 2, figsize=(10.0, 7.6), layout="constrained")
     figure.suptitle(
@@ -188,7 +195,7 @@ def _biology(plt: Any, results: ExperimentResults) -> Any:
     return figure
 
 
-def _draw_peaks(left: Any, right: Any, results: ExperimentResults) -> None:
+def _draw_peaks(left: "Axes", right: "Axes", results: ExperimentResults) -> None:
     """Draw the times of the peak and of the first alarm, and the angle of the square at these times."""
     x = np.array(L_OVER_V)
     for name, colour, marker in (("peak", COLOURS[0], "o"), ("alarm", COLOURS[1], "s")):
@@ -212,7 +219,7 @@ def _draw_peaks(left: Any, right: Any, results: ExperimentResults) -> None:
         axis.legend(fontsize=8)
 
 
-def _strip(figure: Any, cell: Any, response: StimulusResponse, title: str) -> None:
+def _strip(figure: "Figure", cell: "SubplotSpec", response: StimulusResponse, title: str) -> None:
     """Draw the last four stored frames of a stimulus in two columns."""
     inner = cell.subgridspec(2, 2, wspace=0.03)
     for index, (time, frame) in enumerate(response.pictures[-4:]):

@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from math import inf
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from joblib import delayed
@@ -34,6 +34,8 @@ MAX_SEEDS = 1000  # the seeds of the splits do not overlap
 MAX_CACHED = 4  # sensor configurations whose recordings are kept
 AGENT_SENSORS = SensorConfig()  # each agent's own cameras
 MINIMAL_SENSORS = SensorConfig(camera={"name": "wide", "shape": [8, 8]})  # for agents without sensors
+
+Values: TypeAlias = dict[str, Any]  # an observation or an info
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +89,7 @@ class NoBrakeRecording:
 
     seed: int
     counterfactual: Counterfactual
-    steps: list[tuple[dict[str, Any], dict[str, Any]]]
+    steps: list[tuple[Values, Values]]
 
 
 class ObservationRecorder:
@@ -96,12 +98,12 @@ class ObservationRecorder:
     alert = False
 
     def __init__(self) -> None:
-        self.steps: list[tuple[dict[str, Any], dict[str, Any]]] = []
+        self.steps: list[tuple[Values, Values]] = []
 
     def reset(self, seed: int | None = None) -> None:
         """Do nothing."""
 
-    def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
+    def act(self, observation: Values, info: Values) -> np.ndarray:
         """Record the observation and return `HOLD`."""
         sensor_info = {key: value for key, value in info.items() if key.startswith("lgmd/")}
         self.steps.append((observation, sensor_info))
@@ -119,7 +121,7 @@ class FixedOnsetBrake:
     def reset(self, seed: int | None = None) -> None:
         """Do nothing."""
 
-    def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
+    def act(self, observation: Values, info: Values) -> np.ndarray:
         """Return `BRAKE` from the onset on, `HOLD` before."""
         self._decision += 1
         return to_action(BRAKE if self._decision >= self._onset else HOLD)

@@ -19,7 +19,6 @@ the index `_at(y, stride) + x`; its left border is in the padding of the row abo
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +40,7 @@ from lgmd_gym.kernels.simd import (
     total,
 )
 from lgmd_gym.neuron import scalars as sc
+from lgmd_gym.neuron.base import Map
 from lgmd_gym.neuron.lgmd.params import LGMDParams
 from lgmd_gym.neuron.scalars import feed_forward, fire
 
@@ -264,7 +264,7 @@ def step(
         fire(row, const, _grouping(products[first], g[n], slots[n], h, columns, omega, gain, const[sc.T_G]))
 
 
-def allocate(num: int, shape: tuple[int, int]) -> tuple[NDArray[Any], ...]:
+def allocate(num: int, shape: tuple[int, int]) -> tuple[Map, ...]:
     """Return the maps of `num` neurons over `shape` pixels, filled with 0.
 
     Rows are padded to `columns`, a multiple of 16 pixels. Maps are float32 unless stated otherwise.
@@ -287,7 +287,7 @@ def allocate(num: int, shape: tuple[int, int]) -> tuple[NDArray[Any], ...]:
     return *(_aligned_zeros(size) for size in sizes), np.zeros((num, 2, h), np.int32)
 
 
-def shifted_views(maps: tuple[NDArray[Any], ...], height: int) -> tuple[NDArray[np.float32], ...]:
+def shifted_views(maps: tuple[Map, ...], height: int) -> tuple[NDArray[np.float32], ...]:
     """Return views of the maps that the next frame depends on.
 
     Args:

@@ -11,7 +11,7 @@ from lgmd_gym.neuron.lgmd import general, kernels
 from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.registry import register
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
-from lgmd_gym.neuron.validation import checked_region
+from lgmd_gym.neuron.validation import Frames, checked_region
 
 
 class LGMD(FrameNeuron):
@@ -81,7 +81,7 @@ class LGMD(FrameNeuron):
         else:
             self._maps = general.allocate(self._count, region_shape, self.params.n_p)
 
-    def step_range(self, first: int, last: int, frames: NDArray[Any], active: NDArray[np.bool_]) -> None:
+    def step_range(self, first: int, last: int, frames: Frames, active: NDArray[np.bool_]) -> None:
         """Step the active neurons among first..last-1; see `FrameNeuron.step_range`."""
         kernel = cast(Any, kernels if self._fast else general).step
         kernel(
@@ -93,7 +93,7 @@ class LGMD(FrameNeuron):
         self,
         first: int,
         last: int,
-        frames: NDArray[Any],
+        frames: Frames,
         active: NDArray[np.bool_],
         turns_px: NDArray[np.int64],
     ) -> None:

@@ -4,7 +4,7 @@ import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self, TypeAlias
+from typing import Literal, Self, TypeAlias
 
 import tomli_w
 
@@ -225,5 +225,5 @@ class LGMDParams(Record):
         Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8")
 
 
-NeuronSpec: TypeAlias = LGMDParams | Mapping[str, Any] | None
+NeuronSpec: TypeAlias = LGMDParams | Mapping[str, object] | None
 """The `params` argument of neurons, environments and wrappers; None for the default parameters."""
