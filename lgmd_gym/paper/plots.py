@@ -206,7 +206,7 @@ def _draw_peaks(left: "Axes", right: "Axes", results: ExperimentResults) -> None
         left.plot(1000 * x, 1000 * (slope * x + intercept), color=colour, linewidth=1.0)
         angle = 2.0 * np.degrees(np.arctan(x / y))
         right.plot(1000 * x, angle, marker, color=colour, label=f"at the {name}")
-    locust = {"color": "0.6", "linestyle": "--"}
+    locust: dict[str, Any] = {"color": "0.6", "linestyle": "--"}
     left.plot(1000 * x, 1000 * LOCUST_SLOPE * x - 27.0, label="locust: 4.7 · l/|v| - 27 ms", **locust)
     left.set_ylabel("time before contact [ms]")
     left.set_ylim(0.0, 1500.0)
