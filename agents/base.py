@@ -10,8 +10,8 @@ import numpy as np
 from lgmd_gym.errors import check_within
 
 if TYPE_CHECKING:
-    from lgmd_gym.camera import CameraSpec
     from lgmd_gym.neuron import NeuronSpec
+    from lgmd_gym.sensing.channel import ChannelSpec
 
 BRAKE = -1.0  # demand for full braking
 HOLD = 0.0  # demand for the scripted speed
@@ -101,7 +101,7 @@ class BatchAgent:
         self._allocate(1)
 
     @property
-    def camera(self) -> "CameraSpec | None":
+    def camera(self) -> "ChannelSpec | None":
         """Cameras of the agent, used unless the user specifies others; None for no preference."""
         return None
 
@@ -234,7 +234,7 @@ class Agent:
         return self.agent.reads_neuron
 
     @property
-    def camera(self) -> "CameraSpec | None":
+    def camera(self) -> "ChannelSpec | None":
         """Cameras of the agent, used unless the user specifies others; None for no preference."""
         return self.agent.camera
 

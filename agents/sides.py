@@ -7,7 +7,7 @@ from lgmd_gym.agents.zones import CONTRAST_S, NUM_FIELDS, SPAN_M, zone_cameras
 # The forward fields are those of `stopping-zone` at twice the width: a pedestrian on collision course is
 # beside the ego's lane until the last second.
 FORWARD_WIDTH_PX, FORWARD_SPAN_M, FORWARD_COLUMNS = 160, 2.0 * SPAN_M, 10
-DETECTORS = ("lgmd", "dsn", "edges")
+NEURONS = ("lgmd", "dsn", "edges")
 SIDE_WIDTH_PX, SIDE_COLUMNS = 80, 5
 
 
@@ -36,53 +36,55 @@ SIDES = {
     "middle": SidePair(20.0, 20.0, -2.3, 16),
     "far": SidePair(43.0, 34.0, -1.9, 8),
 }
-NUM_SIDE_FIELDS = 2 * len(SIDES)  # per detector
+NUM_SIDE_FIELDS = 2 * len(SIDES)  # per neuron
 NUM_MOTION_FIELDS = NUM_FIELDS + 2 * NUM_SIDE_FIELDS  # without the detectors of edges
-NUM_ALL_ROUND = NUM_FIELDS + NUM_SIDE_FIELDS * len(DETECTORS)
+NUM_ALL_ROUND = NUM_FIELDS + NUM_SIDE_FIELDS * len(NEURONS)
 NUM_FORWARD_COLUMNS = NUM_FIELDS * FORWARD_COLUMNS
-NUM_COLUMNS = NUM_FORWARD_COLUMNS + NUM_SIDE_FIELDS * len(DETECTORS) * SIDE_COLUMNS
+NUM_COLUMNS = NUM_FORWARD_COLUMNS + NUM_SIDE_FIELDS * len(NEURONS) * SIDE_COLUMNS
 
 
 def forward_cameras() -> list[dict[str, Any]]:
-    """Return the cameras of `stopping-zone` at twice the width, with ten columns of 0.48 m at the far end.
+    """Return the channels of `stopping-zone` at twice the width, with ten columns of 0.48 m at the far end.
 
     Their stopping distance follows the car's estimate of its full braking.
     """
     return [
-        camera
-        | {
-            "shape": [camera["shape"][0], FORWARD_WIDTH_PX],
-            "span_m": FORWARD_SPAN_M,
+        {
+            "camera": camera
+            | {
+                "shape": [camera["shape"][0], FORWARD_WIDTH_PX],
+                "gaze": camera["gaze"] | {"span_m": FORWARD_SPAN_M, "brake_known": True},
+            },
+            "neuron": "lgmd",
             "columns": FORWARD_COLUMNS,
-            "brake_known": True,
         }
         for camera in zone_cameras()
     ]
 
 
 def side_cameras() -> list[dict[str, Any]]:
-    """Return the cameras at the sides: per detector the near, middle and far pair, left before right."""
+    """Return the channels at the sides: per neuron the near, middle and far pair, left before right."""
     return [
         {
-            "name": f"{name}_{side}_{detector}",
-            "shape": [pair.height_px, SIDE_WIDTH_PX],
-            "detector": detector,
+            "name": f"{name}_{side}_{neuron}",
+            "camera": {
+                "name": f"{name}_{side}",
+                "shape": [pair.height_px, SIDE_WIDTH_PX],
+                "hfov_deg": pair.hfov_deg,
+                "mount": {"yaw_deg": sign * pair.yaw_deg, "pitch_deg": pair.pitch_deg, "calibrated": True},
+                "gaze": {"kind": "path", "derotated": True},
+                "sensor": {"contrast_s": CONTRAST_S},
+                "stabiliser": "gyroscope",
+            },
+            "neuron": neuron,
             "columns": SIDE_COLUMNS,
-            "gaze": "path",
-            "yaw_deg": sign * pair.yaw_deg,
-            "hfov_deg": pair.hfov_deg,
-            "pitch_deg": pair.pitch_deg,
-            "stabilised": True,
-            "derotated": True,
-            "calibrated": True,
-            "contrast_s": CONTRAST_S,
         }
-        for detector in DETECTORS
+        for neuron in NEURONS
         for name, pair in SIDES.items()
         for side, sign in (("left", -1.0), ("right", 1.0))
     ]
 
 
 def all_round_cameras() -> list[dict[str, Any]]:
-    """Return the forward cameras, then those at the sides."""
+    """Return the forward channels, then those at the sides."""
     return forward_cameras() + side_cameras()

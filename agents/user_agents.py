@@ -11,8 +11,8 @@ from lgmd_gym.errors import check_flag, check_keys, shown, unknown_name
 from lgmd_gym.processes.user_modules import error_reason, import_user_module
 
 if TYPE_CHECKING:
-    from lgmd_gym.camera import CameraSpec
     from lgmd_gym.neuron import NeuronSpec
+    from lgmd_gym.sensing.channel import ChannelSpec
 
 
 TOLERANCE = 1e-6  # of rounding in actions beyond ±1
@@ -53,7 +53,7 @@ class UserAgents(BatchAgent):
         self.include_frame = check_flag("include_frame", getattr(self.objects[0], "include_frame", False))
 
     @property
-    def camera(self) -> "CameraSpec | None":
+    def camera(self) -> "ChannelSpec | None":
         """The attribute `camera` of the objects; None if they have none."""
         return getattr(self.objects[0], "camera", None)
 

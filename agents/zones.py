@@ -1,7 +1,7 @@
 """Geometry of the stopping zones: parts of the ego's path, at multiples of the stopping distance.
 
 The far end of a zone is at its reach, a multiple of the stopping distance at the present speed. Its fields
-are 2.4 m wide there at every speed, see the gaze `"stopping"` of `CameraParams`. A field is a band of rows:
+are 2.4 m wide there at every speed, see the gaze `ToStoppingPoint`. A field is a band of rows:
 the ground field covers the road surface in front of the far end, the low field what stands there up to
 0.7 of the height of the camera, and the upright field the horizon.
 """
@@ -23,7 +23,7 @@ CONTRAST_S = 0.5  # time constant of the contrast control of each field [s]
 DRY_DECELERATION, REACTION = (
     7.5,
     0.5,
-)  # of the stopping distance [m/s², s]; see `CameraParams.stop_deceleration`
+)  # of the stopping distance [m/s², s]; see `ToStoppingPoint`
 # Frame shape (height, width) [px] and elevation of each kind of field. The unit of elevation is the angle
 # from the horizon down to the zone's far end. In this unit a ground field spans -1.43 to -0.98, a low field
 # -0.9 to -0.3 and an upright field -0.15 to 0.35. The top of a car 1.4 m high at the far end is at 0.17.
@@ -67,13 +67,15 @@ def zone_camera(kind: str, reach: float, deceleration: float, reaction: float) -
     return {
         "name": f"{kind}{reach:g}",
         "shape": list(shape),
-        "gaze": "stopping",
-        "reach": reach,
-        "span_m": SPAN_M,
-        "lift": lift,
-        "stop_deceleration": deceleration,
-        "stop_reaction": reaction,
-        "stabilised": True,
-        "calibrated": True,
-        "contrast_s": CONTRAST_S,
+        "mount": {"calibrated": True},
+        "gaze": {
+            "kind": "stopping",
+            "reach": reach,
+            "span_m": SPAN_M,
+            "lift": lift,
+            "deceleration": deceleration,
+            "reaction_s": reaction,
+        },
+        "sensor": {"contrast_s": CONTRAST_S},
+        "stabiliser": "gyroscope",
     }

@@ -50,7 +50,7 @@ FILMS = {
     "layers": Film("LGMD/CCRs-v0", {"world": 8003}, (LAMPS, CAMERA, LAYERS), "ttc-oracle"),
     "dsn": Film(
         "LGMD/CPFA-v0",
-        {"world": "laboratory", "camera": {"name": "standard", "detector": "dsn"}},
+        {"world": "laboratory", "camera": "standard", "neuron": "dsn"},
         (LAMPS, CAMERA, MOTION),
         "ttc-oracle",
     ),

@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from lgmd_gym.camera.scene import Scene
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.envs.decisions import (
     finish_decisions,
@@ -95,7 +96,7 @@ class BrakingEnv(EgoBrakeEnv):
     | `relative_impact_speed` | the same minus the other's speed along the ego's heading [m/s] | no contact |
     | `world` | number of the world, −1 for the laboratory | |
     | `level` | number of the level; only with random levels | |
-    | `condition` | camera condition; only with random levels | |
+    | `condition` | name of the weather; only with random levels | |
 
     ## Arguments
 
@@ -131,7 +132,7 @@ class BrakingEnv(EgoBrakeEnv):
             raise TypeError(f"scenario must be a Scenario or a source of scenarios, got {shown(scenario)}")
         self._source = FixedScenario(scenario) if isinstance(scenario, Scenario) else scenario
         self.scenario = self._source.first
-        self.camera_fields: dict[str, Any] = {}
+        self.scene = Scene()
         self._episode_info: dict[str, Any] = {}
         super().__init__(config, render_mode)
 
@@ -233,9 +234,7 @@ class BrakingEnv(EgoBrakeEnv):
         draw = self._source.draw(self.np_random)
         placement = draw.placement
         self.scenario, self._episode_info = placement.scenario, draw.info
-        self.camera_fields = self.camera_fields | draw.camera_fields
-        self.brake = self.episode_brake(draw.brake)
-        self.camera_fields["max_deceleration"] = self.brake.max_deceleration
+        self.scene, self.brake = draw.scene, self.episode_brake(draw.brake)
         brakes = self.brake.record(self.config["throttle"])[None]
         self._state.load(0, placement, self.brake.max_demands(self.config["policy_frequency"]))
         physics = tuple(make_physics(self._state, brakes, self.weights))

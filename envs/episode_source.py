@@ -7,17 +7,17 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from highway_env.road.road import RoadNetwork
 
-from lgmd_gym.camera import CONDITIONS
+from lgmd_gym.camera.scene import WEATHERS, Scene
 from lgmd_gym.camera.worlds import LABORATORY, draw_world
-from lgmd_gym.envs.appearance import Appearance, brake_of, world_number
+from lgmd_gym.envs.appearance import Appearance, brake_of
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.families.distribution import (
     LEVELS,
     check_families,
     check_levels,
     check_range,
-    draw_camera_fields,
     draw_scenario,
+    draw_weather,
     level_generator,
 )
 from lgmd_gym.envs.families.scenario import Scenario, free_lane
@@ -30,20 +30,20 @@ class Draw(NamedTuple):
 
     Attributes:
         placement: The scenario, placed on the road.
-        camera_fields: Fields of `CameraParams`, `world` among them, and `condition` of the episode.
+        scene: The scene, for cameras and brake.
         info: Additional keys of the episode's info.
         brake: Brake of the ego in this episode; None for that of the environment's configuration. Keys given
             in the configuration take precedence.
     """
 
     placement: Placement
-    camera_fields: dict[str, Any]
+    scene: Scene
     info: dict[str, Any]
     brake: BrakeParams | None = None
 
     def make_network(self) -> RoadNetwork:
         """Return the highway-env road network of the episode, with the lane width of its world."""
-        width = draw_world(self.camera_fields["world"]).lane_width
+        width = draw_world(self.scene.world).lane_width
         return road_network(self.placement.scenario.road, self.placement.start, width)
 
 
@@ -67,7 +67,7 @@ class FixedScenario:
 
     Args:
         scenario: The scenario.
-        appearance: World and camera condition; None for the laboratory.
+        appearance: World, weather and road; None for the laboratory.
     """
 
     def __init__(self, scenario: Scenario, appearance: Appearance | None = None) -> None:
@@ -78,8 +78,8 @@ class FixedScenario:
     def draw(self, rng: np.random.Generator) -> Draw:
         """Return the next episode."""
         placement = place(self.first, rng)
-        fields = self.appearance.draw(rng) | {"queue_lane": self._free_lane}
-        return Draw(placement, fields, {"world": world_number(fields)}, brake_of(fields))
+        scene = replace(self.appearance.draw(rng), queue_lane=self._free_lane)
+        return Draw(placement, scene, {"world": scene.number}, brake_of(scene))
 
 
 class RandomLevels:
@@ -88,18 +88,18 @@ class RandomLevels:
     A level is a random scenario with a number. Half of the levels are threats: the car-to-car, motorcycle,
     pedestrian and bicycle families of the protocols, see `lgmd_gym.envs.families.distribution`. Half are
     non-threats: all other families. With `families`, a level has a scenario of one of them, in the same world
-    as without. A level fixes the family and its arguments, the grey levels, the world, the camera condition
+    as without. A level fixes the family and its arguments, the grey levels, the world, the weather
     (night, fog, …) and the contrast of the road texture, in every process.
     The splits are disjoint, and so are their worlds: training never uses a level or a world of validation or
     test. The environment's seed selects the levels; `info` adds `level` (the number), `world` (its number, or
-    -1 in the laboratory) and `condition` (the camera condition).
+    -1 in the laboratory) and `condition` (the name of the weather).
 
     Args:
         split: Set of levels: "train", "validation" or "test", with 1,000,000 levels each.
         start_level: First level in use.
         num_levels: Number of levels in use; 0 for all from `start_level` on.
-        conditions: Camera conditions, drawn with equal probability: "clear", "night", "night_upper_beam",
-            "fog", "rain", "low_sun".
+        weathers: Weathers, drawn with equal probability: "clear", "night", "night_upper_beam", "fog", "rain",
+            "low_sun".
         world: Number of the world of all levels, or "laboratory"; None for the world of each level.
         road: See `Appearance`.
         families: Names of the scenario families in use, None for all. Half of the levels are threats if both
@@ -110,7 +110,7 @@ class RandomLevels:
             world, on dry and wet roads alike [m/s²]; None for that of the world.
 
     Raises:
-        ValueError: If the split, a condition, the world or a family is unknown, levels are outside the
+        ValueError: If the split, a weather, the world or a family is unknown, levels are outside the
             split, the heights or decelerations are not two numbers above 0 in ascending order, or a
             deceleration is above 12 m/s².
     """
@@ -120,15 +120,15 @@ class RandomLevels:
         split: str = "train",
         start_level: int = 0,
         num_levels: int = 0,
-        conditions: Sequence[str] = tuple(CONDITIONS),
+        weathers: Sequence[str] = tuple(WEATHERS),
         world: int | str | None = None,
         road: str | None = None,
         families: Sequence[str] | None = None,
         mount_heights: Sequence[float] | None = None,
         decelerations: Sequence[float] | None = None,
     ) -> None:
-        start_level, num_levels = check_levels(split, start_level, num_levels, conditions)
-        self.split, self.start_level, self.conditions = split, start_level, tuple(conditions)
+        start_level, num_levels = check_levels(split, start_level, num_levels, weathers)
+        self.split, self.start_level, self.weathers = split, start_level, tuple(weathers)
         self.num_levels = num_levels or LEVELS - start_level
         self.families = check_families(families)
         self.mount_heights = self.decelerations = None
@@ -147,18 +147,23 @@ class RandomLevels:
         generator = level_generator(self.split, level)
         scenario = draw_scenario(generator, self.families)
         placement = place(scenario, generator)
-        world = self.appearance.draw(level_generator(self.split, level, part=2))
-        fields = world | draw_camera_fields(self.split, level, self.conditions)
-        fields["queue_lane"] = free_lane(scenario)
+        weather, texture = draw_weather(self.split, level, self.weathers)
+        height = None
         if self.mount_heights is not None:
-            rng_height = level_generator(self.split, level, part=3)
-            fields["mount_height"] = float(rng_height.uniform(*self.mount_heights))
-        info = {"level": level, "condition": fields["condition"], "world": world_number(fields)}
-        return Draw(placement, fields, info, self._brake(level, fields))
+            height = float(level_generator(self.split, level, part=3).uniform(*self.mount_heights))
+        scene = replace(
+            self.appearance.draw(level_generator(self.split, level, part=2)),
+            weather=weather,
+            texture=texture,
+            queue_lane=free_lane(scenario),
+            mount_height_m=height,
+        )
+        info = {"level": level, "condition": weather, "world": scene.number}
+        return Draw(placement, scene, info, self._brake(level, scene))
 
-    def _brake(self, level: int, fields: dict[str, Any]) -> BrakeParams | None:
+    def _brake(self, level: int, scene: Scene) -> BrakeParams | None:
         """Return the brake of the level's world, with the deceleration of the level."""
-        brake = brake_of(fields)
+        brake = brake_of(scene)
         if self.decelerations is None:
             return brake
         drawn = float(level_generator(self.split, level, part=4).uniform(*self.decelerations))

@@ -15,20 +15,24 @@ from lgmd_gym.envs.families.family import family as add_family
 from lgmd_gym.errors import check_keys, check_known, check_text, shown, unknown_name
 
 if TYPE_CHECKING:
-    from lgmd_gym.camera import CameraSpec
+    from lgmd_gym.camera import Scene
     from lgmd_gym.envs.episode_source import EpisodeSource
     from lgmd_gym.envs.families.scenario import Scenario
     from lgmd_gym.neuron import NeuronSpec
+    from lgmd_gym.sensing.channel import ChannelSpec
 
 RANDOM = "RandomBraking"
 SCENARIO = "Scenario"
 """The id `LGMD/Scenario-v0`, whose argument `scenario` is a scenario as data."""
-_OTHERS = ("camera", "params", "fps", "include_frame", "include_base", "trace", "config", "render_mode")
+_OTHERS = (
+    *("camera", "neuron", "params", "fps", "include_frame", "include_base", "trace", "config"),
+    "render_mode",
+)
 LEVEL_ARGUMENTS = (
     "split",
     "start_level",
     "num_levels",
-    "conditions",
+    "weathers",
     "world",
     "road",
     "families",
@@ -36,7 +40,7 @@ LEVEL_ARGUMENTS = (
     "decelerations",
 )
 """Arguments of `RandomLevels`."""
-APPEARANCE = ("world", "condition", "road")
+APPEARANCE = ("world", "weather", "road", "scene")
 """Arguments that set how a scenario looks."""
 SCENARIO_ARGUMENT = "scenario"
 
@@ -60,11 +64,11 @@ _EASY_FAMILIES = (
 )
 RANDOM_TASKS = {
     RANDOM: RandomTask(
-        "A random level per episode: 43 families, all worlds of the split and all camera conditions.", {}
+        "A random level per episode: 43 families, all worlds of the split and all weathers.", {}
     ),
     "RandomBrakingEasy": RandomTask(
         "A random level per episode, for first trainings: cars on a straight and even road in clear weather.",
-        {"families": _EASY_FAMILIES, "conditions": ("clear",), "road": "smooth"},
+        {"families": _EASY_FAMILIES, "weathers": ("clear",), "road": "smooth"},
     ),
 }
 """Ids `LGMD/<name>-v0` of random levels."""
@@ -124,7 +128,8 @@ def register_family(name: str) -> Callable[[Family], Family]:
 
 def make_braking(
     family: str,
-    camera: "CameraSpec | None" = "fovea",
+    camera: "ChannelSpec | None" = "fovea",
+    neuron: str = "lgmd",
     params: "NeuronSpec | None" = None,
     fps: float | None = None,
     include_frame: bool = False,
@@ -140,6 +145,7 @@ def make_braking(
         family: A scenario family for `BrakingEnv`, "RandomBraking" for random levels, or "Scenario" for a
             scenario given as data.
         camera: See `LGMDObservation`; None for no camera.
+        neuron: See `LGMDObservation`.
         params: See `LGMDObservation`.
         fps: See `LGMDObservation`.
         include_frame: See `LGMDObservation`.
@@ -148,10 +154,10 @@ def make_braking(
         config: Configuration of `BrakingEnv`.
         render_mode: None, "rgb_array" or "human".
         **arguments: Arguments of the family in SI units; `world`, the number of the world, 0 to 9,999, or
-            "laboratory", by default drawn from the training worlds at each reset; `condition`, the camera
-            condition, see `CONDITIONS`, or "mixed" for that of the world; `road`, see `Appearance`. For
-            "RandomBraking", arguments of `RandomLevels`. For "Scenario", `scenario`: a `Scenario`, or plain
-            data as in `scenario_from_data`.
+            "laboratory", by default drawn from the training worlds at each reset; `weather`, see
+            `Weather`, or "mixed" for that of the world; `road`, see `Appearance`; `scene`, other fields of
+            `Scene`. For "RandomBraking", arguments of `RandomLevels`. For "Scenario", `scenario`: a
+            `Scenario`, or plain data as in `scenario_from_data`.
 
     Raises:
         ValueError: If an argument, key or name is unknown, or a value is out of range.
@@ -160,7 +166,7 @@ def make_braking(
 
     source = make_source(family, arguments, _OTHERS)
     env = BrakingEnv(source, config=config, render_mode=render_mode)
-    return with_camera(env, camera, params, fps, include_frame, include_base, trace)
+    return with_camera(env, camera, neuron, params, fps, include_frame, include_base, trace)
 
 
 def make_source(family: str, arguments: dict[str, Any], others: Iterable[str] = ()) -> "EpisodeSource":
@@ -182,7 +188,7 @@ def make_source(family: str, arguments: dict[str, Any], others: Iterable[str] = 
         return RandomLevels(**arguments)
     chosen = {name: arguments[name] for name in APPEARANCE if name in arguments}
     others = {name: value for name, value in arguments.items() if name not in APPEARANCE}
-    return FixedScenario(_scenario(family, others), Appearance(**chosen))
+    return FixedScenario(_scenario(family, others), Appearance.of(**chosen))
 
 
 def _scenario(family: str, arguments: dict[str, Any]) -> "Scenario":
@@ -202,7 +208,7 @@ def _argument_names(family: str) -> Iterable[str]:
     return *inspect.signature(FAMILIES[family]).parameters, *APPEARANCE
 
 
-def with_camera(env: gym.Env, camera: "CameraSpec | None", *observation: Any) -> gym.Env:
+def with_camera(env: gym.Env, camera: "ChannelSpec | None", *observation: Any) -> gym.Env:
     """Return `env` inside `LGMDObservation` with the remaining arguments, or `env` for `camera=None`."""
     if camera is None:
         return env
@@ -287,7 +293,8 @@ def find_kind(kind: str) -> Any:
 
 def make_traffic(
     kind: str,
-    camera: "CameraSpec | None" = "fovea",
+    camera: "ChannelSpec | None" = "fovea",
+    neuron: str = "lgmd",
     params: "NeuronSpec | None" = None,
     fps: float | None = None,
     include_frame: bool = False,
@@ -296,8 +303,9 @@ def make_traffic(
     config: dict[str, Any] | None = None,
     render_mode: str | None = None,
     world: int | str | None = None,
-    condition: str = "clear",
+    weather: "str | dict[str, Any] | None" = None,
     road: str | None = None,
+    scene: "Scene | dict[str, Any] | None" = None,
     split: str = "train",
 ) -> gym.Env:
     """Return a traffic environment inside `LGMDObservation`, or without it for `camera=None`.
@@ -307,6 +315,7 @@ def make_traffic(
     Args:
         kind: A key of `TRAFFIC_KINDS`.
         camera: See `LGMDObservation`; None for no camera.
+        neuron: See `LGMDObservation`.
         params: See `LGMDObservation`.
         fps: See `LGMDObservation`.
         include_frame: See `LGMDObservation`.
@@ -315,8 +324,9 @@ def make_traffic(
         config: Configuration of `TrafficEnv`.
         render_mode: None, "rgb_array" or "human".
         world: Number of the world, 0 to 9,999, or "laboratory"; None to draw one of the split at each reset.
-        condition: Camera condition, see `lgmd_gym.camera.CONDITIONS`, or "mixed" for that of the world.
+        weather: See `lgmd_gym.camera.Weather`, or "mixed" for that of the world; None for clear.
         road: See `lgmd_gym.envs.appearance.Appearance`.
+        scene: Other fields of `lgmd_gym.camera.Scene`.
         split: See `lgmd_gym.envs.appearance.Appearance`.
 
     Raises:
@@ -325,5 +335,5 @@ def make_traffic(
     from lgmd_gym.envs.appearance import Appearance
 
     env = find_kind(kind)(config=config, render_mode=render_mode)
-    env.appearance = Appearance(world=world, condition=condition, road=road, split=split)
-    return with_camera(env, camera, params, fps, include_frame, include_base, trace)
+    env.appearance = Appearance.of(scene, world=world, weather=weather, road=road, split=split)
+    return with_camera(env, camera, neuron, params, fps, include_frame, include_base, trace)

@@ -15,20 +15,25 @@ from lgmd_gym._version import __version__
 from lgmd_gym.envs.registration import register_envs, register_traffic
 
 if TYPE_CHECKING:
-    from lgmd_gym.camera import BirdsEye, CameraParams, EgoCamera
+    from lgmd_gym.camera import BirdsEye, Camera, EgoCamera, Mount, Scene, Weather
     from lgmd_gym.neuron import LGMD, LGMDParams, Response
     from lgmd_gym.rendering.view import LGMDView
+    from lgmd_gym.sensing.channel import Channel
     from lgmd_gym.wrappers.observation import LGMDObservation
 
 __all__ = [
     "LGMD",
     "BirdsEye",
-    "CameraParams",
+    "Camera",
+    "Channel",
     "EgoCamera",
     "LGMDObservation",
     "LGMDParams",
     "LGMDView",
+    "Mount",
     "Response",
+    "Scene",
+    "Weather",
     "__version__",
 ]
 
@@ -37,7 +42,11 @@ _MODULES = {
     "LGMDParams": "neuron",
     "Response": "neuron",
     "BirdsEye": "camera",
-    "CameraParams": "camera",
+    "Camera": "camera",
+    "Channel": "sensing.channel",
+    "Mount": "camera",
+    "Scene": "camera",
+    "Weather": "camera",
     "EgoCamera": "camera",
     "LGMDObservation": "wrappers",
     "LGMDView": "rendering.view",

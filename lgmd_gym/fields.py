@@ -30,7 +30,6 @@ from lgmd_gym.errors import (
     check_known,
     check_number,
     check_text,
-    check_type,
     shown,
 )
 
@@ -234,19 +233,39 @@ class Record:
         """Raise ValueError for values that do not belong together; by default nothing is checked."""
 
     @classmethod
-    def make(cls, value: Self | Mapping[str, Any] | None = None, **changes: Any) -> Self:
-        """Return a record from an instance, a mapping of its fields, or None for the defaults.
+    def presets(cls) -> Mapping[str, Any]:
+        """Return the records that `make` accepts by name, the default one first; none in this class."""
+        return {}
+
+    @classmethod
+    def make(cls, value: Self | Mapping[str, Any] | str | None = None, **changes: Any) -> Self:
+        """Return a record from an instance, a mapping of its fields, or a preset's name.
 
         Args:
-            value: The record, or some of its fields.
+            value: The record, some of its fields, the name of a preset, or None for the default. If the field
+                `name` of a mapping is that of a preset, the other fields change the preset.
             changes: Fields to change on top.
 
         Raises:
-            ValueError: For another type, an unknown field, or a value out of range.
+            ValueError: For another type, an unknown preset or field, or a value out of range.
         """
+        presets = cls.presets()
+        if presets and (value is None or isinstance(value, str)):
+            key = next(iter(presets)) if value is None else check_known(cls.label, value, presets)
+            value = presets[key]
+        elif presets and isinstance(value, Mapping):
+            name = value.get("name")
+            if isinstance(name, str) and name in presets:
+                value, changes = presets[name], {**value, **changes}
         if isinstance(value, cls):
+            if not changes:
+                return value
             return cast(Self, dataclasses.replace(cast(Any, value), **cls._known(changes)))
-        given = {} if value is None else dict(check_type(cls.label or cls.__name__, value, cls, Mapping))
+        if value is not None and not isinstance(value, Mapping):
+            names = "a name, " if presets else ""
+            label = cls.label or cls.__name__
+            raise ValueError(f"{label} must be {names}{cls.__name__} or Mapping, got {shown(value)}")
+        given = {} if value is None else dict(value)
         return cls(**cls._known(given | changes))
 
     def to_dict(self) -> dict[str, Any]:
@@ -298,7 +317,9 @@ def _documentation(item: Declaration) -> str:
     text = item.doc.rstrip(".")
     text += f" [{item.unit}]" if item.unit else ""
     text += f"; in {item.bounds}" if item.interval else f"; one of {item.bounds}" if item.bounds else ""
-    return f"{text}; default {item.default!r}." if item.default is not dataclasses.MISSING else f"{text}."
+    default = item.default
+    shown_default = f"{type(default).__name__}()" if isinstance(default, Record) else repr(default)
+    return f"{text}; default {shown_default}." if item.default is not dataclasses.MISSING else f"{text}."
 
 
 def _plain(value: Any) -> Any:

@@ -30,7 +30,7 @@ from lgmd_gym.processes.files import complete_file
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
 
-    from lgmd_gym.camera import CameraSpec
+    from lgmd_gym.sensing.channel import ChannelSpec
 
 NORMALIZER = f"-vecnormalize{NORMALIZER_SUFFIX}"  # end of the name of the file with the statistics
 CARD = "lgmd_gym.json"  # member of the zip file of a policy of `lgmd-gym train`
@@ -38,9 +38,9 @@ _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, Ru
 
 
 def _check_cameras(name: str, camera: Any) -> Any:
-    from lgmd_gym.sensing.cameras import make_cameras  # imports numba, which takes half a second
+    from lgmd_gym.sensing.channel import make_channels  # imports numba, which takes half a second
 
-    make_cameras(camera)
+    make_channels(camera)
     return camera
 
 
@@ -73,7 +73,7 @@ class PolicyCard(Record):
     label = "card"
 
     algo: str = text(MISSING, 'Class of stable-baselines3 that reads the model, such as "ppo"')
-    camera: "CameraSpec" = value(
+    camera: "ChannelSpec" = value(
         MISSING, _check_cameras, "Cameras of the training, as in the argument `camera` of the environments"
     )
     neuron: dict[str, Any] | None = optional(
@@ -240,7 +240,7 @@ def _normalizer(env: Any) -> Any:
 
 def _values(env: Any) -> dict[str, Any]:
     """Return the fields of the card that follow from the specification of an environment."""
-    from lgmd_gym.camera.spec import plain_values
+    from lgmd_gym.sensing.channel import LGMD, make_channels, plain_values
 
     spec: Any = env.get_attr("spec")[0] if hasattr(env, "get_attr") else getattr(env, "spec", None)
     if spec is None:
@@ -251,8 +251,9 @@ def _values(env: Any) -> dict[str, Any]:
     demands = _demands(env, config)
     _check_rates(env, spec.kwargs, config)
     features = wrappers.get("PolicyWrapper")
+    camera, neuron = sensors.get("camera", "fovea"), sensors.get("neuron", LGMD)
     return {
-        "camera": plain_values(sensors.get("camera", "fovea")),
+        "camera": plain_values(camera if neuron == LGMD else make_channels(camera, neuron)),
         "neuron": plain_values(sensors.get("params")),
         "features": None if features is None else FeatureConfig.make(features),
         "demands": demands,

@@ -14,8 +14,8 @@ from lgmd_gym.errors import check_path, check_text, check_within, shown, unknown
 from lgmd_gym.processes.extras import missing_extra
 
 if TYPE_CHECKING:
-    from lgmd_gym.camera import CameraSpec
     from lgmd_gym.neuron import NeuronSpec
+    from lgmd_gym.sensing.channel import ChannelSpec
 
 NOT_NEURONS = (FRAME, "ego_speed", "speed_change", "ego_yaw_rate", "known_deceleration")
 RAW_INPUTS = (*SCALES, FRAME)  # observations of `LGMDObservation`
@@ -161,7 +161,7 @@ class Policy(BatchAgent):
         layer.bias.data[int(np.argmin(demands))] -= margin
 
     @property
-    def camera(self) -> "CameraSpec":
+    def camera(self) -> "ChannelSpec":
         """Cameras of the training."""
         return self.card.camera
 
@@ -281,7 +281,7 @@ def find_policy(text: str) -> Path:
     return path
 
 
-def _count(camera: "CameraSpec") -> int:
+def _count(camera: "ChannelSpec") -> int:
     """Return the number of cameras."""
     return len(camera) if isinstance(camera, list | tuple) else 1
 

@@ -26,6 +26,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.summary import rate_of
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
+from lgmd_gym.camera import Camera
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.plotting.style import COLOURS, saved_figure
@@ -35,29 +36,33 @@ NO_VIEW = SensorConfig({"name": "wide", "shape": [8, 8]})  # no-brake needs no u
 SUITES = {"r152": "avoided", "false-reaction": "false_activation"}
 TITLES = {"r152": "r152: contacts avoided [%]", "false-reaction": "false-reaction: false activations [%]"}
 
-Camera = Mapping[str, Any]
 
-
-def halved(camera: Camera) -> dict[str, Any]:
+def halved(camera: Camera) -> Camera:
     """Return a camera with half of the rows and columns over the same field of view."""
-    return {**camera, "shape": [side // 2 for side in camera["shape"]]}
+    height, width = camera.shape
+    return replace(camera, shape=(height // 2, width // 2))
 
 
-def replaced(**fields: Any) -> Callable[[Camera], dict[str, Any]]:
-    """Return a change of a camera that replaces fields."""
-    return lambda camera: {**camera, **fields}
+def mounted(**fields: Any) -> Callable[[Camera], Camera]:
+    """Return a change of a camera that replaces fields of its mount."""
+    return lambda camera: replace(camera, mount=replace(camera.mount, **fields))
 
 
-ARMS: dict[str, Callable[[Camera], dict[str, Any]]] = {
-    "complete sensor": dict,
-    "no stabilisation": replaced(stabilised=False),
-    "no calibration": replaced(calibrated=False),
-    "no contrast control": replaced(contrast_s=0.0),
+def without_contrast_control(camera: Camera) -> Camera:
+    """Return a camera without contrast control."""
+    return replace(camera, sensor=replace(camera.sensor, contrast_s=0.0))
+
+
+ARMS: dict[str, Callable[[Camera], Camera]] = {
+    "complete sensor": replace,
+    "no stabilisation": lambda camera: replace(camera, stabiliser=None),
+    "no calibration": mounted(calibrated=False),
+    "no contrast control": without_contrast_control,
     "half the pixels per row and column": halved,
-    "camera 1.0 m high": replaced(mount_height=1.0),
-    "camera 1.5 m high": replaced(mount_height=1.5),
-    "15 frames/s": dict,
-    "60 frames/s": dict,
+    "camera 1.0 m high": mounted(height_m=1.0),
+    "camera 1.5 m high": mounted(height_m=1.5),
+    "15 frames/s": replace,
+    "60 frames/s": replace,
 }
 FPS = {"15 frames/s": 15.0, "60 frames/s": 60.0}
 """Frame rates of the arms with another one than 30 Hz."""
@@ -66,10 +71,12 @@ FPS = {"15 frames/s": 15.0, "60 frames/s": 60.0}
 def play(agent: str, arm: str, suite: str, worlds: range, seeds: int, jobs: int, every: int) -> list[Row]:
     """Return the rows of an arm in a suite."""
     own = SensorConfig().for_agent(make_agent(agent))
-    cameras: Any = own.camera
-    if not isinstance(cameras, list):
+    if isinstance(own.camera, str):
         raise ValueError(f"agent {agent!r} has no cameras of its own; use for example stopping-zone")
-    changed = SensorConfig([ARMS[arm](camera) for camera in cameras], own.params)
+    cameras: list[Any] = [(channel, channel.camera) for channel in own.channels]
+    changed = SensorConfig(
+        [replace(channel, camera=ARMS[arm](camera)) for channel, camera in cameras], own.params
+    )
     schedule = RunConfig(suite=suite, seeds=seeds, worlds=len(worlds), first_world=worlds.start)
     fps = (("fps", FPS[arm]),) if arm in FPS else ()
     cases = [replace(case, arguments=case.arguments + fps) for case in find_suite(suite).cases[::every]]

@@ -17,7 +17,7 @@ from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.kinematics import Vehicle
 from highway_env.vehicle.objects import Obstacle
 
-from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera.objects import BODY_MODELS, body_of
 from lgmd_gym.envs.families.scenario import ADULT_SIZE, BICYCLE_SIZE, CHILD_SIZE, MOTORCYCLE_SIZE
 from lgmd_gym.plotting.figures import contact_sheet
@@ -38,8 +38,8 @@ class Motorcycle(Obstacle):
 WORLD = 42
 LIGHTS = {
     "day": {"world": WORLD},
-    "night": {"world": WORLD, "condition": "night"},
-    "fog": {"world": WORLD, "condition": "fog"},
+    "night": {"world": WORLD, "weather": "night"},
+    "fog": {"world": WORLD, "weather": "fog"},
 }
 HEADINGS = {"side": math.pi / 2, "rear": 0.0, "front": math.pi}
 FIGURES = {
@@ -95,10 +95,8 @@ def picture(name: str, heading: float, light: dict[str, object]) -> np.ndarray:
     road.vehicles.append(ego)
     add_body(road, name, away + 0.5 * ego.LENGTH - 1.7, heading)
     env = SimpleNamespace(road=road, vehicle=ego, steps=0, config={"simulation_frequency": 30})
-    params = CameraParams.make(
-        {"shape": [84, 112], "hfov_deg": 42.0, "pitch_deg": pitch, "roadside": 0.0, **light}
-    )
-    return EgoCamera(params).render(env)
+    camera = {"shape": [84, 112], "hfov_deg": 42.0, "mount": {"pitch_deg": pitch}}
+    return EgoCamera(camera, {"roadside": 0.0, **light}).render(env)
 
 
 def main(path: str | Path = "docs/bodies.png", quick: bool = False) -> dict[str, dict[str, np.ndarray]]:

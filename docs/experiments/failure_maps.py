@@ -40,7 +40,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.summary import rate_of
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
 from lgmd_gym.benchmark.units import Unit, make_units
-from lgmd_gym.camera.params import ROADS, CameraParams
+from lgmd_gym.camera.scene import ROADS
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.envs.families.curves import MAX_LATERAL
@@ -67,11 +67,10 @@ Map = list[list[Rate | None]]  # rate of each cell by row and column; None for o
 
 
 class Cell(NamedTuple):
-    """One cell of a map: a case, and the road and the texture in place of the usual ones."""
+    """One cell of a map: a case, and the road in place of the usual one."""
 
     case: Case
     road: str | None = None
-    texture: float | None = None
 
 
 class Axis(NamedTuple):
@@ -98,8 +97,8 @@ class Plane(NamedTuple):
 
 def vibration_cell(road: str, texture: float, world: int) -> Cell:
     """Return the cell of a road and a texture contrast."""
-    case = make_case(SUITE, "CCRs", f"road-{road}-texture-{texture:g}", ego_speed=to_mps(50))
-    return Cell(case, road, texture)
+    name, scene = f"road-{road}-texture-{texture:g}", {"texture": texture}
+    return Cell(make_case(SUITE, "CCRs", name, ego_speed=to_mps(50), scene=scene), road)
 
 
 def width_cell(width: float, speed_kmh: float, world: int) -> Cell:
@@ -154,22 +153,9 @@ def check_cells(plane: Plane, world: int) -> None:
         cell = plane.cell(x, y, world)
         if cell is not None:
             make_target(cell.case, {}, camera=None).close()
-            if cell.texture is not None:
-                CameraParams.make("wide", texture=cell.texture)
 
 
 NO_VIEW = SensorConfig({"name": "wide", "shape": [8, 8]})  # no-brake and oracles need no useful image
-
-
-def sensors_of(agent: str, texture: float | None) -> SensorConfig:
-    """Return the agent's own sensors, with another contrast of the ground unless it is None."""
-    if texture is None:
-        return SensorConfig()
-    own = SensorConfig().for_agent(make_agent(agent))
-    camera: Any = own.plain.camera
-    cameras = camera if isinstance(camera, list) else [camera]
-    named = [{"name": item} if isinstance(item, str) else item for item in cameras]
-    return replace(own, camera=[item | {"texture": texture} for item in named])
 
 
 def play_all(unit: Unit) -> list[Result]:
@@ -195,22 +181,20 @@ def play_plane(plane: Plane, agents: Sequence[str], bound: str, worlds: range, j
         if (cell := plane.cell(x, y, world)) is not None
     ]
 
-    def tasks(agent: str, sensors: dict[float | None, SensorConfig]) -> list[Task]:
+    def tasks(agent: str, sensors: SensorConfig) -> list[Task]:
         # The seed draws the grey of the target and its place on the texture: one for each world.
         return [
-            Task(agent, cell.case, world - worlds.start, sensors[cell.texture], None, MIXED, world, cell.road)
+            Task(agent, cell.case, world - worlds.start, sensors, None, MIXED, world, cell.road)
             for cell, world in cells
         ]
 
     every = tuple(dict.fromkeys((*agents, bound)))
-    textures = {cell.texture for cell, _ in cells}
-    no_views = dict.fromkeys(textures, NO_VIEW)
-    unbraked = play(tasks(NO_BRAKE, no_views), jobs, every)
+    unbraked = play(tasks(NO_BRAKE, NO_VIEW), jobs, every)
     truths = {key_of(result.row)[1:]: result.counterfactual for result in unbraked}
     maps = {}
     for agent in every:
-        views = {texture: sensors_of(agent, texture) for texture in textures} if agent in agents else no_views
-        paired = [replace(task, counterfactual=truths[task.key[1:]]) for task in tasks(agent, views)]
+        sensors = SensorConfig() if agent in agents else NO_VIEW
+        paired = [replace(task, counterfactual=truths[task.key[1:]]) for task in tasks(agent, sensors)]
         maps[agent] = to_map(plane, [result.row for result in play(paired, jobs, every)], worlds)
     return maps
 

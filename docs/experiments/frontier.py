@@ -19,7 +19,7 @@ from joblib import Parallel, delayed
 
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.suites import find_suite
-from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera import PRESETS, Camera, EgoCamera
 from lgmd_gym.envs import BrakingEnv
 from lgmd_gym.plotting.style import saved_figure
 
@@ -70,12 +70,12 @@ class Frontier(NamedTuple):
     drift_deg_s: float
     seen_s: float
 
-    def growth_px(self, camera: CameraParams, fps: float = 30.0) -> float:
+    def growth_px(self, camera: Camera, fps: float = 30.0) -> float:
         """Return the growth of the target's width per frame in the middle of a camera's image [px]."""
         return self.growth_deg_s / fps * camera.pixels_per_degree
 
 
-def frontier(case: Case, camera: str | CameraParams = "wide", seed: int = 0) -> Frontier | None:
+def frontier(case: Case, camera: str | Camera = "wide", seed: int = 0) -> Frontier | None:
     """Return the frontier of a case in the laboratory; None for a case without contact.
 
     Args:
@@ -91,8 +91,8 @@ def frontier(case: Case, camera: str | CameraParams = "wide", seed: int = 0) -> 
     avoided = _last(contact, lambda start: not _brake_from(env, seed, start)["collision"])
     stopped = avoided or _last(contact, lambda start: _brake_from(env, seed, start)["impact_speed"] == 0.0)
     last = stopped or 1
-    condition = case.argument("condition", "clear")
-    views = _views(env, seed, last, EgoCamera(camera, condition=condition))
+    weather = case.argument("weather", "clear")
+    views = _views(env, seed, last, EgoCamera(camera, {"weather": weather}))
     hidden = [number for number, view in enumerate(views) if view.pixels < VISIBLE_PX]
     here, before = views[-1], views[-2]
     return Frontier(
@@ -157,7 +157,7 @@ def _view(env: BrakingEnv, camera: EgoCamera) -> TargetView:
     """Return the view of the present state."""
     road, ego = env.road, env.ego
     target = road.items[int(road.physics[1]["target"][0])]
-    ahead = ego.LENGTH / 2 - camera.params.mount_setback
+    ahead = ego.LENGTH / 2 - camera.camera.mount.setback_m
     x, y = ego.position[0] + ahead * cos(ego.heading), ego.position[1] + ahead * sin(ego.heading)
 
     def bearing(point_x: float, point_y: float) -> float:
@@ -219,9 +219,9 @@ def by_family(items: Iterable[Frontier | None]) -> dict[str, list[Frontier]]:
     return families
 
 
-def table(families: dict[str, list[Frontier]], camera: CameraParams) -> list[str]:
+def table(families: dict[str, list[Frontier]], camera: Camera) -> list[str]:
     """Return the lines of the table."""
-    inside = [CameraParams.preset(name) for name in ("fovea", "wide")]
+    inside = [PRESETS[name] for name in ("fovea", "wide")]
     heads = ["family", "cases", "avoidable", *(name for name, _, _ in COLUMNS)]
     heads[-3:-3] = [f"growth in `{camera.name}` [px/frame]", *(f"inside `{item.name}`" for item in inside)]
     lines = [heads, ["---"] * len(heads)]
@@ -237,7 +237,7 @@ def table(families: dict[str, list[Frontier]], camera: CameraParams) -> list[str
     return [f"| {' | '.join(line)} |" for line in lines]
 
 
-def draw(families: dict[str, list[Frontier]], camera: CameraParams, path: Path) -> None:
+def draw(families: dict[str, list[Frontier]], camera: Camera, path: Path) -> None:
     """Draw growth against bearing, one panel per kind of target and one point per case."""
     with saved_figure(path, 2, 2, sharex=True, sharey=True, figsize=(10, 8)) as (figure, panels):
         for (prefix, target), axes in zip(TARGETS.items(), panels.flat, strict=True):
@@ -266,7 +266,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="number of processes")
     parser.add_argument("--to", type=Path, help="picture to write")
     arguments = parser.parse_args()
-    camera = CameraParams.preset(arguments.camera)
+    camera = Camera.make(arguments.camera)
     cases = [case for name in arguments.suites for case in find_suite(name).cases]
     items = Parallel(n_jobs=arguments.jobs)(delayed(frontier)(case, camera) for case in cases)
     families = dict(sorted(by_family(items).items()))

@@ -25,7 +25,7 @@ from recorded_levels import level_files
 
 from lgmd_gym.agents import make_agents
 from lgmd_gym.agents.policies.policy import Policy
-from lgmd_gym.camera.spec import plain_values
+from lgmd_gym.sensing.channel import plain_values
 from lgmd_gym.statistics.intervals import Rate
 from lgmd_gym.training.offline.dataset import OfflineDataset
 from lgmd_gym.training.offline.episodes import RecordedEpisode

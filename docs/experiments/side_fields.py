@@ -60,7 +60,7 @@ def film(family: str, camera: dict[str, Any], seed: int) -> np.ndarray:
     observation, _ = env.reset(seed=seed)
     frames, done = [], False
     while not done:
-        frames.append(observation["frame"].reshape(camera["shape"]))
+        frames.append(observation["frame"].reshape(camera["camera"]["shape"]))
         observation, _, terminated, truncated, _ = env.step(np.zeros(1, np.float32))
         done = terminated or truncated
     env.close()

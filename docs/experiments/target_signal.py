@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 from lgmd_gym.agents.rules import excitation
-from lgmd_gym.agents.sides import DETECTORS, NUM_SIDE_FIELDS, SIDE_COLUMNS, side_cameras
+from lgmd_gym.agents.sides import NEURONS, NUM_SIDE_FIELDS, SIDE_COLUMNS, side_cameras
 from lgmd_gym.training.offline.episodes import RecordedEpisode, record_parallel
 from lgmd_gym.training.offline.level_recorder import LevelRecorder
 
@@ -39,8 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, float]]:
     if options.levels < LEAST_LEVELS:
         parser.error(f"--levels must be at least {LEAST_LEVELS}, got {options.levels}")
     below = record(side_cameras(), options.levels, options.jobs)
-    detectors = {"all models": range(len(DETECTORS))} | {
-        f"{name} only": (index,) for index, name in enumerate(DETECTORS)
+    detectors = {"all models": range(len(NEURONS))} | {
+        f"{name} only": (index,) for index, name in enumerate(NEURONS)
     }
     areas = {f"below the horizon, {name}": areas_by_family(below, used) for name, used in detectors.items()}
     rotating = record(
@@ -59,9 +59,11 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, float]]:
 def cameras_at_the_horizon() -> list[dict[str, Any]]:
     """Return the fields at the sides with frames 40 px high around the horizon."""
     cameras = []
-    for camera in side_cameras():
+    for channel in side_cameras():
+        camera = channel["camera"]
         height, pitch = HORIZON[camera["name"].split("_")[0]]
-        cameras.append(camera | {"shape": [height, camera["shape"][1]], "pitch_deg": pitch})
+        shape, mount = [height, camera["shape"][1]], camera["mount"] | {"pitch_deg": pitch}
+        cameras.append(channel | {"camera": camera | {"shape": shape, "mount": mount}})
     return cameras
 
 
@@ -91,7 +93,7 @@ def areas_by_family(
 
     Args:
         pairs: Episodes with and without the target.
-        detectors: Indices in `DETECTORS` of the models in use.
+        detectors: Indices in `NEURONS` of the models in use.
     """
     rows, families = [], []
     for episode, without in pairs:
@@ -112,7 +114,7 @@ def areas_by_family(
 
 def features(episode: RecordedEpisode, time: int, detectors: Sequence[int]) -> np.ndarray:
     """Return the mean responses of the columns over the last frames before a decision, and the motion."""
-    shape = (-1, len(DETECTORS), NUM_SIDE_FIELDS * SIDE_COLUMNS)
+    shape = (-1, len(NEURONS), NUM_SIDE_FIELDS * SIDE_COLUMNS)
     columns = episode.observations["column_potential"][: time + 1].astype(np.float64).reshape(shape)
     responses = excitation(columns[:, list(detectors)]).reshape(time + 1, -1)
     levels = np.copysign(np.log1p(2.0 * np.abs(responses)), responses)

@@ -53,8 +53,11 @@ def film(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         Derotated frames, uint8, (T, height, width); |P| without and with derotation, (T, 2, height, width);
         and the yaw rate of the car, (T,) [rad/s].
     """
-    camera = next(item for item in side_cameras() if item["name"] == FIELD)
-    cameras = [camera | {"name": str(flag), "derotated": flag, "columns": 0} for flag in (False, True)]
+    channel = next(item for item in side_cameras() if item["name"] == FIELD)
+    cameras = [
+        channel["camera"] | {"name": str(flag), "gaze": {"kind": "path", "derotated": flag}}
+        for flag in (False, True)
+    ]
     env = gym.make("LGMD/RandomBraking-v0", families=[FAMILY], split="validation", camera=cameras)
     observation, _ = env.reset(seed=seed)
     sensors = env.get_wrapper_attr("sensors")

@@ -4,11 +4,10 @@ from bisect import bisect_right
 from collections.abc import Collection, Sequence
 from itertools import accumulate
 from numbers import Real
-from typing import Any
 
 import numpy as np
 
-from lgmd_gym.camera import CONDITIONS
+from lgmd_gym.camera.scene import WEATHERS
 from lgmd_gym.envs.families import LEVELS as DECLARED
 from lgmd_gym.envs.families.family import Level, make_scenario
 from lgmd_gym.envs.families.scenario import Scenario, without_target
@@ -51,24 +50,24 @@ alone, levels of the same number differ by the target only.
 """
 
 
-def check_levels(split: str, start_level: int, num_levels: int, conditions: Sequence[str]) -> tuple[int, int]:
+def check_levels(split: str, start_level: int, num_levels: int, weathers: Sequence[str]) -> tuple[int, int]:
     """Check the arguments of `RandomLevels`, and return the first level and the number of levels.
 
     Raises:
-        ValueError: If the split or a condition is unknown, or levels are outside the split.
+        ValueError: If the split or a weather is unknown, or levels are outside the split.
     """
     check_known("split", split, SPLITS)
-    check_conditions(conditions)
+    check_weathers(weathers)
     first = check_whole("start_level", start_level, 0, LEVELS - 1)
     return first, check_whole("num_levels", num_levels, 0, LEVELS - first)  # 0 for all
 
 
-def check_conditions(conditions: Sequence[str]) -> None:
-    """Raise ValueError for an unknown camera condition or an empty sequence."""
-    if not check_items("conditions", conditions, str):
-        raise ValueError("conditions needs at least one name, got none")
-    for condition in conditions:
-        check_known("condition", condition, CONDITIONS)
+def check_weathers(weathers: Sequence[str]) -> None:
+    """Raise ValueError for an unknown weather or an empty sequence."""
+    if not check_items("weathers", weathers, str):
+        raise ValueError("weathers needs at least one name, got none")
+    for weather in weathers:
+        check_known("weather", weather, WEATHERS)
 
 
 def check_families(families: Sequence[str] | None) -> tuple[str, ...]:
@@ -103,14 +102,14 @@ def level_generator(split: str, level: int, part: int = 0) -> np.random.Generato
     return np.random.default_rng([SPLITS.index(split), level, *([part] if part else [])])
 
 
-def draw_camera_fields(split: str, level: int, conditions: Sequence[str]) -> dict[str, Any]:
-    """Return the camera fields of a level: a condition, and the contrast of the ground texture in [0.5, 1.5].
+def draw_weather(split: str, level: int, weathers: Sequence[str]) -> tuple[str, float]:
+    """Return the weather of a level, and the contrast of the ground texture in [0.5, 1.5].
 
-    They are drawn from a separate random stream, so that the scenario does not depend on `conditions`.
+    They are drawn from a separate random stream, so that the scenario does not depend on `weathers`.
     """
     rng = level_generator(split, level, part=1)
     texture = float(rng.uniform(0.5, 1.5))
-    return {"condition": conditions[int(rng.integers(len(conditions)))], "texture": texture}
+    return weathers[int(rng.integers(len(weathers)))], texture
 
 
 def draw_scenario(rng: np.random.Generator, families: Collection[str] = ALL_FAMILIES) -> Scenario:

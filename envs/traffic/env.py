@@ -1,17 +1,16 @@
 """`TrafficEnv`: base of the traffic environments, with an IDM driver and an agent that can brake."""
 
-from collections.abc import Mapping
 from functools import partial
 from math import cos, inf
-from types import MappingProxyType
 from typing import Any, ClassVar, cast
 
 import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.abstract import AbstractEnv
 
+from lgmd_gym.camera.scene import Scene
 from lgmd_gym.envs import surrogate_safety
-from lgmd_gym.envs.appearance import Appearance, brake_of, world_number
+from lgmd_gym.envs.appearance import Appearance, brake_of
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.envs.spaces import ContinuousDemand, DiscreteDemand, EgoState, make_action
 from lgmd_gym.envs.surrogate_safety import required_deceleration
@@ -123,9 +122,9 @@ class TrafficEnv(EgoBrakeEnv):
 
     road: TrafficRoad
     appearance: Appearance = Appearance()
-    """World and camera condition of the next episodes."""
-    camera_overrides: Mapping[str, Any] = MappingProxyType({})
-    """Camera fields in place of those that `appearance` draws."""
+    """World, weather and road of the next episodes."""
+    scene: Scene = Scene()
+    """Scene of the present episode."""
     regulated: ClassVar[bool] = False
     """Whether cars give way at intersections of their routes (highway-env's rules)."""
     warm_up: ClassVar[float] = 4.0
@@ -195,9 +194,8 @@ class TrafficEnv(EgoBrakeEnv):
     def _reset(self) -> None:
         """Build the scene and simulate the warm-up; repeat until the warm-up is free of ego contact."""
         # A generator of its own: the draws of the traffic are the same in every world.
-        self.camera_fields = {**self.appearance.draw(self.np_random.spawn(1)[0]), **self.camera_overrides}
-        self.brake = self.episode_brake(brake_of(self.camera_fields))
-        self.camera_fields["max_deceleration"] = self.brake.max_deceleration
+        self.scene = self.appearance.draw(self.np_random.spawn(1)[0])
+        self.brake = self.episode_brake(brake_of(self.scene))
         while True:
             self._jam_steps = 0
             self._build()
@@ -262,7 +260,7 @@ class TrafficEnv(EgoBrakeEnv):
             "required_deceleration": required_deceleration(bodies),
             "target_speed": float(lead["speed"] * cos(lead["heading"] - ego.heading)) if index else inf,
             "distance": ego.travelled,
-            "world": world_number(self.camera_fields),
+            "world": self.scene.number,
         }
 
 

@@ -15,7 +15,6 @@ from lgmd_gym.benchmark.recorder import SeriesRecorder
 from lgmd_gym.benchmark.task import Result, Task, error_result, make_result, run_task
 from lgmd_gym.benchmark.units import Unit, group_key, make_once
 from lgmd_gym.benchmark.views import Views
-from lgmd_gym.camera import BIRDSEYE
 from lgmd_gym.engine.actions import Demands
 from lgmd_gym.engine.episodes import EpisodeQueue, Prepared
 from lgmd_gym.engine.simulation import Rates, Simulation
@@ -23,7 +22,6 @@ from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.info import INFO_KEYS
 from lgmd_gym.envs.registration import make_source
 from lgmd_gym.neuron import LGMDParams
-from lgmd_gym.sensing.cameras import make_cameras
 from lgmd_gym.sensing.frame_rate import camera_rate
 from lgmd_gym.sensing.sensor_array import SensorArray
 from lgmd_gym.sensing.spaces import SIGNALS
@@ -64,7 +62,7 @@ class BatchPlayer:
         self._sensor_config = task.sensor_config.for_agent(agent)
         source = make_source(task.case.environment, _scenario_arguments(arguments))
         self._env = env = BrakingEnv(source, config=arguments.get("config"))
-        if BIRDSEYE in make_cameras(self._sensor_config.arguments["camera"]):
+        if self._sensor_config.has_top_view:
             raise ValueError("the engine does not draw top views")
         self._simulation = self._make_simulation(env, arguments.get("fps"), num_envs)
         self._demands = Demands(env.action_type)

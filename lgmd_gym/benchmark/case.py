@@ -68,7 +68,7 @@ class Case:
 
     @property
     def appearance(self) -> dict[str, Any]:
-        """Arguments that set the appearance, such as `condition`."""
+        """Arguments that set the appearance, such as `weather`."""
         return {name: value for name, value in self.arguments if name in APPEARANCE}
 
     @property
@@ -129,7 +129,7 @@ class EpisodeRow(TypedDict):
 class Row(EpisodeRow):
     """Row of a suite of cases: the fields of the case, and the metrics, whose docstrings define them.
 
-    `test_speed` is null for a start from standstill and for levels. `light` is the camera condition that the
+    `test_speed` is null for a start from standstill and for levels. `light` is the weather that the
     case prescribes, null for that of the run. `avoided` and `speed_reduction` are null without a threat; the
     types are those of a threat without an error.
     """
@@ -218,7 +218,7 @@ def scenario_case(
         variant: Last part of the case's name.
         scenario: The scenario, which states the family.
         fcw_driver: See `Case`.
-        **arguments: Further arguments of the environment, such as `condition`.
+        **arguments: Further arguments of the environment, such as `weather`.
     """
     values = {SCENARIO_ARGUMENT: scenario_to_data(scenario)} | arguments
     return Case(suite, scenario.family, variant, tuple(values.items()), SCENARIO, fcw_driver)
@@ -275,7 +275,7 @@ def new_row(
 def case_fields(case: Case) -> dict[str, Any]:
     """Return the `CASE_KEYS` of a case."""
     speed = None if case.argument("from_stop") else case.speed
-    names = ("target_speed", "overlap", "impact_location", "side", "condition")
+    names = ("target_speed", "overlap", "impact_location", "side", "weather")
     values = (case.family, speed, *map(case.argument, names), case.load or None)
     return dict(zip(CASE_KEYS, values, strict=True))
 

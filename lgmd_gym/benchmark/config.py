@@ -19,14 +19,14 @@ from lgmd_gym.benchmark.case import NO_BRAKE, TRAFFIC, RowKey, Suite, traffic_ca
 from lgmd_gym.benchmark.case_table import read_data
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import OWN, Source, copy_suite, get_suite, is_file
-from lgmd_gym.camera import CLEAR, CONDITIONS, CameraSpec
-from lgmd_gym.camera.spec import check_camera
+from lgmd_gym.camera.scene import CLEAR, WEATHERS
 from lgmd_gym.camera.worlds import SPLIT_WORLDS, WORLDS
 from lgmd_gym.envs.appearance import MIXED, Appearance
 from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.registration import TRAFFIC_KINDS
 from lgmd_gym.errors import as_tuple, check_items, check_keys, check_known, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
+from lgmd_gym.sensing.channel import ChannelSpec, make_channels
 
 PACKAGES = ("numpy", "numba", "gymnasium", "highway-env", "joblib")
 
@@ -103,7 +103,7 @@ class RunConfig:
         agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
         seeds: Number of seeds, >= 1; for traffic, of every kind.
         first_seed: First seed, >= 0.
-        conditions: Camera conditions by name, or "mixed" for that of each world; the suite is run under each.
+        conditions: Weathers by name, or "mixed" for that of each world; the suite is run under each.
         worlds: Number of worlds, over which the runs of each case are distributed; 0 for the laboratory.
         first_world: Number of the first world.
         road: Road that moves the car's body, see `Appearance`.
@@ -125,7 +125,7 @@ class RunConfig:
     worlds: int = 20
     first_world: int = SPLIT_WORLDS["test"].start
     road: str | None = None
-    camera: CameraSpec | None = None
+    camera: ChannelSpec | None = None
     params: NeuronSpec = None
     kinds: tuple[str, ...] | None = None
     modules: tuple[str, ...] = ()
@@ -135,14 +135,14 @@ class RunConfig:
         if self.kinds is not None and self.suite != TRAFFIC:
             raise ValueError(f"kinds applies to suite 'traffic' only, got suite {shown(self.suite)}")
         if self.camera is not None:
-            check_camera(self.camera)
+            make_channels(self.camera)
         LGMDParams.make(self.params)
         plain = SensorConfig(self.camera, self.params).plain
         values: dict[str, Any] = {
             "seeds": check_whole("seeds", self.seeds, 1),
             "first_seed": check_whole("first_seed", self.first_seed, 0),
             "agents": _names("agents", self.agents),
-            "conditions": _names("conditions", self.conditions, "camera condition", (*CONDITIONS, MIXED)),
+            "conditions": _names("conditions", self.conditions, "weather", (*WEATHERS, MIXED)),
             "worlds": check_whole("worlds", self.worlds, 0, WORLDS),
             "first_world": check_whole("first_world", self.first_world, 0, WORLDS - max(self.worlds, 1)),
             "modules": tuple(dict.fromkeys(check_items("modules", self.modules, str, "strings"))),
@@ -173,16 +173,18 @@ class RunConfig:
 
     @property
     def sensor_config(self) -> SensorConfig:
-        """Camera and neuron parameters, without a condition."""
+        """Camera and neuron parameters."""
         return SensorConfig(self.camera, self.params)
 
     def sensors(self, condition: str) -> SensorConfig:
-        """Return camera and neuron parameters under a condition; the environment sets a mixed one.
+        """Return camera and neuron parameters for a weather, which the environment shows.
 
         Raises:
-            ValueError: If the condition is unknown or the camera supports none.
+            ValueError: If a camera is a top view, which shows no weather.
         """
-        return self.sensor_config.with_condition(CLEAR if condition == MIXED else condition)
+        if condition not in (CLEAR, MIXED) and self.sensor_config.has_top_view:
+            raise ValueError(f"camera 'birdseye' does not support condition {condition!r}; use 'clear'")
+        return self.sensor_config
 
     def get_suite(self) -> Suite:
         """Return the suite; that of traffic has no fixed cases."""

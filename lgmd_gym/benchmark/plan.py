@@ -174,7 +174,7 @@ class TrafficPlan(Plan):
                     if agents:
                         world = self.config.world(seed, index)
                         chosen = LABORATORY if world is None else world
-                        appearance = Appearance(world=chosen, condition=condition, road=self.config.road)
+                        appearance = Appearance(world=chosen, weather=condition, road=self.config.road)
                         drives.append(Drive(kind, seed, agents, appearance))
             for first in range(0, len(drives), DRIVES_PER_TASK):
                 batch = tuple(drives[first : first + DRIVES_PER_TASK])

@@ -27,7 +27,7 @@ arguments = { ego_speed = 13.89, target_speed = 5.56 }
 [[cases]]
 family = "parked"                   # any name
 name = "v30"                        # mine/parked/v30
-arguments = { condition = "night" }
+arguments = { weather = "night" }
 [cases.scenario]                    # a scenario of one's own, see `lgmd_gym.envs.families.data`
 ego_speed = 8.33
 duration = 9.0

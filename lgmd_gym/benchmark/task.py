@@ -12,7 +12,7 @@ from lgmd_gym.benchmark.episode import Episode, make_env, play
 from lgmd_gym.benchmark.fcw_driver import FCWDriver
 from lgmd_gym.benchmark.metrics import KEYS, Counterfactual, make_row
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.camera import CLEAR
+from lgmd_gym.camera.scene import CLEAR
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.registration import RANDOM
 
@@ -25,9 +25,9 @@ class Task:
         agent: Agent string.
         case: Case to run.
         seed: Seed of the environment and the agent.
-        sensor_config: Camera and neuron parameters under the condition.
+        sensor_config: Camera and neuron parameters.
         counterfactual: Outcome of `no-brake`; None for `no-brake` itself.
-        condition: Name of the camera condition, for the row.
+        condition: Name of the weather.
         world: Number of the world; None for the laboratory.
         road: Road that moves the car's body, see `Appearance`.
     """
@@ -43,12 +43,15 @@ class Task:
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """Arguments of the environment: those of the case, and world, road and condition of the run."""
+        """Arguments of the environment: those of the case, and world, road and weather of the run."""
         chosen: dict[str, Any] = {} if self.road is None else {"road": self.road}
+        own = self.case.environment == RANDOM  # a level has a world and a weather of its own
+        if not own:
+            chosen["weather"] = self.condition
         if self.world is None:
             chosen["world"] = LABORATORY
-        elif self.case.environment != RANDOM:  # a level has a world and a condition of its own
-            chosen |= {"world": self.world, "condition": self.condition}
+        elif not own:
+            chosen["world"] = self.world
         return chosen | dict(self.case.arguments)
 
     @property

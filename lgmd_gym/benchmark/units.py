@@ -10,8 +10,8 @@ from uuid import uuid4
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.task import Task
-from lgmd_gym.camera import CameraParams
-from lgmd_gym.sensing.cameras import make_cameras
+from lgmd_gym.camera import Camera
+from lgmd_gym.sensing.channel import make_channels
 
 MAX_TASKS = 64  # tasks of a unit, whose results leave a worker process together
 
@@ -74,7 +74,7 @@ def _pixels(group: list[Task]) -> int:
     task = group[0]
     try:
         sensors = task.sensor_config.for_agent(make_agent(task.agent)).arguments
-        cameras = make_cameras(sensors["camera"]).values()
+        cameras = [channel.camera for channel in make_channels(sensors["camera"])]
     except (Exception, SystemExit):
         return 0
-    return sum(math.prod(item.shape) for item in cameras if isinstance(item, CameraParams))
+    return sum(math.prod(item.shape) for item in cameras if isinstance(item, Camera))

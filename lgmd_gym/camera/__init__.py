@@ -1,19 +1,32 @@
 """Greyscale camera frames of a highway-env road: the view from the ego car and a top view."""
 
 from lgmd_gym.camera.birdseye import BirdsEye
+from lgmd_gym.camera.camera import (
+    PRESETS,
+    AlongPath,
+    Camera,
+    CameraItem,
+    Fixed,
+    ImageSensor,
+    Mount,
+    ToStoppingPoint,
+)
 from lgmd_gym.camera.ego import EgoCamera
-from lgmd_gym.camera.params import CLEAR, CONDITIONS, PRESETS, CameraParams
-from lgmd_gym.camera.spec import BIRDSEYE, CameraItem, CameraSpec, with_condition
+from lgmd_gym.camera.scene import CLEAR, WEATHERS, Scene, Weather
 
 __all__ = [
-    "BIRDSEYE",
     "CLEAR",
-    "CONDITIONS",
     "PRESETS",
+    "WEATHERS",
+    "AlongPath",
     "BirdsEye",
+    "Camera",
     "CameraItem",
-    "CameraParams",
-    "CameraSpec",
     "EgoCamera",
-    "with_condition",
+    "Fixed",
+    "ImageSensor",
+    "Mount",
+    "Scene",
+    "ToStoppingPoint",
+    "Weather",
 ]

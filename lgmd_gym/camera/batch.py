@@ -1,46 +1,52 @@
 """CameraBatch: cameras of one frame size on the egos of many environments."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.camera.aim import FIXED, GAZES
-from lgmd_gym.camera.effects import LOOK, beam_profile, in_world, look_of, texture_gains
-from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.camera import Camera
+from lgmd_gym.camera.effects import LOOK, beam_profile, in_scene, look_of, texture_gains
 from lgmd_gym.camera.pinhole import LENS
-from lgmd_gym.camera.pose import MOUNT, mount_of
+from lgmd_gym.camera.pose import FIXED, GAZE_NUMBERS, MOUNT, USUAL_BRAKE, mount_of
 from lgmd_gym.camera.render.buffers import Views
 from lgmd_gym.camera.render.raster import SharedTables, Workspace, draw_cameras, tables_key
 from lgmd_gym.camera.render.sensor import STATE_SIZE
+from lgmd_gym.camera.scene import Scene
 from lgmd_gym.kernels.bundle import Bundle
 
 
 class _Prepared(NamedTuple):
-    """What the kernels read of one camera's parameters."""
+    """What the kernels read of one camera in a scene."""
 
     mount: np.ndarray
     look: np.ndarray
     beam: np.ndarray
     tables_key: tuple[Any, ...]
-    params: CameraParams
+    camera: Camera  # in the scene
 
 
 @lru_cache(maxsize=512)
-def _prepare(p: CameraParams) -> _Prepared:
-    p = in_world(p)
-    return _Prepared(mount_of(p), look_of(p), beam_profile(p), tables_key(p), p)
+def _prepare(camera: Camera, scene: Scene, max_deceleration: float) -> _Prepared:
+    camera = in_scene(camera, scene)
+    return _Prepared(
+        mount=mount_of(camera, scene, max_deceleration),
+        look=look_of(camera, scene),
+        beam=beam_profile(camera),
+        tables_key=tables_key(camera, scene),
+        camera=camera,
+    )
 
 
 class CameraBatch:
     """Cameras of one frame size on the egos of many environments, drawn by one compiled call.
 
     Args:
-        params: Parameters of the cameras (the members of the batch), the same for every environment at
-            first; None for a member that is drawn by other means.
+        cameras: The cameras (the members of the batch), in the laboratory at first; None for a member that is
+            drawn by other means.
         shape: `(height, width)` of the frames [px].
-        cameras: Index of each member in the spans of the roads.
         num_envs: Number of environments.
 
     Attributes:
@@ -50,15 +56,13 @@ class CameraBatch:
 
     def __init__(
         self,
-        params: Sequence[CameraParams | None],
+        cameras: Sequence[Camera | None],
         shape: tuple[int, int],
-        cameras: Sequence[int] = (0,),
         num_envs: int = 1,
     ) -> None:
-        self.shape = shape
-        size = (num_envs, len(params))
+        self.shape, self._cameras = shape, tuple(cameras)
+        size = (num_envs, len(cameras))
         self.lenses = np.zeros((*size, 2), LENS)
-        self._cameras = np.array(cameras, dtype=np.int64)
         self._mounts = np.zeros(size, MOUNT)
         self._tables_indices = np.full(size, -1, dtype=np.int64)
         self._views = Views(
@@ -69,38 +73,45 @@ class CameraBatch:
             noise_starts=np.zeros(size, dtype=np.int64),
             exposures=np.full((*size, STATE_SIZE), np.nan),
         )
-        # Index of the tables, camera, mount and lenses of each camera, and the fields of its view.
-        self._bundle = Bundle(
-            self._tables_indices, self._cameras, self._mounts, self.lenses, tuple(self._views)
-        )
+        # Index of the tables, mount and lenses of each camera, and the fields of its view.
+        self._bundle = Bundle(self._tables_indices, self._mounts, self.lenses, tuple(self._views))
         self._tables: dict[tuple[Any, ...], tuple[int, SharedTables]] = {}
         self._next_index = 0
-        for member, p in enumerate(params):
-            if p is not None:
-                self.set_params(slice(None), member, p)
+        self.set_scene(slice(None), Scene())
 
-    def set_params(
-        self, index: int | slice, member: int, p: CameraParams, texture: float | None = None
-    ) -> None:
-        """Set the parameters of one camera.
+    def set_scene(self, index: int | slice, scene: Scene, max_deceleration: float = USUAL_BRAKE) -> None:
+        """Set the scene of an environment.
 
         Args:
             index: Environment, or a slice of the environments.
-            member: Index of the camera in the batch.
-            p: Its parameters, of the shape of the batch.
-            texture: Contrast of the ground in place of that of `p`.
+            scene: The scene.
+            max_deceleration: Full braking of the car [m/s²].
+
+        Raises:
+            ValueError: If a camera does not fit the scene, see `in_scene`.
         """
-        prepared = _prepare(p)
+        # Environments draw the texture at random, and it changes two numbers only.
+        plain = scene if scene.texture == 1.0 else replace(scene, texture=1.0)
+        for member, camera in enumerate(self._cameras):
+            if camera is not None:
+                prepared = _prepare(camera, plain, max_deceleration)
+                self._set(index, member, prepared, texture_gains(scene, prepared.camera.sensor.linear_light))
+                self._use_tables(index, member, prepared, plain)
+
+    def _set(self, index: int | slice, member: int, prepared: _Prepared, gains: Mapping[str, float]) -> None:
+        """Write what the kernels read of one camera."""
         self._mounts[index, member] = prepared.mount
         self._views.looks[index, member] = prepared.look
         self._views.beams[index, member] = prepared.beam
         self._views.sky_aims[index, member] = np.nan  # redraw the sky
         self._views.exposures[index, member] = np.nan  # adapt to the next frame
-        if texture is not None:
-            for name, gain in texture_gains(prepared.params, texture).items():
-                self._views.looks[name][index, member] = gain
+        for name, gain in gains.items():
+            self._views.looks[name][index, member] = gain
+
+    def _use_tables(self, index: int | slice, member: int, prepared: _Prepared, scene: Scene) -> None:
+        """Select the lookup tables of one camera, and drop those that no camera uses any more."""
         if prepared.tables_key not in self._tables:
-            self._tables[prepared.tables_key] = self._next_index, SharedTables(prepared.params)
+            self._tables[prepared.tables_key] = self._next_index, SharedTables(prepared.camera, scene)
             self._next_index += 1
         used = self._tables[prepared.tables_key][0]
         if not np.all(self._tables_indices[index, member] == used):
@@ -108,19 +119,20 @@ class CameraBatch:
             in_use = set(self._tables_indices.ravel().tolist())
             self._tables = {key: item for key, item in self._tables.items() if item[0] in in_use}
 
-    def turn(self, index: int, member: int, p: CameraParams, gaze: tuple[float, float] | None) -> None:
-        """Turn a camera relative to its mount, in place of the gaze of its parameters `p`.
+    def turn(self, member: int, scene: Scene, turn: tuple[float, float] | None) -> None:
+        """Turn a camera of the first environment relative to its mount, in place of its gaze.
 
         Args:
-            index: Environment.
             member: Index of the camera in the batch.
-            p: Its parameters.
-            gaze: Turn to the right and upwards [degrees]; None for the gaze of the parameters.
+            scene: The scene.
+            turn: Turn to the right and upwards [degrees]; None for the gaze of the camera.
         """
-        mount, mounted = self._mounts[index, member], _prepare(p).mount
-        right, up = gaze or (0.0, 0.0)
+        camera = self._cameras[member]
+        assert camera is not None
+        mount, mounted = self._mounts[0, member], mount_of(in_scene(camera, scene), scene)
+        right, up = turn or (0.0, 0.0)
         mount["yaw_deg"], mount["pitch_deg"] = mounted["yaw_deg"] + right, mounted["pitch_deg"] + up
-        mount["gaze"] = GAZES[p.gaze] if gaze is None else FIXED
+        mount["gaze"] = GAZE_NUMBERS[camera.gaze.kind] if turn is None else FIXED
 
     def draw(
         self,

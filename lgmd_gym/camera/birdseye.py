@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.camera.camera import MAX_WIDTH
 from lgmd_gym.camera.ego import check_frame
-from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.errors import check_within
+from lgmd_gym.errors import check_size, check_within
 
 
 class BirdsEye:
@@ -19,12 +19,15 @@ class BirdsEye:
     Args:
         shape: `(height, width)` [px].
         scaling: Pixels per metre; None shows as many metres across as the environment's own rendering.
+
+    Attributes:
+        scaling: The same.
     """
 
     def __init__(self, shape: tuple[int, int] = (90, 160), scaling: float | None = None) -> None:
-        self._shape = CameraParams(shape=shape).shape
+        self._shape = check_size("camera shape", shape, 4, MAX_WIDTH)
         in_range = None if scaling is None else check_within("scaling", scaling, 1e-3, 1e3, "px/m")
-        self._scaling = in_range
+        self.scaling = in_range
         self._viewer: Any = None
         self._oversampling = 1
         self._env: Any = None
@@ -76,7 +79,7 @@ class BirdsEye:
         config = base.config
         # The viewer's lines are at least a pixel wide: draw at the environment's resolution, then average.
         self._oversampling = max(1, -(-config["screen_width"] // width))
-        scaling = self._scaling
+        scaling = self.scaling
         if scaling is None:
             scaling = config.get("scaling", 5.5) * width / config["screen_width"]
         viewer = EnvViewer(

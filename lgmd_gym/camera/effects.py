@@ -6,8 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from lgmd_gym.camera.params import MAX_WIDTH, CameraParams
+from lgmd_gym.camera.camera import MAX_WIDTH, Camera, ImageSensor, ToStoppingPoint
+from lgmd_gym.camera.scene import SKYLINE, Scene, Weather
 from lgmd_gym.camera.worlds import World, draw_world
+from lgmd_gym.errors import shown
 
 LOOK = np.dtype(
     [
@@ -49,7 +51,7 @@ BEAM_WIDTH = 0.26  # the headlights fall to 1/e at this tangent of the angle fro
 LOW_BEAM, UPPER_BEAM = (26.0, 0.05), (90.0, 1.0)
 WHITE = 255.0  # grey level and light
 SHOT_NOISE, READ_NOISE = 1.2, 0.8
-"""Usual noise of the sensor in numbered worlds, see `CameraParams`."""
+"""Usual noise of the sensor in numbered worlds, see `ImageSensor`."""
 _GLARE = 700.0  # light that is scattered in the direction of a low sun
 _WET_ASPHALT, _WET_VERGE, _WET_PAINT = 0.78, 0.85, 0.9  # grey of a wet surface over that of a dry one
 # Glass beads return headlights: a marking has at least 100 mcd/(m² lx) (EN 1436), asphalt 10 to 20. By day
@@ -65,111 +67,125 @@ NOISE_LOG2 = 17
 """Binary logarithm of the number of different numbers in the noise table."""
 
 
-def in_world(p: CameraParams) -> CameraParams:
-    """Return a camera with the sensor of its world: linear light, noise and automatic exposure.
+def in_scene(camera: Camera, scene: Scene) -> Camera:
+    """Return a camera with the sensor and the height of the lens that a scene determines.
 
-    The noise replaces that of `p`, also that of a condition: at night it grows with the gain of the exposure.
+    In a world: linear light, noise and automatic exposure; the noise replaces that of camera and weather, as
+    it grows with the gain of the exposure. In the laboratory: at least the noise of the weather.
+
+    Raises:
+        ValueError: If the scene has a panorama and the camera the gaze `ToStoppingPoint`, which zooms.
     """
-    world = draw_world(p.world)
-    if not world.drawn:
-        return p
-    return replace(
-        p,
-        linear_light=True,
-        auto_exposure_s=p.auto_exposure_s or world.exposure_s,
-        shot_noise=SHOT_NOISE * world.noise,
-        read_noise=READ_NOISE * world.noise,
-    )
+    if scene.panorama != SKYLINE and isinstance(camera.gaze, ToStoppingPoint):
+        raise ValueError(
+            f"scene panorama must be {SKYLINE!r} with the gaze 'stopping' of camera {camera.name!r}, got "
+            f"{shown(scene.panorama)}"
+        )
+    world, weather, sensor, mount = draw_world(scene.world), scene.weather, camera.sensor, camera.mount
+    if world.drawn:
+        sensor = replace(
+            sensor,
+            linear_light=True,
+            auto_exposure_s=sensor.auto_exposure_s or world.exposure_s,
+            shot_noise=SHOT_NOISE * world.noise,
+            read_noise=READ_NOISE * world.noise,
+        )
+    elif weather.shot_noise > sensor.shot_noise or weather.read_noise > sensor.read_noise:
+        sensor = replace(
+            sensor,
+            shot_noise=max(sensor.shot_noise, weather.shot_noise),
+            read_noise=max(sensor.read_noise, weather.read_noise),
+        )
+    if scene.mount_height_m is not None:
+        mount = replace(mount, height_m=scene.mount_height_m)
+    if sensor is camera.sensor and mount is camera.mount:
+        return camera
+    return replace(camera, sensor=sensor, mount=mount)
 
 
-def look_of(p: CameraParams) -> np.ndarray:
-    """Return the appearance of the world for a camera, a `LOOK` record of shape ()."""
-    look, world = np.zeros((), LOOK), draw_world(p.world)
-    look["asphalt"] = to_light(p, _wet(p, world.asphalt_grey, _WET_ASPHALT))
-    look["verge"] = to_light(p, _wet(p, world.verge_grey, _WET_VERGE))
-    look["paint"] = to_light(p, _wet(p, world.paint_grey, _WET_PAINT))
-    if world.drawn and p.light == "night" and not p.wet:
+def look_of(camera: Camera, scene: Scene) -> np.ndarray:
+    """Return the appearance of the world for a camera in its scene, a `LOOK` record of shape ()."""
+    look, world, weather = np.zeros((), LOOK), draw_world(scene.world), scene.weather
+    linear, night = camera.sensor.linear_light, weather.light == "night"
+    look["asphalt"] = to_light(_wet(weather, world.asphalt_grey, _WET_ASPHALT), linear)
+    look["verge"] = to_light(_wet(weather, world.verge_grey, _WET_VERGE), linear)
+    look["paint"] = to_light(_wet(weather, world.paint_grey, _WET_PAINT), linear)
+    if world.drawn and night and not weather.wet:
         look["paint"] *= _RETRO_REFLECTION
-    for name, gain in texture_gains(p, p.texture).items():
+    for name, gain in texture_gains(scene, linear).items():
         look[name] = gain
     look["line_width"], (look["dash"], look["dash_period"]) = world.line_width, world.dash
-    _set_sky(look, p, world)
-    _set_sun(look, p, world)
-    _set_sensor(look, p)
-    look["night"], look["wet"] = float(p.light == "night"), float(p.wet)
+    _set_sky(look, weather, world, linear)
+    _set_sun(look, weather, world)
+    _set_sensor(look, camera.sensor, world, night)
+    look["night"], look["wet"] = float(night), float(weather.wet)
     look["night_light"], look["beam_gain"] = world.street_light, world.beam
-    look["beam_reach"], look["beam_stray"] = UPPER_BEAM if p.upper_beam else LOW_BEAM
-    if p.visibility_m > 0.0:
+    look["beam_reach"], look["beam_stray"] = UPPER_BEAM if weather.upper_beam else LOW_BEAM
+    if weather.visibility_m > 0.0:
         # Koschmieder: 5 % of the contrast remains at the visibility.
-        look["extinction"] = math.log(20.0) / p.visibility_m
-        remaining, haze = far_transmission(p), look["haze"]
+        look["extinction"] = math.log(20.0) / weather.visibility_m
+        remaining, haze = far_transmission(weather), look["haze"]
         for name in ("zenith", "horizon", "hills", "trees"):
             look[name] = haze + remaining * (look[name] - haze)
         look["leaf_gain"] *= remaining
-        if p.light == "night":
-            look["veil"] = to_light(p, _FOG_GREY) * world.beam
-            look["lamps_ahead"] = max(p.mount_setback, 0.0)
+        if night:
+            look["veil"] = to_light(_FOG_GREY, linear) * world.beam
+            look["lamps_ahead"] = max(camera.mount.setback_m, 0.0)
     return look
 
 
-def to_light(p: CameraParams, grey: float) -> float:
+def to_light(grey: float, linear: bool) -> float:
     """Return the light of a display-coded grey level; both are 255 for white."""
-    return grey * grey / WHITE if p.linear_light else grey
+    return grey * grey / WHITE if linear else grey
 
 
-def _slope(p: CameraParams, grey: float) -> float:
+def _slope(grey: float, linear: bool) -> float:
     """Return the change of light per grey level at a display-coded grey level."""
-    return 2.0 * grey / WHITE if p.linear_light else 1.0
+    return 2.0 * grey / WHITE if linear else 1.0
 
 
-def texture_gains(p: CameraParams, texture: float) -> dict[str, float]:
-    """Return the fields of `LOOK` that the contrast of asphalt and verge determines.
-
-    Args:
-        p: Parameters of the camera.
-        texture: Contrast, in place of that of `p`.
-    """
-    world = draw_world(p.world)
-    asphalt, verge = _wet(p, world.asphalt_grey, _WET_ASPHALT), _wet(p, world.verge_grey, _WET_VERGE)
+def texture_gains(scene: Scene, linear: bool) -> dict[str, float]:
+    """Return the fields of `LOOK` that the contrast of asphalt and verge determines."""
+    world, texture = draw_world(scene.world), scene.texture
+    asphalt = _wet(scene.weather, world.asphalt_grey, _WET_ASPHALT)
+    verge = _wet(scene.weather, world.verge_grey, _WET_VERGE)
     return {
-        "asphalt_gain": 9.0 * texture * world.asphalt_contrast * _TEXTURE_GAIN * _slope(p, asphalt),
-        "verge_gain": 16.0 * texture * world.verge_contrast * _TEXTURE_GAIN * _slope(p, verge),
+        "asphalt_gain": 9.0 * texture * world.asphalt_contrast * _TEXTURE_GAIN * _slope(asphalt, linear),
+        "verge_gain": 16.0 * texture * world.verge_contrast * _TEXTURE_GAIN * _slope(verge, linear),
     }
 
 
-def _set_sensor(look: np.ndarray, p: CameraParams) -> None:
+def _set_sensor(look: np.ndarray, sensor: ImageSensor, world: World, night: bool) -> None:
     """Set noise and exposure."""
-    night = p.light == "night"
-    look["shot_noise"], look["read_noise"] = p.shot_noise, p.read_noise
-    look["shutter_s"] = p.shutter_s
-    look["linear"], look["auto_exposure_s"] = float(p.linear_light), p.auto_exposure_s
-    world = draw_world(p.world)
+    look["shot_noise"], look["read_noise"] = sensor.shot_noise, sensor.read_noise
+    look["shutter_s"] = sensor.shutter_s
+    look["linear"], look["auto_exposure_s"] = float(sensor.linear_light), sensor.auto_exposure_s
     look["target_grey"] = (world.night_exposure if night else 1.0) * world.exposure_grey
-    look["contrast"], look["contrast_s"] = world.contrast, p.contrast_s
+    look["contrast"], look["contrast_s"] = world.contrast, sensor.contrast_s
     look["least_gain"], look["most_gain"] = (0.5, 6.0) if night else (0.25, 8.0)
 
 
-def _wet(p: CameraParams, grey: float, darkening: float) -> float:
+def _wet(weather: Weather, grey: float, darkening: float) -> float:
     """Return the grey of a surface, multiplied by `darkening` if it is wet."""
-    return grey * darkening if p.wet else grey
+    return grey * darkening if weather.wet else grey
 
 
-def _set_sky(look: np.ndarray, p: CameraParams, world: World) -> None:
+def _set_sky(look: np.ndarray, weather: Weather, world: World, linear: bool) -> None:
     """Set the light of sky, skyline and fog."""
     greys = (*world.greys, world.leaf_contrast)
-    if p.light == "night":
+    if weather.light == "night":
         # In numbered worlds street lamps light the sky.
         glow = math.sqrt(world.street_light / 0.04) if world.drawn else 1.0
         greys = tuple(glow * grey for grey in (6.0, 14.0, 7.0, 4.0, 1.0))
     names = ("zenith", "horizon", "hills", "trees")
     for name, grey in zip(names, greys, strict=False):
-        look[name] = to_light(p, grey)
-    look["leaf_gain"] = greys[4] * _slope(p, greys[3])
+        look[name] = to_light(grey, linear)
+    look["leaf_gain"] = greys[4] * _slope(greys[3], linear)
     look["hill_scale"], look["tree_scale"] = world.hill_scale, world.tree_scale
-    look["haze"] = to_light(p, haze_grey(p))
+    look["haze"] = to_light(haze_grey(weather), linear)
 
 
-def _set_sun(look: np.ndarray, p: CameraParams, world: World) -> None:
+def _set_sun(look: np.ndarray, weather: Weather, world: World) -> None:
     """Set the direction of the sun, the light on faces, and shadows."""
     if not world.drawn:
         look["sun_x"], look["sun_y"], look["sun_z"] = _LABORATORY_SUN
@@ -177,15 +193,15 @@ def _set_sun(look: np.ndarray, p: CameraParams, world: World) -> None:
         # Three rings of 0.22 around a shadow that leans away from the sun.
         values = (0.22, -0.12 / _LABORATORY_SUN[2], -0.08, 0.16, 3.0, 1.0, 0.75)
     else:
-        azimuth, elevation, share = sun_of(p, world)
+        azimuth, elevation, share = sun_of(weather, world)
         level = math.cos(elevation)
         look["sun_x"], look["sun_y"] = level * math.cos(azimuth), level * math.sin(azimuth)
         look["sun_z"] = math.sin(elevation)
         # A vertical face receives light from half of the sky and from the ground.
         look["ambient"], look["direct"] = 0.12 + 0.55 * (1.0 - share), share / math.sin(elevation)
-        look["cast"], look["glare"] = share, _GLARE if p.light == "low_sun" and share > 0.0 else 0.0
+        look["cast"], look["glare"] = share, _GLARE if weather.light == "low_sun" and share > 0.0 else 0.0
         # From 0.1 m inside the outline of a car to 0.5 m outside it; a box has a shadow at its edges only.
-        rings, missing = 7, world.under_body * (0.6 if p.light == "night" else 1.0)
+        rings, missing = 7, world.under_body * (0.6 if weather.light == "night" else 1.0)
         values = (missing / rings, 0.0, -0.1, 0.1, rings, 0.2, 0.95)
         look["under_road"] = look["asphalt"] * (1.0 - missing)
     names = (
@@ -196,12 +212,12 @@ def _set_sun(look: np.ndarray, p: CameraParams, world: World) -> None:
         look[name] = value
 
 
-def sun_of(p: CameraParams, world: World) -> tuple[float, float, float]:
+def sun_of(weather: Weather, world: World) -> tuple[float, float, float]:
     """Return azimuth and elevation of the sun [rad], and its share of the light on the road."""
     azimuth, elevation, share = world.sun_azimuth_deg, world.sun_elevation_deg, world.sun_share
-    if p.light == "night" or p.wet or p.visibility_m > 0.0:
+    if weather.light == "night" or weather.wet or weather.visibility_m > 0.0:
         share = 0.0
-    elif p.light == "low_sun":
+    elif weather.light == "low_sun":
         # Within 25° of +x, where roads lead, 4° to 12° above the horizon.
         azimuth = 25.0 * (azimuth / 180.0 - 1.0)
         elevation = 4.0 + 8.0 * (elevation - 18.0) / 44.0
@@ -209,20 +225,20 @@ def sun_of(p: CameraParams, world: World) -> tuple[float, float, float]:
     return math.radians(azimuth), math.radians(elevation), share
 
 
-def haze_grey(p: CameraParams) -> float:
+def haze_grey(weather: Weather) -> float:
     """Return the grey level of the fog."""
-    return 18.0 if p.light == "night" else 200.0
+    return 18.0 if weather.light == "night" else 200.0
 
 
-def far_transmission(p: CameraParams) -> float:
+def far_transmission(weather: Weather) -> float:
     """Return the share of the contrast of sky and skyline that remains behind 500 m of fog."""
-    return math.exp(-500.0 * math.log(20.0) / p.visibility_m)
+    return math.exp(-500.0 * math.log(20.0) / weather.visibility_m)
 
 
-def beam_profile(p: CameraParams) -> np.ndarray:
+def beam_profile(camera: Camera) -> np.ndarray:
     """Return the headlights' fall-off over the columns of a frame; float32, shape (width,)."""
-    width = p.shape[1]
-    tan = (np.arange(width) + 0.5 - 0.5 * width) / p.focal_px
+    width = camera.shape[1]
+    tan = (np.arange(width) + 0.5 - 0.5 * width) / camera.focal_px
     return np.exp(-((tan / BEAM_WIDTH) ** 2)).astype(np.float32)
 
 

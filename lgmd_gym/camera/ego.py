@@ -1,17 +1,19 @@
 """EgoCamera: the view from the ego car of a highway-env environment."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from lgmd_gym.camera.batch import CameraBatch
-from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.camera import Camera, CameraItem
+from lgmd_gym.camera.effects import in_scene
 from lgmd_gym.camera.pinhole import project
 from lgmd_gym.camera.render.buffers import Buffers
 from lgmd_gym.camera.render.raster import Workspace
 from lgmd_gym.camera.road_pool import RoadPool, road_key
+from lgmd_gym.camera.scene import Scene
 from lgmd_gym.camera.scene_table import SceneTable, view_of
-from lgmd_gym.camera.spec import CameraItem
 
 _UINT8 = np.dtype(np.uint8)
 
@@ -23,40 +25,46 @@ class EgoCamera:
     state give the same frame, in any process. The ego's own body is not drawn.
 
     Args:
-        params: A preset's name, `CameraParams`, a dict of its fields, or None for `wide`.
-        fields: Fields of `CameraParams` to change, or `condition`.
+        camera: A preset's name, a `Camera`, a mapping of its fields, or None for `wide`.
+        scene: A `Scene` or a mapping of its fields; None for the laboratory.
+        **changes: Fields of `Camera` to change.
+
+    Attributes:
+        camera: The camera.
+        scene: The scene.
 
     Example:
-        >>> EgoCamera("fovea", mount_height=1.4).params.hfov_deg
+        >>> EgoCamera("fovea", {"weather": "fog"}, mount={"height_m": 1.4}).camera.hfov_deg
         10.0
     """
 
-    def __init__(self, params: CameraItem | None = None, **fields: Any) -> None:
-        self._params = CameraParams.make(params, **fields)
-        self._stage: _Stage | None = _Stage(self._params)
+    def __init__(
+        self,
+        camera: CameraItem | None = None,
+        scene: Scene | Mapping[str, Any] | None = None,
+        **changes: Any,
+    ) -> None:
+        self.camera, self.scene = Camera.make(camera, **changes), Scene.make(scene)
+        self._stage: _Stage | None = _Stage(self.camera, self.scene)
         self._lens: Any = None
 
     @classmethod
-    def posed(cls, params: CameraParams, lens: Any) -> "EgoCamera":
+    def posed(cls, camera: Camera, scene: Scene, lens: Any) -> "EgoCamera":
         """Return a camera posed as in a frame that a `CameraBatch` has drawn.
 
         Args:
-            params: Parameters of the camera.
+            camera: The camera.
+            scene: The scene.
             lens: `LENS` record of the frame.
         """
-        camera = cls.__new__(cls)
-        camera._params, camera._stage, camera._lens = params, None, lens
-        return camera
-
-    @property
-    def params(self) -> CameraParams:
-        """The parameters of this camera."""
-        return self._params
+        posed = cls.__new__(cls)
+        posed.camera, posed.scene, posed._stage, posed._lens = camera, scene, None, lens
+        return posed
 
     @property
     def shape(self) -> tuple[int, int]:
         """`(height, width)` of the frames [px]."""
-        return self._params.shape
+        return self.camera.shape
 
     @property
     def buffers(self) -> Buffers:
@@ -77,15 +85,15 @@ class EgoCamera:
             env: A highway-env environment, wrapped or not, after its first reset.
             out: Frame to draw into, uint8, shape (height, width); a new one if None.
             gaze: Turn of the optical axis to the right and upwards on top of the mount, for this frame only
-                [degrees]; replaces the `path` gaze.
+                [degrees]; replaces the gaze of the camera.
 
         Raises:
             ValueError: If the environment has no road or ego yet, or a pose is not finite.
         """
         if out is None:
-            out = np.empty(self._params.shape, dtype=np.uint8)
+            out = np.empty(self.camera.shape, dtype=np.uint8)
         else:
-            check_frame(out, self._params.shape)
+            check_frame(out, self.camera.shape)
         stage = self._own_stage()
         stage.render(env, out, gaze)
         self._lens = stage.batch.lenses[0, 0, 0]
@@ -115,29 +123,30 @@ class EgoCamera:
 
     def _own_stage(self) -> "_Stage":
         if self._stage is None:
-            self._stage = _Stage(self._params)
+            self._stage = _Stage(self.camera, self.scene)
         return self._stage
 
 
 class _Stage:
     """What one camera needs to draw frames by itself."""
 
-    def __init__(self, p: CameraParams) -> None:
-        self.batch = CameraBatch([p], p.shape)
-        self.workspace = Workspace(p.shape)
-        self._params, self._keys = p, (road_key(p),)
-        self._scene_table, self._roads = SceneTable(), RoadPool(1, 1)
-        self._view = view_of([p])
+    def __init__(self, camera: Camera, scene: Scene) -> None:
+        self.batch = CameraBatch([camera], camera.shape)
+        self.batch.set_scene(0, scene)
+        self.workspace = Workspace(camera.shape)
+        self._scene, self._key = scene, road_key(scene)
+        self._scene_table, self._roads = SceneTable(), RoadPool(1)
+        self._view = view_of([in_scene(camera, scene)], scene)
         self._selected = np.ones((1, 1), np.bool_)
-        self._turned = False  # whether the last gaze replaced that of the parameters
+        self._turned = False  # whether the last frame had another gaze than that of the camera
 
     def render(self, env: Any, out: np.ndarray, gaze: tuple[float, float] | None) -> None:
         """Draw the present frame into `out`."""
         if gaze is not None or self._turned:
-            self.batch.turn(0, 0, self._params, gaze)
+            self.batch.turn(0, self._scene, gaze)
             self._turned = gaze is not None
         ego = self._scene_table.read(env, None if self._turned else self._view)
-        self._roads.assign(0, ego.road, self._keys)
+        self._roads.assign(0, ego.road, self._key)
         self.batch.draw(
             0,
             1,

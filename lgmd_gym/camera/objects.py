@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lgmd_gym.camera.env_state import Ego
 from lgmd_gym.camera.pose import side_tangent
-from lgmd_gym.camera.scene import Ego
 from lgmd_gym.kernels import kernel
 
 MAX_RANGE = 600.0

@@ -1,22 +1,15 @@
-"""Pose of a lens on the moving ego car: mount, gaze and motion of the car's body."""
+"""Pose of a lens on the moving ego car: mount, gaze, zoom and motion of the car's body.
+
+The gaze `ToStoppingPoint` keeps a part of the road in the frame that the car reaches when it brakes: its
+distance follows the ego's speed, and its direction the ego's steering angle. A frame of a given size then
+contains the same part of the lane at every speed. Other pixels of a real sensor are read; nothing moves.
+"""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
-from lgmd_gym.camera.aim import (
-    AIM,
-    GAZES,
-    PATH,
-    STOPPING,
-    aim_depth,
-    aim_focal,
-    aim_of,
-    aim_pitch,
-    aim_yaw,
-    path_yaw,
-    slip_and_yaw_rate,
-)
 from lgmd_gym.camera.body_motion import (
     HEAVE,
     PITCH,
@@ -26,11 +19,38 @@ from lgmd_gym.camera.body_motion import (
     residual_motion,
     road_gain,
 )
+from lgmd_gym.camera.camera import MIN_STOP, Camera, ToStoppingPoint
 from lgmd_gym.camera.effects import NOISE_LOG2
-from lgmd_gym.camera.params import ROADS, CameraParams
-from lgmd_gym.camera.worlds import World, draw_world
+from lgmd_gym.camera.scene import ROADS, Scene
+from lgmd_gym.camera.worlds import draw_world
 from lgmd_gym.kernels import kernel
 
+FIXED, PATH, STOPPING = 0, 1, 2  # values of `MOUNT.gaze`
+GAZE_NUMBERS = {"fixed": FIXED, "path": PATH, "stopping": STOPPING}
+MAX_TURN = math.radians(40.0)
+"""Bound of the turn towards the path [rad]."""
+USUAL_BRAKE = 9.0
+"""Deceleration of full braking in the laboratory [m/s²]."""
+CALIBRATED = 0.1
+"""Share of the errors of a calibrated mount that remains: 0.05° and 1 cm at most. An assumption: a car that
+drives for minutes measures the direction of its lens from the vanishing point of its own motion."""
+ESTIMATE_ERROR = 0.07
+"""Standard deviation of the car's estimate of its full braking in numbered worlds, as a share of the true
+deceleration; errors are at most twice as large. An assumption for an estimate of the friction from wheel
+slip, rain sensor and temperature."""
+_ESTIMATE_STREAM = 13  # second part of the seed, which separates the error from other draws of the same world
+_PATH_S = 1.0  # look-ahead time of the gaze `AlongPath` [s]
+_WET = 2.0 / 3.0  # deceleration on a wet road over that on a dry one
+_GYRO_DIVE = 0.02  # share of the dive that remains of a stabilised lens
+
+AIM = np.dtype(
+    [
+        *((name, np.float64) for name in ("reach", "span", "offset", "lift", "deceleration", "reaction")),
+        *((name, np.float64) for name in ("setback", "height", "width")),
+    ]
+)
+"""Aim of the gaze `ToStoppingPoint`, as the kernels read it: its fields; deceleration on the present road;
+height of the lens as the sensor knows it [m]; width of the frame [px]. Zeros for other gazes."""
 MOUNT = np.dtype(
     [
         *((name, np.float64) for name in ("setback", "left", "height", "yaw_deg", "pitch_deg")),
@@ -42,48 +62,118 @@ MOUNT = np.dtype(
 )
 """How a camera sits on the car and moves with it, as the kernels read it.
 
-The fields of `CameraParams`; amplitude of the road in `ROADS`; focal length and image centre [px]; gaze, see
-`camera.aim`; 1 for linear light, a stabilised lens, a derotated view, sensor noise, `vehicles="box"` and a
-numbered world.
+Fields of `Mount`, `Scene` and `ImageSensor`; amplitude of the road in `ROADS`; focal length and image centre
+[px]; gaze, see `GAZE_NUMBERS`; 1 for linear light, a stabilised lens, a derotated view, sensor noise,
+`vehicles="box"` and a numbered world.
 """
-CALIBRATED = 0.1
-"""Share of the errors of a calibrated mount that remains: 0.05° and 1 cm at most. An assumption: a car that
-drives for minutes measures the direction of its lens from the vanishing point of its own motion."""
-_GYRO_DIVE = 0.02  # share of the dive that remains of a stabilised lens
 
 
-def mount_of(p: CameraParams) -> np.ndarray:
-    """Return the `MOUNT` record of a camera, shape ()."""
-    height, width = p.shape
-    world = draw_world(p.world)
-    left, lens_height = (CALIBRATED if p.calibrated else 1.0), height_of(p, world)
-    known_height = lens_height - left * (lens_height - p.mount_height)
-    values = (
-        *(p.mount_setback, p.mount_left, lens_height),
-        *(p.yaw_deg + left * world.yaw_error_deg, p.pitch_deg + left * world.pitch_error_deg),
-        *(ROADS[p.road], p.dive_deg * (_GYRO_DIVE if p.stabilised else 1.0), p.shutter_s),
-        *(p.focal_px, 0.5 * width, 0.5 * height, p.linear_light),
-        *(
-            GAZES[p.gaze],
-            p.stabilised,
-            p.derotated,
-            p.shot_noise > 0.0 or p.read_noise > 0.0,
-            p.vehicles == "box",
-        ),
-        *(world.drawn, seed_of(p)),
-        aim_of(p, known_height),
-    )
-    return np.array(values, dtype=MOUNT)
+def mount_of(camera: Camera, scene: Scene, max_deceleration: float = USUAL_BRAKE) -> np.ndarray:
+    """Return the `MOUNT` record of a camera, shape ().
+
+    Args:
+        camera: The camera in its scene, see `effects.in_scene`.
+        scene: The scene.
+        max_deceleration: Full braking of the car [m/s²].
+    """
+    world, mount, sensor, stabilised = draw_world(scene.world), camera.mount, camera.sensor, camera.stabiliser
+    left = CALIBRATED if mount.calibrated else 1.0
+    # An error of the mount does not halve the height.
+    lens_height = max(mount.height_m + world.mount_height_error, 0.5 * mount.height_m)
+    record = np.zeros((), MOUNT)
+    record["setback"], record["left"], record["height"] = mount.setback_m, mount.left_m, lens_height
+    record["yaw_deg"] = mount.yaw_deg + left * world.yaw_error_deg
+    record["pitch_deg"] = mount.pitch_deg + left * world.pitch_error_deg
+    record["road"], record["shutter_s"] = ROADS[scene.road], sensor.shutter_s
+    record["dive_deg"] = scene.dive_deg * (_GYRO_DIVE if stabilised else 1.0)
+    record["focal"] = camera.focal_px
+    record["centre_u"], record["centre_v"] = 0.5 * camera.shape[1], 0.5 * camera.shape[0]
+    record["linear"], record["gaze"] = sensor.linear_light, GAZE_NUMBERS[camera.gaze.kind]
+    record["stabilised"], record["derotated"] = stabilised is not None, camera.gaze.derotated
+    record["noisy"] = sensor.shot_noise > 0.0 or sensor.read_noise > 0.0
+    record["box"], record["drawn"], record["seed"] = scene.vehicles == "box", world.drawn, scene.noise_seed
+    if isinstance(camera.gaze, ToStoppingPoint):
+        known_height = lens_height - left * (lens_height - mount.height_m)
+        record["aim"] = _aim_of(camera, camera.gaze, scene, known_height, max_deceleration)
+    return record
 
 
-def height_of(p: CameraParams, world: World) -> float:
-    """Return the height of the lens above the ground [m]; an error of the mount does not halve it."""
-    return max(p.mount_height + world.mount_height_error, 0.5 * p.mount_height)
+def _aim_of(
+    camera: Camera, gaze: ToStoppingPoint, scene: Scene, known_height: float, max_deceleration: float
+) -> np.ndarray:
+    """Return an `AIM` record, shape (), for a height of the lens that the sensor knows [m]."""
+    deceleration = gaze.deceleration * (_WET if scene.weather.wet else 1.0)
+    if gaze.brake_known:
+        deceleration = gaze.deceleration * known_deceleration(scene, max_deceleration) / USUAL_BRAKE
+    aim = np.zeros((), AIM)
+    aim["reach"], aim["span"], aim["offset"], aim["lift"] = gaze.reach, gaze.span_m, gaze.offset_m, gaze.lift
+    aim["deceleration"], aim["reaction"] = deceleration, gaze.reaction_s
+    aim["setback"], aim["height"], aim["width"] = camera.mount.setback_m, known_height, camera.shape[1]
+    return aim
 
 
-def seed_of(p: CameraParams) -> int:
-    """Return the seed of a camera's noise and of vehicles without a `shade`: its world, or `seed`."""
-    return p.seed if p.world is None else p.world
+def known_deceleration(scene: Scene, max_deceleration: float) -> float:
+    """Return the car's estimate of its full braking [m/s²].
+
+    It is the true deceleration with an error that is constant in a world: normally distributed, see
+    `ESTIMATE_ERROR`. The laboratory has no error.
+    """
+    return max_deceleration * (1.0 + _estimate_error(scene.world))
+
+
+@lru_cache(maxsize=1024)
+def _estimate_error(world: int | None) -> float:
+    """Return the relative error of the estimate in a world; 0 in the laboratory."""
+    if world is None:
+        return 0.0
+    drawn = float(np.random.default_rng([world, _ESTIMATE_STREAM]).standard_normal())
+    return ESTIMATE_ERROR * max(-2.0, min(2.0, drawn))
+
+
+@kernel(exact=True, arrays=True)
+def slip_and_yaw_rate(scene):
+    """Return slip angle [rad] and yaw rate [rad/s] of highway-env's kinematic bicycle."""
+    slip = math.atan(0.5 * math.tan(scene.steering))
+    return slip, scene.speed * math.sin(slip) / (0.5 * scene.length)
+
+
+@kernel(exact=True, arrays=True)
+def path_yaw(scene):
+    """Return the direction, relative to the heading, of the ego's position in one second [rad]."""
+    slip, rate = slip_and_yaw_rate(scene)
+    return max(-MAX_TURN, min(MAX_TURN, slip + 0.5 * (rate * _PATH_S)))
+
+
+@kernel(exact=True, arrays=True)
+def aim_depth(aim, speed):
+    """Return the distance of the aim from the lens at an ego speed [m]."""
+    v = max(speed, 0.0)
+    distance = v * v / (2.0 * aim.deceleration) + v * aim.reaction
+    return max(distance, MIN_STOP) * aim.reach + aim.setback
+
+
+@kernel(exact=True, arrays=True)
+def aim_yaw(aim, scene, depth):
+    """Return the direction of the aim, at a distance from the lens [m], relative to the heading [rad]."""
+    slip, _ = slip_and_yaw_rate(scene)
+    forward = 0.5 * scene.length - aim.setback  # of the lens, from the ego's centre
+    way = depth + forward
+    course = slip + math.sin(slip) / scene.length * way  # half of the turn on the way to the aim
+    ahead = max(way * math.cos(course) - forward, 0.5 * depth)
+    turn = math.atan(way * math.sin(course) / ahead)
+    return max(-MAX_TURN, min(MAX_TURN, turn)) - math.atan(aim.offset / depth)
+
+
+@kernel(exact=True, arrays=True)
+def aim_pitch(aim, depth):
+    """Return the elevation of the optical axis for an aim at a distance from the lens [m] [rad]."""
+    return aim.lift * math.atan(aim.height / depth)
+
+
+@kernel(exact=True, arrays=True)
+def aim_focal(aim, depth):
+    """Return the focal length for an aim at a distance from the lens [m] [px]."""
+    return aim.width * depth / aim.span
 
 
 @kernel(exact=True, arrays=True)

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from lgmd_gym.camera.objects import OBJECT
-from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.camera.pose import seed_of
 from lgmd_gym.camera.road_geometry import LINE, RoadGeometry, network_of, road_geometry
+from lgmd_gym.camera.scene import Scene
 from lgmd_gym.camera.worlds import draw_world
 from lgmd_gym.kernels.bundle import Bundle
 
@@ -20,11 +19,12 @@ Span: TypeAlias = tuple[int, ...]
 """A row of `RoadArrays.spans`."""
 
 
-def road_key(p: CameraParams) -> RoadKey:
-    """Return the parameters of a camera that its road depends on."""
-    world = draw_world(p.world)
-    rail = p.guard_rail or world.guard_rail
-    return p.roadside * world.roadside, seed_of(p), rail, world.drawn, p.queue_lane if world.drawn else None
+def road_key(scene: Scene) -> RoadKey:
+    """Return what the geometry of the road depends on in a scene."""
+    world = draw_world(scene.world)
+    rail = scene.guard_rail or world.guard_rail
+    queue_lane = scene.queue_lane if world.drawn else None
+    return scene.roadside * world.roadside, scene.noise_seed, rail, world.drawn, queue_lane
 
 
 class RoadArrays(NamedTuple):
@@ -35,7 +35,7 @@ class RoadArrays(NamedTuple):
         lines: Markings of all roads, `LINE` records.
         roadside: Posts, trees and rails of all roads, `OBJECT` records.
         spans: First and last + 1 row of `surface`, `lines` and `roadside`, and 1 for an all-paved ground,
-            per environment and camera, int64, shape (num_envs, cameras, 7).
+            per environment, int64, shape (num_envs, 7).
     """
 
     surface: np.ndarray
@@ -52,57 +52,54 @@ class RoadPool:
 
     Args:
         num_envs: Number of environments.
-        cameras: Number of cameras per environment.
 
     Attributes:
         arrays: The present `RoadArrays`.
         bundle: The same arrays.
     """
 
-    def __init__(self, num_envs: int, cameras: int) -> None:
-        spans = np.zeros((num_envs, cameras, 7), dtype=np.int64)
+    def __init__(self, num_envs: int) -> None:
+        spans = np.zeros((num_envs, 7), dtype=np.int64)
         self.arrays = RoadArrays(np.zeros((0, 8)), np.zeros(0, LINE), np.zeros(0, OBJECT), spans)
         self.bundle = Bundle(*self.arrays)
-        self._roads: list[tuple[Any, Sequence[RoadKey]] | None] = [None] * num_envs
+        self._roads: list[tuple[Any, RoadKey] | None] = [None] * num_envs
         self._stored: dict[bytes, Span] = {}
         self._used = [0, 0, 0]  # rows of surface, lines and roadside
         self._shared = False  # whether a copy of this pool has the same arrays
 
-    def assign(self, index: int, road: Any, keys: Sequence[RoadKey]) -> None:
+    def assign(self, index: int, road: Any, key: RoadKey) -> None:
         """Set the road of an environment.
 
-        A call with the same network and keys as before returns at once: a network must not change.
+        A call with the same network and key as before returns at once: a network must not change.
 
         Args:
             index: Environment.
             road: A highway-env `Road` or `RoadNetwork`.
-            keys: `road_key` of every camera.
+            key: `road_key` of the scene.
         """
         network, known = network_of(road), self._roads[index]
-        if known is not None and network is known[0] and keys == known[1]:
+        if known is not None and network is known[0] and key == known[1]:
             return
-        roads = {key: road_geometry(network, *key) for key in dict.fromkeys(keys)}
-        digests = {key: _digest(geometry) for key, geometry in roads.items()}
-        new = {digests[key]: road for key, road in roads.items() if digests[key] not in self._stored}
-        if new:
-            self._reserve(list(new.values()), set(digests.values()))
-            for digest, geometry in new.items():
-                self._stored[digest] = _append(self.arrays, self._used, geometry)
-        self.arrays.spans[index] = [self._stored[digests[key]] for key in keys]
-        self._roads[index] = network, keys
+        geometry = road_geometry(network, *key)
+        digest = _digest(geometry)
+        if digest not in self._stored:
+            self._reserve(geometry)
+            self._stored[digest] = _append(self.arrays, self._used, geometry)
+        self.arrays.spans[index] = self._stored[digest]
+        self._roads[index] = network, key
 
-    def _reserve(self, roads: Sequence[RoadGeometry], keep: set[bytes]) -> None:
-        """Make space for more roads, if necessary in new arrays without the roads that no camera uses."""
-        needed = [used + _count(roads, kind) for kind, used in enumerate(self._used)]
+    def _reserve(self, road: RoadGeometry) -> None:
+        """Make space for one more road, if necessary in new arrays without the roads that nothing uses."""
+        needed = [used + len(rows) for used, rows in zip(self._used, _rows(road), strict=True)]
         old = self.arrays
         fits = all(need <= len(rows) for need, rows in zip(needed, old[:3], strict=True))
         if fits and not self._shared:
             return
-        spans = old.spans.reshape(-1, 7).tolist()
+        spans = old.spans.tolist()
         in_use = set(map(tuple, spans))
-        kept = {digest: span for digest, span in self._stored.items() if span in in_use or digest in keep}
+        kept = {digest: span for digest, span in self._stored.items() if span in in_use}
         old_roads = {digest: _road_at(old, span) for digest, span in kept.items()}
-        sizes = [_count([*old_roads.values(), *roads], kind) for kind in range(3)]
+        sizes = [_count([*old_roads.values(), road], kind) for kind in range(3)]
         arrays = RoadArrays(
             *(
                 np.zeros((2 * size, *rows.shape[1:]), rows.dtype)
@@ -111,9 +108,9 @@ class RoadPool:
             spans=old.spans.copy(),
         )
         used = [0, 0, 0]
-        stored = {digest: _append(arrays, used, road) for digest, road in old_roads.items()}
+        stored = {digest: _append(arrays, used, kept_road) for digest, kept_road in old_roads.items()}
         moved = {span: stored[digest] for digest, span in kept.items()}
-        arrays.spans.reshape(-1, 7)[:] = [moved.get(tuple(span), span) for span in spans]
+        arrays.spans[:] = [moved.get(tuple(span), span) for span in spans]
         self.arrays, self._stored, self._used, self._shared = arrays, stored, used, False
         self.bundle = Bundle(*arrays)
 

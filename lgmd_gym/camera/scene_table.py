@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.camera.aim import MAX_TURN
 from lgmd_gym.camera.body_motion import MAX_DEG, PITCH, ROLL, YAW
-from lgmd_gym.camera.bounds import MIN_STOP
+from lgmd_gym.camera.camera import Camera, Fixed, ToStoppingPoint
+from lgmd_gym.camera.env_state import SCENE, Ego, read_scene
 from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, View, read_objects
-from lgmd_gym.camera.params import ROADS, CameraParams
-from lgmd_gym.camera.scene import SCENE, Ego, read_scene
+from lgmd_gym.camera.pose import MAX_TURN
+from lgmd_gym.camera.scene import ROADS, Scene
 from lgmd_gym.kernels.bundle import Bundle
 
 _MAX_SPREAD = math.radians(170.0)
@@ -71,41 +71,41 @@ class SceneTable:
         self._take_views()
 
 
-def view_of(cameras: Sequence[CameraParams]) -> View | None:
+def view_of(cameras: Sequence[Camera], scene: Scene) -> View | None:
     """Return the directions that cameras look in; None if they look all around, or if there are none."""
-    if not cameras or any(_may_look_behind(p) for p in cameras):
+    if not cameras or any(_may_look_behind(camera, scene) for camera in cameras):
         return None
-    margins = [_max_turn_deg(p) + ROADS[p.road] * MAX_DEG[YAW] for p in cameras]
-    first = min(p.yaw_deg - margin for p, margin in zip(cameras, margins, strict=True))
-    last = max(p.yaw_deg + margin for p, margin in zip(cameras, margins, strict=True))
+    shake = ROADS[scene.road] * MAX_DEG[YAW]
+    margins = [_max_turn_deg(camera) + shake for camera in cameras]
+    first = min(camera.mount.yaw_deg - margin for camera, margin in zip(cameras, margins, strict=True))
+    last = max(camera.mount.yaw_deg + margin for camera, margin in zip(cameras, margins, strict=True))
     if math.radians(last - first) > _MAX_SPREAD:
         return None
-    reach = max(abs(p.mount_setback) for p in cameras) + max(abs(p.mount_left) for p in cameras)
+    mounts = [camera.mount for camera in cameras]
+    reach = max(abs(mount.setback_m) for mount in mounts) + max(abs(mount.left_m) for mount in mounts)
     return View(math.radians(first), math.radians(last), reach)
 
 
-def _max_turn_deg(p: CameraParams) -> float:
+def _max_turn_deg(camera: Camera) -> float:
     """Return the largest turn of a lens relative to its mount [degrees]."""
-    if p.gaze == "fixed":
+    if isinstance(camera.gaze, Fixed):
         return 0.0
-    aside = math.atan(abs(p.offset_m) / _least_depth(p)) if p.gaze == "stopping" else 0.0
+    aside = 0.0
+    if isinstance(camera.gaze, ToStoppingPoint):
+        aside = math.atan(abs(camera.gaze.offset_m) / camera.least_depth_m)
     return math.degrees(MAX_TURN + aside)
 
 
-def _least_depth(p: CameraParams) -> float:
-    """Return the least distance of the aim of the gaze `"stopping"` from the lens [m]."""
-    return MIN_STOP * p.reach + p.mount_setback
-
-
-def _may_look_behind(p: CameraParams) -> bool:
+def _may_look_behind(camera: Camera, scene: Scene) -> bool:
     """Return whether a pitched camera may see what is straight below or above it, or behind it."""
     # To the side of the car, its pitch is roll.
-    roll = ROADS[p.road] * (MAX_DEG[PITCH] + MAX_DEG[ROLL])
-    pitch_deg, focal = abs(p.pitch_deg), p.focal_px
-    if p.gaze == "stopping":
-        depth = _least_depth(p)
-        pitch_deg += math.degrees(abs(p.lift) * math.atan((p.mount_height + 0.1) / depth))
-        focal = p.shape[1] * depth / p.span_m
-    pitch = math.radians(min(pitch_deg + _MAX_DECELERATION * p.dive_deg + roll, 90.0))
-    half_height = 0.5 * (p.shape[0] + p.shape[1] * math.sin(math.radians(roll)))
+    roll = ROADS[scene.road] * (MAX_DEG[PITCH] + MAX_DEG[ROLL])
+    (height, width), gaze = camera.shape, camera.gaze
+    pitch_deg, focal = abs(camera.mount.pitch_deg), camera.focal_px
+    if isinstance(gaze, ToStoppingPoint):
+        depth = camera.least_depth_m
+        pitch_deg += math.degrees(abs(gaze.lift) * math.atan((camera.mount.height_m + 0.1) / depth))
+        focal = width * depth / gaze.span_m
+    pitch = math.radians(min(pitch_deg + _MAX_DECELERATION * scene.dive_deg + roll, 90.0))
+    half_height = 0.5 * (height + width * math.sin(math.radians(roll)))
     return focal * math.cos(pitch) <= (half_height + 1.0) * math.sin(pitch)

@@ -53,7 +53,7 @@ class Bench:
     module: Names = None
     """Modules with scenario families of your own: my_scenarios, or my_scenarios:MyFamily."""
     conditions: Names = None
-    """Camera conditions, each run separately: clear, night, night_upper_beam, fog, rain, low_sun, or mixed
+    """Weathers, each run separately: clear, night, night_upper_beam, fog, rain, low_sun, or mixed
     for that of each world. Default: clear."""
     worlds: Count = None
     """Number of worlds (asphalt, light, surroundings, brake); 0 for the plain laboratory. Default: 20."""

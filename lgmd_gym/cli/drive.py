@@ -50,7 +50,7 @@ class Drive:
     world: Annotated[str | None, arg(metavar="N|laboratory")] = None
     """World: a number from 0 to 9999, or laboratory. Default: a training world, drawn by the seed."""
     condition: Name = None
-    """Camera condition: clear, night, night_upper_beam, fog, rain or low_sun, or mixed for that of the world;
+    """Weather: clear, night, night_upper_beam, fog, rain or low_sun, or mixed for that of the world;
     not for random levels, which draw their own. Default: clear."""
     camera: Name = None
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
@@ -78,7 +78,7 @@ def run(options: Drive) -> int:
     sensors = SensorConfig(options.camera, read_params(options.params))
     surroundings = parse_world(options.world)
     if options.condition is not None:
-        surroundings["condition"] = options.condition
+        surroundings["weather"] = options.condition
     try:
         with activity("preparing the episode") as show:
             result = play_episode(

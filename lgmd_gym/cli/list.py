@@ -105,7 +105,7 @@ def envs() -> Table:
 
 def cameras() -> Table:
     """Return the camera presets."""
-    from lgmd_gym.camera.params import PRESETS
+    from lgmd_gym.camera import PRESETS
 
     table = Table("camera", "frame", "field of view", "px per degree", title="cameras")
     for name, params in PRESETS.items():

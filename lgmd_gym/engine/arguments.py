@@ -6,34 +6,38 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from lgmd_gym.camera import BirdsEye, CameraSpec
+from lgmd_gym.camera import BirdsEye
 from lgmd_gym.errors import check_known, is_integer, shown
 from lgmd_gym.neuron import LGMDParams
-from lgmd_gym.sensing.cameras import make_cameras
+from lgmd_gym.sensing.channel import ChannelSpec, make_channels
 from lgmd_gym.sensing.sensor_array import SensorArray
 
 _MODES = {mode.value for mode in AutoresetMode}
 
 
-def make_sensors(camera: CameraSpec, fps: float, neuron: LGMDParams, num_envs: int) -> SensorArray:
+def make_sensors(
+    camera: ChannelSpec, neuron: str, fps: float, params: LGMDParams, num_envs: int
+) -> SensorArray:
     """Return the cameras and neurons of the environments.
 
     Args:
         camera: See `LGMDObservation`.
+        neuron: See `LGMDObservation`.
         fps: Camera frame rate [Hz].
-        neuron: Parameters of the neurons.
+        params: Parameters of the neurons.
         num_envs: Number of environments.
 
     Raises:
         ValueError: If a camera is a top view.
     """
-    for name, made in make_cameras(camera).items():
-        if isinstance(made, BirdsEye):
+    channels = make_channels(camera, neuron)
+    for channel in channels:
+        if isinstance(channel.camera, BirdsEye):
             raise ValueError(
-                f"camera {name!r} is a top view, which highway-env draws; "
+                f"camera {channel.name!r} is a top view, which highway-env draws; "
                 "use gym.make_vec(…, vectorization_mode='sync')"
             )
-    return SensorArray(camera, fps, neuron, num_envs)
+    return SensorArray(channels, fps, params, num_envs)
 
 
 def autoreset_mode_of(mode: AutoresetMode | str) -> AutoresetMode:

@@ -116,8 +116,7 @@ class Simulation:
             self._link()
         self.brakes[index] = brake.record(self._throttle)
         if self.sensors is not None:
-            fields = draw.camera_fields | {"max_deceleration": brake.max_deceleration}
-            self.sensors.set_camera_fields(index, fields)
+            self.sensors.set_scene(index, draw.scene, brake.max_deceleration)
             self.sensors.set_road(index, network)
 
     def start(self, selected: np.ndarray) -> None:
@@ -184,8 +183,8 @@ class Simulation:
 
     def _make_scenes(self) -> SceneArrays:
         if self.sensors is None:
+            from lgmd_gym.camera.env_state import SCENE
             from lgmd_gym.camera.objects import OBJECT
-            from lgmd_gym.camera.scene import SCENE
 
             shape = self.num_envs
             return SceneArrays(

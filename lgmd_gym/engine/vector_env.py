@@ -8,7 +8,6 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from lgmd_gym.camera import CameraSpec
 from lgmd_gym.engine.actions import Demands
 from lgmd_gym.engine.arguments import autoreset_mode_of, make_sensors, mask_of, seeds_of
 from lgmd_gym.engine.episodes import EpisodeQueue, Prepared
@@ -22,11 +21,12 @@ from lgmd_gym.envs.registration import make_source
 from lgmd_gym.errors import check_flags, check_keys, check_mapping, check_whole, shown
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.validation import MAX_THREADS
+from lgmd_gym.sensing.channel import LGMD, ChannelSpec
 from lgmd_gym.sensing.frame_rate import camera_rate
 from lgmd_gym.sensing.spaces import make_space
 
 _NAMES = (
-    *("num_envs", "camera", "params", "fps", "include_frame", "include_base", "trace", "config"),
+    *("num_envs", "camera", "neuron", "params", "fps", "include_frame", "include_base", "trace", "config"),
     *("render_mode", "threads", "autoreset_mode", "copy"),
 )
 
@@ -49,6 +49,7 @@ class BrakingVectorEnv(VectorEnv):
         num_envs: Number of environments N.
         family: A scenario family, or "RandomBraking"; set by the environment id.
         camera: See `LGMDObservation`; None for no camera, so that observations are those of `BrakingEnv`.
+        neuron: See `LGMDObservation`.
         params: See `LGMDObservation`.
         fps: See `LGMDObservation`.
         include_frame: See `LGMDObservation`.
@@ -77,7 +78,8 @@ class BrakingVectorEnv(VectorEnv):
         num_envs: int = 1,
         *,
         family: str,
-        camera: CameraSpec | None = "fovea",
+        camera: ChannelSpec | None = "fovea",
+        neuron: str = LGMD,
         params: NeuronSpec = None,
         fps: float | None = None,
         include_frame: bool = False,
@@ -108,15 +110,17 @@ class BrakingVectorEnv(VectorEnv):
             policy=settings["policy_frequency"],
             camera=camera_rate(fps, settings["simulation_frequency"]) if camera is not None else 1.0,
         )
-        neuron = LGMDParams.make(params)
-        sensors = None if camera is None else make_sensors(camera, rates.camera, neuron, self.num_envs)
+        sensors = None
+        if camera is not None:
+            checked = LGMDParams.make(params)
+            sensors = make_sensors(camera, neuron, rates.camera, checked, self.num_envs)
         self.simulation = Simulation(self.num_envs, rates, sensors, settings["throttle"], threads)
         self.simulation.weights[:] = self._single.weights
         self._queue = EpisodeQueue([source] * self.num_envs, ahead=threads > 1)
         self._episodes: list[Prepared | None] = [None] * self.num_envs
         self._demands = Demands(self._single.action_type)
         self._top_views = TopViews(self.simulation, config or {})
-        self._make_spaces(neuron, include_frame, include_base)
+        self._make_spaces(include_frame, include_base)
         self._observations = Observations(
             self.simulation, self.single_observation_space, include_frame, include_base, copy
         )
@@ -256,7 +260,7 @@ class BrakingVectorEnv(VectorEnv):
         self._start(ended)
         return infos | {f"_{key}": ended.copy() for key in infos}
 
-    def _make_spaces(self, neuron: LGMDParams, include_frame: bool, include_base: bool) -> None:
+    def _make_spaces(self, include_frame: bool, include_base: bool) -> None:
         base, rates, sensors = self._single.observation_space, self.simulation.rates, self.simulation.sensors
         self.single_action_space = copying.deepcopy(self._single.action_space)
         self.single_observation_space = cast(gym.Space, base)

@@ -26,13 +26,13 @@ from lgmd_gym.openscenario.world import Mover, World, read_entities
 
 NIGHT_LUX = 50.0
 """Illuminance of the sun below which it is night; twilight of a street is about 10 lx, a dull day 1000 lx."""
-FOG = 1000.0  # [m], visual range below which the condition is fog, as in meteorology
+FOG = 1000.0  # [m], visual range below which the weather is fog, as in meteorology
 _WIDEST = 6.0  # [m], width of a lane; wider ones are open test areas
 _REACH = (-50.0, 500.0)  # [m] ahead of the ego within which a crossing road counts
 
 
-def condition_of(environment: Element | None) -> str:
-    """Return the camera condition of an `Environment`: clear, night, fog or rain.
+def weather_of(environment: Element | None) -> str:
+    """Return the weather of an `Environment`: clear, night, fog or rain.
 
     Night is a sun below 50 lx, fog a visual range below 1000 m, rain a precipitation with an intensity.
 
@@ -57,7 +57,7 @@ def condition_of(environment: Element | None) -> str:
         intensity = "precipitationIntensity" if rain.has("precipitationIntensity") else "intensity"
         found |= {"rain"} if rain.number(intensity) > 0.0 else set()
     if len(found) > 1:
-        raise weather.error(f"the conditions {', '.join(sorted(found))} cannot be combined; use one")
+        raise weather.error(f"the weathers {', '.join(sorted(found))} cannot be combined; use one")
     return found.pop() if found else CLEAR
 
 
@@ -160,7 +160,7 @@ class Compiled:
 
     Attributes:
         scenario: The scenario.
-        condition: Camera condition.
+        weather: Name of the weather.
         start: Time in the file at which the episode begins [s].
         contact: Time in the file of the ego's first contact if it does not brake [s]; inf without one.
         ego: The ego.
@@ -171,7 +171,7 @@ class Compiled:
     """
 
     scenario: Scenario
-    condition: str
+    weather: str
     start: float
     contact: float
     ego: Mover
@@ -198,7 +198,7 @@ def compile_scenario(root: Element, family: str) -> Compiled:
     world = World(read_roads(_file(network)), catalogs, movers)
     board = root.child("Storyboard")
     environment = run_init(board, world)
-    condition = condition_of(environment)
+    weather = weather_of(environment)
     read_story(board, world).play(world)
     for node in (root.node, *catalogs.visited):
         check_used(node, IGNORED_TAGS, IGNORED_ATTRIBUTES)
@@ -206,7 +206,7 @@ def compile_scenario(root: Element, family: str) -> Compiled:
     if ego is None:
         raise root.child("Entities").error("the scenario needs an entity with the name Ego")
     try:
-        return _compile(root, world, ego, family, condition)
+        return _compile(root, world, ego, family, weather)
     except LocatedError:
         raise
     except ValueError as error:
@@ -217,7 +217,7 @@ def _file(item: Element) -> Path:
     return item.node.file.parent / item.text("filepath")
 
 
-def _compile(root: Element, world: World, ego: Mover, family: str, condition: str) -> Compiled:
+def _compile(root: Element, world: World, ego: Mover, family: str, weather: str) -> Compiled:
     others = [item for item in world.movers.values() if item is not ego and not item.deleted]
     contact, target = _first_contact(ego, [item for item in others if item.body.kind != "road_marking"])
     properties = _properties(root)
@@ -242,7 +242,7 @@ def _compile(root: Element, world: World, ego: Mover, family: str, condition: st
         ego_width=ego.body.width,
         ego_reference=_pose(ego, start)[1] if _bends(ego, start) else 0.0,
     )
-    return Compiled(scenario, condition, start, contact, ego, target, world, root, properties)
+    return Compiled(scenario, weather, start, contact, ego, target, world, root, properties)
 
 
 def _properties(root: Element) -> dict[str, str]:

@@ -118,7 +118,7 @@ def export_case(case: Case, path: str | Path) -> tuple[Path, Path]:
         The two files.
 
     Raises:
-        ValueError: If a file exists or cannot be written, or OpenSCENARIO has no such camera condition.
+        ValueError: If a file exists or cannot be written, or OpenSCENARIO has no such weather.
     """
     path = check_path("path", path)
     check_type("case", case, Case)
@@ -129,8 +129,8 @@ def export_case(case: Case, path: str | Path) -> tuple[Path, Path]:
         if file.exists():
             raise ValueError(f"{str(file)!r} exists; choose another file or remove it")
     scenario = case.scenario
-    condition = str(dict(case.arguments).get("condition", CLEAR))
-    roots = scenario_xml(scenario, files[1].name, condition, case.fcw_driver), road_xml(scenario.road)
+    weather = str(dict(case.arguments).get("weather", CLEAR))
+    roots = scenario_xml(scenario, files[1].name, weather, case.fcw_driver), road_xml(scenario.road)
     for file, root in zip(files, roots, strict=True):
         ET.indent(root)
         text = ET.tostring(root, encoding="unicode", xml_declaration=False)
@@ -141,15 +141,13 @@ def export_case(case: Case, path: str | Path) -> tuple[Path, Path]:
     return files
 
 
-def scenario_xml(
-    scenario: Scenario, road: str, condition: str = CLEAR, fcw_driver: bool = False
-) -> ET.Element:
+def scenario_xml(scenario: Scenario, road: str, weather: str = CLEAR, fcw_driver: bool = False) -> ET.Element:
     """Return a scenario as OpenSCENARIO 1.3.
 
     Args:
         scenario: The scenario.
         road: Path of the OpenDRIVE file, relative to the scenario's.
-        condition: Camera condition.
+        weather: Name of the weather.
         fcw_driver: Whether the driver brakes after the alert.
     """
     root = ET.Element("OpenSCENARIO")
@@ -162,8 +160,8 @@ def scenario_xml(
     _add(_add(root, "RoadNetwork"), "LogicFile", filepath=road)
     entities, board = _add(root, "Entities"), _add(root, "Storyboard")
     actions = _add(_add(board, "Init"), "Actions")
-    if condition != CLEAR:
-        _environment(actions, condition)
+    if weather != CLEAR:
+        _environment(actions, weather)
     act = ET.Element("Act", name="Act")
     ego = _ego(scenario)
     for number, actor in enumerate((ego, *scenario.actors)):
@@ -304,11 +302,11 @@ def _condition(trigger: ET.Element, name: str, time: float, rule: str) -> None:
     _add(_add(item, "ByValueCondition"), "SimulationTimeCondition", value=float(time), rule=rule)
 
 
-def _environment(actions: ET.Element, condition: str) -> None:
-    if condition not in _WEATHER:
+def _environment(actions: ET.Element, name: str) -> None:
+    if name not in _WEATHER:
         known = ", ".join(_WEATHER)
-        raise ValueError(f"OpenSCENARIO has no weather for the condition {condition!r}; known: {known}")
+        raise ValueError(f"OpenSCENARIO has no weather {name!r}; known: {known}")
     action = _add(_add(actions, "GlobalAction"), "EnvironmentAction")
-    weather = _add(_add(action, "Environment", name=condition), "Weather", fractionalCloudCover="zeroOktas")
-    tag, values = _WEATHER[condition]
+    weather = _add(_add(action, "Environment", name=name), "Weather", fractionalCloudCover="zeroOktas")
+    tag, values = _WEATHER[name]
     _add(weather, tag, **values)

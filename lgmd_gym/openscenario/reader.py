@@ -108,7 +108,7 @@ def read(path: str | Path) -> Suite:
     A case is named `stem/family/variant`: the file's stem, the parameter `Scenario_ID` or else the stem of
     the scenario file, and the ego's speed in km/h with the other varied parameters. In a cell of a file with
     "_FCW" in its stem or `Scenario_ID`, the driver brakes after the agent's alert (`Case.fcw_driver`). An
-    `Environment` at night, in fog or in rain sets the camera condition.
+    `Environment` at night, in fog or in rain sets the weather.
 
     Args:
         path: A scenario, or a file that varies the parameters of one.
@@ -221,6 +221,6 @@ def _cells(path: Path, file: Path, root: Node, given: Iterable[dict[str, Assignm
 
 def _case(suite: str, cell: Cell, prefix: str = "") -> Case:
     compiled, arguments = cell.compiled, {}
-    if compiled.condition != CLEAR:
-        arguments["condition"] = compiled.condition
+    if compiled.weather != CLEAR:
+        arguments["weather"] = compiled.weather
     return scenario_case(suite, prefix + cell.variant, compiled.scenario, cell.fcw_driver, **arguments)

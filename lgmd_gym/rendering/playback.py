@@ -101,7 +101,7 @@ def play_episode(
         live: Whether to open a window, in real time.
         overlays: See `LGMDView`.
         sensors: Cameras and neurons; None for those of the agent.
-        surroundings: Arguments `world` and `condition` of the environment; None for its defaults.
+        surroundings: Arguments `world` and `weather` of the environment; None for its defaults.
         progress: Called after every decision with the simulated time [s].
 
     Raises:

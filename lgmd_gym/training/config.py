@@ -11,8 +11,6 @@ import gymnasium as gym
 from lgmd_gym.agents import AGENTS, make_agent
 from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
-from lgmd_gym.camera import CameraSpec
-from lgmd_gym.camera.spec import check_camera
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, traffic_id
 from lgmd_gym.errors import (
     check_items,
@@ -23,6 +21,7 @@ from lgmd_gym.errors import (
     check_whole,
     shown,
 )
+from lgmd_gym.sensing.channel import ChannelSpec, make_channels, plain_values
 from lgmd_gym.training.config_checks import (
     RANDOM_ID,
     check_demands,
@@ -82,7 +81,7 @@ class TrainConfig:
     algo: str
     env_id: str = RANDOM_ID
     env_kwargs: dict[str, Any] = field(default_factory=dict)
-    camera: CameraSpec = CAMERAS
+    camera: ChannelSpec = CAMERAS
     demands: Sequence[float] = ()
     features: FeatureConfig = field(default_factory=FeatureConfig)
     n_envs: int = 1
@@ -108,7 +107,8 @@ class TrainConfig:
             object.__setattr__(self, name, check_whole(name, getattr(self, name), 0, limit))
         check_text("env_id", self.env_id)
         check_text("policy", self.policy)
-        check_camera(self.camera)
+        make_channels(self.camera)
+        object.__setattr__(self, "camera", plain_values(self.camera))
         check_type("env_kwargs", self.env_kwargs, dict)
         if "camera" in self.env_kwargs:
             raise ValueError(
@@ -185,7 +185,7 @@ class TrainConfig:
         """Return the configuration as plain values."""
         return asdict(self) | {"features": self.features.to_dict()}
 
-    def make_env(self, split: str, camera: CameraSpec | None = None) -> gym.Env:
+    def make_env(self, split: str, camera: ChannelSpec | None = None) -> gym.Env:
         """Return an environment with `LGMDObservation`.
 
         Args:
@@ -232,7 +232,7 @@ class TrainConfig:
         return PolicyWrapper(self.make_env(split), **self.features_of(split).to_dict())
 
 
-def _cameras_of(agent: str) -> CameraSpec:
+def _cameras_of(agent: str) -> ChannelSpec:
     if agent == ALL_ROUND:
         return all_round_cameras()
     if ":" not in agent:

@@ -15,7 +15,7 @@ from lgmd_gym.agents import HOLD
 from lgmd_gym.agents.policies.features import FRAME
 from lgmd_gym.camera import BirdsEye
 from lgmd_gym.envs.registration import TRAFFIC_KINDS
-from lgmd_gym.sensing.cameras import make_cameras
+from lgmd_gym.sensing.channel import make_channels
 from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
 from lgmd_gym.training.extra_episodes import ExtraEpisodes, parse_levels, parse_traffic
 from lgmd_gym.training.offline.episodes import (
@@ -128,7 +128,7 @@ def _level_recorder(config: TrainConfig, split: str) -> LevelRecorder | EpisodeR
 
 
 def _is_in_engine(config: TrainConfig) -> bool:
-    top_view = any(isinstance(camera, BirdsEye) for camera in make_cameras(config.camera).values())
+    top_view = any(isinstance(channel.camera, BirdsEye) for channel in make_channels(config.camera))
     return gym.spec(config.env_id).vector_entry_point is not None and not top_view
 
 

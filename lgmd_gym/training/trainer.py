@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import lgmd_gym
 from lgmd_gym.agents.policies.card import write_card
 from lgmd_gym.agents.policies.network import describe_network
-from lgmd_gym.camera.spec import plain_values
 from lgmd_gym.errors import check_keys, check_whole
 from lgmd_gym.processes.files import FolderLock, complete_file, new_folder
 from lgmd_gym.processes.user_modules import error_reason
+from lgmd_gym.sensing.channel import plain_values
 from lgmd_gym.training.config import TrainConfig
 from lgmd_gym.training.hyperparams import OFFLINE
 from lgmd_gym.training.model_card import write_model_card

@@ -2,16 +2,16 @@
 
 import json
 import warnings
-from dataclasses import asdict
 from typing import Any, NamedTuple, cast
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from lgmd_gym.camera import CameraParams, CameraSpec
+from lgmd_gym.camera import Scene
 from lgmd_gym.errors import check_flags, check_mapping
 from lgmd_gym.neuron import LGMDParams, NeuronSpec, Response
+from lgmd_gym.sensing.channel import LGMD, ChannelSpec, make_channels, plain_values
 from lgmd_gym.sensing.frame_rate import camera_rate
 from lgmd_gym.sensing.road_hook import check_highway_env, on_road_step
 from lgmd_gym.sensing.sensor_array import SensorArray
@@ -46,7 +46,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     ``spike_frequency``     (cameras,)                  spikes of the last n_ts frames [spikes/s], from 0
                                                         to about 10 · fps
     ``membrane_potential``  (cameras,)                  K (eq. 10), 0.5 to 1; from 0 with
-                                                        ``detector="dsn"``
+                                                        ``neuron="dsn"``
     ``ffi``                 (cameras,)                  F̂ [grey levels], 0 to 255 / (1 − Σ a_i)
     ``ego_speed``           (1,)                        ego speed [m/s], −100 to 100
     ``ego_yaw_rate``        (1,)                        mean yaw rate of the decision [rad/s], positive
@@ -64,28 +64,32 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     ====================================  ===============================================================
     key                                   meaning
     ====================================  ===============================================================
-    ``lgmd/<camera>/spike_frequency``     as in the observation, for one camera [spikes/s]
-    ``lgmd/<camera>/membrane_potential``  as in the observation, for one camera
-    ``lgmd/<camera>/ffi``                 as in the observation, for one camera [grey levels]
+    ``lgmd/<channel>/spike_frequency``     as in the observation, for one camera [spikes/s]
+    ``lgmd/<channel>/membrane_potential``  as in the observation, for one camera
+    ``lgmd/<channel>/ffi``                 as in the observation, for one camera [grey levels]
     ``lgmd/alert``                        whether the spike frequency of any camera is >= t_sf
     ``lgmd/trace``                        a `TraceFrame` per camera frame of the step, with `trace`
     ====================================  ===============================================================
 
-    An environment can change the cameras at each reset through an attribute ``camera_fields``: a dict of
-    `CameraParams` fields, and optionally ``condition``.
+    An environment can set the scene of each episode through an attribute ``scene``, a `Scene`, together with
+    ``brake``, whose ``max_deceleration`` [m/s²] is the full braking of its car.
 
     Args:
         env: A highway-env environment, wrapped or not.
-        camera: A preset name ("wide", "standard", "tele", "fovea", "paper"), "birdseye", `CameraParams`, a
-            mapping of its fields, or a sequence of these.
+        camera: A preset name ("wide", "standard", "tele", "fovea", "paper"), "birdseye", a `Camera`, a
+            `Channel`, a mapping of the fields of either, or a sequence of these.
+        neuron: Neuron of the cameras without their own, see `lgmd_gym.neuron.register`.
         params: `LGMDParams` or a mapping of its fields; None for the defaults.
         fps: Camera frame rate [Hz]; None for 30 if that divides `simulation_frequency`, else
             `simulation_frequency` itself.
         include_frame: Whether to include the frames; all cameras must have the same shape.
         include_base: Whether to include the observation of the wrapped environment.
         trace: Whether to add ``lgmd/trace`` to the info.
+        scene: Scene of an environment without its own, a `Scene` or a mapping of its fields; None for the
+            laboratory.
 
     Attributes:
+        channels: The channels.
         rendering_paused: If set, skip rendering until the next reset; the outputs of the neurons are
             constant meanwhile.
 
@@ -104,18 +108,20 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     def __init__(
         self,
         env: gym.Env,
-        camera: CameraSpec = "fovea",
+        camera: ChannelSpec = "fovea",
+        neuron: str = LGMD,
         params: NeuronSpec = None,
         fps: float | None = None,
         include_frame: bool = False,
         include_base: bool = False,
         trace: bool = False,
+        scene: Scene | dict[str, Any] | None = None,
     ) -> None:
         check_highway_env(env)
         gym.Wrapper.__init__(self, env)
         check_flags(include_frame=include_frame, include_base=include_base, trace=trace)
         self.params = LGMDParams.make(params)
-        self.camera = camera
+        self.channels, self._scene = make_channels(camera, neuron), Scene.make(scene)
         self.include_frame, self.include_base, self.trace = include_frame, include_base, trace
         self._requested_fps = fps
         self._was_reset = False
@@ -127,11 +133,13 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         RecordConstructorArgs.__init__(
             self,
             camera=_to_json(camera),
+            neuron=neuron,
             params=_to_json(params),
             fps=fps,
             include_frame=include_frame,
             include_base=include_base,
             trace=trace,
+            scene=_to_json(scene),
         )
 
     def reset(
@@ -148,7 +156,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         if self._highway_env.config["simulation_frequency"] != self._simulation_frequency:
             self._build_sensors()
         self.sensors.reset()
-        self.sensors.set_camera_fields(0, getattr(self._highway_env, "camera_fields", None))
+        self._set_scene()
         on_road_step(self.env, self._on_substep)
         self._substeps, self._trace_frames, self.rendering_paused = 0, [], False
         self._was_reset = True
@@ -190,12 +198,20 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self.fps = camera_rate(self._requested_fps, frequency)
         self._simulation_frequency = frequency
         self._stride = round(self._simulation_frequency / self.fps)
-        self.sensors = SensorArray(self.camera, self.fps, self.params)
+        self.sensors = SensorArray(self.channels, self.fps, self.params)
         self._info_keys = [key for keys in signal_keys(self.sensors.names).values() for key in keys]
         base = self.env.observation_space if self.include_base else None
         self.observation_space = make_space(
             self.sensors, self._simulation_frequency, self.include_frame, base
         )
+
+    def _set_scene(self) -> None:
+        """Set the scene of the episode."""
+        base = self._highway_env
+        if hasattr(base, "scene"):
+            self.sensors.set_scene(0, base.scene, base.brake.max_deceleration)
+        else:
+            self.sensors.set_scene(0, self._scene)
 
     def _check_frequency(self, options: dict[str, Any] | None) -> None:
         """Refuse a simulation frequency in the options of a reset before the environment applies it."""
@@ -237,14 +253,8 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
 
 
 def _to_json(value: Any) -> Any:
-    """Return a `camera` or `params` argument as plain JSON values, for `EnvSpec.to_json`."""
-    if isinstance(value, CameraParams):
-        value = asdict(value)
-    elif isinstance(value, LGMDParams):
-        value = value.to_dict()
-    elif isinstance(value, list | tuple):
-        value = [_to_json(item) for item in cast(list[Any], value)]
-    return json.loads(json.dumps(value, default=_number_to_json))
+    """Return an argument as plain JSON values, for `EnvSpec.to_json`."""
+    return json.loads(json.dumps(plain_values(value), default=_number_to_json))
 
 
 def _number_to_json(value: Any) -> Any:

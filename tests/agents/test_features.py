@@ -21,6 +21,7 @@ from lgmd_gym.agents.sides import (
     all_round_cameras,
 )
 from lgmd_gym.agents.zones import NUM_FIELDS, NUM_ZONES, REACHES
+from lgmd_gym.sensing.channel import make_channels
 
 
 def observe(frequency, speed=10.0):
@@ -149,15 +150,15 @@ def test_zone_features_of_all_round_cameras_are_those_of_stopping_zone():
 
 
 def test_cameras_of_all_round_are_in_the_order_of_the_features():
-    names = [camera["name"] for camera in all_round_cameras()]
+    channels = make_channels(all_round_cameras())
+    names = [channel.name for channel in channels]
     assert len(set(names)) == NUM_ALL_ROUND
     assert names[NUM_FIELDS : NUM_FIELDS + 3] == ["near_left_lgmd", "near_right_lgmd", "middle_left_lgmd"]
-    cameras = all_round_cameras()[NUM_FIELDS:]
-    for first, others in ((cameras[k], cameras[k::NUM_SIDE_FIELDS]) for k in range(NUM_SIDE_FIELDS)):
-        assert [camera["detector"] for camera in others] == ["lgmd", "dsn", "edges"]
-        for other in others:
-            assert first | {"name": "", "detector": ""} == other | {"name": "", "detector": ""}
-    columns = [camera["columns"] for camera in all_round_cameras()]
+    sides = channels[NUM_FIELDS:]
+    for first, others in ((sides[k], sides[k::NUM_SIDE_FIELDS]) for k in range(NUM_SIDE_FIELDS)):
+        assert [channel.neuron for channel in others] == ["lgmd", "dsn", "edges"]
+        assert all((channel.camera, channel.columns) == (first.camera, first.columns) for channel in others)
+    columns = [channel.columns for channel in channels]
     assert sum(columns[:NUM_FIELDS]) == NUM_FORWARD_COLUMNS
     assert sum(columns) == NUM_COLUMNS
     assert ZONE_INPUTS["columns"].size == 4 * NUM_COLUMNS

@@ -10,7 +10,7 @@ import lgmd_gym
 from lgmd_gym import benchmark
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies import PolicyCard, save_card, save_policy
-from lgmd_gym.camera import CameraParams
+from lgmd_gym.camera import Camera
 
 pytest.importorskip("stable_baselines3")
 
@@ -139,12 +139,12 @@ def test_a_wrong_card_is_refused(model, values, words, tmp_path):
 
 def test_cards_of_other_environments(tmp_path):
     file = tmp_path / "model.zip"
-    lens = CameraParams.make("wide")
+    lens = Camera.make("wide")
     env = gym.make("LGMD/CCRs-v0", camera=lens, params=lgmd_gym.LGMDParams(t_sf=40.0))
     card = save_card(file, env, "ppo", vec_normalize="stats.pkl")
     assert (card.neuron["t_sf"], card.vec_normalize) == (40.0, "stats.pkl")
     again = PolicyCard.make(json.loads(file.with_suffix(".json").read_text()))
-    assert CameraParams.make(again.camera) == lens
+    assert Camera.make(again.camera) == lens
 
 
 @pytest.mark.parametrize(("make", "words"), [

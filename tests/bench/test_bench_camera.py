@@ -4,9 +4,10 @@ import timeit
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera
 from support.roads import add_car, straight_env
 
-from lgmd_gym.camera import CONDITIONS, EgoCamera
+from lgmd_gym.camera import WEATHERS
 
 pytestmark = pytest.mark.bench
 
@@ -15,7 +16,7 @@ CASES = [("wide", 0, 38), ("wide", 5, 55), ("fovea", 5, 65), ("paper", 5, 165)]
 # Fields of `wide`, and the factor by which they may raise the rendering time with 5 vehicles.
 OPTIONS = {
     "night": ({"light": "night"}, 1.4),
-    "fog": (CONDITIONS["fog"], 1.4),
+    "fog": (WEATHERS["fog"], 1.4),
     "guard_rail": ({"guard_rail": True}, 2.6),
     "night_fog": ({"light": "night", "visibility_m": 30.0}, 1.7),
     "road": ({"road": "normal"}, 1.5),  # redraws the sky, and no edge is level
@@ -38,7 +39,7 @@ def median_time(function, number):
 
 @pytest.mark.parametrize(("name", "vehicles", "limit_us"), CASES)
 def test_time_per_frame(benchmark, name, vehicles, limit_us):
-    env, camera = busy_env(vehicles), EgoCamera(name)
+    env, camera = busy_env(vehicles), ego_camera(name)
     out = camera.render(env)
     benchmark(camera.render, env, out)
     # Twice the limit, as machines differ.
@@ -49,7 +50,7 @@ def test_time_per_frame(benchmark, name, vehicles, limit_us):
 def test_time_added_by_an_option(benchmark, name):
     fields, factor = OPTIONS[name]
     env = busy_env()
-    plain, camera = EgoCamera("wide"), EgoCamera("wide", **fields)
+    plain, camera = ego_camera("wide"), ego_camera("wide", **fields)
     out = camera.render(env)
     plain.render(env, out)
 

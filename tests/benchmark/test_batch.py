@@ -73,7 +73,6 @@ class Faulty:
 
 
 def make_tasks(agent, cases=CASES, seeds=(0, 1), sensors=DEFAULT_SENSORS, condition="clear"):
-    sensors = sensors.with_condition(condition)
     return [Task(agent, case, seed, sensors, THREAT, condition) for seed in seeds for case in cases]
 
 

@@ -1,17 +1,21 @@
 """Cases, cameras and the episodes that they define."""
 
+import json
+
 import numpy as np
 import pytest
 
 from lgmd_gym.agents import AGENTS, BatchAgent, make_agent
 from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.episode import make_env, play
 from lgmd_gym.benchmark.metrics import Counterfactual
 from lgmd_gym.benchmark.recorder import SERIES
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import SUITES, find_case, find_suite
 from lgmd_gym.benchmark.task import Task, run_task
-from lgmd_gym.camera import CameraParams
+from lgmd_gym.camera import Camera
+from lgmd_gym.sensing.channel import Channel
 
 SLOW_APPROACH = Case("test", "CCRs", "v20", (("ego_speed", 5.556),))
 THREAT = Counterfactual(True, 5.0, 10.0)
@@ -28,25 +32,17 @@ def test_night_case_renders_dark_frames():
     assert night < 0.5 * day
 
 
-TELE = CameraParams.preset("tele")
+@pytest.mark.parametrize("channel", [Camera(hfov_deg=7.0), Channel(camera="tele", neuron="dsn", columns=5)])
+def test_plain_cameras_give_the_same_channels(channel):
+    config = SensorConfig(["fovea", channel])
+    assert config.plain.channels == config.channels
+    assert json.loads(json.dumps(config.plain.camera)) == config.plain.camera
 
 
-@pytest.mark.parametrize("camera", ["tele", {"name": "tele"}, TELE, SensorConfig(TELE).plain.camera])
-def test_condition_applies_to_every_kind_of_camera_argument(camera):
-    foggy = SensorConfig([camera]).with_condition("fog").arguments["camera"]
-    assert foggy == [TELE.with_condition("fog")]
-
-
-def test_plain_camera_contains_only_the_changes_to_its_preset():
-    camera = CameraParams.preset("tele", pitch_deg=1.5)
-    plain = SensorConfig(camera).plain.camera
-    assert plain == {"name": "tele", "pitch_deg": 1.5}
-    assert CameraParams.make(plain) == camera
-
-
-def test_birdseye_camera_supports_no_condition():
+def test_the_top_view_shows_no_weather():
     with pytest.raises(ValueError, match="'birdseye' does not support condition 'fog'; use 'clear'"):
-        SensorConfig("birdseye").with_condition("fog")
+        RunConfig(camera="birdseye").sensors("fog")
+    assert RunConfig(camera="birdseye").sensors("mixed").has_top_view
 
 
 def test_suite_cases_have_distinct_names_and_valid_scenarios():

@@ -83,7 +83,7 @@ def violations(case):
 def test_arguments_of_a_case():
     assert find_case("ncap2023/CCRs/v30/overlap-50").arguments == (("ego_speed", 8.333333), ("overlap", -0.5))
     night = find_case("ncap2026/CPNA/v30/location75-night")
-    assert dict(night.arguments) == {"ego_speed": 8.333333, "impact_location": 0.75, "condition": "night"}
+    assert dict(night.arguments) == {"ego_speed": 8.333333, "impact_location": 0.75, "weather": "night"}
 
 
 @pytest.mark.parametrize(

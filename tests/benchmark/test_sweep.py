@@ -86,8 +86,8 @@ def test_flags_and_words(load):
         "CCCscp/side-right/obstructed", "CCCscp/side-right/not-obstructed",
     ]  # fmt: skip
     assert arguments(suite)[1] == {"side": "left", "obstructed": False}
-    suite = load({"family": "EmptyRoad", "sweep": {"condition": ["clear", "night"]}})
-    assert names(suite) == ["EmptyRoad/condition-clear", "EmptyRoad/condition-night"]
+    suite = load({"family": "EmptyRoad", "sweep": {"weather": ["clear", "night"]}})
+    assert names(suite) == ["EmptyRoad/weather-clear", "EmptyRoad/weather-night"]
     assert [case.scenario.family for case in suite.cases] == ["EmptyRoad"] * 2
 
 
@@ -122,7 +122,7 @@ def test_copy_of_a_sweep_is_equal(load, tmp_path):
         ({"sweep": {"ego_speed": [10, 70]}}, "'mine/CutIn/v252': ego_speed: 70 m/s = 252 km/h"),
         ({"sweep": {"gap": [6]}, "arguments": {"gap": 6}}, "arguments.gap and sweep.gap exclude each other"),
         ({"sweep": {"ego_speed": [6]}, "speeds_kmh": [30]}, "speeds_kmh and sweep.ego_speed exclude"),
-        ({"sweep": {"condition": ["nigth"]}}, "did you mean 'night'?"),
+        ({"sweep": {"weather": ["nigth"]}}, "did you mean 'night'?"),
         ({"gap": [6]}, "write arguments = { gap = ... }, or sweep = { gap = [...] }"),
         ({"family": "Own", "sweep": {"gap": [6]}}, "a family of your own requires module = "),
         ({"family": ["CutIn"]}, "family must consist of letters, digits"),

@@ -142,14 +142,14 @@ def test_live_episode_observes_the_same_as_the_wrapper_while_braking(merge):
 
 def test_live_episode_continues_in_the_world_of_the_recording():
     """Also the brake is that of the world, which is wet in the rain."""
-    appearance = Appearance(world=8003, condition="rain")
+    appearance = Appearance(world=8003, weather="rain")
     recorded = Recorded("merge", 0, SENSORS, {"duration": 6}, appearance)
     live = LiveEpisode(recorded.recording, 30, SENSORS)
     assert live.env.brake == draw_brake(8003, wet=True)
     steps = [live.step(HOLD) for _ in range(20)]
     assert all(map(same_inputs, steps, recorded.steps[31:]))
     env = gym.make(
-        traffic_id("merge"), camera="fovea", trace=True, config={"duration": 6}, world=8003, condition="rain"
+        traffic_id("merge"), camera="fovea", trace=True, config={"duration": 6}, world=8003, weather="rain"
     )
     env.reset(seed=0)
     for step in recorded.steps[1:20]:

@@ -1,14 +1,14 @@
-"""The gaze `"stopping"`: its aim on the ego's path and its zoom; stabilised and calibrated lenses."""
+"""The gaze `ToStoppingPoint`: its aim on the ego's path and its zoom; stabilised and calibrated lenses."""
 
 import math
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera, rig
 from support.records import record
 from support.roads import add_car, straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
-from lgmd_gym.camera.aim import aim_depth, aim_of
+from lgmd_gym.camera import Scene
 from lgmd_gym.camera.body_motion import (
     GYRO_DRIFT_DEG,
     GYRO_GAIN_ERROR,
@@ -18,17 +18,30 @@ from lgmd_gym.camera.body_motion import (
     body_motion,
     residual_motion,
 )
-from lgmd_gym.camera.brake_estimate import ERROR, known_deceleration
+from lgmd_gym.camera.effects import in_scene
+from lgmd_gym.camera.env_state import SCENE
 from lgmd_gym.camera.pinhole import LENS
-from lgmd_gym.camera.pose import CALIBRATED, mount_of, pose_lens
-from lgmd_gym.camera.scene import SCENE
+from lgmd_gym.camera.pose import (
+    CALIBRATED,
+    ESTIMATE_ERROR,
+    aim_depth,
+    known_deceleration,
+    mount_of,
+    pose_lens,
+)
 from lgmd_gym.camera.worlds import draw_world
 
 LENGTH, SETBACK, HEIGHT = 4.3, 1.7, 1.2
 
 
 def stopping_camera(**fields):
-    return EgoCamera(CameraParams(gaze="stopping", roadside=0.0, **fields))
+    return ego_camera(rig(gaze="stopping", roadside=0.0, **fields))
+
+
+def depth_of(speed, max_deceleration=9.0, **fields):
+    """Return the distance of the aim from the lens [m]."""
+    mount = mount_of(*rig(gaze="stopping", **fields), max_deceleration)
+    return aim_depth(mount["aim"].view(np.recarray)[()], speed)
 
 
 def stopping_distance(speed, deceleration=7.5, reaction=0.5):
@@ -54,25 +67,23 @@ def test_the_aim_is_in_the_middle_and_the_span_fills_the_frame(speed, reach, off
 
 def test_the_stopping_distance_has_a_least_value_and_grows_on_a_wet_road():
     def depth(speed, **fields):
-        p = CameraParams(gaze="stopping", **fields)
-        return aim_depth(aim_of(p, HEIGHT).view(np.recarray)[()], speed) - SETBACK
+        return depth_of(speed, **fields) - SETBACK
 
     assert depth(0.0) == depth(-3.0) == depth(2.0) == 4.0
     assert depth(20.0) == pytest.approx(stopping_distance(20.0))
     assert depth(20.0, wet=True) == pytest.approx(stopping_distance(20.0, 5.0))
-    changed = depth(20.0, stop_deceleration=9.0, stop_reaction=0.2, reach=2.0)
+    changed = depth(20.0, deceleration=9.0, reaction_s=0.2, reach=2.0)
     assert changed == pytest.approx(2.0 * stopping_distance(20.0, 9.0, 0.2))
 
 
 def test_a_known_brake_scales_the_stopping_distance():
     def depth(**fields):
-        p = CameraParams(gaze="stopping", brake_known=True, **fields)
-        return aim_depth(aim_of(p, HEIGHT).view(np.recarray)[()], 20.0) - SETBACK
+        return depth_of(20.0, brake_known=True, **fields) - SETBACK
 
     assert depth() == depth(wet=True) == pytest.approx(stopping_distance(20.0))
     assert depth(max_deceleration=6.0) == pytest.approx(stopping_distance(20.0, 5.0))
-    assert depth(max_deceleration=6.0, stop_deceleration=9.0) == pytest.approx(stopping_distance(20.0, 6.0))
-    known = known_deceleration(CameraParams(max_deceleration=6.0, world=8003))
+    assert depth(max_deceleration=6.0, deceleration=9.0) == pytest.approx(stopping_distance(20.0, 6.0))
+    known = known_deceleration(Scene(world=8003), 6.0)
     assert known != 6.0
     assert depth(max_deceleration=6.0, world=8003) == pytest.approx(
         stopping_distance(20.0, 7.5 * known / 9.0)
@@ -81,13 +92,13 @@ def test_a_known_brake_scales_the_stopping_distance():
 
 def test_the_estimate_of_the_brake_has_an_error_per_world():
     def errors(worlds, deceleration=8.0):
-        params = [CameraParams(max_deceleration=deceleration, world=world) for world in worlds]
-        return np.array([known_deceleration(p) / deceleration - 1.0 for p in params])
+        scenes = [Scene(world=world) for world in worlds]
+        return np.array([known_deceleration(scene, deceleration) / deceleration - 1.0 for scene in scenes])
 
     drawn = errors(range(2000))
     assert drawn.mean() == pytest.approx(0.0, abs=0.005)
-    assert drawn.std() == pytest.approx(0.96 * ERROR, rel=0.05)  # of a clipped normal distribution
-    assert abs(drawn).max() == pytest.approx(2.0 * ERROR)
+    assert drawn.std() == pytest.approx(0.96 * ESTIMATE_ERROR, rel=0.05)  # of a clipped normal distribution
+    assert abs(drawn).max() == pytest.approx(2.0 * ESTIMATE_ERROR)
     np.testing.assert_allclose(errors(range(20), 5.0), drawn[:20], atol=1e-12)
     assert errors([None]) == 0.0
 
@@ -141,21 +152,21 @@ def test_a_stabilised_lens_keeps_a_small_part_of_the_motion(axis):
 
 def lens_of(**params):
     lens = record(LENS)
-    mount = mount_of(CameraParams(**params)).view(np.recarray)[()]
+    mount = mount_of(*rig(**params)).view(np.recarray)[()]
     pose_lens(mount, record(SCENE, length=LENGTH, speed=16.0, time_s=2.3, acceleration=-8.0), 0.0, lens)
     return lens
 
 
 def test_a_stabilised_lens_turns_little_and_heaves_as_before():
     moving, steady, still = (
-        lens_of(world=7, road=road, stabilised=flag)
-        for road, flag in (("rough", False), ("rough", True), ("still", False))
+        lens_of(world=7, road=road, stabiliser=flag)
+        for road, flag in (("rough", None), ("rough", "gyroscope"), ("still", None))
     )
     for name in ("pitch", "roll", "yaw"):
         assert abs(steady[name] - still[name]) < math.radians(0.08)
         assert steady[name] != still[name]
     assert steady.z == moving.z != still.z
-    dive, left = (lens_of(dive_deg=0.1, stabilised=flag).pitch for flag in (False, True))
+    dive, left = (lens_of(dive_deg=0.1, stabiliser=flag).pitch for flag in (None, "gyroscope"))
     assert (dive, left) == (pytest.approx(math.radians(-0.8)), pytest.approx(math.radians(-0.016)))
 
 
@@ -167,8 +178,8 @@ def test_a_calibrated_lens_knows_most_of_its_mounting_errors():
     assert math.degrees(known.yaw) == pytest.approx(CALIBRATED * world.yaw_error_deg)
     assert known.z == lens.z == pytest.approx(HEIGHT + world.mount_height_error)
     for calibrated, share in ((False, 1.0), (True, CALIBRATED)):
-        p = CameraParams(world=12, gaze="stopping", calibrated=calibrated)
-        height = mount_of(p)["aim"]["height"]
+        p = rig(world=12, gaze="stopping", calibrated=calibrated)
+        height = mount_of(*p)["aim"]["height"]
         assert height == pytest.approx(HEIGHT + (1.0 - share) * world.mount_height_error)
 
 
@@ -177,10 +188,8 @@ def test_at_night_the_headlights_are_those_of_the_car():
     env = straight_env(speed=14.0, line_types=False)
     add_car(env, 24.0, 7.5, shade=120)
     shared = {"light": "night", "roadside": 0.0, "texture": 0.0, "vehicles": "box"}
-    aimed = EgoCamera(
-        CameraParams(gaze="stopping", offset_m=-4.0, span_m=3.0, shape=(60, 120), lift=-0.4, **shared)
-    )
-    wide = EgoCamera(CameraParams(hfov_deg=60.0, shape=(400, 800), **shared))
+    aimed = ego_camera(rig(gaze="stopping", offset_m=-4.0, span_m=3.0, shape=(60, 120), lift=-0.4, **shared))
+    wide = ego_camera(rig(hfov_deg=60.0, shape=(400, 800), **shared))
     for camera in (aimed, wide):
         camera.render(env)
     points = [(21.988, y, z) for y in (7.2, 7.5) for z in (0.5, 0.9)]
@@ -194,12 +203,12 @@ def test_at_night_the_headlights_are_those_of_the_car():
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"panorama": "natural"}, "panorama must be 'skyline' with gaze='stopping', got 'natural'"),
+        ({"panorama": "natural"}, "panorama must be 'skyline' with the gaze 'stopping' of camera 'custom'"),
         ({"span_m": 50.0}, "span_m must be at most 22.8 m, four times the least distance"),
-        ({"reach": 0.1, "mount_setback": -9.0}, "span_m must be at most -34.4 m"),
-        ({"reach": 0.0}, "reach must be in \\[0.1, 10\\] stopping distances, got 0"),
+        ({"reach": 0.1, "setback_m": -9.0}, "span_m must be at most -34.4 m"),
+        ({"reach": 0.0}, "reach must be in \\[0.1, 10\\], got 0"),
     ],
 )
 def test_fields_that_do_not_fit_the_zoom_are_rejected(fields, message):
     with pytest.raises(ValueError, match=message):
-        CameraParams(gaze="stopping", **fields)
+        in_scene(*rig(gaze="stopping", **fields))

@@ -5,9 +5,9 @@ from collections import Counter
 import numpy as np
 import pytest
 from reference.camera import worst_error
+from support.cameras import ego_camera, rig
 from support.roads import box_record, lens_x, set_roadside, straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.objects import BODY_MODELS, MODEL_CAR, MODEL_TRUCK, body_of
 from lgmd_gym.camera.render.models import all_models
 
@@ -68,7 +68,7 @@ def test_any_integer_is_a_world(world):
 def posed(name, heading, shape=(24, 32), **fields):
     """Return a scene with one body, and the parameters of a camera."""
     env = straight_env(lanes=1, y=0.0)
-    params = CameraParams.make({"shape": shape, "hfov_deg": 50.0, "texture": 0.0, "roadside": 0.0, **fields})
+    params = rig({"shape": shape, "hfov_deg": 50.0, "texture": 0.0, "roadside": 0.0, **fields})
     body = BODY_MODELS[name]
     size = (4.0 * body.highest, 2.0, body.highest)
     record = box_record(lens_x(env) + 12.0, 0.5, size, heading=heading, model=body.model)
@@ -87,10 +87,10 @@ def test_body_is_drawn_as_along_the_rays(name, heading):
 def test_lamps_of_a_body_are_on_at_night(name):
     """Rear lamps are at 170, and headlights dazzle."""
     env, params = posed(name, 0.0, shape=(96, 128), hfov_deg=20.0, light="night")
-    rear = EgoCamera(params).render(env)
+    rear = ego_camera(params).render(env)
     assert np.sum(np.abs(rear.astype(int) - 170) < 3) > 10
     env, params = posed(name, np.pi, shape=(96, 128), light="night")
-    assert np.sum(EgoCamera(params).render(env) == 255) > 20
+    assert np.sum(ego_camera(params).render(env) == 255) > 20
 
 
 @pytest.mark.parametrize("name", SHOWN)

@@ -4,10 +4,10 @@ from math import pi, radians, sqrt
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera, rig
 from support.records import record
 from support.roads import straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.body_motion import (
     BAND_RMS,
     BANDS_HZ,
@@ -20,16 +20,16 @@ from lgmd_gym.camera.body_motion import (
     body_motion,
     road_gain,
 )
+from lgmd_gym.camera.env_state import SCENE
 from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.pose import mount_of, pose_lens
-from lgmd_gym.camera.scene import SCENE
 
 SECONDS, RATE_HZ = 400, 105  # three times the 35 Hz of the measured change of pitch
 
 
 def posed(ago=0.0, scene=(), **params):
     """Return the lens of a camera 2 m behind the front of a car of 4 m at the speed of the recording."""
-    mount = mount_of(CameraParams(mount_setback=2.0, **params)).view(np.recarray)[()]
+    mount = mount_of(*rig(setback_m=2.0, **params)).view(np.recarray)[()]
     lens = record(LENS)
     pose_lens(mount, record(SCENE, **({"length": 4.0, "speed": MEAN_SPEED} | dict(scene))), ago, lens)
     return lens
@@ -93,7 +93,7 @@ def test_earlier_pose_has_the_earlier_motion():
 
 def test_motion_is_bounded_and_the_lens_stays_above_the_ground():
     scenes = [{"time_s": time, "speed": 60.0} for time in np.arange(0.0, 30.0, 0.05)]
-    lenses = [posed(scene=scene, road="normal", mount_height=0.02) for scene in scenes]
+    lenses = [posed(scene=scene, road="normal", height_m=0.02) for scene in scenes]
     for name, bound in zip(("pitch", "roll", "yaw"), MAX_DEG, strict=True):
         largest = np.rad2deg(max(abs(lens[name]) for lens in lenses))
         assert 0.5 * bound < largest < bound
@@ -103,13 +103,13 @@ def test_motion_is_bounded_and_the_lens_stays_above_the_ground():
 def test_still_road_and_standstill_move_nothing():
     env = straight_env()
     env.steps = 7
-    moving, still = EgoCamera("fovea", road="normal"), EgoCamera("fovea")
+    moving, still = ego_camera("fovea", road="normal"), ego_camera("fovea")
     frame = still.render(env)
     lens = still._lens
     assert (lens["pitch"], lens["roll"], lens["yaw"], lens["z"]) == (0.0, 0.0, 0.0, 1.2)
     assert not np.array_equal(moving.render(env), frame)
     again = moving.render(env)
-    assert np.array_equal(EgoCamera("fovea", road="normal").render(env), again)
-    assert not np.array_equal(EgoCamera("fovea", road="normal", seed=1)._lens, moving._lens)
+    assert np.array_equal(ego_camera("fovea", road="normal").render(env), again)
+    assert not np.array_equal(ego_camera("fovea", road="normal", seed=1)._lens, moving._lens)
     env.vehicle.speed = 0.0
     assert np.array_equal(moving.render(env), still.render(env))

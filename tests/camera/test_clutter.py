@@ -5,9 +5,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from reference.camera import worst_error
+from support.cameras import rig
 from support.roads import box_record, lens_x, ring_road, set_roadside, straight_env
 
-from lgmd_gym.camera import CameraParams, objects
+from lgmd_gym.camera import objects
 from lgmd_gym.camera.clutter import ROAD_TYPES, Clutter, draw_clutter, place_clutter
 from lgmd_gym.camera.objects import MODEL_BEAM, MODEL_BUS, MODEL_CAR, MODEL_DECK, MODEL_MARK, OBJECT
 
@@ -189,7 +190,7 @@ def test_drawn_clutter_is_that_of_a_road_type():
 @pytest.mark.parametrize("heading", [0.15, 2.7])
 def test_model_is_drawn_as_along_the_rays(name, heading):
     env = straight_env(lanes=1, y=0.0)
-    params = CameraParams(shape=(24, 32), hfov_deg=50.0, texture=0.0, roadside=0.0, pitch_deg=10.0)
+    params = rig(shape=(24, 32), hfov_deg=50.0, texture=0.0, roadside=0.0, pitch_deg=10.0)
     size = (0.4, 4.0, 6.0) if MODELS[name] <= 22 else (8.0, 4.0, 6.0)
     base = 3.0 if MODELS[name] <= 16 else 0.0
     record = box_record(lens_x(env) + 14.0, 1.0, size, heading=heading, model=MODELS[name], base=base)
@@ -204,7 +205,7 @@ def test_clutter_is_drawn_as_along_the_rays(seed, kind):
     On one road in ten, long objects hide each other in turn, and some pixels are wrong.
     """
     env = straight_env(lanes=2, x=300.0)
-    params = CameraParams(shape=(21, 34), hfov_deg=60.0, texture=0.0)
+    params = rig(shape=(21, 34), hfov_deg=60.0, texture=0.0)
     lanes = np.array([[-200.0, y, 5000.0, y, 0.0, 3.5] for y in (0.0, 3.5)])
     clutter = replace(ROAD_TYPES[kind], bridge=6.0, gantry=6.0, signal=6.0)
     records = place_clutter(lanes, clutter, seed, (250.0, 500.0), queue_lane=0)

@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera
 from support.roads import add_car, lens_x, straight_env
 
-from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera.render.coverage import add_polygon
 
 PLAIN = {"texture": 0.0, "roadside": 0.0, "vehicles": "box"}
@@ -92,7 +92,7 @@ def test_polygons_far_outside_the_frame_are_clipped():
 def box_area_by_grey(dx, lens="standard", gap=15.0):
     """Return the area of a box from its grey, its exact visible area and that of its rear face [px]."""
     env = straight_env(line_types=False)
-    camera = EgoCamera(lens, **PLAIN, pitch_deg=0.0)
+    camera = ego_camera(lens, **PLAIN, pitch_deg=0.0)
     car = add_car(env, lens_x(env) + gap + 2.0 + dx, 3.5, shade=10, size=(4.0, 1.8, 1.9))
     frame = camera.render(env).astype(float)
     d = gap + dx
@@ -119,9 +119,9 @@ def test_grey_of_a_box_is_proportional_to_its_projected_area(dx):
 
 def test_edge_moved_by_a_tenth_of_a_pixel_changes_the_frame_by_a_tenth_of_its_contrast():
     env = straight_env(line_types=False)
-    camera = EgoCamera("standard", **PLAIN)
+    camera = ego_camera("standard", **PLAIN)
     car = add_car(env, lens_x(env) + 22.0, 5.0, shade=10, size=(4.0, 1.8, 3.0))
-    px = 20.0 / camera.params.focal_px  # metres across per pixel on the rear face
+    px = 20.0 / camera.camera.focal_px  # metres across per pixel on the rear face
     rows = slice(32, 38)  # the box against plain sky
     right = 3.5 + 2.4 - 1.0
     car.position[1] = right
@@ -140,7 +140,7 @@ def test_edge_moved_by_a_tenth_of_a_pixel_changes_the_frame_by_a_tenth_of_its_co
 def test_looming_is_smooth():
     """The frame changes by small, even steps while a car approaches by centimetres."""
     env = straight_env(line_types=False)
-    camera = EgoCamera("fovea", **PLAIN)
+    camera = ego_camera("fovea", **PLAIN)
     car = add_car(
         env, lens_x(env) + 42.0, 3.5, shade=30, size=(4.0, 1.8, 1.1)
     )  # below the horizon: plain ground behind
@@ -159,7 +159,7 @@ def test_looming_is_smooth():
 
 def test_details_of_an_approaching_car_fade_in():
     env = straight_env(line_types=False)
-    camera = EgoCamera("standard", texture=0.0, roadside=0.0)
+    camera = ego_camera("standard", texture=0.0, roadside=0.0)
     car = add_car(env, 80.0, 3.5, shade=200)
     frames = []
     for k in range(600):
@@ -178,7 +178,7 @@ def test_far_markings_fade_and_do_not_flicker():
     0.15 m wide at 39 m (0.54 px) and a contrast of 104 that is 0.054 · 0.54 · 104 · 0.52 < 2 grey levels.
     """
     env = straight_env(speed=30.0)
-    camera = EgoCamera("wide", texture=0.0, roadside=0.0)
+    camera = ego_camera("wide", texture=0.0, roadside=0.0)
     frames = []
     for k in range(60):
         env.vehicle.position[0] = k * 1.0
@@ -192,7 +192,7 @@ def test_far_markings_fade_and_do_not_flicker():
 def test_far_asphalt_does_not_flicker():
     """One standard deviation of near asphalt is 9 grey levels; a pixel of row 46 covers 74 m by 0.8 m."""
     env = straight_env(lanes=1, width=60.0, line_types=False, speed=30.0)
-    camera = EgoCamera("wide", roadside=0.0)
+    camera = ego_camera("wide", roadside=0.0)
     frames = []
     for k in range(60):
         env.vehicle.position[0] = k * 1.0

@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera
 from support.roads import add_car, straight_env
-
-from lgmd_gym.camera import EgoCamera
 
 SHAPE = (48, 80)
 MARGIN = (96, 160)
@@ -16,10 +15,10 @@ def _crop_and_frame(env, hfov_deg, **fields):
     """Return the middle of a large frame, and a frame with the same focal length and the size of the crop."""
     height, width = (SHAPE[0] + 2 * MARGIN[0], SHAPE[1] + 2 * MARGIN[1])
     tan = math.tan(math.radians(hfov_deg / 2)) * width / SHAPE[1]
-    large = EgoCamera(
+    large = ego_camera(
         "wide", shape=(height, width), hfov_deg=2 * math.degrees(math.atan(tan)), **fields
     ).render(env)
-    small = EgoCamera("wide", shape=SHAPE, hfov_deg=hfov_deg, **fields).render(env)
+    small = ego_camera("wide", shape=SHAPE, hfov_deg=hfov_deg, **fields).render(env)
     crop = large[MARGIN[0] : height - MARGIN[0], MARGIN[1] : width - MARGIN[1]]
     return crop.astype(int), small.astype(int)
 
@@ -72,6 +71,6 @@ def test_field_of_a_stopping_zone_is_the_middle_of_a_larger_frame(world, rows, l
 
 def _light(env, shape, span_m, lift, world):
     """Return the light of a frame without noise: that of the sensor depends on the size of the frame."""
-    camera = EgoCamera(shape=shape, span_m=span_m, gaze="stopping", lift=lift, world=world)
+    camera = ego_camera(shape=shape, span_m=span_m, gaze="stopping", lift=lift, world=world)
     camera.render(env)
     return camera.light.copy()

@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera, rig
 from support.roads import straight_env
 
 from lgmd_gym import LGMDParams
 from lgmd_gym.agents.sides import side_cameras
-from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera import EgoCamera, Fixed
+from lgmd_gym.sensing.channel import Channel
 from lgmd_gym.sensing.sensor_array import SensorArray
 
 LENS = {"shape": (40, 80), "hfov_deg": 30.0}
@@ -23,17 +25,17 @@ def views(camera, env, headings):
 
 
 def test_the_view_turns_by_whole_pixels_within_half_a_pixel_of_the_car():
-    p = CameraParams(**LENS, yaw_deg=12.0, derotated=True)
+    p = rig(**LENS, yaw_deg=12.0, derotated=True)
     env = straight_env(speed=0.0)
     headings = np.linspace(-0.3, 0.4, 23)
-    for heading, (yaw_px, lens) in zip(headings, views(EgoCamera(p), env, headings), strict=True):
-        assert lens["yaw"] * p.focal_px == pytest.approx(yaw_px, abs=1e-6)
-        assert abs(lens["yaw"] - heading - math.radians(12.0)) * p.focal_px <= 0.5 + 1e-9
+    for heading, (yaw_px, lens) in zip(headings, views(EgoCamera(*p), env, headings), strict=True):
+        assert lens["yaw"] * p.camera.focal_px == pytest.approx(yaw_px, abs=1e-6)
+        assert abs(lens["yaw"] - heading - math.radians(12.0)) * p.camera.focal_px <= 0.5 + 1e-9
 
 
 def test_distant_points_move_by_the_turn():
-    p = CameraParams(**LENS, derotated=True)
-    camera, env = EgoCamera(p), straight_env(speed=0.0)
+    p = rig(**LENS, derotated=True)
+    camera, env = ego_camera(p), straight_env(speed=0.0)
     columns, yaws = [], []
     for yaw_px, _ in views(camera, env, np.radians([0.0, 0.9, 2.2, 1.4, -1.0])):
         columns.append(camera.project((3000.0, 0.0, 0.0))[0])
@@ -43,7 +45,7 @@ def test_distant_points_move_by_the_turn():
 
 
 def test_other_views_have_the_yaw_of_the_car():
-    camera = EgoCamera(CameraParams(**LENS))
+    camera = ego_camera(rig(**LENS))
     assert camera.yaw_px == 0
     (yaw_px, lens), *_ = views(camera, straight_env(speed=0.0), [0.1234])
     assert (yaw_px, lens["yaw"]) == (0, pytest.approx(0.1234))
@@ -55,7 +57,7 @@ def test_motion_blur_contains_the_rotation_during_the_exposure():
     for derotated in (False, True):
         env = straight_env(speed=10.0)
         env.vehicle.action = {"steering": 0.2, "acceleration": 0.0}
-        camera = EgoCamera(CameraParams(**fields, derotated=derotated))
+        camera = ego_camera(rig(**fields, derotated=derotated))
         camera.render(env)
         end, start = camera._own_stage().batch.lenses[0, 0]["yaw"]
         pairs.append(end - start)
@@ -63,10 +65,10 @@ def test_motion_blur_contains_the_rotation_during_the_exposure():
     assert pairs[1] == pytest.approx(pairs[0], abs=1e-12)
 
 
-@pytest.mark.parametrize("detector", ["lgmd", "dsn", "lplc2"])
-def test_a_rotation_of_the_car_causes_no_motion(detector):
+@pytest.mark.parametrize("neuron", ["lgmd", "dsn", "lplc2"])
+def test_a_rotation_of_the_car_causes_no_motion(neuron):
     cameras = [
-        {"name": str(derotated), **LENS, "derotated": derotated, "detector": detector}
+        Channel(camera={"name": str(derotated), **LENS, "gaze": Fixed(derotated=derotated)}, neuron=neuron)
         for derotated in (False, True)
     ]
     env, sensors = straight_env(lanes=2, speed=0.0), SensorArray(cameras, 30.0, LGMDParams())
@@ -82,11 +84,11 @@ def test_a_rotation_of_the_car_causes_no_motion(detector):
 
 
 def test_the_fields_at_the_sides_are_derotated():
-    assert all(camera["derotated"] for camera in side_cameras())
+    assert all(channel["camera"]["gaze"]["derotated"] for channel in side_cameras())
 
 
 def test_a_zooming_view_cannot_be_derotated():
-    with pytest.raises(ValueError, match="camera derotated must be False with gaze='stopping', got True"):
-        CameraParams(gaze="stopping", derotated=True)
-    with pytest.raises(ValueError, match="camera derotated must be"):
-        CameraParams(derotated="yes")
+    with pytest.raises(ValueError, match="unknown camera gaze field 'derotated'"):
+        rig(gaze="stopping", derotated=True)
+    with pytest.raises(ValueError, match="camera gaze derotated must be"):
+        rig(derotated="yes")

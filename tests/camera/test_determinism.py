@@ -4,19 +4,17 @@ import subprocess
 import sys
 
 import numpy as np
+from support.cameras import ego_camera
 from support.roads import add_car, straight_env
-
-from lgmd_gym.camera import EgoCamera
 
 DIGEST = """
 import hashlib, sys
 sys.path.insert(0, {tests!r})
 from support.roads import straight_env, add_car
-from lgmd_gym.camera import EgoCamera, CameraParams
 digest = hashlib.sha256()
 for name in ("wide", "fovea"):
     env = straight_env(); add_car(env, 25.0, 3.5); add_car(env, 40.0, 7.0, heading=0.3)
-    camera = EgoCamera(CameraParams.preset(name, seed=5).with_condition("rain"))
+    camera = ego_camera(name, seed=5, weather="rain")
     for k in range(5):
         env.vehicle.position[0] = k * 0.4
         digest.update(camera.render(env).tobytes())
@@ -35,5 +33,5 @@ def test_same_seed_gives_same_frames_in_another_process(request, capsys):
 def test_seed_changes_texture_and_shades():
     env = straight_env()
     add_car(env, 12.0, 3.5)
-    frames = [EgoCamera("wide", seed=s).render(env).astype(int) for s in (0, 1)]
+    frames = [ego_camera("wide", seed=s).render(env).astype(int) for s in (0, 1)]
     assert np.abs(frames[0] - frames[1])[50:].mean() > 3.0

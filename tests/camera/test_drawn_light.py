@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera, rig
 from support.roads import box_record, lens_x, set_roadside, straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.clutter import Clutter, place_clutter
 from lgmd_gym.camera.effects import look_of, noise_table
 from lgmd_gym.camera.objects import MODEL_LAMP, MODEL_THICKET, MODEL_TREE
@@ -18,7 +18,7 @@ TRAINING = [draw_world(number) for number in SPLIT_WORLDS["train"][:300]]
     ("grey", "expected"), [(110.0, 110), (60.0, 35), (30.0, 0), (150.0, 170), (220.0, 255)]
 )
 def test_tone_curve_is_steeper_around_the_target_of_the_exposure(grey, expected):
-    look = look_of(CameraParams(linear_light=True))
+    look = look_of(*rig(linear_light=True))
     assert (look["contrast"], look["target_grey"]) == (1.0, 110.0)
     look["contrast"] = 1.5
     image, out = np.full((3, 20), grey**2 / 255.0, np.float32), np.zeros((3, 20), np.uint8)
@@ -37,7 +37,7 @@ def test_worlds_differ_in_their_sensor(name, low, high):
 
 def test_target_of_the_exposure_at_night():
     world = draw_world(5)
-    looks = [look_of(CameraParams.make({"world": 5, "condition": name})) for name in ("clear", "night")]
+    looks = [look_of(*rig({"world": 5, "weather": name})) for name in ("clear", "night")]
     assert [float(look["target_grey"]) for look in looks] == pytest.approx(
         [world.exposure_grey, world.exposure_grey * world.night_exposure]
     )
@@ -46,11 +46,11 @@ def test_target_of_the_exposure_at_night():
 
 @pytest.mark.parametrize(
     ("fields", "brighter"),
-    [({"world": 5, "condition": "night"}, True), ({"world": 5, "condition": "night", "wet": True}, False),
-     ({"world": 5}, False), ({"condition": "night"}, False)],
+    [({"world": 5, "weather": "night"}, True), ({"world": 5, "weather": "night", "wet": True}, False),
+     ({"world": 5}, False), ({"weather": "night"}, False)],
 )  # fmt: skip
 def test_dry_markings_return_headlights(fields, brighter):
-    look, day = (look_of(CameraParams.make(f)) for f in (fields, {**fields, "light": "day"}))
+    look, day = (look_of(*rig(f)) for f in (fields, {**fields, "light": "day"}))
     share = 1.8 if brighter else 1.0
     assert look["paint"] == pytest.approx(share * day["paint"])
 
@@ -60,12 +60,12 @@ def test_street_lamps_shine_at_night_to_all_sides():
     frames = {}
     for light in ("day", "night"):
         for heading in (0.0, np.pi / 2):
-            params = CameraParams(light=light, roadside=0.0, pitch_deg=8.0)
+            params = rig(light=light, roadside=0.0, pitch_deg=8.0)
             record = box_record(
                 lens_x(env) + 40.0, 4.0, (0.5, 0.5, 8.0), heading=heading, model=MODEL_LAMP, base=7.8
             )
             set_roadside(env, params, record)
-            camera = EgoCamera(params)
+            camera = ego_camera(params)
             frames[light, heading] = camera.render(env).astype(int)
             u, v = np.floor(camera.project([lens_x(env) + 40.0, 4.0, 7.9])).astype(int)
     for heading in (0.0, np.pi / 2):

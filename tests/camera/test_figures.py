@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from reference.camera import worst_error
 from reference.geometry import camera_axes
+from support.cameras import ego_camera, rig
 from support.roads import FIGURES, add_car, add_figure, add_obstacle, box_record, lens_x, straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.effects import look_of
 from lgmd_gym.camera.objects import FIGURES as KINDS
 from lgmd_gym.camera.render.figures import pose_figure
@@ -38,7 +38,7 @@ def posed(kind, heading, ahead=8.0, left=0.3, speed=1.4, travelled=0.5, **fields
     """Return a scene with one figure, and the parameters of a camera."""
     env = straight_env(lanes=1, y=0.0, line_types=False)
     add_figure(env, kind, lens_x(env) + ahead, -left, 70, heading, None, speed, travelled)
-    return env, CameraParams.make({**SMALL, **fields})
+    return env, rig({**SMALL, **fields})
 
 
 @pytest.mark.parametrize("kind", FIGURES)
@@ -51,7 +51,7 @@ def posed(kind, heading, ahead=8.0, left=0.3, speed=1.4, travelled=0.5, **fields
         (2.4, FOG),
         (-2.0, {"travelled": 0.9}),
         (3.0, {"speed": 0.0, "ahead": 5.0}),
-        (-1.4, {"mount_height": 3.5, "pitch_deg": -35.0, "ahead": 4.0}),
+        (-1.4, {"height_m": 3.5, "pitch_deg": -35.0, "ahead": 4.0}),
         (1.3, {"ahead": 2.2, "left": 0.5}),
     ],
 )
@@ -143,7 +143,7 @@ def test_crank_turns_once_in_its_development():
 def light_of(kind, heading, ahead, left=0.0, **fields):
     fields = {"shape": (90, 160), "hfov_deg": 66.0, "pitch_deg": 0.0, **fields}
     env, params = posed(kind, heading, ahead, left, **fields)
-    camera = EgoCamera(params)
+    camera = ego_camera(params)
     camera.render(env)
     return camera.light.astype(float)
 
@@ -202,27 +202,27 @@ def box_light(kind):
     figure = env.road.objects.pop()
     box = add_obstacle(env, lens_x(env) + 8.0, 0.0, 70)
     box.LENGTH, box.WIDTH, box.HEIGHT, box.heading = figure.LENGTH, figure.WIDTH, figure.HEIGHT, 0.3
-    camera = EgoCamera(params)
+    camera = ego_camera(params)
     camera.render(env)
     return camera.light
 
 
 def test_figure_without_a_grey_has_a_dark_jacket():
     env, params = posed("Pedestrian", 0.0)
-    frame = EgoCamera(params).render(env)
+    frame = ego_camera(params).render(env)
     del env.road.objects[0].shade
-    other = EgoCamera(params).render(env)
+    other = ego_camera(params).render(env)
     env.road.objects[0].shade = 60
     assert (frame != other).any()
-    assert (EgoCamera(params).render(env) == other).all()
+    assert (ego_camera(params).render(env) == other).all()
 
 
 @pytest.mark.parametrize("kind", FIGURES)
 def test_sun_casts_the_shadow_of_the_rider(kind):
     """The shadow of what is at 0.85 of the height, and no shadow 0.7 m beside it."""
-    fields = {"world": 11, "mount_height": 4.0, "pitch_deg": -25.0, "shape": (90, 160), "hfov_deg": 90.0}
+    fields = {"world": 11, "height_m": 4.0, "pitch_deg": -25.0, "shape": (90, 160), "hfov_deg": 90.0}
     env, params = posed(kind, 0.3, 9.0, 0.0, **fields)
-    camera, look = EgoCamera(params), look_of(params)
+    camera, look = ego_camera(params), look_of(*params)
     camera.render(env)
     shadowed = camera.light.astype(float)
     lens = SimpleNamespace(**{name: float(camera._lens[name]) for name in camera._lens.dtype.names})

@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera
 from support.roads import add_car, straight_env
 
-from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera.render.texture import TEXEL_M, ground_texture
 
 
@@ -32,15 +32,15 @@ def f_hat(frames, dt_ms=1000 / 30, tau_ms=10.0):
 
 
 def test_f_hat_on_an_empty_road_is_in_the_range_of_real_clips():
-    assert np.median(f_hat(drive(EgoCamera("wide")))) >= 2.0
-    assert np.median(f_hat(drive(EgoCamera("wide", roadside=0.0)))) >= 2.0  # the asphalt alone flows
-    assert np.median(f_hat(drive(EgoCamera("wide", texture=0.0, roadside=0.0)))) < 1.0
+    assert np.median(f_hat(drive(ego_camera("wide")))) >= 2.0
+    assert np.median(f_hat(drive(ego_camera("wide", roadside=0.0)))) >= 2.0  # the asphalt alone flows
+    assert np.median(f_hat(drive(ego_camera("wide", texture=0.0, roadside=0.0)))) < 1.0
 
 
 def test_still_scene_gives_identical_frames():
     env = straight_env()
     add_car(env, 20.0, 3.5)
-    camera = EgoCamera("wide")
+    camera = ego_camera("wide")
     first = camera.render(env)
     for _ in range(5):
         assert np.array_equal(camera.render(env), first)
@@ -54,8 +54,8 @@ def test_still_scene_gives_identical_frames():
 def test_ground_is_fixed_in_the_world():
     """Texture moves from one frame row to another with the distance driven."""
     env = straight_env(lanes=1, width=60.0, line_types=False)
-    camera = EgoCamera("wide", roadside=0.0, texture=3.0)
-    f, h = camera.params.focal_px, 1.2
+    camera = ego_camera("wide", roadside=0.0, texture=3.0)
+    f, h = camera.camera.focal_px, 1.2
     env.vehicle.position[0] = 50.0
     before = camera.render(env).astype(float)
     far, near = 70, 80  # rows; the ground of row 70 moves to row 80 after:
@@ -74,7 +74,7 @@ def test_ground_is_fixed_in_the_world():
 
 def test_ground_moves_sideways_with_the_car():
     env = straight_env(lanes=1, width=60.0, line_types=False)
-    camera = EgoCamera("wide", roadside=0.0, texture=3.0)
+    camera = ego_camera("wide", roadside=0.0, texture=3.0)
     before = camera.render(env).astype(float)
     row = 75
     px = 1.2 / (row + 0.5 - 45)  # metres across per pixel
@@ -100,6 +100,6 @@ def test_texture_is_periodic_and_its_levels_are_box_averages():
 
 
 def test_frames_of_an_episode_change_evenly():
-    changes = f_hat(drive(EgoCamera("wide"), frames=200), tau_ms=0.0)
+    changes = f_hat(drive(ego_camera("wide"), frames=200), tau_ms=0.0)
     assert changes.max() < 1.8 * np.median(changes)
     assert changes.min() > 0.5 * np.median(changes)

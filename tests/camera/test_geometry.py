@@ -2,9 +2,9 @@ import math
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera, rig
 from support.roads import EGO_LENGTH, add_car, lens_x, straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.render.texture import distance_ahead
 
 PLAIN = {"texture": 0.0, "roadside": 0.0, "vehicles": "box"}
@@ -27,7 +27,7 @@ def changed(camera, env, car):
 @pytest.mark.parametrize("gap", [8.0, 20.0])
 def test_box_covers_the_pixels_of_its_projection(shape, gap):
     env = straight_env(line_types=False)
-    camera = EgoCamera("standard", shape=shape, **PLAIN)
+    camera = ego_camera("standard", shape=shape, **PLAIN)
     # Dark, and higher than the lens, so that its rear face alone sets left, right and top.
     car = add_car(env, lens_x(env) + gap + 2.0, 3.5, shade=10, size=(4.0, 1.8, 1.6))
     top, bottom, left, right = changed(camera, env, car)
@@ -44,7 +44,7 @@ def test_box_covers_the_pixels_of_its_projection(shape, gap):
 
 def test_larger_y_is_on_the_right():
     env = straight_env()
-    camera = EgoCamera("wide", **PLAIN)
+    camera = ego_camera("wide", **PLAIN)
     car = add_car(env, 25.0, 3.5 + 3.5, shade=10)
     _, _, left, _ = changed(camera, env, car)
     assert left > 80
@@ -58,7 +58,7 @@ def test_straight_ahead_is_the_middle_for_any_heading(heading):
     env = straight_env(heading=heading, x=100.0, line_types=False)
     ahead = env.vehicle.position + 30.0 * np.array([math.cos(heading), math.sin(heading)])
     car = add_car(env, *ahead, shade=10, heading=heading)
-    camera = EgoCamera("standard", **PLAIN)
+    camera = ego_camera("standard", **PLAIN)
     _, _, left, right = changed(camera, env, car)
     assert (left + right) / 2 == pytest.approx(80.0, abs=1.0)
     u, v = camera.project([*ahead, 1.2])
@@ -67,7 +67,7 @@ def test_straight_ahead_is_the_middle_for_any_heading(heading):
 
 def test_mount_is_behind_the_front_bumper():
     env = straight_env()
-    camera = EgoCamera("wide", mount_setback=0.5, mount_left=0.4, mount_height=1.5)
+    camera = ego_camera("wide", setback_m=0.5, left_m=0.4, height_m=1.5)
     camera.render(env)
     lens = np.array([EGO_LENGTH / 2 - 0.5, 3.5 - 0.4, 1.5])
     assert camera.project(lens + np.array([10.0, 0.0, 0.0])) == pytest.approx((80.0, 45.0))
@@ -80,7 +80,7 @@ def test_mount_is_behind_the_front_bumper():
 @pytest.mark.parametrize("pitch", [-8.0, 0.0, 5.0])
 def test_pitch_moves_the_horizon(pitch):
     env = straight_env(line_types=False)
-    camera = EgoCamera("wide", pitch_deg=pitch, **PLAIN)
+    camera = ego_camera("wide", pitch_deg=pitch, **PLAIN)
     frame = camera.render(env)
     v = 45 + 80 / math.tan(math.radians(30)) * math.tan(math.radians(pitch))
     far = camera.project([1e7, 3.5, 0.0])
@@ -92,20 +92,20 @@ def test_pitch_moves_the_horizon(pitch):
 
 def test_yaw_and_gaze_turn_the_picture():
     env = straight_env()
-    camera = EgoCamera("wide", yaw_deg=10.0, **PLAIN)
+    camera = ego_camera("wide", yaw_deg=10.0, **PLAIN)
     point = [lens_x(env) + 20.0, 3.5, 1.2]
     camera.render(env)
-    shift = camera.params.focal_px * math.tan(math.radians(10.0))
+    shift = camera.camera.focal_px * math.tan(math.radians(10.0))
     assert camera.project(point)[0] == pytest.approx(80.0 - shift)
     camera.render(env, gaze=(-10.0, 5.0))
-    rise = camera.params.focal_px * math.tan(math.radians(5.0))
+    rise = camera.camera.focal_px * math.tan(math.radians(5.0))
     assert camera.project(point) == pytest.approx((80.0, 45.0 + rise))
 
 
 def test_path_gaze_turns_towards_the_curve():
     env = straight_env()
     point = [lens_x(env) + 20.0, 3.5, 1.2]
-    camera = EgoCamera("wide", gaze="path")
+    camera = ego_camera("wide", gaze="path")
     camera.render(env)
     assert camera.project(point)[0] == pytest.approx(80.0)
     env.vehicle.action = {"steering": 0.05, "acceleration": 0.0}  # to the right
@@ -115,17 +115,17 @@ def test_path_gaze_turns_towards_the_curve():
 
 def test_point_behind_the_lens_projects_to_nan():
     env = straight_env()
-    camera = EgoCamera("wide")
+    camera = ego_camera("wide")
     camera.render(env)
     assert np.isnan(camera.project([[-5.0, 3.5, 0.0]])).all()
     with pytest.raises(ValueError, match="render"):
-        EgoCamera("wide").project([1.0, 2.0, 3.0])
+        ego_camera("wide").project([1.0, 2.0, 3.0])
 
 
 @pytest.mark.parametrize("pitch_deg", [-5.0, 0.0, 5.0])
 def test_distance_of_a_ground_row_agrees_with_projection(pitch_deg):
     env = straight_env(x=3.0, y=1.0)
-    camera = EgoCamera("wide", pitch_deg=pitch_deg)
+    camera = ego_camera("wide", pitch_deg=pitch_deg)
     camera.render(env)
     for row in (65, 75, 89):
         ahead = distance_ahead(camera._lens, row)
@@ -136,7 +136,7 @@ def test_distance_of_a_ground_row_agrees_with_projection(pitch_deg):
 
 def test_out_is_filled_and_checked():
     env = straight_env()
-    camera = EgoCamera(CameraParams(shape=(40, 60)))
+    camera = ego_camera(rig(shape=(40, 60)))
     out = np.zeros((40, 60), np.uint8)
     assert camera.render(env, out) is out
     assert out.std() > 5

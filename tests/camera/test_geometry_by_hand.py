@@ -4,12 +4,12 @@ from math import asin, atan, cos, pi, radians, sin, tan
 
 import numpy as np
 import pytest
+from support.cameras import rig
 from support.records import lens_of, record
 
-from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.env_state import SCENE
 from lgmd_gym.camera.pinhole import LENS, project
 from lgmd_gym.camera.pose import mount_of, pose_lens
-from lgmd_gym.camera.scene import SCENE
 
 
 @pytest.mark.parametrize(
@@ -43,8 +43,8 @@ def test_points_behind_the_lens_have_no_projection():
 
 def posed(params=(), ago=0.0, **scene):
     """Return the lens of a camera on a car of 4 m at 10 m/s."""
-    params = {"mount_setback": 0.5, "mount_left": 0.25, "mount_height": 1.5} | dict(params)
-    mount = mount_of(CameraParams(**params)).view(np.recarray)[()]
+    params = {"setback_m": 0.5, "left_m": 0.25, "height_m": 1.5} | dict(params)
+    mount = mount_of(*rig(**params)).view(np.recarray)[()]
     lens = record(LENS)
     pose_lens(mount, record(SCENE, **({"length": 4.0, "speed": 10.0} | scene)), ago, lens)
     return lens
@@ -60,13 +60,13 @@ def test_mount_on_the_car():
 
 def test_options_of_the_mount():
     def mount(**fields):
-        return mount_of(CameraParams(**fields))
+        return mount_of(*rig(**fields))
 
     for fields in ({"shot_noise": 0.05}, {"read_noise": 0.05}, {"shot_noise": 1.0, "read_noise": 1.0}):
         assert mount(**fields)["noisy"] == 1
     assert mount(shot_noise=0.0, read_noise=0.0)["noisy"] == 0
     assert [mount(gaze=gaze)["gaze"] for gaze in ("fixed", "path", "stopping")] == [0, 1, 2]
-    assert [mount(stabilised=flag)["stabilised"] for flag in (True, False)] == [1, 0]
+    assert [mount(stabiliser=kind)["stabilised"] for kind in ("gyroscope", None)] == [1, 0]
     assert [mount(vehicles=kind)["box"] for kind in ("box", "car")] == [1, 0]
     values = mount(seed=17, shutter_s=0.01)
     assert (values["seed"], values["shutter_s"]) == (17, 0.01)
@@ -103,7 +103,7 @@ def test_gaze_along_the_path_is_where_the_car_is_in_one_second(sign):
 
 def test_earlier_pose_is_on_the_same_circle():
     ago = 0.5
-    lens = posed({"mount_setback": 2.0, "mount_left": 0.0}, ago, heading=0.3, steering=STEERING)
+    lens = posed({"setback_m": 2.0, "left_m": 0.0}, ago, heading=0.3, steering=STEERING)
     course = 0.3 + SLIP - YAW_RATE * ago / 2
     assert (lens.x, lens.y) == pytest.approx((-5 * cos(course), -5 * sin(course)))
     assert lens.yaw == pytest.approx(0.3 - YAW_RATE * ago)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera, rig
 from support.roads import straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.effects import beam_profile, look_of
 from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.render.buffers import Horizon, Tables, View
@@ -23,8 +23,8 @@ def view_of(p, yaw, x=31.7, y=-4.2, pitch=-0.05):
     empty = np.zeros((0, 0), np.float32)
     return View(
         lens=lens[()],
-        look=look_of(p)[()],
-        beam=beam_profile(p),
+        look=look_of(*p)[()],
+        beam=beam_profile(p.camera),
         sky=empty,
         sky_aim=np.zeros(2),
         noise_start=0,
@@ -108,7 +108,7 @@ def reference_row(view, tables, coverage, row, behind, part):
     ],
 )
 def test_rows_equal_the_reference(width, fields, yaw):
-    p = CameraParams(shape=(40, width), hfov_deg=30.0, **fields)
+    p = rig(shape=(40, width), hfov_deg=30.0, **fields)
     view, tables, rng = view_of(p, yaw), tables_of(0), np.random.default_rng(width)
     assert (view.look["cast"] > 0.0) == (p.world is not None and not p.wet)
     low, high = (
@@ -132,7 +132,7 @@ def test_rows_equal_the_reference(width, fields, yaw):
 
 
 def test_rows_beside_the_row_do_not_change():
-    p = CameraParams(shape=(12, 37))
+    p = rig(shape=(12, 37))
     view, tables = view_of(p, 0.1), tables_of(0)
     coverage = np.ones((4, 12, 39), np.float32)
     image = np.full((12, 37), -1.0, np.float32)
@@ -145,7 +145,7 @@ def test_rows_beside_the_row_do_not_change():
 
 def test_texture_repeats_after_its_period():
     """164 m along and 20 m across are whole periods of the texture: the same ground."""
-    env, camera = straight_env(lanes=1, width=200.0, line_types=False), EgoCamera("wide", roadside=0.0)
+    env, camera = straight_env(lanes=1, width=200.0, line_types=False), ego_camera("wide", roadside=0.0)
     before = camera.render(env)
     env.vehicle.position = env.vehicle.position + np.array([4096 * TEXEL_M, 512 * TEXEL_M])
     assert np.abs(camera.render(env)[50:].astype(int) - before[50:]).max() <= 1

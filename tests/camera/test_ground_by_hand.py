@@ -5,9 +5,9 @@ from math import atan, cos, hypot, pi, sin, tan
 import numba as nb
 import numpy as np
 import pytest
+from support.cameras import rig
 from support.records import lens_of, records
 
-from lgmd_gym.camera import CameraParams
 from lgmd_gym.camera.effects import look_of
 from lgmd_gym.camera.render.buffers import GroundLayer
 from lgmd_gym.camera.render.ground import PAINT, add_lines
@@ -114,7 +114,7 @@ def test_level_of_the_texture_is_the_footprint_of_a_pixel(focal, row, levels):
     assert 12 - turned.log_x == min(max(int(np.floor(np.log2(across) + 0.5)), 0), 12)
 
 
-LOOK = look_of(CameraParams())[()]
+LOOK = look_of(*rig())[()]
 LINE_WIDTH = 0.15
 
 

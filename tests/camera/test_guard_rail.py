@@ -2,9 +2,9 @@
 
 import numpy as np
 from highway_env.road.road import RoadNetwork
+from support.cameras import ego_camera
 from support.roads import add_car, lens_x, straight_env
 
-from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera.objects import MODEL_RAIL
 from lgmd_gym.camera.road_geometry import road_geometry
 
@@ -27,8 +27,8 @@ def test_road_without_lanes_has_no_rails():
 
 def test_rails_hide_cars_behind_them_only():
     env = straight_env(lanes=1, y=0.0, line_types=False)
-    camera = EgoCamera("wide", roadside=0.0, texture=0.0, guard_rail=True)
-    bare = EgoCamera("wide", roadside=0.0, texture=0.0)
+    camera = ego_camera("wide", roadside=0.0, texture=0.0, guard_rail=True)
+    bare = ego_camera("wide", roadside=0.0, texture=0.0)
     rail = camera.render(env).astype(int) - bare.render(env)
     u, v = np.floor(camera.project([lens_x(env) + 10.0, 2.5, 0.6])).astype(int)
     assert abs(rail[v, u]) > 20
@@ -43,7 +43,7 @@ def test_rails_hide_cars_behind_them_only():
 
 def test_rails_are_fixed_in_the_world():
     env = straight_env(line_types=False)
-    camera = EgoCamera("wide", roadside=0.0, texture=0.0, guard_rail=True, hfov_deg=90.0)
+    camera = ego_camera("wide", roadside=0.0, texture=0.0, guard_rail=True, hfov_deg=90.0)
     env.vehicle.position[0] = 100.0
     first = camera.render(env)
     env.vehicle.position[0] += 4.0  # the distance between posts; only the far end changes

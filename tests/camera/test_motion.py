@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera
 from support.records import lens_of
 from support.roads import add_car, lens_x, straight_env
 
-from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera.objects import OBJECT
 from lgmd_gym.camera.render.sensor import blur_steps, lens_before
 
@@ -13,7 +13,7 @@ from lgmd_gym.camera.render.sensor import blur_steps, lens_before
 def test_still_scene_has_no_motion_blur():
     env = straight_env(speed=0.0)
     add_car(env, 20.0, 3.5)
-    sharp, blurred = EgoCamera("wide"), EgoCamera("wide", shutter_s=0.02)
+    sharp, blurred = ego_camera("wide"), ego_camera("wide", shutter_s=0.02)
     assert np.array_equal(sharp.render(env), blurred.render(env))
 
 
@@ -21,9 +21,9 @@ def test_motion_blur_is_the_mean_over_the_exposure():
     env = straight_env(speed=20.0)
     car = add_car(env, lens_x(env) + 12.0, 3.5, shade=30, heading=np.pi / 2)
     car.speed = 8.0
-    blurred = EgoCamera("wide", shutter_s=0.02)
+    blurred = ego_camera("wide", shutter_s=0.02)
     blurred.render(env)
-    sharp, total, n = EgoCamera("wide"), 0.0, 40
+    sharp, total, n = ego_camera("wide"), 0.0, 40
     at, there = env.vehicle.position.copy(), car.position.copy()
     for k in range(n):
         ago = (k + 0.5) / n * 0.02
@@ -39,8 +39,8 @@ def test_motion_blur_is_the_mean_over_the_exposure():
 def test_turning_blurs_the_horizon():
     env = straight_env(speed=15.0)
     env.vehicle.action = {"steering": 0.15, "acceleration": 0.0}
-    sharp = EgoCamera("fovea").render(env).astype(float)
-    blurred = EgoCamera("fovea", shutter_s=0.03).render(env).astype(float)
+    sharp = ego_camera("fovea").render(env).astype(float)
+    blurred = ego_camera("fovea", shutter_s=0.03).render(env).astype(float)
     assert np.abs(np.diff(blurred[:40], axis=1)).mean() < 0.8 * np.abs(np.diff(sharp[:40], axis=1)).mean()
 
 

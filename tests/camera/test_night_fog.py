@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera, rig
 from support.roads import add_car, lens_x, straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.effects import look_of
 from lgmd_gym.camera.render.light import veil_at
 
@@ -12,7 +12,7 @@ NIGHT = {"light": "night", "roadside": 0.0}
 
 
 def veil(slope, away, visibility_m=30.0, height=1.2, **fields):
-    look = look_of(CameraParams(light="night", visibility_m=visibility_m, **fields))[()]
+    look = look_of(*rig(light="night", visibility_m=visibility_m, **fields))[()]
     return veil_at(look, height, slope, away)
 
 
@@ -57,8 +57,8 @@ def test_the_veil_grows_with_distance_and_below_the_cut_off_with_extinction():
 def test_the_veil_of_a_frame_falls_off_to_its_sides():
     env = straight_env()
     env.vehicle.position[1] = 100.0  # off the road
-    params = {**NIGHT, "visibility_m": 0.5, "texture": 0.0, "mount_setback": 0.0, "mount_height": 0.5}
-    light = EgoCamera("wide", **params)
+    params = {**NIGHT, "visibility_m": 0.5, "texture": 0.0, "setback_m": 0.0, "height_m": 0.5}
+    light = ego_camera("wide", **params)
     light.render(env)
     row = light.light[70].astype(float) - 18.0  # all of the ground is behind fog
     assert row[80] > 20.0
@@ -70,17 +70,17 @@ def test_the_veil_of_a_frame_falls_off_to_its_sides():
 def test_a_black_box_has_the_fog_in_front_of_it_only():
     env, visibility_m = straight_env(), 15.0
     add_car(env, lens_x(env) + 10.0, 3.5, shade=0.0)
-    camera = EgoCamera("wide", **NIGHT, visibility_m=visibility_m, vehicles="box")
+    camera = ego_camera("wide", **NIGHT, visibility_m=visibility_m, vehicles="box")
     camera.render(env)
     u, v = np.floor(camera.project([lens_x(env) + 8.0, 3.5, 0.5])).astype(int)
     assert u == 80
-    clear, slope = np.exp(-10.0 * np.log(20.0) / visibility_m), (v + 0.5 - 45.0) / camera.params.focal_px
+    clear, slope = np.exp(-10.0 * np.log(20.0) / visibility_m), (v + 0.5 - 45.0) / camera.camera.focal_px
     expected = 18.0 * (1.0 - clear) + veil(slope, 10.0, visibility_m)
     assert camera.light[v, u] == pytest.approx(expected, abs=0.5)
     assert veil(slope, 10.0, visibility_m) < 0.9 * veil(slope, 1.2 / slope, visibility_m)
 
 
 def test_fog_by_day_and_a_clear_night_have_no_veil():
-    assert look_of(CameraParams(visibility_m=30.0))["veil"] == 0.0
-    assert look_of(CameraParams(light="night"))["veil"] == 0.0
-    assert look_of(CameraParams(light="night", visibility_m=30.0))["veil"] > 0.0
+    assert look_of(*rig(visibility_m=30.0))["veil"] == 0.0
+    assert look_of(*rig(light="night"))["veil"] == 0.0
+    assert look_of(*rig(light="night", visibility_m=30.0))["veil"] > 0.0

@@ -1,15 +1,15 @@
 """360° panoramas: natural noise and images."""
 
-import dataclasses
 import json
 
 import numpy as np
 import pytest
 from PIL import Image
+from support.cameras import ego_camera
 from support.records import lens_of
 from support.roads import straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera import Scene
 from lgmd_gym.camera.pinhole import project
 from lgmd_gym.camera.render.buffers import horizon_of
 from lgmd_gym.camera.render.sky import draw_panorama, natural_panorama
@@ -28,7 +28,7 @@ def image_path(tmp_path):
 @pytest.mark.parametrize("heading", [0.3, 2.0, -1.0])
 def test_image_spans_360_degrees_around_the_horizon(image_path, heading):
     env = straight_env(heading=heading)
-    camera = EgoCamera("wide", panorama=image_path, roadside=0.0, pitch_deg=10.0)
+    camera = ego_camera("wide", panorama=image_path, roadside=0.0, pitch_deg=10.0)
     frame = camera.render(env).astype(float)
     for right in (-25, -10, 0, 15, 25):
         way = heading + np.radians(right)
@@ -59,11 +59,11 @@ def test_panorama_rolls_with_the_lens():
 
 def test_panorama_moves_with_the_heading_but_not_with_the_position():
     env = straight_env(heading=1.0)
-    camera = EgoCamera("fovea", panorama="natural", roadside=0.0)
+    camera = ego_camera("fovea", panorama="natural", roadside=0.0)
     first = camera.render(env).astype(float)
     env.vehicle.position[0] += 100.0
     assert np.array_equal(camera.render(env)[:40], first[:40])
-    px = 1.0 / camera.params.focal_px
+    px = 1.0 / camera.camera.focal_px
     env.vehicle.heading += 0.1 * px
     tenth = np.abs(camera.render(env)[:40] - first[:40]).mean()
     env.vehicle.heading += 0.9 * px
@@ -85,21 +85,21 @@ def test_natural_panorama_has_the_contrast_and_spectrum_of_natural_scenes():
 
 def test_night_darkens_and_fog_flattens_the_panorama():
     env = straight_env()
-    day = EgoCamera("wide", roadside=0.0, panorama="natural").render(env)[:35].astype(float)
+    day = ego_camera("wide", roadside=0.0, panorama="natural").render(env)[:35].astype(float)
     assert (
-        EgoCamera("wide", roadside=0.0, panorama="natural", light="night").render(env)[:35].mean()
+        ego_camera("wide", roadside=0.0, panorama="natural", light="night").render(env)[:35].mean()
         < 0.06 * day.mean()
     )
-    fog = EgoCamera("wide", roadside=0.0, panorama="natural", visibility_m=300.0).render(env)[:35]
+    fog = ego_camera("wide", roadside=0.0, panorama="natural", visibility_m=300.0).render(env)[:35]
     assert fog.std() < 0.05 * day.std()
 
 
-def test_params_with_a_panorama_round_trip_through_json(image_path, tmp_path):
-    params = CameraParams(panorama=tmp_path / "panorama.png", guard_rail=True)
-    assert params.panorama == image_path
-    again = CameraParams.make(json.loads(json.dumps(dataclasses.asdict(params))))
-    assert again == params
-    assert hash(again) == hash(params)
+def test_scenes_with_a_panorama_round_trip_through_json(image_path, tmp_path):
+    scene = Scene(panorama=tmp_path / "panorama.png", guard_rail=True)
+    assert scene.panorama == image_path
+    again = Scene.make(json.loads(json.dumps(scene.to_dict())))
+    assert again == scene
+    assert hash(again) == hash(scene)
 
 
 def test_unreadable_panorama_raises_an_error_with_path_and_fix(tmp_path):
@@ -107,18 +107,18 @@ def test_unreadable_panorama_raises_an_error_with_path_and_fix(tmp_path):
     text.write_text("not a picture")
     for bad in (str(tmp_path / "none.png"), str(text), str(tmp_path), "natrual"):
         with pytest.raises(ValueError) as error:
-            EgoCamera("wide", panorama=bad)
+            ego_camera("wide", panorama=bad)
         message = str(error.value)
         assert repr(bad) in message
         assert "PNG" in message
         assert "\n" not in message
     for field, bad in (("panorama", ""), ("panorama", 3), ("guard_rail", 1)):
-        with pytest.raises(ValueError, match=f"camera {field} must be"):
-            CameraParams(**{field: bad})
+        with pytest.raises(ValueError, match=f"scene {field} must be"):
+            Scene(**{field: bad})
 
 
 @pytest.mark.parametrize("size", [(16, 1), (17, 5), (33, 400), (3000, 100)])
 def test_image_of_any_size_fills_the_frame(tmp_path, size):
     Image.new("RGB", size, (200, 200, 200)).save(tmp_path / "any.png")
-    camera = EgoCamera("wide", panorama=str(tmp_path / "any.png"), roadside=0.0, pitch_deg=40.0)
+    camera = ego_camera("wide", panorama=str(tmp_path / "any.png"), roadside=0.0, pitch_deg=40.0)
     assert np.all(camera.render(straight_env()) == 200)

@@ -9,9 +9,9 @@ import pytest
 from highway_env.road.lane import SineLane, StraightLane
 from highway_env.road.road import Road, RoadNetwork
 from highway_env.vehicle.kinematics import Vehicle
+from support.cameras import ego_camera
 from support.roads import env_of, ring_road, straight_env
 
-from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera import road_geometry as geometry_module
 from lgmd_gym.camera.road_geometry import STRIPED, road_geometry
 
@@ -37,7 +37,7 @@ def test_every_highway_env_road_renders_with_markings(env_id):
         config["vehicles_count"] = 5
     env = gym.make(env_id, config=config)
     env.reset(seed=3)
-    camera = EgoCamera("wide")
+    camera = ego_camera("wide")
     frames = [camera.render(env)]
     for _ in range(2):
         env.step(env.action_space.sample())
@@ -70,7 +70,7 @@ def test_curved_markings_follow_the_lane(clockwise):
 def test_curved_marking_appears_at_its_projection():
     road, lane = ring_road()
     env = env_of(road, Vehicle(road, lane.position(0.0, 0.0), lane.heading_at(0.0), 10.0))
-    camera = EgoCamera("wide", texture=0.0, roadside=0.0)
+    camera = ego_camera("wide", texture=0.0, roadside=0.0)
     frame = camera.render(env)
     hits = 0
     for s in np.arange(5.0, 15.0, 0.5):
@@ -85,7 +85,7 @@ def test_curved_marking_appears_at_its_projection():
 
 def test_stripes_are_three_metres_in_four_and_a_third():
     env = straight_env(lanes=2, y=1.75)
-    camera = EgoCamera("wide", texture=0.0, roadside=0.0)
+    camera = ego_camera("wide", texture=0.0, roadside=0.0)
     frame = camera.render(env)
     for s in np.arange(206.5, 216.0, 0.25):  # the lane starts at x = -200
         if 0.4 < s % 4.33 < 2.6 or 3.4 < s % 4.33 < 3.95:
@@ -100,7 +100,7 @@ def test_geometry_is_cached_for_the_lifetime_of_the_network(monkeypatch):
     original = geometry_module._extract
     monkeypatch.setattr(geometry_module, "_extract", lambda *a: calls.append(1) or original(*a))
     env = straight_env()
-    camera = EgoCamera("wide")
+    camera = ego_camera("wide")
     for _ in range(3):
         camera.render(env)
     assert len(calls) == 1
@@ -140,5 +140,5 @@ def test_lanes_side_by_side_are_joined_but_not_those_of_other_lengths_or_apart()
 def test_network_without_lanes_is_all_asphalt():
     env = straight_env()
     env.road.network = RoadNetwork()
-    frame = EgoCamera("wide").render(env)
+    frame = ego_camera("wide").render(env)
     assert abs(frame[60:].mean() - 104) < 5

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.cameras import ego_camera, rig
 from support.roads import add_car, lens_x, straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
 from lgmd_gym.camera.render.coverage import add_edge
 
 OPTIONS = st.fixed_dictionaries(
@@ -17,7 +17,7 @@ OPTIONS = st.fixed_dictionaries(
         "hfov_deg": st.floats(2.0, 160.0),
         "pitch_deg": st.floats(-60.0, 60.0),
         "yaw_deg": st.floats(-360.0, 360.0),
-        "mount_height": st.floats(0.05, 5.0),
+        "height_m": st.floats(0.05, 5.0),
         "light": st.sampled_from(["day", "night"]),
         "visibility_m": st.sampled_from([0.0, 0.01, 1.0, 30.0]),
         "shutter_s": st.sampled_from([0.0, 0.03]),
@@ -45,7 +45,7 @@ def test_any_camera_renders_any_scene(options, poses, steering):
     env.vehicle.action = {"steering": steering, "acceleration": -3.0}
     for x, y, turn, speed in poses:
         add_car(env, x, y, heading=turn, speed=speed)
-    camera = EgoCamera(CameraParams(**options))
+    camera = ego_camera(rig(**options))
     frame = camera.render(env)
     assert frame.shape == options["shape"]
     assert np.isfinite(camera.light).all()
@@ -67,7 +67,7 @@ def test_any_pose_of_fifty_vehicles_renders_in_bounded_time(poses, heading, pres
     env = straight_env(heading=heading)
     for x, y, turn, length, width in poses:
         add_car(env, x, y, heading=turn, size=(length, width, 1.5))
-    camera = EgoCamera(preset, pitch_deg=pitch)
+    camera = ego_camera(preset, pitch_deg=pitch)
     camera.render(env)
     start = time.process_time()
     frame = camera.render(env)
@@ -80,14 +80,14 @@ def test_any_pose_of_fifty_vehicles_renders_in_bounded_time(poses, heading, pres
 @given(x=st.floats(-3, 9), y=st.floats(-3, 3), turn=st.floats(-4, 4))
 def test_vehicle_at_the_lens_changes_no_row_above_its_roof(x, y, turn):
     env = straight_env()
-    camera = EgoCamera("wide", roadside=0.0)
+    camera = ego_camera("wide", roadside=0.0)
     car = add_car(env, lens_x(env) + x, 3.5 + y, heading=turn, shade=30)
     frame = camera.render(env)
     # The car is lower than 1.43 m: rows above its nearest possible point do not change.
     c, s = abs(np.cos(turn)), abs(np.sin(turn))
     clear = x - 0.5 * (car.LENGTH * c + car.WIDTH * s)
     if clear > 0.3:
-        top = 45 - camera.params.focal_px * 0.23 / clear
+        top = 45 - camera.camera.focal_px * 0.23 / clear
         env.road.vehicles.remove(car)
         bare = camera.render(env)
         rows = max(int(top) - 1, 0)
@@ -96,7 +96,7 @@ def test_vehicle_at_the_lens_changes_no_row_above_its_roof(x, y, turn):
 
 def test_vehicle_around_behind_and_next_to_the_lens():
     env = straight_env()
-    camera = EgoCamera("wide", roadside=0.0)
+    camera = ego_camera("wide", roadside=0.0)
     bare = camera.render(env)
     car = add_car(env, lens_x(env), 3.5)
     inside = camera.render(env)  # the lens is inside the car: only its shadow is drawn
@@ -115,13 +115,13 @@ def test_invalid_vehicle_height_does_not_affect_later_frames(height):
     env = straight_env()
     car = add_car(env, 20.0, 3.5)
     for pitch in (0.0, 5.0):
-        camera = EgoCamera("wide", pitch_deg=pitch)
+        camera = ego_camera("wide", pitch_deg=pitch)
         camera.render(env)
         car.HEIGHT = height
         camera.render(env)
         car.HEIGHT = 1.4
         again = camera.render(env)
-        assert np.array_equal(again, EgoCamera("wide", pitch_deg=pitch).render(env))
+        assert np.array_equal(again, ego_camera("wide", pitch_deg=pitch).render(env))
 
 
 def test_edges_are_clipped_to_the_accumulator():
@@ -147,7 +147,7 @@ def test_coverage_buffers_are_zero_after_each_frame():
     for k in range(6):
         add_car(env, lens_x(env) + 4.0 + 3.0 * k, 3.5 * (k % 3), heading=0.5 * k)
     for preset in ("wide", "fovea"):
-        camera = EgoCamera(preset, guard_rail=True)
+        camera = ego_camera(preset, guard_rail=True)
         for yaw_deg in (-120.0, -35.0, 0.0, 35.0, 120.0):
             camera.render(env, gaze=(yaw_deg, 0.1 * yaw_deg))
             assert not camera.buffers.ground.any()

@@ -3,23 +3,23 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from support.cameras import ego_camera
 
 import lgmd_gym  # noqa: F401
-from lgmd_gym import EgoCamera
-from lgmd_gym.camera import CONDITIONS
+from lgmd_gym.camera import WEATHERS
 
 ACCUMULATORS = ("ground", "solids")  # cleared by every frame
 FAMILIES = ("CCRb", "CCCscp", "CurveGuardRail", "LeadTurnsOff", "AdjacentPass")
 
 
-@pytest.mark.parametrize("condition", CONDITIONS)
+@pytest.mark.parametrize("condition", WEATHERS)
 @pytest.mark.parametrize("camera", ["wide", "fovea"])
 def test_light_does_not_depend_on_frames_drawn_before(camera, condition):
     rng = np.random.default_rng(0)
     for family in FAMILIES:
         env = gym.make(f"LGMD/{family}-v0", camera=None)
         env.reset(seed=1)
-        clean, used = EgoCamera(camera, condition=condition), EgoCamera(camera, condition=condition)
+        clean, used = ego_camera(camera, weather=condition), ego_camera(camera, weather=condition)
         for _ in range(12):
             for _ in range(8):
                 env.step(np.array([-0.1], np.float32))

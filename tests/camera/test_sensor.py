@@ -6,11 +6,13 @@ from math import exp, sqrt
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera, rig
 from support.records import records
 from support.roads import add_mark, straight_env
 
-from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera.effects import look_of, noise_table
+from lgmd_gym.camera.env_state import SCENE
 from lgmd_gym.camera.render.sensor import (
     CONTRAST_GREY,
     CONTRAST_MEAN,
@@ -21,7 +23,6 @@ from lgmd_gym.camera.render.sensor import (
     fixed_tone,
     follow_exposure,
 )
-from lgmd_gym.camera.scene import SCENE
 
 BRIDGE = {"size": (200.0, 60.0), "shade": 10.0}
 
@@ -29,7 +30,7 @@ BRIDGE = {"size": (200.0, 60.0), "shade": 10.0}
 def exposed(light, gain=1.0, start=0, **fields):
     """Return the frame of an even light, shape (200, 201)."""
     image, out = np.full((200, 201), light, np.float32), np.zeros((200, 201), np.uint8)
-    look = look_of(CameraParams(**fields))[()]
+    look = look_of(*rig(**fields))[()]
     expose(out, image, look, gain, fixed_tone(look), noise_table(0), start)
     return out
 
@@ -66,7 +67,7 @@ def test_gain_amplifies_noise():
 
 @pytest.mark.parametrize("linear", [False, True])
 def test_gain_brings_the_mean_light_to_mid_grey(linear):
-    look = look_of(CameraParams(auto_exposure_s=1.0, linear_light=linear))[()]
+    look = look_of(*rig(auto_exposure_s=1.0, linear_light=linear))[()]
     target = 110.0**2 / 255.0 if linear else 110.0
     exposure = np.full(STATE_SIZE, np.nan)
     assert adapt_exposure(exposure, np.full((9, 21), 40.0, np.float32), look) == pytest.approx(target / 40.0)
@@ -79,7 +80,7 @@ def test_gain_brings_the_mean_light_to_mid_grey(linear):
     ("light", "night", "gain"), [(4.0, 0, 8.0), (1e4, 0, 110 / 255), (0.0, 1, 6.0), (250.0, 1, 0.5)]
 )
 def test_gain_is_bounded(light, night, gain):
-    look = look_of(CameraParams(auto_exposure_s=1.0, light=("day", "night")[night]))[()]
+    look = look_of(*rig(auto_exposure_s=1.0, light=("day", "night")[night]))[()]
     assert adapt_exposure(
         np.full(STATE_SIZE, np.nan), np.full((8, 8), light, np.float32), look
     ) == pytest.approx(gain)
@@ -89,7 +90,7 @@ def test_gain_approaches_with_the_time_constant():
     scenes = records(
         SCENE, *({"time_s": time, "steps": step} for time, step in ((2.0, 20), (2.3, 23), (0.1, 1)))
     )
-    look = look_of(CameraParams(auto_exposure_s=0.5, contrast_s=1.0))[()]
+    look = look_of(*rig(auto_exposure_s=0.5, contrast_s=1.0))[()]
     exposure = np.array([1.0, 4.0, 1.5, 100.0, 20.0, 50.0, 10.0])
     follow_exposure(exposure, scenes[0], look)
     # One time constant: the logarithm has gone 63 % of its way.
@@ -111,7 +112,7 @@ def test_contrast_control_brings_mean_and_deviation_to_those_of_every_frame(line
     """Without noise: half of the pixels are darker and half lighter than the mean by the deviation."""
     grey = 120.0 + np.where(np.arange(1600).reshape(40, 40) % 2 == 0, -deviation, deviation)
     image = (grey**2 / 255.0 if linear else grey).astype(np.float32)
-    look = look_of(CameraParams(contrast_s=1.0, linear_light=linear))[()]
+    look = look_of(*rig(contrast_s=1.0, linear_light=linear))[()]
     exposure, out = np.full(STATE_SIZE, np.nan), np.zeros((40, 40), np.uint8)
     tone = adapt_contrast(exposure, image, look, 1.0, 1.0)
     assert tone[0] == pytest.approx(gain, rel=1e-4)
@@ -128,7 +129,7 @@ def test_contrast_of_fog_is_amplified_over_time():
     """A road in fog: the contrast of the frame is brought to that of every frame."""
     env = straight_env()
     plain, controlled = (
-        EgoCamera("fovea", condition="fog", roadside=0.0, contrast_s=contrast_s) for contrast_s in (0.0, 0.4)
+        ego_camera("fovea", weather="fog", roadside=0.0, contrast_s=contrast_s) for contrast_s in (0.0, 0.4)
     )
     deviations = []
     for frame in range(60):
@@ -150,8 +151,8 @@ def drive_under_a_bridge(camera):
 
 
 def test_picture_becomes_brighter_under_a_bridge_after_a_delay():
-    greys = drive_under_a_bridge(EgoCamera("wide", auto_exposure_s=0.5, roadside=0.0))
-    fixed = drive_under_a_bridge(EgoCamera("wide", roadside=0.0))
+    greys = drive_under_a_bridge(ego_camera("wide", auto_exposure_s=0.5, roadside=0.0))
+    fixed = drive_under_a_bridge(ego_camera("wide", roadside=0.0))
     assert fixed[:2] == [fixed[0]] * 2
     assert fixed[2:] == [fixed[2]] * 6
     assert greys[1] == pytest.approx(greys[0], abs=0.5)
@@ -163,22 +164,22 @@ def test_picture_becomes_brighter_under_a_bridge_after_a_delay():
 
 
 def test_first_frame_of_an_episode_has_its_own_gain():
-    env, camera = straight_env(), EgoCamera("wide", auto_exposure_s=5.0, roadside=0.0)
+    env, camera = straight_env(), ego_camera("wide", auto_exposure_s=5.0, roadside=0.0)
     drive_under_a_bridge(camera)
     env.steps = 3
-    assert np.array_equal(camera.render(env), EgoCamera(camera.params).render(env))
+    assert np.array_equal(camera.render(env), EgoCamera(camera.camera).render(env))
     env.steps = 9
     camera.render(env)
     add_mark(env, 50.0, 3.5, **BRIDGE)
     env.steps = 0
-    assert np.array_equal(camera.render(env), EgoCamera(camera.params).render(env))
+    assert np.array_equal(camera.render(env), EgoCamera(camera.camera).render(env))
 
 
 @pytest.mark.parametrize(
     "copied", [copy.deepcopy, lambda camera: pickle.loads(pickle.dumps(camera))], ids=["deepcopy", "pickle"]
 )
 def test_copy_continues_with_the_same_gain(copied):
-    env, camera = straight_env(), EgoCamera("wide", auto_exposure_s=0.5, roadside=0.0)
+    env, camera = straight_env(), ego_camera("wide", auto_exposure_s=0.5, roadside=0.0)
     camera.render(env)
     add_mark(env, 50.0, 3.5, **BRIDGE)
     env.steps = 15
@@ -187,4 +188,4 @@ def test_copy_continues_with_the_same_gain(copied):
     for env.steps in (20, 30):
         frame = camera.render(env)
         assert np.array_equal(clone.render(env), frame)
-    assert not np.array_equal(EgoCamera(camera.params).render(env), frame)
+    assert not np.array_equal(EgoCamera(camera.camera).render(env), frame)

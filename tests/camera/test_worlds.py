@@ -6,18 +6,23 @@ from dataclasses import astuple, fields
 
 import numpy as np
 import pytest
+from support.cameras import ego_camera, rig
 from support.records import lens_of, record
 from support.roads import add_car, box_record, set_roadside, straight_env
 
-from lgmd_gym import CameraParams, EgoCamera
-from lgmd_gym.camera import CONDITIONS
-from lgmd_gym.camera.effects import LOOK, in_world, look_of, sun_of
+from lgmd_gym.camera import WEATHERS, Scene, Weather
+from lgmd_gym.camera.effects import LOOK, in_scene, look_of, sun_of
 from lgmd_gym.camera.objects import MODEL_BEAM, MODEL_CROWN, MODEL_DECK, OBJECT
 from lgmd_gym.camera.pinhole import project
 from lgmd_gym.camera.render.light import add_sun_glare
 from lgmd_gym.camera.worlds import ASPHALTS, SPLIT_WORLDS, VERGES, WORLDS, World, draw_world
 
 MANY = [draw_world(number) for number in range(400)]
+
+
+def look_in(p):
+    """Return the appearance for a camera in its scene."""
+    return look_of(in_scene(*p), p.scene)
 
 
 def test_splits_divide_all_worlds():
@@ -49,25 +54,25 @@ def test_the_laboratory_is_no_number():
 @pytest.mark.parametrize("world", [-1, WORLDS, 2.5, "lab", True])
 def test_unknown_worlds_are_refused(world):
     with pytest.raises(ValueError, match="world"):
-        CameraParams(world=world)
+        Scene(world=world)
 
 
 def test_a_frame_depends_on_the_world_only():
     env = straight_env(lanes=2, x=40.0)
     add_car(env, 60.0, 0.0)
     frames = [
-        EgoCamera("wide", world=number, seed=seed).render(env) for number, seed in ((3, 0), (3, 5), (4, 0))
+        ego_camera("wide", world=number, seed=seed).render(env) for number, seed in ((3, 0), (3, 5), (4, 0))
     ]
     np.testing.assert_array_equal(frames[0], frames[1])
     assert np.mean(frames[0] != frames[2]) > 0.5
 
 
-@pytest.mark.parametrize("condition", [*CONDITIONS])
+@pytest.mark.parametrize("condition", [*WEATHERS])
 def test_every_condition_is_drawn_in_every_kind_of_world(condition):
     env = straight_env(lanes=2, x=40.0, speed=14.0)
     add_car(env, 65.0, 0.0)
     frames = [
-        EgoCamera("wide", world=number, condition=condition, road="rough").render(env) for number in range(8)
+        ego_camera("wide", world=number, weather=condition, road="rough").render(env) for number in range(8)
     ]
     assert len({frame.tobytes() for frame in frames}) == 8
     for frame in frames:
@@ -76,11 +81,11 @@ def test_every_condition_is_drawn_in_every_kind_of_world(condition):
 
 def test_the_sun_has_the_direction_of_the_world():
     for number, world in enumerate(MANY[:40]):
-        look = look_of(in_world(CameraParams(world=number)))
+        look = look_in(rig(world=number))
         azimuth = np.degrees(np.arctan2(look["sun_y"], look["sun_x"])) % 360.0
         assert azimuth == pytest.approx(world.sun_azimuth_deg)
         assert np.degrees(np.arcsin(look["sun_z"])) == pytest.approx(world.sun_elevation_deg)
-        azimuth, elevation, _ = sun_of(CameraParams(world=number, light="low_sun"), world)
+        azimuth, elevation, _ = sun_of(Weather(light="low_sun"), world)
         assert abs(np.degrees(azimuth)) <= 25.0
         assert 4.0 <= np.degrees(elevation) <= 12.0
 
@@ -96,7 +101,7 @@ def test_a_car_casts_its_shadow_away_from_the_sun():
         sides = []
         for lateral in (-2.2, 2.2):
             env = straight_env(lanes=3, x=40.0, y=4.0)
-            camera = EgoCamera("wide", world=number, roadside=0.0, texture=0.0)
+            camera = ego_camera("wide", world=number, roadside=0.0, texture=0.0)
             camera.render(env)
             bare = camera.light.copy()
             add_car(env, 60.0, 4.0)
@@ -114,9 +119,7 @@ def test_a_car_casts_its_shadow_away_from_the_sun():
 def test_no_cast_shadow_without_the_sun():
     for condition in ("night", "fog", "rain"):
         for number in range(20):
-            assert (
-                look_of(in_world(CameraParams.make("wide", world=number, condition=condition)))["cast"] == 0.0
-            )
+            assert look_in(rig("wide", world=number, weather=condition))["cast"] == 0.0
     overcast = [number for number, world in enumerate(MANY) if world.sun_share == 0.0]
     assert 0.3 < len(overcast) / len(MANY) < 0.5
 
@@ -125,7 +128,7 @@ def test_the_under_body_shadow_is_as_dark_as_measured_and_graded():
     """Display-coded, real roads have 0.49 to 0.58 of their grey below a car, graded over some 8 px."""
     env = straight_env(lanes=1, x=40.0)
     number = next(number for number, world in enumerate(MANY) if world.sun_share == 0.0)
-    camera = EgoCamera("fovea", world=number, texture=0.0, roadside=0.0, shape=(180, 320), pitch_deg=-5.0)
+    camera = ego_camera("fovea", world=number, texture=0.0, roadside=0.0, shape=(180, 320), pitch_deg=-5.0)
     camera.render(env)
     bare = camera.light.copy()
     add_car(env, 56.0, 0.0)
@@ -144,7 +147,7 @@ def test_the_under_body_shadow_is_as_dark_as_measured_and_graded():
 
 def test_the_mount_has_the_errors_of_the_world():
     env = straight_env(x=40.0)
-    camera, exact = EgoCamera("fovea", world=5), EgoCamera("fovea")
+    camera, exact = ego_camera("fovea", world=5), ego_camera("fovea")
     camera.render(env)
     exact.render(env)
     world, lens, plain = draw_world(5), camera._lens, exact._lens
@@ -158,7 +161,7 @@ def test_the_mount_has_the_errors_of_the_world():
 @pytest.mark.parametrize("number", [1618, 1790, 5702])
 def test_frames_do_not_depend_on_frames_drawn_before(number):
     """The scratch memory is clear after each frame, also where details of trees protrude from them."""
-    env, camera = straight_env(lanes=2), EgoCamera("fovea", world=number, road="rough")
+    env, camera = straight_env(lanes=2), ego_camera("fovea", world=number, road="rough")
     for step in range(60):
         env.steps = step
         env.vehicle.position[0] = 1.5 * step
@@ -183,15 +186,15 @@ def test_the_glare_is_brightest_in_the_direction_of_the_sun(roll):
 
 @pytest.mark.parametrize(("model", "shaded"), [(MODEL_BEAM, False), (MODEL_CROWN, False), (MODEL_DECK, True)])
 def test_only_bridges_overhead_have_a_soft_shadow(model, shaded):
-    params = CameraParams(shape=(90, 160), world=1)  # overcast
+    params = rig(shape=(90, 160), world=1)  # overcast
     env = straight_env(lanes=1)
     set_roadside(env, params, np.zeros(0, OBJECT))
-    camera = EgoCamera(params)
+    camera = ego_camera(params)
     camera.render(env)
     bare = camera.light[70:].copy()
     x, y = env.vehicle.position
     record_above = box_record(x + 9.0, y, (8.0, 4.0, 6.0), model=model, base=5.0)
     set_roadside(env, params, record_above)
-    camera = EgoCamera(params)
+    camera = ego_camera(params)
     camera.render(env)
     assert bool((camera.light[70:] < 0.9 * bare).any()) is shaded

@@ -6,7 +6,7 @@ import pytest
 from support.examples import load
 
 from lgmd_gym.benchmark.case import make_case
-from lgmd_gym.camera import CameraParams
+from lgmd_gym.camera import Camera
 
 frontier = load("frontier").frontier
 
@@ -31,7 +31,7 @@ def test_stationary_car(kmh):
     assert item.view.width_deg == pytest.approx(2 * degrees(atan(0.856 / lens)))
     grown = 2 * degrees(atan(0.856 / lens) - atan(0.856 / (lens + speed / 30)))
     assert item.growth_deg_s == pytest.approx(30 * grown)
-    wide = CameraParams.preset("wide")
+    wide = Camera.make("wide")
     assert item.growth_px(wide) == pytest.approx(grown * wide.pixels_per_degree)
     assert item.drift_deg_s == pytest.approx(0.0, abs=1e-9)
     assert item.view.pixels > 20

@@ -101,15 +101,15 @@ def test_day_is_first():
 
 
 def test_drives_of_the_laboratory():
-    drives = simulated_drives((), range(2), arguments={"ego_speed": 9.0}, camera={"texture": 2.0})
+    drives = simulated_drives((), range(2), arguments={"ego_speed": 9.0}, camera={"hfov_deg": 40.0})
     assert len(drives) == 2 * 2 * len(ROADS)
-    assert {(item.group, item.arguments["condition"]) for item in drives} == {
+    assert {(item.group, item.arguments["weather"]) for item in drives} == {
         ("day", "clear"), ("night", "night")
     }  # fmt: skip
     assert all(item.arguments["ego_speed"] == 9.0 for item in drives)
     assert {item.arguments["world"] for item in drives} == {"laboratory"}
     assert drives[-1].label == (
-        "Traffic-Intersection world=laboratory condition=night ego_speed=9.0 texture=2.0"
+        "Traffic-Intersection world=laboratory weather=night ego_speed=9.0 hfov_deg=40.0"
     )
     assert [list(item.seeds) for item in drives[:: len(ROADS)]] == [[0], [1], [0], [1]]
 
@@ -119,8 +119,8 @@ def test_drives_have_worlds_and_conditions_in_turn():
     day = [item for item in drives if item.group == "day"]
     assert len(drives) == 2 * len(day) == 2 * 3 * len(ROADS)
     assert [item.arguments["world"] for item in day] == [*range(20), *range(7)]
-    assert [item.arguments["condition"] for item in day[:7]] == list(GROUPS["day"])
-    assert len({item.env for item in day if item.arguments["condition"] == "rain"}) == 4
+    assert [item.arguments["weather"] for item in day[:7]] == list(GROUPS["day"])
+    assert len({item.env for item in day if item.arguments["weather"] == "rain"}) == 4
 
 
 def test_a_drive_has_the_light_of_its_world():
@@ -133,7 +133,7 @@ def test_a_drive_has_the_light_of_its_world():
 @pytest.mark.parametrize("env", ["LGMD/Following-v0", "LGMD/Traffic-TwoWay-v0"])
 def test_frames_of_a_drive(env, short_drives):
     day, night = (
-        Drives(env=env, arguments={"world": "laboratory", "condition": name}) for name in ("clear", "night")
+        Drives(env=env, arguments={"world": "laboratory", "weather": name}) for name in ("clear", "night")
     )
     frames = list(drive_frames(day, 0, OPTICS))
     assert len(frames) == 15
@@ -146,8 +146,8 @@ def test_frames_of_a_drive(env, short_drives):
 
 def test_rate_of_a_drive():
     """At 25 Hz, one second of a drive has 25 frames; the ego has moved as far as in 30 frames at 30 Hz."""
-    item = Drives(env="LGMD/Following-v0", arguments={"ego_speed": 10.0, "world": "laboratory"},
-                  camera={"texture": 0.0})  # fmt: skip
+    arguments = {"ego_speed": 10.0, "world": "laboratory", "scene": {"texture": 0.0}}
+    item = Drives(env="LGMD/Following-v0", arguments=arguments)
     one, other = (list(drive_frames(item, 0, OPTICS._replace(fps=fps))) for fps in (25, 30))
     assert (len(one), len(other)) == (125, 150)
     np.testing.assert_array_equal(one[25], other[30])
@@ -170,7 +170,7 @@ def test_command(clips, tmp_path, capsys):
         "noon.mkv": "day", "dusk.mkv": "day", "dark.mkv": "night"
     }  # fmt: skip
     assert [row["name"] for row in drives if row["kind"] == "simulated"][1] == (
-        "Following ego_speed=25.0 world=1 condition=clear seed=0"
+        "Following ego_speed=25.0 world=1 weather=clear seed=0"
     )
     assert "5–95 % range: day " in printed
     rows = rows_of(out / "realism.csv")

@@ -39,10 +39,10 @@ def no_brake(rng, num_envs):
     return np.zeros((num_envs, 1), np.float32)
 
 
-@pytest.mark.parametrize("condition", ["clear", "night"])
-def test_engine_equals_single_environments(figures, condition):
+@pytest.mark.parametrize("weather", ["clear", "night"])
+def test_engine_equals_single_environments(figures, weather):
     reference, engine = make_pair(
-        env_id("PedestrianPass"), 2, "SameStep", 1, include_frame=True, condition=condition
+        env_id("PedestrianPass"), 2, "SameStep", 1, include_frame=True, weather=weather
     )
     assert_equal_steps(reference, engine, 90, np.random.default_rng(0), no_brake)
     reference.close()

@@ -7,20 +7,29 @@ import pytest
 from support.brakes import draw_all_brakes
 from support.vectors import assert_equal_steps, make_pair, random_demands
 
+from lgmd_gym.camera import Camera
 from lgmd_gym.envs import FAMILIES, env_id
+from lgmd_gym.sensing.channel import Channel
 
 MODES = ["NextStep", "SameStep", "Disabled"]
 LEVELS = env_id("RandomBraking")
 FAST = {"ego_speed": 3.0}  # a second of braking ends the episode
 TWO_CAMERAS = ["wide", {"name": "fovea", "shape": [60, 100]}]
+ASIDE = Camera(mount={"yaw_deg": 30.0})
 FRAMES = {"include_frame": True}
 
 ARGUMENTS = {
     "two cameras": {"camera": TWO_CAMERAS},
     "frames of two cameras": {"camera": ["wide", "fovea"], "include_frame": True},
     "frames of three decisions in two": {"config": {"policy_frequency": 20}, "trace": True},
-    "three detectors": {
-        "camera": ["wide", *({"name": name, "yaw_deg": 30.0, "detector": name} for name in ("lplc2", "dsn"))],
+    "three neurons": {
+        "camera": [
+            "wide",
+            *(
+                {"name": name, "camera": {"mount": {"yaw_deg": 30.0}}, "neuron": name}
+                for name in ("lplc2", "dsn")
+            ),
+        ],
         **FRAMES,
     },
     "several frames per decision": {"config": {"policy_frequency": 10}, "trace": True},
@@ -32,17 +41,24 @@ ARGUMENTS = {
     "reward": {"config": {"reward": {"contact": 3.0, "brake": 0.5}}},
     "brake": {"config": {"max_deceleration": 5.0, "dead_time": 0.3}},
     "known brake": {
-        "camera": {"name": "zone", "shape": [20, 80], "gaze": "stopping", "brake_known": True},
+        "camera": {"name": "zone", "shape": [20, 80], "gaze": {"kind": "stopping", "brake_known": True}},
         "config": {"max_deceleration": 5.0},
         "world": 6003,
         "include_frame": True,
     },
-    "condition": {"condition": "night", "include_frame": True},
+    "weather": {"weather": "night", "include_frame": True},
     "neuron": {"params": {"t_sf": 10.0}},
-    "night fog": {"camera": {"name": "wide", "light": "night", "visibility_m": 30.0}, **FRAMES},
-    "automatic exposure": {"camera": {"name": "wide", "auto_exposure_s": 0.3}, "include_frame": True},
+    "night fog": {"camera": "wide", "weather": {"light": "night", "visibility_m": 30.0}, **FRAMES},
+    "automatic exposure": {
+        "camera": {"name": "wide", "sensor": {"auto_exposure_s": 0.3}},
+        "include_frame": True,
+    },
     "columns": {
-        "camera": ["fovea", {"name": "wide", "columns": 5}, {"name": "tele", "detector": "dsn", "columns": 4}]
+        "camera": [
+            "fovea",
+            Channel(camera="wide", columns=5),
+            Channel(camera="tele", neuron="dsn", columns=4),
+        ]
     },
 }
 

@@ -4,8 +4,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from lgmd_gym.camera import Scene
 from lgmd_gym.camera.worlds import SPLIT_WORLDS, draw_world
-from lgmd_gym.envs.appearance import MIXED, Appearance, camera_fields, world_condition
+from lgmd_gym.envs.appearance import MIXED, Appearance, world_weather
 from lgmd_gym.envs.dynamics.brake import BrakeParams, draw_brake
 
 IDS = ("LGMD/CCRs-v0", "LGMD/Traffic-Highway-v0", "LGMD/RandomBraking-v0")
@@ -16,7 +17,7 @@ def worlds_of(env_id, seeds=range(4), **arguments):
     worlds = []
     for seed in seeds:
         env.reset(seed=seed)
-        worlds.append(env.unwrapped.camera_fields["world"])
+        worlds.append(env.unwrapped.scene.world)
     return worlds
 
 
@@ -60,22 +61,39 @@ def test_roads_have_the_lane_width_of_the_world():
         assert env.unwrapped.vehicle.position[1] in middles
 
 
+def scene_in(world, **arguments):
+    return Appearance(world=world, **arguments).draw(np.random.default_rng(0))
+
+
+def test_a_scene_gives_world_weather_road_and_further_fields():
+    fields = {"world": 7, "weather": "fog", "texture": 0.5}
+    expected = Scene(world=7, weather="fog", road="normal", texture=0.5)
+    assert Appearance.of(fields).draw(np.random.default_rng(0)) == expected
+    assert Appearance.of(expected).draw(np.random.default_rng(0)) == expected
+    assert Appearance.of(Scene()).draw(np.random.default_rng(0)) == Scene()
+    assert Appearance.of(fields, world=8, weather="rain").draw(np.random.default_rng(0)).world == 8
+    assert Appearance.of({"texture": 0.5}).world is None
+    env = gym.make("LGMD/CCRs-v0", camera=None, scene=fields)
+    env.reset(seed=0)
+    assert (env.unwrapped.scene.texture, env.unwrapped.scene.weather.name) == (0.5, "fog")
+
+
 def test_the_camera_moves_on_a_normal_road_except_in_the_laboratory():
-    assert camera_fields(3, "clear", None)["road"] == "normal"
-    assert camera_fields(None, "clear", None)["road"] == "still"
-    assert camera_fields(None, "clear", "rough")["road"] == "rough"
+    assert scene_in(3).road == "normal"
+    assert scene_in("laboratory").road == "still"
+    assert scene_in("laboratory", road="rough").road == "rough"
 
 
-def test_mixed_is_the_condition_of_the_world():
-    drawn = [world_condition(world) for world in range(400)]
-    for condition in ("clear", "night", "fog", "rain"):
-        assert 70 < drawn.count(condition) < 130
-    assert camera_fields(7, MIXED, None)["condition"] == world_condition(7)
-    assert camera_fields(None, MIXED, None)["condition"] == "clear"
+def test_mixed_is_the_weather_of_the_world():
+    drawn = [world_weather(world) for world in range(400)]
+    for weather in ("clear", "night", "fog", "rain"):
+        assert 70 < drawn.count(weather) < 130
+    assert scene_in(7, weather=MIXED).weather.name == world_weather(7)
+    assert scene_in("laboratory", weather=MIXED).weather.name == "clear"
 
 
 def test_brakes_of_single_and_vector_environments_are_those_of_the_worlds():
-    arguments = {"camera": None, "condition": "rain"}
+    arguments = {"camera": None, "weather": "rain"}
     vector = gym.make_vec("LGMD/CCRs-v0", num_envs=3, **arguments)
     _, infos = vector.reset(seed=5)
     for index, world in enumerate(infos["world"].tolist()):
@@ -93,7 +111,7 @@ def test_brakes_of_single_and_vector_environments_are_those_of_the_worlds():
     [
         ({"world": 10_000}, r"world must be a whole number in \[0, 9999\], got 10000"),
         ({"world": "labratory"}, "unknown world 'labratory'; did you mean 'laboratory'"),
-        ({"condition": "nigth"}, "unknown condition 'nigth'; did you mean 'night'"),
+        ({"weather": "nigth"}, "unknown weather 'nigth'; did you mean 'night'"),
         ({"road": "ruff"}, "unknown road 'ruff'; known: normal, rough"),
         ({"split": "held"}, "unknown split of worlds 'held'"),
     ],

@@ -8,9 +8,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from lgmd_gym import CameraParams, EgoCamera
 from lgmd_gym.benchmark.suites import find_suite
-from lgmd_gym.camera import CONDITIONS
+from lgmd_gym.camera import WEATHERS, EgoCamera, Scene
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs import FAMILIES
 from lgmd_gym.envs.braking import BrakingEnv
@@ -136,7 +135,6 @@ def test_decelerations_replace_those_of_the_worlds():
         assert info == other
         assert replace(drawn.brake, max_deceleration=usual.brake.max_deceleration) == usual.brake
         decelerations.append(drawn.brake.max_deceleration)
-        assert drawn.camera_fields["max_deceleration"] == decelerations[-1]
     assert 4.5 <= min(decelerations) < 5.0
     assert 9.5 < max(decelerations) <= 10.0
     wet = [drawn.reset(seed=seed)[1]["condition"] == "rain" for seed in range(100)]
@@ -190,33 +188,41 @@ def test_the_road_matches_the_scenario():
             assert len(lanes) == 2
 
 
-def test_levels_set_condition_and_texture_of_the_camera():
+def test_levels_set_weather_and_texture_of_the_scene():
     env = gym.make("LGMD/RandomBraking-v0", camera=["fovea", "birdseye"], split="validation")
     textures = {}
     for seed in range(40):
         _, info = env.reset(seed=seed)
         used = env.get_wrapper_attr("sensors").cameras[0]["fovea"]
-        bare = CameraParams.preset("fovea").with_condition(info["condition"])
-        changed = {"texture": used.params.texture, "world": info["world"], "road": "normal"}
-        changed["max_deceleration"] = env.unwrapped.brake.max_deceleration
-        assert used.params == replace(bare, **changed, queue_lane=free_lane(env.unwrapped.scenario))
+        assert (
+            used.scene
+            == env.unwrapped.scene
+            == Scene(
+                world=info["world"],
+                weather=info["condition"],
+                road="normal",
+                texture=used.scene.texture,
+                queue_lane=free_lane(env.unwrapped.scenario),
+            )
+        )
         assert info["world"] in SPLIT_WORLDS["validation"]
-        assert np.array_equal(env.get_wrapper_attr("frames")["fovea"], EgoCamera(used.params).render(env))
-        textures.setdefault(info["condition"], []).append(used.params.texture)
-    assert set(textures) == set(CONDITIONS)
+        frame = EgoCamera("fovea", used.scene).render(env)
+        assert np.array_equal(env.get_wrapper_attr("frames")["fovea"], frame)
+        textures.setdefault(info["condition"], []).append(used.scene.texture)
+    assert set(textures) == set(WEATHERS)
     values = np.concatenate(list(textures.values()))
     assert 0.5 <= values.min() < 0.7 < 1.3 < values.max() <= 1.5
     env.close()
 
 
-def test_the_scenario_does_not_depend_on_the_conditions():
-    clear = random_env(conditions=["clear"])
+def test_the_scenario_does_not_depend_on_the_weathers():
+    clear = random_env(weathers=["clear"])
     mixed = random_env()
     for seed in range(20):
         assert clear.reset(seed=seed)[1]["condition"] == "clear"
         mixed.reset(seed=seed)
         assert clear.scenario == mixed.scenario
-        assert clear.camera_fields["texture"] == mixed.camera_fields["texture"]
+        assert clear.scene.texture == mixed.scene.texture
 
 
 def test_levels_of_all_families_are_those_of_before():
@@ -285,14 +291,14 @@ def test_the_easy_task_has_cars_on_a_straight_and_even_road():
     families, worlds = set(), set()
     for seed in range(60):
         info = env.reset(seed=seed)[1]
-        scenario, fields = env.unwrapped.scenario, env.unwrapped.camera_fields
-        assert (scenario.road.kind, info["condition"], fields["road"]) == ("straight", "clear", "smooth")
+        scenario, scene = env.unwrapped.scenario, env.unwrapped.scene
+        assert (scenario.road.kind, info["condition"], scene.road) == ("straight", "clear", "smooth")
         families.add(scenario.family)
         worlds.add(info["world"])
     assert families == set(defaults["families"])
     assert len(worlds) > 30
     assert worlds < set(SPLIT_WORLDS["train"])
-    changed = gym.make(name, camera=None, families=["CMRs"], conditions=["fog"], split="validation")
+    changed = gym.make(name, camera=None, families=["CMRs"], weathers=["fog"], split="validation")
     assert changed.reset(seed=0)[1]["condition"] == "fog"
     assert changed.unwrapped.scenario.family == "CMRs"
     same = gym.make("LGMD/RandomBraking-v0", camera=None, **defaults)
@@ -325,7 +331,7 @@ def test_the_engine_draws_the_same_families(name, arguments):
         ({"levels": 3}, "'num_levels'"),
         ({"conditions": ["clear", "foggy"]}, "unknown condition 'foggy'; did you mean 'fog'"),
         ({"conditions": []}, "conditions needs at least one name"),
-        ({"condition": "night"}, "unknown argument of RandomBraking 'condition'; did you mean 'conditions'"),
+        ({"weather": "night"}, "unknown argument of RandomBraking 'weather'; did you mean 'weathers'"),
         ({"ego_speed": 3.0}, "unknown argument of RandomBraking 'ego_speed'"),
         ({"families": ["CCRs", "Folowing"]}, "family of random levels 'Folowing'; did you mean 'Following'"),
         ({"families": []}, "families needs at least one name, got none"),

@@ -122,9 +122,9 @@ def test_agents_cannot_read_the_brake():
         assert one[-1] == other[-1]
 
 
-@pytest.mark.parametrize(("condition", "wet"), [("clear", False), ("rain", True), ("fog", False)])
-def test_registered_ids_draw_the_brake_of_the_world(condition, wet):
-    env = gym.make("LGMD/CCRs-v0", camera=None, world=12, condition=condition)
+@pytest.mark.parametrize(("weather", "wet"), [("clear", False), ("rain", True), ("fog", False)])
+def test_registered_ids_draw_the_brake_of_the_world(weather, wet):
+    env = gym.make("LGMD/CCRs-v0", camera=None, world=12, weather=weather)
     env.reset(seed=0)
     assert env.unwrapped.brake == draw_brake(12, wet)
 

@@ -3,8 +3,8 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from support.cameras import rig
 
-from lgmd_gym import CameraParams
 from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.camera.road_geometry import road_geometry
 from lgmd_gym.camera.road_pool import road_key
@@ -47,9 +47,7 @@ def test_many_cases_have_a_free_lane():
 def queue_of(env, world, lane):
     """Return the records on the road that stand there because of the queue."""
     with_queue, without = (
-        road_geometry(
-            env.unwrapped.road, *road_key(CameraParams(world=world, queue_lane=queue_lane))
-        ).roadside
+        road_geometry(env.unwrapped.road, *road_key(rig(world=world, queue_lane=queue_lane))).roadside
         for queue_lane in (lane, None)
     )
     return with_queue[~np.isin(with_queue, without)]
@@ -60,7 +58,7 @@ def test_queues_stand_on_the_free_lane_of_numbered_worlds():
     for world in range(8000, 8010):
         env = gym.make("LGMD/CCRs-v0", camera="wide", world=world)
         env.reset(seed=0)
-        assert env.unwrapped.camera_fields["queue_lane"] == RIGHT
+        assert env.unwrapped.scene.queue_lane == RIGHT
         queue = queue_of(env, world, RIGHT)
         lane = env.unwrapped.road.network.get_lane(("start", "end", RIGHT))
         across = np.array([lane.local_coordinates((item["x"], item["y"]))[1] for item in queue])
@@ -77,5 +75,5 @@ def test_no_queue_stands_in_the_laboratory():
 
 @pytest.mark.parametrize("lane", [-1, 0.5, True, "left"])
 def test_refused_lanes(lane):
-    with pytest.raises(ValueError, match="camera queue_lane"):
-        CameraParams(queue_lane=lane)
+    with pytest.raises(ValueError, match="scene queue_lane"):
+        rig(queue_lane=lane)

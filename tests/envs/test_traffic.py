@@ -169,7 +169,7 @@ def test_brake_has_dead_time_build_up_and_limit():
 
 
 def test_the_brake_is_that_of_the_world():
-    env = make_traffic("highway", camera=None, world=8003, condition="rain")
+    env = make_traffic("highway", camera=None, world=8003, weather="rain")
     _, info = env.reset(seed=0)
     assert info["world"] == 8003
     brake = env.ego.brake

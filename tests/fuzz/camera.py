@@ -6,7 +6,6 @@ array with a second camera, and it must leave the drawing memory empty.
 
 import functools
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import gymnasium as gym
@@ -15,6 +14,7 @@ import numpy as np
 sys.path[:0] = [str(Path(__file__).parents[1])]
 
 from highway_env.vehicle.kinematics import Vehicle
+from support.cameras import Rig, ego_camera, rig
 from support.fuzz import run_cases
 from support.roads import (
     FIGURES,
@@ -27,8 +27,7 @@ from support.roads import (
     straight_env,
 )
 
-import lgmd_gym  # noqa: F401 - registers the environments
-from lgmd_gym.camera import CameraParams, EgoCamera
+from lgmd_gym import LGMDParams
 from lgmd_gym.sensing.sensor_array import SensorArray
 
 IDS = (
@@ -39,23 +38,27 @@ LIGHT_BOUNDS = (-1.0, 500.0)  # [grey levels], for natural contrast without nois
 
 
 def draw_camera(rng, name, shape):
-    """Return random parameters of a camera."""
+    """Return a random camera and scene."""
     choice, stopping = rng.choice, rng.random() < 0.2
-    return CameraParams(
+    gaze = {"gaze": str(choice(["fixed", "path"]))}
+    if stopping:
+        gaze = {
+            "gaze": "stopping",
+            "reach": float(rng.uniform(0.2, 3.0)),
+            "span_m": float(rng.uniform(0.2, 6.0)),
+            "offset_m": float(rng.uniform(-20.0, 20.0)),
+            "lift": float(rng.uniform(-1.5, 0.5)),
+        }
+    return rig(
         name=name,
         shape=shape,
         hfov_deg=float(rng.uniform(2.0, 160.0)),
-        mount_height=float(choice([0.05, 1.2, 5.0])),
-        mount_setback=float(rng.uniform(1.2 if stopping else -3.0, 5.0)),
-        mount_left=float(rng.uniform(-1.0, 1.0)),
+        height_m=float(choice([0.05, 1.2, 5.0])),
+        setback_m=float(rng.uniform(1.2 if stopping else -3.0, 5.0)),
+        left_m=float(rng.uniform(-1.0, 1.0)),
         pitch_deg=float(choice([0.0, rng.uniform(-60.0, 60.0)])),
         yaw_deg=float(choice([0.0, rng.uniform(-360.0, 360.0)])),
-        gaze="stopping" if stopping else str(choice(["fixed", "path"])),
-        reach=float(rng.uniform(0.2, 3.0)),
-        span_m=float(rng.uniform(0.2, 6.0)),
-        offset_m=float(rng.uniform(-20.0, 20.0)),
-        lift=float(rng.uniform(-1.5, 0.5)),
-        stabilised=bool(rng.integers(2)),
+        stabiliser="gyroscope" if rng.integers(2) else None,
         calibrated=bool(rng.integers(2)),
         texture=float(choice([0.0, 1.0])),
         roadside=float(choice([0.0, 1.0, 4.0])),
@@ -71,6 +74,7 @@ def draw_camera(rng, name, shape):
         shutter_s=float(choice([0.0, 0.0, 0.03])),
         linear_light=bool(rng.integers(2)),
         auto_exposure_s=float(choice([0.0, 0.2])),
+        **gaze,
     )
 
 
@@ -128,7 +132,7 @@ def check(env, cameras, noise):
     """Draw the frames of two cameras, and compare them with those of a sensor array."""
     frames = []
     for params in cameras:
-        camera = EgoCamera(params)
+        camera = ego_camera(params)
         frame = camera.render(env)
         assert np.isfinite(camera.light).all()
         low, high = LIGHT_BOUNDS
@@ -137,10 +141,11 @@ def check(env, cameras, noise):
         assert not camera.buffers.ground.any()
         assert not camera.buffers.solids.any()
         assert np.array_equal(camera.render(env), frame)
-        frames.append(EgoCamera(params, read_noise=noise, shot_noise=noise).render(env))
+        frames.append(ego_camera(params, read_noise=noise, shot_noise=noise).render(env))
         assert noise or np.array_equal(frames[-1], frame)
-    noisy = [replace(params, read_noise=noise, shot_noise=noise) for params in cameras]
-    array = SensorArray(noisy, 30.0, None)
+    noisy = [rig(params, read_noise=noise, shot_noise=noise).camera for params in cameras]
+    array = SensorArray(noisy, 30.0, LGMDParams())
+    array.set_scene(0, cameras[0].scene)
     for _ in range(2):
         array.read(env)
         array.process(0, 1)
@@ -154,7 +159,9 @@ def draw_case(rng):
     text, env = draw_scene(rng)
     shape = tuple(rng.integers(4, 64, 2).tolist())
     other = shape if rng.integers(2) else tuple(rng.integers(4, 64, 2).tolist())
-    cameras = [draw_camera(rng, "one", shape), draw_camera(rng, "two", other)]
+    first, second = draw_camera(rng, "one", shape), draw_camera(rng, "two", other)
+    scene = rig(first, panorama="skyline").scene if second.camera.gaze.kind == "stopping" else first.scene
+    cameras = [Rig(first.camera, scene), Rig(second.camera, scene)]
     noise = float(rng.choice([0.0, 3.0]))
     return f"{text} {cameras}", lambda: check(env, cameras, noise)
 

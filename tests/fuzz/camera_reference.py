@@ -5,13 +5,13 @@ The light of every pixel must be that of many rays through it, within the error 
 
 import copy
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parents[1])]
 
 from fuzz.camera import draw_camera, draw_scene
 from reference.camera import separate_objects, worst_error
+from support.cameras import rig
 from support.fuzz import run_cases
 
 
@@ -26,12 +26,12 @@ def draw_case(rng):
     """Return the description of a random scene with one camera, and its check."""
     text, env = draw_scene(rng)
     shape = tuple(rng.integers(4, 48, 2).tolist())
-    params = replace(draw_camera(rng, "one", shape), panorama="skyline", shutter_s=0.0, guard_rail=False)
-    params = replace(params, linear_light=False)
+    params = rig(draw_camera(rng, "one", shape), panorama="skyline", shutter_s=0.0, guard_rail=False)
+    params = rig(params, linear_light=False)
     # Ground nearer than the near plane is drawn without road. Pieces of a rail that meet have no order.
-    params = replace(params, mount_height=max(params.mount_height, 0.4))
+    params = rig(params, height_m=max(params.height_m, 0.4))
     if params.light == "night":
-        params = replace(params, vehicles="box")  # no halos of headlights
+        params = rig(params, vehicles="box")  # no halos of headlights
     return f"{text} {params}", lambda: check(copy.deepcopy(env), params)
 
 

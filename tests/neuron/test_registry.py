@@ -40,7 +40,7 @@ class Change:
 if "change" not in neuron.names():
     neuron.register("change", Change)
 
-CAMERAS = ["wide", {"name": "own", "shape": (30, 40), "detector": "change", "columns": 4}]
+CAMERAS = ["wide", {"name": "own", "camera": {"shape": (30, 40)}, "neuron": "change", "columns": 4}]
 
 
 def test_an_own_model_in_environments_and_the_engine():
@@ -109,7 +109,7 @@ def test_names_and_declarations_are_checked():
     with pytest.raises(ValueError, match="must be a function or class, got 3"):
         neuron.register("three", 3)
     with pytest.raises(ValueError, match="unknown neuron 'lplc3'; did you mean 'lplc2'"):
-        gym.make("LGMD/CCRs-v0", ego_speed=8.0, camera={"detector": "lplc3"})
+        gym.make("LGMD/CCRs-v0", ego_speed=8.0, neuron="lplc3")
     with pytest.raises(ValueError, match="LPLC2 has no columns"):
         neuron.make("lplc2", (32, 40), columns=4)
     with pytest.raises(ValueError, match=r"must have shift\(active, turns_px\)"):

@@ -100,12 +100,12 @@ RICH = Scenario(
 def test_kinds_sizes_and_shades(tmp_path):
     from lgmd_gym.benchmark.case import scenario_case
 
-    case = scenario_case("mine", "x", RICH, fcw_driver=True, condition="fog")
+    case = scenario_case("mine", "x", RICH, fcw_driver=True, weather="fog")
     back = exported(tmp_path, case)
     straight = replace(RICH, ego_reference=0.0, actors=tuple(replace(a, reference=0.0) for a in RICH.actors))
     assert list(differences(straight, back.scenario)) == []  # on a straight path, the reference has no effect
     assert back.fcw_driver
-    assert dict(back.arguments)["condition"] == "fog"
+    assert dict(back.arguments)["weather"] == "fog"
     env = gym.make("LGMD/Scenario-v0", camera=None, **dict(back.arguments))
     env.reset(seed=0)
 
@@ -186,8 +186,6 @@ def test_errors_are_one_line(tmp_path, monkeypatch, capsys, arguments, message):
 
 
 def test_conditions_without_weather_are_refused(tmp_path):
-    case = Case("mine", "CCRs", "x", (("condition", "low_sun"),))
-    with pytest.raises(
-        ValueError, match="OpenSCENARIO has no weather for the condition 'low_sun'; known: night"
-    ):
+    case = Case("mine", "CCRs", "x", (("weather", "low_sun"),))
+    with pytest.raises(ValueError, match="OpenSCENARIO has no weather 'low_sun'; known: night"):
         export_case(case, tmp_path / "a.xosc")

@@ -99,7 +99,7 @@ def test_fcw_cells_have_the_driver(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("inside", "condition"),
+    ("inside", "weather"),
     [
         (SUN.format(100000), None),
         (SUN.format(50), None),
@@ -111,15 +111,15 @@ def test_fcw_cells_have_the_driver(tmp_path):
         ('<Precipitation precipitationType="dry" precipitationIntensity="0"/>', None),
     ],
 )
-def test_environments_set_the_camera_condition(tmp_path, inside, condition):
+def test_environments_set_the_weather(tmp_path, inside, weather):
     (case,) = read(write(tmp_path, scenario(START, globals_=weather(inside)))).cases
-    assert dict(case.arguments).get("condition") == condition
+    assert dict(case.arguments).get("weather") == weather
 
 
 @pytest.mark.parametrize(
     ("inside", "message"),
     [
-        (SUN.format(0) + '<Fog visualRange="9"/>', "the conditions fog, night cannot be combined; use one"),
+        (SUN.format(0) + '<Fog visualRange="9"/>', "the weathers fog, night cannot be combined; use one"),
         ('<Precipitation precipitationType="snow"/>', "precipitationType='snow' is not supported"),
     ],
 )

@@ -80,7 +80,7 @@ def test_own_scenarios_in_suite_files(tmp_path):
     assert case.scenario == Scenario(
         family="parked", ego_speed=8.33, duration=9.0, actors=(Actor(gap=40.0, lateral_offset=1.0),)
     )
-    assert dict(case.arguments)["condition"] == "night"
+    assert dict(case.arguments)["weather"] == "night"
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ def veil(scene, column, slope, away):
     lens, look = scene.lens, scene.look
     if not (look.night and look.extinction):
         return np.zeros(column.shape)
-    start, rate = max(scene.p.mount_setback, 0.0), 2.0 * look.extinction + 1.0 / look.beam_reach
+    start, rate = max(scene.p.setback_m, 0.0), 2.0 * look.extinction + 1.0 / look.beam_reach
     slope, away = np.broadcast_to(slope, column.shape), np.broadcast_to(away, column.shape)
     remaining = np.exp(-rate * np.maximum(away - start, 0.0))[:, None]
     shares = remaining + (1.0 - remaining) * (np.arange(_POINTS) + 0.5) / _POINTS

@@ -10,10 +10,10 @@ import numpy as np
 from reference.air import row_slope, veil
 from reference.ground import ground_light
 from reference.solids import ordered_solids
+from support.cameras import Rig, ego_camera
 
-from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera import objects as kinds
-from lgmd_gym.camera.effects import look_of
+from lgmd_gym.camera.effects import in_scene, look_of
 from lgmd_gym.camera.render.coverage import NEAR
 from lgmd_gym.camera.render.sky import skyline
 from lgmd_gym.camera.road_geometry import road_geometry
@@ -28,9 +28,11 @@ class ReferenceCamera:
     """
 
     def __init__(self, camera, env):
-        p, lens = camera.params, camera._lens
+        p, lens = Rig(camera.camera, camera.scene), camera._lens
         self.p, self.lens = p, SimpleNamespace(**{name: float(lens[name]) for name in lens.dtype.names})
-        self.look = SimpleNamespace(**{name: float(value) for name, value in _fields(look_of(p))})
+        self.look = SimpleNamespace(
+            **{name: float(value) for name, value in _fields(look_of(in_scene(*p), p.scene))}
+        )
         self.road = road_geometry(env.road, p.roadside, p.seed, p.guard_rail)
         roadside = [SimpleNamespace(**dict(_fields(record))) for record in self.road.roadside]
         everything = [*objects_of(env, p), *roadside]
@@ -139,7 +141,7 @@ def worst_error(params, env):
     The tolerance is one grey level and 4 % of the contrast in the pixel. Pixels that differ by more than half
     of it are measured again with more rays.
     """
-    camera = EgoCamera(params)
+    camera = ego_camera(params)
     camera.render(env)
     light, reference = camera.light.astype(float).ravel(), ReferenceCamera(camera, env)
     rows, columns = (places.ravel() for places in np.indices(params.shape))

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from reference.camera import separate_boxes, worst_error
+from support.cameras import ego_camera, rig
 from support.roads import add_car, add_mark, add_obstacle, box_record, lens_x, set_roadside, straight_env
-
-from lgmd_gym.camera import CameraParams, EgoCamera
 
 pytestmark = pytest.mark.slow
 SMALL = {"shape": (21, 34), "hfov_deg": 70.0}
@@ -35,17 +34,17 @@ def scene(**road):
             "visibility_m": 20.0,
             "light": "night",
             "vehicles": "box",
-            "mount_height": 0.4,
-            "mount_setback": 0.0,
+            "height_m": 0.4,
+            "setback_m": 0.0,
         },
         {"pitch_deg": 0.4},  # the horizon is within a row
         {"pitch_deg": 20.0, "yaw_deg": 30.0},
-        {"mount_height": 0.4},  # below the cabins
-        {"mount_height": 4.0, "mount_setback": -4.0, "pitch_deg": -35.0},
+        {"height_m": 0.4},  # below the cabins
+        {"height_m": 4.0, "setback_m": -4.0, "pitch_deg": -35.0},
     ],
 )
 def test_light_is_that_of_many_rays(fields):
-    params = CameraParams.make({**SMALL, "roadside": 0.0, **fields})
+    params = rig({**SMALL, "roadside": 0.0, **fields})
     assert worst_error(params, scene()) <= 1.0
 
 
@@ -60,10 +59,10 @@ def test_light_is_that_of_many_rays(fields):
     ],
 )
 def test_light_of_a_rolling_camera_is_that_of_many_rays(fields):
-    params = CameraParams.make({**SMALL, "roadside": 0.0, "road": "rough", "seed": 1, **fields})
+    params = rig({**SMALL, "roadside": 0.0, "road": "rough", "seed": 1, **fields})
     env = scene()
     env.vehicle.speed, env.steps = 60.0, 24
-    camera = EgoCamera(params)
+    camera = ego_camera(params)
     camera.render(env)
     assert camera._lens["roll"] < np.radians(-0.85)
     assert worst_error(params, env) <= 1.0
@@ -74,7 +73,7 @@ def test_lens_that_points_down_shows_what_is_behind_it():
     x = lens_x(env)
     add_car(env, x - 4.0, 0.0, 230.0)
     add_mark(env, x - 3.0, 6.5, 200.0)
-    params = CameraParams(shape=(60, 20), hfov_deg=100.0, pitch_deg=-60.0, mount_height=5.0, roadside=0.0)
+    params = rig(shape=(60, 20), hfov_deg=100.0, pitch_deg=-60.0, height_m=5.0, roadside=0.0)
     assert worst_error(params, env) <= 1.0
 
 
@@ -95,7 +94,7 @@ def cross_traffic(seed):
 
 @pytest.mark.parametrize("seed", [0, 8, 16, 33, 74, 233, 299])
 def test_long_boxes_hide_each_other_as_along_the_rays(seed):
-    env, params = cross_traffic(seed), CameraParams.make({**SMALL, "roadside": 0.0, "vehicles": "box"})
+    env, params = cross_traffic(seed), rig({**SMALL, "roadside": 0.0, "vehicles": "box"})
     separate_boxes(env)
     assert worst_error(params, env) <= 1.0
 
@@ -105,7 +104,7 @@ def test_long_boxes_hide_each_other_as_along_the_rays(seed):
 def test_bridge_is_above_what_is_below_it(ahead, pitch_deg):
     env = scene()
     x = lens_x(env)
-    params = CameraParams.make({**SMALL, "pitch_deg": pitch_deg})
+    params = rig({**SMALL, "pitch_deg": pitch_deg})
     deck = box_record(x + ahead, 3.5, (10.0, 30.0, 7.0), base=5.0)
     wall = box_record(x + 20.0, 14.0, (50.0, 0.3, 3.0))
     set_roadside(env, params, np.concatenate((deck, wall)))

@@ -3,8 +3,8 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from support.cameras import ego_camera
 
-from lgmd_gym import EgoCamera
 from lgmd_gym.neuron import danger_zone
 from lgmd_gym.rendering.display import danger_zone_edges, target_boxes
 
@@ -19,9 +19,9 @@ def env():
 
 
 def test_danger_zone_edges_equal_those_of_the_mask(env):
-    camera = EgoCamera("standard", mount_setback=0.0)
+    camera = ego_camera("standard", setback_m=0.0)
     camera.render(env)
-    mask = danger_zone(camera.shape, camera.params.hfov_deg, height_m=camera.params.mount_height)
+    mask = danger_zone(camera.shape, camera.camera.hfov_deg, height_m=camera.camera.mount.height_m)
     left, right = danger_zone_edges(camera, env.unwrapped.vehicle)
     for row in (60, 75, 88):
         inside = np.flatnonzero(mask[row] > 0.5)
@@ -30,10 +30,10 @@ def test_danger_zone_edges_equal_those_of_the_mask(env):
 
 
 def test_target_box_encloses_the_target(env):
-    camera = EgoCamera("fovea", vehicles="box", mount_setback=0.0)
+    camera = ego_camera("fovea", vehicles="box", setback_m=0.0)
     camera.render(env)
     ((left, top, right, bottom),) = target_boxes(camera, env.unwrapped)
     gap = 5.0 * EGO_SPEED  # contact after 5 s
-    assert right - left == pytest.approx(camera.params.focal_px * 1.712 / gap, rel=1e-6)
-    assert bottom - top == pytest.approx(camera.params.focal_px * 1.427 / gap, rel=0.12)  # with the far end
+    assert right - left == pytest.approx(camera.camera.focal_px * 1.712 / gap, rel=1e-6)
+    assert bottom - top == pytest.approx(camera.camera.focal_px * 1.427 / gap, rel=0.12)  # with the far end
     assert (left + right) / 2 == pytest.approx(80.0, abs=1e-6)

@@ -88,7 +88,7 @@ def test_result_describes_the_end_of_the_episode():
 def test_world_and_condition_repeat_a_run_of_the_benchmark():
     sensors, agent = SensorConfig(), "stopping-zone"
     row = run_task(Task(agent, find_case("quick/CCRs/v30"), 3, sensors, condition="night", world=9003)).row
-    surroundings = {"world": 9003, "condition": "night"}
+    surroundings = {"world": 9003, "weather": "night"}
     result = play_episode("quick/CCRs/v30", make_agent(agent), 3, {}, surroundings=surroundings)
     elsewhere = play_episode("quick/CCRs/v30", make_agent(agent), 3, {})
     assert (result.collision, result.duration) == (row["collision"], pytest.approx(row["duration"]))

@@ -181,12 +181,11 @@ def test_render_before_reset_raises():
         LGMDView(approach()).render()
 
 
-@pytest.mark.parametrize("detector", ["lplc2", "dsn"])
-def test_layers_are_those_of_the_detector(detector):
-    camera = {"name": "side", "yaw_deg": 10.0, "detector": detector}
+@pytest.mark.parametrize("neuron", ["lplc2", "dsn"])
+def test_layers_are_those_of_the_neuron(neuron):
     pictures = []
-    for item in (camera, camera | {"detector": "lgmd"}):
-        env = LGMDView(approach(camera=item))
+    for name in (neuron, "lgmd"):
+        env = LGMDView(approach(camera={"mount": {"yaw_deg": 10.0}}, neuron=name))
         env.reset(seed=0)
         for _ in range(10):
             env.step(HOLD)

@@ -4,8 +4,9 @@ import gymnasium as gym
 import highway_env  # noqa: F401  (registers the environments)
 import numpy as np
 import pytest
+from support.cameras import ego_camera
 
-from lgmd_gym import EgoCamera, LGMDObservation
+from lgmd_gym import LGMDObservation
 
 CONFIGS = {
     "highway-v0": {"vehicles_count": 9},
@@ -27,7 +28,7 @@ CAMERAS = ["fovea", "wide"]
 def test_a_hundred_frames_on_every_stock_environment(env_id):
     env = gym.make(env_id, config={"simulation_frequency": 30, **CONFIGS[env_id]})
     env = LGMDObservation(env, camera=CAMERAS, include_frame=True, trace=True)
-    cameras = [EgoCamera(name) for name in CAMERAS]
+    cameras = [ego_camera(name) for name in CAMERAS]
     frames, seed, max_ffi = 0, 0, 0.0
     while frames < 100:
         observation, info = env.reset(seed=seed)
@@ -52,10 +53,10 @@ def test_a_hundred_frames_on_every_stock_environment(env_id):
 def test_frame_does_not_depend_on_earlier_frames(env_id, preset):
     env = gym.make(env_id, config=CONFIGS[env_id])
     env.reset(seed=3)
-    camera = EgoCamera(preset)
+    camera = ego_camera(preset)
     for _ in range(12):
         env.step(1)
         for yaw_deg in (-120.0, -35.0, 0.0, 35.0, 120.0):
             camera.render(env, gaze=(yaw_deg, 0.0))
-        np.testing.assert_array_equal(camera.render(env), EgoCamera(preset).render(env))
+        np.testing.assert_array_equal(camera.render(env), ego_camera(preset).render(env))
     env.close()

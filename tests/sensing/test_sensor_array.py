@@ -9,40 +9,42 @@ import pytest
 from support.golden_frames import busy_road, curve
 from support.roads import add_car, straight_env
 
-from lgmd_gym import LGMD, BirdsEye, CameraParams, EgoCamera, LGMDParams
-from lgmd_gym.camera import CONDITIONS
+from lgmd_gym import LGMD, BirdsEye, LGMDParams, neuron
+from lgmd_gym.camera import WEATHERS, AlongPath, Camera, EgoCamera, Fixed, Scene, Weather
 from lgmd_gym.camera.objects import OBJECT
-from lgmd_gym.neuron import DSN, LPLC2, SustainedEdges
+from lgmd_gym.sensing.channel import make_channels
 from lgmd_gym.sensing.sensor_array import SensorArray
 
-SMALL = {"shape": (45, 80)}
+SMALL, TINY = {"shape": (45, 80)}, {"shape": (30, 40)}
+ASIDE, BACK = {"mount": {"yaw_deg": 20.0}}, {"mount": {"yaw_deg": 180.0}}
+PATH, STEADY = {"gaze": AlongPath(derotated=True)}, {"gaze": Fixed(derotated=True)}
 CAMERAS = [
-    CameraParams.preset("wide", **SMALL),
-    {"name": "small", "shape": (30, 40), "yaw_deg": 20.0, "seed": 3},
-    CameraParams.preset("fovea", **SMALL, guard_rail=True),
-    {"name": "back", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box"},
-    {"name": "path", "shape": (45, 80), "gaze": "path", "panorama": "natural", "mount_left": 0.4},
-    {"name": "driver", "shape": (45, 80), "gaze": "path", "guard_rail": True},
-    {"name": "back edges", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box", "detector": "edges"},
-    {"name": "columns", "shape": (30, 40), "yaw_deg": 20.0, "seed": 3, "columns": 4},
-    {"name": "flow columns", "shape": (30, 40), "yaw_deg": 20.0, "detector": "dsn", "columns": 2},
-    {"name": "side", "shape": (45, 80), "yaw_deg": 30.0, "detector": "lplc2"},
-    {"name": "derotated", "shape": (30, 40), "derotated": True, "columns": 4},
-    {"name": "derotated path", "shape": (45, 80), "gaze": "path", "derotated": True},
-    {"name": "derotated flow", "shape": (30, 40), "derotated": True, "detector": "dsn", "columns": 4},
-    {"name": "derotated edges", "shape": (30, 40), "derotated": True, "detector": "edges"},
-    {"name": "derotated side", "shape": (45, 80), "derotated": True, "detector": "lplc2"},
-    {"name": "small flow", "shape": (30, 40), "yaw_deg": 20.0, "seed": 3, "detector": "dsn"},
-    {"name": "back flow", "shape": (30, 40), "yaw_deg": 180.0, "vehicles": "box", "detector": "dsn"},
+    Camera.make("wide", **SMALL),
+    {"name": "small", **TINY, **ASIDE},
+    Camera.make("fovea", **SMALL),
+    {"name": "back", **TINY, **BACK},
+    {"name": "path", **SMALL, "gaze": "path", "mount": {"left_m": 0.4}},
+    {"name": "driver", **SMALL, "gaze": "path", "sensor": {"linear_light": True}},
+    {"name": "back edges", "camera": {**TINY, **BACK}, "neuron": "edges"},
+    {"name": "columns", "camera": {**TINY, **ASIDE}, "columns": 4},
+    {"name": "flow columns", "camera": {**TINY, **ASIDE}, "neuron": "dsn", "columns": 2},
+    {"name": "side", "camera": {**SMALL, "mount": {"yaw_deg": 30.0}}, "neuron": "lplc2"},
+    {"name": "derotated", "camera": {**TINY, **STEADY}, "columns": 4},
+    {"name": "derotated path", "camera": {**SMALL, **PATH}},
+    {"name": "derotated flow", "camera": {**TINY, **STEADY}, "neuron": "dsn", "columns": 4},
+    {"name": "derotated edges", "camera": {**TINY, **STEADY}, "neuron": "edges"},
+    {"name": "derotated side", "camera": {**SMALL, **STEADY}, "neuron": "lplc2"},
+    {"name": "small flow", "camera": {**TINY, **ASIDE}, "neuron": "dsn"},
+    {"name": "back flow", "camera": {**TINY, **BACK}, "neuron": "dsn"},
 ]
-MODELS = {"lgmd": LGMD, "lplc2": LPLC2, "dsn": DSN, "edges": SustainedEdges}
-FIELDS = [
-    {},
-    {"condition": "night", "texture": 0.7, "visibility_m": 40.0},
-    {"condition": "rain", "texture": 1.4, "auto_exposure_s": 0.2},
-    {"condition": "fog", "seed": 5, "roadside": 2.0, "linear_light": True},
-    {"condition": "low_sun", "world": 11, "road": "rough"},
-    {"condition": "night_upper_beam", "world": 12},
+CHANNELS = make_channels(CAMERAS)
+SCENES = [
+    {"vehicles": "box", "panorama": "natural"},
+    {"weather": Weather.make("night", visibility_m=40.0), "texture": 0.7},
+    {"weather": "rain", "texture": 1.4, "guard_rail": True},
+    {"weather": "fog", "seed": 5, "roadside": 2.0},
+    {"weather": "low_sun", "world": 11, "road": "rough"},
+    {"weather": "night_upper_beam", "world": 12, "mount_height_m": 1.4},
 ]
 
 
@@ -66,24 +68,19 @@ def move(envs, step):
 def make_array(camera=CAMERAS, num_envs=6, **arguments):
     sensors = SensorArray(camera, 30.0, LGMDParams(), num_envs, **arguments)
     for index in range(num_envs):
-        sensors.set_camera_fields(index, FIELDS[index])
+        sensors.set_scene(index, SCENES[index])
     return sensors
 
 
-def reference(camera, fields):
+def reference(channel, scene):
     """Return a camera and a neuron of their own."""
-    own = EgoCamera(CameraParams.make(camera), **fields)
-    return own, MODELS[own.params.detector](own.shape, 30.0)
-
-
-def column_potentials(p, neuron):
-    return neuron.column_potentials(p.columns) if p.columns else []
+    return EgoCamera(channel.camera, scene), neuron.make(channel.neuron, channel.camera.shape, 30.0)
 
 
 @pytest.mark.parametrize("threads", [None, 3])
 def test_frames_and_outputs_equal_those_of_single_cameras_and_neurons(threads):
     envs, sensors = scenes(), make_array(threads=threads)
-    singles = [[reference(camera, fields) for camera in CAMERAS] for fields in FIELDS]
+    singles = [[reference(channel, scene) for channel in CHANNELS] for scene in SCENES]
     turns = dict.fromkeys(range(len(CAMERAS)), 0)
     for step in range(6):
         move(envs, step)
@@ -91,14 +88,18 @@ def test_frames_and_outputs_equal_those_of_single_cameras_and_neurons(threads):
             sensors.read(env, index)
         sensors.step()
         for index, env in enumerate(envs):
-            for k, (camera, neuron) in enumerate(singles[index]):
+            for k, (camera, model) in enumerate(singles[index]):
                 before = camera.yaw_px
                 frame = camera.render(env)
                 np.testing.assert_array_equal(sensors.frame_of(k, index), frame)
                 turns[k] += abs(camera.yaw_px - before) if step else 0
-                expected = neuron.step(frame, turn_px=camera.yaw_px - before)
+                expected = model.step(frame, turn_px=camera.yaw_px - before)
                 assert [field[index, k].item() for field in sensors.responses] == list(expected)
-            expected = [column_potentials(camera.params, neuron) for camera, neuron in singles[index]]
+            expected = [
+                model.column_potentials(channel.columns)
+                for channel, (_, model) in zip(CHANNELS, singles[index], strict=True)
+                if channel.columns
+            ]
             np.testing.assert_array_equal(sensors.column_potentials()[index], np.concatenate(expected))
     assert [name for k, name in enumerate(sensors.names) if turns[k]] == [
         name for name in sensors.names if name.startswith("derotated")
@@ -107,33 +108,33 @@ def test_frames_and_outputs_equal_those_of_single_cameras_and_neurons(threads):
     assert sensors.responses.alert.dtype == np.bool_
 
 
-def test_fields_of_the_next_road_need_not_fit_the_last_one():
+def test_the_scene_of_the_next_road_need_not_fit_the_last_one():
     """A level on two lanes, and then one with a queue on the third lane."""
     sensors = SensorArray("wide", 30.0, LGMDParams(), 1)
     narrow, broad = straight_env(lanes=2), straight_env(lanes=3)
     for env, lane in ((broad, 2), (narrow, 1), (broad, 2)):
-        fields = {"world": 8002, "queue_lane": lane}
-        sensors.set_camera_fields(0, fields)
+        scene = Scene(world=8002, queue_lane=lane)
+        sensors.set_scene(0, scene)
         sensors.set_road(0, env.road)
         sensors.read(env, 0)
         sensors.process(0, 1)
-        np.testing.assert_array_equal(sensors.frame_of(0, 0), EgoCamera("wide", **fields).render(env))
+        np.testing.assert_array_equal(sensors.frame_of(0, 0), EgoCamera("wide", scene).render(env))
 
 
-def test_camera_fields_change_at_any_time():
+def test_scenes_change_at_any_time():
     envs, sensors = scenes(), make_array()
     for step in range(8):
         move(envs, step)
         for index, env in enumerate(envs):
-            # Without the automatic exposure, which follows the frames before.
-            fields = FIELDS[(index + step // 2) % 4] | {"auto_exposure_s": 0.0}
-            sensors.set_camera_fields(index, fields)
+            scene = Scene.make(SCENES[(index + step // 2) % 4])
+            sensors.set_scene(index, scene)
             sensors.read(env, index)
             sensors.process(index, index + 1)
-            for k, camera in enumerate(CAMERAS):
-                own = EgoCamera(CameraParams.make(camera), **fields)
+            for k, channel in enumerate(CHANNELS):
+                own = EgoCamera(channel.camera, scene)
                 np.testing.assert_array_equal(sensors.frame_of(k, index), own.render(env))
-                assert sensors.cameras[index][sensors.names[k]].params == own.params
+                posed = sensors.cameras[index][sensors.names[k]]
+                assert (posed.camera, posed.scene) == (own.camera, own.scene)
                 point = [30.0, 2.0, 0.5]
                 projected = sensors.cameras[index][sensors.names[k]].project(point)
                 np.testing.assert_array_equal(projected, own.project(point))
@@ -152,15 +153,15 @@ def test_inactive_environments_keep_frames_and_outputs():
         sensors.read(env, index)
     active = np.array([True, False, True, True, False, False])
     sensors.process(0, 3, active)
-    changed = [not np.array_equal(sensors.frames[0][k], before[0][0][k]) for k in range(len(FIELDS))]
+    changed = [not np.array_equal(sensors.frames[0][k], before[0][0][k]) for k in range(len(SCENES))]
     assert changed == [True, False, True, False, False, False]
     for new, old in zip(sensors.responses, before[1], strict=True):
         np.testing.assert_array_equal(new[[1, 3]], old[[1, 3]])
     assert (sensors.responses.ffi != before[1].ffi)[[0, 2]].all()
 
 
-def test_detectors_on_the_same_views_share_frames_until_a_camera_pauses():
-    """A camera that pauses keeps the exposure of its last frame, while its twin adapts further."""
+def test_neurons_on_the_same_views_share_frames():
+    """A channel that pauses keeps its outputs; its camera is drawn for the other neuron."""
     lgmds, dsns = [CAMERAS[1], CAMERAS[3]], CAMERAS[-2:]
     envs, together = scenes(), make_array([*lgmds, *dsns])
     apart = make_array(lgmds), make_array(dsns)
@@ -175,17 +176,17 @@ def test_detectors_on_the_same_views_share_frames_until_a_camera_pauses():
         for camera in range(4):
             own = apart[camera // 2]
             for index in range(len(envs)):
-                frame = own.frame_of(camera % 2, index)
-                np.testing.assert_array_equal(together.frame_of(camera, index), frame)
+                if together.enabled[index, camera]:
+                    frame = own.frame_of(camera % 2, index)
+                    np.testing.assert_array_equal(together.frame_of(camera, index), frame)
                 expected = own.response_of(index).membrane_potential[camera % 2]
                 assert together.response_of(index).membrane_potential[camera] == expected
-    assert together.frames[0] is not together.frames[1]
 
 
 def test_a_disabled_camera_pauses_and_starts_anew():
     env = busy_road()
     sensors = make_array(num_envs=1)
-    own, neuron = reference(CAMERAS[2], {})
+    own, model = reference(CHANNELS[2], SCENES[0])
     for step in range(12):
         move([env], step)
         sensors.enabled[0, 2] = not 4 <= step < 8
@@ -195,12 +196,12 @@ def test_a_disabled_camera_pauses_and_starts_anew():
         if sensors.enabled[0, 2]:
             frame = own.render(env)
             if step == 8:
-                neuron.reset()
+                model.reset()
             np.testing.assert_array_equal(sensors.frame_of(2), frame)
-            kept = list(neuron.step(frame)), frame
+            kept = list(model.step(frame)), frame
         assert [field[0, 2].item() for field in sensors.responses] == kept[0]
         np.testing.assert_array_equal(sensors.frame_of(2), kept[1])
-        np.testing.assert_array_equal(sensors.frame_of(0), EgoCamera(CAMERAS[0]).render(env))
+        np.testing.assert_array_equal(sensors.frame_of(0), EgoCamera(CAMERAS[0], SCENES[0]).render(env))
 
 
 def test_reset_returns_selected_neurons_to_their_first_frame():
@@ -241,7 +242,7 @@ def test_threads_process_disjoint_ranges_at_once():
             apart.read(env, index)
             together.read(env, index)
         together.step()
-        threads = [threading.Thread(target=apart.process, args=(k, k + 1)) for k in range(len(FIELDS))]
+        threads = [threading.Thread(target=apart.process, args=(k, k + 1)) for k in range(len(SCENES))]
         for thread in threads:
             thread.start()
         for thread in threads:
@@ -264,10 +265,9 @@ def test_copies_are_independent(duplicate):
     for used, scene in ((clone, other), (sensors, env), (clone, env)):
         used.read(scene)
         used.step()
-        for k, camera in enumerate(CAMERAS):
-            np.testing.assert_array_equal(
-                used.frame_of(k), EgoCamera(CameraParams.make(camera)).render(scene)
-            )
+        for k, channel in enumerate(CHANNELS):
+            own = EgoCamera(channel.camera, SCENES[0])
+            np.testing.assert_array_equal(used.frame_of(k), own.render(scene))
     assert not np.array_equal(clone.responses.ffi, sensors.responses.ffi)
 
 
@@ -292,24 +292,18 @@ def test_top_views_are_rendered_by_read():
     env.close()
 
 
-def test_invalid_camera_fields_raise():
-    sensors = make_array(num_envs=1)
-    with pytest.raises(ValueError, match="unknown camera field 'textur'; did you mean 'texture'"):
-        sensors.set_camera_fields(0, {"textur": 1.0})
-    with pytest.raises(ValueError, match=r"camera texture must be in \[0, 5\]"):
-        sensors.set_camera_fields(0, {"texture": 9.0})
-    with pytest.raises(ValueError, match=r"must keep the shape \(45, 80\) of camera 'wide', got \(20, 20\)"):
-        sensors.set_camera_fields(0, {"shape": (20, 20)})
-    with pytest.raises(ValueError, match="must keep the detector lgmd of camera 'wide', got dsn"):
-        sensors.set_camera_fields(0, {"detector": "dsn"})
-    with pytest.raises(ValueError, match="must keep the brake_known False of camera 'wide', got True"):
-        sensors.set_camera_fields(0, {"brake_known": True})
-    with pytest.raises(ValueError, match="must keep the derotated False of camera 'wide', got True"):
-        sensors.set_camera_fields(0, {"derotated": True})
+def test_invalid_scenes_raise():
+    sensors = SensorArray(["wide", {"gaze": "stopping"}], 30.0, LGMDParams())
+    with pytest.raises(ValueError, match="unknown scene field 'textur'; did you mean 'texture'"):
+        sensors.set_scene(0, {"textur": 1.0})
+    with pytest.raises(ValueError, match=r"scene texture must be in \[0, 5\]"):
+        sensors.set_scene(0, {"texture": 9.0})
+    with pytest.raises(ValueError, match="scene panorama must be 'skyline' with the gaze 'stopping'"):
+        sensors.set_scene(0, {"panorama": "natural"})
 
 
-def test_conditions_are_covered():
-    assert {fields.get("condition", "clear") for fields in FIELDS} == set(CONDITIONS)
+def test_weathers_are_covered():
+    assert {Scene.make(scene).weather.name for scene in SCENES} == set(WEATHERS)
 
 
 def test_a_full_list_of_objects_is_drawn():

@@ -113,8 +113,14 @@ def signature_of(function):
 
 
 SMALL = {"name": "wide", "shape": [8, 8]}
-CAMERA_FIELDS = signature_of(camera.CameraParams)
-ENV = {"camera": SMALL, "params": None, "fps": None, "include_frame": False, "include_base": False}
+ENV = {
+    "camera": SMALL,
+    "neuron": "lgmd",
+    "params": None,
+    "fps": None,
+    "include_frame": False,
+    "include_base": False,
+}
 ENV |= {"trace": False, "render_mode": None}
 ENV_TYPES = {"render_mode": "str | None"} | signature_of(lgmd_gym.LGMDObservation)
 del ENV_TYPES["env"]
@@ -162,10 +168,10 @@ def _add_scenarios(add):
 def _add_environments(add):
     """Add the functions of environments and wrappers."""
     for name, types in (
-        ("CCRs", {"lateral_offset": "float | None", "condition": "str"}),
+        ("CCRs", {"lateral_offset": "float | None", "weather": "str", "scene": ""}),
         (
             "RandomBraking",
-            {"split": "str", "start_level": "int", "num_levels": "int", "conditions": "", "families": ""},
+            {"split": "str", "start_level": "int", "num_levels": "int", "weathers": "", "families": ""},
         ),
     ):
         add(f"gym.make {name}", partial(gym.make, envs.env_id(name)), ENV, ENV_TYPES | types, made)
@@ -214,21 +220,25 @@ def _add_sensors(add):
     add("LGMDParams.from_toml", lgmd_gym.LGMDParams.from_toml, {"path": "x"})
     add("danger_zone", neuron.danger_zone, {"shape": (8, 8), "hfov_deg": 40.0})
     add(
-        "CameraParams",
-        camera.CameraParams,
+        "Camera",
+        camera.Camera,
         {"shape": (8, 8)},
         None,
         lambda made: rendered(camera.EgoCamera(made)),
     )
+    add("Mount", camera.Mount, {}, None, lambda made: rendered(camera.EgoCamera(SMALL, mount=made)))
     add(
-        "EgoCamera",
-        camera.EgoCamera,
-        {"params": None},
-        {"params": "", **CAMERA_FIELDS, "condition": "str"},
+        "ImageSensor",
+        camera.ImageSensor,
+        {},
         None,
+        lambda made: rendered(camera.EgoCamera(SMALL, sensor=made)),
     )
+    add("Scene", camera.Scene, {}, None, lambda made: rendered(camera.EgoCamera(SMALL, made)))
+    add("Weather", camera.Weather, {}, None, lambda made: camera.Scene(weather=made))
+    add("Channel", lgmd_gym.Channel, {"camera": SMALL})
+    add("EgoCamera", camera.EgoCamera, {"camera": SMALL, "scene": None}, {"camera": "", "scene": ""})
     add("BirdsEye", camera.BirdsEye, {"shape": (8, 8)}, None, rendered)
-    add("with_condition", camera.with_condition, {"camera": "wide", "condition": "fog"})
 
 
 def _add_agents(add):

@@ -11,6 +11,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from highway_env.vehicle.kinematics import Vehicle
+from support.cameras import ego_camera
 from support.roads import (
     add_car,
     add_figure,
@@ -22,7 +23,7 @@ from support.roads import (
     straight_env,
 )
 
-from lgmd_gym.camera import CONDITIONS, CameraParams, EgoCamera
+from lgmd_gym.camera import WEATHERS
 
 PATH = Path(__file__).parents[1] / "golden" / "camera.npz"
 SHAPE = (45, 80)
@@ -31,21 +32,21 @@ OPTIONS = {
     "box": {"vehicles": "box", "seed": 7},
     "rail": {"guard_rail": True, "texture": 2.0},
     "panorama": {"panorama": "natural", "pitch_deg": 7.0, "roadside": 3.0},
-    "mount": {"gaze": "path", "mount_height": 1.6, "mount_left": 0.4, "pitch_deg": -8.0, "yaw_deg": 12.0},
+    "mount": {"gaze": "path", "height_m": 1.6, "left_m": 0.4, "pitch_deg": -8.0, "yaw_deg": 12.0},
     "motion": {"road": "rough", "dive_deg": 0.3, "shutter_s": 0.03},
     "night-rail": {"light": "night", "guard_rail": True},
     "world-sunny": {"world": 11, "road": "normal"},
     "world-overcast": {"world": 1, "road": "rough"},
-    "world-night": {"world": 4, "condition": "night"},
-    "world-rain": {"world": 6, "condition": "rain"},
-    "world-low-sun": {"world": 10, "condition": "low_sun"},
+    "world-night": {"world": 4, "weather": "night"},
+    "world-rain": {"world": 6, "weather": "rain"},
+    "world-low-sun": {"world": 10, "weather": "low_sun"},
     "night-fog": {"light": "night", "visibility_m": 30.0},
     "world-night-fog": {"world": 4, "light": "night", "visibility_m": 60.0, "road": "rough"},
-    "stopping": {"gaze": "stopping", "reach": 1.3, "lift": -0.6, "road": "rough", "stabilised": True},
+    "stopping": {"gaze": "stopping", "reach": 1.3, "lift": -0.6, "road": "rough", "stabiliser": "gyroscope"},
     "stopping-night": {"gaze": "stopping", "offset_m": 6.0, "span_m": 9.0, "light": "night"},
     "world-stopping": {"gaze": "stopping", "world": 6, "wet": True, "calibrated": True, "contrast_s": 0.5},
 }
-"""Camera fields that the golden frames cover in addition to the named conditions."""
+"""Camera fields that the golden frames cover in addition to the named weathers."""
 
 
 def busy_road():
@@ -94,14 +95,14 @@ def golden_frames():
     """Return all frames by name, uint8, shape (45, 80)."""
     frames = {}
     for preset in PRESETS:
-        for condition in CONDITIONS:
-            camera = EgoCamera(CameraParams.preset(preset, shape=SHAPE, condition=condition))
-            frames[f"{preset}-{condition}"] = camera.render(busy_road())
-        frames[f"{preset}-curve"] = EgoCamera(preset, shape=SHAPE).render(curve())
+        for weather in WEATHERS:
+            camera = ego_camera(preset, shape=SHAPE, weather=weather)
+            frames[f"{preset}-{weather}"] = camera.render(busy_road())
+        frames[f"{preset}-curve"] = ego_camera(preset, shape=SHAPE).render(curve())
     for name, fields in OPTIONS.items():
-        frames[name] = EgoCamera("wide", shape=SHAPE, **fields).render(busy_road())
+        frames[name] = ego_camera("wide", shape=SHAPE, **fields).render(busy_road())
     for name, (figure, fields) in FIGURES.items():
-        camera = EgoCamera("standard", shape=SHAPE, **fields)
+        camera = ego_camera("standard", shape=SHAPE, **fields)
         frames[name] = camera.render(road_with_figure(*figure))
     return frames
 

@@ -109,7 +109,7 @@ def lens_x(env):
 
 def set_roadside(env, params, roadside):
     """Set what cameras with these parameters draw along a road: `OBJECT` records, sorted by x."""
-    key = road_key(params)
+    key = road_key(params.scene)
     geometry = road_geometry.road_geometry(env.road, *key)
     order = np.argsort(roadside["x"], kind="stable")
     road_geometry._CACHE[env.road.network][key] = geometry._replace(roadside=roadside[order])

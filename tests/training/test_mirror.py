@@ -6,6 +6,7 @@ import pytest
 from lgmd_gym.agents.policies.features import NUM_LEVELS, ZONE_INPUTS, FeatureConfig, FeatureHistory
 from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, NUM_MOTION_FIELDS, all_round_cameras
 from lgmd_gym.agents.zones import NUM_FIELDS
+from lgmd_gym.sensing.channel import make_channels
 from lgmd_gym.training.offline.mirror import mirror_input, mirror_of
 
 
@@ -20,26 +21,25 @@ def opposite(name):
 
 def test_columns_of_the_mirror_image():
     """Each column has a value of its own, at its place in the mirrored camera from right to left."""
-    cameras = all_round_cameras()
+    channels = make_channels(all_round_cameras())
     parts, start = {}, 0
-    for camera in cameras:
-        parts[camera["name"]] = np.arange(start, start + camera["columns"]) + 1.0
-        start += camera["columns"]
+    for channel in channels:
+        parts[channel.name] = np.arange(start, start + channel.columns) + 1.0
+        start += channel.columns
     assert start == NUM_COLUMNS
     expected = [
-        parts[opposite(camera["name"])][::-1] * (-1.0 if camera.get("detector") == "dsn" else 1.0)
-        for camera in cameras
+        parts[opposite(channel.name)][::-1] * (-1.0 if channel.neuron == "dsn" else 1.0)
+        for channel in channels
     ]
     assert np.array_equal(mirrored("columns", np.concatenate(list(parts.values()))), np.concatenate(expected))
 
 
 @pytest.mark.parametrize(("name", "motion"), [("sides", -1.0), ("sides_ffi", 1.0)])
 def test_fields_of_the_mirror_image(name, motion):
-    cameras = all_round_cameras()[NUM_FIELDS:NUM_MOTION_FIELDS]
-    values = {camera["name"]: 1.0 + index for index, camera in enumerate(cameras)}
+    channels = make_channels(all_round_cameras())[NUM_FIELDS:NUM_MOTION_FIELDS]
+    values = {channel.name: 1.0 + index for index, channel in enumerate(channels)}
     expected = [
-        values[opposite(camera["name"])] * (motion if camera["detector"] == "dsn" else 1.0)
-        for camera in cameras
+        values[opposite(channel.name)] * (motion if channel.neuron == "dsn" else 1.0) for channel in channels
     ]
     assert mirrored(name, np.array(list(values.values()))).tolist() == expected
 

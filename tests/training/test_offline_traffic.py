@@ -9,6 +9,7 @@ from support.recordings import offline_config
 from support.traffic import Recorded
 
 from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.traffic.emergencies import Emergencies
 from lgmd_gym.training.offline import traffic
 from lgmd_gym.training.offline.episodes import EpisodeRecorder
@@ -78,13 +79,13 @@ def test_segments_exclude_the_ten_seconds_before_an_emergency(monkeypatch, emerg
 @pytest.mark.parametrize("seed", [HIGHWAY, pytest.param(INTERSECTION, marks=pytest.mark.slow)])
 def test_observations_equal_those_of_the_benchmark(monkeypatch, seed):
     config = {"duration": 12}
-    monkeypatch.setattr(traffic, "make_traffic", partial(traffic.make_traffic, config=config))
-    fields = {"world": None, "condition": "fog", "road": "still"}
-    monkeypatch.setattr(traffic, "draw_camera_fields", lambda *_: fields)
+    in_fog = partial(traffic.make_traffic, config=config, world="laboratory")
+    monkeypatch.setattr(traffic, "make_traffic", in_fog)
+    monkeypatch.setattr(traffic, "draw_weather", lambda *_: ("fog", 1.0))
     monkeypatch.setattr(traffic, "segment_bounds", lambda non_threat, policy_hz: [(0, len(non_threat))])
     ((whole,),) = TrafficRecorder("train", "fovea").record(range(seed, seed + 1))
-    sensor_config = SensorConfig(camera="fovea").with_condition("fog")
-    steps = Recorded(list(traffic.KINDS)[seed], seed, sensor_config, config).steps
+    appearance, sensors = Appearance(world="laboratory", weather="fog"), SensorConfig(camera="fovea")
+    steps = Recorded(list(traffic.KINDS)[seed], seed, sensors, config, appearance).steps
     assert len(whole) == len(steps) - 1  # no action follows the last observation
     for name, array in whole.observations.items():
         assert np.array_equal(array, np.stack([step.observation[name] for step in steps[:-1]]))
@@ -96,7 +97,7 @@ def test_successive_seeds_have_the_kinds_in_turn(monkeypatch):
 
     def record_kind(kind, camera, params, **arguments):
         made.append((kind, params))
-        return make_traffic(kind, camera, params, config={"duration": 1}, **arguments)
+        return make_traffic(kind, camera, params=params, config={"duration": 1}, **arguments)
 
     monkeypatch.setattr(traffic, "make_traffic", record_kind)
     params = {"t_sp": 0.6}

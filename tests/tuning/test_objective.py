@@ -6,7 +6,7 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.episode import make_env
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
-from lgmd_gym.envs.appearance import brake_of, world_condition
+from lgmd_gym.envs.appearance import brake_of, world_weather
 from lgmd_gym.tuning import objective as objective_module
 from lgmd_gym.tuning.objective import Objective, ObjectiveValue, find_onset, is_latching
 
@@ -84,9 +84,9 @@ def test_episodes_are_in_worlds_of_the_split(split):
     level, case = (make_env(task.case, task.sensor_config, task.arguments) for task in (tasks[0], cases[0]))
     assert level.reset(seed=0)[1]["world"] in SPLIT_WORLDS[split]
     assert case.reset(seed=0)[1]["world"] == cases[0].world
-    fields = case.unwrapped.camera_fields
-    assert fields["condition"] == world_condition(cases[0].world)
-    assert case.unwrapped.brake == brake_of(fields)
+    scene = case.unwrapped.scene
+    assert scene.weather.name == world_weather(cases[0].world)
+    assert case.unwrapped.brake == brake_of(scene)
 
 
 def test_only_latching_rules_are_replayed():

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from support.rollouts import BRAKE, HOLD, rollout
 
-from lgmd_gym import LGMD, BirdsEye, CameraParams, EgoCamera, LGMDObservation
-from lgmd_gym.camera.brake_estimate import ERROR, known_deceleration
+from lgmd_gym import LGMD, BirdsEye, LGMDObservation
+from lgmd_gym.camera import Camera, EgoCamera, Scene, ToStoppingPoint
+from lgmd_gym.camera.pose import ESTIMATE_ERROR, known_deceleration
 
 SMALL = {"vehicles_count": 3, "simulation_frequency": 30}
 
@@ -70,7 +71,7 @@ def test_birdseye_is_a_camera():
 def test_camera_params_are_a_camera():
     env = gym.make(
         "LGMD/CCRs-v0",
-        camera=CameraParams(name="custom-20", hfov_deg=20.0),
+        camera=Camera(name="custom-20", hfov_deg=20.0),
         include_frame=True,
         world="laboratory",
     )
@@ -126,10 +127,10 @@ def test_trace_can_be_pickled():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"camera": "fova"}, "unknown camera preset 'fova'; did you mean 'fovea'"),
+        ({"camera": "fova"}, "unknown camera 'fova'; did you mean 'fovea'"),
         ({"camera": []}, r"camera must have at least one element, got \[\]"),
-        ({"camera": ["wide", "wide"]}, "camera names must be unique, got 'wide' twice"),
-        ({"params": {"tsp": 0.7}}, "unknown LGMD parameter 'tsp'; did you mean 't_sp'"),
+        ({"camera": ["wide", "wide"]}, "channel names must be unique, got 'wide' twice"),
+        ({"params": {"tsp": 0.7}}, "unknown LGMD field 'tsp'; did you mean 't_sp'"),
         ({"speed": 3.0}, "did you mean 'ego_speed'"),
         ({"ego_speed": 50}, "180 km/h"),
         ({"camera": ["wide", "paper"], "include_frame": True}, "cameras must have the same shape"),
@@ -153,13 +154,13 @@ def test_step_before_reset_raises():
 
 @pytest.mark.parametrize("env_id", ["LGMD/CCRs-v0", "LGMD/Traffic-Highway-v0"])
 def test_known_deceleration_is_the_estimate_of_the_brake(env_id):
-    zone = {"name": "zone", "gaze": "stopping", "brake_known": True}
+    zone = Camera(name="zone", gaze=ToStoppingPoint(brake_known=True))
     env = gym.make(env_id, camera=["wide", zone], world=8003)
     observation, _ = env.reset(seed=1)
     brake = env.unwrapped.brake.max_deceleration
-    p = CameraParams(world=8003, max_deceleration=brake)
-    assert observation["known_deceleration"] == np.float32(known_deceleration(p))
-    assert abs(observation["known_deceleration"] / brake - 1.0) < 2.01 * ERROR
+    expected = known_deceleration(Scene(world=8003), brake)
+    assert observation["known_deceleration"] == np.float32(expected)
+    assert abs(observation["known_deceleration"] / brake - 1.0) < 2.01 * ESTIMATE_ERROR
     assert observation in env.observation_space
     env.close()
     plain = gym.make(env_id)

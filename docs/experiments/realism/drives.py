@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 import numpy as np
 
-from lgmd_gym.camera import CameraParams
+from lgmd_gym.camera import Camera
 from lgmd_gym.camera.worlds import LABORATORY
 
 GROUPS = {
@@ -47,8 +47,8 @@ class Drives:
 
     Attributes:
         env: Environment id.
-        arguments: Arguments of `gym.make`: of the scenario family, `world`, `condition` and `road`.
-        camera: Fields of `CameraParams`.
+        arguments: Arguments of `gym.make`: of the scenario family, `world`, `weather` and `road`.
+        camera: Fields of `Camera`.
         seeds: Seeds, one drive each.
         group: Group of real clips with which the drives are compared.
     """
@@ -86,9 +86,9 @@ def simulated_drives(
     arguments: Mapping[str, Any] | None = None,
     camera: Mapping[str, Any] | None = None,
 ) -> list[Drives]:
-    """Return drives on `ROADS` by day and at night, each with one world and one condition of its group.
+    """Return drives on `ROADS` by day and at night, each with one world and one weather of its group.
 
-    Worlds and conditions follow each other in turn: the drives of a group have as many worlds as possible.
+    Worlds and weathers follow each other in turn: the drives of a group have as many worlds as possible.
 
     Args:
         worlds: Numbers of the worlds; empty for the laboratory.
@@ -97,11 +97,11 @@ def simulated_drives(
         camera: Further camera fields of every drive.
     """
     drives = []
-    for group, conditions in GROUPS.items():
+    for group, weathers in GROUPS.items():
         for index, (seed, (env, own)) in enumerate(product(seeds, ROADS)):
             appearance = {
                 "world": worlds[index % len(worlds)] if worlds else LABORATORY,
-                "condition": conditions[index % len(conditions)] if worlds else conditions[0],
+                "weather": weathers[index % len(weathers)] if worlds else weathers[0],
             }
             drives.append(
                 Drives(env=env, arguments={**own, **appearance, **(arguments or {})}, camera=camera or {},
@@ -118,7 +118,7 @@ def drive_frames(drives: Drives, seed: int, optics: Optics) -> Iterator[np.ndarr
         seed: Seed of the environment.
         optics: Size, rate and field of view of the frames.
     """
-    camera = CameraParams.make(
+    camera = Camera.make(
         {"name": "clip", "shape": optics.shape, "hfov_deg": optics.hfov_deg, **drives.camera}
     )
     rates = {"policy_frequency": optics.fps, "simulation_frequency": 2 * optics.fps}

@@ -115,7 +115,7 @@ def ncap2026_extended() -> tuple[Case, ...]:
 def ncap2026_robustness() -> tuple[Case, ...]:
     """Return the public part of the robustness layer (N3 5.2.1.3) at two speeds of each scenario, aligned.
 
-    Target heading ±10° and ±20°; a car next to the target; night and glare (the condition `low_sun`) for
+    Target heading ±10° and ±20°; a car next to the target; night and glare (the weather `low_sun`) for
     CCRs, CCRm and CCRb; ±2 m/s² of deceleration and ±0.5 s of headway for CCRb; ±5 km/h of the target for
     CCCscp, CCFtap and CCFhos. The path of CCFtap (±0.5 m) and the timing of CCCscp (±0.1 s) are not varied.
     """
@@ -126,8 +126,8 @@ def ncap2026_robustness() -> tuple[Case, ...]:
     for family, more in (("CCRs", {}), ("CCRm", {}), ("CCRb", BRAKING)):
         for variant, change in (
             ("beside", {"beside": True}),
-            ("night", {"condition": "night"}),
-            ("glare", {"condition": "low_sun"}),
+            ("night", {"weather": "night"}),
+            ("glare", {"weather": "low_sun"}),
         ):
             rows += speed_cases(suite, family, [30, 50], f"/{variant}", **change, **more)
     for variant, change in (
@@ -156,7 +156,7 @@ def _cells(
     rows: list[Case] = []
     for per_cent, light in product(locations, lights):
         tail = f"{'-warned' if warned else ''}/location{per_cent}{'-night' if light == 'night' else ''}"
-        more: dict[str, Any] = {"condition": "night"} if light == "night" else {}
+        more: dict[str, Any] = {"weather": "night"} if light == "night" else {}
         cells = speed_cases(
             suite, family, list(speeds), tail, impact_location=per_cent / 100, **arguments, **more
         )

@@ -103,10 +103,10 @@ def fmvss127_pedestrian() -> tuple[Case, ...]:
         *speed_cases(suite, "CPLA", standing, "/standing", **STANDING),
         *speed_cases(suite, "CPLA", along, "/along", **ALONG),
     ]
-    for beam, condition in BEAMS.items():
-        rows += speed_cases(suite, "CPNA", crossing, f"/right50-{beam}", condition=condition)
-        rows += speed_cases(suite, "CPLA", standing, f"/standing-{beam}", **STANDING, condition=condition)
-        rows += speed_cases(suite, "CPLA", along, f"/along-{beam}", **ALONG, condition=condition)
+    for beam, weather in BEAMS.items():
+        rows += speed_cases(suite, "CPNA", crossing, f"/right50-{beam}", weather=weather)
+        rows += speed_cases(suite, "CPLA", standing, f"/standing-{beam}", **STANDING, weather=weather)
+        rows += speed_cases(suite, "CPLA", along, f"/along-{beam}", **ALONG, weather=weather)
     return tuple(rows)
 
 

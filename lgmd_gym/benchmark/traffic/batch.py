@@ -27,7 +27,7 @@ class Drive:
         kind: Kind of traffic.
         seed: Seed of the traffic and the agents.
         agents: Agent strings.
-        appearance: World, condition and road; the world must not be None.
+        appearance: World, weather and road; the world must not be None.
     """
 
     kind: str
@@ -42,8 +42,8 @@ class TrafficTask:
 
     Attributes:
         drives: The drives.
-        sensor_config: Camera and neuron parameters under the condition.
-        condition: Name of the camera condition, for the rows.
+        sensor_config: Camera and neuron parameters.
+        condition: Name of the weather, for the rows.
     """
 
     drives: tuple[Drive, ...]

@@ -8,9 +8,9 @@ import numpy as np
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.reader import Moment, SceneFrame
-from lgmd_gym.camera import BIRDSEYE
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.neuron import LGMDParams
+from lgmd_gym.sensing.channel import BIRDSEYE
 from lgmd_gym.sensing.frame_rate import camera_rate
 from lgmd_gym.sensing.sensor_array import SensorArray
 from lgmd_gym.sensing.spaces import make_observation, signal_keys

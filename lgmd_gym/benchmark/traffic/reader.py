@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgmd_gym.agents import to_action
-from lgmd_gym.camera import BIRDSEYE
 from lgmd_gym.envs.traffic.env import TrafficEnv
+from lgmd_gym.sensing.channel import BIRDSEYE
 from lgmd_gym.sensing.road_hook import on_road_step
 from lgmd_gym.sensing.sensor_array import SensorArray
 from lgmd_gym.sensing.spaces import yaw_rate
@@ -73,7 +73,7 @@ class SceneReader:
     def reset(self, seed: int) -> Moment:
         """Reset the environment and read the first frame."""
         _, info = self.env.reset(seed=seed)
-        self.sensors.set_camera_fields(self.index, self.env.camera_fields)
+        self.sensors.set_scene(self.index, self.env.scene, self.env.brake.max_deceleration)
         on_road_step(self.env, self._on_substep)
         self._substeps, self._frames = 0, []
         self._read()

@@ -28,7 +28,7 @@ class LiveEpisode:
         self.env = recording.fork(decision)
         self._observer = Observer(sensor_config)
         sensors = self._observer.sensors
-        sensors.set_camera_fields(0, self.env.camera_fields)
+        sensors.set_scene(0, self.env.scene, self.env.brake.max_deceleration)
         sensors.set_road(0, self.env.road)
         for moment in recording.moments[: decision + 1]:
             (self.start,) = self._observer.observe([moment])

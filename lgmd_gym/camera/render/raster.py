@@ -6,11 +6,10 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from lgmd_gym.camera.aim import STOPPING
+from lgmd_gym.camera.camera import Camera
 from lgmd_gym.camera.effects import noise_table
 from lgmd_gym.camera.objects import MAX_DRAWN, MODEL_MARK, OBJECT, choose_objects, is_figure, light_of_code
-from lgmd_gym.camera.params import CameraParams
-from lgmd_gym.camera.pose import noise_start, pose_lens
+from lgmd_gym.camera.pose import STOPPING, noise_start, pose_lens
 from lgmd_gym.camera.render.buffers import (
     Buffers,
     GroundLayer,
@@ -43,6 +42,7 @@ from lgmd_gym.camera.render.solids import Air, distance, draw_object, first_from
 from lgmd_gym.camera.render.texture import ground_texture
 from lgmd_gym.camera.road_geometry import RoadGeometry
 from lgmd_gym.camera.roadside import PLANT_RANGE
+from lgmd_gym.camera.scene import SKYLINE, Scene
 from lgmd_gym.camera.worlds import draw_world
 from lgmd_gym.kernels import kernel
 from lgmd_gym.kernels.bundle import Bundle
@@ -224,13 +224,14 @@ def draw_frame(frame, view, opening, road, tables, models, objects, count, buffe
 _MAX_JOINED = 8  # tables that a workspace remembers
 
 
-def tables_key(p: CameraParams) -> tuple[Any, ...]:
-    """Return the parameters that cameras of one frame size must have in common to share `SharedTables`."""
-    world = draw_world(p.world)
-    key = (world.asphalt, world.verge, world.skyline) if world.drawn else (p.seed, p.linear_light)
-    if p.panorama != "skyline":
+def tables_key(camera: Camera, scene: Scene) -> tuple[Any, ...]:
+    """Return what cameras of one frame size in their scenes have in common if they share `SharedTables`."""
+    world, weather = draw_world(scene.world), scene.weather
+    key = (world.asphalt, world.verge, world.skyline)
+    key = key if world.drawn else (scene.seed, camera.sensor.linear_light)
+    if scene.panorama != SKYLINE:
         # The table of a panorama includes light and fog, at the resolution of the lens.
-        key = *key, p.panorama, p.seed, p.light, p.visibility_m, p.focal_px
+        key = *key, scene.panorama, scene.seed, weather.light, weather.visibility_m, camera.focal_px
     return key
 
 
@@ -241,26 +242,26 @@ class SharedTables:
         bundle: The fields of `Tables`, then those of `Models`.
     """
 
-    def __init__(self, p: CameraParams) -> None:
-        self._params = p
-        world = draw_world(p.world)
-        grounds = (world.asphalt, world.verge) if world.drawn else (("asphalt", p.seed), ("verge", p.seed))
+    def __init__(self, camera: Camera, scene: Scene) -> None:
+        self._arguments = camera, scene
+        world, seed = draw_world(scene.world), scene.seed
+        grounds = (world.asphalt, world.verge) if world.drawn else (("asphalt", seed), ("verge", seed))
         asphalt, verge = (ground_texture(*ground) for ground in grounds)
         tables = Tables(
             asphalt=asphalt.data,
             verge=verge.data,
             level_start=asphalt.level_start,
-            skyline=skyline(100_000 + world.skyline if world.drawn else p.seed),
-            noise=noise_table(0 if world.drawn else p.seed),
-            panorama=panorama_table(p),
+            skyline=skyline(100_000 + world.skyline if world.drawn else seed),
+            noise=noise_table(0 if world.drawn else seed),
+            panorama=panorama_table(camera, scene),
         )
-        self.bundle = Bundle(tuple(tables), tuple(all_models(linear=p.linear_light)))
+        self.bundle = Bundle(tuple(tables), tuple(all_models(linear=camera.sensor.linear_light)))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "SharedTables":
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return SharedTables, (self._params,)
+        return SharedTables, self._arguments
 
 
 class Workspace:
@@ -309,7 +310,7 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
             `Buffers`.
     """
     batch, scene_table, roads, tables, space = inputs.arrays
-    tables_indices, cameras, mounts, lenses, views = batch
+    tables_indices, mounts, lenses, views = batch
     scenes, objects, counts = scene_table
     surface, lines, roadside, spans = roads
     chosen, buffers = space
@@ -317,10 +318,10 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
     tables, models = Tables(*tables[0]), Models(*tables[1])
     for env in range(first, last):
         scene = scenes[env]
-        for k in range(cameras.shape[0]):
+        for k in range(mounts.shape[1]):
             if not selected[env, k] or tables_indices[env, k] != tables_index:
                 continue
-            mount, lens, span = mounts[env, k], lenses[env, k, 0], spans[env, cameras[k]]
+            mount, lens, span = mounts[env, k], lenses[env, k, 0], spans[env]
             pose_lens(mount, scene, 0.0, lens)
             if mount.shutter_s > 0.0:
                 pose_lens(mount, scene, mount.shutter_s, lenses[env, k, 1])

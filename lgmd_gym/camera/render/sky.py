@@ -7,8 +7,9 @@ from pathlib import Path
 import numba as nb
 import numpy as np
 
+from lgmd_gym.camera.camera import Camera
 from lgmd_gym.camera.effects import WHITE, far_transmission, haze_grey, to_light
-from lgmd_gym.camera.params import CameraParams
+from lgmd_gym.camera.scene import SKYLINE, Scene
 from lgmd_gym.kernels import kernel
 from lgmd_gym.kernels.simd import (
     LANES,
@@ -197,8 +198,8 @@ _ROWS = 128  # heights are multiples of this
 _NIGHT = 0.035  # light of a night sky, as a share of daylight
 
 
-def panorama_table(p: CameraParams) -> np.ndarray:
-    """Return the panorama of a camera under its light and fog, at the resolution of its pixels.
+def panorama_table(camera: Camera, scene: Scene) -> np.ndarray:
+    """Return the panorama of a camera under light and fog of its scene, at the resolution of its pixels.
 
     Columns run from the direction +x towards +y, texels are square, and the horizon is at half height.
 
@@ -208,22 +209,23 @@ def panorama_table(p: CameraParams) -> np.ndarray:
     Raises:
         ValueError: If an image cannot be read.
     """
-    if p.panorama == "skyline":
+    if scene.panorama == SKYLINE:
         return np.zeros((0, 0), dtype=np.float32)
-    grey = natural_panorama(p.seed) if p.panorama == "natural" else _image(p.panorama)
+    weather, linear = scene.weather, camera.sensor.linear_light
+    grey = natural_panorama(scene.seed) if scene.panorama == "natural" else _image(scene.panorama)
     grey = grey.astype(np.float32)
-    if p.linear_light:
+    if linear:
         grey *= grey / np.float32(WHITE)
     # Halve the resolution while a pixel at the centre of the frame covers more than about 1.4 texels.
-    while grey.shape[1] > 16 and 1.0 / p.focal_px > 1.4 * 2.0 * math.pi / grey.shape[1]:
+    while grey.shape[1] > 16 and 1.0 / camera.focal_px > 1.4 * 2.0 * math.pi / grey.shape[1]:
         grey = 0.25 * (grey[0::2, 0::2] + grey[1::2, 0::2] + grey[0::2, 1::2] + grey[1::2, 1::2])
         if grey.shape[0] % 2:
             grey = np.concatenate((grey, grey[-1:]))
-    if p.light == "night":
+    if weather.light == "night":
         grey *= _NIGHT
-    if p.visibility_m > 0.0:
-        haze = to_light(p, haze_grey(p))
-        grey = haze + far_transmission(p) * (grey - haze)
+    if weather.visibility_m > 0.0:
+        haze = to_light(haze_grey(weather), linear)
+        grey = haze + far_transmission(weather) * (grey - haze)
     return np.ascontiguousarray(grey, dtype=np.float32)
 
 
@@ -255,7 +257,7 @@ def _image(path: str) -> np.ndarray:
     except Exception as error:  # decoders raise many types of errors
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(
-            f"camera panorama={path!r} cannot be read as an image ({reason}); "
+            f"scene panorama={path!r} cannot be read as an image ({reason}); "
             "pass the path of a PNG or JPEG, or 'skyline' or 'natural'"
         ) from error
 

@@ -17,7 +17,7 @@ from lgmd_gym.benchmark.case import Case, Row, relative_impact
 from lgmd_gym.benchmark.config import DEFAULT_AGENTS
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
-from lgmd_gym.camera.params import CONDITIONS
+from lgmd_gym.camera import WEATHERS
 from lgmd_gym.envs.registration import RANDOM, RANDOM_TASKS
 from lgmd_gym.processes.files import complete_folder
 from lgmd_gym.report.gallery.cards import (
@@ -199,7 +199,7 @@ def _write(
     if with_sheets:
         on_progress("cameras and roads")
         sheets["cameras"] = _save_sheet(media, "camera", camera_sheet())
-        sheets["roads"] = _save_sheet(media, "road", road_sheet(tuple(ROADS), tuple(CONDITIONS)))
+        sheets["roads"] = _save_sheet(media, "road", road_sheet(tuple(ROADS), tuple(WEATHERS)))
     page = render_page(cards, outcomes, sheets, agent, seeds)
     (folder / "index.html").write_text(page, encoding="utf-8")
 

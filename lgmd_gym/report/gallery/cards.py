@@ -14,8 +14,7 @@ from docstring_parser import DocstringStyle, parse
 from PIL import Image
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.camera import CameraParams, EgoCamera
-from lgmd_gym.camera.params import CONDITIONS, PRESETS
+from lgmd_gym.camera import WEATHERS, EgoCamera
 from lgmd_gym.clips import VideoWriter
 from lgmd_gym.envs import FAMILIES, env_id
 from lgmd_gym.envs.episode_source import RandomLevels
@@ -187,10 +186,9 @@ CAMERAS = ("wide", "standard", "tele", "fovea")
 APPROACH_DECISIONS = 90  # decisions of an approach at 8 m/s, after which the target is 16 m ahead
 
 
-def road_sheet(roads: tuple[str, ...], conditions: tuple[str, ...]) -> dict[str, dict[str, np.ndarray]]:
+def road_sheet(roads: tuple[str, ...], weathers: tuple[str, ...]) -> dict[str, dict[str, np.ndarray]]:
     """Return frames of the wide camera by road and condition, uint8, shape (height, width)."""
-    wide = CameraParams.preset("wide")
-    cameras = {name: EgoCamera(wide.with_condition(name)) for name in conditions}
+    cameras = {name: EgoCamera("wide", {"weather": name}) for name in weathers}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # highway-env's warnings about its own spaces and versions
         return {env_id: _road_frames(env_id, cameras) for env_id in roads}
@@ -203,7 +201,7 @@ def camera_sheet() -> dict[str, dict[str, np.ndarray]]:
     for _ in range(APPROACH_DECISIONS):
         env.step([0.0])
     return {
-        preset: {name: EgoCamera(PRESETS[preset].with_condition(name)).render(env) for name in CONDITIONS}
+        preset: {name: EgoCamera(preset, {"weather": name}).render(env) for name in WEATHERS}
         for preset in CAMERAS
     }
 

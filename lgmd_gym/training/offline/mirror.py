@@ -12,8 +12,8 @@ import numpy as np
 
 from lgmd_gym.agents.policies.features import NUM_LEVELS, ZONE_INPUTS
 from lgmd_gym.agents.sides import (
-    DETECTORS,
     FORWARD_COLUMNS,
+    NEURONS,
     NUM_FORWARD_COLUMNS,
     NUM_MOTION_FIELDS,
     NUM_SIDE_FIELDS,
@@ -92,8 +92,8 @@ def _fields(signed: bool) -> Mirror:
 def _columns() -> Mirror:
     """Return the mirror image of the columns; the signs of direction-selective neurons change."""
     forward = np.arange(NUM_FORWARD_COLUMNS).reshape(-1, FORWARD_COLUMNS)[:, ::-1].ravel()
-    count = NUM_SIDE_FIELDS * len(DETECTORS) * SIDE_COLUMNS
+    count = NUM_SIDE_FIELDS * len(NEURONS) * SIDE_COLUMNS
     sides = NUM_FORWARD_COLUMNS + np.arange(count).reshape(-1, 2, SIDE_COLUMNS)[:, ::-1, ::-1].ravel()
-    direction = np.repeat([-1.0 if name == "dsn" else 1.0 for name in DETECTORS], count // len(DETECTORS))
+    direction = np.repeat([-1.0 if name == "dsn" else 1.0 for name in NEURONS], count // len(NEURONS))
     signs = np.concatenate([np.ones(NUM_FORWARD_COLUMNS), direction]).astype(np.float32)
     return Mirror(np.concatenate([forward, sides]), signs)

@@ -15,13 +15,14 @@ import numpy as np
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.episode import rollout
 from lgmd_gym.benchmark.task import NO_BRAKE
-from lgmd_gym.camera import CONDITIONS, CameraSpec
+from lgmd_gym.camera.scene import WEATHERS
 from lgmd_gym.envs.dynamics.brake import BrakeParams
-from lgmd_gym.envs.families.distribution import draw_camera_fields
+from lgmd_gym.envs.families.distribution import draw_weather
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, make_traffic
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, Emergencies, simulate_driver
 from lgmd_gym.neuron import NeuronSpec
+from lgmd_gym.sensing.channel import ChannelSpec
 from lgmd_gym.training.offline.episodes import (
     TRAFFIC,
     Observation,
@@ -48,7 +49,7 @@ class TrafficRecorder:
     """
 
     split: str
-    camera: CameraSpec
+    camera: ChannelSpec
     kinds: tuple[str, ...] = tuple(TRAFFIC_KINDS)
     shrink: int | None = None
     params: NeuronSpec = None
@@ -60,9 +61,17 @@ class TrafficRecorder:
     def _record_segments(self, seed: int) -> list[RecordedEpisode]:
         kind = self.kinds[seed % len(self.kinds)]
         with_frame = self.shrink is not None
-        env = make_traffic(kind, self.camera, self.params, include_frame=with_frame, split=self.split)
+        weather, texture = draw_weather(self.split, seed, tuple(WEATHERS))
+        env = make_traffic(
+            kind,
+            self.camera,
+            params=self.params,
+            include_frame=with_frame,
+            weather=weather,
+            scene={"texture": texture},
+            split=self.split,
+        )
         base: Any = env.unwrapped
-        base.camera_overrides = draw_camera_fields(self.split, seed, tuple(CONDITIONS))
         try:
             observations, emergencies = run_episode(env, seed, self.shrink)
         finally:
