@@ -77,16 +77,19 @@ def place(scenario: Scenario, rng: np.random.Generator) -> Placement:
     ego["reference"], ego["kind"] = scenario.ego_reference, EGO
     tables = [_path_of(start, scenario.ego_reference, scenario.ego_path)]
     scripts = [segment_table(scenario.ego_profile)]
-    for body, (actor, shade) in zip(bodies[1:], shaded, strict=True):
+    poses: list[Pose] = []
+    for actor, _ in shaded:
         centre = start.x + scenario.ego_length / 2 + actor.gap + actor.length / 2
-        pose = Pose(centre, start.y - actor.lateral_offset, -actor.heading)
-        tables.append(_path_of(pose, actor.reference, actor.path))
+        poses.append(Pose(centre, start.y - actor.lateral_offset, -actor.heading))
+        tables.append(_path_of(poses[-1], actor.reference, actor.path))
         scripts.append(segment_table(actor.profile))
-        body["x"], body["y"], body["heading"] = pose
-        for name in ("speed", "length", "width", "height", "reference"):
-            body[name] = getattr(actor, name)
-        body["shade"] = shade if actor.shade is None else int(actor.shade)
-        body["kind"] = BODY_KINDS[actor.kind]
+    others = bodies[1:]
+    for name in ("x", "y", "heading"):
+        others[name] = [getattr(pose, name) for pose in poses]
+    for name in ("speed", "length", "width", "height", "reference"):
+        others[name] = [getattr(actor, name) for actor, _ in shaded]
+    others["shade"] = [shade if actor.shade is None else actor.shade for actor, shade in shaded]
+    others["kind"] = [BODY_KINDS[actor.kind] for actor, _ in shaded]
     bodies["script_speed"] = bodies["speed"]
     bodies["segment_end"] = np.cumsum([len(script) for script in scripts])
     bodies["segment"][1:] = bodies["segment_end"][:-1]

@@ -224,9 +224,10 @@ class Record:
 
     def __post_init__(self) -> None:
         """Check every declared field, then call `check`."""
-        for item in declarations(type(self)):
-            name = f"{self.label} {item.name}".lstrip()
-            object.__setattr__(self, item.name, item.check(name, getattr(self, item.name)))
+        for name, label, check, default in _checks(type(self)):
+            value = getattr(self, name)
+            if value is not default:
+                object.__setattr__(self, name, check(label, value))
         self.check()
 
     def check(self) -> None:
@@ -287,6 +288,23 @@ def declarations(cls: type) -> tuple[Declaration, ...]:
         for item in dataclasses.fields(cast(Any, cls))
         if _KEY in item.metadata
     )
+
+
+@cache
+def _checks(cls: type[Record]) -> tuple[tuple[str, str, Callable[[str, Any], Any], Any], ...]:
+    """Return name, name in messages, check, and the default that needs no check of each declared field.
+
+    The last is `...` if there is no default, or if the check converts or refuses it.
+    """
+    found: list[tuple[str, str, Callable[[str, Any], Any], Any]] = []
+    for item in declarations(cls):
+        label, default = f"{cls.label} {item.name}".lstrip(), item.default
+        try:
+            unchanged = default is not dataclasses.MISSING and item.check(label, default) is default
+        except ValueError:
+            unchanged = False
+        found.append((item.name, label, item.check, default if unchanged else ...))
+    return tuple(found)
 
 
 def declaration_of(annotation: Any) -> Declaration | None:

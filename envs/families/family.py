@@ -135,10 +135,11 @@ def _checked(function: Family) -> Any:
 
     @wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
-        bound = signature.bind(*args, **kwargs)
-        bound.apply_defaults()
-        values = bound.arguments
-        return function(**values | {name: item.check(name, values[name]) for name, item in declared.items()})
+        given = signature.bind(*args, **kwargs).arguments if args else kwargs
+        for name, item in declared.items():
+            if name in given:
+                given[name] = item.check(name, given[name])
+        return function(**given)
 
     plain = [
         parameter.replace(annotation=parameter.annotation.__origin__) if name in declared else parameter
