@@ -66,7 +66,8 @@ class Appearance(Record):
         if isinstance(scene, Scene):
             given: dict[str, Any] = {"world": chosen.world, "weather": chosen.weather, "road": chosen.road}
         else:
-            given = {key: scene[key] for key in ("world", "weather", "road") if key in (scene or {})}
+            fields = scene or {}
+            given = {key: fields[key] for key in ("world", "weather", "road") if key in fields}
         if "world" in given and given["world"] is None:
             given["world"] = LABORATORY
         return cls(**given | {key: item for key, item in arguments.items() if item is not None}, scene=chosen)

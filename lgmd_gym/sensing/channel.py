@@ -101,9 +101,8 @@ def make_channels(camera: ChannelSpec, neuron: str = LGMD) -> tuple[Channel, ...
 def _make_channel(item: Any, neuron: str) -> Channel:
     if isinstance(item, Channel):
         return item
-    if isinstance(item, Mapping) and "camera" in item:
-        return Channel.make({"neuron": neuron, **item})
-    return Channel(camera=item, neuron=neuron)
+    fields = item if isinstance(item, Mapping) and "camera" in item else {"camera": item}
+    return Channel.make({"neuron": neuron, **fields})
 
 
 def plain_values(value: Any) -> Any:
