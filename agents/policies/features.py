@@ -184,10 +184,13 @@ class FeatureHistory:
     Args:
         features: Configuration of the policy.
         num_envs: Number of environments N.
+        zone_type: Type of the inputs in `ZONE_INPUTS`.
     """
 
-    def __init__(self, features: FeatureConfig, num_envs: int = 1) -> None:
-        self.features = features
+    def __init__(
+        self, features: FeatureConfig, num_envs: int = 1, zone_type: type[np.floating] = np.float32
+    ) -> None:
+        self.features, self._zone_type = features, zone_type
         self._zones = [name for name in features.inputs if name in ZONE_INPUTS]
         self._required = {source_observation(name) for name in features.inputs}
         self._kept = {source_observation(name) for name in features.inputs if name not in ZONE_INPUTS}
@@ -260,7 +263,7 @@ class FeatureHistory:
                 self._state[f"{part}/{name}"][rows] for part in ("level", "last", "mean")
             )
             averages = averages.reshape(len(rows), -1)
-            return np.concatenate([weaker(level, last), averages], axis=1).astype(np.float32)
+            return np.concatenate([weaker(level, last), averages], axis=1).astype(self._zone_type)
         value = self._state[f"observation/{source_observation(name)}"][rows]
         if name == FRAME:
             return shrink_frames(value, self.features.shrink)

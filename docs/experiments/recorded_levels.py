@@ -15,8 +15,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
 from lgmd_gym.training.offline.dataset import OfflineDataset
-from lgmd_gym.training.offline.episodes import RecordedEpisode
-from lgmd_gym.training.offline.storage import check_file, load
+from lgmd_gym.training.offline.episodes import RecordedEpisode, check_file, load
 from lgmd_gym.training.recordings import FORMAT
 
 

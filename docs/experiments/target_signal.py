@@ -18,7 +18,7 @@ import torch
 from lgmd_gym.agents.rules import excitation
 from lgmd_gym.agents.sides import NEURONS, NUM_SIDE_FIELDS, SIDE_COLUMNS, side_cameras
 from lgmd_gym.training.offline.episodes import RecordedEpisode, record_parallel
-from lgmd_gym.training.offline.level_recorder import LevelRecorder
+from lgmd_gym.training.offline.recorder import LevelRecorder
 
 FAMILIES = (
     *("CCCscp", "CCFtap", "CMCscp", "CMFtap"),

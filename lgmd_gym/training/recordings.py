@@ -20,13 +20,15 @@ from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
 from lgmd_gym.training.extra_episodes import ExtraEpisodes, parse_levels, parse_traffic
 from lgmd_gym.training.offline.episodes import (
     CHUNK_SIZE,
-    EpisodeRecorder,
     RecordedEpisode,
     RecordFunction,
+    check_file,
+    is_complete,
+    load,
     record_parallel,
+    save,
 )
-from lgmd_gym.training.offline.level_recorder import LevelRecorder
-from lgmd_gym.training.offline.storage import check_file, is_complete, load, save
+from lgmd_gym.training.offline.recorder import EpisodeRecorder, LevelRecorder
 from lgmd_gym.training.offline.traffic import TrafficRecorder
 
 LEVEL_CHUNK_SIZE = 25  # levels recorded by one task of a process, for the environments of the engine

@@ -12,7 +12,7 @@ from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.benchmark import RunConfig, get_suite
 from lgmd_gym.benchmark.case import Case, Suite
 from lgmd_gym.benchmark.run_folder import StoredRun
-from lgmd_gym.training.offline.storage import save
+from lgmd_gym.training.offline.episodes import save
 from lgmd_gym.training.recordings import FORMAT
 
 

@@ -6,8 +6,8 @@ import pytest
 from support.recordings import offline_config
 
 from lgmd_gym.training import PolicyWrapper
-from lgmd_gym.training.offline.braking_outcomes import TOLERANCE, BrakingOutcome, braking_outcomes
-from lgmd_gym.training.offline.episodes import EpisodeRecorder, record_parallel
+from lgmd_gym.training.offline.episodes import record_parallel
+from lgmd_gym.training.offline.recorder import TOLERANCE, BrakingOutcome, EpisodeRecorder, braking_outcomes
 
 
 @pytest.mark.parametrize("demands", [(0.0, -1.0), (-0.6, 0.0)])

@@ -5,8 +5,7 @@ from functools import partial
 import pytest
 from support.recordings import offline_config
 
-from lgmd_gym.training.offline.episodes import EpisodeRecorder
-from lgmd_gym.training.offline.level_recorder import NUM_ENVS, LevelRecorder
+from lgmd_gym.training.offline.recorder import NUM_ENVS, EpisodeRecorder, LevelRecorder
 
 SMALL = {"name": "wide", "shape": (24, 32)}
 

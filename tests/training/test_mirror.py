@@ -7,7 +7,7 @@ from lgmd_gym.agents.policies.features import NUM_LEVELS, ZONE_INPUTS, FeatureCo
 from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, NUM_MOTION_FIELDS, all_round_cameras
 from lgmd_gym.agents.zones import NUM_FIELDS
 from lgmd_gym.sensing.channel import make_channels
-from lgmd_gym.training.offline.mirror import mirror_input, mirror_of
+from lgmd_gym.training.offline.dataset import mirror_input, mirror_of
 
 
 def mirrored(name, values):

@@ -9,10 +9,8 @@ from support.recordings import offline_config, synthetic_episode
 from lgmd_gym.agents.policies.features import SCALES, ZONE_INPUTS, FeatureConfig, FeatureHistory
 from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS
 from lgmd_gym.agents.zones import NUM_FIELDS
-from lgmd_gym.training.offline.dataset import OfflineDataset
-from lgmd_gym.training.offline.episodes import EpisodeRecorder
-from lgmd_gym.training.offline.mirror import mirror_input
-from lgmd_gym.training.offline.policy_inputs import policy_inputs
+from lgmd_gym.training.offline.dataset import OfflineDataset, mirror_input, policy_inputs
+from lgmd_gym.training.offline.recorder import EpisodeRecorder
 
 
 def test_batches_equal_the_observations_of_the_policy_wrapper(tmp_path):
@@ -82,14 +80,14 @@ def test_inputs_of_an_episode_equal_those_of_a_feature_history(repeat):
     observations = {name: rng.random((40, size), np.float32) for name, size in sizes.items()}
     inputs = (*SCALES, "speed_change", "spike_peak", *(name for name in ZONE_INPUTS if name != "zones"))
     features = FeatureConfig(inputs=inputs, history=1, repeat=repeat)
-    found, history = policy_inputs(observations, features, np.float32), FeatureHistory(features)
+    (found,), history = policy_inputs([observations], features, np.float32), FeatureHistory(features)
     assert set(found) == set(inputs)
     for time in range(40):
         history.update({name: values[time : time + 1] for name, values in observations.items()})
         if time % repeat == 0:
             for name, expected in history.stack().items():
                 assert found[name][time // repeat] == pytest.approx(expected[0], abs=1e-6)
-    for name, rounded in policy_inputs(observations, features).items():
+    for name, rounded in policy_inputs([observations], features)[0].items():
         assert rounded.dtype == (np.float16 if name in ZONE_INPUTS else np.float32)
         assert rounded == pytest.approx(found[name], abs=5e-4)
 

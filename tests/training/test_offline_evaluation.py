@@ -10,9 +10,8 @@ from support.recordings import dataset, learner, offline_config, spike_episodes,
 
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.training.offline import learner as learner_module
-from lgmd_gym.training.offline.braking_outcomes import TOLERANCE
-from lgmd_gym.training.offline.episodes import EpisodeRecorder
 from lgmd_gym.training.offline.evaluation import Evaluation, evaluate, select_margin
+from lgmd_gym.training.offline.recorder import TOLERANCE, EpisodeRecorder
 
 
 def test_evaluation_ends_each_episode_at_the_first_braking_decision():

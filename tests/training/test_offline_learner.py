@@ -7,11 +7,9 @@ import pytest
 import torch
 from support.recordings import FEATURES, dataset, learner, spike_episodes, synthetic_episode
 
-from lgmd_gym.training.offline.ensemble import check_without_frames
-from lgmd_gym.training.offline.evaluation import evaluate
+from lgmd_gym.training.offline.evaluation import evaluate, expected_return, scale_false_braking_cost
 from lgmd_gym.training.offline.learner import SEED_STEP
-from lgmd_gym.training.offline.objective import expected_return, scale_false_braking_cost
-from lgmd_gym.training.offline.standardisation import measure
+from lgmd_gym.training.offline.networks import check_without_frames, measure
 
 
 def test_expected_return_equals_the_mean_of_sampled_episodes():

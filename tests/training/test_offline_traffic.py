@@ -12,7 +12,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.traffic.emergencies import Emergencies
 from lgmd_gym.training.offline import traffic
-from lgmd_gym.training.offline.episodes import EpisodeRecorder
+from lgmd_gym.training.offline.recorder import EpisodeRecorder
 from lgmd_gym.training.offline.traffic import (
     TrafficRecorder,
     non_threat_episode,

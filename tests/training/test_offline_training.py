@@ -14,8 +14,8 @@ from lgmd_gym.agents.policies.card import read_card
 from lgmd_gym.cli import main as cli
 from lgmd_gym.processes.files import FolderLock
 from lgmd_gym.training.offline import traffic
-from lgmd_gym.training.offline.level_recorder import LevelRecorder
-from lgmd_gym.training.offline.storage import load
+from lgmd_gym.training.offline.episodes import load
+from lgmd_gym.training.offline.recorder import LevelRecorder
 from lgmd_gym.training.recordings import load_or_record
 
 

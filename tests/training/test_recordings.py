@@ -8,9 +8,8 @@ from support.recordings import offline_config, synthetic_episode
 
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, traffic_id
 from lgmd_gym.training import recordings, train
-from lgmd_gym.training.offline.episodes import EpisodeRecorder
-from lgmd_gym.training.offline.level_recorder import LevelRecorder
-from lgmd_gym.training.offline.storage import _difference, check_file, load, save
+from lgmd_gym.training.offline.episodes import _difference, check_file, load, save
+from lgmd_gym.training.offline.recorder import EpisodeRecorder, LevelRecorder
 from lgmd_gym.training.recordings import check_recordings, load_or_record, origin_of, recording_sets
 
 

@@ -1,16 +1,42 @@
-"""`OfflineDataset`: batches of recorded episodes in the form that a policy is trained on."""
+"""`OfflineDataset`: batches of recorded episodes in the form that a policy is trained on.
+
+A level and its mirror image, left and right exchanged, have the same outcomes. Mirrored inputs are therefore
+further training data, of roads with traffic on the left.
+"""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import cache
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 import torch
 
-from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
-from lgmd_gym.training.offline.episodes import RecordedEpisode
-from lgmd_gym.training.offline.mirror import mirror_input
-from lgmd_gym.training.offline.policy_inputs import policy_inputs
+from lgmd_gym.agents.policies.features import (
+    FRAME,
+    NUM_LEVELS,
+    ZONE_INPUTS,
+    FeatureConfig,
+    FeatureHistory,
+    source_observation,
+)
+from lgmd_gym.agents.sides import (
+    FORWARD_COLUMNS,
+    NEURONS,
+    NUM_FORWARD_COLUMNS,
+    NUM_MOTION_FIELDS,
+    NUM_SIDE_FIELDS,
+    SIDE_COLUMNS,
+)
+from lgmd_gym.agents.zones import NUM_FIELDS
+from lgmd_gym.training.offline.episodes import Observation, RecordedEpisode
+
+EPISODES_AT_ONCE = 16  # whose inputs are computed together
+EVEN = ("ego_speed", "known_deceleration", "zones", "zones_spikes", "zones_ffi")
+"""Inputs that the mirror image does not change."""
+EXCHANGED = ("columns", "sides", "sides_ffi")
+"""Inputs of which the mirror image exchanges left and right."""
 
 
 class EpisodeBatch(NamedTuple):
@@ -42,7 +68,7 @@ class OfflineDataset:
     not kept.
 
     Args:
-        episodes: Recorded episodes, at least one; they are processed one by one.
+        episodes: Recorded episodes, at least one; they are processed in groups.
         features: Inputs and timing of the policy.
 
     Attributes:
@@ -53,10 +79,11 @@ class OfflineDataset:
         self.episodes: list[RecordedEpisode] = []
         self._features = features
         self._inputs: list[dict[str, np.ndarray]] = []  # of each episode
-        for episode in episodes:
+        remaining = iter(episodes)
+        while group := list(islice(remaining, EPISODES_AT_ONCE)):
             # Batches add the history. Stored here, it would multiply the memory by its length.
-            self._inputs.append(policy_inputs(episode.observations, features))
-            self.episodes.append(replace(episode, observations={}))
+            self._inputs += policy_inputs([episode.observations for episode in group], features)
+            self.episodes += [replace(episode, observations={}) for episode in group]
 
     def __len__(self) -> int:
         return len(self.episodes)
@@ -132,3 +159,117 @@ class OfflineDataset:
         if name == FRAME:
             return torch.from_numpy(np.moveaxis(values, -1, 1).copy())
         return torch.from_numpy(values).float()
+
+
+def policy_inputs(
+    episodes: Sequence[Observation], features: FeatureConfig, zone_type: type[np.floating] = np.float16
+) -> list[dict[str, np.ndarray]]:
+    """Return the inputs of episodes at each decision of the policy, without a history, (decisions, ...) each.
+
+    Args:
+        episodes: Observations of each episode by name, (T, ...) each; frames are shrunk already.
+        features: Inputs and timing of the policy.
+        zone_type: Type of the inputs in `ZONE_INPUTS`; float16 rounds them to three digits.
+
+    Raises:
+        ValueError: If an observation is missing, or comes from other cameras than an input requires.
+    """
+    lengths = np.array([len(next(iter(observations.values()))) for observations in episodes])
+    history = FeatureHistory(replace(features, history=1, shrink=1), len(episodes), zone_type)
+    names = {source_observation(name) for name in features.inputs} & set(episodes[0])
+    padded = {name: _padded([item[name] for item in episodes]) for name in names}
+    tables: dict[str, np.ndarray] = {}
+    for time in range(lengths.max()):
+        running = np.flatnonzero(lengths > time)
+        history.update({name: values[:, time] for name, values in padded.items()}, running)
+        if time % features.repeat == 0:
+            for name, values in history.stack(running).items():
+                if name not in tables:
+                    shape = len(episodes), -(-lengths.max() // features.repeat), *values.shape[1:]
+                    tables[name] = np.zeros(shape, values.dtype)
+                tables[name][running, time // features.repeat] = values
+    decisions = (-(-lengths // features.repeat)).tolist()
+    return [
+        {name: table[index, :count].copy() for name, table in tables.items()}
+        for index, count in enumerate(decisions)
+    ]
+
+
+def _padded(arrays: list[np.ndarray]) -> np.ndarray:
+    """Return arrays of different lengths as one, (N, longest, ...), with zeros at their ends."""
+    table = np.zeros((len(arrays), max(map(len, arrays)), *arrays[0].shape[1:]), arrays[0].dtype)
+    for row, values in zip(table, arrays, strict=True):
+        row[: len(values)] = values
+    return table
+
+
+class Mirror(NamedTuple):
+    """Mirror image of an input x of one decision: ``x[order] * signs``.
+
+    Attributes:
+        order: Index of the element that takes each place, int64.
+        signs: Sign of each element, float32.
+    """
+
+    order: np.ndarray
+    signs: np.ndarray
+
+
+def mirror_input(name: str, values: np.ndarray) -> np.ndarray:
+    """Return the mirror image of a policy input at each decision, new array, (decisions, elements).
+
+    Raises:
+        ValueError: For an input without a known mirror image.
+    """
+    order, signs = mirror_of(name, values.shape[1])
+    image = values[:, order]
+    negative = signs < 0.0
+    image[:, negative] = -image[:, negative]
+    return image
+
+
+def check_mirror(names: Iterable[str]) -> None:
+    """Raise ValueError for an input without a known mirror image."""
+    for name in names:
+        if name not in (*EVEN, *EXCHANGED, "ego_yaw_rate"):
+            raise ValueError(f"mirror does not support the input {name!r}; set mirror to false")
+
+
+@cache
+def mirror_of(name: str, size: int) -> Mirror:
+    """Return the mirror image of a policy input.
+
+    Args:
+        name: Name of the input.
+        size: Number of its elements per decision.
+
+    Raises:
+        ValueError: For an input without a known mirror image.
+    """
+    if name in EVEN:
+        return Mirror(np.arange(size), np.ones(size, np.float32))
+    if name == "ego_yaw_rate":
+        return Mirror(np.arange(size), np.full(size, -1.0, np.float32))
+    check_mirror([name])
+    single = _columns() if name == "columns" else _fields(signed=name == "sides")
+    count = len(single.order)
+    assert size == NUM_LEVELS * count == ZONE_INPUTS[name].size
+    order = (np.arange(NUM_LEVELS)[:, None] * count + single.order).ravel()
+    return Mirror(order, np.tile(single.signs, NUM_LEVELS))
+
+
+def _fields(signed: bool) -> Mirror:
+    """Return the mirror image of one value per LGMD and DSN at the sides: left and right exchanged."""
+    pairs = np.arange(NUM_MOTION_FIELDS - NUM_FIELDS).reshape(-1, 2)
+    direction = [1.0, -1.0 if signed else 1.0]
+    return Mirror(pairs[:, ::-1].ravel(), np.repeat(direction, NUM_SIDE_FIELDS).astype(np.float32))
+
+
+def _columns() -> Mirror:
+    """Return the mirror image of the columns; the signs of direction-selective neurons change."""
+    forward = np.arange(NUM_FORWARD_COLUMNS).reshape(-1, FORWARD_COLUMNS)[:, ::-1].ravel()
+    count = NUM_SIDE_FIELDS * len(NEURONS) * SIDE_COLUMNS
+    sides = NUM_FORWARD_COLUMNS + np.arange(count).reshape(-1, 2, SIDE_COLUMNS)[:, ::-1, ::-1].ravel()
+    direction = np.repeat([-1.0 if name == "dsn" else 1.0 for name in NEURONS], count // len(NEURONS))
+    signs = np.concatenate([np.ones(NUM_FORWARD_COLUMNS), direction]).astype(np.float32)
+    return Mirror(np.concatenate([forward, sides]), signs)

@@ -1,29 +1,37 @@
-"""Episodes without braking, recorded once, with the outcome of braking at each of their decisions.
+"""Episodes without braking, with the outcome of braking at each of their decisions, and their files."""
 
-With a latching brake, an episode is a drive at constant demand up to one braking decision. One recording
-therefore contains every observation a policy can get before it brakes. Replays of copied environments
-without sensors give the outcome of braking at each decision.
-"""
-
+import json
 from collections.abc import Callable, Iterator
-from copy import deepcopy
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeAlias
+from zipfile import BadZipFile
 
-import gymnasium as gym
 import numpy as np
 from joblib import delayed
 
 from lgmd_gym.agents.policies.features import FRAME, SCALES, shrink_frames
+from lgmd_gym.processes.files import complete_file, is_intact_zip
 from lgmd_gym.processes.pool import run_parallel
-from lgmd_gym.training.offline.braking_outcomes import STRIDE, BrakingOutcome, braking_outcomes
 
-MINIMAL_CAMERA = {"name": "wide", "shape": (8, 8)}  # of the environment that is copied and replayed
 CHUNK_SIZE = 4  # seeds recorded by one task of a process
 SIGNALS = (*SCALES, "column_potential")  # recorded if present
 TRAFFIC = "traffic"  # `family` of episodes in traffic
 
 Observation: TypeAlias = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True, slots=True)
+class BrakingOutcome:
+    """Outcome of braking from one decision on.
+
+    Attributes:
+        episode_return: Sum of the environment's rewards from that decision on.
+        contact: Whether the episode ends in a contact.
+    """
+
+    episode_return: float
+    contact: bool
 
 
 @dataclass(frozen=True)
@@ -110,66 +118,119 @@ def stack(observations: list[Observation]) -> Observation:
     return {name: np.stack([item[name] for item in observations]) for name in observations[0]}
 
 
-@dataclass(frozen=True)
-class EpisodeRecorder:
-    """Records episodes of an environment with a discrete demand and a latching brake, one per seed.
+PER_DECISION = ("rewards", "braking_returns", "braking_contacts")
+PREFIX = "observations/"
 
-    Attributes:
-        make_env: Picklable function that returns a new environment with `LGMDObservation`; its argument
-            `camera` replaces the cameras.
-        hold: Action that holds the speed.
-        brake: Action that brakes.
-        shrink: See `select_signals`.
+
+def save(by_seed: list[list[RecordedEpisode]], file: Path, origin: dict[str, Any]) -> None:
+    """Write episodes to a file; an interrupted write leaves no file.
+
+    Args:
+        by_seed: Episodes of each seed; a traffic episode gives any number of segments.
+        file: File to write.
+        origin: Settings that the episodes were recorded with, as plain values.
     """
+    episodes = [episode for group in by_seed for episode in group]
+    arrays: dict[str, Any] = {
+        "origin": np.array(json.dumps(origin)),
+        "counts": np.array([len(group) for group in by_seed]),
+        "lengths": np.array([len(episode) for episode in episodes]),
+        "threats": np.array([episode.threat for episode in episodes], bool),
+        "traffic": np.array([episode.traffic for episode in episodes], bool),
+        "families": np.array([episode.family for episode in episodes], str),
+    }
+    if episodes:
+        for name in PER_DECISION:
+            arrays[name] = np.concatenate([getattr(episode, name) for episode in episodes])
+        for name in episodes[0].observations:
+            arrays[PREFIX + name] = np.concatenate([episode.observations[name] for episode in episodes])
+    with complete_file(file) as part, part.open("wb") as out:
+        np.savez_compressed(out, **arrays)
 
-    make_env: Callable[..., gym.Env]
-    hold: int
-    brake: int
-    shrink: int | None = None
 
-    def record(self, seeds: range) -> list[list[RecordedEpisode]]:
-        """Return a list with one episode for each seed."""
-        env, twin = self.make_env(), self.make_env(camera=MINIMAL_CAMERA)
-        try:
-            return [[self._record_episode(env, twin.unwrapped, seed)] for seed in seeds]
-        finally:
-            env.close()
-            twin.close()
+def is_complete(file: Path) -> bool:
+    """Return whether `save` finished a file and nothing damaged it since."""
+    return is_intact_zip(file, "origin.npy")
 
-    def _record_episode(self, env: gym.Env, twin: Any, seed: int) -> RecordedEpisode:
-        """Record `env` and replay braking in copies of `twin`, the same environment without sensors."""
-        observations, copies, rewards, done = [], [], [], False
-        observation, info = env.reset(seed=seed)
-        twin.reset(seed=seed)
-        while not done:
-            if len(observations) % STRIDE == 0:
-                copies.append(deepcopy(twin))
-            observations.append(select_signals(observation, self.shrink))
-            observation, reward, terminated, truncated, info = env.step(self.hold)
-            twin.step(self.hold)
-            rewards.append(float(reward))
-            done = terminated or truncated
 
-        def replay(onset: int) -> BrakingOutcome:
-            copy = deepcopy(copies[onset // STRIDE])
-            for _ in range(onset % STRIDE):
-                copy.step(self.hold)
-            return _brake_to_end(copy, self.brake)
+def load(file: Path) -> list[list[RecordedEpisode]]:
+    """Return the episodes in a file, by seed.
 
-        outcomes = braking_outcomes(len(observations), replay)
-        return RecordedEpisode.from_outcomes(
-            observations, rewards, outcomes, bool(info["collision"]), _family_of(env)
+    Raises:
+        ValueError: If the file contains no recorded episodes.
+    """
+    with _open(file) as archive:
+        episodes = _episodes(archive)
+        return [[next(episodes) for _ in range(count)] for count in archive["counts"]]
+
+
+def check_file(file: Path, origin: dict[str, Any]) -> int:
+    """Return the number of seeds in a file without loading its episodes.
+
+    Args:
+        file: File written by `save`.
+        origin: Required settings; a `shrink` of None accepts any.
+
+    Raises:
+        ValueError: If the file contains no recorded episodes, or was recorded with other settings.
+    """
+    with _open(file) as archive:
+        recorded = json.loads(str(archive["origin"]))
+        for key, value in origin.items():
+            if recorded.get(key) != value and not (key == "shrink" and value is None):
+                raise ValueError(
+                    f"the episodes in {str(file)!r} were recorded with another {key} "
+                    f"({', not '.join(map(_abbreviated, _difference(recorded.get(key), value)))}); "
+                    "omit --recordings, or record in a new training folder"
+                )
+        return len(archive["counts"])
+
+
+def _difference(recorded: Any, required: Any) -> tuple[Any, Any]:
+    """Return the first different elements of two lists or dicts, at any depth, or else the two values."""
+    pairs: list[tuple[Any, Any]] = []
+    if isinstance(recorded, list) and isinstance(required, list) and len(recorded) == len(required):
+        pairs = list(zip(recorded, required, strict=True))
+    elif isinstance(recorded, dict) and isinstance(required, dict):
+        keys = dict.fromkeys([*required, *recorded])
+        pairs = [({key: recorded.get(key)}, {key: required.get(key)}) for key in keys]
+        if len(keys) == 1:
+            return recorded, required
+    for pair in pairs:
+        if pair[0] != pair[1]:
+            return _difference(*pair)
+    return recorded, required
+
+
+def _abbreviated(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _open(file: Path) -> Any:
+    try:
+        archive = np.load(file)
+        for name in ("origin", "counts"):
+            if name not in archive:
+                raise ValueError(f"no entry {name!r}")
+    except (OSError, EOFError, ValueError, BadZipFile) as error:
+        raise ValueError(f"{str(file)!r} contains no recorded episodes ({error})") from None
+    return archive
+
+
+def _episodes(archive: Any) -> Iterator[RecordedEpisode]:
+    arrays = {name: archive[name] for name in archive.files if name not in ("origin", "counts")}
+    observations = {
+        name.removeprefix(PREFIX): array for name, array in arrays.items() if name.startswith(PREFIX)
+    }
+    bounds = np.cumsum([0, *arrays["lengths"]])
+    families = arrays.get("families", np.full(len(arrays["lengths"]), ""))  # format 6 and later
+    for index in range(len(arrays["lengths"])):
+        part = slice(*bounds[index : index + 2])
+        yield RecordedEpisode(
+            {name: array[part] for name, array in observations.items()},
+            *(arrays[name][part] for name in PER_DECISION),
+            threat=bool(arrays["threats"][index]),
+            traffic=bool(arrays["traffic"][index]),
+            family=str(families[index]),
         )
-
-
-def _family_of(env: gym.Env) -> str:
-    scenario = getattr(env.unwrapped, "scenario", None)
-    return TRAFFIC if scenario is None else scenario.family
-
-
-def _brake_to_end(env: Any, brake: int) -> BrakingOutcome:
-    episode_return, done, info = 0.0, False, {}
-    while not done:
-        _, reward, terminated, truncated, info = env.step(brake)
-        episode_return, done = episode_return + float(reward), terminated or truncated
-    return BrakingOutcome(episode_return, bool(info["collision"]))

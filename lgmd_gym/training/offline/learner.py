@@ -1,29 +1,34 @@
-"""`OfflineLearner`: gradient ascent on the expected return over recorded episodes, see `objective`."""
+"""`OfflineLearner`: gradient ascent on the expected return over recorded episodes, see `evaluation`."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import torch
 
 from lgmd_gym.agents.base import HOLD
 from lgmd_gym.errors import check_flag, check_positive, check_whole, check_within
-from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset
-from lgmd_gym.training.offline.ensemble import (
+from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset, check_mirror
+from lgmd_gym.training.offline.evaluation import (
+    Evaluation,
+    evaluate,
+    expected_return,
+    scale_false_braking_cost,
+    select_margin,
+)
+from lgmd_gym.training.offline.networks import (
+    Standardisation,
     check_without_frames,
     extracts_features,
     linear_layers,
+    make_model,
+    measure,
     merge_networks,
     merged_layers,
+    network_arguments,
 )
-from lgmd_gym.training.offline.evaluation import Evaluation, evaluate, select_margin
-from lgmd_gym.training.offline.mirror import check_mirror
-from lgmd_gym.training.offline.models import make_model, network_arguments
-from lgmd_gym.training.offline.objective import expected_return, scale_false_braking_cost
-from lgmd_gym.training.offline.optimizer import Optimizer, make_optimizer
-from lgmd_gym.training.offline.standardisation import Standardisation, measure
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
@@ -32,6 +37,37 @@ if TYPE_CHECKING:
 SEED_STEP = 1000  # between the seeds of the networks of an ensemble
 RETURN_SCALE = 0.1  # factor of the loss
 MEASURED_EPISODES = 2000  # at most, for the standardisation of features
+
+
+class Optimizer(NamedTuple):
+    """Trained parameters of a network, their optimizer and the schedule of its learning rate."""
+
+    trained: list[torch.nn.Parameter]
+    optimizer: torch.optim.Optimizer
+    schedule: torch.optim.lr_scheduler.LRScheduler
+
+    def step(self, loss: torch.Tensor) -> None:
+        """Take one step down the gradient of a loss."""
+        self.optimizer.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.trained, 1.0)
+        self.optimizer.step()
+        self.schedule.step()
+
+
+def make_optimizer(network: Any, learning_rate: float, weight_decay: float, steps: int) -> Optimizer:
+    """Return AdamW with a one-cycle schedule for a network's parameters, without those of its value function.
+
+    Args:
+        network: Network of a stable-baselines3 policy.
+        learning_rate: Maximum of the schedule.
+        weight_decay: See `torch.optim.AdamW`.
+        steps: Number of steps of the schedule.
+    """
+    trained = [value for name, value in network.named_parameters() if "value" not in name]
+    optimizer = torch.optim.AdamW(trained, learning_rate, weight_decay=weight_decay)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, learning_rate, total_steps=steps)
+    return Optimizer(trained, optimizer, schedule)
 
 
 class OfflineLearner:
@@ -56,7 +92,7 @@ class OfflineLearner:
             Without this penalty a network that learns slowly, for example on frames, saturates at never
             braking and its gradient vanishes.
         standardise: Whether the network learns on features with mean 0 and standard deviation 1 over the
-            training episodes, see `standardisation`. It learns in fewer epochs. Not for frames.
+            training episodes, see `networks`. It learns in fewer epochs. Not for frames.
         mirror: Whether each training episode is mirrored, left to right, with probability 1/2 in each pass.
         select_margin: Whether the policy brakes where its log odds exceed the margin, of -4, -3.5, ..., 4,
             with the highest weighted return (see `Evaluation`) on the validation episodes, in place of 0.

@@ -23,13 +23,7 @@ from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, Emergencies, simulate_driver
 from lgmd_gym.neuron import NeuronSpec
 from lgmd_gym.sensing.channel import ChannelSpec
-from lgmd_gym.training.offline.episodes import (
-    TRAFFIC,
-    Observation,
-    RecordedEpisode,
-    select_signals,
-    stack,
-)
+from lgmd_gym.training.offline.episodes import TRAFFIC, Observation, RecordedEpisode, select_signals, stack
 
 MARGIN = 10.0  # segments end this time before an emergency [s]
 MAX_LENGTH = 10.0  # longest segment [s]; levels last 7 s in the median and 22 s at most

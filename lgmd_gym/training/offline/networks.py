@@ -1,0 +1,119 @@
+"""Networks of `OfflineLearner`: models of stable-baselines3, their standardisation, and merged ensembles.
+
+Adam's steps are equally long for all weights, so that it learns faster from features of equal spread; the
+levels of columns have standard deviations of 0.08 to 0.65. After training the mean and the scale become part
+of the first layer: the saved policy reads the features as they are.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import torch
+
+from lgmd_gym.errors import shown
+
+if TYPE_CHECKING:
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.type_aliases import GymEnv
+
+
+def make_model(policy: str, env: "GymEnv", seed: int, policy_kwargs: dict[str, Any]) -> "PPO":
+    """Return a PPO model; only its network and its file format are used."""
+    from stable_baselines3 import PPO
+
+    torch.set_num_threads(1)
+    return PPO(policy, env, 2e-3, 2, 2, seed=seed, device="cpu", policy_kwargs=policy_kwargs)
+
+
+def network_arguments(changes: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of a network: the defaults of `OfflineLearner` with some changes."""
+    return {"activation_fn": torch.nn.ReLU, "net_arch": {"pi": [64, 64], "vf": []}} | changes
+
+
+def extracts_features(network: Any) -> bool:
+    """Return whether a network computes its features with weights of its own, as from frames."""
+    return any(True for _ in network.features_extractor.parameters())
+
+
+def check_without_frames(network: Any, name: str, required: object) -> None:
+    """Raise ValueError for a network that processes frames, where a hyperparameter requires vectors."""
+    if extracts_features(network):
+        value = str(required).lower()
+        raise ValueError(f"{name} must be {value} for a policy on frames; set {name}: {value}")
+
+
+def merged_layers(policy_kwargs: dict[str, Any], count: int) -> dict[str, Any]:
+    """Return the arguments of a network that is as wide as `count` networks together.
+
+    Raises:
+        ValueError: If `net_arch` does not contain the layers of the policy.
+    """
+    layers = policy_kwargs["net_arch"]
+    if isinstance(layers, dict) and "pi" not in layers:
+        raise ValueError(f"net_arch of an ensemble must contain 'pi', got {shown(layers)}; use pi: [64, 64]")
+    units = layers["pi"] if isinstance(layers, dict) else layers
+    return policy_kwargs | {"net_arch": {"pi": [count * size for size in units], "vf": []}}
+
+
+@torch.no_grad()
+def merge_networks(networks: Sequence[Any], merged: Any) -> None:
+    """Write networks into one with the arguments of `merged_layers`.
+
+    Each layer contains the layers of the networks side by side: hidden layers are block diagonal, and the
+    outputs are the means of those of the networks.
+    """
+    layers = [linear_layers(network) for network in networks]
+    targets = linear_layers(merged)
+    for depth, (target, *parts) in enumerate(zip(targets, *layers, strict=True)):
+        weights, biases = [part.weight for part in parts], [part.bias for part in parts]
+        if depth == len(targets) - 1:
+            joined = torch.cat(weights, 1) if depth else torch.stack(weights).sum(0)
+            target.weight.copy_(joined / len(parts))
+            target.bias.copy_(torch.stack(biases).mean(0))
+        else:
+            target.weight.copy_(torch.block_diag(*weights) if depth else torch.cat(weights))
+            target.bias.copy_(torch.cat(biases))
+
+
+def linear_layers(network: Any) -> list[torch.nn.Linear]:
+    """Return the layers from the inputs to the outputs of the actions."""
+    hidden = [item for item in network.mlp_extractor.policy_net if isinstance(item, torch.nn.Linear)]
+    return [*hidden, network.action_net]
+
+
+MIN_VARIANCE = 1e-3  # added, so that features that hardly vary are not magnified
+
+
+class Standardisation(NamedTuple):
+    """Mean and scale of each feature.
+
+    Attributes:
+        mean: Mean, (features,).
+        scale: One over the standard deviation, (features,).
+    """
+
+    mean: torch.Tensor
+    scale: torch.Tensor
+
+    def apply(self, features: torch.Tensor) -> torch.Tensor:
+        """Standardise features, (M, features), in place and return them."""
+        return features.sub_(self.mean).mul_(self.scale)  # new arrays of 30 MB would cost as much as products
+
+    @torch.no_grad()
+    def fold(self, layer: torch.nn.Linear) -> None:
+        """Change a first layer of standardised features into that of the features as they are."""
+        layer.weight.mul_(self.scale)
+        layer.bias.sub_(layer.weight @ self.mean)
+
+
+@torch.no_grad()
+def measure(batches: Iterable[torch.Tensor]) -> Standardisation:
+    """Return the standardisation of features, (M, features) per batch, at least one row."""
+    count, total, squares = 0, 0.0, 0.0
+    for batch in batches:
+        values = batch.double()
+        count, total, squares = count + len(values), total + values.sum(0), squares + values.square().sum(0)
+    mean: Any = total / count
+    variance: Any = squares / count - mean.square()
+    scale = 1.0 / (variance.clamp(min=0.0) + MIN_VARIANCE).sqrt()
+    return Standardisation(mean.float(), scale.float())
