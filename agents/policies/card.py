@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lgmd_gym.agents.base import FPS
-from lgmd_gym.agents.policies.features import FeatureConfig
+from lgmd_gym.agents.policies.features import NORMALIZER_SUFFIX, FeatureConfig, save_normalizer
 from lgmd_gym.agents.policies.network import WEIGHTS, NetworkSpec, describe_network
-from lgmd_gym.agents.policies.normalizer import NORMALIZER_SUFFIX, save_normalizer
 from lgmd_gym.errors import (
     check_items,
     check_mapping,

@@ -8,8 +8,14 @@ import numpy as np
 
 from lgmd_gym.agents.base import BatchAgent, Infos, Observations
 from lgmd_gym.agents.policies.card import PolicyCard, policy_card
-from lgmd_gym.agents.policies.features import FRAME, SCALES, FeatureConfig, FeatureHistory
-from lgmd_gym.agents.policies.normalizer import announce_pickle, load_normalizer
+from lgmd_gym.agents.policies.features import (
+    FRAME,
+    SCALES,
+    FeatureConfig,
+    FeatureHistory,
+    announce_pickle,
+    load_normalizer,
+)
 from lgmd_gym.errors import check_path, check_text, check_within, shown, unknown_name
 from lgmd_gym.processes.extras import missing_extra
 

@@ -16,7 +16,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 import lgmd_gym  # noqa: F401  (registers the environments)
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.features import FeatureConfig
-from lgmd_gym.training.policy_vec_env import PolicyVecEnv
+from lgmd_gym.training.policy_env import PolicyVecEnv
 
 FEATURES = FeatureConfig(
     inputs=("zones", "ego_speed", "ego_yaw_rate"),  # 17 neurons with averages over time; no gap, no TTC

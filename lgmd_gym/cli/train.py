@@ -59,10 +59,6 @@ class Train:
     extra_traffic: Annotated[tuple[str, ...] | None, arg(metavar="N:KIND[,KIND...] [...]")] = None
     """Traffic episodes of some kinds that offline trains on in addition, for example
     2000:intersection,roundabout."""
-    videos: int = 0
-    """Number of validation episodes that are filmed at each evaluation, in FOLDER/videos and TensorBoard."""
-    wandb: Name = None
-    """Project of Weights & Biases to log to; requires the package wandb."""
     jobs: int = 2
     """Number of processes that record episodes, and of threads that train an ensemble."""
     out: File = None
@@ -121,8 +117,6 @@ def config_of(options: Train) -> "TrainConfig":
         traffic_episodes=options.traffic_episodes,
         extra_levels=options.extra_levels,
         extra_traffic=options.extra_traffic,
-        videos=options.videos,
-        wandb=options.wandb,
     )
 
 

@@ -1,16 +1,22 @@
 """`TrainConfig`: the options of a training run, from the command line, a YAML file or Python."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from math import inf
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 
-from lgmd_gym.agents import AGENTS, make_agent
-from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
+from lgmd_gym.agents import AGENTS, HOLD, make_agent
+from lgmd_gym.agents.base import FPS
+from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
+from lgmd_gym.camera import CameraSpec
+from lgmd_gym.camera.spec import check_camera
+from lgmd_gym.envs.families.distribution import EXTRA_FAMILIES, check_families
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, traffic_id
 from lgmd_gym.errors import (
     check_items,
@@ -19,26 +25,21 @@ from lgmd_gym.errors import (
     check_text,
     check_type,
     check_whole,
+    check_within,
     shown,
 )
-from lgmd_gym.sensing.channel import ChannelSpec, make_channels, plain_values
-from lgmd_gym.training.config_checks import (
-    RANDOM_ID,
-    check_demands,
-    check_extra_episodes,
-    check_offline,
-    check_rates,
-)
-from lgmd_gym.training.extra_episodes import LEVELS_EXAMPLE, TRAFFIC_EXAMPLE
 from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
-from lgmd_gym.training.policy_wrapper import PolicyWrapper
+from lgmd_gym.training.policy_env import PolicyWrapper
 
+RANDOM_ID = "LGMD/RandomBraking-v0"
 ALL_ROUND = "all-round"  # value of `sensors_of` for the cameras of `all_round_cameras`
 CAMERAS = ("fovea", "tele", "wide")
 SEED_STRIDE = 1_000_000  # distance between the environment seeds of neighbouring training seeds
 MAX_SEED = 2**32 - 1  # of NumPy's global generator, which stable-baselines3 seeds
 VALIDATION_SEED = 10_000  # first environment seed of an evaluation
 DEMANDS = {"ppo": (0.0, -1.0), "dqn": (0.0, -1.0), "sac": (), OFFLINE: (0.0, -1.0)}
+LEVELS_EXAMPLE = f"400:{','.join(EXTRA_FAMILIES[:2])}"
+TRAFFIC_EXAMPLE = "400:intersection,roundabout"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,8 +72,6 @@ class TrainConfig:
         extra_traffic: Traffic episodes of some kinds that "offline" trains on in addition, a number and the
             kinds each, for example "400:intersection,roundabout"; a quarter as many are added to its
             evaluations.
-        videos: Number of validation episodes in videos at each evaluation; not for "offline".
-        wandb: Project of Weights & Biases that the training is logged to; None for no log there.
 
     Raises:
         ValueError: If a value is invalid or does not fit the algorithm.
@@ -95,14 +94,12 @@ class TrainConfig:
     traffic_episodes: int = 0
     extra_levels: Sequence[str] = ()
     extra_traffic: Sequence[str] = ()
-    videos: int = 0
-    wandb: str | None = None
 
     def __post_init__(self) -> None:
         check_known("algorithm", self.algo, ALGORITHMS)
         for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes"):
             object.__setattr__(self, name, check_whole(name, getattr(self, name), 1))
-        for name in ("traffic_episodes", "seed", "videos"):
+        for name in ("traffic_episodes", "seed"):
             limit = MAX_SEED if name == "seed" else inf
             object.__setattr__(self, name, check_whole(name, getattr(self, name), 0, limit))
         check_text("env_id", self.env_id)
@@ -118,7 +115,6 @@ class TrainConfig:
         check_type("policy_kwargs", self.algo_kwargs.get("policy_kwargs"), dict, type(None))
         check_type("features", self.features, FeatureConfig)
         check_type("recordings", self.recordings, str, type(None))
-        check_type("wandb", self.wandb, str, type(None))
         check_demands(self.algo, self.demands)
         check_rates(self.env_kwargs)
         for name, example in (("extra_levels", LEVELS_EXAMPLE), ("extra_traffic", TRAFFIC_EXAMPLE)):
@@ -241,3 +237,116 @@ def _cameras_of(agent: str) -> ChannelSpec:
     if camera is None:
         raise ValueError(f"agent {agent!r} has no cameras of its own; use camera, or 'stopping-zone'")
     return camera
+
+
+@dataclass(frozen=True)
+class ExtraEpisodes:
+    """A number of episodes, and the families of their levels or the kinds of their traffic."""
+
+    count: int
+    names: tuple[str, ...]
+
+
+def parse_levels(text: str) -> ExtraEpisodes:
+    """Return the levels of a text such as "400:CCRsCurve,StandingBox".
+
+    Raises:
+        ValueError: If the text has another form, for an unknown family, or for one that is named twice.
+    """
+    count, names = _split("extra_levels", text, LEVELS_EXAMPLE)
+    families = check_families(names)
+    _check_once("extra_levels", text, "family", families)
+    return ExtraEpisodes(count, families)
+
+
+def parse_traffic(text: str) -> ExtraEpisodes:
+    """Return the traffic episodes of a text such as "400:intersection,roundabout".
+
+    Raises:
+        ValueError: If the text has another form, for an unknown kind, or for one that is named twice.
+    """
+    count, kinds = _split("extra_traffic", text, TRAFFIC_EXAMPLE)
+    for kind in kinds:
+        check_known("kind of traffic", kind, TRAFFIC_KINDS)
+    _check_once("extra_traffic", text, "kind", kinds)
+    return ExtraEpisodes(count, tuple(kinds))
+
+
+def _split(option: str, text: str, example: str) -> tuple[int, list[str]]:
+    """Return the number and the names of a text "NUMBER:NAME,NAME"."""
+    match = re.fullmatch(r"\s*([0-9]{1,9})\s*:(.+)", text)
+    if match is None:
+        raise ValueError(f"{option} must be like {example!r}, got {shown(text)}")
+    count, names = match.groups()
+    return check_whole(f"number of {option}", int(count), 1), [name.strip() for name in names.split(",")]
+
+
+def _check_once(option: str, text: str, noun: str, names: Sequence[str]) -> None:
+    if len(set(names)) < len(names):
+        raise ValueError(f"{option} names a {noun} twice: {shown(text)}; use each name once")
+
+
+def check_demands(algo: str, demands: Sequence[float]) -> None:
+    """Raise ValueError for demands without a brake, repeated ones, or those of another algorithm."""
+    for demand in check_items("demands", demands, Real, "numbers"):
+        check_within("demands", demand, -1.0, 1.0)
+    if demands and (min(demands) >= 0.0 or len({*demands}) < len(demands)):
+        raise ValueError(
+            f"demands must be distinct, with one below 0 that brakes, got {list(demands)}; "
+            "use for example --demands 0 -1"
+        )
+    if algo == "dqn" and not demands:
+        raise ValueError("dqn requires discrete demands; use for example --demands 0 -1")
+    if algo == "sac" and demands:
+        raise ValueError(f"sac requires a continuous demand, got demands {list(demands)}; omit them")
+
+
+def check_rates(env_kwargs: dict[str, Any]) -> None:
+    """Raise ValueError for a frame rate or decision rate at which no agent runs."""
+    config = env_kwargs.get("config") or {}
+    rates = {"fps": env_kwargs.get("fps"), "policy_frequency": config.get("policy_frequency")}
+    for name, rate in rates.items():
+        if rate not in (None, FPS):
+            raise ValueError(
+                f"{name} in env_kwargs must be {FPS:g} Hz, the rate of agents, got {shown(rate)}; "
+                "use PolicyWrapper's repeat for fewer decisions"
+            )
+
+
+def check_extra_episodes(config: "TrainConfig") -> None:
+    """Raise ValueError for texts that name no episodes, or the same levels twice."""
+    for text in config.extra_traffic:
+        parse_traffic(text)
+    families = [family for text in config.extra_levels for family in parse_levels(text).names]
+    repeated = next((family for family in families if families.count(family) > 1), None)
+    if repeated is not None:  # the sets start at the same seed
+        raise ValueError(
+            f"extra_levels names {repeated!r} in two sets, which would contain the same levels; "
+            "increase the number of one set"
+        )
+    if families and config.env_id != RANDOM_ID:
+        raise ValueError(f"extra_levels requires env {RANDOM_ID!r}, got {config.env_id!r}; omit it")
+
+
+def check_offline(config: "TrainConfig") -> None:
+    """Raise ValueError for values that recorded episodes do not support."""
+    demands = config.demands
+    if sorted(demands)[1:] != [HOLD] or min(demands) > LATCH_DEMAND:
+        raise ValueError(
+            f"demands of algo 'offline' must be 0 and one of {LATCH_DEMAND} or less, "
+            f"got {list(demands)}; use for example --demands 0 -1"
+        )
+    if not config.features.latch:
+        raise ValueError("algo 'offline' requires latch: true in its hyperparameters")
+    changed = set(config.env_kwargs.get("config") or {}) - {"action"}
+    if changed and (config.traffic_episodes or config.extra_traffic):
+        raise ValueError(
+            f"traffic episodes have the default {', '.join(sorted(changed))}, got others in config of "
+            "env_kwargs; omit them, or traffic_episodes and extra_traffic"
+        )
+    if "speed_change" in config.features.inputs:
+        # A policy with this input braked in traffic whenever the driver accelerated.
+        raise ValueError(
+            "algo 'offline' does not support the input 'speed_change': the ego never accelerates in "
+            "recorded levels; remove it from the inputs"
+        )

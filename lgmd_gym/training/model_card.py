@@ -33,7 +33,7 @@ lgmd-gym bench --suite r152 --agents policy:policy.zip
 from lgmd_gym.agents import make_agent
 
 agent = make_agent("policy:policy.zip")
-print(agent.card)
+print(agent.agent.card)
 ```
 
 ## Training
@@ -123,5 +123,5 @@ def _shown(config: TrainConfig) -> dict[str, Any]:
     return {
         name: list(value) if isinstance(value, tuple) else value
         for name, value in values.items()
-        if name not in ("camera", "recordings", "wandb")
+        if name not in ("camera", "recordings")
     }

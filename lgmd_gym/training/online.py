@@ -15,7 +15,7 @@ def train_online(config: TrainConfig, folder: Path, progress: bool) -> "BaseAlgo
     """Train from the last checkpoint in the folder, if any; return the best model on the validation split."""
     import torch
 
-    from lgmd_gym.training.checkpoints import best_model, save_model
+    from lgmd_gym.training.callbacks import best_model, save_model
 
     torch.set_num_threads(1)
     envs, eval_envs = make_envs(config, "train"), make_envs(config, "validation")
@@ -51,7 +51,7 @@ def make_envs(config: TrainConfig, split: str) -> "VecEnv":
     from joblib import cpu_count
     from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
-    from lgmd_gym.training.policy_vec_env import PolicyVecEnv
+    from lgmd_gym.training.policy_env import PolicyVecEnv
 
     if gym.spec(config.env_id).vector_entry_point is None:
         return VecMonitor(DummyVecEnv([lambda: config.make_policy_env(split)] * config.n_envs))
@@ -74,7 +74,7 @@ def algorithm_class(algo: str) -> "type[BaseAlgorithm]":
 
 def _make_model(config: TrainConfig, folder: Path, envs: "VecEnv") -> Any:
     """Return the model of the newest checkpoint that opens, or a new model."""
-    from lgmd_gym.training.checkpoints import load_checkpoint
+    from lgmd_gym.training.callbacks import load_checkpoint
 
     algorithm = algorithm_class(config.algo)
     model = load_checkpoint(algorithm, folder, envs)
@@ -105,15 +105,9 @@ def algorithm_kwargs(config: TrainConfig) -> dict[str, Any]:
 def _callbacks(
     config: TrainConfig, folder: Path, eval_envs: "VecEnv", model: "BaseAlgorithm"
 ) -> "list[BaseCallback]":
-    from lgmd_gym.training.checkpoints import CheckpointSaver, Evaluator
-    from lgmd_gym.training.monitor_log import MonitorLog
+    from lgmd_gym.training.callbacks import CheckpointSaver, Evaluator, MonitorLog
 
     frequency = max(config.eval_freq // config.n_envs, 1)
     evaluator = Evaluator(eval_envs, folder, frequency, config.eval_episodes)
     evaluator.restore(model)
-    callbacks = [CheckpointSaver(folder, frequency), evaluator, MonitorLog(folder, config.env_id)]
-    if config.videos:
-        from lgmd_gym.training.videos import VideoRecorder
-
-        callbacks.insert(0, VideoRecorder(config, folder, frequency))
-    return callbacks
+    return [CheckpointSaver(folder, frequency), evaluator, MonitorLog(folder, config.env_id)]

@@ -16,8 +16,14 @@ from lgmd_gym.agents.policies.features import FRAME
 from lgmd_gym.camera import BirdsEye
 from lgmd_gym.envs.registration import TRAFFIC_KINDS
 from lgmd_gym.sensing.channel import make_channels
-from lgmd_gym.training.config import SEED_STRIDE, VALIDATION_SEED, TrainConfig
-from lgmd_gym.training.extra_episodes import ExtraEpisodes, parse_levels, parse_traffic
+from lgmd_gym.training.config import (
+    SEED_STRIDE,
+    VALIDATION_SEED,
+    ExtraEpisodes,
+    TrainConfig,
+    parse_levels,
+    parse_traffic,
+)
 from lgmd_gym.training.offline.episodes import (
     CHUNK_SIZE,
     RecordedEpisode,

@@ -18,8 +18,7 @@ from lgmd_gym.sensing.channel import plain_values
 from lgmd_gym.training.config import TrainConfig
 from lgmd_gym.training.hyperparams import OFFLINE
 from lgmd_gym.training.model_card import write_model_card
-from lgmd_gym.training.policy_wrapper import PolicyWrapper
-from lgmd_gym.training.tracking import wandb_module, wandb_run
+from lgmd_gym.training.policy_env import PolicyWrapper
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
@@ -97,8 +96,6 @@ def check_config(config: TrainConfig) -> None:
     Raises:
         ValueError: For the first problem found.
     """
-    if config.wandb is not None:
-        wandb_module()
     env = config.make_policy_env("train")
     try:
         if config.algo == OFFLINE:
@@ -134,8 +131,7 @@ def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path
     """Train in a locked folder; a second process would mix its checkpoints and logs with these."""
     lock = FolderLock(folder, "training folder")
     try:
-        with wandb_run(config, folder):
-            return _write_policy(config, folder, progress, jobs)
+        return _write_policy(config, folder, progress, jobs)
     finally:
         lock.release()
 
@@ -150,7 +146,7 @@ def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) 
         model = train_online(config, folder, progress)
     path = folder / "policy.zip"
     network = describe_network(model)
-    values = config.to_dict() | {"recordings": None, "wandb": None}  # those of the machine and its user
+    values = config.to_dict() | {"recordings": None}  # a path of this machine
     card = {
         "lgmd_gym": lgmd_gym.__version__,
         "algo": type(model).__name__.lower(),  # stable-baselines3 class that reads the file

@@ -14,8 +14,8 @@ from gymnasium import spaces
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.card import CARD, write_card
+from lgmd_gym.agents.policies.features import announce_pickle
 from lgmd_gym.agents.policies.network import NetworkSpec, describe_network
-from lgmd_gym.agents.policies.normalizer import announce_pickle
 from lgmd_gym.agents.policies.policy import SHIPPED
 
 pytest.importorskip("stable_baselines3")
@@ -168,6 +168,6 @@ def test_a_wrong_description_is_refused(tmp_path, capfd, changes, words):
 
 def test_worker_processes_print_no_line(tmp_path, capsys, monkeypatch):
     worker = SimpleNamespace(name="worker")
-    monkeypatch.setattr("lgmd_gym.agents.policies.normalizer.current_process", lambda: worker)
+    monkeypatch.setattr("lgmd_gym.agents.policies.features.current_process", lambda: worker)
     announce_pickle(tmp_path / "policy.zip")
     assert capsys.readouterr().err == ""

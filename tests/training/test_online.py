@@ -14,7 +14,7 @@ from lgmd_gym.agents.policies.card import read_card
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.training import TrainConfig, resume, train
-from lgmd_gym.training.checkpoints import checkpoints_of, load_checkpoint, save_model
+from lgmd_gym.training.callbacks import checkpoints_of, load_checkpoint, save_model
 
 DEMANDS = (0.0, -0.4, -1.0)
 TINY = {"name": "wide", "shape": [9, 16]}
@@ -79,7 +79,7 @@ def test_neighbouring_seeds_share_no_environment_seeds(tmp_path, monkeypatch):
 
     CCRs has no levels, so that the seeds below 1,000,000 are those of evaluations.
     """
-    from lgmd_gym.training.policy_vec_env import PolicyVecEnv
+    from lgmd_gym.training.policy_env import PolicyVecEnv
 
     seeds, seed_envs = [], PolicyVecEnv.seed
     monkeypatch.setattr(

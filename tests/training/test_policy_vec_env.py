@@ -136,7 +136,7 @@ def test_training_and_evaluation_rewards_have_their_scales():
 
 
 def test_other_autoreset_modes_are_refused():
-    from lgmd_gym.training.policy_vec_env import PolicyVecEnv
+    from lgmd_gym.training.policy_env import PolicyVecEnv
 
     envs = gym.make_vec("LGMD/CCRs-v0", num_envs=1)
     with pytest.raises(ValueError, match="autoreset_mode 'Disabled', got 'NextStep'"):

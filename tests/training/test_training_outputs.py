@@ -10,8 +10,8 @@ from support.recordings import offline_config, write_yaml
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.training import TrainConfig, train
+from lgmd_gym.training.callbacks import MonitorLog
 from lgmd_gym.training.model_card import best_result, write_model_card
-from lgmd_gym.training.monitor_log import MonitorLog
 
 YAML = """
 LGMD/CCRs-v0:
