@@ -64,8 +64,8 @@ class Interval:
         return above and (value <= self.high if self.has_high else value < self.high)
 
     def __str__(self) -> str:
-        low = f"{'[' if self.has_low else '('}{self.low:g}"
-        return f"{low}, {self.high:g}{']' if self.has_high else ')'}"
+        low = f"{'[' if self.has_low else '('}{self.low:.12g}"
+        return f"{low}, {self.high:.12g}{']' if self.has_high else ')'}"
 
 
 @dataclasses.dataclass(frozen=True, slots=True)

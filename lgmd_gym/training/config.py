@@ -1,9 +1,8 @@
 """`TrainConfig`: the options of a training run, from the command line, a YAML file or Python."""
 
 import re
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
-from math import inf
+from collections.abc import Callable, Sequence
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -22,12 +21,12 @@ from lgmd_gym.errors import (
     check_items,
     check_keys,
     check_known,
-    check_text,
     check_type,
     check_whole,
     check_within,
     shown,
 )
+from lgmd_gym.fields import Record, optional, record, text, value, whole
 from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
 from lgmd_gym.training.policy_env import PolicyWrapper
 
@@ -42,87 +41,136 @@ LEVELS_EXAMPLE = f"400:{','.join(EXTRA_FAMILIES[:2])}"
 TRAFFIC_EXAMPLE = "400:intersection,roundabout"
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrainConfig:
+def _check_env_kwargs(name: str, env_kwargs: Any) -> dict[str, Any]:
+    given = {} if env_kwargs is None else check_type(name, env_kwargs, dict)
+    if "camera" in given:
+        raise ValueError(f"{name} contains the camera {shown(given['camera'])}; use the option camera")
+    config = given.get("config") or {}
+    rates = {"fps": given.get("fps"), "policy_frequency": config.get("policy_frequency")}
+    for key, rate in rates.items():
+        if rate not in (None, FPS):
+            raise ValueError(
+                f"{key} in {name} must be {FPS:g} Hz, the rate of agents, got {shown(rate)}; "
+                "use PolicyWrapper's repeat for fewer decisions"
+            )
+    return given
+
+
+def _check_algo_kwargs(name: str, algo_kwargs: Any) -> dict[str, Any]:
+    given = {} if algo_kwargs is None else check_type(name, algo_kwargs, dict)
+    check_type("policy_kwargs", given.get("policy_kwargs"), dict, type(None))
+    return given
+
+
+def _check_camera(name: str, camera: Any) -> Any:
+    check_camera(camera)
+    return camera
+
+
+def _check_features(name: str, features: Any) -> FeatureConfig:
+    return FeatureConfig() if features is None else check_type(name, features, FeatureConfig)
+
+
+def _check_demands(name: str, demands: Any) -> tuple[float, ...]:
+    given = check_items(name, demands, Real, "numbers")
+    for demand in given:
+        check_within(name, demand, -1.0, 1.0)
+    if given and (min(given) >= 0.0 or len({*given}) < len(given)):
+        raise ValueError(
+            f"{name} must be distinct, with one below 0 that brakes, got {list(given)}; "
+            "use for example --demands 0 -1"
+        )
+    return given
+
+
+def _texts(example: str) -> Callable[[str, Any], tuple[str, ...]]:
+    """Return a check of texts that name extra episodes."""
+    return lambda name, given: check_items(name, given, str, f"texts such as {example!r}")
+
+
+@record
+class TrainConfig(Record):
     """Options of a training run, as plain values apart from `features`.
 
     `from_hyperparams` fills in the hyperparameters of an algorithm; the constructor reads no file.
-
-    Attributes:
-        algo: "ppo", "sac", "dqn" or "offline".
-        env_id: Environment id. An id that is registered with the argument `split`, as those of random levels
-            and traffic, is trained on the split "train" and evaluated on the split "validation".
-        env_kwargs: Further arguments of `gym.make`.
-        camera: Camera or cameras, see `LGMDObservation`.
-        demands: Demands that the policy chooses from, in [-1, 1]; empty for a continuous demand.
-        features: Inputs and timing of the policy.
-        n_envs: Number of environments stepped in parallel.
-        n_timesteps: Number of policy decisions over all environments; for "offline" number of recorded
-            episodes.
-        policy: stable-baselines3's name of the network.
-        algo_kwargs: Further arguments of the algorithm, as in the YAML file.
-        seed: Seed of the network and the environments.
-        eval_freq: Number of decisions between two evaluations; "offline" evaluates after every epoch.
-        eval_episodes: Number of episodes per evaluation.
-        recordings: Folder of an offline training run, to reuse its recorded episodes; None to record anew.
-        traffic_episodes: Number of traffic episodes that "offline" trains on in addition; a quarter as many
-            are added to its evaluations.
-        extra_levels: Levels that "offline" trains on in addition, a number and scenario families each, for
-            example "400:CCRsCurve,StandingBox"; a twentieth as many are added to its evaluations.
-        extra_traffic: Traffic episodes of some kinds that "offline" trains on in addition, a number and the
-            kinds each, for example "400:intersection,roundabout"; a quarter as many are added to its
-            evaluations.
 
     Raises:
         ValueError: If a value is invalid or does not fit the algorithm.
     """
 
-    algo: str
-    env_id: str = RANDOM_ID
-    env_kwargs: dict[str, Any] = field(default_factory=dict)
-    camera: ChannelSpec = CAMERAS
-    demands: Sequence[float] = ()
-    features: FeatureConfig = field(default_factory=FeatureConfig)
-    n_envs: int = 1
-    n_timesteps: int = 100_000
-    policy: str = "MultiInputPolicy"
-    algo_kwargs: dict[str, Any] = field(default_factory=dict)
-    seed: int = 0
-    eval_freq: int = 16_000
-    eval_episodes: int = 96
-    recordings: str | None = None
-    traffic_episodes: int = 0
-    extra_levels: Sequence[str] = ()
-    extra_traffic: Sequence[str] = ()
+    algo: str = value(
+        MISSING,
+        lambda _, algo: check_known("algorithm", algo, ALGORITHMS),
+        "Algorithm",
+        ", ".join(ALGORITHMS),
+    )
+    env_id: str = text(
+        RANDOM_ID,
+        "Environment id; an id that is registered with the argument `split`, as those of random levels and "
+        'traffic, is trained on the split "train" and evaluated on the split "validation"',
+    )
+    env_kwargs: dict[str, Any] = value(None, _check_env_kwargs, "Further arguments of `gym.make`")
+    camera: CameraSpec = value(CAMERAS, _check_camera, "Camera or cameras, see `LGMDObservation`")
+    demands: tuple[float, ...] = value(
+        (),
+        _check_demands,
+        "Demands that the policy chooses from, in [-1, 1]; empty for a continuous demand",
+    )
+    features: FeatureConfig = value(None, _check_features, "Inputs and timing of the policy")
+    n_envs: int = whole(1, "[1, inf)", "", "Number of environments stepped in parallel")
+    n_timesteps: int = whole(
+        100_000,
+        "[1, inf)",
+        "",
+        'Number of policy decisions over all environments; for "offline" number of recorded episodes',
+    )
+    policy: str = text("MultiInputPolicy", "stable-baselines3's name of the network")
+    algo_kwargs: dict[str, Any] = value(
+        None, _check_algo_kwargs, "Further arguments of the algorithm, as in the YAML file"
+    )
+    seed: int = whole(0, f"[0, {MAX_SEED}]", "", "Seed of the network and the environments")
+    eval_freq: int = whole(
+        16_000,
+        "[1, inf)",
+        "",
+        'Number of decisions between two evaluations; "offline" evaluates after every epoch',
+    )
+    eval_episodes: int = whole(96, "[1, inf)", "", "Number of episodes per evaluation")
+    recordings: str | None = optional(
+        text(
+            None,
+            "Folder of an offline training run, to reuse its recorded episodes; None to record anew",
+        )
+    )
+    traffic_episodes: int = whole(
+        0,
+        "[0, inf)",
+        "",
+        'Number of traffic episodes that "offline" trains on in addition; a quarter as many are added to its '
+        "evaluations",
+    )
+    extra_levels: tuple[str, ...] = value(
+        (),
+        _texts(LEVELS_EXAMPLE),
+        'Levels that "offline" trains on in addition, a number and scenario families each, for example '
+        f'"{LEVELS_EXAMPLE}"; a twentieth as many are added to its evaluations',
+    )
+    extra_traffic: tuple[str, ...] = value(
+        (),
+        _texts(TRAFFIC_EXAMPLE),
+        'Traffic episodes of some kinds that "offline" trains on in addition, a number and the kinds each, '
+        f'for example "{TRAFFIC_EXAMPLE}"; a quarter as many are added to its evaluations',
+    )
 
-    def __post_init__(self) -> None:
-        check_known("algorithm", self.algo, ALGORITHMS)
-        for name in ("n_envs", "n_timesteps", "eval_freq", "eval_episodes"):
-            object.__setattr__(self, name, check_whole(name, getattr(self, name), 1))
-        for name in ("traffic_episodes", "seed"):
-            limit = MAX_SEED if name == "seed" else inf
-            object.__setattr__(self, name, check_whole(name, getattr(self, name), 0, limit))
-        check_text("env_id", self.env_id)
-        check_text("policy", self.policy)
-        make_channels(self.camera)
-        object.__setattr__(self, "camera", plain_values(self.camera))
-        check_type("env_kwargs", self.env_kwargs, dict)
-        if "camera" in self.env_kwargs:
-            raise ValueError(
-                f"env_kwargs contains the camera {shown(self.env_kwargs['camera'])}; use the option camera"
-            )
-        check_type("algo_kwargs", self.algo_kwargs, dict)
-        check_type("policy_kwargs", self.algo_kwargs.get("policy_kwargs"), dict, type(None))
-        check_type("features", self.features, FeatureConfig)
-        check_type("recordings", self.recordings, str, type(None))
-        check_demands(self.algo, self.demands)
-        check_rates(self.env_kwargs)
-        for name, example in (("extra_levels", LEVELS_EXAMPLE), ("extra_traffic", TRAFFIC_EXAMPLE)):
-            texts = check_items(name, getattr(self, name), str, f"texts such as {example!r}")
-            object.__setattr__(self, name, texts)
-        check_extra_episodes(self)
+    def check(self) -> None:
+        """Raise ValueError for values that do not fit the algorithm."""
+        if self.algo == "dqn" and not self.demands:
+            raise ValueError("dqn requires discrete demands; use for example --demands 0 -1")
+        if self.algo == "sac" and self.demands:
+            raise ValueError(f"sac requires a continuous demand, got demands {list(self.demands)}; omit them")
+        _check_extra_episodes(self)
         if self.algo == OFFLINE:
-            check_offline(self)
+            _check_offline(self)
         for name in ("recordings", "traffic_episodes", "extra_levels", "extra_traffic"):
             if getattr(self, name) and self.algo != OFFLINE:
                 raise ValueError(f"{name} requires algo 'offline', got {self.algo!r}; omit it")
@@ -286,38 +334,11 @@ def _check_once(option: str, text: str, noun: str, names: Sequence[str]) -> None
         raise ValueError(f"{option} names a {noun} twice: {shown(text)}; use each name once")
 
 
-def check_demands(algo: str, demands: Sequence[float]) -> None:
-    """Raise ValueError for demands without a brake, repeated ones, or those of another algorithm."""
-    for demand in check_items("demands", demands, Real, "numbers"):
-        check_within("demands", demand, -1.0, 1.0)
-    if demands and (min(demands) >= 0.0 or len({*demands}) < len(demands)):
-        raise ValueError(
-            f"demands must be distinct, with one below 0 that brakes, got {list(demands)}; "
-            "use for example --demands 0 -1"
-        )
-    if algo == "dqn" and not demands:
-        raise ValueError("dqn requires discrete demands; use for example --demands 0 -1")
-    if algo == "sac" and demands:
-        raise ValueError(f"sac requires a continuous demand, got demands {list(demands)}; omit them")
-
-
-def check_rates(env_kwargs: dict[str, Any]) -> None:
-    """Raise ValueError for a frame rate or decision rate at which no agent runs."""
-    config = env_kwargs.get("config") or {}
-    rates = {"fps": env_kwargs.get("fps"), "policy_frequency": config.get("policy_frequency")}
-    for name, rate in rates.items():
-        if rate not in (None, FPS):
-            raise ValueError(
-                f"{name} in env_kwargs must be {FPS:g} Hz, the rate of agents, got {shown(rate)}; "
-                "use PolicyWrapper's repeat for fewer decisions"
-            )
-
-
-def check_extra_episodes(config: "TrainConfig") -> None:
+def _check_extra_episodes(config: "TrainConfig") -> None:
     """Raise ValueError for texts that name no episodes, or the same levels twice."""
-    for text in config.extra_traffic:
-        parse_traffic(text)
-    families = [family for text in config.extra_levels for family in parse_levels(text).names]
+    for kinds in config.extra_traffic:
+        parse_traffic(kinds)
+    families = [family for item in config.extra_levels for family in parse_levels(item).names]
     repeated = next((family for family in families if families.count(family) > 1), None)
     if repeated is not None:  # the sets start at the same seed
         raise ValueError(
@@ -328,7 +349,7 @@ def check_extra_episodes(config: "TrainConfig") -> None:
         raise ValueError(f"extra_levels requires env {RANDOM_ID!r}, got {config.env_id!r}; omit it")
 
 
-def check_offline(config: "TrainConfig") -> None:
+def _check_offline(config: "TrainConfig") -> None:
     """Raise ValueError for values that recorded episodes do not support."""
     demands = config.demands
     if sorted(demands)[1:] != [HOLD] or min(demands) > LATCH_DEMAND:

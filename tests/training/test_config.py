@@ -147,7 +147,7 @@ def test_offline_requires_holding_and_hard_braking(demands):
             {"extra_traffic": ["3:merge", "3:roundabot"]},
             "unknown kind of traffic 'roundabot'; did you mean 'roundabout'",
         ),
-        ("offline", {"traffic_episodes": -1}, "traffic_episodes must be a whole number >= 0, got -1"),
+        ("offline", {"traffic_episodes": -1}, r"traffic_episodes must be in \[0, inf\), got -1"),
         (
             "offline",
             {"traffic_episodes": 3, "env_kwargs": {"config": {"reward": {"brake": 5.0}}}},
@@ -171,7 +171,7 @@ def test_offline_requires_holding_and_hard_braking(demands):
         ),
         ("ppo", {"demands": (0.5,)}, r"demands must be distinct, with one below 0 that brakes, got \[0.5\]"),
         ("dqn", {"demands": (0.0, 0.0, -1.0)}, "demands must be distinct"),
-        ("ppo", {"seed": 2**32}, r"seed must be a whole number in \[0, 4294967295\], got 4294967296"),
+        ("ppo", {"seed": 2**32}, r"seed must be in \[0, 4294967295\], got 4294967296"),
         ("ppo", {"algo_kwargs": {"policy_kwargs": "dict()"}}, "policy_kwargs must be dict or NoneType"),
         ("ppo", {"inputs": ("ffi", "ego_speed", "ffi")}, "each policy input once, got 'ffi' twice"),
         ("offline", {"inputs": ("zones", "speed_change")}, "does not support the input 'speed_change'"),
@@ -258,12 +258,12 @@ def test_invalid_algorithm_arguments_are_rejected(tmp_path, algo, algo_kwargs, m
         (["--resume", "missing"], "'missing' contains no training to resume"),
         (["--inputs", "zones", "--camera", "wide"], "train with --sensors-of stopping-zone"),
         (["--sensors-of", "stopping-zone", "--camera", "wide"], "use either camera or sensors_of"),
-        (["--n-timesteps", "0"], "n_timesteps must be a whole number >= 1, got 0"),
+        (["--n-timesteps", "0"], "n_timesteps must be in [1, inf), got 0"),
         (["--jobs", "0"], "jobs must be a whole number >= 1, got 0"),
         (["--extra-levels", "3:CCRs"], "extra_levels requires algo 'offline', got 'dqn'"),
         (["--extra-traffic", "3:merge"], "extra_traffic requires algo 'offline', got 'dqn'"),
         (["--traffic-episodes", "3"], "traffic_episodes requires algo 'offline', got 'dqn'"),
-        (["--eval-episodes", "0"], "eval_episodes must be a whole number >= 1, got 0"),
+        (["--eval-episodes", "0"], "eval_episodes must be in [1, inf), got 0"),
     ],
 )
 def test_command_prints_one_line_for_invalid_options(arguments, message, capsys, monkeypatch, tmp_path):
@@ -296,7 +296,7 @@ WITHOUT_LAYERS = {"n_networks": 2, "policy_kwargs": {"net_arch": {"vf": [8]}}}
     ],
 )
 def test_an_algorithm_that_cannot_be_made_is_rejected_before_the_training(algo, options, message):
-    options |= {"features": FeatureConfig(("ego_speed",), latch=True), "demands": DEMANDS[algo]}
+    options |= {"features": FeatureConfig(inputs=("ego_speed",), latch=True), "demands": DEMANDS[algo]}
     config = TrainConfig(algo=algo, env_id="LGMD/CCRs-v0", camera="fovea", **options)
     with pytest.raises(ValueError, match=message) as caught:
         check_config(config)
