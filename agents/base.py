@@ -3,7 +3,7 @@
 import copy
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
 import numpy as np
 
@@ -275,5 +275,5 @@ def _frame(frame: Any, function: Callable[[Any], Any]) -> Any:
 def _plain(value: Any) -> Any:
     """Return a scalar as a Python number, and a copy of an array."""
     if isinstance(value, np.generic):
-        return value.item()
-    return value.copy() if isinstance(value, np.ndarray) else value
+        return cast(Any, value).item()
+    return np.array(cast(Any, value)) if isinstance(value, np.ndarray) else value

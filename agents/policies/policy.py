@@ -222,7 +222,7 @@ class Policy(BatchAgent):
         second, best = np.sort(values, axis=1)[:, -2:].T
         safe = best - second > SAFE_LEAD * np.maximum(1.0, np.abs(values).max(axis=1))
         actions = zip(values.argmax(axis=1).tolist(), safe.tolist(), strict=True)
-        demands = self.card.demands or ()
+        demands: list[float] = list(self.card.demands or ())
         return [
             demands[action] if certain else self._decide_alone(inputs, row)
             for row, (action, certain) in enumerate(actions)
