@@ -50,7 +50,7 @@ def test_outcomes_are_found_with_few_replays():
         replayed.append(onset)
         return outcome(onset)
 
-    outcomes = braking_outcomes(60, replay)
+    (outcomes,) = braking_outcomes([60], lambda pairs: [replay(onset) for _, onset in pairs])
     # 6 on the grid, 5 midpoints, and 5 halvings between 36 and 48, where contacts begin: 39, 45, 37, 40, 38
     assert len(replayed) == len(set(replayed)) == 16
     for onset, found in enumerate(outcomes):
@@ -60,4 +60,4 @@ def test_outcomes_are_found_with_few_replays():
 
 def test_outcome_of_a_single_decision():
     outcome = BrakingOutcome(-1.0, True)
-    assert braking_outcomes(1, lambda onset: outcome) == [outcome]
+    assert braking_outcomes([1], lambda pairs: [outcome]) == [[outcome]]

@@ -59,25 +59,6 @@ class RecordedEpisode:
     def __len__(self) -> int:
         return len(self.rewards)
 
-    @classmethod
-    def from_outcomes(
-        cls,
-        observations: list[Observation],
-        rewards: list[float],
-        outcomes: list[BrakingOutcome],
-        threat: bool,
-        family: str,
-    ) -> "RecordedEpisode":
-        """Return the episode of observations, rewards and outcomes of braking, one each per decision."""
-        return cls(
-            stack(observations),
-            rewards=np.array(rewards, np.float32),
-            braking_returns=np.array([item.episode_return for item in outcomes], np.float32),
-            braking_contacts=np.array([item.contact for item in outcomes]),
-            threat=threat,
-            family=family,
-        )
-
 
 RecordFunction: TypeAlias = Callable[[range], list[list[RecordedEpisode]]]
 """Method `record` of `EpisodeRecorder`, `LevelRecorder` and `TrafficRecorder`: the episodes of each seed."""

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from typing import Any, TypeAlias
 
@@ -17,13 +18,14 @@ import numpy as np
 
 from lgmd_gym.agents.base import HOLD
 from lgmd_gym.engine import BrakingVectorEnv
-from lgmd_gym.engine.simulation import Simulation, Snapshot
+from lgmd_gym.engine.simulation import Simulation
 from lgmd_gym.training.offline.episodes import (
     TRAFFIC,
     BrakingOutcome,
     Observation,
     RecordedEpisode,
     select_signals,
+    stack,
 )
 
 MINIMAL_CAMERA = {"name": "wide", "shape": (8, 8)}  # of the environment that is copied and replayed
@@ -35,8 +37,10 @@ Rounds: TypeAlias = Generator[list[int], Iterable[BrakingOutcome], list[BrakingO
 """Yields decisions to replay, receives their outcomes, and returns the outcome of every decision."""
 
 
-def braking_outcomes(length: int, replay: Callable[[int], BrakingOutcome]) -> list[BrakingOutcome]:
-    """Return the outcome of braking at each of `length` decisions.
+def braking_outcomes(
+    lengths: Sequence[int], replay: Callable[[list[tuple[int, int]]], Iterable[BrakingOutcome]]
+) -> list[list[BrakingOutcome]]:
+    """Return the outcome of braking at each decision of several episodes, with few calls of `replay`.
 
     Every twelfth decision is replayed, and the midpoint of each interval between two of them. If the return
     at the midpoint deviates from the linear interpolation by more than 0.05, or the three outcomes differ in
@@ -45,21 +49,9 @@ def braking_outcomes(length: int, replay: Callable[[int], BrakingOutcome]) -> li
     six decisions apart, are not noticed.
 
     Args:
-        length: Number of decisions, >= 1.
-        replay: Returns the outcome of braking at a decision; called once per decision at most.
-    """
-    (outcomes,) = batch_outcomes([length], lambda pairs: [replay(onset) for _, onset in pairs])
-    return outcomes
-
-
-def batch_outcomes(
-    lengths: Sequence[int], replay: Callable[[list[tuple[int, int]]], Iterable[BrakingOutcome]]
-) -> list[list[BrakingOutcome]]:
-    """Return the results of `braking_outcomes` for several episodes, with few calls of `replay`.
-
-    Args:
         lengths: Number of decisions of each episode, >= 1.
-        replay: Returns the outcomes of braking for pairs of an episode's index and a decision.
+        replay: Returns the outcomes of braking for pairs of an episode's index and a decision; no pair is
+            replayed twice.
     """
     results: list[list[BrakingOutcome]] = [[] for _ in lengths]
     rounds = [_rounds(length) for length in lengths]
@@ -107,6 +99,43 @@ def _interpolate(first: int, middle: int, last: int, known: dict[int, BrakingOut
     return True
 
 
+@dataclass
+class _Run:
+    """One episode without braking; a snapshot is taken at every `STRIDE`-th decision."""
+
+    family: str
+    observations: list[Observation] = field(default_factory=list)
+    rewards: list[float] = field(default_factory=list)
+    snapshots: list[Any] = field(default_factory=list)
+    threat: bool = False
+
+    def to_episode(self, outcomes: list[BrakingOutcome]) -> RecordedEpisode:
+        """Return the episode with the outcomes of braking, one per decision."""
+        return RecordedEpisode(
+            stack(self.observations),
+            rewards=np.array(self.rewards, np.float32),
+            braking_returns=np.array([item.episode_return for item in outcomes], np.float32),
+            braking_contacts=np.array([item.contact for item in outcomes]),
+            threat=self.threat,
+            family=self.family,
+        )
+
+
+Requests: TypeAlias = list[tuple[_Run, int]]
+"""Pairs of an episode and a decision at which braking begins."""
+
+
+def _to_episodes(
+    runs: Sequence[_Run], replay: Callable[[Requests], Iterable[BrakingOutcome]]
+) -> list[list[RecordedEpisode]]:
+    """Return a list with the episode of each run; `replay` returns the outcomes of braking."""
+    outcomes = braking_outcomes(
+        [len(run.rewards) for run in runs],
+        lambda pairs: replay([(runs[index], onset) for index, onset in pairs]),
+    )
+    return [[run.to_episode(found)] for run, found in zip(runs, outcomes, strict=True)]
+
+
 @dataclass(frozen=True)
 class EpisodeRecorder:
     """Records episodes of an environment with a discrete demand and a latching brake, one per seed.
@@ -128,35 +157,36 @@ class EpisodeRecorder:
         """Return a list with one episode for each seed."""
         env, twin = self.make_env(), self.make_env(camera=MINIMAL_CAMERA)
         try:
-            return [[self._record_episode(env, twin.unwrapped, seed)] for seed in seeds]
+            return [
+                _to_episodes([self._record_run(env, twin.unwrapped, seed)], self._replay)[0] for seed in seeds
+            ]
         finally:
             env.close()
             twin.close()
 
-    def _record_episode(self, env: gym.Env, twin: Any, seed: int) -> RecordedEpisode:
-        """Record `env` and replay braking in copies of `twin`, the same environment without sensors."""
-        observations, copies, rewards, done = [], [], [], False
+    def _record_run(self, env: gym.Env, twin: Any, seed: int) -> _Run:
+        """Record `env`, with copies of `twin`, the same environment without sensors, as snapshots."""
         observation, info = env.reset(seed=seed)
         twin.reset(seed=seed)
+        run, done = _Run(_family_of(env)), False
         while not done:
-            if len(observations) % STRIDE == 0:
-                copies.append(deepcopy(twin))
-            observations.append(select_signals(observation, self.shrink))
+            if len(run.observations) % STRIDE == 0:
+                run.snapshots.append(deepcopy(twin))
+            run.observations.append(select_signals(observation, self.shrink))
             observation, reward, terminated, truncated, info = env.step(self.hold)
             twin.step(self.hold)
-            rewards.append(float(reward))
+            run.rewards.append(float(reward))
             done = terminated or truncated
+        run.threat = bool(info["collision"])
+        return run
 
-        def replay(onset: int) -> BrakingOutcome:
-            copy = deepcopy(copies[onset // STRIDE])
+    def _replay(self, requests: Requests) -> Iterator[BrakingOutcome]:
+        """Yield the outcome of braking for pairs of an episode and a decision."""
+        for run, onset in requests:
+            copy = deepcopy(run.snapshots[onset // STRIDE])
             for _ in range(onset % STRIDE):
                 copy.step(self.hold)
-            return _brake_to_end(copy, self.brake)
-
-        outcomes = braking_outcomes(len(observations), replay)
-        return RecordedEpisode.from_outcomes(
-            observations, rewards, outcomes, bool(info["collision"]), _family_of(env)
-        )
+            yield _brake_to_end(copy, self.brake)
 
 
 def _family_of(env: gym.Env) -> str:
@@ -174,23 +204,6 @@ def _brake_to_end(env: Any, brake: int) -> BrakingOutcome:
 
 NUM_ENVS = 4  # environments with cameras; more are slower, because fewer tables fit in the cache
 NUM_REPLAYS = 128  # environments without cameras that replay braking
-
-
-@dataclass
-class _Run:
-    """One episode without braking; a snapshot is taken at every `STRIDE`-th decision."""
-
-    family: str
-    observations: list[Observation] = field(default_factory=list)
-    rewards: list[float] = field(default_factory=list)
-    snapshots: list[Snapshot] = field(default_factory=list)
-    threat: bool = False
-
-    def to_episode(self, outcomes: list[BrakingOutcome]) -> RecordedEpisode:
-        """Return the episode with the outcomes of braking."""
-        return RecordedEpisode.from_outcomes(
-            self.observations, self.rewards, outcomes, self.threat, self.family
-        )
 
 
 @dataclass(frozen=True)
@@ -218,15 +231,9 @@ class LevelRecorder:
         runs = self._record_runs(seeds)
         replays = self._make_envs(NUM_REPLAYS, camera=None, include_frame=False)
         try:
-            outcomes = batch_outcomes(
-                [len(run.rewards) for run in runs],
-                lambda pairs: self._replay(
-                    replays.simulation, [(runs[index], onset) for index, onset in pairs]
-                ),
-            )
+            return _to_episodes(runs, partial(self._replay, replays.simulation))
         finally:
             replays.close()
-        return [[run.to_episode(found)] for run, found in zip(runs, outcomes, strict=True)]
 
     def _make_envs(self, num_envs: int, **changes: Any) -> BrakingVectorEnv:
         arguments = self.arguments | changes
@@ -261,14 +268,12 @@ class LevelRecorder:
             row = {name: values[index] for name, values in observations.items()}
             run.observations.append(select_signals(row, self.shrink))
 
-    def _replay(self, simulation: Simulation, requests: list[tuple[_Run, int]]) -> Iterator[BrakingOutcome]:
+    def _replay(self, simulation: Simulation, requests: Requests) -> Iterator[BrakingOutcome]:
         """Yield the outcome of braking for pairs of an episode and a decision."""
         for start in range(0, len(requests), NUM_REPLAYS):
             yield from self._replay_batch(simulation, requests[start : start + NUM_REPLAYS])
 
-    def _replay_batch(
-        self, simulation: Simulation, requests: list[tuple[_Run, int]]
-    ) -> Iterator[BrakingOutcome]:
+    def _replay_batch(self, simulation: Simulation, requests: Requests) -> Iterator[BrakingOutcome]:
         """Yield the outcomes of at most `NUM_REPLAYS` requests."""
         for index, (run, onset) in enumerate(requests):
             simulation.restore(index, run.snapshots[onset // STRIDE])
