@@ -3,7 +3,7 @@
 import copy
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol, Self, cast
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias, cast
 
 import numpy as np
 
@@ -18,8 +18,12 @@ HOLD = 0.0  # demand for the scripted speed
 FPS = 30.0  # frame and decision rate for which all agents are tuned [Hz]
 TRACE = "lgmd/trace"  # key of the infos
 
-Observations = Mapping[str, np.ndarray]
+Observations: TypeAlias = Mapping[str, np.ndarray]
 """Observations of `LGMDObservation` by name, arrays of shape (N, …)."""
+Info: TypeAlias = dict[str, Any]
+"""Info of one environment."""
+State: TypeAlias = dict[str, bool | float | np.ndarray]
+"""State of an agent in one environment, by name."""
 
 
 def to_action(demand: float) -> np.ndarray:
@@ -39,7 +43,7 @@ class Infos(Protocol):
 
     def __contains__(self, key: object, /) -> bool: ...
 
-    def row(self, index: int, /) -> dict[str, Any]:
+    def row(self, index: int, /) -> Info:
         """Return the info of one environment, as a single environment returns it."""
         ...
 
@@ -47,7 +51,7 @@ class Infos(Protocol):
 class InfoArrays(dict[str, Any]):
     """`Infos` from arrays by name; arrays of `lgmd/trace` as described there."""
 
-    def row(self, index: int) -> dict[str, Any]:
+    def row(self, index: int) -> Info:
         """Return the info of one environment."""
         info = {key: _plain(values[index]) for key, values in self.items() if key != TRACE}
         if TRACE in self:
@@ -59,7 +63,7 @@ class InfoArrays(dict[str, Any]):
 class _SingleInfo:
     """`Infos` of one environment."""
 
-    def __init__(self, info: dict[str, Any]) -> None:
+    def __init__(self, info: Info) -> None:
         self._info = info
 
     def __contains__(self, key: object) -> bool:
@@ -71,7 +75,7 @@ class _SingleInfo:
             return [_frame(frame, lambda item: np.asarray(item)[None]) for frame in value]
         return np.asarray([value])
 
-    def row(self, index: int) -> dict[str, Any]:
+    def row(self, index: int) -> Info:
         return self._info
 
 
@@ -111,11 +115,11 @@ class BatchAgent:
         return None
 
     @classmethod
-    def options(cls) -> dict[str, Any]:
+    def options(cls) -> dict[str, object]:
         """Return the options of the agent's string with their defaults."""
         return {item.name: item.default for item in inspect.signature(cls).parameters.values()}
 
-    def initial(self) -> dict[str, Any]:
+    def initial(self) -> State:
         """Return the state of one environment at the start of an episode: numbers or arrays by name."""
         return {}
 
@@ -176,7 +180,7 @@ class BatchAgent:
 class LatchingAgent(BatchAgent):
     """Base class: brakes fully once `brake_conditions` returns True, and latches until the episode ends."""
 
-    def initial(self) -> dict[str, Any]:
+    def initial(self) -> State:
         """Return a released brake."""
         return {"latched": False}
 
@@ -203,7 +207,7 @@ class Actor(Protocol):
         """Start a new episode."""
         ...
 
-    def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
+    def act(self, observation: Mapping[str, np.ndarray], info: Info) -> np.ndarray:
         """Return the action for an observation."""
         ...
 
@@ -252,7 +256,7 @@ class Agent:
         """Start a new episode; `seed` seeds random agents."""
         self.agent.reset(seeds=[seed])
 
-    def act(self, observation: dict[str, Any], info: dict[str, Any]) -> np.ndarray:
+    def act(self, observation: Mapping[str, np.ndarray], info: Info) -> np.ndarray:
         """Return the action for an observation: float32, shape (1,), in [-1, 1]."""
         observations = {name: np.asarray(values)[None] for name, values in observation.items()}
         demands = self.agent.act(observations, _SingleInfo(info))

@@ -1,11 +1,10 @@
 """Agents that ignore the observation: the counterfactual without braking and two lower bounds."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.base import BRAKE, FPS, HOLD, BatchAgent, Infos, Observations
+from lgmd_gym.agents.base import BRAKE, FPS, HOLD, BatchAgent, Infos, Observations, State
 from lgmd_gym.errors import check_positive
 
 
@@ -47,7 +46,7 @@ class RandomBrake(BatchAgent):
         self.fps = check_positive("fps", fps)
         super().__init__()
 
-    def initial(self) -> dict[str, Any]:
+    def initial(self) -> State:
         """Return an onset time, which `reset` draws [s], and the number of decisions."""
         return {"onset": 0.0, "decisions": 0}
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.base import FPS, Infos, Observations
+from lgmd_gym.agents.base import FPS, Infos, Observations, State
 from lgmd_gym.agents.rules import COUNT, POSITIVE, Reading, Rule, RuleParams, readings
 from lgmd_gym.fields import number, record, whole
 from lgmd_gym.processes.extras import missing_extra
@@ -31,7 +31,7 @@ class ImageRule(Rule):
         """The preset `fovea`, turned along the path."""
         return {"name": "fovea", "gaze": "path"}
 
-    def initial(self) -> dict[str, Any]:
+    def initial(self) -> State:
         """Return the number of frames at the level, the state of the gate, and no previous frame."""
         return super().initial() | {"streak": 0, "closed": 0, "has_previous": False, "measure": 0.0}
 

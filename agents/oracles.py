@@ -1,11 +1,10 @@
 """Oracles: agents on ground truth, as references without errors of perception."""
 
 from math import inf
-from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents.base import FPS, Infos, LatchingAgent, Observations
+from lgmd_gym.agents.base import FPS, Infos, LatchingAgent, Observations, State
 from lgmd_gym.agents.zones import CAMERA_SETBACK, FULL_DECELERATION, stopping_distance
 from lgmd_gym.errors import check_positive
 
@@ -63,7 +62,7 @@ class StoppingDistanceOracle(LatchingAgent):
         self.margin = check_positive("margin", margin)
         super().__init__()
 
-    def initial(self) -> dict[str, Any]:
+    def initial(self) -> State:
         """Return a released brake and no previous target speed."""
         return super().initial() | {"target_speed": inf}
 

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from lgmd_gym.agents.base import TRACE, Infos, LatchingAgent, Observations
+from lgmd_gym.agents.base import TRACE, Infos, LatchingAgent, Observations, State
 from lgmd_gym.agents.zones import (
     DRY_DECELERATION,
     LOW_FIELD,
@@ -27,7 +28,7 @@ CAMERA = "camera"  # group of the parameters that determine the cameras of a rul
 _MARGIN = 3e-7  # of K to 0 and 1, so that excitations are at most 15
 
 
-def excitation(membrane_potential: Any) -> np.ndarray:
+def excitation(membrane_potential: ArrayLike) -> np.ndarray:
     """Return the mean excitation k/(n σ3) = log(K / (1 - K)), the inverse of eq. 10, in [-15, 15], float64.
 
     The membrane potential K saturates: excitations above 3 map to the interval from 0.95 to 1. Those of a
@@ -126,7 +127,7 @@ class Rule(LatchingAgent):
         super().__init__()
 
     @classmethod
-    def options(cls) -> dict[str, Any]:
+    def options(cls) -> dict[str, object]:
         """Return the options of the rule's string with their defaults."""
         return {item.name: item.default for item in declarations(cls.Params)}
 
@@ -184,7 +185,7 @@ class FrequencyRule(Rule):
     f is the highest spike frequency of all cameras [spikes/s].
     """
 
-    def initial(self) -> dict[str, Any]:
+    def initial(self) -> State:
         """Return the number of consecutive frames at the threshold."""
         return super().initial() | {"streak": 0}
 
@@ -254,7 +255,7 @@ class AdaptiveThreshold(FrequencyRule):
     name = "adaptive-threshold"
     Params = AdaptiveThresholdParams
 
-    def initial(self) -> dict[str, Any]:
+    def initial(self) -> State:
         """Return the mean frequency and the number of frames."""
         return super().initial() | {"mean": 0.0}
 
@@ -317,7 +318,7 @@ class DangerZone(Rule):
         """The ground field."""
         return [zone_camera("ground", 1.0, self.params.deceleration, self.params.reaction)]
 
-    def initial(self) -> dict[str, Any]:
+    def initial(self) -> State:
         """Return the number of frames at the level and the state of the gate."""
         return super().initial() | {"streak": 0, "closed": 0}
 
@@ -416,10 +417,11 @@ class StoppingZone(Rule):
         """Ground fields, nearest zone first, then upright fields, then low fields."""
         return zone_cameras(self.params.deceleration, self.params.reaction)
 
-    def initial(self) -> dict[str, Any]:
+    def initial(self) -> State:
         """Return the numbers of frames at the threshold, and since the required number of them."""
-        ages = np.full(NUM_FIELDS, self.params.memory)
-        return super().initial() | {"streaks": np.zeros(NUM_FIELDS, np.int64), "ages": ages}
+        ages: np.ndarray = np.full(NUM_FIELDS, self.params.memory)
+        streaks: np.ndarray = np.zeros(NUM_FIELDS, np.int64)
+        return super().initial() | {"streaks": streaks, "ages": ages}
 
     def should_brake(self, reading: Reading) -> np.ndarray:
         """Return whether an upright obstacle is in a zone."""
@@ -434,7 +436,7 @@ class StoppingZone(Rule):
         return active & standing.any(axis=1)
 
 
-def _read_toml(path: Any) -> dict[str, Any]:
+def _read_toml(path: object) -> dict[str, Any]:
     try:
         return tomllib.loads(Path(str(path)).read_text(encoding="utf-8"))
     except OSError as error:

@@ -93,7 +93,7 @@ class UserAgents(BatchAgent):
         self.objects = [self._make() for _ in range(num_envs)]
         self._used = [False] * num_envs
 
-    def _checked(self, returned: Any) -> np.float32:
+    def _checked(self, returned: object) -> np.float32:
         """Return the demand of an action; raise ValueError unless it is one number in [-1, 1], not a bool."""
         wanted = f"agent {self.name!r} must return one number in [-1, 1]"
         try:

@@ -50,18 +50,18 @@ def _check_neuron(name: str, neuron: Any) -> Any:
     return neuron
 
 
-def _check_demands(name: str, demands: Any) -> tuple[float, ...] | None:
+def _check_demands(name: str, demands: object) -> tuple[float, ...] | None:
     items = check_items(name, demands, object, "numbers")
     for demand in items:
         check_within("demand", demand, -1.0, 1.0)
     return items or None
 
 
-def _check_features(name: str, features: Any) -> FeatureConfig:
+def _check_features(name: str, features: object) -> FeatureConfig:
     return FeatureConfig.make(check_type(name, features, dict, FeatureConfig))
 
 
-def _check_network(name: str, network: Any) -> NetworkSpec:
+def _check_network(name: str, network: object) -> NetworkSpec:
     return NetworkSpec.make(check_type(name, network, dict, NetworkSpec))
 
 

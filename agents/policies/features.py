@@ -80,7 +80,7 @@ NORMALIZER_SUFFIX = ".npz"  # of the statistics of a `VecNormalize`
 MAX_HISTORY = 1000  # decisions; also the limit of `repeat` and `shrink`
 
 
-def _check_inputs(name: str, inputs: Any) -> tuple[str, ...]:
+def _check_inputs(name: str, inputs: object) -> tuple[str, ...]:
     names = check_items(name, inputs, str, "names")
     if not names:
         raise ValueError(f"{name} must contain at least one policy input, got none")

@@ -16,6 +16,7 @@ from lgmd_gym.errors import check_items, check_keys, check_known, check_type, ch
 from lgmd_gym.fields import Record, record, text, value
 
 if TYPE_CHECKING:
+    import torch
     from stable_baselines3.common.base_class import BaseAlgorithm
     from stable_baselines3.common.policies import BasePolicy
 
@@ -28,7 +29,7 @@ PLAIN_KWARGS = (
 )  # fmt: skip
 
 
-def _check_inputs(name: str, inputs: Any) -> dict[str, tuple[int, ...]]:
+def _check_inputs(name: str, inputs: object) -> dict[str, tuple[int, ...]]:
     return {
         key: tuple(
             check_whole(f"shape of {key}", side, 1, MAX_UNITS)
@@ -38,7 +39,7 @@ def _check_inputs(name: str, inputs: Any) -> dict[str, tuple[int, ...]]:
     }
 
 
-def _check_kwargs(name: str, kwargs: Any) -> dict[str, Any]:
+def _check_kwargs(name: str, kwargs: object) -> dict[str, Any]:
     given = {} if kwargs is None else check_type(name, kwargs, dict)
     check_keys(f"key of {name}", given, PLAIN_KWARGS)
     _check_units(given)
@@ -149,7 +150,7 @@ def _actions(count: int | None) -> spaces.Space:
     return spaces.Box(-1.0, 1.0, (1,)) if count is None else spaces.Discrete(count)
 
 
-def _check_units(value: Any) -> None:
+def _check_units(value: object) -> None:
     """Raise ValueError if a number in nested values exceeds the limit of layers."""
     if isinstance(value, dict | list | tuple):
         for item in value.values() if isinstance(value, dict) else value:
@@ -158,5 +159,5 @@ def _check_units(value: Any) -> None:
         raise ValueError(f"numbers of policy_kwargs must be at most {MAX_UNITS}, got {value}")
 
 
-def _shapes(weights: Mapping[str, Any]) -> dict[str, tuple[int, ...]]:
+def _shapes(weights: "Mapping[str, torch.Tensor]") -> dict[str, tuple[int, ...]]:
     return {name: tuple(value.shape) for name, value in weights.items()}

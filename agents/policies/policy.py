@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from lgmd_gym.agents.base import BatchAgent, Infos, Observations
+from lgmd_gym.agents.base import BatchAgent, Infos, Observations, State
 from lgmd_gym.agents.policies.card import PolicyCard, policy_card
 from lgmd_gym.agents.policies.features import (
     FRAME,
@@ -186,7 +186,7 @@ class Policy(BatchAgent):
         """Whether outputs of neurons are among the inputs."""
         return any(name not in NOT_NEURONS for name in self.features.inputs)
 
-    def initial(self) -> dict[str, Any]:
+    def initial(self) -> State:
         """Return a released brake and the number of decisions."""
         return {"demand": 0.0, "decisions": 0}
 

@@ -41,7 +41,7 @@ LEVELS_EXAMPLE = f"400:{','.join(EXTRA_FAMILIES[:2])}"
 TRAFFIC_EXAMPLE = "400:intersection,roundabout"
 
 
-def _check_env_kwargs(name: str, env_kwargs: Any) -> dict[str, Any]:
+def _check_env_kwargs(name: str, env_kwargs: object) -> dict[str, Any]:
     given = {} if env_kwargs is None else check_type(name, env_kwargs, dict)
     if "camera" in given:
         raise ValueError(f"{name} contains the camera {shown(given['camera'])}; use the option camera")
@@ -56,7 +56,7 @@ def _check_env_kwargs(name: str, env_kwargs: Any) -> dict[str, Any]:
     return given
 
 
-def _check_algo_kwargs(name: str, algo_kwargs: Any) -> dict[str, Any]:
+def _check_algo_kwargs(name: str, algo_kwargs: object) -> dict[str, Any]:
     given = {} if algo_kwargs is None else check_type(name, algo_kwargs, dict)
     check_type("policy_kwargs", given.get("policy_kwargs"), dict, type(None))
     return given
@@ -67,11 +67,11 @@ def _check_camera(name: str, camera: Any) -> Any:
     return camera
 
 
-def _check_features(name: str, features: Any) -> FeatureConfig:
+def _check_features(name: str, features: object) -> FeatureConfig:
     return FeatureConfig() if features is None else check_type(name, features, FeatureConfig)
 
 
-def _check_demands(name: str, demands: Any) -> tuple[float, ...]:
+def _check_demands(name: str, demands: object) -> tuple[float, ...]:
     given = check_items(name, demands, Real, "numbers")
     for demand in given:
         check_within(name, demand, -1.0, 1.0)
@@ -83,7 +83,7 @@ def _check_demands(name: str, demands: Any) -> tuple[float, ...]:
     return given
 
 
-def _texts(example: str) -> Callable[[str, Any], tuple[str, ...]]:
+def _texts(example: str) -> Callable[[str, object], tuple[str, ...]]:
     """Return a check of texts that name extra episodes."""
     return lambda name, given: check_items(name, given, str, f"texts such as {example!r}")
 

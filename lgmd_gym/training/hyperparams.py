@@ -84,7 +84,7 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     return entries
 
 
-def _features(wrappers: Any) -> dict[str, Any]:
+def _features(wrappers: object) -> dict[str, Any]:
     """Return the arguments of `PolicyWrapper` in rl-zoo's `env_wrapper`."""
     if wrappers is None:
         return {}

@@ -167,9 +167,9 @@ def check_file(file: Path, origin: dict[str, Any]) -> int:
         return len(archive["counts"])
 
 
-def _difference(recorded: Any, required: Any) -> tuple[Any, Any]:
+def _difference(recorded: object, required: object) -> tuple[object, object]:
     """Return the first different elements of two lists or dicts, at any depth, or else the two values."""
-    pairs: list[tuple[Any, Any]] = []
+    pairs: list[tuple[object, object]] = []
     if isinstance(recorded, list) and isinstance(required, list) and len(recorded) == len(required):
         pairs = list(zip(recorded, required, strict=True))
     elif isinstance(recorded, dict) and isinstance(required, dict):
@@ -183,7 +183,7 @@ def _difference(recorded: Any, required: Any) -> tuple[Any, Any]:
     return recorded, required
 
 
-def _abbreviated(value: Any) -> str:
+def _abbreviated(value: object) -> str:
     text = json.dumps(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
