@@ -89,7 +89,7 @@ def test_values_are_shown_in_one_short_line():
         (lambda: BrakingVectorEnv(1, family="CCRs", threads=10**9), "threads must be a whole number in"),
         (lambda: agents.make_agent(3), "agent must be a string, got 3"),
         (lambda: agents.SpikeThreshold([1]), "params must be SpikeThresholdParams, got [1]"),
-        (lambda: agents.register_agent("x"), "agent must be a subclass of Agent, got 'x'"),
+        (lambda: agents.register_agent("x"), "agent must be a subclass of BatchAgent, got 'x'"),
         (lambda: agents.make_agent("policy:" + "x" * 999 + ".zip"), "is not a path: File name too long"),
         (lambda: agents.to_action(float("nan")), "demand must be finite, got nan"),
         (lambda: benchmark.RunConfig(agents=None), "agents must be a list of strings, got None"),
