@@ -13,8 +13,6 @@ from lgmd_gym.agents import AGENTS, HOLD, make_agent
 from lgmd_gym.agents.base import FPS
 from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
-from lgmd_gym.camera import CameraSpec
-from lgmd_gym.camera.spec import check_camera
 from lgmd_gym.envs.families.distribution import EXTRA_FAMILIES, check_families
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, traffic_id
 from lgmd_gym.errors import (
@@ -27,6 +25,7 @@ from lgmd_gym.errors import (
     shown,
 )
 from lgmd_gym.fields import Record, optional, record, text, value, whole
+from lgmd_gym.sensing.channel import ChannelSpec, make_channels, plain_values
 from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
 from lgmd_gym.training.policy_env import PolicyWrapper
 
@@ -63,8 +62,8 @@ def _check_algo_kwargs(name: str, algo_kwargs: object) -> dict[str, Any]:
 
 
 def _check_camera(name: str, camera: Any) -> Any:
-    check_camera(camera)
-    return camera
+    make_channels(camera)
+    return plain_values(camera)
 
 
 def _check_features(name: str, features: object) -> FeatureConfig:
@@ -110,7 +109,7 @@ class TrainConfig(Record):
         'traffic, is trained on the split "train" and evaluated on the split "validation"',
     )
     env_kwargs: dict[str, Any] = value(None, _check_env_kwargs, "Further arguments of `gym.make`")
-    camera: CameraSpec = value(CAMERAS, _check_camera, "Camera or cameras, see `LGMDObservation`")
+    camera: ChannelSpec = value(CAMERAS, _check_camera, "Camera or cameras, see `LGMDObservation`")
     demands: tuple[float, ...] = value(
         (),
         _check_demands,
