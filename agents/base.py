@@ -256,9 +256,13 @@ class Agent:
         """Start a new episode; `seed` seeds random agents."""
         self.agent.reset(seeds=[seed])
 
-    def act(self, observation: Mapping[str, np.ndarray], info: Info) -> np.ndarray:
-        """Return the action for an observation: float32, shape (1,), in [-1, 1]."""
-        observations = {name: np.asarray(values)[None] for name, values in observation.items()}
+    def act(self, observation: Mapping[str, np.ndarray] | np.ndarray, info: Info) -> np.ndarray:
+        """Return the action for an observation: float32, shape (1,), in [-1, 1].
+
+        Without a camera, the observation is that of the environment, an array, which agents do not read.
+        """
+        items = observation.items() if isinstance(observation, Mapping) else ()
+        observations = {name: np.asarray(values)[None] for name, values in items}
         demands = self.agent.act(observations, _SingleInfo(info))
         for error in self.agent.failures.values():
             raise error
