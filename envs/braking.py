@@ -7,22 +7,13 @@ import numpy as np
 
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.envs.base import EgoBrakeEnv
-from lgmd_gym.envs.decisions import (
-    finish_decisions,
-    make_clock,
-    make_outcome,
-    make_physics,
-    start_decisions,
-    start_episodes,
-)
 from lgmd_gym.envs.episode_source import EpisodeSource, FixedScenario
 from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.highway.road import BrakingRoad, EgoCar
 from lgmd_gym.envs.info import INFO_KEYS
-from lgmd_gym.envs.physics_state import PhysicsState
 from lgmd_gym.envs.reward import RewardParams
-from lgmd_gym.envs.scene import SceneArrays, write_scene
-from lgmd_gym.envs.spaces import EgoState, make_action
+from lgmd_gym.envs.simulation import Rates, Sensors, Simulation
+from lgmd_gym.envs.spaces import ContinuousDemand, EgoState, make_action
 from lgmd_gym.errors import check_keys, check_mapping, shown
 
 _SELECTED = np.ones(1, np.bool_)
@@ -30,6 +21,8 @@ _SELECTED = np.ones(1, np.bool_)
 
 class BrakingEnv(EgoBrakeEnv):
     """A car follows a scripted path and speed; the agent can brake.
+
+    The environment is highway-env's face of row 0 of a `Simulation` of one environment.
 
     ## Description
 
@@ -121,6 +114,10 @@ class BrakingEnv(EgoBrakeEnv):
     """
 
     road: BrakingRoad
+    action_type: ContinuousDemand
+    simulation: Simulation
+    rendering_paused = False
+    """Whether attached cameras draw no frames until the next reset."""
 
     def __init__(
         self,
@@ -159,15 +156,32 @@ class BrakingEnv(EgoBrakeEnv):
         reward = {**self.config["reward"], **reward}
         weights = RewardParams(**reward)
         super().configure(config)
-        self.config["reward"], self.weights = reward, weights.record()[None]
-        self._state = PhysicsState(1)
-        self._clock, self._outcome = make_clock(1), make_outcome(1)
+        self.config["reward"], self.weights = reward, weights.record()
+        before, self.simulation = vars(self).get("simulation"), self.make_simulation(1)
+        if before is not None and before.rates.simulation == self.simulation.rates.simulation:
+            self.simulation.take_sensors(before)
+
+    def make_simulation(self, num_envs: int, threads: int = 1) -> Simulation:
+        """Return a simulation of environments with this configuration; see `Simulation`."""
+        config = self.config
+        rates = Rates(simulation=config["simulation_frequency"], policy=config["policy_frequency"])
+        return Simulation(num_envs, rates, self.weights, config["throttle"], threads)
+
+    def attach_sensors(self, sensors: Sensors, camera_hz: float) -> None:
+        """Draw and process the frames of cameras inside the steps, from the next reset on.
+
+        Args:
+            sensors: Cameras and neurons of one environment.
+            camera_hz: Camera frames per second [Hz].
+        """
+        self.simulation.attach(sensors, camera_hz)
+        self.simulation.show = self._shown
 
     def define_spaces(self) -> None:
         """Set the action and observation types and their spaces."""
         check_keys("observation type", [self.config["observation"].get("type")], ["EgoState"])
         self.observation_type = EgoState(self)
-        self.action_type = make_action(self, self.config["action"])
+        self.action_type = make_action(self, self.config["action"])  # pyright: ignore[reportIncompatibleVariableOverride]
         self.observation_space = self.observation_type.space()
         self.action_space = self.action_type.space()
 
@@ -191,56 +205,42 @@ class BrakingEnv(EgoBrakeEnv):
             raise RuntimeError("the environment has no episode: call reset() before step()")
         self.time += 1 / self.config["policy_frequency"]
         self._simulate(action)
-        physics, clock, outcome = self.road.physics, tuple(self._clock), self._outcome
-        finish_decisions(0, 1, self.config["policy_frequency"], physics, clock, tuple(outcome))
         if self.render_mode == "human":
             self.render()
-        terminated, truncated = bool(outcome.terminated[0]), bool(outcome.truncated[0])
-        return (
-            self.observation_type.observe(),
-            float(outcome.rewards[0]),
-            terminated,
-            truncated,
-            self._info(None),
-        )
+        outcome = self.simulation.outcome
+        ended = bool(outcome.terminated[0]), bool(outcome.truncated[0])
+        return self.observation_type.observe(), float(outcome.rewards[0]), *ended, self._info(None)
 
     def _simulate(self, action: Any = None) -> None:
         """Advance by the simulation steps of one decision."""
-        rate = self.config["simulation_frequency"]
-        steps = int(rate // self.config["policy_frequency"])
         if action is not None and not self.config["manual_control"]:
             self.action_type.act(action)
-        self._clock.remaining[0] = steps
-        start_decisions(0, 1, steps, self.road.physics, tuple(self._clock))
-        for step in range(steps):
-            self.road.step(1 / rate)
-            self.steps += 1
-            if step < steps - 1:
-                self._automatic_rendering()
+        simulation = self.simulation
+        on_step = self._automatic_rendering if self.viewer is not None and self.enable_auto_render else None
+        simulation.step(simulation.clock.demands, _SELECTED, not self.rendering_paused, on_step)
+        self.steps = int(simulation.state.episodes["steps"][0])
         self.enable_auto_render = False
-        self.road.refresh()
 
-    def write_scene(self, arrays: SceneArrays) -> None:
-        """Write the present state for the cameras, much faster than they can read the vehicles.
-
-        Args:
-            arrays: `SceneArrays` of one environment.
-        """
-        physics = self.road.physics
-        physics[1]["steps"] = self.steps
-        write_scene(0, self.config["simulation_frequency"], physics, tuple(arrays))
+    def restart_sensors(self) -> None:
+        """Process a first frame of the present state with sensors attached after the reset."""
+        self.simulation.equip(0, self.scene, self.road.network)
+        self.simulation.show_frames(_SELECTED)
 
     def _reset(self) -> None:
         draw = self._source.draw(self.np_random)
-        placement = draw.placement
-        self.scenario, self._episode_info = placement.scenario, draw.info
+        self.scenario, self._episode_info = draw.placement.scenario, draw.info
         self.scene, self.brake = draw.scene, self.episode_brake(draw.brake)
-        brakes = self.brake.record(self.config["throttle"])[None]
-        self._state.load(0, placement, self.brake.max_demands(self.config["policy_frequency"]))
-        physics = tuple(make_physics(self._state, brakes, self.weights))
-        self.road = BrakingRoad(draw.make_network(), self.np_random, physics, self._clock.demands)
+        self.rendering_paused = False
+        simulation, network = self.simulation, draw.make_network()
+        simulation.load(0, draw.placement, self.brake)
+        self.road = BrakingRoad(network, self.np_random, simulation)
         self.controlled_vehicles = [self.road.ego]
-        start_episodes(0, 1, _SELECTED, physics, tuple(self._clock), tuple(self._outcome))
+        simulation.equip(0, self.scene, network)
+        simulation.start(_SELECTED)
+
+    def _shown(self, index: int) -> "BrakingEnv":
+        return self
 
     def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
-        return dict(zip(INFO_KEYS, self._outcome.infos[0].tolist(), strict=True)) | self._episode_info
+        values = self.simulation.outcome.infos[0].tolist()
+        return dict(zip(INFO_KEYS, values, strict=True)) | self._episode_info

@@ -1,7 +1,7 @@
 """Compiled start, steps and end of the decisions of a range of environments.
 
-The functions take the fields of `Physics`, `Clock` and `Outcome` as plain tuples, too, which are cheaper to
-pass from Python.
+Python is called neither per environment nor per step of the simulation. The functions take the fields of
+`Physics`, `Clock` and `Outcome` as plain tuples, too, which are cheaper to pass from Python.
 """
 
 from typing import NamedTuple
@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from lgmd_gym.envs.dynamics.brake import put_demand
-from lgmd_gym.envs.dynamics.episode import Arrays, Physics, is_terminated, is_truncated
+from lgmd_gym.envs.dynamics.episode import Arrays, Physics, is_terminated, is_truncated, step_environment
 from lgmd_gym.envs.info import INFO, write_info
 from lgmd_gym.envs.physics_state import PhysicsState
 from lgmd_gym.envs.reward import step_reward
+from lgmd_gym.envs.scene import SceneArrays, write_scene
 from lgmd_gym.envs.surrogate_safety import is_approached
 from lgmd_gym.kernels import kernel
 
@@ -52,9 +53,18 @@ class Outcome(NamedTuple):
 def make_physics(state: PhysicsState, brakes: np.ndarray, weights: np.ndarray) -> Physics:
     """Return the arrays of a state; make them again after `PhysicsState.load` has replaced arrays."""
     return Physics(
-        state.bodies, state.episodes, state.egos, state.lines, state.pending, state.segments, state.paths,
-        state.before, state.parts, brakes, weights,
-    )  # fmt: skip
+        bodies=state.bodies,
+        episodes=state.episodes,
+        egos=state.egos,
+        lines=state.lines,
+        pending=state.pending,
+        segments=state.segments,
+        paths=state.paths,
+        before=state.before,
+        parts=state.parts,
+        brakes=brakes,
+        weights=weights,
+    )
 
 
 def make_clock(num: int) -> Clock:
@@ -90,6 +100,42 @@ def start_decisions(first: int, last: int, steps: int, physics: Arrays, clock: A
         demand = clock.demands[i]
         demand = demand if demand < 0.0 or brake.throttle > 0.0 else 0.0
         put_demand(physics.lines[i], physics.pending[i], brake.delay, demand)
+
+
+@kernel(exact=True)
+def advance(
+    first: int, last: int, left: int, stride: int, rate: float, physics: Arrays, clock: Arrays, scenes: Arrays
+) -> bool:
+    """Advance each environment up to its next camera frame, or until `left` steps of its decision are left.
+
+    Args:
+        first: First environment.
+        last: Last environment + 1.
+        left: Simulation steps of the decision at which to stop; 0 for its end.
+        stride: Simulation steps per camera frame.
+        rate: Simulation frequency [Hz].
+        physics: `Physics`.
+        clock: `Clock`.
+        scenes: `SceneArrays`; written for the environments with a frame.
+
+    Returns:
+        Whether a frame is due in any of the environments, see `Clock.due`.
+    """
+    physics, clock, scenes = Physics(*physics), Clock(*clock), SceneArrays(*scenes)
+    any_due = False
+    for i in range(first, last):
+        clock.due[i] = False
+        episode = physics.episodes[i]
+        while clock.remaining[i] > left and not clock.due[i]:
+            step_environment(i, 1.0 / rate, physics)
+            clock.remaining[i] -= 1
+            # highway-env counts a step after the frame of that step.
+            clock.due[i] = (episode.steps + 1) % stride == 0
+            if clock.due[i]:
+                write_scene(i, rate, physics, scenes)
+                any_due = True
+            episode.steps += 1
+    return any_due
 
 
 @kernel(exact=True)
@@ -136,3 +182,14 @@ def start_episodes(
             clock.headings[i] = physics.bodies[i, 0].heading
             outcome.rewards[i] = 0.0
             outcome.terminated[i] = outcome.truncated[i] = False
+
+
+@kernel(exact=True)
+def show_episodes(
+    first: int, last: int, rate: float, selected: np.ndarray, physics: Arrays, scenes: Arrays
+) -> None:
+    """Write the present state of the selected environments for their cameras."""
+    physics, scenes = Physics(*physics), SceneArrays(*scenes)
+    for i in range(first, last):
+        if selected[i]:
+            write_scene(i, rate, physics, scenes)

@@ -38,7 +38,7 @@ def write_info(bodies: np.ndarray, episode: Any, ego: Any, paths: np.ndarray, in
     info.gap, info.ttc = gap, contact_time(bodies, episode.bodies, paths)
     info.thw, info.drac, info.required_deceleration = headway(gap, here.speed), inf, inf
     if lead > 0:
-        other = bodies[lead]
+        other: Any = bodies[lead]
         closing_speed = here.speed - speed_along_ego(here, other)
         info.drac = rate_to_avoid_crash(gap, closing_speed)
         info.required_deceleration = max(info.drac - other.acceleration, 0.0)

@@ -15,10 +15,65 @@ from lgmd_gym.errors import check_items, check_keys, check_known, check_within
 
 if TYPE_CHECKING:
     from lgmd_gym.envs.base import EgoBrakeEnv
+    from lgmd_gym.envs.braking import BrakingEnv
+
+
+class Demands:
+    """Longitudinal demands of actions, on arrays over N environments.
+
+    Args:
+        table: Demands of discrete actions; None for actions that are demands.
+    """
+
+    def __init__(self, table: Sequence[float] | None = None) -> None:
+        self._table = None if table is None else np.array(table, np.float64)
+
+    def read(self, actions: Any, num_envs: int) -> np.ndarray:
+        """Return the demands in [-1, 1], float64, shape (num_envs,).
+
+        Args:
+            actions: One number per environment, shape (num_envs,) or (num_envs, 1).
+            num_envs: Number of environments.
+
+        Raises:
+            ValueError: If the actions have another shape, or one is not finite or no index of a demand.
+        """
+        values = _numbers(actions, num_envs)
+        if self._table is None:
+            _check_each(values, np.isfinite(values), "a finite number in [-1, 1]")
+            return np.clip(values, -1.0, 1.0)
+        last = len(self._table) - 1
+        known = (values >= 0) & (values <= last) & (values == np.floor(values))
+        _check_each(values, known, f"an index in [0, {last}]")
+        return self._table[values.astype(np.int64)]
+
+
+def _numbers(actions: Any, num_envs: int) -> np.ndarray:
+    """Return the actions as float64, shape (num_envs,)."""
+    try:
+        values = np.asarray(actions, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"actions must be {num_envs} numbers, got {actions!r}") from None
+    if values.shape not in ((num_envs,), (num_envs, 1)):
+        raise ValueError(
+            f"actions must be {num_envs} numbers, one per environment, got shape {values.shape}; "
+            "use envs.action_space.sample()"
+        )
+    return values.reshape(-1)
+
+
+def _check_each(values: np.ndarray, valid: np.ndarray, kind: str) -> None:
+    """Raise ValueError for the first invalid value."""
+    if not valid.all():
+        index = int(np.argmin(valid))
+        where = f" in environment {index}" if len(values) > 1 else ""
+        raise ValueError(f"an action must be {kind}, got {values[index]:g}{where}")
 
 
 class ContinuousDemand(ActionType):
     """A longitudinal demand in [-1, 1]: −1 full brake, 0 hold the scripted speed, +1 full throttle."""
+
+    decoder = Demands()
 
     def space(self) -> spaces.Space:
         """Return Box(-1, 1, (1,), float32)."""
@@ -32,13 +87,14 @@ class ContinuousDemand(ActionType):
     def act(self, action: Any) -> None:
         """Set the demand of the ego, clipped to [-1, 1].
 
+        Args:
+            action: One number, an array of shape () or (1,).
+
         Raises:
-            ValueError: If the action is not one finite number.
+            ValueError: If the action is not one finite number, or no index of a demand.
         """
-        values = np.asarray(action, dtype=np.float64).reshape(-1)
-        if values.size != 1 or not np.isfinite(values[0]):
-            raise ValueError(f"action must be one finite number in [-1, 1], got {action!r}")
-        cast(EgoCar, self.controlled_vehicle).demand(min(max(float(values[0]), -1.0), 1.0))
+        (demand,) = self.decoder.read(np.reshape(action, -1), 1).tolist()
+        cast(EgoCar, self.controlled_vehicle).demand(demand)
 
 
 class DiscreteDemand(ContinuousDemand):
@@ -54,20 +110,11 @@ class DiscreteDemand(ContinuousDemand):
         if not check_items("demands", demands, Real, "numbers"):
             raise ValueError("demands must contain at least one number in [-1, 1], got none")
         self.demands = tuple(check_within("demands", demand, -1.0, 1.0) for demand in demands)
+        self.decoder = Demands(self.demands)
 
     def space(self) -> spaces.Space:
         """Return Discrete(len(demands))."""
         return spaces.Discrete(len(self.demands))
-
-    def act(self, action: Any) -> None:
-        """Set the demand of the ego.
-
-        Raises:
-            ValueError: If the index is out of range.
-        """
-        if not 0 <= int(action) < len(self.demands):
-            raise ValueError(f"action must be an index in [0, {len(self.demands) - 1}], got {action!r}")
-        cast(EgoCar, self.controlled_vehicle).demand(self.demands[int(action)])
 
 
 class EgoState(ObservationType):
@@ -81,10 +128,7 @@ class EgoState(ObservationType):
 
     def observe(self) -> np.ndarray:
         """Return the current state, float32, shape (3,)."""
-        if self.env.vehicle is None:
-            return np.zeros(3, dtype=np.float32)
-        ego = cast(EgoCar, self.env.vehicle)
-        return np.array([ego.speed, ego.acceleration, ego.yaw_rate], dtype=np.float32)
+        return cast("BrakingEnv", self.env).simulation.ego_states()[0]
 
 
 ACTIONS = {"ContinuousDemand": ContinuousDemand, "DiscreteDemand": DiscreteDemand}
@@ -92,7 +136,7 @@ ACTIONS = {"ContinuousDemand": ContinuousDemand, "DiscreteDemand": DiscreteDeman
 
 def make_action(
     env: "EgoBrakeEnv", config: dict[str, Any], types: Mapping[str, type[ContinuousDemand]] = ACTIONS
-) -> ActionType:
+) -> ContinuousDemand:
     """Return the action type for `config["action"]`.
 
     Args:

@@ -22,10 +22,11 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.benchmark.case import Row
 from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.benchmark.player import run_task
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.summary import rate_of
-from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
+from lgmd_gym.benchmark.task import NO_BRAKE, Task
 from lgmd_gym.camera import Camera
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.appearance import MIXED

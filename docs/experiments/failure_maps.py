@@ -34,8 +34,8 @@ from joblib import delayed
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.analysis.tables import rate_text
-from lgmd_gym.benchmark.batch import play_unit
 from lgmd_gym.benchmark.case import Case, Row, key_of, make_case, to_mps
+from lgmd_gym.benchmark.player import play_unit
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.summary import rate_of
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task

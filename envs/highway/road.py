@@ -18,6 +18,7 @@ from lgmd_gym.envs.dynamics.bodies import (
     ROAD_MARKING,
 )
 from lgmd_gym.envs.dynamics.episode import step_environment
+from lgmd_gym.envs.simulation import Simulation
 
 
 class _BodyItem:
@@ -142,35 +143,26 @@ class BrakingRoad(Road):
     Args:
         network: The road network.
         np_random: Random generator.
-        physics: The fields of `Physics`.
-        demands: Longitudinal demands of all environments, float64, shape (N,).
+        simulation: The simulation.
         index: Index of the environment.
-
-    Attributes:
-        physics: The fields of `Physics`.
     """
 
-    _stale = False
+    _shown_steps = -1  # steps of the episode that the vehicles show; −1 for none
 
     def __init__(
-        self,
-        network: RoadNetwork,
-        np_random: np.random.Generator,
-        physics: tuple[np.ndarray, ...],
-        demands: np.ndarray,
-        index: int = 0,
+        self, network: RoadNetwork, np_random: np.random.Generator, simulation: Simulation, index: int = 0
     ) -> None:
         super().__init__(network=network, np_random=np_random)  # type: ignore[arg-type]
-        self.physics, self._demands, self._index = physics, demands, index
-        bodies, episodes, *_ = physics
-        bodies = bodies[index, : episodes[index]["bodies"]]
+        self._simulation, self._index = simulation, index
+        state = simulation.state
+        bodies = state.bodies[index, : state.episodes[index]["bodies"]]
         self._ego = EgoCar(self, bodies[0], self.set_demand)
         self._items: list[Any] = [self._ego, *(CLASSES[body["kind"]](self, body) for body in bodies[1:])]
         items = list(zip(self._items, bodies["kind"].tolist(), strict=True))
         self.vehicles = [item for item, kind in items if kind <= CAR]
         self.objects = [item for item, kind in items if kind > CAR]
         self._obstacles: list[Any] = [item for item, kind in items[1:] if kind != ROAD_MARKING]
-        self._stale = True
+        self._shown_steps = -1
 
     @property
     def ego(self) -> EgoCar:
@@ -212,30 +204,32 @@ class BrakingRoad(Road):
 
     def set_demand(self, demand: float) -> None:
         """Set the longitudinal demand in [-1, 1] of the next decision."""
-        self._demands[self._index] = demand
+        self._simulation.clock.demands[self._index] = demand
 
     def act(self) -> None:
         """Do nothing: all vehicles follow scripts."""
 
     def step(self, dt: float) -> None:
         """Advance all vehicles and objects by `dt` [s], or up to the ego's first contact."""
-        step_environment(self._index, dt, self.physics)
-        self._stale = True
+        step_environment(self._index, dt, self._simulation.physics)
+        self._shown_steps = -1
 
     def refresh(self) -> None:
         """Copy the present state to the vehicles and objects, unless they show it already."""
-        if self._stale:
-            self._stale = False
+        steps = self._simulation.state.episodes["steps"].item(self._index)
+        if steps != self._shown_steps:
+            self._shown_steps = steps
             self._show()
 
     def _show(self) -> None:
-        bodies, episodes, egos = (values[self._index] for values in self.physics[:3])
+        state, index = self._simulation.state, self._index
+        bodies, episode = state.bodies[index], state.episodes[index]
         rows = bodies.view(np.float64).reshape(len(bodies), -1)[:, :_SHOWN].tolist()
         for item, (*motion, steering) in zip(self._items, rows, strict=False):
             item.show(*motion)
             if isinstance(item, PathCar):
                 item.steer(steering)
-        self._ego.yaw_rate = float(egos["yaw_rate"])
-        touched = int(episodes["touched"])
+        self._ego.yaw_rate = float(state.egos["yaw_rate"][index])
+        touched = int(episode["touched"])
         if touched:
             self._ego.crashed = self._items[touched].crashed = True

@@ -9,11 +9,9 @@ import numpy as np
 
 from lgmd_gym.agents.base import Actor
 from lgmd_gym.benchmark.case import Case
-from lgmd_gym.benchmark.recorder import SeriesRecorder
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs import env_id
 from lgmd_gym.envs.families.scenario import Scenario
-from lgmd_gym.sensing.spaces import SIGNALS
 
 
 class Step(NamedTuple):
@@ -109,24 +107,3 @@ def rollout(env: gym.Env, agent: Actor, seed: int) -> Iterator[tuple[Step, np.nd
             return
         observation, reward, terminated, truncated, info = env.step(action)
         step = Step(observation, info, float(reward), terminated or truncated)
-
-
-def play(env: gym.Env, agent: Actor, seed: int) -> Episode:
-    """Run one episode to its end.
-
-    Args:
-        env: Braking environment inside `LGMDObservation`.
-        agent: Agent that acts.
-        seed: Seed of the environment and of the agent.
-    """
-    base: Any = env.unwrapped
-    recorder, first = SeriesRecorder(1, base.config["policy_frequency"]), np.zeros(1, np.int64)
-    info, total = {}, 0.0
-    for step, action in rollout(env, agent, seed):
-        info, total = step.info, total + step.reward
-        signals = {name: step.observation[name][None] for name in SIGNALS}
-        recorder.add(first, signals, info, np.array([agent.alert]), np.array([float(action[0])]))
-    bodies = base.road.obstacles
-    shade = float(bodies[0].shade) if bodies else float("nan")
-    fps = env.get_wrapper_attr("fps")
-    return Episode.of(recorder.series(0), info, base.scenario, shade, fps, total, info["world"])

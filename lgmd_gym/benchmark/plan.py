@@ -9,19 +9,19 @@ from typing import Any
 import gymnasium as gym
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.batch import play_unit
 from lgmd_gym.benchmark.case import TRAFFIC, Row, key_of, traffic_case
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.episode import make_env
 from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.player import play_unit
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
 from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
 from lgmd_gym.benchmark.units import Unit, make_units
 from lgmd_gym.camera.render.raster import draw_cameras
 from lgmd_gym.camera.worlds import LABORATORY
-from lgmd_gym.engine.kernels import advance
 from lgmd_gym.envs.appearance import Appearance
+from lgmd_gym.envs.decisions import advance
 from lgmd_gym.envs.registration import traffic_id
 from lgmd_gym.processes.pool import TaskMap
 

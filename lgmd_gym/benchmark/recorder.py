@@ -1,11 +1,10 @@
 """The time series of episodes, recorded decision by decision."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from lgmd_gym.sensing.spaces import SIGNALS
+from lgmd_gym.sensing.assembly import SIGNALS
 
 GROUND_TRUTH = ("ego_speed", "gap", "ttc", "drac", "deceleration", "target_speed")  # keys of `info`
 # One value per decision each; of `SIGNALS`, the maximum over the cameras. `standstill_hold` is 1 while the
@@ -35,34 +34,33 @@ class SeriesRecorder:
 
     def add(
         self,
-        envs: np.ndarray,
+        active: np.ndarray,
         observations: Mapping[str, np.ndarray],
-        infos: Mapping[str, Any],
+        infos: Mapping[str, np.ndarray],
         alerts: np.ndarray,
         demands: np.ndarray,
     ) -> None:
-        """Append one decision of several environments.
+        """Append one decision of the active environments.
 
         Args:
-            envs: The n environments, int64, shape (n,).
-            observations: Observations with the `SIGNALS`, shape (n, cameras).
-            infos: Infos with the keys of `GROUND_TRUTH`, shape (n,).
-            alerts: Alerts of the agents, bool, shape (n,).
-            demands: Demands of the agents, shape (n,).
+            active: Selection of the environments, bool, shape (N,).
+            observations: Observations with the `SIGNALS`, shape (N, cameras).
+            infos: Infos with the keys of `GROUND_TRUTH`, shape (N,).
+            alerts: Alerts of the agents, bool, shape (N,).
+            demands: Demands of the agents, shape (N,).
         """
-        lengths = self._lengths[envs]
-        if lengths.max(initial=0) == self._values.shape[1]:
+        if self._lengths.max() == self._values.shape[1]:
             self._values = np.concatenate((self._values, np.zeros_like(self._values)), axis=1)
-        rows = np.empty((len(envs), len(SERIES)))
-        rows[:, 0] = lengths / self._decision_hz
+        rows = np.empty((len(active), len(SERIES)))
+        rows[:, 0] = self._lengths / self._decision_hz
         for column, name in enumerate(GROUND_TRUTH, 1):
             rows[:, column] = infos[name]
         for column, name in enumerate(SIGNALS, _SIGNALS):
             rows[:, column] = observations[name].max(axis=1)
         rows[:, _ALERT] = alerts
         rows[:, -1] = (rows[:, 1] == 0.0) & (demands < 0.0)
-        self._values[envs, lengths] = rows
-        self._lengths[envs] += 1
+        self._values[active, self._lengths[active]] = rows[active]
+        self._lengths[active] += 1
 
     def series(self, index: int) -> dict[str, np.ndarray]:
         """Return arrays of shape (decisions,) by name for the present episode of an environment."""

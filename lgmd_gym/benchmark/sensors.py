@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from lgmd_gym.agents import Agent
+from lgmd_gym.agents import Agent, BatchAgent
 from lgmd_gym.neuron import NeuronSpec
 from lgmd_gym.sensing.channel import BIRDSEYE, Channel, ChannelSpec, make_channels, plain_values
 
@@ -25,7 +25,7 @@ class SensorConfig:
     params: NeuronSpec = None
     include_frame: bool = False
 
-    def for_agent(self, agent: Agent | None = None) -> "SensorConfig":
+    def for_agent(self, agent: Agent | BatchAgent | None = None) -> "SensorConfig":
         """Return the config with the agent's own camera and parameters in place of None."""
         include_frame = self.include_frame or bool(getattr(agent, "include_frame", False))
         camera, params = self.camera, self.params

@@ -1,15 +1,12 @@
 """One task of a run: one agent in one case with one seed."""
 
-import traceback
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lgmd_gym.agents import Agent, make_agent
 from lgmd_gym.benchmark.case import NO_BRAKE, Case, Row, RowKey, new_row
-from lgmd_gym.benchmark.episode import Episode, make_env, play
-from lgmd_gym.benchmark.fcw_driver import FCWDriver
+from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.metrics import KEYS, Counterfactual, make_row
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.camera.scene import CLEAR
@@ -80,17 +77,6 @@ class Result:
     counterfactual: Counterfactual | None = None
 
 
-def run_task(task: Task) -> Result:
-    """Run a task by itself; an exception in the agent or the environment becomes an error row."""
-    try:
-        agent = make_agent(task.agent)
-        sensor_config = task.sensor_config.for_agent(agent)
-        episode = _play(task, agent, sensor_config)
-    except (Exception, SystemExit):  # an agent that calls exit() would end the worker process
-        return error_result(task, traceback.format_exc())
-    return make_result(task, episode, sensor_config)
-
-
 def make_result(task: Task, episode: Episode, sensor_config: SensorConfig) -> Result:
     """Return the result of an episode that was played with a sensor configuration."""
     counterfactual = task.counterfactual or Counterfactual.of(episode)
@@ -110,15 +96,3 @@ def error_result(task: Task, error: str) -> Result:
     """Return the result of a task that failed with a traceback."""
     row = new_row(KEYS, task.agent, task.case, task.seed, task.condition, world=task.world, error=error)
     return Result(row)
-
-
-def _play(task: Task, agent: Agent, sensor_config: SensorConfig) -> Episode:
-    env = make_env(task.case, sensor_config, task.arguments)
-    try:
-        if task.has_driver:
-            base: Any = env.unwrapped
-            limits = lambda: np.array([base.brake.max_deceleration])  # noqa: E731
-            agent = Agent(FCWDriver(agent.agent, limits, base.config["policy_frequency"]))
-        return play(env, agent, task.seed)
-    finally:
-        env.close()

@@ -54,11 +54,6 @@ class SceneTable:
         self.object_counts[index] = read_objects(ego, view, self._object_bytes, index)
         return ego
 
-    def at(self, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the views of the arrays that belong to one environment; the first axes have length 1."""
-        here = slice(index, index + 1)
-        return self.scenes[here], self.objects[here], self.object_counts[here]
-
     def _take_views(self) -> None:
         self._scene_bytes = self.scenes.view(np.uint8).data
         self._object_bytes = self.objects.reshape(-1).view(np.uint8).data

@@ -1,29 +1,28 @@
 """`BrakingVectorEnv`: the compiled vector environment of all braking scenarios."""
 
 import copy as copying
-from typing import Any, cast
+from collections.abc import Sequence
+from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from lgmd_gym.engine.actions import Demands
-from lgmd_gym.engine.arguments import autoreset_mode_of, make_sensors, mask_of, seeds_of
-from lgmd_gym.engine.episodes import EpisodeQueue, Prepared
-from lgmd_gym.engine.infos import InfoArrays
-from lgmd_gym.engine.observations import Observations
-from lgmd_gym.engine.simulation import Rates, Simulation
-from lgmd_gym.engine.top_view import TopViews
-from lgmd_gym.envs.braking import BrakingEnv
+from lgmd_gym.engine.batch import BrakingBatch
 from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.registration import make_source
-from lgmd_gym.errors import check_flags, check_keys, check_mapping, check_whole, shown
-from lgmd_gym.neuron import LGMDParams, NeuronSpec
+from lgmd_gym.errors import (
+    check_flags,
+    check_keys,
+    check_known,
+    check_mapping,
+    check_whole,
+    is_integer,
+    shown,
+)
+from lgmd_gym.neuron import NeuronSpec
 from lgmd_gym.neuron.validation import MAX_THREADS
 from lgmd_gym.sensing.channel import LGMD, ChannelSpec
-from lgmd_gym.sensing.frame_rate import camera_rate
-from lgmd_gym.sensing.spaces import make_space
 
 _NAMES = (
     *("num_envs", "camera", "neuron", "params", "fps", "include_frame", "include_base", "trace", "config"),
@@ -31,6 +30,7 @@ _NAMES = (
 )
 
 MAX_ENVS = 65536
+_MODES = {mode.value for mode in AutoresetMode}
 
 
 class BrakingVectorEnv(VectorEnv):
@@ -100,31 +100,26 @@ class BrakingVectorEnv(VectorEnv):
             raise ValueError(
                 f"render_mode must be None or 'rgb_array' for a vector, got {shown(render_mode)}"
             )
-        self._single = BrakingEnv(source, config=config)
+        self.batch = batch = BrakingBatch(
+            [source] * self.num_envs,
+            config,
+            camera,
+            neuron,
+            params,
+            fps,
+            include_frame=include_frame,
+            include_base=include_base,
+            trace=trace,
+            threads=threads,
+        )
+        self.simulation = batch.simulation
         self.render_mode, self.copy = render_mode, copy
-        mode = autoreset_mode_of(autoreset_mode)
-        self.metadata = {**self._single.metadata, "autoreset_mode": mode}
-        settings = self._single.config
-        rates = Rates(
-            simulation=settings["simulation_frequency"],
-            policy=settings["policy_frequency"],
-            camera=camera_rate(fps, settings["simulation_frequency"]) if camera is not None else 1.0,
-        )
-        sensors = None
-        if camera is not None:
-            checked = LGMDParams.make(params)
-            sensors = make_sensors(camera, neuron, rates.camera, checked, self.num_envs)
-        self.simulation = Simulation(self.num_envs, rates, sensors, settings["throttle"], threads)
-        self.simulation.weights[:] = self._single.weights
-        self._queue = EpisodeQueue([source] * self.num_envs, ahead=threads > 1)
-        self._episodes: list[Prepared | None] = [None] * self.num_envs
-        self._demands = Demands(self._single.action_type)
-        self._top_views = TopViews(self.simulation, config or {})
-        self._make_spaces(include_frame, include_base)
-        self._observations = Observations(
-            self.simulation, self.single_observation_space, include_frame, include_base, copy
-        )
-        self._infos = InfoArrays(self.simulation, trace)
+        self.metadata = {**batch.single.metadata, "autoreset_mode": _autoreset_mode(autoreset_mode)}
+        self.single_action_space = copying.deepcopy(batch.single.action_space)
+        self.single_observation_space = batch.space
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self._observations = None if copy else batch.empty()
         self._ended = np.zeros(self.num_envs, np.bool_)
 
     def reset(
@@ -142,13 +137,13 @@ class BrakingVectorEnv(VectorEnv):
         """
         options = check_mapping("options", options)
         check_keys("option", options, ("reset_mask",))
-        mask = mask_of(options.get("reset_mask"), self.num_envs)
-        for index, value in enumerate(seeds_of(seed, self.num_envs)):
+        mask = _mask_of(options.get("reset_mask"), self.num_envs)
+        for index, value in enumerate(_seeds_of(seed, self.num_envs)):
             if mask[index]:
-                self._queue.seed(index, value)
-        self._start(mask)
+                self.batch.queue.seed(index, value)
+        self.batch.start(mask)
         self._ended[mask] = False
-        return self._observations.read(), self._infos.read(mask)
+        return self.read_observations(), self.read_infos(mask)
 
     def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Advance all environments by one decision.
@@ -158,7 +153,7 @@ class BrakingVectorEnv(VectorEnv):
                 autoreset mode "Disabled".
             RuntimeError: Before the first reset.
         """
-        if None in self._episodes:
+        if None in self.batch.episodes:
             raise RuntimeError("the environments have no episodes: call reset() before step()")
         mode, ended = self.metadata["autoreset_mode"], self._ended
         if mode == AutoresetMode.DISABLED and ended.any():
@@ -169,15 +164,15 @@ class BrakingVectorEnv(VectorEnv):
         restart = ended if mode == AutoresetMode.NEXT_STEP else np.zeros_like(ended)
         self.simulation.step(self.read_demands(actions), ~restart)
         if restart.any():
-            self._start(restart)
+            self.batch.start(restart)
         outcome = self.simulation.outcome
         result = outcome.rewards.copy(), outcome.terminated.copy(), outcome.truncated.copy()
         self._ended = result[1] | result[2]
         extra: dict[str, Any] = {}
         if mode == AutoresetMode.SAME_STEP and self._ended.any():
             extra = self._end_episodes(self._ended)
-        infos = self._infos.read(np.ones(self.num_envs, np.bool_))
-        return self._observations.read(), *result, infos | extra
+        infos = self.read_infos(np.ones(self.num_envs, np.bool_))
+        return self.read_observations(), *result, infos | extra
 
     def read_demands(self, actions: Any) -> np.ndarray:
         """Return the longitudinal demands of actions, in [-1, 1], float64, shape (num_envs,).
@@ -188,15 +183,28 @@ class BrakingVectorEnv(VectorEnv):
         Raises:
             ValueError: If an action is out of range.
         """
-        return self._demands.read(actions, self.num_envs)
+        return self.batch.read_demands(actions)
 
     def read_observations(self) -> Any:
         """Return the present observations of all environments."""
-        return self._observations.read()
+        return self.batch.observations(self._observations)
 
     def read_infos(self, selected: np.ndarray) -> dict[str, Any]:
-        """Return the infos of the selected environments, bool, shape (num_envs,)."""
-        return self._infos.read(selected)
+        """Return the infos of the selected environments in the format of Gymnasium's vector environments.
+
+        Every key `k` has an array of shape (num_envs,), with 0, False or None in other environments, and a
+        mask `_k` of the environments that have it.
+
+        Args:
+            selected: The environments, bool, shape (num_envs,).
+        """
+        arrays, traces = self.batch.infos(), self.batch.traces
+        if traces is not None:
+            arrays["lgmd/trace"] = np.full(self.num_envs, None, dtype=object)
+            for index in np.flatnonzero(selected).tolist():
+                arrays["lgmd/trace"][index] = traces.take(index)
+        infos: dict[str, Any] = {key: _only(values, selected) for key, values in arrays.items()}
+        return infos | {f"_{key}": selected.copy() for key in arrays}
 
     def scenario_of(self, index: int) -> Scenario:
         """Return the scenario of environment `index`.
@@ -204,7 +212,7 @@ class BrakingVectorEnv(VectorEnv):
         Raises:
             RuntimeError: Before its first reset.
         """
-        prepared = self._episodes[index]
+        prepared = self.batch.episodes[index]
         if prepared is None:
             raise RuntimeError("the environments have no episodes: call reset() before scenario_of()")
         return prepared.draw.placement.scenario
@@ -217,59 +225,80 @@ class BrakingVectorEnv(VectorEnv):
         """
         if self.render_mode is None:
             return None
-        episodes = [prepared for prepared in self._episodes if prepared is not None]
-        if len(episodes) < self.num_envs:
+        if None in self.batch.episodes:
             raise RuntimeError("the environments have no episodes: call reset() before render()")
-        return tuple(self._top_views.render(index, prepared) for index, prepared in enumerate(episodes))
+        frames: Any = tuple(self.batch.show(index).render() for index in range(self.num_envs))
+        return frames
 
     def close_extras(self, **kwargs: Any) -> None:
         """Stop background threads and close the cameras."""
-        self._queue.close()
-        self._top_views.close()
-        if self.simulation.sensors is not None:
-            self.simulation.sensors.close()
+        self.batch.close()
 
     @property
     def np_random(self) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Random generators of the environments."""
-        return tuple(self._queue.generators)
+        return tuple(self.batch.queue.generators)
 
     @property
     def np_random_seed(self) -> Any:
         """Last seeds of the environments."""
-        return tuple(self._queue.seeds)
-
-    def _start(self, selected: np.ndarray) -> None:
-        """Start new episodes in the selected environments."""
-        for index in np.flatnonzero(selected).tolist():
-            self._queue.seed(index, None)
-            prepared = self._queue.next(index)
-            brake = self._single.episode_brake(prepared.draw.brake)
-            self.simulation.load(index, prepared.draw, prepared.network, brake)
-            self._episodes[index] = prepared
-            self._infos.set_episode(index, prepared.draw.info)
-        self.simulation.start(selected)
+        return tuple(self.batch.queue.seeds)
 
     def _end_episodes(self, ended: np.ndarray) -> dict[str, Any]:
         """Restart environments at once; returns their final observations and infos."""
-        batch = self._observations.read(copy=True)
+        batch = self.batch.observations()
         final = np.full(self.num_envs, None, dtype=object)
         for index in np.flatnonzero(ended).tolist():
             final[index] = _item(batch, index)
-        infos = {"final_obs": final, "final_info": self._infos.read(ended)}
-        self._start(ended)
+        infos = {"final_obs": final, "final_info": self.read_infos(ended)}
+        self.batch.start(ended)
         return infos | {f"_{key}": ended.copy() for key in infos}
-
-    def _make_spaces(self, include_frame: bool, include_base: bool) -> None:
-        base, rates, sensors = self._single.observation_space, self.simulation.rates, self.simulation.sensors
-        self.single_action_space = copying.deepcopy(self._single.action_space)
-        self.single_observation_space = cast(gym.Space, base)
-        if sensors is not None:
-            included = base if include_base else None
-            self.single_observation_space = make_space(sensors, rates.simulation, include_frame, included)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
 
 def _item(batch: Any, index: int) -> Any:
     return {key: value[index] for key, value in batch.items()} if isinstance(batch, dict) else batch[index]
+
+
+def _only(values: np.ndarray, selected: np.ndarray) -> np.ndarray:
+    """Return a copy with the values of other environments set to 0, False or None."""
+    empty = np.full(values.shape, None, dtype=object) if values.dtype == object else np.zeros_like(values)
+    empty[selected] = values[selected]
+    return empty
+
+
+def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    """Return an autoreset mode; raise ValueError for an unknown one."""
+    if isinstance(mode, AutoresetMode):
+        return mode
+    return AutoresetMode(check_known("autoreset_mode", mode, _MODES))
+
+
+def _seeds_of(seed: Any, num_envs: int) -> list[int | None]:
+    """Return one seed per environment; raise ValueError for another number of seeds, or an invalid seed."""
+    if seed is None:
+        return [None] * num_envs
+    seeds = [seed + index for index in range(num_envs)] if is_integer(seed) else seed
+    seeds = seeds.tolist() if isinstance(seeds, np.ndarray) else seeds
+    if not isinstance(seeds, Sequence) or len(seeds) != num_envs:
+        raise ValueError(f"seed must be one number or {num_envs} numbers, got {shown(seed)}")
+    for value in seeds:
+        if value is not None and (not is_integer(value) or value < 0):
+            raise ValueError(f"seed must be None or integers >= 0, got {shown(value)}")
+    return [None if value is None else int(value) for value in seeds]
+
+
+def _mask_of(mask: Any, num_envs: int) -> np.ndarray:
+    """Return a selection of environments, bool, shape (num_envs,); None selects all.
+
+    Raises:
+        ValueError: If the mask has another type or shape, or selects no environment.
+    """
+    if mask is None:
+        return np.ones(num_envs, np.bool_)
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (num_envs,):
+        raise ValueError(
+            f"options['reset_mask'] must be a bool array of shape ({num_envs},), got {shown(mask)}"
+        )
+    if not mask.any():
+        raise ValueError("options['reset_mask'] must select at least one environment, got none")
+    return mask

@@ -276,8 +276,7 @@ def play(compiled: Compiled, point: float) -> Impact | None:
     while not done:
         _, _, terminated, truncated, _ = env.step(hold)
         done = terminated or truncated
-    physics = env.road.physics
-    bodies, episode = physics[0][0], physics[1][0]
+    bodies, episode = env.simulation.state.bodies[0], env.simulation.state.episodes[0]
     env.close()
     if episode["touched"] == 0 or episode["touched"] != episode["target"]:
         return None

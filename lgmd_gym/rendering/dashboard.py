@@ -26,7 +26,7 @@ from lgmd_gym.rendering.canvas import (
 )
 from lgmd_gym.rendering.display import DisplayState, danger_zone_edges, target_boxes
 from lgmd_gym.rendering.window import dummy_display
-from lgmd_gym.wrappers.observation import LGMDObservation, TraceFrame
+from lgmd_gym.wrappers import LGMDObservation, TraceFrame
 
 RASTER: PixelBox = (76, 562, 644, 590)
 PLOT: PixelBox = (76, 594, 644, 694)

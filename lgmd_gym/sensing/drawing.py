@@ -105,11 +105,7 @@ class Drawing:
             cameras = [in_scene(camera, scene) for camera in self._cameras if camera is not None]
             self._views[index] = view_of(cameras, scene)
         base: Any = env.unwrapped
-        write_scene = getattr(base, "write_scene", None)
-        if write_scene is None or base.road is None:
-            self.scene_table.read(base, self._views[index], index)
-        else:
-            write_scene(self.scene_table.at(index))
+        self.scene_table.read(base, self._views[index], index)
         self.set_road(index, base.road)
 
     def render_top_views(self, env: gym.Env, index: int, enabled: np.ndarray) -> None:

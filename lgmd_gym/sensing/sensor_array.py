@@ -134,9 +134,6 @@ class SensorArray:
     def read(self, env: gym.Env, index: int = 0) -> None:
         """Read the present state of a highway-env environment, and render its top views.
 
-        An environment with a method `write_scene`, such as `BrakingEnv`, writes its state itself: it receives
-        `scenes`, `objects` and `object_counts` of one environment.
-
         Args:
             env: The environment, wrapped or not, after its first reset.
             index: Index of the environment.
@@ -145,6 +142,15 @@ class SensorArray:
             ValueError: If the environment has no road or ego yet, or a pose is not finite.
         """
         self._drawing.read(env, index)
+        self.read_top_views(env, index)
+
+    @property
+    def has_top_views(self) -> bool:
+        """Whether highway-env draws one of the cameras."""
+        return any(isinstance(channel.camera, BirdsEye) for channel in self.channels)
+
+    def read_top_views(self, env: gym.Env, index: int = 0) -> None:
+        """Render the enabled cameras of environment `index` that highway-env draws."""
         self._drawing.render_top_views(env, index, self.enabled[index])
 
     def set_road(self, index: int, road: Any) -> None:

@@ -15,14 +15,14 @@ from typing import Any, TypeAlias
 import numpy as np
 from joblib import delayed
 
-from lgmd_gym.agents import BRAKE, HOLD, Agent, Rule, make_agent, to_action
-from lgmd_gym.agents.base import Actor
+from lgmd_gym.agents import BRAKE, HOLD, Agent, BatchAgent, Rule, make_agent
+from lgmd_gym.agents.base import Infos, Observations, rows_of
 from lgmd_gym.benchmark.case import Row, level_case
-from lgmd_gym.benchmark.episode import Episode, make_env, play
 from lgmd_gym.benchmark.metrics import Counterfactual, make_row
+from lgmd_gym.benchmark.player import play_agent, run_task
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
-from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
+from lgmd_gym.benchmark.task import NO_BRAKE, Task
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.envs.families.distribution import LEVELS
@@ -92,39 +92,37 @@ class NoBrakeRecording:
     steps: list[tuple[Values, Values]]
 
 
-class ObservationRecorder:
-    """Agent that never brakes and records its observations."""
-
-    alert = False
+class ObservationRecorder(BatchAgent):
+    """Agent of one environment that never brakes and records its observations."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.steps: list[tuple[Values, Values]] = []
 
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing."""
-
-    def act(self, observation: Values, info: Values) -> np.ndarray:
+    def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
         """Record the observation and return `HOLD`."""
-        sensor_info = {key: value for key, value in info.items() if key.startswith("lgmd/")}
-        self.steps.append((observation, sensor_info))
-        return to_action(HOLD)
+        sensor_info = {key: value for key, value in infos.row(0).items() if key.startswith("lgmd/")}
+        self.steps.append((rows_of(observations, 0), sensor_info))
+        return np.full(1, HOLD)
 
 
-class FixedOnsetBrake:
+class FixedOnsetBrake(BatchAgent):
     """Agent that brakes fully from the decision with index `onset` on; never for None."""
 
-    alert = False
+    reads_neuron = False
 
     def __init__(self, onset: int | None) -> None:
-        self._onset, self._decision = inf if onset is None else onset, -1
+        super().__init__()
+        self._onset = inf if onset is None else onset
 
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing."""
+    def initial(self) -> Values:
+        """Return the index of the decision before the first one."""
+        return {"decision": -1}
 
-    def act(self, observation: Values, info: Values) -> np.ndarray:
+    def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
         """Return `BRAKE` from the onset on, `HOLD` before."""
-        self._decision += 1
-        return to_action(BRAKE if self._decision >= self._onset else HOLD)
+        self.state["decision"] = self.state["decision"] + active
+        return np.where(self.state["decision"] >= self._onset, BRAKE, HOLD)
 
 
 class Objective:
@@ -212,7 +210,7 @@ def is_latching(agent: Agent) -> bool:
 def record(task: Task) -> NoBrakeRecording:
     """Simulate an episode without braking and return its recording."""
     recorder = ObservationRecorder()
-    episode = _simulate(task, recorder)
+    episode = play_agent(task, recorder)
     return NoBrakeRecording(task.seed, Counterfactual.of(episode), recorder.steps)
 
 
@@ -227,18 +225,10 @@ def find_onset(rule: Agent, recording: NoBrakeRecording) -> int | None:
 
 def simulate_onset(task: Task, counterfactual: Counterfactual, onset: int | None) -> Row:
     """Return the row of an episode with full braking from a decision on."""
-    episode = _simulate(task, FixedOnsetBrake(onset))
+    episode = play_agent(task, FixedOnsetBrake(onset))
     return make_row("", task.case, task.seed, episode, counterfactual)
 
 
 def simulate_no_brake(task: Task) -> Counterfactual:
     """Return the outcome of an episode without braking."""
-    return Counterfactual.of(_simulate(task, FixedOnsetBrake(None)))
-
-
-def _simulate(task: Task, agent: Actor) -> Episode:
-    env = make_env(task.case, task.sensor_config, task.arguments)
-    try:
-        return play(env, agent, task.seed)
-    finally:
-        env.close()
+    return Counterfactual.of(play_agent(task, FixedOnsetBrake(None)))

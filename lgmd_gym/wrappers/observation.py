@@ -2,7 +2,7 @@
 
 import json
 import warnings
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -11,25 +11,10 @@ from gymnasium.utils import RecordConstructorArgs
 from lgmd_gym.camera import Scene
 from lgmd_gym.errors import check_flags, check_mapping
 from lgmd_gym.neuron import LGMDParams, NeuronSpec, Response
+from lgmd_gym.sensing.assembly import Assembly, Traces, mean_yaw_rate, row_of
 from lgmd_gym.sensing.channel import LGMD, ChannelSpec, make_channels, plain_values
-from lgmd_gym.sensing.frame_rate import camera_rate
-from lgmd_gym.sensing.road_hook import check_highway_env, on_road_step
+from lgmd_gym.sensing.highway import SensorHost, camera_rate, check_highway_env, on_road_step
 from lgmd_gym.sensing.sensor_array import SensorArray
-from lgmd_gym.sensing.spaces import make_observation, make_space, signal_info, signal_keys, yaw_rate
-
-
-class TraceFrame(NamedTuple):
-    """Outputs of the neurons for one camera frame.
-
-    Attributes:
-        time: Simulated time since the reset [s].
-        ego_speed: Ego speed [m/s].
-        response: Outputs of the neurons, arrays of shape (cameras,).
-    """
-
-    time: float
-    ego_speed: float
-    response: Response
 
 
 class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
@@ -125,8 +110,10 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self.include_frame, self.include_base, self.trace = include_frame, include_base, trace
         self._requested_fps = fps
         self._was_reset = False
-        self._trace_frames: list[TraceFrame] = []
-        self._substeps, self._heading = 0, 0.0
+        self._substeps, self._last = 0, (0, 0.0)  # steps and heading at the last observation
+        self._hosted = isinstance(env.unwrapped, SensorHost)
+        if self._hosted:
+            _check_no_cameras(env)
         self.rendering_paused = False
         self._build_sensors()
         # After the checks of the arguments, because JSON has no other values.
@@ -152,26 +139,45 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
                 divide; the environment stays as it was.
         """
         self._check_frequency(options)
+        base_env = self._highway_env
+        if self._traces is not None:
+            self._traces.take(0)
+        if self._hosted:
+            self._attach()
         base, info = self.env.reset(seed=seed, options=options)
-        if self._highway_env.config["simulation_frequency"] != self._simulation_frequency:
+        changed = base_env.config["simulation_frequency"] != self._simulation_frequency
+        if changed:
             self._build_sensors()
-        self.sensors.reset()
-        self._set_scene()
-        on_road_step(self.env, self._on_substep)
-        self._substeps, self._trace_frames, self.rendering_paused = 0, [], False
-        self._was_reset = True
-        self._process_frame()
-        self._heading = float(self._highway_env.vehicle.heading)
-        return self._observation(base, 0.0), self._extend_info(info)
+        self._substeps, self._last = 0, (0, 0.0)
+        self.rendering_paused, self._was_reset = False, True
+        if not self._hosted:
+            self.sensors.reset()
+            self._set_scene()
+            on_road_step(self.env, self._on_substep)
+            self._process_frame()
+        elif changed:
+            self._attach()
+            base_env.restart_sensors()
+        return self._observation(base, *self._take_motion()), self._extend_info(info)
 
     def step(self, action: Any) -> tuple[dict[str, Any], Any, bool, bool, dict[str, Any]]:
         """Step the environment and process its camera frames."""
-        self._trace_frames = []
-        substeps, heading = self._substeps, self._heading
+        if not self._was_reset:
+            raise RuntimeError("reset must be called before step")
         base, reward, terminated, truncated, info = self.env.step(action)
-        self._heading = float(self._highway_env.vehicle.heading)
-        rate = yaw_rate(self._heading, heading, (self._substeps - substeps) / self._simulation_frequency)
-        return self._observation(base, rate), reward, terminated, truncated, self._extend_info(info)
+        observation = self._observation(base, *self._take_motion())
+        return observation, reward, terminated, truncated, self._extend_info(info)
+
+    @property
+    def rendering_paused(self) -> bool:
+        """Whether no frames are rendered until the next reset."""
+        return self._paused
+
+    @rendering_paused.setter
+    def rendering_paused(self, value: bool) -> None:
+        self._paused = value
+        if self._hosted:
+            self._highway_env.rendering_paused = value
 
     def close(self) -> None:
         """Close the cameras, then the environment."""
@@ -199,11 +205,16 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self._simulation_frequency = frequency
         self._stride = round(self._simulation_frequency / self.fps)
         self.sensors = SensorArray(self.channels, self.fps, self.params)
-        self._info_keys = [key for keys in signal_keys(self.sensors.names).values() for key in keys]
         base = self.env.observation_space if self.include_base else None
-        self.observation_space = make_space(
-            self.sensors, self._simulation_frequency, self.include_frame, base
-        )
+        self._assembly = Assembly(self.sensors, frequency, self.include_frame, base)
+        self._traces = Traces(self.sensors) if self.trace else None
+        self.observation_space = self._assembly.space
+
+    def _attach(self) -> None:
+        """Let the environment draw the frames inside its steps."""
+        base = self._highway_env
+        base.attach_sensors(self.sensors, self.fps)
+        base.simulation.on_frames = None if self._traces is None else self._on_frames
 
     def _set_scene(self) -> None:
         """Set the scene of the episode."""
@@ -231,25 +242,48 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
             return
         self.sensors.read(self._highway_env)
         self.sensors.process(0, 1)
-        if self.trace:
+        if self._traces is not None:
             time = self._substeps / self._simulation_frequency
-            speed = float(self._highway_env.vehicle.speed)
-            self._trace_frames.append(TraceFrame(time, speed, self.response))
+            self._traces.append(0, time, float(self._highway_env.vehicle.speed))
 
-    def _observation(self, base: Any, rate: float) -> dict[str, Any]:
-        if not self._was_reset:
-            raise RuntimeError("reset must be called before step")
-        speed = float(self._highway_env.vehicle.speed)
-        observation = make_observation(self.sensors, 0, speed, rate, self.include_frame)
+    def _on_frames(self, *_: Any) -> None:
+        assert self._traces is not None
+        simulation = self._highway_env.simulation
+        self._traces.append(0, float(simulation.times[0]), float(simulation.speeds[0]))
+
+    def _take_motion(self) -> tuple[float, float]:
+        """Return the ego speed [m/s] and the mean yaw rate since the last call or reset [rad/s]."""
+        base = self._highway_env
+        if self._hosted:
+            simulation = base.simulation
+            steps, speed = simulation.state.episodes["steps"].item(0), simulation.speeds.item(0)
+            heading = simulation.headings.item(0)
+        else:
+            steps, speed, heading = self._substeps, float(base.vehicle.speed), float(base.vehicle.heading)
+        (last_steps, last_heading), self._last = self._last, (steps, heading)
+        return speed, mean_yaw_rate(heading, last_heading, (steps - last_steps) / self._simulation_frequency)
+
+    def _observation(self, base: Any, speed: float, yaw_rate: float) -> dict[str, Any]:
+        observation = row_of(self._assembly.observations(speed, yaw_rate), 0)
         if self.include_base:
             observation["base"] = base
         return observation
 
     def _extend_info(self, info: dict[str, Any]) -> dict[str, Any]:
-        info = info | signal_info(self.sensors, 0, self._info_keys)
-        if self.trace:
-            info["lgmd/trace"] = self._trace_frames
+        info = info | row_of(self._assembly.infos(), 0)
+        if self._traces is not None:
+            info["lgmd/trace"] = self._traces.take(0)
         return info
+
+
+def _check_no_cameras(env: gym.Env) -> None:
+    """Raise ValueError if an environment that draws its own frames has cameras already."""
+    while isinstance(env, gym.Wrapper):
+        if isinstance(env, LGMDObservation):
+            raise ValueError(
+                "env must have no cameras, got LGMDObservation; use camera=None, or one list of cameras"
+            )
+        env = env.env
 
 
 def _to_json(value: Any) -> Any:

@@ -7,9 +7,10 @@ from support.roads import straight_env
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.zones import CAMERA_SETBACK, FIELDS, REACHES, SPAN_M, stopping_distance, zone_cameras
+from lgmd_gym.benchmark.player import run_task
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_case
-from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
+from lgmd_gym.benchmark.task import NO_BRAKE, Task
 from lgmd_gym.camera import EgoCamera
 
 BOTH = {"upright": 1.0, "low": 2.0}

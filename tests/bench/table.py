@@ -178,7 +178,7 @@ def envpool_rate():
 def shares(count=64):
     """Return the shares of camera, neuron, physics and the rest in a step of the engine on one thread."""
     from lgmd_gym.camera.batch import CameraBatch
-    from lgmd_gym.engine.simulation import Simulation
+    from lgmd_gym.envs.simulation import Simulation
 
     parts = {(CameraBatch, "draw"): 0.0, (LGMD, "step_range"): 0.0, (Simulation, "step"): 0.0}
     step, originals = engine(count), {key: getattr(*key) for key in parts}

@@ -10,16 +10,16 @@ from support.brakes import draw_all_brakes
 from support.runs import new_run, read_rows, sorted_rows
 
 from lgmd_gym.agents import AGENTS
-from lgmd_gym.benchmark import batch
-from lgmd_gym.benchmark.batch import BatchPlayer, play_unit
+from lgmd_gym.benchmark import player
 from lgmd_gym.benchmark.case import key_of, level_case
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.player import BatchPlayer, play_unit, run_task
 from lgmd_gym.benchmark.run_folder import read_series, series_name
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_case
-from lgmd_gym.benchmark.task import Task, run_task
+from lgmd_gym.benchmark.task import Task
 from lgmd_gym.benchmark.units import make_units
 from lgmd_gym.processes.pool import Executor
 
@@ -100,7 +100,7 @@ def _no_fallback(monkeypatch):
     def fail(task):
         raise AssertionError(f"{task.key} was run outside its batch")
 
-    monkeypatch.setattr(batch, "run_task", fail)
+    monkeypatch.setattr(player, "run_task", fail)
 
 
 @pytest.mark.usefixtures("_no_fallback")
@@ -134,7 +134,7 @@ def test_user_agent_is_called_for_each_environment():
 @pytest.mark.parametrize("width", [1, 40])
 def test_width_of_a_batch_does_not_change_the_results(monkeypatch, width):
     tasks = make_tasks("spike-threshold", CASES[:3])
-    monkeypatch.setattr(batch, "WIDTH", width)
+    monkeypatch.setattr(player, "WIDTH", width)
     assert_equal_results(play_batches(tasks), list(map(run_task, tasks)))
 
 
@@ -300,8 +300,8 @@ def test_run_gives_the_rows_and_series_of_single_tasks(tmp_path, jobs):
 def test_units_of_a_group_use_the_same_simulation(monkeypatch):
     """The second unit begins after a unit that was not played to its end."""
     made = []
-    monkeypatch.setattr(batch, "_players", {})
-    monkeypatch.setattr(batch, "BatchPlayer", lambda *arguments: made.append(1) or BatchPlayer(*arguments))
+    monkeypatch.setattr(player, "_players", {})
+    monkeypatch.setattr(player, "BatchPlayer", lambda *arguments: made.append(1) or BatchPlayer(*arguments))
     tasks = make_tasks("stopping-zone", CASES[1:3], seeds=(0, 1))
     (unit,) = make_units(tasks, 1)
     next(play_unit(unit._replace(tasks=tasks[:2])))
@@ -311,7 +311,7 @@ def test_units_of_a_group_use_the_same_simulation(monkeypatch):
     (again,) = make_units(tasks[:1], 1)  # the files of the agent may have changed
     next(play_unit(again))
     assert len(made) == 2
-    assert len(batch._players) == 1
+    assert len(player._players) == 1
 
 
 def test_results_appear_as_episodes_end():

@@ -8,12 +8,13 @@ import pytest
 from lgmd_gym.agents import AGENTS, BatchAgent, make_agent
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.config import RunConfig
-from lgmd_gym.benchmark.episode import make_env, play
+from lgmd_gym.benchmark.episode import make_env
 from lgmd_gym.benchmark.metrics import Counterfactual
+from lgmd_gym.benchmark.player import play_agent, run_task
 from lgmd_gym.benchmark.recorder import SERIES
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import SUITES, find_case, find_suite
-from lgmd_gym.benchmark.task import Task, run_task
+from lgmd_gym.benchmark.task import Task
 from lgmd_gym.camera import Camera
 from lgmd_gym.sensing.channel import Channel
 
@@ -67,8 +68,7 @@ def test_unknown_suite_and_case_suggest_the_nearest_name():
 
 
 def test_played_episode_has_contact_at_the_expected_time_and_speed():
-    env = make_env(SLOW_APPROACH, SensorConfig())
-    played = play(env, make_agent("no-brake"), 0)
+    played = play_agent(Task("no-brake", SLOW_APPROACH, 0, SensorConfig()), make_agent("no-brake").agent)
     assert played.collision
     assert played.relative_impact_speed == pytest.approx(5.556)
     assert Counterfactual.of(played).contact_time == pytest.approx(5.0, abs=0.05)

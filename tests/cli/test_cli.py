@@ -216,14 +216,12 @@ def test_bench_runs_the_traffic_suite(tmp_path):
 
 
 def test_a_failed_episode_gives_exit_code_one(tmp_path, monkeypatch, capsys):
-    from lgmd_gym.benchmark import batch
-    from lgmd_gym.benchmark import task as tasks
+    from lgmd_gym.benchmark import player
 
     def fail(*arguments):
         raise RuntimeError("no road today")
 
-    monkeypatch.setattr(batch, "_player", fail)
-    monkeypatch.setattr(tasks, "_play", fail)
+    monkeypatch.setattr(player, "BatchPlayer", fail)
     options = ["--jobs", "1", "--seeds", "1", "--agents", "no-brake", "--out", str(tmp_path / "run")]
     assert cli.run(["bench", *options]) == 1
     printed = " ".join(capsys.readouterr().out.split())

@@ -235,7 +235,7 @@ def test_errors_state_the_value_and_suggest_a_fix(call, words):
 def test_nan_action_raises():
     env = BrakingEnv(make_scenario("CCRs"))
     env.reset(seed=0)
-    with pytest.raises(ValueError, match=r"action must be one finite number in \[-1, 1\], got"):
+    with pytest.raises(ValueError, match=r"an action must be a finite number in \[-1, 1\], got nan"):
         env.step(np.array([np.nan]))
 
 

@@ -52,7 +52,7 @@ def outcome(scenario):
     while not done:
         _, _, terminated, truncated, info = env.step([0.0])
         steps, done = steps + 1, terminated or truncated
-    bodies = env.road.physics[0][0]
+    bodies = env.simulation.state.bodies[0]
     place = [bodies[name] for name in ("x", "y", "heading", "speed", "travelled")]
     return np.concatenate([[steps, info["impact_speed"], info["relative_impact_speed"]], *place])
 

@@ -10,9 +10,10 @@ from support.rollouts import HOLD
 
 from lgmd_gym import LGMDView
 from lgmd_gym.agents import make_agent
+from lgmd_gym.benchmark.player import run_task
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_case
-from lgmd_gym.benchmark.task import Task, run_task
+from lgmd_gym.benchmark.task import Task
 from lgmd_gym.cli import main as cli
 from lgmd_gym.rendering.playback import make_target, play_episode
 from lgmd_gym.rendering.window import DISPLAY_VARIABLES, Window

@@ -1,6 +1,6 @@
 """A source of episodes that draws brakes."""
 
-from lgmd_gym.benchmark import batch
+from lgmd_gym.benchmark import player
 from lgmd_gym.engine import vector_env
 from lgmd_gym.envs import registration
 from lgmd_gym.envs.dynamics.brake import draw_brake
@@ -25,5 +25,5 @@ def draw_all_brakes(monkeypatch):
     def drawing(*arguments):
         return DrawnBrakes(make_source(*arguments))
 
-    for module in (registration, vector_env, batch):
+    for module in (registration, vector_env, player):
         monkeypatch.setattr(module, "make_source", drawing)

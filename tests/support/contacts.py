@@ -19,9 +19,9 @@ class Contact:
             *_, terminated, truncated, self.info = env.step([0.0])
             done = terminated or truncated
         self.ego = env.ego
-        index = int(env.road.physics[1]["target"][0])
+        index = int(env.simulation.state.episodes["target"][0])
         self.target = env.road.items[index]
-        self.touched = int(env.road.physics[1]["touched"][0]) == index
+        self.touched = int(env.simulation.state.episodes["touched"][0]) == index
         self.travelled = env.ego.travelled
 
     def from_front(self, ahead, aside):

@@ -6,10 +6,10 @@ import numpy as np
 
 from lgmd_gym.agents import to_action
 from lgmd_gym.envs.traffic.env import TrafficEnv
+from lgmd_gym.sensing.assembly import mean_yaw_rate
 from lgmd_gym.sensing.channel import BIRDSEYE
-from lgmd_gym.sensing.road_hook import on_road_step
+from lgmd_gym.sensing.highway import on_road_step
 from lgmd_gym.sensing.sensor_array import SensorArray
-from lgmd_gym.sensing.spaces import yaw_rate
 
 
 class SceneFrame(NamedTuple):
@@ -86,7 +86,7 @@ class SceneReader:
         if demand is not None:
             env.action_type.act(to_action(demand))
         info, done = env.advance()
-        rate = yaw_rate(float(env.ego.heading), heading, (self._substeps - substeps) / self._hz)
+        rate = mean_yaw_rate(float(env.ego.heading), heading, (self._substeps - substeps) / self._hz)
         return Moment(info, float(env.ego.speed), rate, tuple(self._frames), done)
 
     def _on_substep(self) -> None:

@@ -15,8 +15,9 @@ from lgmd_gym._version import __version__
 from lgmd_gym.agents import make_agent
 from lgmd_gym.benchmark.case import Case, Row, relative_impact
 from lgmd_gym.benchmark.config import DEFAULT_AGENTS
+from lgmd_gym.benchmark.player import run_task
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.task import NO_BRAKE, Task, run_task
+from lgmd_gym.benchmark.task import NO_BRAKE, Task
 from lgmd_gym.camera import WEATHERS
 from lgmd_gym.envs.registration import RANDOM, RANDOM_TASKS
 from lgmd_gym.processes.files import complete_folder

@@ -18,7 +18,7 @@ import numpy as np
 
 from lgmd_gym.agents.base import HOLD
 from lgmd_gym.engine import BrakingVectorEnv
-from lgmd_gym.engine.simulation import Simulation
+from lgmd_gym.envs.simulation import Simulation
 from lgmd_gym.training.offline.episodes import (
     TRAFFIC,
     BrakingOutcome,
