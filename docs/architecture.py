@@ -15,6 +15,28 @@ import lgmd_gym
 ROOT = Path(lgmd_gym.__file__).resolve().parent
 WIDTH, ROW, HIGH = 960, 92, 50  # [px]: picture, distance of two rows, and height of a box
 FONT = "font-family='system-ui, sans-serif'"
+SUBJECTS = {
+    "cli": "the command lgmd-gym",
+    "report": "HTML page of a run, gallery",
+    "training": "stable-baselines3, offline",
+    "openscenario": "read and write scenarios",
+    "paper": "stimuli, claims, figures",
+    "rendering": "dashboard, window, video",
+    "tuning": "search of parameters",
+    "benchmark": "suites, runs, rows, scores",
+    "clips": "neuron on video files",
+    "agents": "rules, oracles, policies",
+    "engine": "N environments, compiled",
+    "plotting": "figures in one style",
+    "envs": "scenarios, physics, traffic",
+    "wrappers": "sensors for highway-env",
+    "sensing": "cameras with neurons",
+    "camera": "frames, worlds, weather",
+    "neuron": "LGMD and other models",
+    "kernels": "compilation",
+    "processes": "pool, files, signals",
+    "statistics": "intervals, bootstrap",
+}
 
 
 def modules() -> Iterator[tuple[str, Path]]:
@@ -66,12 +88,6 @@ def floors(graph: dict[str, set[str]]) -> list[list[str]]:
     return found
 
 
-def summary(room: str) -> str:
-    """Return the part of a room's docstring before the first colon or full stop."""
-    text = ast.get_docstring(ast.parse((ROOT / room / "__init__.py").read_text(encoding="utf-8"))) or ""
-    return text.splitlines()[0].split(":")[0].rstrip(".")
-
-
 def svg() -> str:
     """Return the picture."""
     graph = rooms()
@@ -101,6 +117,8 @@ def svg() -> str:
             "fill='#eef3fa' stroke='#4b6b94'/>"
             f"<text x='{x:.0f}' y='{y + 20:.0f}' text-anchor='middle' {FONT} font-size='14' "
             f"font-weight='600' fill='#1c2b3f'>{room}</text>"
+            f"<text x='{x:.0f}' y='{y + 38:.0f}' text-anchor='middle' {FONT} font-size='11' "
+            f"fill='#4a5a70'>{SUBJECTS.get(room, '')}</text>"
         )
     tip = (
         "<defs><marker id='tip' viewBox='0 0 8 8' refX='6' refY='4' markerWidth='7' markerHeight='7' "

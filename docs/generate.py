@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import architecture
 import figures
 from docstring_markdown import as_markdown
 from environment_pages import VIDEO_AGENT, all_cards, environment_page, id_of, overview_tables
@@ -48,6 +49,7 @@ def main(out: Path) -> None:
     (out / "commands.md").write_text(commands_page(), encoding="utf-8")
     (out / "benchmark.md").write_text(benchmark_table(), encoding="utf-8")
     figures.main(static)
+    architecture.main(static / "architecture.svg")
 
 
 def _record(card: ScenarioCard, static: Path) -> None:
