@@ -44,6 +44,8 @@ class Video:
     """Run folder; must not exist. Default: runs/video-DATE-TIME."""
     params: File = None
     """TOML file of LGMD parameters; replaces those of the configuration."""
+    neuron: str | None = None
+    """Neuron model, registered or MODULE:FACTORY. Default: lgmd."""
     threshold: Number = None
     """Alarm level T_sf [spikes/s]; it applies to one frame rate."""
     fps: Number = None
@@ -135,7 +137,7 @@ def _configs(options: Video) -> "dict[str, PlaybackConfig]":
 
     names = tuple(PLAYBACK_CONFIGS) if options.configs == ("all",) else dict.fromkeys(options.configs)
     values: dict[str, Any] = {
-        name: getattr(options, name) for name in ("fps", "size", "drop_duplicates", "roi")
+        name: getattr(options, name) for name in ("neuron", "fps", "size", "drop_duplicates", "roi")
     }
     params = read_params(options.params)
     if params is not None:

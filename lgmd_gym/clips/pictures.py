@@ -9,11 +9,12 @@ from PIL import Image, ImageDraw
 
 from lgmd_gym.clips.playback import BINS, ClipFrame, ClipSummary, PlaybackConfig
 from lgmd_gym.clips.video import VideoWriter
-from lgmd_gym.neuron import LGMD
+from lgmd_gym.neuron import FrameNeuron
 from lgmd_gym.plotting.style import COLOURS, STYLE, load_font, load_pyplot
 
 WIDTH, MAX_HEIGHT, PANEL = 960, 720, 210  # [px]
 SPAN = 5.0  # duration of the trace [s]
+FULL_LAYER = 64.0  # of G in `shown_layers`
 FULL_EXCITATION = 60.0  # excitation G with the strongest colour
 TEXT, FAINT, BACKGROUND, INACTIVE = (235, 235, 235), (150, 154, 162), (20, 22, 26), (45, 48, 54)
 BLUE, ORANGE, PINK = (86, 180, 233), (230, 159, 0), (204, 121, 167)
@@ -39,20 +40,20 @@ class OverlayWriter:
         self._history: deque[tuple[float, float, int]] = deque()
         self._fonts = {size: load_font(size) for size in (13, 16, 22)}
 
-    def write(self, frame: ClipFrame, neuron: LGMD) -> None:
+    def write(self, frame: ClipFrame, neuron: FrameNeuron) -> None:
         """Append the picture of one frame."""
         r = frame.response
         self._history.append((frame.time, r.spike_frequency, r.spikes))
         while self._history[0][0] < frame.time - SPAN:
             self._history.popleft()
-        self._writer.write(self.draw(frame, neuron.layers["G"]))
+        self._writer.write(self.draw(frame, _excitation(neuron)))
 
     def draw(self, frame: ClipFrame, excitation: np.ndarray) -> np.ndarray:
         """Return the overlay picture of one frame, RGB, uint8.
 
         Args:
             frame: Frame and response.
-            excitation: The G layer, shape (H, W).
+            excitation: Map of the excitation, shape (H, W).
         """
         height, width = frame.picture.shape[:2]
         scale = min(WIDTH / width, MAX_HEIGHT / height)
@@ -136,6 +137,15 @@ class OverlayWriter:
         self._text(pen, (left, top - 24), heading, 16)
         legend = f"{self.config.describe(self._fps)};  white lines: spikes"
         self._text(pen, (right, top - 22), legend, 13, fill=FAINT, anchor="ra")
+
+
+def _excitation(neuron: FrameNeuron) -> np.ndarray:
+    """Return the last layer that pictures show and that has the shape of the frame, on the scale of G."""
+    layers = neuron.layers
+    for name, layer in reversed(list(neuron.shown_layers.items())):
+        if layers[name].shape == neuron.shape:
+            return layers[name] * np.float32(FULL_LAYER / layer.full)
+    return np.zeros(neuron.shape, np.float32)
 
 
 def _blend(picture: np.ndarray, excitation: np.ndarray) -> np.ndarray:

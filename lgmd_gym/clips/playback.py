@@ -11,7 +11,7 @@ import numpy as np
 from lgmd_gym.clips.detection import SILENCE_S
 from lgmd_gym.clips.video import VideoReader, luma
 from lgmd_gym.errors import check_known
-from lgmd_gym.neuron import LGMD, LGMDParams, Response
+from lgmd_gym.neuron import LGMD, FrameNeuron, LGMDParams, Response, make
 
 RESPONSE_SIGNALS = [
     "spike_frequency",
@@ -26,6 +26,7 @@ TRACE_COLUMNS = (
     *RESPONSE_SIGNALS,
     *("excitation_latency_ms", "alert", "onset"),
 )
+LGMD_MODEL = "lgmd"  # its name in the registry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,21 +35,26 @@ class PlaybackConfig:
 
     Attributes:
         params: Neuron parameters.
+        neuron: Name of the neuron model, see `lgmd_gym.neuron.register`.
         fps: Rate to resample to [Hz]; None for the clip's.
         size: (width, height) to scale to [px]; None for the clip's.
         drop_duplicates: Threshold of the duplicate filter, a fraction of the typical difference between
             frames; 0 disables it. The neuron skips duplicates and holds its last response. A conversion from
             25 to 30 Hz makes every sixth frame a duplicate.
         roi: (top, left, height, width) of the neuron's region of interest [px]; None for the whole frame.
+            Only for the LGMD.
     """
 
     params: LGMDParams = field(default_factory=LGMDParams)
+    neuron: str = LGMD_MODEL
     fps: float | None = None
     size: tuple[int, int] | None = None
     drop_duplicates: float = 0.0
     roi: tuple[int, int, int, int] | None = None
 
     def __post_init__(self) -> None:
+        if self.roi is not None and self.neuron != LGMD_MODEL:
+            raise ValueError(f"roi requires the neuron {LGMD_MODEL}, got {self.neuron}; leave it out")
         if not 0.0 <= self.drop_duplicates < 1.0:
             raise ValueError(
                 f"drop_duplicates must be in [0, 1), got {self.drop_duplicates:g}; 0.25 is typical"
@@ -65,8 +71,9 @@ class PlaybackConfig:
         defaults = LGMDParams().to_dict()
         other = {n: v for n, v in self.params.to_dict().items() if v != defaults[n] and n != "t_sf"}
         listed = [f"{n} = {v}" for n, v in other.items()] if len(other) <= 2 else ["other parameters"]
+        model = [f"neuron {self.neuron}"] if self.neuron != LGMD_MODEL else []
         extra = [f"near-duplicates below {self.drop_duplicates:g} dropped"] if self.drop_duplicates else []
-        return ", ".join([f"T_sf = {self.params.t_sf:g} spikes/s {at}", *listed, *extra])
+        return ", ".join([f"T_sf = {self.params.t_sf:g} spikes/s {at}", *model, *listed, *extra])
 
 
 # The paper's model, variants with fewer false alarms, ablations and the previous model.
@@ -135,7 +142,7 @@ class ClipRun:
     def __init__(self, path: str | Path, config: PlaybackConfig) -> None:
         self.config = config
         self.reader = VideoReader(path, config.fps, config.size)
-        self.neuron: LGMD | None = None
+        self.neuron: FrameNeuron | None = None
         self.duplicates = 0
 
     def __iter__(self) -> Iterator[ClipFrame]:
@@ -147,7 +154,7 @@ class ClipRun:
         for frame, picture in enumerate(self.reader):
             grey = luma(picture)
             if self.neuron is None:
-                self.neuron = LGMD(grey.shape, fps, self.config.params, roi=self.config.roi)
+                self.neuron = self._make_neuron(grey.shape, fps)
             duplicate = duplicates.is_duplicate(grey)
             if response is None or not duplicate:
                 response = self.neuron.step(grey)
@@ -155,6 +162,12 @@ class ClipRun:
             onset = bool(response.alert) and silence >= min_silence
             silence = 0 if response.alert else silence + 1
             yield ClipFrame(frame, frame / fps, picture, duplicate, response, onset)
+
+    def _make_neuron(self, shape: tuple[int, int], fps: float) -> FrameNeuron:
+        config = self.config
+        if config.neuron == LGMD_MODEL:
+            return LGMD(shape, fps, config.params, roi=config.roi)
+        return make(config.neuron, shape, fps, params=config.params)
 
 
 class DuplicateFilter:

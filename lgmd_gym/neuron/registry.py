@@ -12,6 +12,7 @@ from lgmd_gym.errors import check_keys, check_known, check_text, shown
 from lgmd_gym.neuron.base import FrameNeuron, Layer, Response, Signal
 from lgmd_gym.neuron.lgmd.params import LGMDParams
 from lgmd_gym.neuron.validation import Frames
+from lgmd_gym.processes.user_modules import import_user_module
 
 
 class Model(Protocol):
@@ -101,6 +102,25 @@ def names() -> tuple[str, ...]:
     return tuple(_MODELS)
 
 
+def check_model(field: str, name: str) -> str:
+    """Return the name of a registered model, or of one that is imported and registered: MODULE:FACTORY.
+
+    Args:
+        field: Name of the argument, for the message.
+        name: The name.
+
+    Raises:
+        ValueError: For another name, with the nearest registered one, or a module that cannot be imported.
+    """
+    module, colon, factory = check_text(field, name).partition(":")
+    if colon and name not in _MODELS:
+        found: object = getattr(import_user_module(module, f"{field} {name!r}"), factory, None)
+        if not callable(found):
+            raise ValueError(f"{field} {name!r} cannot be imported: {module} has no function {factory}")
+        register(name, found)
+    return check_known(field, name, _MODELS)
+
+
 def make(
     name: str,
     shape: tuple[int, int],
@@ -126,7 +146,7 @@ def make(
     Raises:
         ValueError: For an unknown name, or a model without columns or shift where they are needed.
     """
-    registered = _MODELS[check_known("neuron", name, _MODELS)]
+    registered = _MODELS[check_model("neuron", name)]
     params = LGMDParams() if params is None else params
     further = (params,) if registered.takes_params else ()
     model = registered.factory(shape, fps, 1 if num is None else num, *further)

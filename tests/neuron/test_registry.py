@@ -6,8 +6,13 @@ import pickle
 import gymnasium as gym
 import numpy as np
 import pytest
+from support.clips import write_lossless
 
 from lgmd_gym import neuron
+from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.suites import SUITES
+from lgmd_gym.benchmark.task import Task, run_task
+from lgmd_gym.clips.playback import ClipRun, PlaybackConfig
 from lgmd_gym.neuron import LGMDParams, Signal
 
 
@@ -60,6 +65,32 @@ def test_an_own_model_in_environments_and_the_engine():
     assert changed
     assert one["ffi"][1] == 0.0
     assert one["column_potential"].max() > 0.5
+
+
+def test_an_own_model_in_the_benchmark():
+    case = SUITES["quick"].cases[0]
+    result = run_task(Task("spike-threshold:threshold=2", case, 0, SensorConfig(camera=CAMERAS[1])))
+    assert result.row["error"] is None
+    assert result.series["spike_frequency"].max() > 0.0
+
+
+def test_an_own_model_in_clips(tmp_path):
+    rng = np.random.default_rng(0)
+    frames = rng.integers(0, 256, (6, 48, 64), np.uint8)
+    path = write_lossless(tmp_path / "clip.mkv", list(frames))
+    played = list(ClipRun(path, PlaybackConfig(neuron="change")))
+    assert [frame.response.spike_frequency > 50.0 for frame in played] == [False] + [True] * 5
+    with pytest.raises(ValueError, match="roi requires the neuron lgmd, got change"):
+        PlaybackConfig(neuron="change", roi=(0, 0, 4, 4))
+
+
+def test_a_model_of_a_module_is_imported(tmp_path, monkeypatch):
+    source = "from lgmd_gym.neuron import DSN\n\n\ndef make(*a): return DSN(a[0], num=a[2])"
+    (tmp_path / "my_neurons.py").write_text(source)
+    monkeypatch.syspath_prepend(tmp_path)
+    assert neuron.make("my_neurons:make", (8, 8)).step(np.zeros((8, 8))).membrane_potential == 0.5
+    with pytest.raises(ValueError, match="my_neurons has no function mak"):
+        neuron.make("my_neurons:mak", (8, 8))
 
 
 @pytest.mark.parametrize("twin", [copy.deepcopy, lambda neurons: pickle.loads(pickle.dumps(neurons))])
