@@ -126,7 +126,7 @@ def test_a_file_without_card_names_the_remedy(model, tmp_path):
     ({"vec_normalize": "model.json"}, "vec_normalize .* cannot be loaded"),
     ({"cameras": "fovea"}, "unknown card field 'cameras'; did you mean 'camera'?"),
     ({"demands": [2.0]}, r"demand must be in \[-1, 1\], got 2.0"),
-    ({"neuron": {"t_ff": 1}}, "unknown LGMD parameter 't_ff'"),
+    ({"neuron": {"t_ff": 1}}, "unknown LGMD field 't_ff'"),
 ])  # fmt: skip
 def test_a_wrong_card_is_refused(model, values, words, tmp_path):
     path = tmp_path / "model.zip"

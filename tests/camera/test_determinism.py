@@ -10,6 +10,7 @@ from support.roads import add_car, straight_env
 DIGEST = """
 import hashlib, sys
 sys.path.insert(0, {tests!r})
+from support.cameras import ego_camera
 from support.roads import straight_env, add_car
 digest = hashlib.sha256()
 for name in ("wide", "fovea"):

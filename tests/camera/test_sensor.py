@@ -167,12 +167,12 @@ def test_first_frame_of_an_episode_has_its_own_gain():
     env, camera = straight_env(), ego_camera("wide", auto_exposure_s=5.0, roadside=0.0)
     drive_under_a_bridge(camera)
     env.steps = 3
-    assert np.array_equal(camera.render(env), EgoCamera(camera.camera).render(env))
+    assert np.array_equal(camera.render(env), EgoCamera(camera.camera, camera.scene).render(env))
     env.steps = 9
     camera.render(env)
     add_mark(env, 50.0, 3.5, **BRIDGE)
     env.steps = 0
-    assert np.array_equal(camera.render(env), EgoCamera(camera.camera).render(env))
+    assert np.array_equal(camera.render(env), EgoCamera(camera.camera, camera.scene).render(env))
 
 
 @pytest.mark.parametrize(
@@ -188,4 +188,4 @@ def test_copy_continues_with_the_same_gain(copied):
     for env.steps in (20, 30):
         frame = camera.render(env)
         assert np.array_equal(clone.render(env), frame)
-    assert not np.array_equal(EgoCamera(camera.camera).render(env), frame)
+    assert not np.array_equal(EgoCamera(camera.camera, camera.scene).render(env), frame)

@@ -99,7 +99,7 @@ def test_fcw_cells_have_the_driver(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("inside", "weather"),
+    ("inside", "expected"),
     [
         (SUN.format(100000), None),
         (SUN.format(50), None),
@@ -111,9 +111,9 @@ def test_fcw_cells_have_the_driver(tmp_path):
         ('<Precipitation precipitationType="dry" precipitationIntensity="0"/>', None),
     ],
 )
-def test_environments_set_the_weather(tmp_path, inside, weather):
+def test_environments_set_the_weather(tmp_path, inside, expected):
     (case,) = read(write(tmp_path, scenario(START, globals_=weather(inside)))).cases
-    assert dict(case.arguments).get("weather") == weather
+    assert dict(case.arguments).get("weather") == expected
 
 
 @pytest.mark.parametrize(
