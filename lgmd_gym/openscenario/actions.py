@@ -6,12 +6,12 @@ from math import cos, inf, pi
 from lgmd_gym.envs.dynamics.path import rear_axle_path
 from lgmd_gym.openscenario.motion import Place, Timeline, Track, synchronise
 from lgmd_gym.openscenario.nodes import Element, LocatedError
-from lgmd_gym.openscenario.world import Mover, World, reads_front_axle
+from lgmd_gym.openscenario.world import Mover, ScenarioMap, reads_front_axle
 
 _ON_PATH = 0.1  # [m] from a trajectory within which an entity can begin to follow it
 
 
-def settle(world: World, mover: Mover) -> None:
+def settle(world: ScenarioMap, mover: Mover) -> None:
     """Set the path of an entity that follows no trajectory: along its road, or straight on."""
     start = mover.start
     if mover.follows or start is None:
@@ -28,7 +28,7 @@ def settle(world: World, mover: Mover) -> None:
         mover.track = Track(ahead, whole.part(whole.nearest(start)).bends)
 
 
-def teleport(item: Element, mover: Mover, world: World, time: float) -> float:
+def teleport(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
     """Place an entity at the start."""
     only_at_start(item, time)
     place = world.place(item.child("Position"))
@@ -43,7 +43,7 @@ def teleport(item: Element, mover: Mover, world: World, time: float) -> float:
     return time
 
 
-def follow_trajectory(item: Element, mover: Mover, world: World, time: float) -> float:
+def follow_trajectory(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
     """Let an entity follow a trajectory from its start, or from where it is."""
     if item.child("TimeReference").find("None") is None:
         raise item.error("a TimeReference with Timing is not supported; use None")
@@ -74,12 +74,12 @@ def _continue(item: Element, mover: Mover, time: float, rest: Track) -> float:
     return mover.timeline.time_of(distance + rest.length)
 
 
-def assign_route(item: Element, mover: Mover, world: World, time: float) -> float:
+def assign_route(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
     """Let an entity follow a route at its present distance beside the roads' reference lines."""
     return _follow_route(item, mover, world.route(item).shifted, time)
 
 
-def acquire_position(item: Element, mover: Mover, world: World, time: float) -> float:
+def acquire_position(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
     """Let an entity drive to a position on the shortest way."""
     here = mover.place(time)
     road, s, _ = world.locate(here)
@@ -106,7 +106,7 @@ def _follow_route(item: Element, mover: Mover, shifted: Callable[[float], Track]
     return inf
 
 
-def assign_controller(item: Element, mover: Mover, world: World, time: float) -> float:
+def assign_controller(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
     """Set the control point of an entity."""
     assign = item.find("AssignControllerAction")
     if assign is not None:
@@ -124,7 +124,7 @@ def _apart(one: Place, other: Place) -> float:
     return ((one.x - other.x) ** 2 + (one.y - other.y) ** 2) ** 0.5
 
 
-def speed(item: Element, mover: Mover, world: World, time: float) -> float:
+def speed(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
     """Change an entity's speed."""
     dynamics, now = item.child("SpeedActionDynamics"), mover.timeline.at(time).speed
     target = item.child("SpeedActionTarget").only("AbsoluteTargetSpeed", "RelativeTargetSpeed")
@@ -155,7 +155,7 @@ def speed(item: Element, mover: Mover, world: World, time: float) -> float:
     return _change(item, mover, world, time, acceleration, value)
 
 
-def _step(item: Element, mover: Mover, world: World, time: float, value: float) -> float:
+def _step(item: Element, mover: Mover, world: ScenarioMap, time: float, value: float) -> float:
     if time == 0.0:
         mover.timeline, mover.leader = Timeline(abs(value)), None
         mover.backwards = value < 0.0
@@ -172,7 +172,7 @@ def _step(item: Element, mover: Mover, world: World, time: float, value: float) 
 def _change(
     item: Element,
     mover: Mover,
-    world: World,
+    world: ScenarioMap,
     time: float,
     acceleration: float,
     final: float,
@@ -189,7 +189,7 @@ def _change(
     return end
 
 
-def speed_profile(item: Element, mover: Mover, world: World, time: float) -> float:
+def speed_profile(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
     """Change an entity's speed in steps, within limits of acceleration and jerk.
 
     The acceleration builds up with the given rate and ends at once.
@@ -211,7 +211,7 @@ def speed_profile(item: Element, mover: Mover, world: World, time: float) -> flo
     return time
 
 
-def longitudinal_distance(item: Element, mover: Mover, world: World, time: float) -> float:
+def longitudinal_distance(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
     """Place an entity at a distance ahead of or behind another at the start."""
     other = world.mover(item)
     if item.find("DynamicConstraints") is not None:
@@ -240,7 +240,7 @@ def _time_gap(item: Element, mover: Mover, time: float) -> float:
     return item.number("timeGap") * mover.timeline.at(time).speed
 
 
-def synchronize(item: Element, mover: Mover, world: World, time: float) -> float:
+def synchronize(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
     """Change an entity's speed so that it reaches a place when another entity reaches its own."""
     master = world.mover(item, "masterEntityRef")
     for name in ("targetTolerance", "targetToleranceMaster"):
@@ -256,7 +256,7 @@ def synchronize(item: Element, mover: Mover, world: World, time: float) -> float
     distance = mover.track.nearest(place) - now.distance
     final, steady = _final_speed(item, master, arrival)
     try:
-        changes = synchronise(now, distance, arrival - time, final, steady).changes
+        changes = synchronise(now, distance, arrival - time, final, steady)
     except ValueError as error:
         raise item.error(f"SynchronizeAction of {mover.name!r}: {error}") from None
     for start, acceleration, value in changes:
@@ -285,9 +285,9 @@ def _final_speed(
 
 
 AT_START = 0.2  # [s] within which an entity may be deleted
-Run = Callable[[float], float]
+ActionRun = Callable[[float], float]
 """Carries out an action at a time [s] and returns the time of its end."""
-_PRIVATE: dict[str, dict[str, Callable[[Element, Mover, World, float], float]]] = {
+_PRIVATE: dict[str, dict[str, Callable[[Element, Mover, ScenarioMap, float], float]]] = {
     "LongitudinalAction": {
         "SpeedAction": speed,
         "SpeedProfileAction": speed_profile,
@@ -308,7 +308,7 @@ NO_EFFECT = ("AppearanceAction", "ActivateControllerAction", "VariableAction")
 """Known actions that have no effect on the motion."""
 
 
-def private_action(item: Element, mover: Mover, world: World) -> Run | None:
+def private_action(item: Element, mover: Mover, world: ScenarioMap) -> ActionRun | None:
     """Return the function of a `PrivateAction`, or None for an action without effect.
 
     Raises:
@@ -334,7 +334,7 @@ def private_action(item: Element, mover: Mover, world: World) -> Run | None:
     return run
 
 
-def global_action(item: Element, world: World) -> Run | None:
+def global_action(item: Element, world: ScenarioMap) -> ActionRun | None:
     """Return the function of a `GlobalAction` in a story, or None for an action without effect."""
     found = item.only("EntityAction", *NO_EFFECT)
     if found.tag in NO_EFFECT:

@@ -22,7 +22,7 @@ from lgmd_gym.openscenario.nodes import Element, LocatedError, check_used
 from lgmd_gym.openscenario.parameters import Catalogs
 from lgmd_gym.openscenario.roads import Road, RoadNetwork, read_roads
 from lgmd_gym.openscenario.storyboard import read_story, run_init
-from lgmd_gym.openscenario.world import Mover, World, read_entities
+from lgmd_gym.openscenario.world import Mover, ScenarioMap, read_entities
 
 NIGHT_LUX = 50.0
 """Illuminance of the sun below which it is night; twilight of a street is about 10 lx, a dull day 1000 lx."""
@@ -176,7 +176,7 @@ class Compiled:
     contact: float
     ego: Mover
     target: Mover | None
-    world: World
+    world: ScenarioMap
     root: Element
     properties: dict[str, str]
 
@@ -195,7 +195,7 @@ def compile_scenario(root: Element, family: str) -> Compiled:
     catalogs = Catalogs(root)
     movers = read_entities(root, catalogs)
     network = root.child("RoadNetwork").child("LogicFile")
-    world = World(read_roads(_file(network)), catalogs, movers)
+    world = ScenarioMap(read_roads(_file(network)), catalogs, movers)
     board = root.child("Storyboard")
     environment = run_init(board, world)
     weather = weather_of(environment)
@@ -217,7 +217,7 @@ def _file(item: Element) -> Path:
     return item.node.file.parent / item.text("filepath")
 
 
-def _compile(root: Element, world: World, ego: Mover, family: str, weather: str) -> Compiled:
+def _compile(root: Element, world: ScenarioMap, ego: Mover, family: str, weather: str) -> Compiled:
     others = [item for item in world.movers.values() if item is not ego and not item.deleted]
     contact, target = _first_contact(ego, [item for item in others if item.body.kind != "road_marking"])
     properties = _properties(root)

@@ -9,7 +9,7 @@ from math import cos, inf
 
 from lgmd_gym.openscenario.nodes import Element, LocatedError
 from lgmd_gym.openscenario.parameters import RULES, compare
-from lgmd_gym.openscenario.world import Mover, World
+from lgmd_gym.openscenario.world import Mover, ScenarioMap
 
 _CLOSE = 1e-9
 _NEVER = 1e9  # [s], for times that are undefined
@@ -17,7 +17,7 @@ Test = Callable[[float], bool]
 """Whether a condition holds at a time [s]."""
 
 
-def entity_test(item: Element, world: World) -> Test:
+def entity_test(item: Element, world: ScenarioMap) -> Test:
     """Return the test of a `ByEntityCondition`.
 
     Raises:
@@ -49,27 +49,27 @@ def _limit(item: Element) -> Callable[[float], bool]:
     return lambda value: meets(value, rule, limit)
 
 
-def _speed(item: Element, mover: Mover, world: World) -> Test:
+def _speed(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     met = _limit(item)
     return lambda time: met(mover.timeline.at(time).speed * (-1.0 if mover.backwards else 1.0))
 
 
-def _relative_speed(item: Element, mover: Mover, world: World) -> Test:
+def _relative_speed(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     met, other = _limit(item), world.mover(item)
     return lambda time: met(mover.timeline.at(time).speed - other.timeline.at(time).speed)
 
 
-def _acceleration(item: Element, mover: Mover, world: World) -> Test:
+def _acceleration(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     met = _limit(item)
     return lambda time: met(mover.timeline.at(time).acceleration)
 
 
-def _traveled_distance(item: Element, mover: Mover, world: World) -> Test:
+def _traveled_distance(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     value = item.number("value")
     return lambda time: mover.timeline.at(time).distance >= value - _CLOSE
 
 
-def _stand_still(item: Element, mover: Mover, world: World) -> Test:
+def _stand_still(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     duration = item.number("duration")
 
     def holds(time: float) -> bool:
@@ -90,7 +90,7 @@ def _gap(one: Mover, other: Mover, freespace: bool, time: float) -> tuple[float,
     return abs(along), seen.y
 
 
-def _relative_distance(item: Element, mover: Mover, world: World) -> Test:
+def _relative_distance(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     met, other, freespace = _limit(item), world.mover(item), item.flag("freespace")
     kinds = ("longitudinal", "lateral", "cartesianDistance", "euclidianDistance")
     kind = item.choice("relativeDistanceType", kinds)
@@ -107,7 +107,7 @@ def _relative_distance(item: Element, mover: Mover, world: World) -> Test:
     return holds
 
 
-def _reach_position(item: Element, mover: Mover, world: World) -> Test:
+def _reach_position(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     place, tolerance = world.place(item.child("Position")), item.number("tolerance")
 
     def holds(time: float) -> bool:
@@ -117,7 +117,7 @@ def _reach_position(item: Element, mover: Mover, world: World) -> Test:
     return holds
 
 
-def _distance(item: Element, mover: Mover, world: World) -> Test:
+def _distance(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     met, place = _limit(item), world.place(item.child("Position"))
     _no_freespace(item)
 
@@ -128,7 +128,7 @@ def _distance(item: Element, mover: Mover, world: World) -> Test:
     return holds
 
 
-def _time_to_collision(item: Element, mover: Mover, world: World) -> Test:
+def _time_to_collision(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     met, freespace = _limit(item), item.flag("freespace")
     target = item.child("TimeToCollisionConditionTarget").only("EntityRef", "Position")
     if target.tag == "EntityRef":
@@ -155,7 +155,7 @@ def _closing_time(one: Mover, other: Mover, freespace: bool, time: float) -> flo
     return along / closing if closing > 0.0 and ahead else _NEVER
 
 
-def _time_headway(item: Element, mover: Mover, world: World) -> Test:
+def _time_headway(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     met, other, freespace = _limit(item), world.mover(item), item.flag("freespace")
 
     def holds(time: float) -> bool:
@@ -170,7 +170,7 @@ def _no_freespace(item: Element) -> None:
         raise item.error(f"{item.tag} with freespace to a position is not supported; use freespace=false")
 
 
-_ENTITY: dict[str, Callable[[Element, Mover, World], Test]] = {
+_ENTITY: dict[str, Callable[[Element, Mover, ScenarioMap], Test]] = {
     "SpeedCondition": _speed,
     "RelativeSpeedCondition": _relative_speed,
     "AccelerationCondition": _acceleration,
@@ -279,7 +279,7 @@ class Trigger:
         return inf
 
 
-def read_trigger(item: Element | None, world: World, states: States) -> Trigger:
+def read_trigger(item: Element | None, world: ScenarioMap, states: States) -> Trigger:
     """Return a `StartTrigger`; None is one at once.
 
     Args:
@@ -298,7 +298,7 @@ def read_trigger(item: Element | None, world: World, states: States) -> Trigger:
     return Trigger(groups)
 
 
-def _condition(item: Element, world: World, states: States) -> Condition:
+def _condition(item: Element, world: ScenarioMap, states: States) -> Condition:
     edge, delay = item.choice("conditionEdge", EDGES), item.number("delay", 0.0)
     kind = item.only("ByValueCondition", "ByEntityCondition")
     if kind.tag == "ByValueCondition":

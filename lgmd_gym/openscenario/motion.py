@@ -270,15 +270,13 @@ def _reach(piece: Piece, distance: float, end: float) -> float:
     return piece.time + high
 
 
-class Approach(NamedTuple):
-    """Changes of speed with which an entity reaches a place at a time: start, acceleration, final speed."""
-
-    changes: tuple[tuple[float, float, float], ...]
+SpeedChange = tuple[float, float, float]
+"""Start [s], acceleration [m/s²] and final speed [m/s]."""
 
 
 def synchronise(
     now: Piece, distance: float, duration: float, final_speed: float | None, steady: tuple[float, float]
-) -> Approach:
+) -> tuple[SpeedChange, ...]:
     """Return the changes of speed with which an entity covers a distance in a given time.
 
     The entity has the final speed for the steady distance or time at the end. Before, it waits and then
@@ -314,7 +312,7 @@ def synchronise(
         begin = start + time - ramp if share <= 0.5 else start
         return _checked(((begin, change / ramp, final_speed),), start, speed)
     if abs(change) <= _CLOSE and abs(mean - speed) * time < 1e-6:
-        return Approach(())
+        return ()
     middle = 2.0 * mean - (speed + final_speed) / 2
     half = time / 2
     return _checked(
@@ -327,11 +325,11 @@ def synchronise(
     )
 
 
-def _checked(changes: tuple[tuple[float, float, float], ...], start: float, speed: float) -> Approach:
+def _checked(changes: tuple[SpeedChange, ...], start: float, speed: float) -> tuple[SpeedChange, ...]:
     for begin, acceleration, final_speed in changes:
         if final_speed < 0.0:
             raise ValueError(f"a speed of {final_speed:.3g} m/s would be needed; start later or further away")
         if abs(acceleration) > 12.0:
             raise ValueError(f"an acceleration of {acceleration:.3g} m/s² would be needed; start earlier")
         assert begin >= start - _CLOSE, (begin, start, speed)
-    return Approach(changes)
+    return changes

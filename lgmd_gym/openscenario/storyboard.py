@@ -3,11 +3,11 @@
 from dataclasses import dataclass, field
 from math import inf
 
-from lgmd_gym.openscenario.actions import Run, global_action, private_action, settle
+from lgmd_gym.openscenario.actions import ActionRun, global_action, private_action, settle
 from lgmd_gym.openscenario.conditions import States, Trigger, read_trigger
 from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.parameters import declare
-from lgmd_gym.openscenario.world import Mover, World
+from lgmd_gym.openscenario.world import Mover, ScenarioMap
 
 
 @dataclass(eq=False)
@@ -27,7 +27,7 @@ class Event:
     item: Element
     triggers: tuple[Element | None, Element | None]
     groups: list[tuple[str, str]]
-    runs: list[tuple[str, Run]]
+    runs: list[tuple[str, ActionRun]]
     compiled: tuple[Trigger, Trigger] | None = None
     started: float = inf
     ended: float = inf
@@ -45,7 +45,7 @@ class Storyboard:
     events: list[Event]
     states: States = field(default_factory=dict)
 
-    def play(self, world: World) -> None:
+    def play(self, world: ScenarioMap) -> None:
         """Carry out all events that have an effect, in the order of their triggers.
 
         Raises:
@@ -114,7 +114,7 @@ def _references(trigger: Element) -> list[Element]:
     return found
 
 
-def run_init(board: Element, world: World) -> Element | None:
+def run_init(board: Element, world: ScenarioMap) -> Element | None:
     """Carry out the initial actions; return the environment, None without one.
 
     Raises:
@@ -138,7 +138,7 @@ def run_init(board: Element, world: World) -> Element | None:
     return environment
 
 
-def read_story(board: Element, world: World) -> Storyboard:
+def read_story(board: Element, world: ScenarioMap) -> Storyboard:
     """Return the events of all stories.
 
     Raises:
@@ -158,7 +158,7 @@ def read_story(board: Element, world: World) -> Storyboard:
 
 
 def _group_events(
-    story: Element, act: Element, trigger: Element | None, group: Element, world: World
+    story: Element, act: Element, trigger: Element | None, group: Element, world: ScenarioMap
 ) -> list[Event]:
     _once(group)
     actors = group.child("Actors")
@@ -179,7 +179,7 @@ def _group_events(
     return events
 
 
-def _runs(action: Element, movers: list[Mover], world: World) -> list[tuple[str, Run]]:
+def _runs(action: Element, movers: list[Mover], world: ScenarioMap) -> list[tuple[str, ActionRun]]:
     found = action.only("PrivateAction", "GlobalAction")
     if found.tag == "GlobalAction":
         runs = [global_action(found, world)]

@@ -33,7 +33,7 @@ _OWN = ("ego", "car", "box", "road_marking", "pedestrian", "bicycle", "motorcycl
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Body:
+class EntityBody:
     """Size and kind of an entity.
 
     Attributes:
@@ -73,7 +73,7 @@ class Mover:
     """
 
     name: str
-    body: Body
+    body: EntityBody
     track: Track | None = None
     start: Place | None = None
     follows: bool = False
@@ -139,7 +139,7 @@ def reads_front_axle(item: Element, catalogs: Catalogs) -> bool:
     return front_axle
 
 
-def _body(item: Element) -> Body:
+def _body(item: Element) -> EntityBody:
     box = item.child("BoundingBox")
     centre, size = box.child("Center"), box.child("Dimensions")
     if centre.number("y", 0.0) != 0.0:
@@ -150,7 +150,7 @@ def _body(item: Element) -> Body:
         shade = None if SHADE not in properties else check_whole(SHADE, float(properties[SHADE]), 0, 255)
     except ValueError as error:
         raise item.error(str(error)) from None
-    return Body(
+    return EntityBody(
         kind=kind,
         length=size.number("length"),
         width=size.number("width"),
@@ -198,7 +198,7 @@ POSITIONS = (
 )
 
 
-class World:
+class ScenarioMap:
     """Roads, catalogs and entities.
 
     Args:

@@ -11,7 +11,18 @@ from lgmd_gym.benchmark.protocols.car_to_car_2023 import OVERLAPS, colour_weight
 from lgmd_gym.benchmark.summary import AgentSummary, without_fcw_driver, write_csv
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.processes.files import replace_file
-from lgmd_gym.report.svg import INK, RULE, SOFT, Axis, Element, Panel, element, file_text, label, new_panel
+from lgmd_gym.report.svg import (
+    INK,
+    RULE,
+    SOFT,
+    Element,
+    Panel,
+    PanelAxis,
+    element,
+    file_text,
+    label,
+    new_panel,
+)
 from lgmd_gym.statistics.intervals import Rate
 
 MAX_SPEEDS = 25  # test speeds of a family from which they are rounded to `COARSE`
@@ -123,7 +134,7 @@ def impact_points(rows: list[Row], agents: list[str], condition: str) -> list[Im
 def _impact_panel(points: list[ImpactPoint], agents: list[str]) -> Element:
     """Draw one family; the thin diagonal is an impact at test speed."""
     high = max(10.0, *(point.speed for point in points), *(point.mean for point in points)) * 1.04
-    axes = Axis("test speed [km/h]", high), Axis("mean impact speed [km/h]", high)
+    axes = PanelAxis("test speed [km/h]", high), PanelAxis("mean impact speed [km/h]", high)
     panel = Panel(points[0].family, *axes, family=points[0].family)
     (x1, y1), (x2, y2) = panel.point(0.0, 0.0), panel.point(high, high)
     ends = {"x1": f"{x1:.1f}", "y1": f"{y1:.1f}", "x2": f"{x2:.1f}", "y2": f"{y2:.1f}"}
@@ -161,7 +172,10 @@ def avoidance_figure(rows: list[Row], agents: list[str], condition: str) -> Repo
     if not summaries:
         return None
     title = f"Avoided threats against false activations, {condition}"
-    axes = Axis("false activations [% of non-threats]", 104.0), Axis("avoided [% of threats]", 104.0)
+    axes = (
+        PanelAxis("false activations [% of non-threats]", 104.0),
+        PanelAxis("avoided [% of threats]", 104.0),
+    )
     panel = Panel(condition, *axes, size=(420.0, 300.0))
     drawn: list[tuple[float, float]] = []
     for item in summaries:

@@ -31,7 +31,7 @@ LEFT, RIGHT, TOP, BOTTOM = 40.0, 12.0, 26.0, 36.0
 NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-class Axis(NamedTuple):
+class PanelAxis(NamedTuple):
     """Axis from 0 to `high` with its label."""
 
     label: str
@@ -69,7 +69,7 @@ class Panel:
     """
 
     def __init__(
-        self, title: str, x: Axis, y: Axis, size: tuple[float, float] = (320.0, 220.0), **data: str
+        self, title: str, x: PanelAxis, y: PanelAxis, size: tuple[float, float] = (320.0, 220.0), **data: str
     ) -> None:
         self.x, self.y, self.size = x, y, size
         self.root = new_panel(title, size, **data)

@@ -19,9 +19,9 @@ from lgmd_gym.envs.dynamics.script import Bend
 from lgmd_gym.openscenario.motion import Place, Track, section
 from lgmd_gym.openscenario.parameters import Catalogs
 from lgmd_gym.openscenario.roads import read_roads
-from lgmd_gym.openscenario.world import Body, Mover, World
+from lgmd_gym.openscenario.world import EntityBody, Mover, ScenarioMap
 
-CAR = Body(kind="car", length=4.0, width=2.0, height=1.5, reference=0.0)
+CAR = EntityBody(kind="car", length=4.0, width=2.0, height=1.5, reference=0.0)
 
 
 def close(place, x, y, heading):
@@ -104,7 +104,7 @@ def world(tmp_path):
     roads = read_roads(path.with_name("road.xodr"))
     root = element(tmp_path, "<OpenSCENARIO><CatalogLocations/></OpenSCENARIO>")
     mover = Mover("Ego", CAR, track=Track(HERE))
-    return World(roads, Catalogs(root), {"Ego": mover})
+    return ScenarioMap(roads, Catalogs(root), {"Ego": mover})
 
 
 ROUTE = """<RouteRef><Route name="r" closed="false">
