@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 from multiprocessing import current_process
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -180,6 +180,10 @@ def source_observation(name: str) -> str:
     return DERIVED_INPUTS[name][0] if name in DERIVED_INPUTS else name
 
 
+Chosen: TypeAlias = np.ndarray | slice
+"""Rows of arrays of environments."""
+
+
 class FeatureHistory:
     """Features of a policy over its last decisions, in N environments.
 
@@ -221,21 +225,22 @@ class FeatureHistory:
         Raises:
             ValueError: If an observation is missing, or comes from other cameras than an input requires.
         """
-        rows = np.arange(len(self._updated)) if rows is None else rows
+        chosen = self._chosen(rows)
         for name in self._required:
             if name not in observations:
                 raise ValueError(f"the policy requires the observation {name!r}, got {sorted(observations)}")
         for name in self._kept:
-            self._write(f"observation/{name}", rows, np.asarray(observations[name])[rows])
-        first = ~self._updated[rows]
+            self._write(f"observation/{name}", chosen, np.asarray(observations[name])[chosen])
+        first = ~self._updated[chosen]
+        first = first if first.any() else None
         if "spike_peak" in self.features.inputs:
-            frequency = np.asarray(observations["spike_frequency"])[rows]
-            decayed = PEAK_DECAY * self._read("peak", rows, frequency)
-            self._write("peak", rows, np.where(first[:, None], frequency, np.maximum(frequency, decayed)))
+            frequency = np.asarray(observations["spike_frequency"])[chosen]
+            decayed = PEAK_DECAY * self._read("peak", chosen, frequency)
+            self._write("peak", chosen, _where(first, frequency, np.maximum(frequency, decayed)))
         for name in self._zones:
-            level = levels_of(name, np.asarray(observations[ZONE_INPUTS[name].source])[rows])
-            self._update_zone(name, rows, level, first[:, None])
-        self._updated[rows] = True
+            level = levels_of(name, np.asarray(observations[ZONE_INPUTS[name].source])[chosen])
+            self._update_zone(name, chosen, level, first)
+        self._updated[chosen] = True
 
     def stack(self, rows: np.ndarray | None = None) -> dict[str, np.ndarray]:
         """Append the present features to the histories and return the histories of each input.
@@ -246,68 +251,75 @@ class FeatureHistory:
         Returns:
             Features, oldest first, arrays of shape (M, …).
         """
-        rows = np.arange(len(self._updated)) if rows is None else rows
-        stacked = {name: self._append(name, rows, self._feature(name, rows)) for name in self.features.inputs}
-        self._stacked[rows] = True
+        chosen = self._chosen(rows)
+        first = ~self._stacked[chosen]
+        first = first if first.any() else None
+        stacked = {name: self._append(name, chosen, first) for name in self.features.inputs}
+        self._stacked[chosen] = True
         return stacked
 
-    def _append(self, name: str, rows: np.ndarray, feature: np.ndarray) -> np.ndarray:
-        """Append features to the histories of an input and return these."""
-        length = self.features.history_of(name)
+    def _append(self, name: str, chosen: Chosen, first: np.ndarray | None) -> np.ndarray:
+        """Append the present features of an input to its histories and return these."""
+        feature, length = self._feature(name, chosen, first), self.features.history_of(name)
         if length == 1:
             return feature
         filled = np.repeat(feature[:, None], length, axis=1)
-        history = self._read(f"history/{name}", rows, filled)
-        appended = np.concatenate([history[:, 1:], feature[:, None]], axis=1)
-        first = ~self._stacked[rows].reshape(-1, *[1] * feature.ndim)
-        history = np.where(first, filled, appended)
-        self._write(f"history/{name}", rows, history)
+        history = self._read(f"history/{name}", chosen, filled)
+        history = _where(first, filled, np.concatenate([history[:, 1:], feature[:, None]], axis=1))
+        self._write(f"history/{name}", chosen, history)
         return np.concatenate(list(np.moveaxis(history, 1, 0)), axis=-1)
 
-    def _feature(self, name: str, rows: np.ndarray) -> np.ndarray:
-        """Return the present feature of some environments."""
+    def _feature(self, name: str, chosen: Chosen, first: np.ndarray | None) -> np.ndarray:
+        """Return the present feature of some environments, a new array."""
         if name in ZONE_INPUTS:
-            level, last, averages = (
-                self._state[f"{part}/{name}"][rows] for part in ("level", "last", "mean")
-            )
-            averages = averages.reshape(len(rows), -1)
-            return np.concatenate([weaker(level, last), averages], axis=1).astype(self._zone_type)
-        value = self._state[f"observation/{source_observation(name)}"][rows]
+            level, last, mean = (self._state[f"{part}/{name}"][chosen] for part in ("level", "last", "mean"))
+            parts = [weaker(level, last), mean.reshape(len(level), -1)]
+            return np.concatenate(parts, axis=1).astype(self._zone_type)
+        value = self._state[f"observation/{source_observation(name)}"][chosen]
         if name == FRAME:
             return shrink_frames(value, self.features.shrink)
         if name == "speed_change":
-            last = np.where(self._stacked[rows, None], self._read("speed", rows, value), value)
-            self._write("speed", rows, value)
+            last = _where(first, value, self._read("speed", chosen, value)).copy()
+            self._write("speed", chosen, value)
             value = value - last
         elif name == "spike_peak":
-            value = self._state["peak"][rows]
+            value = self._state["peak"][chosen]
         offset, scale = SCALES.get(name) or (0.0, DERIVED_INPUTS[name][1])
         return np.clip((value - offset) / scale, -CLIP, CLIP).astype(np.float32)
 
-    def _update_zone(self, name: str, rows: np.ndarray, level: np.ndarray, first: np.ndarray) -> None:
+    def _update_zone(self, name: str, chosen: Chosen, level: np.ndarray, first: np.ndarray | None) -> None:
         """Process the levels of the fields of an input, shape (M, fields)."""
-        last = np.where(first, level, self._read(f"level/{name}", rows, level))
-        before = np.zeros((len(rows), NUM_LEVELS - 1, level.shape[1]))
-        averages = np.where(first[:, None], 0.0, self._read(f"mean/{name}", rows, before))
-        averages += GAINS * (level[:, None] - averages)
-        for part, values in (("last", last), ("level", level), ("mean", averages)):
-            self._write(f"{part}/{name}", rows, values)
+        last = _where(first, level, self._read(f"level/{name}", chosen, level))
+        zeros = np.zeros((len(level), NUM_LEVELS - 1, level.shape[1])) if first is not None else level
+        mean = _where(first, zeros, self._read(f"mean/{name}", chosen, zeros))
+        self._write(f"last/{name}", chosen, last)
+        self._write(f"level/{name}", chosen, level)
+        self._write(f"mean/{name}", chosen, mean + GAINS * (level[:, None] - mean))
 
-    def _read(self, name: str, rows: np.ndarray, default: np.ndarray) -> np.ndarray:
+    def _chosen(self, rows: np.ndarray | None) -> Chosen:
+        """Return the rows of arrays of the state; a slice, which makes no copies, for all of them."""
+        return slice(None) if rows is None or len(rows) == len(self._updated) else rows
+
+    def _read(self, name: str, chosen: Chosen, default: np.ndarray) -> np.ndarray:
         """Return an array of the state for some environments; the default before the first `_write`."""
-        return self._state[name][rows] if name in self._state else default
+        return self._state[name][chosen] if name in self._state else default
 
-    def _write(self, name: str, rows: np.ndarray, values: np.ndarray) -> None:
+    def _write(self, name: str, chosen: Chosen, values: np.ndarray) -> None:
         """Set an array of the state for some environments."""
         if name not in self._state:
             self._state[name] = np.zeros((len(self._updated), *values.shape[1:]), values.dtype)
-        self._state[name][rows] = values
+        self._state[name][chosen] = values
+
+
+def _where(first: np.ndarray | None, values: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return the values of the environments selected by `first`, else others; `first` is None for none."""
+    return others if first is None else np.where(first.reshape(-1, *[1] * (values.ndim - 1)), values, others)
 
 
 def shrink_frames(frames: np.ndarray, side: int) -> np.ndarray:
     """Return frames, uint8 (N, height, width, channels), with blocks of `side` × `side` px averaged."""
     if side == 1:
-        return frames
+        return frames.copy()
     count, height, width, channels = frames.shape
     rows, columns = height // side, width // side
     blocks = frames[:, : rows * side, : columns * side].reshape(count, rows, side, columns, side, channels)
