@@ -107,7 +107,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         check_flags(include_frame=include_frame, include_base=include_base, trace=trace)
         self.params = LGMDParams.make(params)
         self.channels, self._scene = make_channels(camera, neuron), Scene.make(scene)
-        self.include_frame, self.include_base, self.trace = include_frame, include_base, trace
+        self.include_frame, self.include_base, self._trace = include_frame, include_base, trace
         self._requested_fps = fps
         self._was_reset = False
         self._substeps, self._last = 0, (0, 0.0)  # steps and heading at the last observation
@@ -179,6 +179,16 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         if self._hosted:
             self._highway_env.rendering_paused = value
 
+    @property
+    def trace(self) -> bool:
+        """Whether the info has ``lgmd/trace``; a change applies from the next reset on."""
+        return self._trace
+
+    @trace.setter
+    def trace(self, value: bool) -> None:
+        self._trace = value
+        self._traces = Traces(self.sensors) if value else None
+
     def close(self) -> None:
         """Close the cameras, then the environment."""
         self.sensors.close()
@@ -207,7 +217,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self.sensors = SensorArray(self.channels, self.fps, self.params)
         base = self.env.observation_space if self.include_base else None
         self._assembly = Assembly(self.sensors, frequency, self.include_frame, base)
-        self._traces = Traces(self.sensors) if self.trace else None
+        self.trace = self._trace
         self.observation_space = self._assembly.space
 
     def _attach(self) -> None:

@@ -9,9 +9,10 @@ import pytest
 from support.clips import write_lossless
 
 from lgmd_gym import neuron
+from lgmd_gym.benchmark.player import run_task
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import SUITES
-from lgmd_gym.benchmark.task import Task, run_task
+from lgmd_gym.benchmark.task import Task
 from lgmd_gym.clips.playback import ClipRun, PlaybackConfig
 from lgmd_gym.neuron import LGMDParams, Signal
 

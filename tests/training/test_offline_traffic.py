@@ -85,7 +85,7 @@ def test_observations_equal_those_of_the_benchmark(monkeypatch, seed):
     monkeypatch.setattr(traffic, "segment_bounds", lambda non_threat, policy_hz: [(0, len(non_threat))])
     ((whole,),) = TrafficRecorder("train", "fovea").record(range(seed, seed + 1))
     appearance, sensors = Appearance(world="laboratory", weather="fog"), SensorConfig(camera="fovea")
-    steps = Recorded(list(traffic.KINDS)[seed], seed, sensors, config, appearance).steps
+    steps = Recorded(list(traffic.TRAFFIC_KINDS)[seed], seed, sensors, config, appearance).steps
     assert len(whole) == len(steps) - 1  # no action follows the last observation
     for name, array in whole.observations.items():
         assert np.array_equal(array, np.stack([step.observation[name] for step in steps[:-1]]))
