@@ -201,7 +201,7 @@ class BrakingEnv(EgoBrakeEnv):
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Advance by one decision; see `AbstractEnv.step`."""
-        if self.vehicle is None:
+        if not self.controlled_vehicles:
             raise RuntimeError("the environment has no episode: call reset() before step()")
         self.time += 1 / self.config["policy_frequency"]
         self._simulate(action)
@@ -213,9 +213,10 @@ class BrakingEnv(EgoBrakeEnv):
 
     def _simulate(self, action: Any = None) -> None:
         """Advance by the simulation steps of one decision."""
-        if action is not None and not self.config["manual_control"]:
-            self.action_type.act(action)
         simulation = self.simulation
+        if action is not None and not self.config["manual_control"]:
+            # As `action_type.act`, without bringing the vehicles up to date.
+            simulation.clock.demands[:] = self.action_type.decoder.read(np.reshape(action, -1), 1)
         on_step = self._automatic_rendering if self.viewer is not None and self.enable_auto_render else None
         simulation.step(simulation.clock.demands, _SELECTED, not self.rendering_paused, on_step)
         self.steps = int(simulation.state.episodes["steps"][0])

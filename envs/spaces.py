@@ -41,7 +41,7 @@ class Demands:
         values = _numbers(actions, num_envs)
         if self._table is None:
             _check_each(values, np.isfinite(values), "a finite number in [-1, 1]")
-            return np.clip(values, -1.0, 1.0)
+            return np.minimum(np.maximum(values, -1.0), 1.0)  # faster than np.clip
         last = len(self._table) - 1
         known = (values >= 0) & (values <= last) & (values == np.floor(values))
         _check_each(values, known, f"an index in [0, {last}]")

@@ -100,6 +100,7 @@ class Assembly:
         base: spaces.Space[Any] | None = None,
     ) -> None:
         self._sensors, self._include_frame = sensors, include_frame
+        self._has_columns = any(sensors.columns)
         parts = _spaces(sensors, simulation_frequency, include_frame)
         self._shapes = [(name, box.shape, box.dtype) for name, box in parts.items()]
         every: dict[str, spaces.Space[Any]] = {**parts} if base is None else {**parts, "base": base}
@@ -129,7 +130,7 @@ class Assembly:
         out["ego_yaw_rate"][:, 0] = yaw_rates
         if sensors.known_decelerations is not None:
             out["known_deceleration"][:] = sensors.known_decelerations
-        if any(sensors.columns):
+        if self._has_columns:
             out["column_potential"][:] = sensors.column_potentials()
         if self._include_frame:
             np.copyto(out["frame"], sensors.stacked_frames().transpose(0, 2, 3, 1))
