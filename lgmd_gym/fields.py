@@ -33,6 +33,7 @@ from lgmd_gym.errors import (
     shown,
 )
 
+_NO_VALUE = object()  # no field has this value
 _KEY = "lgmd_gym"  # of the declaration in the metadata of a dataclass field
 _R = TypeVar("_R", bound=type)
 
@@ -294,7 +295,7 @@ def declarations(cls: type) -> tuple[Declaration, ...]:
 def _checks(cls: type[Record]) -> tuple[tuple[str, str, Callable[[str, Any], Any], Any], ...]:
     """Return name, name in messages, check, and the default that needs no check of each declared field.
 
-    The last is `...` if there is no default, or if the check converts or refuses it.
+    The last is `_NO_VALUE` if there is no default, or if the check converts or refuses it.
     """
     found: list[tuple[str, str, Callable[[str, Any], Any], Any]] = []
     for item in declarations(cls):
@@ -303,7 +304,7 @@ def _checks(cls: type[Record]) -> tuple[tuple[str, str, Callable[[str, Any], Any
             unchanged = default is not dataclasses.MISSING and item.check(label, default) is default
         except ValueError:
             unchanged = False
-        found.append((item.name, label, item.check, default if unchanged else ...))
+        found.append((item.name, label, item.check, default if unchanged else _NO_VALUE))
     return tuple(found)
 
 

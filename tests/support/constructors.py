@@ -264,7 +264,7 @@ def _add_runs(add):
     add("RunConfig", benchmark.RunConfig, {}, None, lambda made: made.to_dict())
     add("Executor", benchmark.Executor, {})
     add("run", lambda config: benchmark.run(config), {"config": None}, {"config": "int"})
-    add("Case", case, {"name": "a/b", "family": "CCRs", "arguments": ()}, signature_of(Case))
+    add("Case", case, {"suite": "a", "family": "CCRs", "variant": "b"}, signature_of(Case))
     add("find_suite", find_suite, {"name": "quick"}, {"name": "str"})
     add("get_suite", get_suite, {"source": "quick"})
     add(
