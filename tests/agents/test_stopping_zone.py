@@ -30,7 +30,7 @@ def test_fields_cover_the_rows_of_their_zones(speed):
         ego_camera = EgoCamera(camera)
         ego_camera.render(env)
         height, width = camera["shape"]
-        distance = camera["reach"] * stopping_distance(speed, 8.0, 0.5)
+        distance = camera["gaze"]["reach"] * stopping_distance(speed, 8.0, 0.5)
         x, y = distance + env.vehicle.LENGTH / 2, env.vehicle.position[1]
         (left, far), (right, _) = ego_camera.project([(x, y - SPAN_M / 2, 0.0), (x, y + SPAN_M / 2, 0.0)])
         # A unit is the angle 1.2 m / depth: half of the width in pixels.
