@@ -125,6 +125,18 @@ def test_links_between_pages_resolve():
                 assert (path.parent / target).exists(), f"{path.name} links to {target}"
 
 
+def test_paths_on_the_page_about_the_architecture_exist():
+    paths = re.findall(r"`([\w./]+/[\w./]*)`", (DOCS / "architecture.md").read_text())
+    assert len(paths) > 20
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
+def test_every_experiment_is_on_the_list():
+    text = (DOCS / "experiments" / "README.md").read_text()
+    found = {path.relative_to(DOCS / "experiments").parts[0] for path in (DOCS / "experiments").rglob("*.py")}
+    assert [name for name in found if f"`{name.removesuffix('.py')}" not in text] == []
+
+
 def test_the_reference_lists_every_row_key_and_agent():
     metrics = (DOCS / "reference" / "metrics.md").read_text()
     assert [key for key in KEYS if f"`{key}`" not in metrics] == []
