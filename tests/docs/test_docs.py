@@ -1,5 +1,6 @@
 """The documentation: its code blocks run, its links resolve, and the reference is complete."""
 
+import pkgutil
 import re
 import shlex
 import sys
@@ -123,6 +124,17 @@ def test_links_between_pages_resolve():
         for target in re.findall(r"\]\(([^)#]+)\)", path.read_text()):
             if not target.startswith("http") and "_generated" not in target:
                 assert (path.parent / target).exists(), f"{path.name} links to {target}"
+
+
+def test_names_of_the_package_on_the_pages_resolve():
+    wrong = []
+    for path in [ROOT / "README.md", *PAGES]:
+        for name in set(re.findall(r"\blgmd_gym(?:\.\w+)+", path.read_text())):
+            try:
+                pkgutil.resolve_name(name)
+            except (ImportError, AttributeError):
+                wrong.append(f"{path.name}: {name}")
+    assert wrong == []
 
 
 def test_paths_on_the_page_about_the_architecture_exist():
