@@ -44,7 +44,7 @@ ORDER = (
 # Within these folders, the sub-folders in the same order; "" is the folder's own files.
 ORDER_WITHIN = {
     "benchmark": ("analysis", ""),
-    "envs": ("traffic", "", "highway", "families", "dynamics"),
+    "envs": ("traffic", "", "families", "dynamics"),  # `highway` is on the floor of the folder's own files
     "training": ("", "offline"),
 }
 
