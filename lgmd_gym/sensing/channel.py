@@ -6,7 +6,7 @@ from typing import Any, TypeAlias, cast
 from lgmd_gym import neuron as models
 from lgmd_gym.camera.birdseye import BirdsEye
 from lgmd_gym.camera.camera import PRESETS, Camera, CameraItem
-from lgmd_gym.errors import as_tuple, check_keys, check_known, shown
+from lgmd_gym.errors import as_tuple, check_keys, shown
 from lgmd_gym.fields import Record, record, text, value, whole
 
 BIRDSEYE = "birdseye"
@@ -45,7 +45,7 @@ class Channel(Record):
     )
     neuron: str = value(
         LGMD,
-        lambda name, neuron: check_known(name, neuron, models.names()),
+        models.check_model,
         "Name of the model that processes the frames, see `lgmd_gym.neuron.register`.",
     )
     columns: int = whole(
@@ -84,7 +84,7 @@ def make_channels(camera: ChannelSpec, neuron: str = LGMD) -> tuple[Channel, ...
     Raises:
         ValueError: For an unknown name or field, a value out of range, an empty sequence, or a repeated name.
     """
-    check_known("neuron", neuron, models.names())
+    models.check_model("neuron", neuron)
     items = as_tuple(camera)
     channels = tuple(_make_channel(item, neuron) for item in ((camera,) if items is None else items))
     if not channels:
