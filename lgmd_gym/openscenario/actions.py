@@ -264,9 +264,7 @@ def synchronize(item: Element, mover: Mover, world: ScenarioMap, time: float) ->
     return arrival
 
 
-def _final_speed(
-    item: Element, master: Mover, arrival: float
-) -> tuple[float | None, tuple[float, float]]:  # fmt: skip
+def _final_speed(item: Element, master: Mover, arrival: float) -> tuple[float | None, tuple[float, float]]:
     """Return the final speed, None for any, and the distance and time at the end with it."""
     block = item.find("FinalSpeed")
     if block is None:

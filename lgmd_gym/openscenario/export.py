@@ -180,10 +180,15 @@ def scenario_xml(scenario: Scenario, road: str, weather: str = CLEAR, fcw_driver
 def _ego(scenario: Scenario) -> Actor:
     """Return the ego as an actor at the origin."""
     return Actor(
-        gap=0.0, speed=scenario.ego_speed, profile=scenario.ego_profile, path=scenario.ego_path,
-        length=scenario.ego_length, width=scenario.ego_width, height=EGO_HEIGHT,
+        gap=0.0,
+        speed=scenario.ego_speed,
+        profile=scenario.ego_profile,
+        path=scenario.ego_path,
+        length=scenario.ego_length,
+        width=scenario.ego_width,
+        height=EGO_HEIGHT,
         reference=scenario.ego_reference,
-    )  # fmt: skip
+    )
 
 
 def _add(parent: ET.Element, tag: str, **attributes: Any) -> ET.Element:

@@ -222,22 +222,26 @@ def _clips(detections: Sequence[ClipDetection]) -> list[ClaimResult]:
     rows = []
     if total.hits.n:
         significant = total.p_value < 0.05
-        rows.append(ClaimResult(
-            "crash clips: alarm shortly before the crash, few earlier alarms",
-            f"onset in the last 1.5 s: {total.hits.k} of {total.hits.n}, by chance "
-            f"{total.chance.probability:.2f} [{total.chance.low:.2f}–{total.chance.high:.2f}] each, "
-            f"p = {total.p_value:.1g} at its upper bound; earlier frames in alarm "
-            f"{100 * total.alarm_frames.k / max(total.alarm_frames.n, 1):.0f} %",
-            HOLDS if total.hits.k == total.hits.n and significant else PARTLY if total.hits.k else FAILS,
-            "T_sf relative to the frame rate, T_sp, sigma_3; texture that passes close to the camera",
-        ))  # fmt: skip
+        rows.append(
+            ClaimResult(
+                "crash clips: alarm shortly before the crash, few earlier alarms",
+                f"onset in the last 1.5 s: {total.hits.k} of {total.hits.n}, by chance "
+                f"{total.chance.probability:.2f} [{total.chance.low:.2f}–{total.chance.high:.2f}] each, "
+                f"p = {total.p_value:.1g} at its upper bound; earlier frames in alarm "
+                f"{100 * total.alarm_frames.k / max(total.alarm_frames.n, 1):.0f} %",
+                HOLDS if total.hits.k == total.hits.n and significant else PARTLY if total.hits.k else FAILS,
+                "T_sf relative to the frame rate, T_sp, sigma_3; texture that passes close to the camera",
+            )
+        )
     if no_crash:
-        rows.append(ClaimResult(
-            "near-miss clips: no alarm",
-            f"{len(silent)} of {len(no_crash)} ({', '.join(silent) or 'none'})",
-            _grade(len(silent), len(no_crash)),
-            "vehicles that pass close to the camera, a weakness that the paper names",
-        ))  # fmt: skip
+        rows.append(
+            ClaimResult(
+                "near-miss clips: no alarm",
+                f"{len(silent)} of {len(no_crash)} ({', '.join(silent) or 'none'})",
+                _grade(len(silent), len(no_crash)),
+                "vehicles that pass close to the camera, a weakness that the paper names",
+            )
+        )
     return rows
 
 

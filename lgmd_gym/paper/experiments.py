@@ -68,10 +68,14 @@ class StimulusResponse:
 
 
 def run_stimulus(
-    background: Background, foreground: ForegroundObject | None = None, seconds: float = CONTACT, *,
-    screen: Screen = SCREEN, models: Mapping[str, LGMDParams] = MODELS,
+    background: Background,
+    foreground: ForegroundObject | None = None,
+    seconds: float = CONTACT,
+    *,
+    screen: Screen = SCREEN,
+    models: Mapping[str, LGMDParams] = MODELS,
     picture_times: tuple[float, ...] = (),
-) -> StimulusResponse:  # fmt: skip
+) -> StimulusResponse:
     """Run several models on one stimulus.
 
     Args:
@@ -299,6 +303,11 @@ def run_experiments(on_step: StepCallback, picture: Path | None = None) -> Exper
         picture: Image file for the panorama; None for a random image.
     """
     return ExperimentResults(
-        gratings(on_step), low_contrast_gratings(on_step), looming_in_gratings(on_step),
-        light_and_dark(on_step), panorama(on_step, picture), approaches(on_step), selectivity(on_step),
-    )  # fmt: skip
+        gratings(on_step),
+        low_contrast_gratings(on_step),
+        looming_in_gratings(on_step),
+        light_and_dark(on_step),
+        panorama(on_step, picture),
+        approaches(on_step),
+        selectivity(on_step),
+    )

@@ -86,9 +86,12 @@ def _gratings(plt: ModuleType, results: ExperimentResults) -> "Figure":
 
 
 def _heat_map(
-    axis: "Axes", responses: list[GratingResponse], values: tuple[float, ...],
-    key: Callable[[GratingResponse], float], model: str,
-) -> "AxesImage":  # fmt: skip
+    axis: "Axes",
+    responses: list[GratingResponse],
+    values: tuple[float, ...],
+    key: Callable[[GratingResponse], float],
+    model: str,
+) -> "AxesImage":
     """Draw the highest K of a model, with F̂ as text, over a property of the gratings and their frequency."""
     table = np.zeros((len(values), len(TEMPORAL)))
     axis.grid(visible=False)
@@ -226,7 +229,14 @@ def _strip(figure: "Figure", cell: "SubplotSpec", response: StimulusResponse, ti
         axis = figure.add_subplot(inner[index // 2, index % 2])
         axis.imshow(frame, cmap="gray", vmin=0, vmax=255)
         axis.set_axis_off()
-        axis.text(0.02, 0.96, f"{time:.2f} s", transform=axis.transAxes, va="top", fontsize=6.5,
-                  bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8})  # fmt: skip
+        axis.text(
+            0.02,
+            0.96,
+            f"{time:.2f} s",
+            transform=axis.transAxes,
+            va="top",
+            fontsize=6.5,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
+        )
         if index == 0:
             axis.set_title(title, fontsize=8, loc="left")

@@ -140,9 +140,11 @@ class Elongating(ForegroundObject):
 
 
 def stimulus_frames(
-    screen: Screen, seconds: float, background: Background | None = None,
+    screen: Screen,
+    seconds: float,
+    background: Background | None = None,
     foreground: ForegroundObject | None = None,
-) -> Iterator[Frame]:  # fmt: skip
+) -> Iterator[Frame]:
     """Yield the grey frames of a stimulus: uint8, shape (height, width), row 0 at the top.
 
     Args:

@@ -139,9 +139,14 @@ class ReportData:
             return []
         case, condition = self.suite.by_name[row["case"]], row["condition"]
         task = Task(
-            row["agent"], case, row["seed"], self.config.sensors(condition), condition=condition,
-            world=row["world"], road=self.config.road,
-        )  # fmt: skip
+            row["agent"],
+            case,
+            row["seed"],
+            self.config.sensors(condition),
+            condition=condition,
+            world=row["world"],
+            road=self.config.road,
+        )
         return capture_frames(task, decisions)
 
 
@@ -229,11 +234,22 @@ def comparison_section(data: ReportData) -> dict[str, Any] | None:
 def _difference_lines(comparisons: list[Comparison]) -> list[tuple[Any, ...]]:
     """Return the values of `DIFFERENCE_COLUMNS`; an undefined bound is None, an empty field."""
     return [
-        (item.condition, item.name_a, item.name_b, line.name, line.unit, line.mean_a, line.mean_b,
-         *line.change[:3], line.change.n, line.higher, line.lower)
+        (
+            item.condition,
+            item.name_a,
+            item.name_b,
+            line.name,
+            line.unit,
+            line.mean_a,
+            line.mean_b,
+            *line.change[:3],
+            line.change.n,
+            line.higher,
+            line.lower,
+        )
         for item in comparisons
         for line in item.differences
-    ]  # fmt: skip
+    ]
 
 
 def episode_section(data: ReportData) -> list[dict[str, Any]]:

@@ -100,9 +100,15 @@ class Panel:
         places = " ".join("{:.1f},{:.1f}".format(*self.point(*point)) for point in points)
         index = series % len(COLOURS)
         element(
-            group, "polyline", points=places, fill="none", class_=f"l{index}", stroke=COLOURS[index],
-            stroke_width=1.3, stroke_dasharray=DASHES[series % len(DASHES)],
-        )  # fmt: skip
+            group,
+            "polyline",
+            points=places,
+            fill="none",
+            class_=f"l{index}",
+            stroke=COLOURS[index],
+            stroke_width=1.3,
+            stroke_dasharray=DASHES[series % len(DASHES)],
+        )
 
     def mark(self, group: Element, x: float, y: float, series: int, title: str, shift: float = 0.0) -> None:
         """Draw a mark with a hover title at a point of data, `shift` pixels to the right."""
@@ -120,18 +126,32 @@ def new_panel(title: str, size: tuple[float, float], **data: str) -> Element:
     width, height = size
     names = {f"data_{key}": value for key, value in data.items()}
     return element(
-        None, "svg", class_="panel", viewBox=f"0 0 {width:g} {height:g}", width=f"{width:g}",
-        height=f"{height:g}", role="img", aria_label=title, font_family=FONT, **names,
-    )  # fmt: skip
+        None,
+        "svg",
+        class_="panel",
+        viewBox=f"0 0 {width:g} {height:g}",
+        width=f"{width:g}",
+        height=f"{height:g}",
+        role="img",
+        aria_label=title,
+        font_family=FONT,
+        **names,
+    )
 
 
 def add_mark(parent: Element, x: float, y: float, series: int) -> Element:
     """Add the mark of a series, whose colour and shape repeat after 35 series."""
     index = series % len(COLOURS)
     return element(
-        parent, "path", d=SHAPES[series % len(SHAPES)], transform=f"translate({x:.1f} {y:.1f})",
-        class_=f"s{index} halo", fill=COLOURS[index], stroke=PAGE, stroke_width=0.8,
-    )  # fmt: skip
+        parent,
+        "path",
+        d=SHAPES[series % len(SHAPES)],
+        transform=f"translate({x:.1f} {y:.1f})",
+        class_=f"s{index} halo",
+        fill=COLOURS[index],
+        stroke=PAGE,
+        stroke_width=0.8,
+    )
 
 
 def legend_mark(series: int) -> Element:
