@@ -16,11 +16,12 @@ MODES = ("rgb_array", "human")
 class LGMDView(gym.Wrapper, RecordConstructorArgs):
     """Render camera frame, neuron and road in one picture of 1280×720 pixels.
 
-    The picture shows the camera frame with overlays; the layers P, I, S and G of the LGMD, or the maps of
-    LPLC2; spikes and spike frequency of the last 5 s with the alert level; highway-env's top view; bars for
-    speed, gap, time to contact and deceleration; and lamps for alert, braking and contact. Quantities that
-    stock highway-env environments do not provide (gap, time to contact) are left blank. Observations,
-    rewards and infos are unchanged, and the render mode of the wrapped environment does not matter.
+    The picture shows the camera frame with overlays; the layers that the neuron declares, such as P, I, S
+    and G of the LGMD; spikes and spike frequency of the last 5 s with the alert level; highway-env's top
+    view; bars for speed, gap, time to contact and deceleration; and lamps for alert, braking and contact.
+    Quantities that stock highway-env environments do not provide (gap, time to contact) are left blank.
+    Observations, rewards and infos are unchanged, and the render mode of the wrapped environment does not
+    matter.
 
     Args:
         env: An environment with `LGMDObservation` among its wrappers.

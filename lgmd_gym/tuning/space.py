@@ -90,8 +90,9 @@ class SearchSpace:
         geometry are.
         """
         shifts: list[tuple[str, float | int, Proposal]] = []
-        values = {name: value for name, value in self.defaults().items() if name != CAMERA_KEY}
-        for name, value in (rule_class(self.agent).options() | values).items():
+        values: Proposal = rule_class(self.agent).options() | self.defaults()
+        values.pop(CAMERA_KEY, None)
+        for name, value in values.items():
             for sign in (-1, 1):
                 shifted: float | int = float(f"{value * (1 + sign * SHIFT):.6g}")
                 if isinstance(value, int):
