@@ -143,6 +143,14 @@ class _Cache(FunctionCache):
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return *super()._index_key(sig, codegen), _is_inner()
 
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return a stored overload; None, after clearing the cache, if it names modules that were renamed."""
+        try:
+            return super().load_overload(sig, target_context)
+        except (ImportError, AttributeError):  # of unpickling the types of an earlier version of this package
+            self.flush()
+            return None
+
 
 class _InnerLibrary(JITCodeLibrary):
     """LLVM module of a function without machine code, for the modules of the functions that call it."""

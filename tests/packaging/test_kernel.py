@@ -2,9 +2,11 @@
 
 import gc
 import importlib
+import pickle
 import subprocess
 import sys
 
+import numba
 import pytest
 
 SOURCE = """
@@ -103,3 +105,15 @@ def test_an_unknown_version_of_numba_compiles_as_usual(squares, monkeypatch):
     usual = kernel_module.kernel(squares.square.py_func)
     assert not isinstance(usual, kernel_module.Kernel)
     assert usual(3) == squares.square(3) == 9
+
+
+def test_a_cache_of_an_earlier_version_with_renamed_modules_is_replaced(squares, tmp_path):
+    """The index of such a cache cannot be unpickled, because the types in it name modules that are gone."""
+    assert squares.tripled(3) == 27
+    index = next(tmp_path.glob("__pycache__/squares.tripled*.nbi"))
+    index.write_bytes(pickle.dumps(numba.__version__) + b"cno.such.module\nName\n.")
+    run = subprocess.run(
+        [sys.executable, "-c", CALLS.format("tripled(3)")],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert run.stdout.startswith("27 ")
