@@ -156,7 +156,7 @@ def _views(env: BrakingEnv, seed: int, last: int, camera: EgoCamera) -> list[Tar
 def _view(env: BrakingEnv, camera: EgoCamera) -> TargetView:
     """Return the view of the present state."""
     road, ego = env.road, env.ego
-    target = road.items[int(road.physics[1]["target"][0])]
+    target = road.items[int(env.simulation.state.episodes["target"][0])]
     ahead = ego.LENGTH / 2 - camera.camera.mount.setback_m
     x, y = ego.position[0] + ahead * cos(ego.heading), ego.position[1] + ahead * sin(ego.heading)
 

@@ -141,7 +141,7 @@ def test_width_of_a_batch_does_not_change_the_results(monkeypatch, width):
 @pytest.mark.usefixtures("_no_fallback")
 @pytest.mark.parametrize("agent", ["ttc-oracle", "stopping-zone"])
 def test_fcw_driver_brakes_in_a_batch(agent):
-    case = dataclasses.replace(find_case("quick/CCRs/v50"), name="test/CCRs/fcw", fcw_driver=True)
+    case = dataclasses.replace(find_case("quick/CCRs/v50"), variant="fcw", fcw_driver=True)
     tasks = make_tasks(agent, (case, CASES[1]), seeds=(0,))
     results = play_batches(tasks)
     assert_equal_results(results, list(map(run_task, tasks)))
@@ -155,7 +155,7 @@ def test_fcw_driver_brakes_in_a_batch(agent):
 def test_brakes_of_episodes_in_a_batch(monkeypatch, agent):
     """Results with drawn brakes are equal, and the FCW driver decelerates by 4 m/s² with each of them."""
     draw_all_brakes(monkeypatch)
-    case = dataclasses.replace(find_case("quick/CCRs/v50"), name="test/CCRs/fcw", fcw_driver=True)
+    case = dataclasses.replace(find_case("quick/CCRs/v50"), variant="fcw", fcw_driver=True)
     tasks = make_tasks(agent, (case, CASES[1]), seeds=(0, 1))
     results = play_batches(tasks)
     assert_equal_results(results, list(map(run_task, tasks)))
@@ -182,7 +182,7 @@ def test_conditions_sensors_and_rates_of_tasks_are_kept():
     tasks += make_tasks("spike-threshold", short, (1,), SensorConfig("wide", {"t_sf": 60.0}))
     weak = (*CASES[0].arguments, ("config", {"max_deceleration": 3.0}))
     slow = (*CASES[0].arguments, ("config", {"policy_frequency": 15}))
-    cases = [dataclasses.replace(CASES[0], name=f"test/CCRs/{name}") for name in ("weak", "slow")]
+    cases = [dataclasses.replace(CASES[0], variant=name) for name in ("weak", "slow")]
     cases = [
         dataclasses.replace(case, arguments=values) for case, values in zip(cases, (weak, slow), strict=True)
     ]
@@ -301,16 +301,22 @@ def test_units_of_a_group_use_the_same_simulation(monkeypatch):
     """The second unit begins after a unit that was not played to its end."""
     made = []
     monkeypatch.setattr(player, "_players", {})
-    monkeypatch.setattr(player, "BatchPlayer", lambda *arguments: made.append(1) or BatchPlayer(*arguments))
+
+    def make(task, num_envs):
+        made.append(num_envs)
+        return BatchPlayer(task, num_envs)
+
+    monkeypatch.setattr(player, "BatchPlayer", make)
     tasks = make_tasks("stopping-zone", CASES[1:3], seeds=(0, 1))
     (unit,) = make_units(tasks, 1)
     next(play_unit(unit._replace(tasks=tasks[:2])))
     results = list(play_unit(unit._replace(tasks=tasks[2:])))
+    assert made == [player.WIDTH]
     assert_equal_results(results, list(map(run_task, tasks[2:])))
-    assert len(made) == 1
+    assert made == [player.WIDTH, 1, 1]
     (again,) = make_units(tasks[:1], 1)  # the files of the agent may have changed
     next(play_unit(again))
-    assert len(made) == 2
+    assert made[3:] == [player.WIDTH]
     assert len(player._players) == 1
 
 
