@@ -49,7 +49,7 @@ def info_table(info: Mapping[str, Any], cls: Any) -> str:
     meanings |= {row[0].strip("`"): [row[1], ""] for row in rst_rows(LGMDObservation) if "lgmd/" in row[0]}
     rows = []
     for key, value in info.items():
-        general = re.sub(r"^lgmd/\w+/", "lgmd/<camera>/", key)
+        general = re.sub(r"^lgmd/\w+/", "lgmd/<channel>/", key)
         rows.append((f"`{key}`", f"`{type(value).__name__}`", *meanings[general]))
     return table(("key", "type", "meaning", "undefined"), rows)
 

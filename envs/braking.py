@@ -220,6 +220,7 @@ class BrakingEnv(EgoBrakeEnv):
         on_step = self._automatic_rendering if self.viewer is not None and self.enable_auto_render else None
         simulation.step(simulation.clock.demands, _SELECTED, not self.rendering_paused, on_step)
         self.steps = int(simulation.state.episodes["steps"][0])
+        self.road.refresh()  # for callers that keep references to vehicles
         self.enable_auto_render = False
 
     def restart_sensors(self) -> None:

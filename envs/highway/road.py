@@ -137,8 +137,8 @@ _SHOWN = 7  # x, y, heading, speed, acceleration, travelled and steering come fi
 class BrakingRoad(Road):
     """A road whose vehicles and objects show one environment of a simulation.
 
-    The state is that of the simulation: a change to a vehicle lasts until the next step only. The vehicles
-    are brought up to date when they are read from the road, not in every step.
+    The state is that of the simulation: a change to a vehicle lasts until the next step only. `BrakingEnv`
+    brings the vehicles up to date after each decision, and the road does when they are read from it.
 
     Args:
         network: The road network.

@@ -9,7 +9,7 @@ from rich.text import Text
 from tyro.conf import Positional, arg
 
 from lgmd_gym.cli.console import make_console
-from lgmd_gym.cli.values import Count, File, Number, read_params
+from lgmd_gym.cli.values import Count, File, Name, Number, read_params
 
 if TYPE_CHECKING:
     from lgmd_gym.clips.batch import ClipJob, ClipResult
@@ -44,7 +44,7 @@ class Video:
     """Run folder; must not exist. Default: runs/video-DATE-TIME."""
     params: File = None
     """TOML file of LGMD parameters; replaces those of the configuration."""
-    neuron: str | None = None
+    neuron: Name = None
     """Neuron model, registered or MODULE:FACTORY. Default: lgmd."""
     threshold: Number = None
     """Alarm level T_sf [spikes/s]; it applies to one frame rate."""

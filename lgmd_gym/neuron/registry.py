@@ -84,8 +84,8 @@ def register(name: str, factory: Callable[..., object], *, takes_params: bool = 
         ...
         ...     def reset(self, mask):
         ...         self.last[mask] = 0.0
-        >>> register("change", Change)
-        >>> float(make("change", (4, 8), fps=30.0).step(np.full((4, 8), 9, np.uint8)).spike_frequency)
+        >>> register("mean-change", Change)
+        >>> float(make("mean-change", (4, 8), fps=30.0).step(np.full((4, 8), 9, np.uint8)).spike_frequency)
         9.0
     """
     if not check_text("name", name):

@@ -167,7 +167,7 @@ def test_version(capsys):
             "world must be a whole number in [0, 9999], got 10000",
         ),
         (["drive", "LGMD/CCRs-v0", "--condition", "nite"], "did you mean 'night'?"),
-        (["train", "--seed", "-1"], "seed must be a whole number in [0, 4294967295], got -1"),
+        (["train", "--seed", "-1"], "seed must be in [0, 4294967295], got -1"),
         (["drive", "LGMD/CCRs-v0", "--set", "ego_speed=50"], "for 50 km/h pass 13.89"),
         (["drive", "LGMD/CCRs-v0", "--set", "ego_speed=-1"], "ego_speed must be in (0, 40] m/s, got -1"),
         (["drive", "LGMD/CCRs-v0", "--set", "speed=5"], "did you mean 'ego_speed'?"),

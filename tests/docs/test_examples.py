@@ -69,9 +69,9 @@ def test_easy_levels_are_those_of_the_easy_task():
     task = RANDOM_TASKS["RandomBrakingEasy"].arguments
     for number, case in enumerate(cases):
         level = {"split": "validation", "start_level": number, "num_levels": 1}
-        expected = task | {name: list(task[name]) for name in ("families", "conditions")} | level
+        expected = task | {name: list(task[name]) for name in ("families", "weathers")} | level
         given = dict(case.arguments)
-        assert given | {name: list(given[name]) for name in ("families", "conditions")} == expected
+        assert given | {name: list(given[name]) for name in ("families", "weathers")} == expected
         assert case.scenario == make_source(RANDOM, given).first
     assert {case.scenario.family for case in cases} == set(task["families"])
     assert len(cases) == 200

@@ -62,7 +62,8 @@ def test_spec_survives_json(name, arguments):
 def test_traffic_ids_take_the_arguments_of_the_observation_wrapper():
     env = gym.make("LGMD/Traffic-Highway-v0", camera="wide", include_frame=True, config={"duration": 5})
     assert isinstance(env.unwrapped, find_kind("highway"))
-    assert env.get_wrapper_attr("camera") == "wide"
+    (channel,) = env.get_wrapper_attr("channels")
+    assert channel.camera.name == "wide"
     observation, _ = env.reset(seed=0)
     assert observation["frame"].shape == env.observation_space["frame"].shape
     assert env.unwrapped.config["duration"] == 5

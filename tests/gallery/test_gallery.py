@@ -78,7 +78,7 @@ def test_every_family_and_kind_of_traffic_has_a_card():
     easy = cards["RandomBrakingEasy"].docstring
     assert "first trainings" in easy.summary
     defaults = {argument.name: argument.default for argument in easy.arguments}
-    assert (defaults["conditions"], defaults["road"]) == ("('clear',)", "'smooth'")
+    assert (defaults["weathers"], defaults["road"]) == ("('clear',)", "'smooth'")
     assert defaults["families"].startswith("('CCRs', ")
 
 

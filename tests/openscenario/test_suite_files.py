@@ -64,7 +64,7 @@ OWN = """name = "mine"
 [[cases]]
 family = "parked"
 name = "v30"
-arguments = { condition = "night" }
+arguments = { weather = "night" }
 [cases.scenario]
 ego_speed = 8.33
 duration = 9.0
@@ -88,8 +88,8 @@ def test_own_scenarios_in_suite_files(tmp_path):
     [
         (("gap", "gaps"), r"unknown key of scenario.actors\[0\] 'gaps'; did you mean 'gap'"),
         (
-            ("condition", "conditions"),
-            "unknown argument of a case with a scenario 'conditions'; did you mean",
+            ("weather =", "weathers ="),
+            "unknown argument of a case with a scenario 'weathers'; did you mean",
         ),
         (
             ("duration = 9.0", 'duration = 9.0\nfamily = "x"'),

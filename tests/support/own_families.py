@@ -49,7 +49,7 @@ module = "my_scenarios:Parked"
 family = "Squeeze"
 name = "dusk"
 sweep.gap = [6.5, 8]
-arguments = { condition = "night" }
+arguments = { weather = "night" }
 
 [[cases]]
 family = "Parked"
