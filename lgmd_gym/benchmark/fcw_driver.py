@@ -46,7 +46,6 @@ class FCWDriver(BatchAgent):
         self.alerts, self.failures = self.agent.alerts, self.agent.failures
         since = self.state["since_alert"]
         since = self.state["since_alert"] = np.where(since < 0, np.where(self.alerts, 0, -1), since + 1)
-        limits, braking = self._max_deceleration(), since >= self._delay
-        return np.divide(
-            -DECELERATION, limits, out=np.zeros(len(limits)), where=braking & (limits > 0.0)
-        )  # 0: no episode yet
+        limits = self._max_deceleration()
+        usable = (since >= self._delay) & (limits > 0.0)  # 0: no episode yet
+        return np.divide(-DECELERATION, limits, out=np.zeros(len(limits)), where=usable)
