@@ -70,9 +70,25 @@ MODULES = {
     ),
     "metrics": Module(("lgmd_gym/benchmark/metrics.py",), ("tests/benchmark/test_formulas.py",)),
     "statistics": Module(
-        ("lgmd_gym/statistics/intervals.py", *_under("lgmd_gym/benchmark/analysis", "bootstrap", "compare")),
-        ("tests/benchmark/test_formulas.py", "tests/benchmark/test_statistics.py"),
-        ("compare_runs", "compare_agents", "read_case_rows", "_agent_pairs"),
+        (*_under("lgmd_gym/statistics", "intervals", "bootstrap"), "lgmd_gym/benchmark/analysis/compare.py"),
+        _under("tests/benchmark", "test_formulas", "test_statistics", "test_effective_size"),
+        (
+            *(
+                "compare_runs",
+                "compare_agents",
+                "read_case_rows",
+                "_agent_pairs",
+                "count_interval",
+                "_stretch",
+            ),
+            *(
+                "comparison_table",
+                "change_text",
+                "difference_figure",
+                "_plot_differences",
+                "_comparison_label",
+            ),
+        ),
     ),
     "neuron": Module(("lgmd_gym/neuron/scalars.py",), ("tests/neuron/test_boundaries.py",)),
     "camera": Module(
