@@ -86,7 +86,7 @@ def first_event(config: RunConfig, agent_name: str, row: Row) -> Onset:
     agent, kind = make_agent(agent_name), row["family"]
     sensors = SensorConfig(config.camera, config.params).for_agent(agent)
     world = LABORATORY if row["world"] is None else row["world"]
-    place = {"world": world, "condition": row["condition"], "road": config.road}
+    place = {"world": world, "weather": row["condition"], "road": config.road}
     env = make_target(f"{TRAFFIC}/{kind}", {}, **sensors.arguments, **place)
     observation, info = env.reset(seed=row["seed"])
     agent.reset(row["seed"])

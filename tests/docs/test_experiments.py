@@ -301,7 +301,7 @@ def test_traffic_causes():
     script = load("traffic_causes")
     config = RunConfig(suite="traffic", agents=("always-brake",), seeds=2, worlds=0, conditions=("clear",))
     row = {"agent": "always-brake", "case": "traffic/two-way/s0", "seed": 0, "world": None, "error": None}
-    row |= {"condition": "clear", "brakes": 2, "false_activations": 2}
+    row |= {"condition": "clear", "brakes": 2, "false_activations": 2, "family": "two-way"}
     run = StoredRun(config, [row, row | {"false_activations": 1}], False)
     ((kind, onset),) = script.play(run, "always-brake", 1)
     assert kind == "two-way"

@@ -105,13 +105,13 @@ def test_pixels_of_a_field_by_hand():
     camera = {
         "shape": [10, 20],
         "hfov_deg": 2 * degrees(atan(10 / focal)),
-        "pitch_deg": degrees(atan(20 / focal)),
+        "mount": {"pitch_deg": degrees(atan(20 / focal))},
     }
     row, column = field_samples(camera, (60, 100), 90.0)
     assert row.shape == (1, 1, 10, 20)
     centre = row[0, 0, 4:6, 9:11].mean(), column[0, 0, 4:6, 9:11].mean()
     assert centre == pytest.approx((29.5 - 20, 49.5), abs=0.05)
-    assert field_samples(camera | {"pitch_deg": 30.0}, (60, 100), 90.0) is None  # 58 px up
+    assert field_samples(camera | {"mount": {"pitch_deg": 30.0}}, (60, 100), 90.0) is None  # 58 px up
     assert field_samples(camera | {"hfov_deg": 5.0}, (60, 100), 90.0) is None  # 0.2 px per pixel
 
 

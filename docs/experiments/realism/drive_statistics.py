@@ -214,7 +214,7 @@ def field_cameras(kind: str) -> list[dict[str, Any]]:
     for speed_kmh in SPEEDS_KMH:
         depth = stopping_distance(speed_kmh / 3.6, FULL_DECELERATION, REACTION) + CAMERA_SETBACK
         hfov_deg, down_deg = 2 * degrees(atan(SPAN_M / 2 / depth)), degrees(atan(CAMERA_HEIGHT / depth))
-        angles = {"hfov_deg": round(hfov_deg, 4), "pitch_deg": round(pitch * down_deg, 4)}
+        angles = {"hfov_deg": round(hfov_deg, 4), "mount": {"pitch_deg": round(pitch * down_deg, 4)}}
         cameras.append({"name": f"{kind}{speed_kmh}", "shape": list(shape), **angles})
     return cameras
 
@@ -223,7 +223,7 @@ def field_samples(camera: Mapping[str, Any], shape: tuple[int, int], hfov_deg: f
     """Return where the pixels of a camera field are in a frame; None for a field that cannot be resampled.
 
     Args:
-        camera: `shape`, `hfov_deg` and `pitch_deg` of the field, which is straight ahead.
+        camera: `shape`, `hfov_deg` and `mount` of the field, which is straight ahead.
         shape: (height, width) of the frame [px].
         hfov_deg: Horizontal field of view of the frame [degrees].
 
@@ -241,7 +241,7 @@ def field_samples(camera: Mapping[str, Any], shape: tuple[int, int], hfov_deg: f
     offsets = (np.arange(count) + 0.5) / count
     rows = (np.arange(height) + offsets[:, None] - 0.5 * height)[:, None, :, None] / focal
     columns = (np.arange(width) + offsets[:, None] - 0.5 * width)[None, :, None, :] / focal
-    pitch = radians(camera["pitch_deg"])
+    pitch = radians(camera["mount"]["pitch_deg"])
     forward = cos(pitch) + rows * sin(pitch)
     down = rows * cos(pitch) - sin(pitch)
     samples = np.stack(np.broadcast_arrays(
