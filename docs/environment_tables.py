@@ -15,6 +15,7 @@ from lgmd_gym.envs.dynamics.script import Bend, Segment
 from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
 from lgmd_gym.envs.registration import APPEARANCE, RANDOM_TASKS, SCENARIO, make_braking, make_traffic
 from lgmd_gym.envs.reward import RewardParams
+from lgmd_gym.fields import Record
 from lgmd_gym.report.gallery.cards import DocumentedArgument, ScenarioCard, parse_docstring
 from lgmd_gym.wrappers.observation import LGMDObservation
 
@@ -58,7 +59,7 @@ def argument_tables(card: ScenarioCard, cls: Any) -> str:
     """Return the arguments of an environment and the fields that some of them have as Markdown tables."""
     config = argument_texts(cls)["config"]
     rows = [
-        (f"`{row.name}`", f"`{row.default}`" if row.default else "–", _resolved(row, config))
+        (f"`{row.name}`", f"`{row.default}`" if row.default else "–", _meaning(row, config))
         for row in _arguments(card)
     ]
     parts = [table(("argument", "default", "meaning"), rows)]
@@ -81,10 +82,15 @@ def _arguments(card: ScenarioCard) -> list[DocumentedArgument]:
     if not card.traffic and card.name not in RANDOM_TASKS:
         for name in reversed(APPEARANCE):
             if name not in {item.name for item in own}:
-                common.insert(
-                    0, DocumentedArgument(name, repr(getattr(Appearance(), name)), "See `Appearance`.")
-                )
+                value = getattr(Appearance(), name)
+                shown = f"{type(value).__name__}()" if isinstance(value, Record) else repr(value)
+                common.insert(0, DocumentedArgument(name, shown, "See `Appearance`."))
     return own + common
+
+
+def _meaning(argument: DocumentedArgument, config: str) -> str:
+    """Return the description of an argument without its default, which has a column."""
+    return re.sub(r"; default [^;]*\.$", ".", _resolved(argument, config))
 
 
 def _resolved(argument: DocumentedArgument, config: str) -> str:

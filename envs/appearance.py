@@ -37,7 +37,7 @@ class Appearance(Record):
         f"Number of the world, or {LABORATORY!r}; None to draw a world of the split at each reset.",
     )
     weather: str | Weather = value(
-        CLEAR, _check_weather, f"Name of a `Weather`, or {MIXED!r} for that of the world."
+        CLEAR, _check_weather, f"Named weather, `Weather` or its fields, or {MIXED!r} for that of the world."
     )
     road: str | None = optional(
         choice(

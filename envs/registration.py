@@ -324,7 +324,8 @@ def make_traffic(
         config: Configuration of `TrafficEnv`.
         render_mode: None, "rgb_array" or "human".
         world: Number of the world, 0 to 9,999, or "laboratory"; None to draw one of the split at each reset.
-        weather: Name of a `lgmd_gym.camera.Weather`, or "mixed" for that of the world; None for clear.
+        weather: Named weather, `lgmd_gym.camera.Weather` or its fields, or "mixed" for that of the world;
+            None for clear.
         road: See `lgmd_gym.envs.appearance.Appearance`.
         scene: Other fields of `lgmd_gym.camera.Scene`.
         split: See `lgmd_gym.envs.appearance.Appearance`.

@@ -50,7 +50,7 @@ def test_a_page_states_what_the_environment_is(name, entries):
     assert page.startswith(f"# {name}\n")
     assert [heading for heading in HEADINGS if f"\n## {heading}\n" not in page] == []
     assert [entry for entry in entries if entry not in page] == []
-    assert ("| `weather` | " in page) is ("RandomBraking" not in name)  # they have `weathers`
+    assert ("| `weather` | `" in page) is ("RandomBraking" not in name)  # they have `weathers`
     assert "| `spike_frequency` | `(1,)` | `float32` | 0 to " in page
     assert "| `frame` | `(90, 160, 1)` | `uint8` | 0 to 255 | " in page
     assert "| `lgmd/fovea/ffi` | `float` | as in the observation" in page
