@@ -72,7 +72,8 @@ class UserAgents(BatchAgent):
                 self.objects[index], self._used[index] = self._make(), False
             reset = getattr(self.objects[index], "reset", None)
             if reset is not None:
-                reset(None if seeds is None else seeds[index])
+                seed = None if seeds is None else seeds[index]
+                reset(None if seed is None else int(seed))
 
     def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
         """Return the demands of the objects; exceptions are kept in `failures`."""

@@ -158,6 +158,7 @@ class BrakingEnv(EgoBrakeEnv):
         super().configure(config)
         self.config["reward"], self.weights = reward, weights.record()
         before, self.simulation = vars(self).get("simulation"), self.make_simulation(1)
+        self.controlled_vehicles = []  # the new simulation has no episode before the next reset
         if before is not None and before.rates.simulation == self.simulation.rates.simulation:
             self.simulation.take_sensors(before)
 

@@ -4,8 +4,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from lgmd_gym.agents import Agent, BatchAgent
+from lgmd_gym.camera import BirdsEye
 from lgmd_gym.neuron import NeuronSpec
-from lgmd_gym.sensing.channel import BIRDSEYE, Channel, ChannelSpec, make_channels, plain_values
+from lgmd_gym.sensing.channel import Channel, ChannelSpec, make_channels, plain_values
 
 DEFAULT_CAMERA = "fovea"
 
@@ -47,7 +48,7 @@ class SensorConfig:
     @property
     def has_top_view(self) -> bool:
         """Whether a camera is highway-env's top view, which shows no weather."""
-        return any(channel.name == BIRDSEYE for channel in self.channels)
+        return any(isinstance(channel.camera, BirdsEye) for channel in self.channels)
 
     @property
     def arguments(self) -> dict[str, Any]:

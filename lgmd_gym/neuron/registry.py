@@ -213,7 +213,7 @@ class _Adapter(FrameNeuron):
             outputs = self.model.step(frames, selected)
             check_keys(f"signal of neuron {self._name!r}", outputs, self._columns)
             for key, index in self._columns.items():
-                self._scalars[selected, index] = self._checked(key, outputs[key])[selected]
+                self._scalars[selected, index] = self._checked(key, outputs[key], selected)
         if "alert" not in self._columns:
             frequency, alert = (Response._fields.index(key) for key in ("spike_frequency", "alert"))
             self._scalars[selected, alert] = self._scalars[selected, frequency] >= self._alert_level
@@ -240,7 +240,8 @@ class _Adapter(FrameNeuron):
     def reset(self, mask: ArrayLike | None = None) -> None:
         """Return to the state before the first frame; see `FrameNeuron.reset`."""
         super().reset(mask)
-        self.model.reset(self._all_active if mask is None else np.asarray(mask))
+        with self._lock:
+            self.model.reset(self._all_active if mask is None else np.asarray(mask))
 
     def _among(self, first: int, last: int, active: NDArray[np.bool_]) -> NDArray[np.bool_]:
         selected = np.zeros(self._count, np.bool_)
@@ -266,15 +267,15 @@ class _Adapter(FrameNeuron):
                 )
         return cast(Mapping[str, Signal], signals)
 
-    def _checked(self, key: str, values: ArrayLike) -> NDArray[np.float64]:
-        """Return an output as an array of shape (num,) within its bounds."""
+    def _checked(self, key: str, values: ArrayLike, selected: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Return an output of the selected neurons within its bounds; `values` have the shape (num,)."""
         array = np.asarray(values, np.float64)
         if array.shape != (self._count,):
             raise ValueError(
                 f"signal {key!r} of neuron {self._name!r} must have the shape ({self._count},), got "
                 f"{array.shape}"
             )
-        signal = self.model.signals[key]
+        array, signal = array[selected], self.model.signals[key]
         inside = (array >= signal.low) & (array <= signal.high)  # False for NaN
         if not inside.all():
             raise ValueError(

@@ -101,6 +101,11 @@ def make_channels(camera: ChannelSpec, neuron: str = LGMD) -> tuple[Channel, ...
 def _make_channel(item: Any, neuron: str) -> Channel:
     if isinstance(item, Channel):
         return item
+    if isinstance(item, Mapping) and "camera" not in item and {"neuron", "columns"} & item.keys():
+        raise ValueError(
+            f"neuron and columns are fields of a channel, not of a camera, got {shown(item)}; "
+            "use {'camera': …, 'neuron': …, 'columns': …}"
+        )
     fields = item if isinstance(item, Mapping) and "camera" in item else {"camera": item}
     return Channel.make({"neuron": neuron, **fields})
 

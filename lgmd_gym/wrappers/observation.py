@@ -257,7 +257,8 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
             self._traces.append(0, time, float(self._highway_env.vehicle.speed))
 
     def _on_frames(self, *_: Any) -> None:
-        assert self._traces is not None
+        if self._traces is None:  # switched off during the episode
+            return
         simulation = self._highway_env.simulation
         self._traces.append(0, float(simulation.times[0]), float(simulation.speeds[0]))
 

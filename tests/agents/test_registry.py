@@ -1,10 +1,12 @@
 """Agent strings, the registry, and agents of the user."""
 
+import random
+
 import numpy as np
 import pytest
 from support.agents import make_step, run_agent
 
-from lgmd_gym.agents import AGENTS, BatchAgent, make_agent, register_agent
+from lgmd_gym.agents import AGENTS, BatchAgent, make_agent, make_agents, register_agent
 from lgmd_gym.agents.user_agents import parse_agent
 
 USER_AGENT = f"{__name__}:Threshold"
@@ -157,3 +159,19 @@ def test_a_key_that_is_not_in_the_observation_or_info_suggests_the_closest(name)
     expected = f"unknown {name} key 'spike_freq'; did you mean 'spike_frequency'"
     with pytest.raises(KeyError, match=expected):
         agent.act({"spike_frequency": np.zeros(1)}, {"spike_frequency": 0.0})
+
+
+def test_a_user_agent_receives_its_seed_as_an_int(tmp_path, monkeypatch):
+    """`random.Random` refuses NumPy's integers."""
+    (tmp_path / "seeded.py").write_text(
+        "import random\n\n\nclass Seeded:\n"
+        "    def reset(self, seed):\n        self.draw = random.Random(seed)\n\n"
+        "    def act(self, observation, info):\n        return [0.0]\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    agents = make_agents("seeded:Seeded", 2)
+    agents.reset(None, np.array([3, 4]))
+    assert [agent.draw.random() for agent in agents.objects] == [
+        random.Random(3).random(),
+        random.Random(4).random(),
+    ]

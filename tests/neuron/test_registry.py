@@ -146,3 +146,26 @@ def test_names_and_declarations_are_checked():
         neuron.make("lplc2", (32, 40), columns=4)
     with pytest.raises(ValueError, match=r"must have shift\(active, turns_px\)"):
         neuron.make("change", (4, 8), derotated=True)
+
+
+def test_outputs_of_inactive_neurons_are_ignored():
+    class Sparse:
+        """A model whose outputs are undefined where it has no new frame."""
+
+        signals = {"spike_frequency": Signal(0.0, 255.0, "spikes/s")}  # noqa: RUF012
+
+        def __init__(self, shape, fps, num):
+            self.num = num
+
+        def step(self, frames, active):
+            values = np.full(self.num, np.nan)
+            values[active] = frames[active].mean((1, 2))
+            return {"spike_frequency": values}
+
+        def reset(self, mask):
+            pass
+
+    neuron.register("sparse", Sparse)
+    model = neuron.make("sparse", (4, 8), fps=30.0, num=2)
+    response = model.step(np.full((2, 4, 8), 7, np.uint8), np.array([False, True]))
+    assert response.spike_frequency.tolist() == [0.0, 7.0]

@@ -166,3 +166,24 @@ def test_known_deceleration_is_the_estimate_of_the_brake(env_id):
     plain = gym.make(env_id)
     assert "known_deceleration" not in plain.observation_space.spaces
     plain.close()
+
+
+def test_a_trace_that_is_switched_off_during_an_episode_ends():
+    env = gym.make("LGMD/CCRs-v0", world="laboratory", trace=True)
+    env.reset(seed=0)
+    wrapper = env
+    while not isinstance(wrapper, LGMDObservation):
+        wrapper = wrapper.env
+    wrapper.trace = False
+    *_, info = env.step(np.zeros(1, np.float32))
+    assert "lgmd/trace" not in info
+
+
+def test_a_new_configuration_during_an_episode_needs_a_reset():
+    env = gym.make("LGMD/CCRs-v0", world="laboratory")
+    env.reset(seed=0)
+    env.unwrapped.configure({"policy_frequency": 15})
+    with pytest.raises(RuntimeError, match="call reset"):
+        env.step(np.zeros(1, np.float32))
+    env.reset(seed=0)
+    assert np.isfinite(env.step(np.zeros(1, np.float32))[1])
