@@ -43,9 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, float]]:
         f"{name} only": (index,) for index, name in enumerate(NEURONS)
     }
     areas = {f"below the horizon, {name}": areas_by_family(below, used) for name, used in detectors.items()}
-    rotating = record(
-        [camera | {"derotated": False} for camera in side_cameras()], options.levels, options.jobs
-    )
+    rotating = record([not_derotated(channel) for channel in side_cameras()], options.levels, options.jobs)
     areas["below the horizon, not derotated"] = areas_by_family(rotating, detectors["all models"])
     horizon = record(cameras_at_the_horizon(), options.levels, options.jobs)
     areas["at the horizon, all models"] = areas_by_family(horizon, detectors["all models"])
@@ -54,6 +52,11 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, float]]:
     for sensor, values in areas.items():
         print(f"| {sensor} | {' | '.join(f'{values[name]:.2f}' for name in names)} |")
     return areas
+
+
+def not_derotated(channel: dict[str, Any]) -> dict[str, Any]:
+    """Return a channel along the path without derotation."""
+    return channel | {"camera": channel["camera"] | {"gaze": {"kind": "path"}}}
 
 
 def cameras_at_the_horizon() -> list[dict[str, Any]]:

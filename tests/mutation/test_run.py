@@ -23,7 +23,7 @@ def test_a_signal_ends_with_the_score_so_far_and_leaves_no_copy(tmp_path, number
     while not (out.exists() and out.read_text().count("\n")) and process.poll() is None:
         time.sleep(0.1)
     process.send_signal(number)
-    output = process.communicate(timeout=60)[0]
+    output = process.communicate(timeout=240)[0]
     assert process.returncode == 1
     assert " mutants played, " in output
     assert not [path for path in copies.iterdir() if path.name.startswith("lgmd-gym-mutants-")]

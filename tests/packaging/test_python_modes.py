@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 # Tests of refused values; pytest evaluates the assert statements of test files also with -O.
-REFUSALS = ("camera/test_params.py", "engine/test_errors.py", "neuron/test_params.py")
+REFUSALS = ("camera/test_records.py", "engine/test_errors.py", "neuron/test_params.py")
 
 
 def bounds(requirements):
