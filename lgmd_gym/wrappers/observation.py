@@ -46,15 +46,15 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
 
     **Info**: the keys of the environment and these.
 
-    ====================================  ===============================================================
-    key                                   meaning
-    ====================================  ===============================================================
-    ``lgmd/<channel>/spike_frequency``     as in the observation, for one camera [spikes/s]
-    ``lgmd/<channel>/membrane_potential``  as in the observation, for one camera
-    ``lgmd/<channel>/ffi``                 as in the observation, for one camera [grey levels]
-    ``lgmd/alert``                        whether the spike frequency of any camera is >= t_sf
-    ``lgmd/trace``                        a `TraceFrame` per camera frame of the step, with `trace`
-    ====================================  ===============================================================
+    =====================================  ==============================================================
+    key                                    meaning
+    =====================================  ==============================================================
+    ``lgmd/<channel>/spike_frequency``     as in the observation, for one channel [spikes/s]
+    ``lgmd/<channel>/membrane_potential``  as in the observation, for one channel
+    ``lgmd/<channel>/ffi``                 as in the observation, for one channel [grey levels]
+    ``lgmd/alert``                         whether the spike frequency of any channel is >= t_sf
+    ``lgmd/trace``                         a `TraceFrame` per camera frame of the step, with `trace`
+    =====================================  ==============================================================
 
     An environment can set the scene of each episode through an attribute ``scene``, a `Scene`, together with
     ``brake``, whose ``max_deceleration`` [m/s²] is the full braking of its car.
