@@ -86,6 +86,6 @@ def test_tables_of_docstrings():
     assert markdown_rows("| a | b |\n|---|---|\n| 1 | |\n| 2 | x |") == [["1", ""], ["2", "x"]]
     rows = {row[0]: row[1:] for row in rst_rows(LGMDObservation)}
     assert rows["`ego_yaw_rate`"][1].endswith("positive to the right as in highway-env")
-    assert rows["`lgmd/alert`"] == ["whether the spike frequency of any camera is >= t_sf"]
+    assert rows["`lgmd/alert`"] == ["whether the spike frequency of any channel is >= t_sf"]
     assert set(sections(TrafficEnv)) >= {"Description", "Action Space", "Info", "Version History"}
     assert "Args" not in sections(TrafficEnv)["Arguments"]
