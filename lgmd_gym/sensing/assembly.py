@@ -24,7 +24,7 @@ class TraceFrame(NamedTuple):
     Attributes:
         time: Simulated time since the reset [s].
         ego_speed: Ego speed [m/s].
-        response: Outputs of the neurons, arrays of shape (cameras,).
+        response: Outputs of the neurons, arrays of shape (channels,).
     """
 
     time: float

@@ -28,19 +28,19 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     ======================  ==========================  =================================================
     key                     shape                       meaning, range, unit
     ======================  ==========================  =================================================
-    ``spike_frequency``     (cameras,)                  spikes of the last n_ts frames [spikes/s], from 0
+    ``spike_frequency``     (channels,)                 spikes of the last n_ts frames [spikes/s], from 0
                                                         to about 10 · fps
-    ``membrane_potential``  (cameras,)                  K (eq. 10), 0.5 to 1; from 0 with
+    ``membrane_potential``  (channels,)                 K (eq. 10), 0.5 to 1; from 0 with
                                                         ``neuron="dsn"``
-    ``ffi``                 (cameras,)                  F̂ [grey levels], 0 to 255 / (1 − Σ a_i)
+    ``ffi``                 (channels,)                 F̂ [grey levels], 0 to 255 / (1 − Σ a_i)
     ``ego_speed``           (1,)                        ego speed [m/s], −100 to 100
     ``ego_yaw_rate``        (1,)                        mean yaw rate of the decision [rad/s], positive
                                                         to the right as in highway-env
     ``known_deceleration``  (1,)                        the car's estimate of its full braking [m/s²], of
                                                         cameras with ``brake_known`` only
-    ``column_potential``    (columns,)                  K of each column of each camera in turn, 0 to 1, of
-                                                        cameras with ``columns`` only
-    ``frame``               (height, width, cameras)    grey frames, uint8, with `include_frame`
+    ``column_potential``    (columns,)                  K of each column of each channel in turn, 0 to 1, of
+                                                        channels with ``columns`` only
+    ``frame``               (height, width, channels)   grey frames, uint8, with `include_frame`
     ``base``                as in the environment       its own observation, with `include_base`
     ======================  ==========================  =================================================
 
@@ -201,7 +201,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
 
     @property
     def response(self) -> Response:
-        """Outputs of the neurons for the last camera frame, arrays of shape (cameras,)."""
+        """Outputs of the neurons for the last camera frame, arrays of shape (channels,)."""
         return self.sensors.response_of()
 
     @property
