@@ -182,7 +182,8 @@ def main() -> None:
     total = len(tasks)
     if arguments.limit is not None and arguments.limit < total:
         tasks = random.Random(arguments.seed).sample(tasks, arguments.limit)
-    os.environ |= {"NUMBA_DISABLE_JIT": "1", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    # Options of the caller, such as -n, belong to plugins that are not loaded.
+    os.environ |= {"NUMBA_DISABLE_JIT": "1", "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": ""}
     for name in PRELOADED:  # once, not in every process
         importlib.import_module(name)
     with open(arguments.out or os.devnull, "w") as file:
