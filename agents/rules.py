@@ -34,7 +34,8 @@ def excitation(membrane_potential: ArrayLike) -> np.ndarray:
     The membrane potential K saturates: excitations above 3 map to the interval from 0.95 to 1. Those of a
     direction-selective neuron are negative for motion to the left.
     """
-    k = np.clip(np.asarray(membrane_potential, dtype=np.float64), _MARGIN, 1.0 - _MARGIN)
+    k = np.asarray(membrane_potential, dtype=np.float64)
+    k = np.minimum(np.maximum(k, _MARGIN), 1.0 - _MARGIN)  # faster than np.clip
     return np.log(k / (1.0 - k))
 
 
@@ -431,7 +432,8 @@ class StoppingZone(Rule):
         reached = self.consecutive("streaks", excited, self._required)
         ages = self.state["ages"] = (self.state["ages"] + 1) * ~reached
         active = (reading.speed > p.crawl) & (np.abs(reading.yaw_rate) <= p.yaw_rate)
-        upright, low = np.split(ages[:, NUM_ZONES:] < p.memory, [NUM_ZONES], axis=1)
+        recent = ages[:, NUM_ZONES:] < p.memory
+        upright, low = recent[:, :NUM_ZONES], recent[:, NUM_ZONES:]
         standing = self._zones & reached[:, :NUM_ZONES] & upright & low[:, LOW_FIELD]
         return active & standing.any(axis=1)
 
