@@ -1,10 +1,8 @@
 """The episodes of a run and their order."""
 
-import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import Any
 
 import gymnasium as gym
 
@@ -17,33 +15,11 @@ from lgmd_gym.benchmark.player import play_unit
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
 from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
-from lgmd_gym.benchmark.units import Unit, make_units
-from lgmd_gym.camera.render.raster import draw_cameras
+from lgmd_gym.benchmark.units import make_units
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.appearance import Appearance
-from lgmd_gym.envs.decisions import advance
 from lgmd_gym.envs.registration import traffic_id
 from lgmd_gym.processes.pool import TaskMap
-
-
-def compile_kernels(task: Task) -> None:
-    """Play a task in this process and drop its result, unless numba has the kernels in its cache.
-
-    Args:
-        task: A short task; its errors are left to the workers.
-    """
-    if all(map(_is_cached, (draw_cameras, advance))):
-        return
-    with contextlib.suppress(Exception, SystemExit):
-        next(play_unit(Unit("", [task])))
-
-
-def _is_cached(kernel: Any) -> bool:
-    """Return whether numba's cache has a kernel for the present source."""
-    if kernel.signatures:
-        return True
-    file = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
-    return bool(file is not None and file._load_index())
 
 
 class Plan(ABC):
@@ -72,9 +48,6 @@ class Plan(ABC):
     @abstractmethod
     def play(self, run_tasks: TaskMap, rows: Iterable[Row]) -> Iterator[Result]:
         """Run the episodes that are not among `rows`, and yield their results as they finish."""
-
-    def warm_up(self) -> None:  # noqa: B027  (optional)
-        """Compile in this process what worker processes would compile each by itself."""
 
     @abstractmethod
     def _make_env(self, sensor_config: SensorConfig) -> gym.Env:
@@ -122,10 +95,6 @@ class CasePlan(Plan):
             if task.key[1:] in counterfactuals
         ]
         yield from self._play(run_tasks, [task for task in others if task.key not in done])
-
-    def warm_up(self) -> None:
-        """Compile the kernels of cameras, neuron and motion."""
-        compile_kernels(self._first_task(0, self.config.first_seed, next(iter(self.sensor_configs))))
 
     def _first_task(self, index: int, seed: int, condition: str) -> Task:
         """Return the task of `no-brake` in a case."""

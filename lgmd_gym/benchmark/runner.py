@@ -15,6 +15,7 @@ from lgmd_gym.benchmark.config import RUN_FILE, RunConfig, provenance
 from lgmd_gym.benchmark.plan import make_plan
 from lgmd_gym.benchmark.run_folder import RunFolder, series_name
 from lgmd_gym.benchmark.task import NO_BRAKE, Result
+from lgmd_gym.engine.first_use import compile_kernels
 from lgmd_gym.errors import counted
 from lgmd_gym.processes.pool import SERIAL, Executor, PoolLostError
 
@@ -172,8 +173,8 @@ class Run:
         started, complete, self.stop_reason = time.perf_counter(), False, ""
         try:
             self._describe(False, 0.0)
-            if self.executor.jobs > 1 and self.executor.cluster is None and len(self.rows) < self.total:
-                self.plan.warm_up()
+            if self.executor.cluster is None and len(self.rows) < self.total:
+                compile_kernels()  # before the workers, which would all do so
             with self.executor.open() as run_tasks:
                 for result in self.plan.play(run_tasks, list(self.rows)):
                     self._add(result)

@@ -69,6 +69,7 @@ def run(options: Drive) -> int:
     from lgmd_gym.agents import make_agent
     from lgmd_gym.benchmark.runner import describe_failure
     from lgmd_gym.benchmark.sensors import SensorConfig
+    from lgmd_gym.engine.first_use import compile_kernels
     from lgmd_gym.rendering.playback import play_episode
 
     agent = make_agent(options.agent)
@@ -81,6 +82,7 @@ def run(options: Drive) -> int:
         surroundings["weather"] = options.condition
     try:
         with activity("preparing the episode") as show:
+            compile_kernels()
             result = play_episode(
                 target,
                 agent,

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any
 
 import numba
-from numba.core import config, sigutils
+from numba.core import config, sigutils, types
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -73,6 +73,14 @@ def kernel(
     return compiled
 
 
+def is_cached(kernel: Any) -> bool:
+    """Return whether this process or numba's cache has a compiled form of a kernel of the present source."""
+    if kernel.signatures:
+        return True
+    file = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+    return bool(file is not None and file._load_index())
+
+
 class Kernel(CPUDispatcher):
     """A function as `numba.njit` returns it, which is compiled for Python only if Python calls it.
 
@@ -98,6 +106,8 @@ class Kernel(CPUDispatcher):
         """Compile or load the function for the types `sig`; return the entry point."""
         with global_compiler_lock, _without_garbage_collection():
             args, _ = sigutils.normalize_signature(sig)
+            # A constant argument would cause a compilation of its own.
+            sig = args = tuple(types.unliteral(arg) for arg in args)
             if Kernel._depth == 0 and args in self._inner:
                 self._inner.remove(args)
                 del self.overloads[args]

@@ -24,6 +24,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import find_suite
 from lgmd_gym.benchmark.task import NO_BRAKE, Task
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
+from lgmd_gym.engine.first_use import compile_kernels
 from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.envs.families.distribution import LEVELS
 from lgmd_gym.errors import check_known, check_whole
@@ -199,6 +200,7 @@ class Objective:
         return rows
 
     def _map(self, function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]]) -> list[Any]:
+        compile_kernels()  # before the processes, which would all do so
         return list(run_parallel((delayed(function)(*each) for each in arguments), self.jobs))
 
 

@@ -2,16 +2,19 @@
 
 import importlib
 import io
+import os
+import subprocess
 import sys
 from types import SimpleNamespace
 
 import numba
 import pytest
 
-from lgmd_gym.benchmark import plan as plans
-from lgmd_gym.benchmark.plan import CasePlan
+from lgmd_gym.benchmark import RunConfig, runner
 from lgmd_gym.benchmark.runner import Run
+from lgmd_gym.engine import first_use
 from lgmd_gym.kernels import compilation
+from lgmd_gym.kernels.kernel import is_cached
 from lgmd_gym.processes.pool import Executor
 
 
@@ -116,29 +119,14 @@ def test_numba_is_observed(monkeypatch, capsys):
     assert compilation.START in capsys.readouterr().err
 
 
-def run_with(jobs, tmp_path, make_config):
-    run = Run.new(make_config, tmp_path / f"run{jobs}", Executor(jobs))
-    run.plan.play = lambda run_tasks, rows: iter(())
-    run.play()
-
-
 def test_kernels_are_compiled_before_the_workers_start(monkeypatch, tmp_path):
-    from lgmd_gym.benchmark import RunConfig
-
-    played = []
-    monkeypatch.setattr(plans, "play_unit", lambda unit: iter([played.append(unit)]))
+    events = []
+    monkeypatch.setattr(runner, "compile_kernels", lambda: events.append("compiled"))
     config = RunConfig(suite="quick", agents=("no-brake",), seeds=1)
-    run_with(2, tmp_path, config)
-    cached = all(map(plans._is_cached, (plans.draw_cameras, plans.advance)))
-    assert len(played) == (not cached)
-    monkeypatch.setattr(plans, "_is_cached", lambda kernel: False)
-    played.clear()
-    run_with(1, tmp_path, config)
-    assert played == []
-    (tmp_path / "again").mkdir()
-    run_with(2, tmp_path / "again", config)
-    (unit,) = played
-    assert [task.key for task in unit.tasks] == [CasePlan(config)._first_task(0, 0, "clear").key]
+    run = Run.new(config, tmp_path / "run", Executor(2))
+    run.plan.play = lambda run_tasks, rows: iter([events.append("played")][:0])
+    run.play()
+    assert events == ["compiled", "played"]
 
 
 def test_a_kernel_that_was_compiled_is_cached(tmp_path, monkeypatch):
@@ -147,6 +135,23 @@ def test_a_kernel_that_was_compiled_is_cached(tmp_path, monkeypatch):
     )
     monkeypatch.syspath_prepend(tmp_path)
     twice = importlib.import_module("one_kernel").twice
-    assert not plans._is_cached(twice)
+    assert not is_cached(twice)
     twice(1)
-    assert plans._is_cached(twice)
+    assert is_cached(twice)
+
+
+def test_cached_kernels_start_no_process(monkeypatch):
+    monkeypatch.setattr(first_use, "is_cached", lambda kernel: True)
+    monkeypatch.setattr(first_use.subprocess, "Popen", lambda *_, **__: pytest.fail("started a process"))
+    first_use.compile_kernels()
+
+
+@pytest.mark.slow
+def test_a_second_process_compiles_what_is_not_camera(tmp_path):
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "LGMD_GYM_QUIET": "1"}
+    code = """from lgmd_gym.engine.first_use import advance, compile_kernels, draw_cameras
+compile_kernels()
+print(*(sum(kernel.stats.cache_hits.values()) for kernel in (advance, draw_cameras)))"""
+    command = [sys.executable, "-c", code]
+    loaded = subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout
+    assert loaded.split() == ["1", "0"]

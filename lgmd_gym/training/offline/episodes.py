@@ -11,6 +11,7 @@ import numpy as np
 from joblib import delayed
 
 from lgmd_gym.agents.policies.features import FRAME, SCALES, shrink_frames
+from lgmd_gym.engine.first_use import compile_kernels
 from lgmd_gym.processes.files import complete_file, is_intact_zip
 from lgmd_gym.processes.pool import run_parallel
 
@@ -75,6 +76,7 @@ def record_parallel(
         jobs: Number of processes.
         chunk_size: Largest number of seeds recorded by one task of a process.
     """
+    compile_kernels()  # before the processes, which would all do so
     size = max(min(chunk_size, -(-len(seeds) // jobs)), 1)
     chunks = [seeds[start : start + size] for start in range(0, len(seeds), size)]
     for by_seed in run_parallel((delayed(record)(chunk) for chunk in chunks), jobs):

@@ -1,0 +1,71 @@
+"""Compilation of the kernels at the first use, in two processes at once.
+
+Numba compiles a kernel at its first call, one after the other. The kernel that draws cameras takes two thirds
+of the time, so that a second process compiles the others meanwhile, for numba's cache.
+"""
+
+import os
+import subprocess
+import sys
+
+import gymnasium as gym
+import numpy as np
+from highway_env.road.road import RoadNetwork
+
+from lgmd_gym.camera import Camera
+from lgmd_gym.camera.render.raster import draw_cameras
+from lgmd_gym.camera.scene import Scene
+from lgmd_gym.envs.decisions import advance
+from lgmd_gym.envs.registration import env_id
+from lgmd_gym.kernels.compilation import VARIABLE
+from lgmd_gym.kernels.kernel import is_cached
+from lgmd_gym.neuron import LGMD
+from lgmd_gym.processes.pool import signals_blocked
+from lgmd_gym.sensing.drawing import Drawing
+
+_HELPER = f"from {__name__} import _compile_others; _compile_others()"
+
+
+def compile_kernels() -> None:
+    """Compile the kernels of a braking environment, unless numba's cache has them."""
+    if all(map(is_cached, (draw_cameras, advance))):
+        return
+    environment = os.environ | {VARIABLE: "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    with signals_blocked():
+        helper = subprocess.Popen(
+            [sys.executable, "-c", _HELPER],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+    try:
+        _draw_camera(RoadNetwork.straight_road_network(2), Scene())
+        helper.wait()
+    finally:
+        helper.kill()
+        helper.wait()
+    _step_environment()  # compiles what connects the two, and all that a helper that failed has left
+
+
+def _compile_others() -> None:
+    """Compile the kernels of motion, neuron and worlds."""
+    _step_environment(camera=None)
+    camera = Camera()
+    LGMD(camera.shape).step(np.zeros(camera.shape, np.uint8))
+
+
+def _draw_camera(network: RoadNetwork, scene: Scene) -> None:
+    """Draw one frame."""
+    drawing = Drawing([Camera()], [[0]], 1)
+    drawing.set_scene(0, scene, max_deceleration=9.0)
+    drawing.set_road(0, network)
+    drawing.draw(0, 0, 1, np.ones((1, 1), np.bool_))
+
+
+def _step_environment(**arguments: None) -> None:
+    """Step an environment once."""
+    env = gym.make(env_id("RandomBraking"), **arguments)
+    env.reset(seed=0)
+    env.step(np.zeros(1, np.float32))
+    env.close()
