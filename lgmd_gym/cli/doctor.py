@@ -195,7 +195,10 @@ def check_window() -> list[Finding]:
 
 def check_simulation() -> list[Finding]:
     """Repeat one approach for two seconds: the rule must stop the car, with the same result every time."""
+    from lgmd_gym.engine.first_use import compile_kernels
+
     start = time.perf_counter()
+    compile_kernels()
     unbraked, _ = _run_approach("no-brake")
     compiled = f"ready after {time.perf_counter() - start:.1f} s (compiled once, then cached by numba)"
     braked, steps = _run_approach("spike-threshold")
