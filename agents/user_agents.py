@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgmd_gym.agents.base import BatchAgent, Infos, Observations, rows_of
+from lgmd_gym.agents.base import Agent, BatchAgent, Infos, Observations, rows_of
+from lgmd_gym.agents.rules import Rule
 from lgmd_gym.errors import check_flag, check_keys, shown, unknown_name
 from lgmd_gym.processes.user_modules import error_reason, import_user_module
 
@@ -126,6 +127,14 @@ def make_user_agent(text: str) -> BatchAgent:
     if not callable(getattr(agent_class, "act", None)):
         raise ValueError(f"agent {shown(name)} has no method act(observation, info)")
     options = parse_agent(f"{module}:{''.join(rest)}")[1]
+    kind = agent_class if isinstance(agent_class, type) else object
+    if issubclass(kind, Agent):
+        raise ValueError(
+            f"agent {shown(name)} must not be a subclass of Agent, which wraps agents; derive it from "
+            "BatchAgent or from no class"
+        )
+    if issubclass(kind, Rule):  # its parameters check their own names
+        return kind(**options)
     check_options(name, agent_class, options)
 
     def make() -> Any:
@@ -134,7 +143,7 @@ def make_user_agent(text: str) -> BatchAgent:
         except Exception as error:  # of the class's own code
             raise ValueError(f"agent {shown(name)} cannot be created ({error_reason(error)})") from error
 
-    if isinstance(agent_class, type) and issubclass(agent_class, BatchAgent):
+    if issubclass(kind, BatchAgent):
         return make()
     agents = UserAgents(name, make)
     (agent,) = agents.objects

@@ -155,9 +155,10 @@ def make_braking(
         render_mode: None, "rgb_array" or "human".
         **arguments: Arguments of the family in SI units; `world`, the number of the world, 0 to 9,999, or
             "laboratory", by default drawn from the training worlds at each reset; `weather`, see
-            `Weather`, or "mixed" for that of the world; `road`, see `Appearance`; `scene`, other fields of
-            `Scene`. For "RandomBraking", arguments of `RandomLevels`. For "Scenario", `scenario`: a
-            `Scenario`, or plain data as in `scenario_from_data`.
+            `Weather`, or "mixed" for that of the world; `road`, see `Appearance`; `scene`, a mapping of other
+            fields of `Scene`, or a `Scene`, whose world, by default the laboratory, is fixed. For
+            "RandomBraking", arguments of `RandomLevels`. For "Scenario", `scenario`: a `Scenario`, or plain
+            data as in `scenario_from_data`.
 
     Raises:
         ValueError: If an argument, key or name is unknown, or a value is out of range.
@@ -327,7 +328,8 @@ def make_traffic(
         weather: Named weather, `lgmd_gym.camera.Weather` or its fields, or "mixed" for that of the world;
             None for clear.
         road: See `lgmd_gym.envs.appearance.Appearance`.
-        scene: Other fields of `lgmd_gym.camera.Scene`.
+        scene: Mapping of other fields of `lgmd_gym.camera.Scene`, or a `Scene`, whose world, by default the
+            laboratory, is fixed.
         split: See `lgmd_gym.envs.appearance.Appearance`.
 
     Raises:

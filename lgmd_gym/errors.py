@@ -140,9 +140,9 @@ def check_items(name: str, values: Any, types: type, kind: str = "") -> tuple[An
 
 
 def check_size(name: str, value: Any, low: int, high: int, axes: str = "(height, width)") -> tuple[int, int]:
-    """Return two integers in [low, high], or raise ValueError."""
+    """Return two integers in [low, high], or raise ValueError; also of an array of them."""
     message = f"{name} must be {axes}, each {low} to {high} px, got {shown(value)}"
-    items = as_tuple(value)
+    items = as_tuple(value.tolist() if isinstance(value, np.ndarray) else value)
     if items is None or len(items) != 2 or not all(map(is_integer, items)):
         raise ValueError(message)
     first, second = items

@@ -1,14 +1,16 @@
 """BirdsEye: highway-env's top view as greyscale frames."""
 
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from lgmd_gym.camera.camera import MAX_WIDTH
+from lgmd_gym.camera.camera import BIRDSEYE, MAX_WIDTH
 from lgmd_gym.camera.ego import check_frame
 from lgmd_gym.errors import check_size, check_within
 
 
+@dataclass(eq=False)
 class BirdsEye:
     """highway-env's top view of the road, with the interface of `EgoCamera`.
 
@@ -21,21 +23,22 @@ class BirdsEye:
         scaling: Pixels per metre; None shows as many metres across as the environment's own rendering.
 
     Attributes:
+        name: "birdseye".
+        shape: The same.
         scaling: The same.
     """
 
-    def __init__(self, shape: tuple[int, int] = (90, 160), scaling: float | None = None) -> None:
-        self._shape = check_size("camera shape", shape, 4, MAX_WIDTH)
-        in_range = None if scaling is None else check_within("scaling", scaling, 1e-3, 1e3, "px/m")
-        self.scaling = in_range
+    shape: tuple[int, int] = (90, 160)
+    scaling: float | None = None
+    name: str = field(default=BIRDSEYE, init=False)
+
+    def __post_init__(self) -> None:
+        self.shape = check_size("camera shape", self.shape, 4, MAX_WIDTH)
+        if self.scaling is not None:
+            self.scaling = check_within("scaling", self.scaling, 1e-3, 1e3, "px/m")
         self._viewer: Any = None
         self._oversampling = 1
         self._env: Any = None
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """`(height, width)` of the frames [px]."""
-        return self._shape
 
     def render(self, env: Any, out: np.ndarray | None = None) -> np.ndarray:
         """Render the present top view.
@@ -45,7 +48,7 @@ class BirdsEye:
             out: Frame to draw into, uint8, shape (height, width); a new one if None.
         """
         if out is not None:
-            check_frame(out, self._shape)
+            check_frame(out, self.shape)
         base = getattr(env, "unwrapped", env)
         if getattr(base, "road", None) is None:
             raise ValueError("the environment has no road: call reset() before render()")
@@ -57,7 +60,7 @@ class BirdsEye:
 
         rgb = surfarray.array3d(viewer.sim_surface).swapaxes(0, 1)
         luma = rgb @ np.array([0.299, 0.587, 0.114], dtype=np.float32)
-        height, width = self._shape
+        height, width = self.shape
         k = self._oversampling
         if k > 1:
             luma = luma.reshape(height, k, width, k).mean(axis=(1, 3))
@@ -75,7 +78,7 @@ class BirdsEye:
     def _open(self, base: Any) -> Any:
         from highway_env.envs.common.graphics import EnvViewer
 
-        height, width = self._shape
+        height, width = self.shape
         config = base.config
         # The viewer's lines are at least a pixel wide: draw at the environment's resolution, then average.
         self._oversampling = max(1, -(-config["screen_width"] // width))

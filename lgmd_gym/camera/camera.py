@@ -7,6 +7,8 @@ from typing import Any, TypeAlias, cast
 from lgmd_gym.errors import check_known, check_size, shown
 from lgmd_gym.fields import Record, choice, flag, number, optional, record, text, value
 
+BIRDSEYE = "birdseye"
+"""Name of the camera for highway-env's top view."""
 MAX_WIDTH = 4096
 """Maximum width and height of a frame [px]."""
 MIN_STOP = 4.0
@@ -210,6 +212,8 @@ class Camera(Record):
         """Check the name, and the zoom of the gaze `ToStoppingPoint`."""
         if not self.name:
             raise ValueError("camera name must not be empty")
+        if self.name == BIRDSEYE:
+            raise ValueError(f"camera name {BIRDSEYE!r} is that of highway-env's top view; use `BirdsEye`")
         if isinstance(self.gaze, ToStoppingPoint) and self.gaze.span_m > 4.0 * self.least_depth_m:
             raise ValueError(
                 f"camera span_m must be at most {4.0 * self.least_depth_m:.3g} m, four times the least "

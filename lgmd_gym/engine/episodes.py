@@ -76,6 +76,10 @@ class EpisodeQueue:
             self._worker.shutdown(cancel_futures=True)
         self._worker = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Copies have no background thread, and repeat the draws that wait."""
+        return self.__dict__ | {"_worker": None, "_waiting": [None] * len(self.sources)}
+
     def _own_worker(self) -> ThreadPoolExecutor:
         """Return the background thread of this process; a forked process has none of its parent's threads."""
         if self._worker is None or self._pid != os.getpid():

@@ -1,16 +1,15 @@
 """`Channel`: one neuron behind one camera; the `camera` argument of environments and wrappers."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any, TypeAlias, cast
 
 from lgmd_gym import neuron as models
 from lgmd_gym.camera.birdseye import BirdsEye
-from lgmd_gym.camera.camera import PRESETS, Camera, CameraItem
+from lgmd_gym.camera.camera import BIRDSEYE, PRESETS, Camera, CameraItem
 from lgmd_gym.errors import as_tuple, check_keys, shown
 from lgmd_gym.fields import Record, record, text, value, whole
 
-BIRDSEYE = "birdseye"
-"""Name of the camera for highway-env's top view."""
 LGMD = "lgmd"
 """Name of the usual neuron."""
 
@@ -60,8 +59,7 @@ class Channel(Record):
     def check(self) -> None:
         """Take the name of the camera for none, and check that the columns fit the frame."""
         if not self.name:
-            name = self.camera.name if isinstance(self.camera, Camera) else BIRDSEYE
-            object.__setattr__(self, "name", name)
+            object.__setattr__(self, "name", self.camera.name)
         width = self.camera.shape[1]
         if self.columns and width % self.columns:
             raise ValueError(f"channel columns must divide the width of {width} px, got {self.columns}")
@@ -116,7 +114,7 @@ def plain_values(value: Any) -> Any:
     if items is not None:
         return [plain_values(item) for item in items]
     if isinstance(value, BirdsEye):
-        value = {"name": BIRDSEYE, "shape": list(value.shape), "scaling": value.scaling}
+        value = asdict(value)
     elif isinstance(value, Channel):
         value = {"name": value.name, "camera": value.camera, "neuron": value.neuron, "columns": value.columns}
     elif hasattr(value, "to_dict"):

@@ -147,7 +147,12 @@ class SensorArray:
     @property
     def has_top_views(self) -> bool:
         """Whether highway-env draws one of the cameras."""
-        return any(isinstance(channel.camera, BirdsEye) for channel in self.channels)
+        return bool(self.top_views)
+
+    @property
+    def top_views(self) -> list[int]:
+        """Indices of the channels whose camera highway-env draws."""
+        return [k for k, channel in enumerate(self.channels) if isinstance(channel.camera, BirdsEye)]
 
     def read_top_views(self, env: gym.Env, index: int = 0) -> None:
         """Render the enabled cameras of environment `index` that highway-env draws."""

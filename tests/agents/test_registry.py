@@ -7,6 +7,8 @@ import pytest
 from support.agents import make_step, run_agent
 
 from lgmd_gym.agents import AGENTS, BatchAgent, make_agent, make_agents, register_agent
+from lgmd_gym.agents.base import Agent
+from lgmd_gym.agents.rules import FrequencyRule, SpikeThresholdParams
 from lgmd_gym.agents.user_agents import parse_agent
 
 USER_AGENT = f"{__name__}:Threshold"
@@ -20,6 +22,27 @@ class Threshold:
 
     def act(self, observation, info):
         return -0.5 if observation["spike_frequency"].max() > self.level else 0.0
+
+
+class MyRule(FrequencyRule):
+    """A user's rule with the parameters of another one."""
+
+    name, Params = "mine", SpikeThresholdParams
+
+
+class Derived(Agent):
+    """What earlier versions expected of a user."""
+
+
+def test_options_of_a_users_rule_are_its_parameters():
+    assert make_agent(f"{__name__}:MyRule:threshold=45.5").agent.params.threshold == 45.5
+    with pytest.raises(ValueError, match="unknown option of agent mine 'treshold'; did you mean 'threshold'"):
+        make_agent(f"{__name__}:MyRule:treshold=45.5")
+
+
+def test_a_subclass_of_the_adapter_is_refused():
+    with pytest.raises(ValueError, match=r"must not be a subclass of Agent.*derive it from BatchAgent"):
+        make_agent(f"{__name__}:Derived")
 
 
 def test_parse_agent_returns_name_and_typed_options():

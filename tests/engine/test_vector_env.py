@@ -1,5 +1,7 @@
 """Resets, seeds, copies, rendering, statistics and specifications of the engine."""
 
+import copy
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -148,3 +150,16 @@ def test_close_twice_and_without_reset():
     envs = gym.make_vec("LGMD/CCRs-v0", num_envs=2, threads=2)
     envs.close()
     envs.close()
+
+
+def test_a_copy_continues_with_the_same_episodes():
+    envs = gym.make_vec("LGMD/RandomBraking-v0", num_envs=2, threads=2)
+    envs.reset(seed=0)
+    again = copy.deepcopy(envs)
+    demands = np.full((2, 1), -1.0, np.float32)
+    for _ in range(150):
+        (observed, rewards, *_), (copied, others, *_) = envs.step(demands), again.step(demands)
+        np.testing.assert_array_equal(rewards, others)
+        assert all(np.array_equal(observed[name], copied[name]) for name in observed)
+    envs.close()
+    again.close()

@@ -10,7 +10,6 @@ from lgmd_gym.benchmark.traffic.reader import Moment, SceneFrame
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.sensing.assembly import Assembly, Traces, row_of
-from lgmd_gym.sensing.channel import BIRDSEYE
 from lgmd_gym.sensing.highway import camera_rate
 from lgmd_gym.sensing.sensor_array import SensorArray
 
@@ -37,7 +36,7 @@ class Observer:
         self.sensors = SensorArray(arguments["camera"], self.fps, params, num_envs)
         self._assembly = Assembly(self.sensors, frequency, arguments["include_frame"])
         self._traces = Traces(self.sensors)
-        self._top_views = [k for k, name in enumerate(self.sensors.names) if name == BIRDSEYE]
+        self._top_views = self.sensors.top_views
 
     def observe(self, moments: Sequence[Moment | None]) -> list[Step | None]:
         """Process the frames of one decision of every episode and return its steps.

@@ -7,7 +7,6 @@ import numpy as np
 from lgmd_gym.agents import to_action
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.sensing.assembly import mean_yaw_rate
-from lgmd_gym.sensing.channel import BIRDSEYE
 from lgmd_gym.sensing.highway import on_road_step
 from lgmd_gym.sensing.sensor_array import SensorArray
 
@@ -65,7 +64,7 @@ class SceneReader:
         self.env, self.sensors, self.index = env, sensors, index
         self._hz = env.config["simulation_frequency"]
         self._stride = round(self._hz / fps)
-        self._top_views = [k for k, name in enumerate(sensors.names) if name == BIRDSEYE]
+        self._top_views = sensors.top_views
         self._substeps = decision * (self._hz // env.config["policy_frequency"])
         self._frames: list[SceneFrame] = []
         on_road_step(env, self._on_substep)
