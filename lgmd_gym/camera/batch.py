@@ -12,8 +12,9 @@ from lgmd_gym.camera.effects import LOOK, beam_profile, in_scene, look_of, textu
 from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.pose import FIXED, GAZE_NUMBERS, MOUNT, USUAL_BRAKE, mount_of
 from lgmd_gym.camera.render.buffers import Views
-from lgmd_gym.camera.render.raster import SharedTables, Workspace, draw_cameras, tables_key
+from lgmd_gym.camera.render.raster import Workspace, draw_cameras
 from lgmd_gym.camera.render.sensor import STATE_SIZE
+from lgmd_gym.camera.render.tables import PLACES, SharedTables
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.kernels.bundle import Bundle
 
@@ -24,7 +25,6 @@ class _Prepared(NamedTuple):
     mount: np.ndarray
     look: np.ndarray
     beam: np.ndarray
-    tables_key: tuple[Any, ...]
     camera: Camera  # in the scene
 
 
@@ -35,7 +35,6 @@ def _prepare(camera: Camera, scene: Scene, max_deceleration: float) -> _Prepared
         mount=mount_of(camera, scene, max_deceleration),
         look=look_of(camera, scene),
         beam=beam_profile(camera),
-        tables_key=tables_key(camera, scene),
         camera=camera,
     )
 
@@ -64,7 +63,8 @@ class CameraBatch:
         size = (num_envs, len(cameras))
         self.lenses = np.zeros((*size, 2), LENS)
         self._mounts = np.zeros(size, MOUNT)
-        self._tables_indices = np.full(size, -1, dtype=np.int64)
+        self._tables = np.full(size, None)  # the `SharedTables` of each camera
+        self._places = np.zeros((*size, *PLACES), np.int64)  # an address of 0 for no tables
         self._views = Views(
             looks=np.zeros(size, LOOK),
             beams=np.zeros((*size, shape[1]), dtype=np.float32),
@@ -73,10 +73,8 @@ class CameraBatch:
             noise_starts=np.zeros(size, dtype=np.int64),
             exposures=np.full((*size, STATE_SIZE), np.nan),
         )
-        # Index of the tables, mount and lenses of each camera, and the fields of its view.
-        self._bundle = Bundle(self._tables_indices, self._mounts, self.lenses, tuple(self._views))
-        self._tables: dict[tuple[Any, ...], tuple[int, SharedTables]] = {}
-        self._next_index = 0
+        # Places of the tables, mount and lenses of each camera, and the fields of its view.
+        self._bundle = Bundle(self._places, self._mounts, self.lenses, tuple(self._views))
         self.set_scene(slice(None), Scene())
 
     def set_scene(self, index: int | slice, scene: Scene, max_deceleration: float = USUAL_BRAKE) -> None:
@@ -96,7 +94,9 @@ class CameraBatch:
             if camera is not None:
                 prepared = _prepare(camera, plain, max_deceleration)
                 self._set(index, member, prepared, texture_gains(scene, prepared.camera.sensor.linear_light))
-                self._use_tables(index, member, prepared, plain)
+                # Not part of `_prepare`, which would keep the arrays of many scenes.
+                tables = SharedTables(prepared.camera, plain)
+                self._tables[index, member], self._places[index, member] = tables, tables.places
 
     def _set(self, index: int | slice, member: int, prepared: _Prepared, gains: Mapping[str, float]) -> None:
         """Write what the kernels read of one camera."""
@@ -107,17 +107,6 @@ class CameraBatch:
         self._views.exposures[index, member] = np.nan  # adapt to the next frame
         for name, gain in gains.items():
             self._views.looks[name][index, member] = gain
-
-    def _use_tables(self, index: int | slice, member: int, prepared: _Prepared, scene: Scene) -> None:
-        """Select the lookup tables of one camera, and drop those that no camera uses any more."""
-        if prepared.tables_key not in self._tables:
-            self._tables[prepared.tables_key] = self._next_index, SharedTables(prepared.camera, scene)
-            self._next_index += 1
-        used = self._tables[prepared.tables_key][0]
-        if not np.all(self._tables_indices[index, member] == used):
-            self._tables_indices[index, member] = used
-            in_use = set(self._tables_indices.ravel().tolist())
-            self._tables = {key: item for key, item in self._tables.items() if item[0] in in_use}
 
     def turn(self, member: int, scene: Scene, turn: tuple[float, float] | None) -> None:
         """Turn a camera of the first environment relative to its mount, in place of its gaze.
@@ -148,6 +137,11 @@ class CameraBatch:
 
         Threads may draw disjoint ranges at once, each with a workspace of its own.
         """
-        for used, tables in self._tables.values():
-            inputs = workspace.join(self._bundle, scene_table, roads, tables.bundle)
-            draw_cameras(first, last, used, frames, selected, inputs.native)
+        inputs = workspace.join(self._bundle, scene_table, roads)
+        draw_cameras(first, last, frames, selected, inputs.native)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        for place, tables in np.ndenumerate(self._tables):
+            if tables is not None:
+                self._places[place] = tables.places

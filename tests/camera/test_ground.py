@@ -7,9 +7,10 @@ from support.roads import straight_env
 
 from lgmd_gym.camera.effects import beam_profile, look_of
 from lgmd_gym.camera.pinhole import LENS
-from lgmd_gym.camera.render.buffers import Horizon, Tables, View
+from lgmd_gym.camera.render.buffers import Horizon, View
 from lgmd_gym.camera.render.ground import shade_row
 from lgmd_gym.camera.render.light import veil_at
+from lgmd_gym.camera.render.tables import Tables
 from lgmd_gym.camera.render.texture import TEXEL_M, ground_texture
 
 

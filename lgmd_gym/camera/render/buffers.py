@@ -42,26 +42,6 @@ class View(NamedTuple):
     exposure: np.ndarray
 
 
-class Tables(NamedTuple):
-    """Lookup tables.
-
-    Attributes:
-        asphalt: `Texture.data`.
-        verge: `Texture.data`.
-        level_start: `Texture.level_start` of both.
-        skyline: See `skyline`.
-        noise: See `noise_table`.
-        panorama: See `panorama_table`.
-    """
-
-    asphalt: np.ndarray
-    verge: np.ndarray
-    level_start: np.ndarray
-    skyline: np.ndarray
-    noise: np.ndarray
-    panorama: np.ndarray
-
-
 class Buffers(NamedTuple):
     """Scratch memory.
 

@@ -6,15 +6,12 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from lgmd_gym.camera.camera import Camera
-from lgmd_gym.camera.effects import noise_table
 from lgmd_gym.camera.objects import MAX_DRAWN, MODEL_MARK, OBJECT, choose_objects, is_figure, light_of_code
 from lgmd_gym.camera.pose import STOPPING, noise_start, pose_lens
 from lgmd_gym.camera.render.buffers import (
     Buffers,
     GroundLayer,
     SolidLayer,
-    Tables,
     View,
     Views,
     horizon_of,
@@ -37,13 +34,11 @@ from lgmd_gym.camera.render.sensor import (
     overwrite,
 )
 from lgmd_gym.camera.render.shadows import add_cast_shadows, add_shadow
-from lgmd_gym.camera.render.sky import draw_panorama, draw_sky, panorama_table, skyline
+from lgmd_gym.camera.render.sky import draw_panorama, draw_sky
 from lgmd_gym.camera.render.solids import Air, distance, draw_object, first_from, order_objects, visible
-from lgmd_gym.camera.render.texture import ground_texture
+from lgmd_gym.camera.render.tables import tables_at
 from lgmd_gym.camera.road_geometry import RoadGeometry
 from lgmd_gym.camera.roadside import PLANT_RANGE
-from lgmd_gym.camera.scene import SKYLINE, Scene
-from lgmd_gym.camera.worlds import draw_world
 from lgmd_gym.kernels import kernel
 from lgmd_gym.kernels.bundle import Bundle
 
@@ -221,49 +216,6 @@ def draw_frame(frame, view, opening, road, tables, models, objects, count, buffe
     expose(frame, image, look, gain, tone, tables.noise, view.noise_start)
 
 
-_MAX_JOINED = 8  # tables that a workspace remembers
-
-
-def tables_key(camera: Camera, scene: Scene) -> tuple[Any, ...]:
-    """Return what cameras of one frame size in their scenes have in common if they share `SharedTables`."""
-    world, weather = draw_world(scene.world), scene.weather
-    key = (world.asphalt, world.verge, world.skyline)
-    key = key if world.drawn else (scene.seed, camera.sensor.linear_light)
-    if scene.panorama != SKYLINE:
-        # The table of a panorama includes light and fog, at the resolution of the lens.
-        key = *key, scene.panorama, scene.seed, weather.light, weather.visibility_m, camera.focal_px
-    return key
-
-
-class SharedTables:
-    """Lookup tables for the cameras with one `tables_key`; copies share the arrays.
-
-    Attributes:
-        bundle: The fields of `Tables`, then those of `Models`.
-    """
-
-    def __init__(self, camera: Camera, scene: Scene) -> None:
-        self._arguments = camera, scene
-        world, seed = draw_world(scene.world), scene.seed
-        grounds = (world.asphalt, world.verge) if world.drawn else (("asphalt", seed), ("verge", seed))
-        asphalt, verge = (ground_texture(*ground) for ground in grounds)
-        tables = Tables(
-            asphalt=asphalt.data,
-            verge=verge.data,
-            level_start=asphalt.level_start,
-            skyline=skyline(100_000 + world.skyline if world.drawn else seed),
-            noise=noise_table(0 if world.drawn else seed),
-            panorama=panorama_table(camera, scene),
-        )
-        self.bundle = Bundle(tuple(tables), tuple(all_models(linear=camera.sensor.linear_light)))
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "SharedTables":
-        return self
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return SharedTables, self._arguments
-
-
 class Workspace:
     """Scratch memory of one thread for frames of one size.
 
@@ -275,26 +227,24 @@ class Workspace:
         self.buffers: Buffers = make_buffers(shape, len(all_models(linear=False).corners_used))
         self._arrays = np.zeros(MAX_DRAWN, OBJECT), tuple(self.buffers)
         self._shape = shape
-        self._scene: tuple[Bundle, ...] = ()
-        self._joined: dict[Bundle, Bundle] = {}
+        self._parts: tuple[Bundle, ...] = ()
+        self._joined = Bundle()
 
-    def join(self, batch: Bundle, scene_table: Bundle, roads: Bundle, tables: Bundle) -> Bundle:
+    def join(self, batch: Bundle, scene_table: Bundle, roads: Bundle) -> Bundle:
         """Return the inputs of `draw_cameras`; they are remembered until a road has to move."""
-        scene = batch, scene_table, roads
-        if scene != self._scene or len(self._joined) > _MAX_JOINED:
-            self._scene, self._joined = scene, {}
-        joined = self._joined.get(tables)
-        if joined is None:
-            joined = Bundle(batch.arrays, scene_table.arrays, roads.arrays, tables.arrays, self._arrays)
-            self._joined[tables] = joined
-        return joined
+        parts = batch, scene_table, roads
+        if parts != self._parts:
+            models = tuple(tuple(all_models(linear)) for linear in (False, True))
+            self._parts = parts
+            self._joined = Bundle(batch.arrays, scene_table.arrays, roads.arrays, models, self._arrays)
+        return self._joined
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Workspace, (self._shape,)
 
 
 @kernel(arrays=True)
-def draw_cameras(first, last, tables_index, frames, selected, inputs):
+def draw_cameras(first, last, frames, selected, inputs):
     """Pose and draw the selected cameras of the environments first..last-1.
 
     Arrays of shape (environments, members, …) hold one row per camera of this frame size.
@@ -302,24 +252,23 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
     Args:
         first: First environment.
         last: Last environment + 1.
-        tables_index: Index of `tables`; cameras with other tables are skipped.
         frames: Frames to draw, uint8, shape (environments, members, height, width).
-        selected: Cameras to draw, bool, shape (environments, members).
-        inputs: Native bundle of five: that of a `CameraBatch`, of a `SceneTable`, of a `RoadPool`, of
-            `SharedTables`, and as scratch memory, `OBJECT` records of shape (512,) and the fields of
-            `Buffers`.
+        selected: Cameras to draw, bool, shape (environments, members); those without tables are skipped.
+        inputs: Native bundle of five: that of a `CameraBatch`, of a `SceneTable`, of a `RoadPool`, the fields
+            of `Models` in display codes and in light, and as scratch memory, `OBJECT` records of shape (512,)
+            and the fields of `Buffers`.
     """
-    batch, scene_table, roads, tables, space = inputs.arrays
-    tables_indices, mounts, lenses, views = batch
+    batch, scene_table, roads, variants, space = inputs.arrays
+    places, mounts, lenses, views = batch
     scenes, objects, counts = scene_table
     surface, lines, roadside, spans = roads
     chosen, buffers = space
     views, buffers = Views(*views), Buffers(*buffers)
-    tables, models = Tables(*tables[0]), Models(*tables[1])
+    coded, light = Models(*variants[0]), Models(*variants[1])
     for env in range(first, last):
         scene = scenes[env]
         for k in range(mounts.shape[1]):
-            if not selected[env, k] or tables_indices[env, k] != tables_index:
+            if not selected[env, k] or places[env, k, 0, 0] == 0:
                 continue
             mount, lens, span = mounts[env, k], lenses[env, k, 0], spans[env]
             pose_lens(mount, scene, 0.0, lens)
@@ -348,4 +297,5 @@ def draw_cameras(first, last, tables_index, frames, selected, inputs):
                 noise_start=views.noise_starts[env, k],
                 exposure=views.exposures[env, k],
             )
+            tables, models = tables_at(places[env, k]), light if view.look.linear > 0.0 else coded
             draw_frame(frames[env, k], view, lenses[env, k, 1], road, tables, models, chosen, count, buffers)

@@ -9,7 +9,7 @@ import numpy as np
 
 from lgmd_gym.camera.camera import Camera
 from lgmd_gym.camera.effects import WHITE, far_transmission, haze_grey, to_light
-from lgmd_gym.camera.scene import SKYLINE, Scene
+from lgmd_gym.camera.scene import SKYLINE, Scene, Weather
 from lgmd_gym.kernels import kernel
 from lgmd_gym.kernels.simd import (
     LANES,
@@ -209,15 +209,29 @@ def panorama_table(camera: Camera, scene: Scene) -> np.ndarray:
     Raises:
         ValueError: If an image cannot be read.
     """
-    if scene.panorama == SKYLINE:
+    name = scene.panorama
+    if name == SKYLINE:
         return np.zeros((0, 0), dtype=np.float32)
-    weather, linear = scene.weather, camera.sensor.linear_light
-    grey = natural_panorama(scene.seed) if scene.panorama == "natural" else _image(scene.panorama)
-    grey = grey.astype(np.float32)
+    try:
+        number = scene.seed if name == "natural" else Path(name).stat().st_mtime_ns
+        return _panorama(name, number, scene.weather, camera.sensor.linear_light, camera.focal_px)
+    except Exception as error:  # decoders raise many types of errors
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise ValueError(
+            f"scene panorama={name!r} cannot be read as an image ({reason}); "
+            "pass the path of a PNG or JPEG, or 'skyline' or 'natural'"
+        ) from error
+
+
+@lru_cache(maxsize=8)
+def _panorama(name: str, number: int, weather: Weather, linear: bool, focal_px: float) -> np.ndarray:
+    """Return the panorama of a seed (for "natural"), or of an image file with a time stamp."""
+    picture = natural_panorama(number) if name == "natural" else _read_image(name, number)
+    grey = picture.astype(np.float32)
     if linear:
         grey *= grey / np.float32(WHITE)
     # Halve the resolution while a pixel at the centre of the frame covers more than about 1.4 texels.
-    while grey.shape[1] > 16 and 1.0 / camera.focal_px > 1.4 * 2.0 * math.pi / grey.shape[1]:
+    while grey.shape[1] > 16 and 1.0 / focal_px > 1.4 * 2.0 * math.pi / grey.shape[1]:
         grey = 0.25 * (grey[0::2, 0::2] + grey[1::2, 0::2] + grey[0::2, 1::2] + grey[1::2, 1::2])
         if grey.shape[0] % 2:
             grey = np.concatenate((grey, grey[-1:]))
@@ -248,18 +262,6 @@ def natural_panorama(seed: int) -> np.ndarray:
     elevation = (0.5 * shape[0] - 0.5 - np.arange(shape[0])[:, None]) * 360.0 / shape[1]
     sky = 0.35 * np.tanh(elevation / 8.0)
     return np.clip(118.0 * np.exp(0.38 * noise + sky - 0.07), 0.0, 255.0).astype(np.uint8)
-
-
-def _image(path: str) -> np.ndarray:
-    try:
-        stamp = Path(path).stat().st_mtime_ns
-        return _read_image(path, stamp)
-    except Exception as error:  # decoders raise many types of errors
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise ValueError(
-            f"scene panorama={path!r} cannot be read as an image ({reason}); "
-            "pass the path of a PNG or JPEG, or 'skyline' or 'natural'"
-        ) from error
 
 
 @lru_cache(maxsize=4)
