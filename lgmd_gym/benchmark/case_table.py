@@ -61,17 +61,11 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 class SweptArgument(NamedTuple):
-    """One swept argument.
+    """One swept argument."""
 
-    Attributes:
-        name: Name of the argument.
-        values: Its values, in SI units; all are different.
-        parts: The part of the case's name for each value; all are different.
-    """
-
-    name: str
-    values: Sequence[Any]
-    parts: Sequence[str]
+    name: str  # name of the argument
+    values: Sequence[Any]  # its values, in SI units; all are different
+    parts: Sequence[str]  # the part of the case's name for each value; all are different
 
 
 def read_values(name: str, given: Any) -> list[Any]:

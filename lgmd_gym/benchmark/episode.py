@@ -25,30 +25,19 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """Time series and outcome of one episode.
+    """Time series and outcome of one episode."""
 
-    Attributes:
-        series: Arrays of shape (decisions + 1,) by name, the first value from the reset; inf where undefined.
-        collision: Whether the ego had contact.
-        impact_speed: Ego speed at contact [m/s]; inf without contact.
-        relative_impact_speed: Impact speed minus the target's speed along the ego's heading [m/s]; inf
-            without contact.
-        target_width: Width of the first actor [m]; NaN on an empty road.
-        fps: Camera frame rate [Hz].
-        target_shade: Grey level of the first actor in [0, 255]; NaN on an empty road.
-        reward_sum: Undiscounted return of the environment.
-        world: Number of the world; None for the laboratory.
-    """
-
+    # arrays of shape (decisions + 1,) by name, the first value from the reset; inf where undefined
     series: dict[str, np.ndarray]
-    collision: bool
-    impact_speed: float
+    collision: bool  # whether the ego had contact
+    impact_speed: float  # ego speed at contact [m/s]; inf without contact
+    # impact speed minus the target's speed along the ego's heading [m/s]; inf without contact
     relative_impact_speed: float
-    target_width: float
-    fps: float
-    target_shade: float = float("nan")
-    reward_sum: float = float("nan")
-    world: int | None = None
+    target_width: float  # width of the first actor [m]; NaN on an empty road
+    fps: float  # camera frame rate [Hz]
+    target_shade: float = float("nan")  # grey level of the first actor in [0, 255]; NaN on an empty road
+    reward_sum: float = float("nan")  # undiscounted return of the environment
+    world: int | None = None  # number of the world; None for the laboratory
 
     @classmethod
     def of(

@@ -28,17 +28,11 @@ UNDEFINED: Value = (None, False)
 
 @dataclass(frozen=True, slots=True)
 class Counterfactual:
-    """Outcome of `no-brake` in the same case with the same seed.
+    """Outcome of `no-brake` in the same case with the same seed."""
 
-    Attributes:
-        threat: Whether it had contact.
-        contact_time: Time of contact [s]; inf without contact.
-        relative_impact_speed: Relative impact speed [m/s]; inf without contact.
-    """
-
-    threat: bool
-    contact_time: float
-    relative_impact_speed: float
+    threat: bool  # whether it had contact
+    contact_time: float  # time of contact [s]; inf without contact
+    relative_impact_speed: float  # relative impact speed [m/s]; inf without contact
 
     @classmethod
     def of(cls, episode: Episode) -> "Counterfactual":
@@ -56,21 +50,13 @@ class Counterfactual:
 
 @dataclass(frozen=True, slots=True)
 class PairedEpisode:
-    """An episode with its counterfactual: the input of every metric.
-
-    Attributes:
-        episode: The episode.
-        counterfactual: Outcome of `no-brake`.
-        premature: Lead before the counterfactual contact beyond which braking is premature [s].
-        onset: Index of the decision at which braking begins; None for never.
-        alert: Index of the first alert; None for never.
-    """
+    """An episode with its counterfactual: the input of every metric."""
 
     episode: Episode
-    counterfactual: Counterfactual
-    premature: float
-    onset: int | None
-    alert: int | None
+    counterfactual: Counterfactual  # outcome of `no-brake`
+    premature: float  # lead before the counterfactual contact beyond which braking is premature [s]
+    onset: int | None  # index of the decision at which braking begins; None for never
+    alert: int | None  # index of the first alert; None for never
 
     @classmethod
     def of(

@@ -50,17 +50,11 @@ MAX_LISTED = 10  # line numbers that a message lists
 
 
 class StoredRun(NamedTuple):
-    """Contents of a run folder.
+    """Contents of a run folder."""
 
-    Attributes:
-        config: Configuration of the run.
-        rows: Rows in the order of the file; each belongs to the run, and none occurs twice.
-        truncated: Whether an incomplete last line was skipped.
-    """
-
-    config: RunConfig
-    rows: list[Row]
-    truncated: bool
+    config: RunConfig  # configuration of the run
+    rows: list[Row]  # rows in the order of the file; each belongs to the run, and none occurs twice
+    truncated: bool  # whether an incomplete last line was skipped
 
 
 def read_run(path: Path) -> StoredRun:

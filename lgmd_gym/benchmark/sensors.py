@@ -13,18 +13,14 @@ DEFAULT_CAMERA = "fovea"
 
 @dataclass(frozen=True, slots=True)
 class SensorConfig:
-    """Camera and neuron parameters.
+    """Camera and neuron parameters."""
 
-    Attributes:
-        camera: See `LGMDObservation`. None selects the agent's own camera (`Agent.camera`), or "fovea" for
-            an agent without one.
-        params: See `LGMDObservation`. None selects the agent's own parameters if the camera is its own.
-        include_frame: Whether the frames are part of the observation.
-    """
-
+    # see `LGMDObservation`. None selects the agent's own camera (`Agent.camera`), or "fovea" for an agent
+    # without one
     camera: ChannelSpec | None = None
+    # see `LGMDObservation`. None selects the agent's own parameters if the camera is its own
     params: NeuronSpec = None
-    include_frame: bool = False
+    include_frame: bool = False  # whether the frames are part of the observation
 
     def for_agent(self, agent: Agent | BatchAgent | None = None) -> "SensorConfig":
         """Return the config with the agent's own camera and parameters in place of None."""

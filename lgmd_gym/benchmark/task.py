@@ -16,27 +16,16 @@ from lgmd_gym.envs.registration import RANDOM
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One episode to run.
-
-    Attributes:
-        agent: Agent string.
-        case: Case to run.
-        seed: Seed of the environment and the agent.
-        sensor_config: Camera and neuron parameters.
-        counterfactual: Outcome of `no-brake`; None for `no-brake` itself.
-        condition: Name of the weather.
-        world: Number of the world; None for the laboratory.
-        road: Road that moves the car's body, see `Appearance`.
-    """
+    """One episode to run."""
 
     agent: str
-    case: Case
-    seed: int
-    sensor_config: SensorConfig
-    counterfactual: Counterfactual | None = None
-    condition: str = CLEAR
-    world: int | None = None
-    road: str | None = None
+    case: Case  # case to run
+    seed: int  # seed of the environment and the agent
+    sensor_config: SensorConfig  # camera and neuron parameters
+    counterfactual: Counterfactual | None = None  # outcome of `no-brake`; None for `no-brake` itself
+    condition: str = CLEAR  # name of the weather
+    world: int | None = None  # number of the world; None for the laboratory
+    road: str | None = None  # road that moves the car's body, see `Appearance`
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -64,16 +53,11 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """Result of one episode.
+    """Result of one episode."""
 
-    Attributes:
-        row: Row of `episodes.jsonl`.
-        series: Time series; None for traffic and after an error.
-        counterfactual: Counterfactual of the row; None for traffic and after an error.
-    """
-
-    row: Row
-    series: dict[str, np.ndarray] | None = None
+    row: Row  # row of `episodes.jsonl`
+    series: dict[str, np.ndarray] | None = None  # time series; None for traffic and after an error
+    # counterfactual of the row; None for traffic and after an error
     counterfactual: Counterfactual | None = None
 
 

@@ -17,17 +17,11 @@ MAX_TASKS = 64  # tasks of a unit, whose results leave a worker process together
 
 
 class Unit(NamedTuple):
-    """Tasks that share agent, sensors and rates.
+    """Tasks that share agent, sensors and rates."""
 
-    Attributes:
-        run: Identifier of the call of `make_units`; files of agents may change between calls.
-        tasks: The tasks, at least one.
-        agents: Agents to make before the first unit of a worker process.
-    """
-
-    run: str
-    tasks: list[Task]
-    agents: tuple[str, ...] = ()
+    run: str  # identifier of the call of `make_units`; files of agents may change between calls
+    tasks: list[Task]  # the tasks, at least one
+    agents: tuple[str, ...] = ()  # agents to make before the first unit of a worker process
 
 
 def make_units(tasks: Iterable[Task], workers: int, agents: tuple[str, ...] = ()) -> list[Unit]:

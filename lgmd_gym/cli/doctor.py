@@ -30,19 +30,12 @@ class Doctor:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Result of one check.
+    """Result of one check."""
 
-    Attributes:
-        check: Name of the check.
-        state: "ok"; "note" if something optional is missing; or "fault".
-        message: Description of the result.
-        fix: Suggested fix; empty if none is needed.
-    """
-
-    check: str
-    state: str
-    message: str
-    fix: str = ""
+    check: str  # name of the check
+    state: str  # "ok"; "note" if something optional is missing; or "fault"
+    message: str  # description of the result
+    fix: str = ""  # suggested fix; empty if none is needed
 
 
 def run(options: Doctor) -> int:

@@ -21,17 +21,11 @@ EVENT_COLUMNS = ("file", "event_s", "start_s", "end_s")
 
 
 class ClipEvent(NamedTuple):
-    """The event of a clip, and the part in which alarms are scored.
+    """The event of a clip, and the part in which alarms are scored."""
 
-    Attributes:
-        event_s: Time of the event from the first frame [s]; None without one.
-        start_s: Start of the evaluated part [s].
-        end_s: End of the evaluated part [s]; None for the event, or the end of the clip.
-    """
-
-    event_s: float | None
-    start_s: float = 0.0
-    end_s: float | None = None
+    event_s: float | None  # time of the event from the first frame [s]; None without one
+    start_s: float = 0.0  # start of the evaluated part [s]
+    end_s: float | None = None  # end of the evaluated part [s]; None for the event, or the end of the clip
 
 
 def read_crashes(path: Path, clips: Sequence[Path]) -> dict[Path, int | None]:
@@ -148,20 +142,13 @@ def _crash_frame(text: str | None, where: str) -> int | None:
 
 
 class ClipJob(NamedTuple):
-    """One clip to process.
+    """One clip to process."""
 
-    Attributes:
-        clip: Video file.
-        info: Properties of the file.
-        annotated: Whether it is known if and when the clip has a crash.
-        crash_frame: Frame of the crash, at the frame rate of the file; None without one.
-        event: Event and evaluated part, for the scores of anticipation; None if the clip is not scored.
-    """
-
-    clip: Path
-    info: VideoInfo
-    annotated: bool
-    crash_frame: int | None
+    clip: Path  # video file
+    info: VideoInfo  # properties of the file
+    annotated: bool  # whether it is known if and when the clip has a crash
+    crash_frame: int | None  # frame of the crash, at the frame rate of the file; None without one
+    # event and evaluated part, for the scores of anticipation; None if the clip is not scored
     event: ClipEvent | None = None
 
     @property
@@ -172,23 +159,14 @@ class ClipJob(NamedTuple):
 
 @dataclass
 class ClipResult:
-    """Result of one clip.
+    """Result of one clip."""
 
-    Attributes:
-        clip: Video file.
-        trace: CSV file with one row per frame.
-        summary: Time series and onsets.
-        duplicates: Number of frames skipped as duplicates.
-        seconds: Processing time, decoding included [s].
-        error: Message if the clip is truncated, else empty.
-    """
-
-    clip: Path
-    trace: Path
-    summary: ClipSummary
-    duplicates: int = 0
-    seconds: float = 0.0
-    error: str = ""
+    clip: Path  # video file
+    trace: Path  # CSV file with one row per frame
+    summary: ClipSummary  # time series and onsets
+    duplicates: int = 0  # number of frames skipped as duplicates
+    seconds: float = 0.0  # processing time, decoding included [s]
+    error: str = ""  # message if the clip is truncated, else empty
 
 
 def make_jobs(

@@ -22,21 +22,13 @@ SETTLE_S = 8.0 / 30.0  # settling time of the filters: 8 frames at 30 Hz
 
 
 class ChanceLevel(NamedTuple):
-    """Probability of an onset in a window by chance.
+    """Probability of an onset in a window by chance."""
 
-    Attributes:
-        onsets: Number of onsets in the earlier part.
-        seconds: Length of the earlier part [s].
-        probability: Probability of at least one onset in a window; NaN without an earlier part.
-        low: Lower bound of the 95 % interval of the probability.
-        high: Upper bound.
-    """
-
-    onsets: int
-    seconds: float
-    probability: float
-    low: float
-    high: float
+    onsets: int  # number of onsets in the earlier part
+    seconds: float  # length of the earlier part [s]
+    probability: float  # probability of at least one onset in a window; NaN without an earlier part
+    low: float  # lower bound of the 95 % interval of the probability
+    high: float  # upper bound
 
     @classmethod
     def of(cls, onsets: int, seconds: float) -> "ChanceLevel":
@@ -50,25 +42,16 @@ class ChanceLevel(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ClipDetection:
-    """Alarms of one clip before and during the window that precedes its crash.
+    """Alarms of one clip before and during the window that precedes its crash."""
 
-    Attributes:
-        clip: Name of the clip.
-        crash_s: Time of the crash [s]; None without one.
-        lead_s: Time from the first onset in the window to the crash [s]; None without such an onset.
-        alarm_frames: Share of alarm frames in the earlier part, which is the whole clip without a crash.
-        chance: Probability of an onset in a window of this clip by chance.
-        peak: Highest spike frequency after settling [spikes/s].
-        fps: Frame rate of the run [Hz].
-    """
-
-    clip: str
-    crash_s: float | None
+    clip: str  # name of the clip
+    crash_s: float | None  # time of the crash [s]; None without one
+    # time from the first onset in the window to the crash [s]; None without such an onset
     lead_s: float | None
-    alarm_frames: Rate
-    chance: ChanceLevel
-    peak: float
-    fps: float
+    alarm_frames: Rate  # share of alarm frames in the earlier part, which is the whole clip without a crash
+    chance: ChanceLevel  # probability of an onset in a window of this clip by chance
+    peak: float  # highest spike frequency after settling [spikes/s]
+    fps: float  # frame rate of the run [Hz]
 
 
 def find_onsets(alarm: np.ndarray, fps: float) -> np.ndarray:
@@ -119,24 +102,16 @@ def detect(
 
 
 class DetectionSummary(NamedTuple):
-    """Detection by one configuration over all clips.
+    """Detection by one configuration over all clips."""
 
-    Attributes:
-        hits: Crashes with an onset in their window.
-        chance: Chance level from the earlier parts of all clips together.
-        p_value: Probability of at least as many hits if each had the upper bound of the chance level. The
-            chance level itself is too uncertain to be used.
-        alarm_frames: Alarm frames in the earlier parts of all clips.
-        silent_clips: Clips without a crash that have no alarm.
-        lead_s: Median lead time of the hits [s]; NaN without hits.
-    """
-
-    hits: Rate
-    chance: ChanceLevel
+    hits: Rate  # crashes with an onset in their window
+    chance: ChanceLevel  # chance level from the earlier parts of all clips together
+    # probability of at least as many hits if each had the upper bound of the chance level. The chance level
+    # itself is too uncertain to be used
     p_value: float
-    alarm_frames: Rate
-    silent_clips: Rate
-    lead_s: float
+    alarm_frames: Rate  # alarm frames in the earlier parts of all clips
+    silent_clips: Rate  # clips without a crash that have no alarm
+    lead_s: float  # median lead time of the hits [s]; NaN without hits
 
 
 def summarize_detections(detections: Iterable[ClipDetection]) -> DetectionSummary:

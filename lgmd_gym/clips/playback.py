@@ -100,23 +100,14 @@ def named_config(name: str) -> PlaybackConfig:
 
 
 class ClipFrame(NamedTuple):
-    """One frame of a clip and the neuron's response.
+    """One frame of a clip and the neuron's response."""
 
-    Attributes:
-        frame: Frame number from 0, at the rate of the run.
-        time: Time since the first frame [s].
-        picture: RGB picture, uint8, shape (height, width, 3).
-        duplicate: Whether the neuron skipped the frame as a duplicate.
-        response: The neuron's response; for a duplicate, the last one.
-        onset: Whether an alarm begins here after `SILENCE_S` without alarm.
-    """
-
-    frame: int
-    time: float
-    picture: np.ndarray
-    duplicate: bool
-    response: Response
-    onset: bool
+    frame: int  # frame number from 0, at the rate of the run
+    time: float  # time since the first frame [s]
+    picture: np.ndarray  # RGB picture, uint8, shape (height, width, 3)
+    duplicate: bool  # whether the neuron skipped the frame as a duplicate
+    response: Response  # the neuron's response; for a duplicate, the last one
+    onset: bool  # whether an alarm begins here after `SILENCE_S` without alarm
 
     def row(self) -> list[str]:
         """Return the values of `TRACE_COLUMNS`."""

@@ -44,19 +44,13 @@ from lgmd_gym.statistics.intervals import DRAWS, wilson
 
 
 class ScoredClip(NamedTuple):
-    """Scores of the frames of one clip.
+    """Scores of the frames of one clip."""
 
-    Attributes:
-        name: Name of the clip.
-        scores: Score of each evaluated frame, float, shape (frames,). The event follows the last frame.
-        event: Whether the clip ends in an event.
-        fps: Frame rate [Hz].
-    """
-
-    name: str
+    name: str  # name of the clip
+    # score of each evaluated frame, float, shape (frames,). The event follows the last frame
     scores: np.ndarray
-    event: bool
-    fps: float
+    event: bool  # whether the clip ends in an event
+    fps: float  # frame rate [Hz]
 
     @classmethod
     def of(
@@ -105,15 +99,12 @@ FIGURES = (FALSE_ALARMS, *RECALLS, *PRECISIONS, MEAN_PRECISION, TTA_CAP, *WITHOU
 
 
 class EventAlarms(NamedTuple):
-    """Alarms of clips with an event at ascending thresholds.
+    """Alarms of clips with an event at ascending thresholds."""
 
-    Attributes:
-        hit: 1 where the window at a horizon is in alarm, else 0; NaN without a frame. Shape (horizons, clips,
-            levels).
-        lead: Time from the first alarm to the event [s], NaN without an alarm. Shape (clips, levels).
-    """
-
+    # 1 where the window at a horizon is in alarm, else 0; NaN without a frame. Shape (horizons, clips,
+    # levels)
     hit: np.ndarray
+    # time from the first alarm to the event [s], NaN without an alarm. Shape (clips, levels)
     lead: np.ndarray
 
     @classmethod
@@ -252,44 +243,27 @@ CHANCE_DRAWS = 1000  # samples of the chance level
 
 
 class Score(NamedTuple):
-    """One figure with its interval and chance level.
+    """One figure with its interval and chance level."""
 
-    Attributes:
-        name: Name of the figure, for example "recall at 0.5 s".
-        value: Value; None if undefined.
-        low: Lower bound of the 95 % interval; None if undefined.
-        high: Upper bound.
-        n: Number of clips that the figure rests on.
-        chance: Chance level; None if undefined or without meaning.
-        p_value: Probability of at least this value by chance.
-    """
-
-    name: str
-    value: float | None
-    low: float | None
-    high: float | None
-    n: int
-    chance: float | None = None
-    p_value: float | None = None
+    name: str  # name of the figure, for example "recall at 0.5 s"
+    value: float | None  # value; None if undefined
+    low: float | None  # lower bound of the 95 % interval; None if undefined
+    high: float | None  # upper bound
+    n: int  # number of clips that the figure rests on
+    chance: float | None = None  # chance level; None if undefined or without meaning
+    p_value: float | None = None  # probability of at least this value by chance
 
 
 class Anticipation(NamedTuple):
-    """Scores of a detector over clips.
+    """Scores of a detector over clips."""
 
-    Attributes:
-        threshold: Threshold of the cap; infinite if even the highest score exceeds the cap, None without a
-            clip without an event.
-        cap: Highest permitted share of false alarms.
-        events: Number of clips with an event.
-        negatives: Number of clips without an event.
-        scores: Figures in the order of a table.
-    """
-
+    # threshold of the cap; infinite if even the highest score exceeds the cap, None without a clip without an
+    # event
     threshold: float | None
-    cap: float
-    events: int
-    negatives: int
-    scores: tuple[Score, ...]
+    cap: float  # highest permitted share of false alarms
+    events: int  # number of clips with an event
+    negatives: int  # number of clips without an event
+    scores: tuple[Score, ...]  # figures in the order of a table
 
 
 def anticipation(clips: Sequence[ScoredClip], cap: float = 0.1) -> Anticipation:

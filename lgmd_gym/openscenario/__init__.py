@@ -3,6 +3,9 @@
 XML is parsed with the standard library's expat, which reports lines. Packages for OpenSCENARIO and OpenDRIVE
 are not used: scenariogeneration only writes files and needs SciPy, pyxodr needs matplotlib and Shapely, and
 the ASAM checkers (asam-qc-openscenarioxml, asam-qc-opendrive) find faults but resolve no positions.
+
+Every function that reads an element raises ValueError for what is missing, unknown or not supported; the
+message begins with the file and line.
 """
 
 from lgmd_gym.benchmark.extensions import provide

@@ -5,7 +5,7 @@ from math import cos, inf, pi
 
 from lgmd_gym.envs.dynamics.path import rear_axle_path
 from lgmd_gym.openscenario.motion import Place, Timeline, Track, synchronise
-from lgmd_gym.openscenario.nodes import Element, LocatedError
+from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.world import Mover, ScenarioMap, reads_front_axle
 
 _ON_PATH = 0.1  # [m] from a trajectory within which an entity can begin to follow it
@@ -34,7 +34,7 @@ def teleport(item: Element, mover: Mover, world: ScenarioMap, time: float) -> fl
     place = world.place(item.child("Position"))
     if mover.follows and mover.track is not None:
         distance = mover.track.nearest(place)
-        if _apart(mover.track.at(distance), place) <= _ON_PATH:
+        if mover.track.at(distance).distance(place) <= _ON_PATH:
             mover.track = mover.track.part(distance)
             return time
         mover.follows = False
@@ -68,7 +68,7 @@ def _continue(item: Element, mover: Mover, time: float, rest: Track) -> float:
     """Continue the path of an entity with another from where it is."""
     assert mover.track is not None
     here, distance = mover.track.at(mover.timeline.at(time).distance), mover.timeline.at(time).distance
-    if _apart(here, rest.start) > _ON_PATH or cos(here.heading - rest.start.heading) < 0.999:
+    if here.distance(rest.start) > _ON_PATH or cos(here.heading - rest.start.heading) < 0.999:
         raise item.error(f"{mover.name!r} is not on its path at {time:.3g} s; begin the path where it is")
     mover.track, mover.follows = mover.track.then(distance, rest.bends), True
     return mover.timeline.time_of(distance + rest.length)
@@ -93,10 +93,8 @@ def _follow_route(item: Element, mover: Mover, shifted: Callable[[float], Track]
     here = mover.place(time)
     centre = shifted(0.0)
     distance = centre.nearest(here)
-    try:
+    with item.locate_errors():
         track = shifted(here.seen_from(centre.at(distance)).y)
-    except ValueError as error:
-        raise item.error(str(error)) from None
     rest = track.part(track.nearest(here))
     if time > 0.0:
         return _continue(item, mover, time, rest)
@@ -118,10 +116,6 @@ def only_at_start(item: Element, time: float) -> None:
     """Raise ValueError for an action that would move an entity by a jump after the start."""
     if time > 0.0:
         raise item.error(f"{item.tag} is supported at the start only, got {time:.3g} s; move it to Init")
-
-
-def _apart(one: Place, other: Place) -> float:
-    return ((one.x - other.x) ** 2 + (one.y - other.y) ** 2) ** 0.5
 
 
 def speed(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
@@ -178,11 +172,9 @@ def _change(
     final: float,
     build_up: float = 0.0,
 ) -> float:
-    try:
-        mover.leader = None
+    mover.leader = None
+    with item.locate_errors(f"{item.tag} of {mover.name!r}: "):
         end = mover.timeline.change(time, acceleration, final, build_up)
-    except ValueError as error:
-        raise item.error(f"{item.tag} of {mover.name!r}: {error}") from None
     for other in world.movers.values():
         if other.leader is mover:
             other.timeline.copy_from(time, mover.timeline)
@@ -222,7 +214,10 @@ def longitudinal_distance(item: Element, mover: Mover, world: ScenarioMap, time:
     item.choice("coordinateSystem", ("entity", "road", "lane"), "entity")
     known = ("leadingReferencedEntity", "trailingReferencedEntity")
     ahead = item.choice("displacement", known, known[1]) == known[0]
-    distance = item.number("distance") if item.has("distance") else _time_gap(item, mover, time)
+    if item.has("distance"):
+        distance = item.number("distance")
+    else:
+        distance = item.number("timeGap") * mover.timeline.at(time).speed
     base, place = other.place(time), mover.place(time)
     same = cos(place.heading - base.heading) > 0.0
     if item.flag("freespace"):
@@ -234,10 +229,6 @@ def longitudinal_distance(item: Element, mover: Mover, world: ScenarioMap, time:
     if item.flag("continuous"):
         mover.timeline, mover.leader = Timeline(other.timeline.at(time).speed), other
     return time
-
-
-def _time_gap(item: Element, mover: Mover, time: float) -> float:
-    return item.number("timeGap") * mover.timeline.at(time).speed
 
 
 def synchronize(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
@@ -255,10 +246,8 @@ def synchronize(item: Element, mover: Mover, world: ScenarioMap, time: float) ->
     place = world.place(item.child("TargetPosition"), time)
     distance = mover.track.nearest(place) - now.distance
     final, steady = _final_speed(item, master, arrival)
-    try:
+    with item.locate_errors(f"SynchronizeAction of {mover.name!r}: "):
         changes = synchronise(now, distance, arrival - time, final, steady)
-    except ValueError as error:
-        raise item.error(f"SynchronizeAction of {mover.name!r}: {error}") from None
     for start, acceleration, value in changes:
         _change(item, mover, world, start, acceleration, value)
     return arrival
@@ -285,49 +274,39 @@ def _final_speed(item: Element, master: Mover, arrival: float) -> tuple[float | 
 AT_START = 0.2  # [s] within which an entity may be deleted
 ActionRun = Callable[[float], float]
 """Carries out an action at a time [s] and returns the time of its end."""
-_PRIVATE: dict[str, dict[str, Callable[[Element, Mover, ScenarioMap, float], float]]] = {
-    "LongitudinalAction": {
-        "SpeedAction": speed,
-        "SpeedProfileAction": speed_profile,
-        "LongitudinalDistanceAction": longitudinal_distance,
-    },
-    "RoutingAction": {
-        "FollowTrajectoryAction": follow_trajectory,
-        "AssignRouteAction": assign_route,
-        "AcquirePositionAction": acquire_position,
-    },
-}
-_DIRECT = {
+_PRIVATE: dict[str, Callable[[Element, Mover, ScenarioMap, float], float]] = {
     "TeleportAction": teleport,
     "SynchronizeAction": synchronize,
     "ControllerAction": assign_controller,
+    "SpeedAction": speed,
+    "SpeedProfileAction": speed_profile,
+    "LongitudinalDistanceAction": longitudinal_distance,
+    "FollowTrajectoryAction": follow_trajectory,
+    "AssignRouteAction": assign_route,
+    "AcquirePositionAction": acquire_position,
 }
+_GROUPS = {
+    "LongitudinalAction": ("SpeedAction", "SpeedProfileAction", "LongitudinalDistanceAction"),
+    "RoutingAction": ("FollowTrajectoryAction", "AssignRouteAction", "AcquirePositionAction"),
+}
+"""Elements that contain one action of some kinds."""
 NO_EFFECT = ("AppearanceAction", "ActivateControllerAction", "VariableAction")
 """Known actions that have no effect on the motion."""
 
 
 def private_action(item: Element, mover: Mover, world: ScenarioMap) -> ActionRun | None:
-    """Return the function of a `PrivateAction`, or None for an action without effect.
-
-    Raises:
-        ValueError: If the action is not supported.
-    """
-    found = item.only(*_PRIVATE, *_DIRECT, *NO_EFFECT)
+    """Return the function of a `PrivateAction`, or None for an action without effect."""
+    found = item.only(*_GROUPS, "TeleportAction", "SynchronizeAction", "ControllerAction", *NO_EFFECT)
     if found.tag in NO_EFFECT:
         found.skip()
         return None
-    function = _DIRECT.get(found.tag)
-    if function is None:
-        found = found.only(*_PRIVATE[found.tag])
-        function = {name: value for group in _PRIVATE.values() for name, value in group.items()}[found.tag]
+    if found.tag in _GROUPS:
+        found = found.only(*_GROUPS[found.tag])
+    function = _PRIVATE[found.tag]
 
     def run(time: float) -> float:
-        try:
+        with found.locate_errors(f"{found.tag}: "):
             return function(found, mover, world, time)
-        except LocatedError:
-            raise
-        except ValueError as error:
-            raise found.error(f"{found.tag}: {error}") from None
 
     return run
 

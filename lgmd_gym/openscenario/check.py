@@ -37,20 +37,14 @@ from lgmd_gym.openscenario.reader import find_files, read_cells
 
 @dataclass(frozen=True, slots=True)
 class Intent:
-    """The intended contact.
+    """The intended contact."""
 
-    Attributes:
-        time: Time in the file [s].
-        speed: Ego speed [m/s].
-        lateral: Position of a point of the target in the axes of the ego's body, + left [m]; None if the file
-            does not define it.
-        point: Distance of that point ahead of the target's reference point [m].
-    """
-
-    time: float
-    speed: float
+    time: float  # time in the file [s]
+    speed: float  # ego speed [m/s]
+    # position of a point of the target in the axes of the ego's body, + left [m]; None if the file does not
+    # define it
     lateral: float | None
-    point: float
+    point: float  # distance of that point ahead of the target's reference point [m]
 
 
 class _Values:
@@ -194,38 +188,23 @@ def _lane_change(compiled: Compiled, values: _Values) -> Intent:
 
 @dataclass(frozen=True, slots=True)
 class Impact:
-    """The contact of an ego that does not brake.
+    """The contact of an ego that does not brake."""
 
-    Attributes:
-        time: Time in the file [s].
-        speed: Ego speed [m/s].
-        lateral: Position of the target's marked point in the axes of the ego's body, + left [m].
-    """
-
-    time: float
-    speed: float
-    lateral: float
+    time: float  # time in the file [s]
+    speed: float  # ego speed [m/s]
+    lateral: float  # position of the target's marked point in the axes of the ego's body, + left [m]
 
 
 @dataclass(frozen=True, slots=True)
 class CheckedFile:
-    """Result of a file; deviations are the largest absolute ones, NaN without an intent.
+    """Result of a file; deviations are the largest absolute ones, NaN without an intent."""
 
-    Attributes:
-        path: The file.
-        cells: Number of cells.
-        contacts: Number of cells in which the ego touches the target.
-        location: Deviation of the impact location [m].
-        speed: Deviation of the impact speed [m/s].
-        time: Deviation of the time of impact [s].
-    """
-
-    path: Path
+    path: Path  # the file
     cells: int
-    contacts: int
-    location: float
-    speed: float
-    time: float
+    contacts: int  # number of cells in which the ego touches the target
+    location: float  # deviation of the impact location [m]
+    speed: float  # deviation of the impact speed [m/s]
+    time: float  # deviation of the time of impact [s]
 
 
 def check_files(paths: Sequence[str | Path], jobs: int = 1) -> Iterator[CheckedFile]:

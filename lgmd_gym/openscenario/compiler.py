@@ -10,15 +10,15 @@ the direction of travel, and the body is turned by 180 degrees.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from math import cos, hypot, inf, pi, remainder, sin
-from pathlib import Path
 
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.script import Bend, Segment
 from lgmd_gym.envs.families.scenario import AFTERMATH, START_TTC, Actor, RoadPlan, Scenario
-from lgmd_gym.openscenario.motion import Place, Track
-from lgmd_gym.openscenario.nodes import Element, LocatedError, check_used
+from lgmd_gym.openscenario.motion import Place, Track, first_true
+from lgmd_gym.openscenario.nodes import Element, check_used
 from lgmd_gym.openscenario.parameters import Catalogs
 from lgmd_gym.openscenario.roads import Road, RoadNetwork, read_roads
 from lgmd_gym.openscenario.storyboard import read_story, run_init
@@ -35,9 +35,6 @@ def weather_of(environment: Element | None) -> str:
     """Return the weather of an `Environment`: clear, night, fog or rain.
 
     Night is a sun below 50 lx, fog a visual range below 1000 m, rain a precipitation with an intensity.
-
-    Raises:
-        ValueError: If several of them are combined, there is snow, or the road is slippery.
     """
     if environment is None:
         return CLEAR
@@ -71,9 +68,6 @@ def road_plan(network: RoadNetwork, ego: Place, located: tuple[Road, float, floa
         network: The roads.
         ego: Initial pose of the ego's centre, in its direction of travel.
         located: The ego's road, distance along it and offset from it [m].
-
-    Raises:
-        ValueError: If the road has spirals.
     """
     road, s, t = located
     distances = [_crossing(other, ego) for other in network.roads.values() if other.junction == "-1"]
@@ -156,29 +150,18 @@ IGNORED_ATTRIBUTES = frozenset(_ATTRIBUTES.split())
 
 @dataclass(frozen=True)
 class Compiled:
-    """A concrete scenario.
-
-    Attributes:
-        scenario: The scenario.
-        weather: Name of the weather.
-        start: Time in the file at which the episode begins [s].
-        contact: Time in the file of the ego's first contact if it does not brake [s]; inf without one.
-        ego: The ego.
-        target: The entity that the ego touches first, or the one it comes nearest to; None without one.
-        world: The world, for positions.
-        root: Root element with the values of the parameters.
-        properties: Properties of the file.
-    """
+    """A concrete scenario."""
 
     scenario: Scenario
-    weather: str
-    start: float
-    contact: float
+    weather: str  # name of the weather
+    start: float  # time in the file at which the episode begins [s]
+    contact: float  # time in the file of the ego's first contact if it does not brake [s]; inf without one
     ego: Mover
+    # the entity that the ego touches first, or the one it comes nearest to; None without one
     target: Mover | None
-    world: ScenarioMap
-    root: Element
-    properties: dict[str, str]
+    world: ScenarioMap  # the world, for positions
+    root: Element  # root element with the values of the parameters
+    properties: dict[str, str]  # properties of the file
 
 
 def compile_scenario(root: Element, family: str) -> Compiled:
@@ -187,15 +170,12 @@ def compile_scenario(root: Element, family: str) -> Compiled:
     Args:
         root: Root element with the values of the parameters.
         family: Family of the scenario.
-
-    Raises:
-        ValueError: If the scenario contains something that is not supported; the message begins with the file
-            and line.
     """
     catalogs = Catalogs(root)
     movers = read_entities(root, catalogs)
     network = root.child("RoadNetwork").child("LogicFile")
-    world = ScenarioMap(read_roads(_file(network)), catalogs, movers)
+    roads = read_roads(root.node.file.parent / network.text("filepath"))
+    world = ScenarioMap(roads, catalogs, movers)
     board = root.child("Storyboard")
     environment = run_init(board, world)
     weather = weather_of(environment)
@@ -205,29 +185,22 @@ def compile_scenario(root: Element, family: str) -> Compiled:
     ego = next((item for name, item in movers.items() if name.lower() == EGO), None)
     if ego is None:
         raise root.child("Entities").error("the scenario needs an entity with the name Ego")
-    try:
+    with root.locate_errors():
         return _compile(root, world, ego, family, weather)
-    except LocatedError:
-        raise
-    except ValueError as error:
-        raise root.error(str(error)) from None
-
-
-def _file(item: Element) -> Path:
-    return item.node.file.parent / item.text("filepath")
 
 
 def _compile(root: Element, world: ScenarioMap, ego: Mover, family: str, weather: str) -> Compiled:
     others = [item for item in world.movers.values() if item is not ego and not item.deleted]
     contact, target = _first_contact(ego, [item for item in others if item.body.kind != "road_marking"])
-    properties = _properties(root)
+    header = root.find("FileHeader")
+    properties = {} if header is None else header.properties()
     duration = float(properties[DURATION]) if DURATION in properties else None
     start = 0.0 if duration is not None else _start(contact, [ego, *others])
     if duration is None:
         others.sort(key=lambda item: item is not target)
-        duration = (
-            (contact if contact < inf else _last_change([ego, *others]) + START_TTC) - start + AFTERMATH
-        )
+        changes = [item.start for mover in (ego, *others) for item in mover.timeline.segments]
+        end = contact if contact < inf else max(changes, default=0.0) + START_TTC
+        duration = end - start + AFTERMATH
     length = ego.body.length
     base, _, _ = _pose(ego, start)
     scenario = Scenario(
@@ -245,22 +218,11 @@ def _compile(root: Element, world: ScenarioMap, ego: Mover, family: str, weather
     return Compiled(scenario, weather, start, contact, ego, target, world, root, properties)
 
 
-def _properties(root: Element) -> dict[str, str]:
-    """Return the properties of a file, such as those of an exported one."""
-    header = root.find("FileHeader")
-    block = None if header is None else header.find("Properties")
-    return {} if block is None else {item.text("name"): item.text("value") for item in block.all("Property")}
-
-
 def _start(contact: float, movers: list[Mover]) -> float:
     changes = [item.timeline.segments[0].start for item in movers if item.timeline.segments]
     first = min(changes, default=inf) - LEAD_IN
     start = min(contact - START_TTC, first)
     return start if start < inf else 0.0
-
-
-def _last_change(movers: list[Mover]) -> float:
-    return max((item.start for mover in movers for item in mover.timeline.segments), default=0.0)
 
 
 def _pose(mover: Mover, time: float) -> tuple[Place, float, float]:
@@ -324,27 +286,19 @@ def _contact(one: Mover, other: Mover, horizon: float) -> tuple[float, float]:
         a, b = _pose(one, time)[0], _pose(other, time)[0]
         apart = hypot(a.x - b.x, a.y - b.y)
         least = min(least, apart)
-        if apart <= reach and _touch(a, b, one, other):
-            return _bisect(one, other, max(time - 0.02, 0.0), time), 0.0
+        if apart <= reach and _touching(one, other, time):
+            touching = partial(_touching, one, other)
+            return first_true(touching, max(time - 0.02, 0.0), time), 0.0
         time += max((apart - reach) / fastest, 0.005)
     return inf, least
-
-
-def _bisect(one: Mover, other: Mover, low: float, high: float) -> float:
-    while high - low > 1e-12 * max(high, 1.0):
-        middle = (low + high) / 2
-        if _touch(_pose(one, middle)[0], _pose(other, middle)[0], one, other):
-            high = middle
-        else:
-            low = middle
-    return high
 
 
 def _top_speed(mover: Mover) -> float:
     return max(mover.timeline.initial_speed, *(item.final_speed for item in mover.timeline.segments), 0.0)
 
 
-def _touch(a: Place, b: Place, one: Mover, other: Mover) -> bool:
+def _touching(one: Mover, other: Mover, time: float) -> bool:
+    a, b = _pose(one, time)[0], _pose(other, time)[0]
     first = Rectangle(a.x, a.y, a.heading, one.body.length, one.body.width)
     second = Rectangle(b.x, b.y, b.heading, other.body.length, other.body.width)
     return first_touch(first, second, 0.0, 0.0) == 0.0

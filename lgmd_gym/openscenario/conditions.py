@@ -7,7 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, inf
 
-from lgmd_gym.openscenario.nodes import Element, LocatedError
+from lgmd_gym.openscenario.motion import first_true
+from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.parameters import RULES, compare
 from lgmd_gym.openscenario.world import Mover, ScenarioMap
 
@@ -18,11 +19,7 @@ Test = Callable[[float], bool]
 
 
 def entity_test(item: Element, world: ScenarioMap) -> Test:
-    """Return the test of a `ByEntityCondition`.
-
-    Raises:
-        ValueError: If the condition is not supported.
-    """
+    """Return the test of a `ByEntityCondition`."""
     triggering = item.child("TriggeringEntities")
     rule = triggering.choice("triggeringEntitiesRule", ("any", "all"))
     movers = [world.mover(entry) for entry in triggering.all("EntityRef")]
@@ -109,23 +106,13 @@ def _relative_distance(item: Element, mover: Mover, world: ScenarioMap) -> Test:
 
 def _reach_position(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     place, tolerance = world.place(item.child("Position")), item.number("tolerance")
-
-    def holds(time: float) -> bool:
-        here = mover.place(time)
-        return ((here.x - place.x) ** 2 + (here.y - place.y) ** 2) ** 0.5 <= tolerance
-
-    return holds
+    return lambda time: mover.place(time).distance(place) <= tolerance
 
 
 def _distance(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     met, place = _limit(item), world.place(item.child("Position"))
     _no_freespace(item)
-
-    def holds(time: float) -> bool:
-        here = mover.place(time)
-        return met(((here.x - place.x) ** 2 + (here.y - place.y) ** 2) ** 0.5)
-
-    return holds
+    return lambda time: met(mover.place(time).distance(place))
 
 
 def _time_to_collision(item: Element, mover: Mover, world: ScenarioMap) -> Test:
@@ -194,19 +181,13 @@ States = dict[tuple[str, str], tuple[float, float]]
 
 @dataclass(frozen=True)
 class Condition:
-    """A condition.
+    """A condition."""
 
-    Attributes:
-        holds: Whether it holds at a time [s].
-        jump: Time at which it changes, if that is known: -inf for a constant; None to search for it [s].
-        edge: Edge at which it triggers.
-        delay: Delay of the trigger [s].
-    """
-
-    holds: Callable[[float], bool]
+    holds: Callable[[float], bool]  # whether it holds at a time [s]
+    # time at which it changes, if that is known: -inf for a constant; None to search for it [s]
     jump: Callable[[], float] | None
-    edge: str
-    delay: float
+    edge: str  # edge at which it triggers
+    delay: float  # delay of the trigger [s]
 
     def first(self, start: float) -> float:
         """Return the first time at or after a start at which the condition triggers [s]; inf for never."""
@@ -236,18 +217,9 @@ class Condition:
         time = start
         while time < start + HORIZON:
             if self.holds(time + _STEP) == value:
-                return self._bisect(time, time + _STEP, value)
+                return first_true(lambda at: self.holds(at) == value, time, time + _STEP)
             time += _STEP
         return inf
-
-    def _bisect(self, low: float, high: float, value: bool) -> float:
-        while high - low > 1e-12 * max(high, 1.0):
-            middle = (low + high) / 2
-            if self.holds(middle) == value:
-                high = middle
-            else:
-                low = middle
-        return high
 
 
 class Trigger:
@@ -315,12 +287,8 @@ def _by_value(item: Element, states: States) -> tuple[Test, Callable[[], float] 
         return (lambda time: meets(time, rule, limit)), (lambda: limit)
     if found.tag == "ParameterCondition":
         name, rule, bound = found.name_of("parameterRef"), found.choice("rule", RULES), found.text("value")
-        try:
+        with found.locate_errors():
             met = compare(found.resolve(f"${name}"), rule, bound)
-        except LocatedError:
-            raise
-        except ValueError as error:
-            raise found.error(str(error)) from None
         return (lambda time: met), (lambda: inf)
     key = found.text("storyboardElementType"), found.text("storyboardElementRef")
     known = ("completeState", "endTransition", "startTransition", "runningState")

@@ -1,6 +1,7 @@
 """Places, paths and speed over time on the plane of the map: x, y and headings + to the left."""
 
 from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import cos, hypot, inf, sin, sqrt
@@ -28,11 +29,26 @@ class Place(NamedTuple):
         """Return the same position with the heading changed by an angle [rad]."""
         return self._replace(heading=self.heading + angle)
 
+    def distance(self, other: "Place") -> float:
+        """Return the distance of two positions [m]."""
+        return ((self.x - other.x) ** 2 + (self.y - other.y) ** 2) ** 0.5
+
     def seen_from(self, other: "Place") -> "Place":
         """Return this place in the axes of another: x ahead of it, y to its left."""
         dx, dy = self.x - other.x, self.y - other.y
         c, s = cos(other.heading), sin(other.heading)
         return Place(dx * c + dy * s, dy * c - dx * s, self.heading - other.heading)
+
+
+def first_true(test: Callable[[float], bool], low: float, high: float) -> float:
+    """Return the number in (low, high] from which on a test is true, within 1e-12."""
+    while high - low > 1e-12 * max(high, 1.0):
+        middle = (low + high) / 2
+        if test(middle):
+            high = middle
+        else:
+            low = middle
+    return high
 
 
 def section(bend: Bend, start: float, end: float) -> Bend | None:
@@ -49,15 +65,10 @@ def section(bend: Bend, start: float, end: float) -> Bend | None:
 
 @dataclass(frozen=True)
 class Track:
-    """A path on the map: bends from a start, straight before and after them.
+    """A path on the map: bends from a start, straight before and after them."""
 
-    Attributes:
-        start: Pose at distance 0.
-        bends: Bends in driving order.
-    """
-
-    start: Place
-    bends: tuple[Bend, ...] = ()
+    start: Place  # pose at distance 0
+    bends: tuple[Bend, ...] = ()  # bends in driving order
 
     @cached_property
     def _path(self) -> Path:

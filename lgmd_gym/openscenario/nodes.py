@@ -6,6 +6,7 @@ The standard library's expat reports line numbers, so that no further package is
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -21,10 +22,6 @@ _TOKEN = re.compile(
     r"\s*(\$\{?\w+\}?|\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?|[A-Za-z_]\w*|[-+*/%(),])"
 )
 CONSTANTS: dict[str, Value] = {"pi": math.pi, "PI": math.pi, "e": math.e, "true": True, "false": False}
-
-
-def _sign(value: float) -> float:
-    return float((value > 0.0) - (value < 0.0))
 
 
 def _round(value: float) -> float:
@@ -44,7 +41,7 @@ _FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
     "asin": (1, math.asin),
     "acos": (1, math.acos),
     "atan": (1, math.atan),
-    "sign": (1, _sign),
+    "sign": (1, lambda value: float((value > 0.0) - (value < 0.0))),
     "abs": (1, math.fabs),
     "max": (2, max),
     "min": (2, min),
@@ -238,25 +235,15 @@ class LocatedError(ValueError):
 
 @dataclass(eq=False, slots=True)
 class Node:
-    """An XML element.
+    """An XML element."""
 
-    Attributes:
-        tag: Name.
-        attributes: Attributes as in the file.
-        file: File.
-        line: Line of the start tag, from 1.
-        children: Child nodes.
-        used: Whether a reader has used the node.
-        read: Names of the attributes that were used.
-    """
-
-    tag: str
-    attributes: dict[str, str]
+    tag: str  # name
+    attributes: dict[str, str]  # attributes as in the file
     file: Path
-    line: int
-    children: list["Node"] = field(default_factory=list)
-    used: bool = False
-    read: set[str] = field(default_factory=set)
+    line: int  # line of the start tag, from 1
+    children: list["Node"] = field(default_factory=list)  # child nodes
+    used: bool = False  # whether a reader has used the node
+    read: set[str] = field(default_factory=set)  # names of the attributes that were used
 
     def error(self, message: str) -> LocatedError:
         """Return an error with the file and line."""
@@ -301,15 +288,10 @@ def _parse(path: Path, data: bytes) -> Node:
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """A node with the values of the parameters that apply to it.
-
-    Attributes:
-        node: The node.
-        scope: Value of each parameter as text.
-    """
+    """A node with the values of the parameters that apply to it."""
 
     node: Node
-    scope: dict[str, str]
+    scope: dict[str, str]  # value of each parameter as text
 
     def __post_init__(self) -> None:
         self.node.used = True
@@ -323,16 +305,22 @@ class Element:
         """Return an error with the file and line."""
         return self.node.error(message)
 
+    @contextmanager
+    def locate_errors(self, prefix: str = "") -> Iterator[None]:
+        """Add a prefix, the file and the line to a ValueError of the block; a located one stays as it is."""
+        try:
+            yield
+        except LocatedError:
+            raise
+        except ValueError as error:
+            raise self.error(f"{prefix}{error}") from None
+
     def has(self, name: str) -> bool:
         """Return whether the element has an attribute."""
         return name in self.node.attributes
 
     def text(self, name: str, default: str | None = None) -> str:
-        """Return an attribute with `$name` and `${...}` replaced by their values.
-
-        Raises:
-            ValueError: If it is missing and has no default, or if its expression is invalid.
-        """
+        """Return an attribute with `$name` and `${...}` replaced by their values."""
         self.node.read.add(name)
         raw = self.node.attributes.get(name)
         if raw is None:
@@ -352,10 +340,8 @@ class Element:
     def resolve(self, raw: str) -> str:
         """Return a text with `$name` or `${...}` replaced by its value."""
         if raw.startswith("${") and raw.endswith("}"):
-            try:
+            with self.locate_errors(f"{self.tag}: "):
                 return format_value(evaluate(raw[2:-1], self.scope))
-            except ValueError as error:
-                raise self.error(f"{self.tag}: {error}") from None
         if raw.startswith("$"):
             if raw[1:] not in self.scope:
                 raise self.error(str(unknown_name("parameter", raw[1:], self.scope)))
@@ -369,7 +355,7 @@ class Element:
             value = float(text)
         except ValueError:
             raise self.error(f"{self.tag} {name} must be a number, got {shown(text)}") from None
-        if value != value or value in (float("inf"), float("-inf")):
+        if not math.isfinite(value):
             raise self.error(f"{self.tag} {name} must be finite, got {shown(text)}")
         return value
 
@@ -395,11 +381,7 @@ class Element:
         return None
 
     def child(self, *tags: str) -> "Element":
-        """Return the first child with one of some tags.
-
-        Raises:
-            ValueError: If there is none; the message names an unsupported child.
-        """
+        """Return the first child with one of some tags."""
         found = self.find(*tags)
         if found is None:
             others = ", ".join(node.tag for node in self.node.children) or "nothing"
@@ -418,6 +400,12 @@ class Element:
         for node in self.node.children:
             if node.tag in tags:
                 yield Element(node, self.scope)
+
+    def properties(self) -> dict[str, str]:
+        """Return the values in the child `Properties` by name."""
+        block = self.find("Properties")
+        items = () if block is None else block.all("Property")
+        return {item.text("name"): item.text("value") for item in items}
 
     def skip(self) -> None:
         """Mark the element and everything in it as used: it has no effect."""

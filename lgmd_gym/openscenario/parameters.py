@@ -51,10 +51,6 @@ def declare(parent: Element, given: Mapping[str, Assignment]) -> dict[str, str]:
 
     Returns:
         The scope of the parent with the declared parameters, in the order of the file.
-
-    Raises:
-        ValueError: If a given parameter is not declared, a value has the wrong type, or a constraint is
-            violated.
     """
     scope, declared = dict(parent.scope), set[str]()
     declarations = parent.find("ParameterDeclarations")
@@ -119,10 +115,6 @@ def variations(distribution: Element) -> list[dict[str, Assignment]]:
     """Return the assignments of every cell of a `ParameterValueDistribution`.
 
     The cells are all combinations of the distributions; the first distribution varies slowest.
-
-    Raises:
-        ValueError: If a distribution is not deterministic or not supported, a parameter is assigned twice, or
-            there are too many cells.
     """
     block = distribution.child("Deterministic")
     axes, size, names = list[list[dict[str, Assignment]]](), 1, set[str]()
@@ -200,9 +192,6 @@ class Catalogs:
         Args:
             item: Element that contains the inline element or a `CatalogReference`.
             *tags: Tags of the inline element and of the entry.
-
-        Raises:
-            ValueError: If a name is unknown, or the entry is of another kind.
         """
         found = item.child(*tags, "CatalogReference")
         if found.tag != "CatalogReference":

@@ -89,17 +89,11 @@ FCW = "_FCW"
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a file.
+    """A cell of a file."""
 
-    Attributes:
-        variant: Name within its family and file.
-        compiled: The scenario.
-        fcw_driver: Whether the driver brakes after the alert.
-    """
-
-    variant: str
-    compiled: Compiled
-    fcw_driver: bool
+    variant: str  # name within its family and file
+    compiled: Compiled  # the scenario
+    fcw_driver: bool  # whether the driver brakes after the alert
 
 
 def read(path: str | Path) -> Suite:
@@ -152,11 +146,7 @@ def read_all(paths: Sequence[str | Path]) -> Suite:
 
 
 def find_files(path: Path) -> list[Path]:
-    """Return an OpenSCENARIO file, or the files of a folder and its sub-folders; see `read_all`.
-
-    Raises:
-        ValueError: If there is none.
-    """
+    """Return an OpenSCENARIO file, or the files of a folder and its sub-folders; see `read_all`."""
     if not path.is_dir():
         return [path]
     found: dict[str, list[Path]] = {"ParameterValueDistribution": [], "Storyboard": []}
@@ -170,11 +160,7 @@ def find_files(path: Path) -> list[Path]:
 
 
 def read_cells(path: Path) -> list[Cell]:
-    """Return the cells of a file, in the order of its variations.
-
-    Raises:
-        ValueError: See `read`.
-    """
+    """Return the cells of a file, in the order of its variations."""
     root = _root(path)
     distribution = root.find("ParameterValueDistribution")
     if distribution is None:

@@ -34,27 +34,17 @@ class Lane(NamedTuple):
 
 @dataclass(frozen=True)
 class Road:
-    """A road.
+    """A road."""
 
-    Attributes:
-        name: Its id.
-        length: Length [m].
-        line: Reference line.
-        sections: Start of each lane section [m], and its lanes by id; + left of the reference line.
-        offsets: Lane offsets.
-        left_hand: Whether traffic drives on the left.
-        junction: Id of the junction that the road belongs to, "-1" for none.
-        links: Road ends that the road's start and end are connected to.
-    """
-
-    name: str
-    length: float
-    line: Track
+    name: str  # its id
+    length: float  # length [m]
+    line: Track  # reference line
+    # start of each lane section [m], and its lanes by id; + left of the reference line
     sections: tuple[tuple[float, dict[int, Lane]], ...]
-    offsets: tuple[Width, ...]
-    left_hand: bool
-    junction: str
-    links: dict[str, End]
+    offsets: tuple[Width, ...]  # lane offsets
+    left_hand: bool  # whether traffic drives on the left
+    junction: str  # id of the junction that the road belongs to, "-1" for none
+    links: dict[str, End]  # road ends that the road's start and end are connected to
 
     def lanes(self, s: float) -> dict[int, Lane]:
         """Return the lanes at a distance [m]."""
@@ -65,11 +55,7 @@ class Road:
         return next(start for start, _ in reversed(self.sections) if start <= s or start == 0.0)
 
     def lane_centre(self, lane: int, s: float) -> float:
-        """Return the offset of a lane's centre from the reference line, + left [m].
-
-        Raises:
-            ValueError: If there is no such lane.
-        """
+        """Return the offset of a lane's centre from the reference line, + left [m]."""
         lanes, total = self.lanes(s), _polynomial(self.offsets, s)
         if lane == 0:
             return total
@@ -99,9 +85,6 @@ class Road:
         Args:
             direction: 1 for the direction of the reference line, -1 for the opposite.
             t: Offset from the reference line, + left of it [m].
-
-        Raises:
-            ValueError: If a spiral would have to be shifted sideways.
         """
         bends, line = [], self.line.part(0.0, self.length).bends
         for bend in line:
@@ -134,11 +117,7 @@ class RoadNetwork:
     roads: dict[str, Road]
 
     def road(self, name: str) -> Road:
-        """Return the road with an id.
-
-        Raises:
-            ValueError: If there is none.
-        """
+        """Return the road with an id."""
         if name not in self.roads:
             raise unknown_name("road", name, self.roads)
         return self.roads[name]
@@ -150,9 +129,6 @@ class RoadNetwork:
             first: Id of the first road.
             direction: Direction on it, 1 along the reference line; None for any.
             last: Id of the last road.
-
-        Raises:
-            ValueError: If there is no way.
         """
         starts = (1, -1) if direction is None else (direction,)
         queue: list[tuple[float, str, int, tuple[tuple[str, int], ...]]]
@@ -182,11 +158,7 @@ class RoadNetwork:
 
 
 def read_roads(path: Path) -> RoadNetwork:
-    """Return the road network of an OpenDRIVE file.
-
-    Raises:
-        ValueError: If the file cannot be read, or a geometry is not supported.
-    """
+    """Return the road network of an OpenDRIVE file."""
     return _network(parse_file(path))
 
 
@@ -281,23 +253,14 @@ class Leg(NamedTuple):
 
 @dataclass(frozen=True)
 class Route:
-    """A way along roads; lanes and offsets refer to the direction of travel.
+    """A way along roads; lanes and offsets refer to the direction of travel."""
 
-    Attributes:
-        legs: The roads.
-        origin: Distance from the beginning of the first road to the first waypoint [m].
-    """
-
-    legs: tuple[Leg, ...]
-    origin: float
+    legs: tuple[Leg, ...]  # the roads
+    origin: float  # distance from the beginning of the first road to the first waypoint [m]
 
     @classmethod
     def through(cls, network: RoadNetwork, stops: list[Stop]) -> "Route":
-        """Return the shortest route through waypoints.
-
-        Raises:
-            ValueError: If there is none.
-        """
+        """Return the shortest route through waypoints."""
         steps: list[tuple[Road, int]] = []
         for (road, lane, s), (other, _, after) in pairwise(stops):
             direction = None if lane is None or lane == 0 else road.direction(lane)

@@ -12,45 +12,27 @@ from lgmd_gym.openscenario.world import Mover, ScenarioMap
 
 @dataclass(eq=False)
 class Event:
-    """An event of the storyboard.
-
-    Attributes:
-        item: The element.
-        triggers: Triggers of its act and of the event itself.
-        groups: Kind and name of the elements that contain it, and its own.
-        runs: Its actions; empty if none has an effect.
-        compiled: The triggers in a form that can be evaluated.
-        started: Start [s]; inf before.
-        ended: End [s]; inf before the start.
-    """
+    """An event of the storyboard."""
 
     item: Element
-    triggers: tuple[Element | None, Element | None]
-    groups: list[tuple[str, str]]
-    runs: list[tuple[str, ActionRun]]
-    compiled: tuple[Trigger, Trigger] | None = None
-    started: float = inf
-    ended: float = inf
+    triggers: tuple[Element | None, Element | None]  # triggers of its act and of the event itself
+    groups: list[tuple[str, str]]  # kind and name of the elements that contain it, and its own
+    runs: list[tuple[str, ActionRun]]  # its actions; empty if none has an effect
+    compiled: tuple[Trigger, Trigger] | None = None  # the triggers in a form that can be evaluated
+    started: float = inf  # start [s]; inf before
+    ended: float = inf  # end [s]; inf before the start
 
 
 @dataclass
 class Storyboard:
-    """The events of a scenario, and what has happened.
+    """The events of a scenario, and what has happened."""
 
-    Attributes:
-        events: The events, in the order of the file.
-        states: Start and end of acts, maneuvers, events and actions by kind and name [s].
-    """
-
-    events: list[Event]
+    events: list[Event]  # the events, in the order of the file
+    # start and end of acts, maneuvers, events and actions by kind and name [s]
     states: States = field(default_factory=dict)
 
     def play(self, world: ScenarioMap) -> None:
-        """Carry out all events that have an effect, in the order of their triggers.
-
-        Raises:
-            ValueError: If a trigger or an action is not supported.
-        """
+        """Carry out all events that have an effect, in the order of their triggers."""
         waiting = [event for event in self.events if self._matters(event)]
         for event in self.events:
             if event not in waiting:
@@ -115,11 +97,7 @@ def _references(trigger: Element) -> list[Element]:
 
 
 def run_init(board: Element, world: ScenarioMap) -> Element | None:
-    """Carry out the initial actions; return the environment, None without one.
-
-    Raises:
-        ValueError: If an action is not supported.
-    """
+    """Carry out the initial actions; return the environment, None without one."""
     environment, actions = None, board.child("Init").child("Actions")
     for item in actions.all("GlobalAction"):
         found = item.only("EnvironmentAction", "VariableAction")
@@ -139,11 +117,7 @@ def run_init(board: Element, world: ScenarioMap) -> Element | None:
 
 
 def read_story(board: Element, world: ScenarioMap) -> Storyboard:
-    """Return the events of all stories.
-
-    Raises:
-        ValueError: If an action is not supported.
-    """
+    """Return the events of all stories."""
     events = []
     for story in board.all("Story"):
         story = Element(story.node, declare(story, {}))

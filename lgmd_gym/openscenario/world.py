@@ -6,7 +6,7 @@ from math import atan2, pi, remainder
 from lgmd_gym.envs.dynamics.script import Bend
 from lgmd_gym.errors import check_known, check_whole, unknown_name
 from lgmd_gym.openscenario.motion import Place, Timeline, Track
-from lgmd_gym.openscenario.nodes import Element, LocatedError
+from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.parameters import Catalogs
 from lgmd_gym.openscenario.roads import Road, RoadNetwork, Route
 
@@ -34,61 +34,34 @@ _OWN = ("ego", "car", "box", "road_marking", "pedestrian", "bicycle", "motorcycl
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EntityBody:
-    """Size and kind of an entity.
+    """Size and kind of an entity."""
 
-    Attributes:
-        kind: Kind of actor, see `Actor`.
-        length: Length [m].
-        width: Width [m].
-        height: Height [m].
-        reference: Distance of the centre ahead of the reference point, the rear axle of a vehicle [m].
-        wheelbase: Distance between the axles [m]; 0 without axles.
-        shade: Grey level; None for a random one.
-    """
-
-    kind: str
-    length: float
-    width: float
-    height: float
-    reference: float
-    wheelbase: float = 0.0
-    shade: int | None = None
+    kind: str  # kind of actor, see `Actor`
+    length: float  # length [m]
+    width: float  # width [m]
+    height: float  # height [m]
+    reference: float  # distance of the centre ahead of the reference point, the rear axle of a vehicle [m]
+    wheelbase: float = 0.0  # distance between the axles [m]; 0 without axles
+    shade: int | None = None  # grey level; None for a random one
 
 
 @dataclass(slots=True)
 class Mover:
-    """An entity in motion.
+    """An entity in motion."""
 
-    Attributes:
-        name: Name in the scenario.
-        body: Its body.
-        track: Path of its reference point from its start; None before it is placed.
-        start: Pose of its reference point at the start; None before it is placed.
-        follows: Whether it follows a trajectory or route.
-        timeline: Its speed; distances count from the start.
-        backwards: Whether it drives backwards along its track.
-        front_axle: Whether the front axle follows trajectories.
-        leader: Entity whose speed it copies.
-        deleted: Whether it has been deleted at the start.
-    """
-
-    name: str
+    name: str  # name in the scenario
     body: EntityBody
-    track: Track | None = None
-    start: Place | None = None
-    follows: bool = False
-    timeline: Timeline = field(default_factory=Timeline)
-    backwards: bool = False
-    front_axle: bool = False
-    leader: "Mover | None" = None
-    deleted: bool = False
+    track: Track | None = None  # path of its reference point from its start; None before it is placed
+    start: Place | None = None  # pose of its reference point at the start; None before it is placed
+    follows: bool = False  # whether it follows a trajectory or route
+    timeline: Timeline = field(default_factory=Timeline)  # its speed; distances count from the start
+    backwards: bool = False  # whether it drives backwards along its track
+    front_axle: bool = False  # whether the front axle follows trajectories
+    leader: "Mover | None" = None  # entity whose speed it copies
+    deleted: bool = False  # whether it has been deleted at the start
 
     def place(self, time: float = 0.0) -> Place:
-        """Return the pose of the reference point at a time [s].
-
-        Raises:
-            ValueError: If the entity has no position.
-        """
+        """Return the pose of the reference point at a time [s]."""
         if self.track is None:
             raise ValueError(f"entity {self.name!r} has no position; add a TeleportAction to Init")
         place = self.track.at(self.timeline.at(time).distance)
@@ -106,11 +79,7 @@ class Mover:
 
 
 def read_entities(scenario: Element, catalogs: Catalogs) -> dict[str, Mover]:
-    """Return the entities of a scenario by name.
-
-    Raises:
-        ValueError: If an entity is not supported.
-    """
+    """Return the entities of a scenario by name."""
     movers = {}
     for item in scenario.child("Entities").all("ScenarioObject"):
         name = item.text("name")
@@ -123,16 +92,12 @@ def read_entities(scenario: Element, catalogs: Catalogs) -> dict[str, Mover]:
 
 
 def reads_front_axle(item: Element, catalogs: Catalogs) -> bool:
-    """Return whether the `Controller` of an element moves the control point to the front axle.
-
-    Raises:
-        ValueError: If the controller has a property that is not supported.
-    """
+    """Return whether the `Controller` of an element moves the control point to the front axle."""
     if not item.node.children:
         return False
     controller = catalogs.resolve(item, "Controller")
     front_axle = False
-    for name, value in _properties(controller).items():
+    for name, value in controller.properties().items():
         if name != CONTROL_POINT or value not in ("FrontAxle", "RearAxle"):
             raise controller.error(f"controller property {name}={value!r} is not supported; remove it")
         front_axle = value == "FrontAxle"
@@ -144,12 +109,10 @@ def _body(item: Element) -> EntityBody:
     centre, size = box.child("Center"), box.child("Dimensions")
     if centre.number("y", 0.0) != 0.0:
         raise centre.error("a bounding box beside the centreline is not supported; use y=0")
-    properties = _properties(item)
-    try:
+    properties = item.properties()
+    with item.locate_errors():
         kind = check_known(KIND, properties.get(KIND, _kind(item)), _OWN)
         shade = None if SHADE not in properties else check_whole(SHADE, float(properties[SHADE]), 0, 255)
-    except ValueError as error:
-        raise item.error(str(error)) from None
     return EntityBody(
         kind=kind,
         length=size.number("length"),
@@ -175,13 +138,6 @@ def _wheelbase(item: Element) -> float:
         return 0.0
     positions = [axle.number("positionX") for axle in axles.all("FrontAxle", "RearAxle")]
     return max(positions) - min(positions) if len(positions) > 1 else 0.0
-
-
-def _properties(item: Element) -> dict[str, str]:
-    block = item.find("Properties")
-    return (
-        {} if block is None else {entry.text("name"): entry.text("value") for entry in block.all("Property")}
-    )
 
 
 _UPRIGHT = 1e-6  # [rad] or [m]
@@ -219,10 +175,8 @@ class ScenarioMap:
 
     def road(self, item: Element) -> Road:
         """Return the road that `roadId` names."""
-        try:
+        with item.locate_errors():
             return self.network.road(item.text("roadId"))
-        except ValueError as error:
-            raise item.error(str(error)) from None
 
     def locate(self, place: Place) -> tuple[Road, float, float]:
         """Return the road nearest to a place, and distance along and offset from it [m].
@@ -238,33 +192,20 @@ class ScenarioMap:
         Args:
             parent: Element that contains a position.
             time: Time of the entities that the position is relative to [s].
-
-        Raises:
-            ValueError: If the position is not supported or refers to something unknown.
         """
         item = parent.only(*POSITIONS)
-        try:
+        with item.locate_errors():
             base = getattr(self, f"_{item.tag}")(item, time)
-        except LocatedError:
-            raise
-        except ValueError as error:
-            raise item.error(str(error)) from None
-        return self._oriented(item.find("Orientation"), base)
-
-    def _oriented(self, orientation: Element | None, base: Place) -> Place:
+        orientation = item.find("Orientation")
         if orientation is None:
             return base
-        for name in ("p", "r"):
-            if abs(remainder(orientation.number(name, 0.0), 2 * pi)) > _UPRIGHT:
-                raise orientation.error(f"Orientation {name} must be 0: bodies are upright")
+        _check_upright(orientation)
         if orientation.choice("type", ("absolute", "relative"), "absolute") == "relative":
             return base.turned(orientation.number("h", 0.0))
         return base._replace(heading=orientation.number("h", base.heading))
 
     def _WorldPosition(self, item: Element, time: float) -> Place:
-        for name in ("p", "r"):
-            if abs(remainder(item.number(name, 0.0), 2 * pi)) > _UPRIGHT:
-                raise item.error(f"WorldPosition {name} must be 0: bodies are upright")
+        _check_upright(item)
         return Place(item.number("x"), item.number("y"), item.number("h", 0.0))
 
     def _LanePosition(self, item: Element, time: float) -> Place:
@@ -325,10 +266,8 @@ class ScenarioMap:
         """Return the shortest route through places given as road, lane and distance along the road [m]."""
         if len(stops) < 2:
             raise item.error("a Route needs at least 2 waypoints")
-        try:
+        with item.locate_errors():
             return Route.through(self.network, stops)
-        except ValueError as error:
-            raise item.error(str(error)) from None
 
     def trajectory(self, parent: Element, current: Place | None) -> Track:
         """Return the trajectory in an element, inline or from a catalog.
@@ -388,6 +327,12 @@ class ScenarioMap:
         if start is None:
             raise shape.error("a position on a trajectory without PositionStart is not supported")
         return Track(start, tuple(bends))
+
+
+def _check_upright(item: Element) -> None:
+    for name in ("p", "r"):
+        if abs(remainder(item.number(name, 0.0), 2 * pi)) > _UPRIGHT:
+            raise item.error(f"{item.tag} {name} must be 0: bodies are upright")
 
 
 def _beside(item: tuple[Road, float, float], place: Place) -> float:

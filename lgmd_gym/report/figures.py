@@ -53,23 +53,14 @@ RATE_COLUMNS = (
 
 
 class ReportFigure(NamedTuple):
-    """Panels of one figure, and its data as lines of a CSV file.
+    """Panels of one figure, and its data as lines of a CSV file."""
 
-    Attributes:
-        name: Stem of the files.
-        title: Title.
-        panels: SVG elements.
-        legend: Agents in the order of their marks; empty without marks.
-        columns: Header of the CSV file.
-        lines: Lines of the CSV file.
-    """
-
-    name: str
+    name: str  # stem of the files
     title: str
-    panels: list[Element]
-    legend: list[str]
-    columns: Sequence[str]
-    lines: Sequence[Sequence[Any]]
+    panels: list[Element]  # SVG elements
+    legend: list[str]  # agents in the order of their marks; empty without marks
+    columns: Sequence[str]  # header of the CSV file
+    lines: Sequence[Sequence[Any]]  # lines of the CSV file
 
     def write(self, folder: Path) -> None:
         """Write `<name>.svg` and `<name>.csv` into a folder; existing files are replaced."""

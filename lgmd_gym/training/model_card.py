@@ -44,17 +44,11 @@ print(agent.agent.card)
 
 
 class Result(NamedTuple):
-    """The best evaluation of a training run on the validation split.
+    """The best evaluation of a training run on the validation split."""
 
-    Attributes:
-        mean: Mean return.
-        std: Standard deviation over episodes; None if it was not recorded.
-        episodes: Number of episodes; None for all recorded ones, levels and traffic segments.
-    """
-
-    mean: float
-    std: float | None
-    episodes: int | None
+    mean: float  # mean return
+    std: float | None  # standard deviation over episodes; None if it was not recorded
+    episodes: int | None  # number of episodes; None for all recorded ones, levels and traffic segments
 
     def __str__(self) -> str:
         return f"{self.mean:.2f}" if self.std is None else f"{self.mean:.2f} +/- {self.std:.2f}"

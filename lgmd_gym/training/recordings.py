@@ -47,24 +47,15 @@ FORMAT = 6  # of the files; recordings of another format are rejected
 
 @dataclass(frozen=True)
 class RecordingSet:
-    """Recorded episodes of one kind.
+    """Recorded episodes of one kind."""
 
-    Attributes:
-        name: Name of the folder: "train" or "validation", also after "extra1-", "extra2-" …, "traffic-",
-            "extra-traffic1-" ….
-        seeds: Seeds of the environment.
-        record: Returns the episodes of each seed.
-        option: Options of the command line that record these episodes.
-        settings: Settings that only these episodes depend on.
-        chunk_size: Largest number of seeds recorded by one task of a process.
-    """
-
+    # name of the folder: "train" or "validation", after "extra1-", "traffic-" or "extra-traffic1-" for more
     name: str
-    seeds: range
-    record: RecordFunction
-    option: str = ""
-    settings: dict[str, Any] = field(default_factory=dict)
-    chunk_size: int = LEVEL_CHUNK_SIZE
+    seeds: range  # seeds of the environment
+    record: RecordFunction  # returns the episodes of each seed
+    option: str = ""  # options of the command line that record these episodes
+    settings: dict[str, Any] = field(default_factory=dict)  # settings that only these episodes depend on
+    chunk_size: int = LEVEL_CHUNK_SIZE  # largest number of seeds recorded by one task of a process
 
 
 def recording_sets(config: TrainConfig, split: str) -> list[RecordingSet]:

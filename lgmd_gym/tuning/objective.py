@@ -41,19 +41,13 @@ Values: TypeAlias = dict[str, Any]  # an observation or an info
 
 @dataclass(frozen=True, slots=True)
 class ObjectiveValue:
-    """Performance of a rule with certain parameters.
+    """Performance of a rule with certain parameters."""
 
-    Attributes:
-        avoided_energy: Mean share of the impact energy that is avoided in threats; 0 for premature braking.
-        false_rate: Share of the other episodes with a false activation.
-        threats: Number of episodes with a threat.
-        non_threats: Number of episodes without a threat.
-    """
-
+    # mean share of the impact energy that is avoided in threats; 0 for premature braking
     avoided_energy: float
-    false_rate: float
-    threats: int
-    non_threats: int
+    false_rate: float  # share of the other episodes with a false activation
+    threats: int  # number of episodes with a threat
+    non_threats: int  # number of episodes without a threat
 
     def total(self, false_cost: float) -> float:
         """Return the value that tuning maximises: avoided_energy − false_cost · false_rate."""
@@ -80,16 +74,11 @@ def avoided_energy(row: Row) -> float:
 
 @dataclass(frozen=True, slots=True)
 class NoBrakeRecording:
-    """Recording of one episode without braking through one sensor configuration.
+    """Recording of one episode without braking through one sensor configuration."""
 
-    Attributes:
-        seed: Seed of the episode.
-        counterfactual: Outcome of the episode.
-        steps: Observation and `lgmd/` keys of `info` at every decision, including the last one.
-    """
-
-    seed: int
-    counterfactual: Counterfactual
+    seed: int  # seed of the episode
+    counterfactual: Counterfactual  # outcome of the episode
+    # observation and `lgmd/` keys of `info` at every decision, including the last one
     steps: list[tuple[Values, Values]]
 
 

@@ -25,21 +25,16 @@ Proposal = dict[str, Any]
 class SearchSpace:
     """Search space of one rule.
 
-    Attributes:
-        agent: Name of a rule.
-        cameras: Camera presets to choose from, for a rule with one camera; empty to keep the rule's camera.
-        camera_geometry: Whether to search the parameters that determine the rule's own cameras.
-        neuron: Names of the neuron parameters (`LGMDParams`) to search.
-
     Raises:
         ValueError: For an unknown name, cameras for a rule with several cameras, or a neuron parameter whose
             default is not a finite number > 0.
     """
 
-    agent: str
+    agent: str  # name of a rule
+    # camera presets to choose from, for a rule with one camera; empty to keep the rule's camera
     cameras: tuple[str, ...] = ()
-    camera_geometry: bool = False
-    neuron: tuple[str, ...] = ()
+    camera_geometry: bool = False  # whether to search the parameters that determine the rule's own cameras
+    neuron: tuple[str, ...] = ()  # names of the neuron parameters (`LGMDParams`) to search
 
     def __post_init__(self) -> None:
         rule_class(self.agent)

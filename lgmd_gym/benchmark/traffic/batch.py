@@ -21,34 +21,21 @@ IN_LABORATORY = Appearance(world=LABORATORY)
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """One seed of a kind of traffic and the agents to run in it.
+    """One seed of a kind of traffic and the agents to run in it."""
 
-    Attributes:
-        kind: Kind of traffic.
-        seed: Seed of the traffic and the agents.
-        agents: Agent strings.
-        appearance: World, weather and road; the world must not be None.
-    """
-
-    kind: str
-    seed: int
+    kind: str  # kind of traffic
+    seed: int  # seed of the traffic and the agents
     agents: tuple[str, ...]
-    appearance: Appearance = IN_LABORATORY
+    appearance: Appearance = IN_LABORATORY  # world, weather and road; the world must not be None
 
 
 @dataclass(frozen=True, slots=True)
 class TrafficTask:
-    """A batch of drives under one condition.
-
-    Attributes:
-        drives: The drives.
-        sensor_config: Camera and neuron parameters.
-        condition: Name of the weather, for the rows.
-    """
+    """A batch of drives under one condition."""
 
     drives: tuple[Drive, ...]
-    sensor_config: SensorConfig
-    condition: str = CLEAR
+    sensor_config: SensorConfig  # camera and neuron parameters
+    condition: str = CLEAR  # name of the weather, for the rows
 
 
 def run_traffic_task(task: TrafficTask) -> list[Row]:

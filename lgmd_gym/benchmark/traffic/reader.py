@@ -12,39 +12,23 @@ from lgmd_gym.sensing.sensor_array import SensorArray
 
 
 class SceneFrame(NamedTuple):
-    """The state of an environment at one camera frame, from which cameras can draw it at any time.
+    """The state of an environment at one camera frame, from which cameras can draw it at any time."""
 
-    Attributes:
-        time: Simulated time since the reset [s].
-        speed: Ego speed [m/s].
-        scene: `SCENE` record.
-        objects: `OBJECT` records.
-        top_views: Frames of bird's-eye cameras, which only highway-env can draw.
-    """
-
-    time: float
-    speed: float
-    scene: Any
-    objects: np.ndarray
-    top_views: tuple[np.ndarray, ...] = ()
+    time: float  # simulated time since the reset [s]
+    speed: float  # ego speed [m/s]
+    scene: Any  # `SCENE` record
+    objects: np.ndarray  # `OBJECT` records
+    top_views: tuple[np.ndarray, ...] = ()  # frames of bird's-eye cameras, which only highway-env can draw
 
 
 class Moment(NamedTuple):
-    """Result of a reset or of one decision of a traffic environment, before its frames are drawn.
+    """Result of a reset or of one decision of a traffic environment, before its frames are drawn."""
 
-    Attributes:
-        info: Info of the environment.
-        speed: Ego speed [m/s].
-        yaw_rate: Mean yaw rate of the decision [rad/s].
-        frames: Camera frames since the last decision.
-        done: Whether the episode has ended.
-    """
-
-    info: dict[str, Any]
-    speed: float
-    yaw_rate: float
-    frames: tuple[SceneFrame, ...]
-    done: bool
+    info: dict[str, Any]  # info of the environment
+    speed: float  # ego speed [m/s]
+    yaw_rate: float  # mean yaw rate of the decision [rad/s]
+    frames: tuple[SceneFrame, ...]  # camera frames since the last decision
+    done: bool  # whether the episode has ended
 
 
 class SceneReader:

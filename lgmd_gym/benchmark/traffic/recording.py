@@ -17,23 +17,15 @@ SNAPSHOT_EVERY = 300  # decisions between two snapshots; one snapshot takes as l
 
 @dataclass(frozen=True)
 class TrafficRecording:
-    """One episode of traffic without an agent. Its frames are not drawn; see `Observer`.
+    """One episode of traffic without an agent. Its frames are not drawn; see `Observer`."""
 
-    Attributes:
-        kind: Kind of traffic.
-        seed: Seed of the traffic.
-        moments: The reset and every decision.
-        snapshots: Environment at every `SNAPSHOT_EVERY`-th decision; copied before use, never stepped.
-        policy_hz: Decision rate [Hz].
-        fps: Camera frame rate [Hz].
-    """
-
-    kind: str
-    seed: int
-    moments: tuple[Moment, ...]
+    kind: str  # kind of traffic
+    seed: int  # seed of the traffic
+    moments: tuple[Moment, ...]  # the reset and every decision
+    # environment at every `SNAPSHOT_EVERY`-th decision; copied before use, never stepped
     snapshots: tuple[TrafficEnv, ...]
-    policy_hz: float
-    fps: float
+    policy_hz: float  # decision rate [Hz]
+    fps: float  # camera frame rate [Hz]
 
     @cached_property
     def emergencies(self) -> Emergencies:

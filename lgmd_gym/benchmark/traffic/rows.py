@@ -50,19 +50,13 @@ KEYS = (
 
 @dataclass(slots=True)
 class BrakingEvent:
-    """One braking event of an agent.
+    """One braking event of an agent."""
 
-    Attributes:
-        start: Time of the first demand [s].
-        time_to_emergency: Time from the start to the emergency without it [s]; None if it is not needed.
-        last: Time of the last demand [s].
-        peak: Highest deceleration beyond the driver's [m/s²].
-    """
-
-    start: float
+    start: float  # time of the first demand [s]
+    # time from the start to the emergency without it [s]; None if it is not needed
     time_to_emergency: float | None
-    last: float
-    peak: float = 0.0
+    last: float  # time of the last demand [s]
+    peak: float = 0.0  # highest deceleration beyond the driver's [m/s²]
 
     @property
     def counts(self) -> bool:
@@ -77,23 +71,14 @@ class BrakingEvent:
 
 @dataclass(slots=True)
 class EpisodeLog:
-    """Events of one agent in one episode.
+    """Events of one agent in one episode."""
 
-    Attributes:
-        events: Braking events in order.
-        alerts: Number of alerts.
-        stops: Number of standstills caused by braking events that count.
-        end: Last step.
-        duration: Duration of the episode [s].
-        peak: Highest deceleration beyond the driver's [m/s²].
-    """
-
-    events: list[BrakingEvent] = field(default_factory=list)
+    events: list[BrakingEvent] = field(default_factory=list)  # braking events in order
     alerts: int = 0
-    stops: int = 0
-    end: Step | None = None
-    duration: float = 0.0
-    peak: float = 0.0
+    stops: int = 0  # number of standstills caused by braking events that count
+    end: Step | None = None  # last step
+    duration: float = 0.0  # duration of the episode [s]
+    peak: float = 0.0  # highest deceleration beyond the driver's [m/s²]
 
 
 def measure(recording: TrafficRecording, log: EpisodeLog) -> dict[str, Any]:

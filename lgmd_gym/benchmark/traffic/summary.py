@@ -39,41 +39,23 @@ COLUMNS = (
 
 
 class TrafficSummary(NamedTuple):
-    """Summary of one agent over a group of episodes in traffic.
-
-    Attributes:
-        agent: Agent string.
-        kind: Kind of traffic; "" for all.
-        drives: Number of episodes.
-        distance: Total distance [m].
-        alerts: Number of alerts.
-        brakes: Number of braking events beyond 0.25 g.
-        false_activations: Number of these that were not needed.
-        false_bounds: 95 % interval of their expected number, see `count_interval`.
-        moving: Time in motion without braking by the agent [s].
-        needed: Part of it in which a brake is needed, and therefore never false [s].
-        avoided: Episodes without contact among those with contact without braking.
-        contacts: Number of episodes with contact.
-        rear_ended: Number of episodes in which another car hit the ego's rear.
-        peak: Highest deceleration beyond the driver's [m/s²].
-        errors: Number of episodes that failed.
-    """
+    """Summary of one agent over a group of episodes in traffic."""
 
     agent: str
-    kind: str
-    drives: int
-    distance: float
+    kind: str  # kind of traffic; "" for all
+    drives: int  # number of episodes
+    distance: float  # total distance [m]
     alerts: int
-    brakes: int
-    false_activations: int
-    false_bounds: tuple[float, float]
-    moving: float
-    needed: float
-    avoided: Rate
-    contacts: int
-    rear_ended: int
-    peak: float
-    errors: int
+    brakes: int  # number of braking events beyond 0.25 g
+    false_activations: int  # number of these that were not needed
+    false_bounds: tuple[float, float]  # 95 % interval of their expected number, see `count_interval`
+    moving: float  # time in motion without braking by the agent [s]
+    needed: float  # part of it in which a brake is needed, and therefore never false [s]
+    avoided: Rate  # episodes without contact among those with contact without braking
+    contacts: int  # number of episodes with contact
+    rear_ended: int  # number of episodes in which another car hit the ego's rear
+    peak: float  # highest deceleration beyond the driver's [m/s²]
+    errors: int  # number of episodes that failed
 
     def per_100km(self, count: float) -> float:
         """Return a count as a rate [1/100 km]; infinite without distance."""

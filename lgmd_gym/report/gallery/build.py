@@ -32,17 +32,11 @@ from lgmd_gym.report.gallery.cards import (
 
 
 class AgentOutcome(NamedTuple):
-    """Result of an agent over the seeds of a scenario.
+    """Result of an agent over the seeds of a scenario."""
 
-    Attributes:
-        text: Result in words.
-        passed: Whether every threat was avoided, and no episode had a false activation or an error.
-        threat: Whether the scenario is a threat in any of the episodes.
-    """
-
-    text: str
-    passed: bool
-    threat: bool
+    text: str  # result in words
+    passed: bool  # whether every threat was avoided, and no episode had a false activation or an error
+    threat: bool  # whether the scenario is a threat in any of the episodes
 
     @classmethod
     def of(cls, rows: Sequence[Row]) -> "AgentOutcome":

@@ -25,31 +25,19 @@ from lgmd_gym.rendering.view import LGMDView
 
 
 class DocumentedArgument(NamedTuple):
-    """One argument in a docstring.
+    """One argument in a docstring."""
 
-    Attributes:
-        name: Name of the argument.
-        default: Default value as code; empty without one.
-        text: Description.
-    """
-
-    name: str
-    default: str
-    text: str
+    name: str  # name of the argument
+    default: str  # default value as code; empty without one
+    text: str  # description
 
 
 class ParsedDocstring(NamedTuple):
-    """A Google-style docstring.
+    """A Google-style docstring."""
 
-    Attributes:
-        summary: The first line.
-        text: Following paragraphs, in Markdown.
-        arguments: Documented arguments in the order of the signature.
-    """
-
-    summary: str
-    text: str
-    arguments: tuple[DocumentedArgument, ...]
+    summary: str  # the first line
+    text: str  # following paragraphs, in Markdown
+    arguments: tuple[DocumentedArgument, ...]  # documented arguments in the order of the signature
 
 
 def parse_docstring(item: Any) -> ParsedDocstring:
@@ -88,21 +76,13 @@ QUALITY = 5.0  # of `VideoWriter`
 
 @dataclass(frozen=True, slots=True)
 class ScenarioCard:
-    """One scenario or kind of traffic in the gallery.
+    """One scenario or kind of traffic in the gallery."""
 
-    Attributes:
-        name: Scenario family, name in `RANDOM_TASKS` or kind of traffic.
-        target: Argument of `lgmd-gym drive`.
-        docstring: Docstring of the scenario.
-        traffic: Whether it is a kind of traffic, in which single episodes are not evaluated.
-        arguments: Arguments of the environment.
-    """
-
-    name: str
-    target: str
-    docstring: ParsedDocstring
-    traffic: bool = False
-    arguments: Mapping[str, Any] = field(default_factory=dict)
+    name: str  # scenario family, name in `RANDOM_TASKS` or kind of traffic
+    target: str  # argument of `lgmd-gym drive`
+    docstring: ParsedDocstring  # docstring of the scenario
+    traffic: bool = False  # whether it is a kind of traffic, in which single episodes are not evaluated
+    arguments: Mapping[str, Any] = field(default_factory=dict)  # arguments of the environment
 
 
 def scenario_cards(names: tuple[str, ...] = ()) -> list[ScenarioCard]:

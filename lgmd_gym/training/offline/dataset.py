@@ -40,25 +40,16 @@ EXCHANGED = ("columns", "sides", "sides_ffi")
 
 
 class EpisodeBatch(NamedTuple):
-    """N episodes of at most T policy decisions, M decisions in total.
+    """N episodes of at most T policy decisions, M decisions in total."""
 
-    Attributes:
-        inputs: Policy inputs by name, (M, ...) each, frames with channels first.
-        indices: Episode and decision of each row of `inputs`, (M,) each.
-        rewards: Rewards of holding the speed, (N, T); this and the next three are 0 after the episode's end.
-        braking_returns: Returns of braking, (N, T).
-        braking_contacts: Whether braking ends in a contact, bool (N, T).
-        mask: 1 at the decisions of the episode, (N, T).
-        threats: Whether the episode without braking ends in a contact, bool (N,).
-    """
-
-    inputs: dict[str, torch.Tensor]
-    indices: tuple[torch.Tensor, torch.Tensor]
+    inputs: dict[str, torch.Tensor]  # policy inputs by name, (M, ...) each, frames with channels first
+    indices: tuple[torch.Tensor, torch.Tensor]  # episode and decision of each row of `inputs`, (M,) each
+    # rewards of holding the speed, (N, T); this and the next three are 0 after the episode's end
     rewards: torch.Tensor
-    braking_returns: torch.Tensor
-    braking_contacts: torch.Tensor
-    mask: torch.Tensor
-    threats: torch.Tensor
+    braking_returns: torch.Tensor  # returns of braking, (N, T)
+    braking_contacts: torch.Tensor  # whether braking ends in a contact, bool (N, T)
+    mask: torch.Tensor  # 1 at the decisions of the episode, (N, T)
+    threats: torch.Tensor  # whether the episode without braking ends in a contact, bool (N,)
 
 
 class OfflineDataset:
@@ -204,15 +195,10 @@ def _padded(arrays: list[np.ndarray]) -> np.ndarray:
 
 
 class Mirror(NamedTuple):
-    """Mirror image of an input x of one decision: ``x[order] * signs``.
+    """Mirror image of an input x of one decision: ``x[order] * signs``."""
 
-    Attributes:
-        order: Index of the element that takes each place, int64.
-        signs: Sign of each element, float32.
-    """
-
-    order: np.ndarray
-    signs: np.ndarray
+    order: np.ndarray  # index of the element that takes each place, int64
+    signs: np.ndarray  # sign of each element, float32
 
 
 def mirror_input(name: str, values: np.ndarray) -> np.ndarray:

@@ -24,38 +24,24 @@ Observation: TypeAlias = dict[str, np.ndarray]
 
 @dataclass(frozen=True, slots=True)
 class BrakingOutcome:
-    """Outcome of braking from one decision on.
+    """Outcome of braking from one decision on."""
 
-    Attributes:
-        episode_return: Sum of the environment's rewards from that decision on.
-        contact: Whether the episode ends in a contact.
-    """
-
-    episode_return: float
-    contact: bool
+    episode_return: float  # sum of the environment's rewards from that decision on
+    contact: bool  # whether the episode ends in a contact
 
 
 @dataclass(frozen=True)
 class RecordedEpisode:
-    """One episode without braking, of T environment decisions, for policies of any decision rate.
+    """One episode without braking, of T environment decisions, for policies of any decision rate."""
 
-    Attributes:
-        observations: Observations by name, (T, ...) each; `frame` is shrunk and present on request only.
-        rewards: Reward of holding the speed at each decision, float32 (T,).
-        braking_returns: Return of braking from each decision on, float32 (T,).
-        braking_contacts: Whether braking from each decision on ends in a contact, bool (T,).
-        threat: Whether the episode without braking ends in a contact.
-        traffic: Whether the episode is a segment of a traffic episode.
-        family: Scenario family of the level; "traffic" in traffic, empty if unknown.
-    """
-
+    # observations by name, (T, ...) each; `frame` is shrunk and present on request only
     observations: Observation
-    rewards: np.ndarray
-    braking_returns: np.ndarray
-    braking_contacts: np.ndarray
-    threat: bool
-    traffic: bool = False
-    family: str = ""
+    rewards: np.ndarray  # reward of holding the speed at each decision, float32 (T,)
+    braking_returns: np.ndarray  # return of braking from each decision on, float32 (T,)
+    braking_contacts: np.ndarray  # whether braking from each decision on ends in a contact, bool (T,)
+    threat: bool  # whether the episode without braking ends in a contact
+    traffic: bool = False  # whether the episode is a segment of a traffic episode
+    family: str = ""  # scenario family of the level; "traffic" in traffic, empty if unknown
 
     def __len__(self) -> int:
         return len(self.rewards)

@@ -42,22 +42,15 @@ def expected_return(logits: torch.Tensor, batch: EpisodeBatch) -> torch.Tensor:
 
 
 class Evaluation(NamedTuple):
-    """Results of the deterministic policy, which brakes where its log odds of braking exceed a margin.
+    """Results of the deterministic policy, which brakes where its log odds of braking exceed a margin."""
 
-    Attributes:
-        mean_return: Mean return over levels and traffic segments.
-        weighted_return: The same with the weighted cost of braking in episodes without a threat. Levels and
-            traffic segments have half of the weight each, whatever their numbers.
-        avoided: Share of threats that end without contact.
-        false_activations: Share of levels without a threat in which the policy brakes.
-        traffic_activations: Share of traffic segments in which the policy brakes; NaN without any.
-    """
-
-    mean_return: float
+    mean_return: float  # mean return over levels and traffic segments
+    # the same with the weighted cost of braking in episodes without a threat. Levels and traffic segments
+    # have half of the weight each, whatever their numbers
     weighted_return: float
-    avoided: float
-    false_activations: float
-    traffic_activations: float
+    avoided: float  # share of threats that end without contact
+    false_activations: float  # share of levels without a threat in which the policy brakes
+    traffic_activations: float  # share of traffic segments in which the policy brakes; NaN without any
 
 
 def evaluate(

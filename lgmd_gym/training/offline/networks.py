@@ -85,15 +85,10 @@ MIN_VARIANCE = 1e-3  # added, so that features that hardly vary are not magnifie
 
 
 class Standardisation(NamedTuple):
-    """Mean and scale of each feature.
+    """Mean and scale of each feature."""
 
-    Attributes:
-        mean: Mean, (features,).
-        scale: One over the standard deviation, (features,).
-    """
-
-    mean: torch.Tensor
-    scale: torch.Tensor
+    mean: torch.Tensor  # mean, (features,)
+    scale: torch.Tensor  # one over the standard deviation, (features,)
 
     def apply(self, features: torch.Tensor) -> torch.Tensor:
         """Standardise features, (M, features), in place and return them."""

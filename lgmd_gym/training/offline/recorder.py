@@ -138,20 +138,14 @@ def _to_episodes(
 
 @dataclass(frozen=True)
 class EpisodeRecorder:
-    """Records episodes of an environment with a discrete demand and a latching brake, one per seed.
+    """Records episodes of an environment with a discrete demand and a latching brake, one per seed."""
 
-    Attributes:
-        make_env: Picklable function that returns a new environment with `LGMDObservation`; its argument
-            `camera` replaces the cameras.
-        hold: Action that holds the speed.
-        brake: Action that brakes.
-        shrink: See `select_signals`.
-    """
-
+    # picklable function that returns a new environment with `LGMDObservation`; its argument `camera` replaces
+    # the cameras
     make_env: Callable[..., gym.Env]
-    hold: int
-    brake: int
-    shrink: int | None = None
+    hold: int  # action that holds the speed
+    brake: int  # action that brakes
+    shrink: int | None = None  # see `select_signals`
 
     def record(self, seeds: range) -> list[list[RecordedEpisode]]:
         """Return a list with one episode for each seed."""
@@ -211,18 +205,12 @@ class LevelRecorder:
     """Records episodes of an environment that the engine covers, one per seed.
 
     The episodes equal those of `EpisodeRecorder` for the same seeds.
-
-    Attributes:
-        env_id: Id of braking environments.
-        arguments: Arguments of `gym.make_vec`; `camera` is required.
-        brake: Demand that brakes, < 0.
-        shrink: See `select_signals`.
     """
 
-    env_id: str
-    arguments: dict[str, Any]
-    brake: float = -1.0
-    shrink: int | None = None
+    env_id: str  # id of braking environments
+    arguments: dict[str, Any]  # arguments of `gym.make_vec`; `camera` is required
+    brake: float = -1.0  # demand that brakes, < 0
+    shrink: int | None = None  # see `select_signals`
 
     def record(self, seeds: range) -> list[list[RecordedEpisode]]:
         """Return a list with one episode for each seed."""

@@ -32,21 +32,13 @@ MIN_LENGTH = 1.0  # shortest stretch without an emergency that is kept [s]
 
 @dataclass(frozen=True)
 class TrafficRecorder:
-    """Records segments of traffic episodes far from any emergency; the seed selects the kind of traffic.
+    """Records segments of traffic episodes far from any emergency; the seed selects the kind of traffic."""
 
-    Attributes:
-        split: "train" or "validation"; light, weather and ground texture are drawn as for its levels.
-        camera: See `LGMDObservation`.
-        kinds: Kinds of traffic, for successive seeds in turn.
-        shrink: See `select_signals`.
-        params: Parameters of the neurons, see `LGMDObservation`.
-    """
-
-    split: str
-    camera: ChannelSpec
-    kinds: tuple[str, ...] = tuple(TRAFFIC_KINDS)
-    shrink: int | None = None
-    params: NeuronSpec = None
+    split: str  # "train" or "validation"; light, weather and ground texture are drawn as for its levels
+    camera: ChannelSpec  # see `LGMDObservation`
+    kinds: tuple[str, ...] = tuple(TRAFFIC_KINDS)  # kinds of traffic, for successive seeds in turn
+    shrink: int | None = None  # see `select_signals`
+    params: NeuronSpec = None  # parameters of the neurons, see `LGMDObservation`
 
     def record(self, seeds: range) -> list[list[RecordedEpisode]]:
         """Return the segments of one traffic episode for each seed."""
