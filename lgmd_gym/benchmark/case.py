@@ -1,7 +1,8 @@
 """Cases, suites with the limits and points of their protocol, and rows of `episodes.jsonl`."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypedDict
 
@@ -211,15 +212,7 @@ def make_case(suite: str, family: str, variant: str, **arguments: Any) -> Case:
 def scenario_case(
     suite: str, variant: str, scenario: Scenario, fcw_driver: bool = False, **arguments: Any
 ) -> Case:
-    """Return the case `suite/family/variant` with a given scenario, which it holds as plain data.
-
-    Args:
-        suite: Name of the suite.
-        variant: Last part of the case's name.
-        scenario: The scenario, which states the family.
-        fcw_driver: See `Case`.
-        **arguments: Further arguments of the environment, such as `weather`.
-    """
+    """Return the case `suite/family/variant` with a given scenario, which it holds as plain data."""
     values = {SCENARIO_ARGUMENT: scenario_to_data(scenario)} | arguments
     return Case(suite, scenario.family, variant, tuple(values.items()), SCENARIO, fcw_driver)
 
@@ -278,6 +271,16 @@ def case_fields(case: Case) -> dict[str, Any]:
     names = ("target_speed", "overlap", "impact_location", "side", "weather")
     values = (case.family, speed, *map(case.argument, names), case.load or None)
     return dict(zip(CASE_KEYS, values, strict=True))
+
+
+def repetitions(keys: Iterable[Hashable]) -> list[str]:
+    """Return "" for the first of equal keys, "/2" for the second, and so on, to make names distinct."""
+    seen = Counter[Hashable]()
+    suffixes = []
+    for key in keys:
+        seen[key] += 1
+        suffixes.append(f"/{seen[key]}" if seen[key] > 1 else "")
+    return suffixes
 
 
 def relative_impact(row: EpisodeRow) -> float:

@@ -30,10 +30,6 @@ _SUFFIXES = {"m/s²": "mps2", "m/s": "kmh", "m": "m", "s": "s", "rad": "rad"}
 def read_data(path: Path, kind: str) -> dict[str, Any]:
     """Return the values of a TOML file, or of a JSON file if its name ends in ".json".
 
-    Args:
-        path: File to read.
-        kind: Kind of file, for the message.
-
     Raises:
         ValueError: If it cannot be read, is not TOML or JSON, or states a key twice.
     """

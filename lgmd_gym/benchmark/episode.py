@@ -68,25 +68,13 @@ class Episode:
 
 
 def make_env(case: Case, sensor_config: SensorConfig, arguments: Mapping[str, Any] | None = None) -> gym.Env:
-    """Return the environment of a case.
-
-    Args:
-        case: The case.
-        sensor_config: Camera and neuron parameters.
-        arguments: Arguments of the environment; None for those of the case.
-    """
+    """Return the environment of a case, with its arguments or others in their place."""
     chosen = dict(case.arguments) if arguments is None else dict(arguments)
     return gym.make(env_id(case.environment), trace=True, **sensor_config.for_agent().arguments | chosen)
 
 
 def rollout(env: gym.Env, agent: Actor, seed: int) -> Iterator[tuple[Step, np.ndarray]]:
-    """Yield every step of an episode, including the final one, and the agent's action on it.
-
-    Args:
-        env: Environment inside `LGMDObservation`.
-        agent: Agent that acts.
-        seed: Seed of the environment and of the agent.
-    """
+    """Yield every step of an episode, including the final one, and the agent's action on it."""
     step = Step(*env.reset(seed=seed))
     agent.reset(seed)
     while True:

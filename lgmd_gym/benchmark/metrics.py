@@ -306,21 +306,9 @@ def make_row(
     seed: int,
     episode: Episode,
     counterfactual: Counterfactual,
-    premature: float = PREMATURE,
     condition: str = CLEAR,
     camera: str | None = None,
 ) -> Row:
-    """Return the row of one episode.
-
-    Args:
-        agent: Agent string.
-        case: Case of the episode.
-        seed: Seed of the episode.
-        episode: Episode to measure.
-        counterfactual: Outcome of `no-brake`, which defines a threat.
-        premature: Lead before the counterfactual contact beyond which braking is premature [s].
-        condition: Camera condition.
-        camera: Camera names.
-    """
-    pair = PairedEpisode.of(episode, counterfactual, premature)
-    return new_row(KEYS, agent, case, seed, condition, world=episode.world, camera=camera, **measure(pair))
+    """Return the row of one episode."""
+    values = measure(PairedEpisode.of(episode, counterfactual))
+    return new_row(KEYS, agent, case, seed, condition, world=episode.world, camera=camera, **values)

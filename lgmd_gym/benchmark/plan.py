@@ -25,9 +25,6 @@ from lgmd_gym.processes.pool import TaskMap
 class Plan(ABC):
     """The episodes of a run.
 
-    Args:
-        config: Configuration of the run.
-
     Attributes:
         suite: The suite.
         sensor_configs: Camera and neuron parameters by condition.

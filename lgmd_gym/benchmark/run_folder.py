@@ -173,12 +173,7 @@ class RunFolder:
     """Files of one run: `episodes.jsonl`, `run.json`, `run.toml`, `traces/` and the outputs.
 
     Use `create` for a new folder and `reopen` for an incomplete run. The folder is locked until `close`.
-
-    Args:
-        lock: Lock on the folder.
-        path: Path of the folder.
-        rows: Rows in the folder.
-        repaired: Whether an incomplete last line was removed.
+    `repaired` states whether an incomplete last line was removed.
     """
 
     def __init__(self, lock: FolderLock, path: Path, rows: list[Row], repaired: bool = False) -> None:

@@ -27,11 +27,7 @@ _FRAME = re.compile(r'^  File "(.+)", line (\d+), in (.+)$', re.MULTILINE)
 
 
 def failure_lines(rows: Iterable[Row]) -> list[str]:
-    """Return a line for each agent and exception: the number of episodes, the exception and its place.
-
-    Args:
-        rows: Rows of a run; those without error are skipped.
-    """
+    """Return a line for each agent and exception: the number of episodes, the exception and its place."""
     failed = [row for row in rows if row["error"] is not None]
     kinds = Counter((row["agent"], describe_failure(row["error"] or "")) for row in failed)
     most = kinds.most_common(MAX_FAILURES)
@@ -75,11 +71,6 @@ INTERRUPTED = "interrupted"
 
 def check_trust(agents: Iterable[str], source: Path, trust: bool) -> None:
     """Print the modules and policy files that agents load, one line each to stderr.
-
-    Args:
-        agents: Agent strings.
-        source: File that names the agents.
-        trust: Whether the user trusts this file.
 
     Raises:
         ValueError: If the user does not trust the file and an agent loads code from outside this package.

@@ -56,7 +56,7 @@ from typing import Any, cast
 
 import tomli_w
 
-from lgmd_gym.benchmark.case import TRAFFIC, Case, Suite, file_name, scenario_case
+from lgmd_gym.benchmark.case import TRAFFIC, Case, Suite, file_name, repetitions, scenario_case
 from lgmd_gym.benchmark.case_table import check_table, read_cases, read_data, read_name
 from lgmd_gym.benchmark.extensions import provided
 from lgmd_gym.benchmark.protocols import load_suites
@@ -214,14 +214,11 @@ def own_case(scenario: Scenario) -> Case:
 
 def distinct(cases: Sequence[Case]) -> tuple[Case, ...]:
     """Return cases of the suite `scenarios`; the second of equal names gets "/2", and so on."""
-    seen: dict[tuple[str, str], int] = {}
-    named = list[Case]()
-    for case in cases:
-        key = case.family, case.variant
-        seen[key] = seen.get(key, 0) + 1
-        variant = case.variant if seen[key] == 1 else f"{case.variant}/{seen[key]}"
-        named.append(replace(case, suite=OWN, variant=variant))
-    return tuple(named)
+    suffixes = repetitions((case.family, case.variant) for case in cases)
+    return tuple(
+        replace(case, suite=OWN, variant=case.variant + suffix)
+        for case, suffix in zip(cases, suffixes, strict=True)
+    )
 
 
 def speed_name(scenario: Scenario) -> str:
@@ -416,11 +413,6 @@ def _with_data(case: Case) -> Case:
 
 def _check_named(declared: Iterable[str], named: Iterable[str], source: Path) -> None:
     """Check that the user has named the modules with scenario families that a file declares.
-
-    Args:
-        declared: "MODULE" or "MODULE:NAME" in the file.
-        named: Those that the user has named.
-        source: The file.
 
     Raises:
         ValueError: If the user has not named one.

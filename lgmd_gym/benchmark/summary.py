@@ -234,10 +234,6 @@ def write_episodes(rows: Sequence[EpisodeRow], path: Path) -> None:
     """Write rows to a CSV file, one line each, ordered by condition, case, agent and seed.
 
     Null is an empty field, booleans are `true` and `false`, and `error` is the last line of the traceback.
-
-    Args:
-        rows: Rows of one run, at least one.
-        path: File to write; an existing one is replaced.
     """
     keys = list(rows[0])
     lines = ([_field(key, cast(Any, row)[key]) for key in keys] for row in sorted(rows, key=_order))

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -155,7 +155,7 @@ def _resume(options: Bench, executor: "Executor", console: Console) -> "Run":
     from lgmd_gym.benchmark.runner import Run
 
     assert options.resume is not None
-    refuse_unused(options, "--resume", RESUME_OPTIONS)
+    refuse_unused(options, RESUME_OPTIONS)
     benchmark = Run.resume(options.resume, executor, options.trust)
     repaired = " after removal of an incomplete last line" if benchmark.folder.repaired else ""
     console.print(f"resuming with {len(benchmark.rows)} of {benchmark.total} episodes{repaired}")
@@ -167,21 +167,9 @@ def _new(options: Bench, executor: "Executor") -> "Run":
     from lgmd_gym.benchmark.config import RunConfig
     from lgmd_gym.benchmark.runner import Run, check_trust
 
-    names = (
-        "suite",
-        "agents",
-        "seeds",
-        "first_seed",
-        "module",
-        "conditions",
-        "worlds",
-        "first_world",
-        "road",
-        "camera",
-    )
-    values: dict[str, Any] = {name: getattr(options, name) for name in names}
-    values["params"] = read_params(options.params)
-    values = {name: value for name, value in values.items() if value is not None}
+    given: dict[str, Any] = {item.name: getattr(options, item.name, None) for item in fields(RunConfig)}
+    given |= {"module": options.module, "params": read_params(options.params)}
+    values = {name: value for name, value in given.items() if value is not None}
     if options.config is None:
         modules = chosen_modules(values.get("suite", ()), values.pop("module", ()), options.trust)
         config = RunConfig(**values, modules=modules)

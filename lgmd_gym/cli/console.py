@@ -68,11 +68,7 @@ def drop_output() -> None:
 
 
 class FittedTables(RenderHook):
-    """Replace every table that a console prints by the parts that `fit` returns.
-
-    Args:
-        console: The console.
-    """
+    """Replace every table that a console prints by the parts that `fit` returns."""
 
     def __init__(self, console: Console) -> None:
         self._console = console

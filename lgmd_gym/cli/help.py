@@ -97,12 +97,7 @@ class _Buffer(io.StringIO):
 
 
 def one_line(box: str, command: str) -> str:
-    """Return the message in the parser's box, with the nearest option of the command if the box has one.
-
-    Args:
-        box: Output of the parser.
-        command: Name of the command.
-    """
+    """Return the message in the parser's box, with the nearest option of the command if the box has one."""
     lines = [line.strip("│╭╰╮╯|+ ") for line in re.sub(r"\x1b\[[0-9;]*m", "", box).splitlines()[1:]]
     text = " ".join("──" if re.fullmatch("[─-]+", line) else line for line in lines if line)
     text = re.sub(r" \(applied to [^)]*\)| Arguments are applied .* matter\.", "", text)

@@ -78,11 +78,7 @@ def _experiments(options: Paper, jobs: "Sequence[ClipJob]", folder: Path) -> "li
 def _process_all_configs(
     out: Path, jobs: "Sequence[ClipJob]", console: Console
 ) -> "tuple[list[ClipResult], list[ClipDetection]]":
-    """Process the clips with every configuration and print the tables.
-
-    Returns:
-        Results of all configurations, and the detections of the configuration `paper`.
-    """
+    """Process the clips with every configuration; return all results, and the detections of `paper`."""
     from lgmd_gym.cli import clips
     from lgmd_gym.clips import tables
     from lgmd_gym.clips.playback import PLAYBACK_CONFIGS

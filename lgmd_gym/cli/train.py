@@ -72,7 +72,7 @@ def run(options: Train) -> int:
     from lgmd_gym.training import resume, train
 
     if options.resume is not None:
-        refuse_unused(options, "--resume", ("resume", "jobs"))
+        refuse_unused(options, ("resume", "jobs"))
     _check_installed()
     folder = options.resume or options.out or _default_folder(options.algo)
     progress = sys.stderr.isatty()

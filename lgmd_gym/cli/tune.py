@@ -52,11 +52,7 @@ class Tune:
 
 
 def run(options: Tune) -> int:
-    """Search the parameters and write the result, or print the sensitivity table.
-
-    Returns:
-        0, or 130 for Ctrl-C.
-    """
+    """Search the parameters and write them, or print the sensitivity table; return 0, or 130 for Ctrl-C."""
     from lgmd_gym.processes.files import check_new_file
     from lgmd_gym.tuning.objective import Objective
     from lgmd_gym.tuning.search import tune

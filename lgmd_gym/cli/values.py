@@ -19,21 +19,15 @@ Number = Annotated[float | None, arg(metavar="X")]
 File = Annotated[Path | None, arg(metavar="PATH")]
 
 
-def refuse_unused(options: Any, flag: str, used: Collection[str]) -> None:
-    """Raise ValueError for options that have no effect beside a flag and differ from their defaults.
-
-    Args:
-        options: Options of a command.
-        flag: The flag, for example "--resume".
-        used: Names of the options that have an effect.
-    """
+def refuse_unused(options: Any, used: Collection[str]) -> None:
+    """Raise ValueError for options that differ from their defaults and have no effect beside --resume."""
     given = [
         f"--{item.name.replace('_', '-')}"
         for item in fields(options)
         if item.name not in used and getattr(options, item.name) != item.default
     ]
     if given:
-        raise ValueError(f"{flag} uses the settings of its run and ignores {', '.join(given)}; remove them")
+        raise ValueError(f"--resume uses the settings of its run and ignores {', '.join(given)}; remove them")
 
 
 def read_params(path: Path | None) -> dict[str, Any] | None:

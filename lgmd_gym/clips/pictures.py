@@ -21,15 +21,7 @@ BLUE, ORANGE, PINK = (86, 180, 233), (230, 159, 0), (204, 121, 167)
 
 
 class OverlayWriter:
-    """Write the overlay video of a clip; use it in a `with` block.
-
-    Args:
-        path: Video file, which must not exist.
-        title: Text at the bottom right.
-        fps: Frame rate [Hz].
-        config: Neuron parameters and frame processing.
-        crash_s: Time of the crash [s]; None for none.
-    """
+    """Write the overlay video of a clip to a new file; use it in a `with` block."""
 
     def __init__(
         self, path: Path, title: str, fps: float, config: PlaybackConfig, crash_s: float | None
@@ -162,15 +154,7 @@ MAX_PICTURES = 5
 def clip_figure(
     path: Path, title: str, summary: ClipSummary, config: PlaybackConfig, crash_s: float | None
 ) -> None:
-    """Draw pictures at the alarms and the time series of F, K, spikes and spike frequency.
-
-    Args:
-        path: PNG file to write.
-        title: Name of the clip.
-        summary: Summary of the clip.
-        config: Neuron parameters and frame processing.
-        crash_s: Time of the crash, marked by a line [s]; None for none.
-    """
+    """Draw pictures at the alarms and the time series of F, K, spikes and spike frequency."""
     plt = load_pyplot()
     with plt.rc_context(STYLE):
         figure = plt.figure(figsize=(9.0, 8.6), layout="constrained")

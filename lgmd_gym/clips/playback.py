@@ -120,10 +120,6 @@ class ClipFrame(NamedTuple):
 class ClipRun:
     """A run of one neuron on a clip; iterate over its frames once. Memory does not depend on its length.
 
-    Args:
-        path: Video file.
-        config: Neuron parameters and frame processing.
-
     Attributes:
         reader: Reader of the clip.
         neuron: The neuron; None before the first frame.

@@ -353,13 +353,7 @@ def _random_pieces(
 def _score(name: str, value: float, samples: np.ndarray, chance: np.ndarray, n: int, smaller: int) -> Score:
     """Return a figure with the interval of its bootstrap samples, and its chance level.
 
-    Args:
-        name: Name of the figure.
-        value: Value; NaN if undefined.
-        samples: Bootstrap samples.
-        chance: Values by chance; without any, the chance level is undefined.
-        n: Number of clips that the figure rests on.
-        smaller: Number of clips of the rarer kind; with one, a figure of both kinds has no interval.
+    `smaller` is the number of clips of the rarer kind; with one, a figure of both kinds has no interval.
     """
     if not np.isfinite(value):
         return Score(name, None, None, None, n)

@@ -95,12 +95,7 @@ def detection_table(title: str, detections: Sequence[ClipDetection]) -> Table:
 
 
 def config_table(detections: Mapping[str, Sequence[ClipDetection]], descriptions: Mapping[str, str]) -> Table:
-    """Return one row per configuration over all clips.
-
-    Args:
-        detections: Detections of all clips by name of the configuration.
-        descriptions: Description of each configuration.
-    """
+    """Return one row per configuration over all clips."""
     table = _table(
         ("configuration", "alarm"), CONFIG_COLUMNS, "configurations over all clips", CONFIG_CAPTION
     )

@@ -165,12 +165,7 @@ class Compiled:
 
 
 def compile_scenario(root: Element, family: str) -> Compiled:
-    """Return a concrete scenario.
-
-    Args:
-        root: Root element with the values of the parameters.
-        family: Family of the scenario.
-    """
+    """Return a concrete scenario."""
     catalogs = Catalogs(root)
     movers = read_entities(root, catalogs)
     network = root.child("RoadNetwork").child("LogicFile")

@@ -223,11 +223,7 @@ class Condition:
 
 
 class Trigger:
-    """Groups of conditions; all conditions of one group must hold.
-
-    Args:
-        groups: The groups; no groups for a trigger at once.
-    """
+    """Groups of conditions; all conditions of one group must hold. Without groups, it triggers at once."""
 
     def __init__(self, groups: list[list[Condition]]) -> None:
         self._groups = groups
@@ -252,13 +248,7 @@ class Trigger:
 
 
 def read_trigger(item: Element | None, world: ScenarioMap, states: States) -> Trigger:
-    """Return a `StartTrigger`; None is one at once.
-
-    Args:
-        item: The trigger.
-        world: Entities.
-        states: Start and end of the elements of the storyboard, filled while they run.
-    """
+    """Return a `StartTrigger`; None is one at once. `states` is filled while the storyboard runs."""
     if item is None:
         return Trigger([])
     groups = [

@@ -142,14 +142,7 @@ def export_case(case: Case, path: str | Path) -> tuple[Path, Path]:
 
 
 def scenario_xml(scenario: Scenario, road: str, weather: str = CLEAR, fcw_driver: bool = False) -> ET.Element:
-    """Return a scenario as OpenSCENARIO 1.3.
-
-    Args:
-        scenario: The scenario.
-        road: Path of the OpenDRIVE file, relative to the scenario's.
-        weather: Name of the weather.
-        fcw_driver: Whether the driver brakes after the alert.
-    """
+    """Return a scenario as OpenSCENARIO 1.3."""
     root = ET.Element("OpenSCENARIO")
     header = _add(root, "FileHeader", author="lgmd-gym", date=DATE, description=scenario.family)
     header.attrib |= {"revMajor": "1", "revMinor": "3"}
@@ -219,17 +212,9 @@ def _entity(entities: ET.Element, name: str, actor: Actor) -> None:
     if actor.kind in _KINDS:
         _add(item, "Performance", maxSpeed=70.0, maxAcceleration=12.0, maxDeceleration=12.0)
         axles = _add(item, "Axles")
-        front = {"maxSteering": 0.5, "positionX": 2.0 * max(actor.reference, 0.0), "positionZ": 0.3}
-        _add(axles, "FrontAxle", **front, trackWidth=1.5, wheelDiameter=0.6)
-        _add(
-            axles,
-            "RearAxle",
-            maxSteering=0.0,
-            positionX=0.0,
-            positionZ=0.3,
-            trackWidth=1.5,
-            wheelDiameter=0.6,
-        )
+        for tag, steering, x in (("FrontAxle", 0.5, 2.0 * max(actor.reference, 0.0)), ("RearAxle", 0.0, 0.0)):
+            place = {"maxSteering": steering, "positionX": x, "positionZ": 0.3}
+            _add(axles, tag, **place, trackWidth=1.5, wheelDiameter=0.6)
     _properties(item, {} if actor.shade is None else {SHADE: str(actor.shade)})
 
 
@@ -252,12 +237,9 @@ def _initial(actions: ET.Element, name: str, actor: Actor, centre: Place) -> Non
     trajectory = _add(_add(follow, "TrajectoryRef"), "Trajectory", name=f"{name}Path", closed="false")
     spline = _add(_add(trajectory, "Shape"), "ClothoidSpline")
     for number, bend in enumerate((*actor.path, Bend(TAIL))):
-        values = {
-            "curvatureStart": bend.curvature,
-            "curvatureEnd": bend.last_curvature,
-            "length": bend.length,
-        }
-        part = _add(spline, "ClothoidSplineSegment", **{key: float(item) for key, item in values.items()})
+        first, last, length = map(float, (bend.curvature, bend.last_curvature, bend.length))
+        values = {"curvatureStart": first, "curvatureEnd": last, "length": length}
+        part = _add(spline, "ClothoidSplineSegment", **values)
         if number == 0:
             _add(_add(part, "PositionStart"), "WorldPosition", **start)
 
@@ -285,13 +267,8 @@ def _change(action: ET.Element, segment: Segment, faster: bool) -> None:
     strength = abs(segment.acceleration)
     if segment.build_up == 0.0:
         speed = _add(action, "SpeedAction")
-        _add(
-            speed,
-            "SpeedActionDynamics",
-            dynamicsDimension="rate",
-            dynamicsShape="linear",
-            value=float(strength),
-        )
+        dynamics = {"dynamicsDimension": "rate", "dynamicsShape": "linear", "value": float(strength)}
+        _add(speed, "SpeedActionDynamics", **dynamics)
         _add(_add(speed, "SpeedActionTarget"), "AbsoluteTargetSpeed", value=float(segment.final_speed))
         return
     profile = _add(action, "SpeedProfileAction", followingMode="follow")

@@ -45,10 +45,6 @@ def compare(value: str, rule: str, other: str) -> bool:
 def declare(parent: Element, given: Mapping[str, Assignment]) -> dict[str, str]:
     """Return the parameters that an element declares, with given values instead of the defaults.
 
-    Args:
-        parent: Element that may contain `ParameterDeclarations`.
-        given: Assigned values by name.
-
     Returns:
         The scope of the parent with the declared parameters, in the order of the file.
     """
@@ -173,9 +169,6 @@ def _range(values: Element) -> list[str]:
 class Catalogs:
     """The catalogs of a scenario.
 
-    Args:
-        scenario: The root element of the scenario, with the values of its parameters.
-
     Attributes:
         visited: Nodes of the entries that were read.
     """
@@ -187,12 +180,7 @@ class Catalogs:
         self._entries: dict[tuple[str, str], Node] | None = None
 
     def resolve(self, item: Element, *tags: str) -> Element:
-        """Return an inline element with one of some tags, or the catalog entry that `item` refers to.
-
-        Args:
-            item: Element that contains the inline element or a `CatalogReference`.
-            *tags: Tags of the inline element and of the entry.
-        """
+        """Return an inline element with one of some tags, or the catalog entry that `item` refers to."""
         found = item.child(*tags, "CatalogReference")
         if found.tag != "CatalogReference":
             return Element(found.node, declare(found, {}))

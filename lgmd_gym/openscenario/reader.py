@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from os.path import normpath
 from pathlib import Path
 
-from lgmd_gym.benchmark.case import Case, Suite, file_name, scenario_case
+from lgmd_gym.benchmark.case import Case, Suite, file_name, repetitions, scenario_case
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.errors import check_path, counted
 from lgmd_gym.openscenario.compiler import Compiled, compile_scenario
@@ -53,12 +53,7 @@ def variants(cells: Sequence[dict[str, str]], speeds: Sequence[float]) -> list[s
         if len({*map(tuple, longer)}) > len({*map(tuple, parts)}):
             parts = longer
     found = ["/".join(part) for part in parts]
-    seen: dict[str, int] = {}
-    for index, name in enumerate(found):
-        seen[name] = seen.get(name, 0) + 1
-        if seen[name] > 1:
-            found[index] = f"{name}/{seen[name]}"
-    return found
+    return [name + suffix for name, suffix in zip(found, repetitions(found), strict=True)]
 
 
 def _rank(name: str, value: str) -> int:
@@ -195,18 +190,14 @@ def _cells(path: Path, file: Path, root: Node, given: Iterable[dict[str, Assignm
         cells.append(compile_scenario(Element(root, scope), family))
         varied.append({name: item.value for name, item in assignments.items()})
     names = variants(varied, [cell.scenario.ego_speed for cell in cells])
-    return [
-        Cell(
-            name,
-            cell,
-            FCW in path.stem or FCW in cell.scenario.family or cell.properties.get(DRIVER) == "true",
-        )
-        for name, cell in zip(names, cells, strict=True)
+    drivers = [
+        FCW in path.stem or FCW in cell.scenario.family or cell.properties.get(DRIVER) == "true"
+        for cell in cells
     ]
+    return list(map(Cell, names, cells, drivers))
 
 
 def _case(suite: str, cell: Cell, prefix: str = "") -> Case:
-    compiled, arguments = cell.compiled, {}
-    if compiled.weather != CLEAR:
-        arguments["weather"] = compiled.weather
-    return scenario_case(suite, prefix + cell.variant, compiled.scenario, cell.fcw_driver, **arguments)
+    weather, scenario = cell.compiled.weather, cell.compiled.scenario
+    arguments = {} if weather == CLEAR else {"weather": weather}
+    return scenario_case(suite, prefix + cell.variant, scenario, cell.fcw_driver, **arguments)

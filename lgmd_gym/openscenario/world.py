@@ -155,13 +155,7 @@ POSITIONS = (
 
 
 class ScenarioMap:
-    """Roads, catalogs and entities.
-
-    Args:
-        network: The road network.
-        catalogs: The catalogs.
-        movers: The entities by name.
-    """
+    """Roads, catalogs and entities."""
 
     def __init__(self, network: RoadNetwork, catalogs: Catalogs, movers: dict[str, Mover]) -> None:
         self.network, self.catalogs, self.movers = network, catalogs, movers

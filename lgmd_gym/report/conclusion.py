@@ -29,10 +29,7 @@ CAVEAT = (
 def conclusion(rows: list[Row], agents: list[str], suite: Suite) -> str:
     """Return one paragraph: sample, avoided threats, false activations and limits of each agent.
 
-    Args:
-        rows: Rows of a suite of cases. Rows with an FCW driver count for the limits only.
-        agents: Agents in the order of the report.
-        suite: The suite, with the limits of its protocol.
+    Rows with an FCW driver count for the limits only.
     """
     conditions = by_condition(rows)
     braking = [agent for agent in agents if agent != NO_BRAKE]

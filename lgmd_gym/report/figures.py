@@ -82,13 +82,7 @@ class ImpactPoint(NamedTuple):
 
 
 def impact_figure(rows: list[Row], agents: list[str], condition: str) -> ReportFigure | None:
-    """Return impact speed over test speed, one panel per scenario family; None without a threat.
-
-    Args:
-        rows: Rows of one condition.
-        agents: Agents in the order of their marks.
-        condition: Camera condition.
-    """
+    """Return impact speed over test speed, one panel per scenario family; None without a threat."""
     points = impact_points(rows, agents, condition)
     if not points:
         return None
@@ -148,13 +142,7 @@ def _impact_title(point: ImpactPoint) -> str:
 
 
 def avoidance_figure(rows: list[Row], agents: list[str], condition: str) -> ReportFigure | None:
-    """Return avoided threats against false activations; None unless the rows have both kinds of episodes.
-
-    Args:
-        rows: Rows of one condition.
-        agents: Agents in the order of their marks.
-        condition: Camera condition.
-    """
+    """Return avoided threats against false activations; None unless the rows have both kinds of episodes."""
     summaries = [
         item
         for item in agent_summaries(without_fcw_driver(rows), agents)

@@ -27,6 +27,8 @@ SHAPES = (
     "M0,4.8L4.6,-3.4H-4.6z",
 )
 DASHES = ("", "5 2", "2 2", "7 2 2 2", "1 3")
+MAX_TICKS = 6  # of an axis
+MAX_COLUMNS = 3  # of panels in a file
 LEFT, RIGHT, TOP, BOTTOM = 40.0, 12.0, 26.0, 36.0
 NOT_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -161,14 +163,14 @@ def legend_mark(series: int) -> Element:
     return root
 
 
-def ticks(high: float, most: int = 6) -> list[float]:
-    """Return round numbers from 0 to `high`, at most `most` of them.
+def ticks(high: float) -> list[float]:
+    """Return round numbers from 0 to `high`, at most `MAX_TICKS` of them.
 
     Example:
         >>> ticks(80.0)
         [0.0, 20.0, 40.0, 60.0, 80.0]
     """
-    step = next(step for step in _steps() if high / step < most)
+    step = next(step for step in _steps() if high / step < MAX_TICKS)
     return [step * number for number in range(int(high / step + 1e-9) + 1)]
 
 
@@ -184,16 +186,9 @@ def to_text(root: Element) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def file_text(title: str, panels: Sequence[Element], legend: Sequence[str] = (), columns: int = 3) -> str:
-    """Return a stand-alone SVG file of panels in rows, with a legend of series above them.
-
-    Args:
-        title: Title of the figure.
-        panels: Panels of `new_panel`.
-        legend: Names of the series in order.
-        columns: Number of panels per row.
-    """
-    columns = min(columns, max(len(panels), 1))
+def file_text(title: str, panels: Sequence[Element], legend: Sequence[str] = ()) -> str:
+    """Return a stand-alone SVG file of panels in rows, with a legend of series above them."""
+    columns = min(MAX_COLUMNS, max(len(panels), 1))
     width = max((float(panel.get("width", 0)) for panel in panels), default=320.0)
     top = 34.0 + 16.0 * -(-len(legend) // columns)
     root = element(None, "svg", font_family=FONT)

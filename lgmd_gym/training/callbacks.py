@@ -62,12 +62,7 @@ def _buffer_file(path: Path) -> Path:
 
 
 class CheckpointSaver(BaseCallback):
-    """Saves the model, and its replay buffer if it has one, every `frequency` calls.
-
-    Args:
-        folder: Training folder.
-        frequency: Number of calls between two checkpoints.
-    """
+    """Saves the model, and its replay buffer if it has one, every `frequency` calls."""
 
     def __init__(self, folder: Path, frequency: int) -> None:
         super().__init__()
@@ -85,14 +80,7 @@ class CheckpointSaver(BaseCallback):
 
 
 class Evaluator(EvalCallback):
-    """Evaluates on the same levels every time, so that evaluations are comparable.
-
-    Args:
-        envs: Environments of the validation split.
-        folder: Training folder.
-        frequency: Number of calls between two evaluations.
-        episodes: Number of episodes per evaluation.
-    """
+    """Evaluates on the same levels every time, so that evaluations are comparable."""
 
     def __init__(self, envs: "VecEnv", folder: Path, frequency: int, episodes: int) -> None:
         self._best, self._unfinished = folder / "best", folder / "best" / "unfinished"
@@ -164,10 +152,6 @@ class MonitorLog(BaseCallback):
     The plotting functions of stable-baselines3 and rl-zoo read it: `load_results(folder)`. `timesteps` is the
     number of decisions of all environments at the end of the episode. A resumed training removes the episodes
     after its checkpoint, which are run again, and continues the time.
-
-    Args:
-        folder: Training folder.
-        env_id: Environment id, for the header.
     """
 
     def __init__(self, folder: Path, env_id: str) -> None:

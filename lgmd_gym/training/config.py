@@ -300,10 +300,7 @@ def parse_levels(text: str) -> ExtraEpisodes:
     Raises:
         ValueError: If the text has another form, for an unknown family, or for one that is named twice.
     """
-    count, names = _split("extra_levels", text, LEVELS_EXAMPLE)
-    families = check_families(names)
-    _check_once("extra_levels", text, "family", families)
-    return ExtraEpisodes(count, families)
+    return _parse_extra("extra_levels", text, LEVELS_EXAMPLE, "family", check_families)
 
 
 def parse_traffic(text: str) -> ExtraEpisodes:
@@ -312,25 +309,25 @@ def parse_traffic(text: str) -> ExtraEpisodes:
     Raises:
         ValueError: If the text has another form, for an unknown kind, or for one that is named twice.
     """
-    count, kinds = _split("extra_traffic", text, TRAFFIC_EXAMPLE)
-    for kind in kinds:
-        check_known("kind of traffic", kind, TRAFFIC_KINDS)
-    _check_once("extra_traffic", text, "kind", kinds)
-    return ExtraEpisodes(count, tuple(kinds))
+    return _parse_extra("extra_traffic", text, TRAFFIC_EXAMPLE, "kind", _check_kinds)
 
 
-def _split(option: str, text: str, example: str) -> tuple[int, list[str]]:
-    """Return the number and the names of a text "NUMBER:NAME,NAME"."""
+def _check_kinds(names: list[str]) -> tuple[str, ...]:
+    return tuple(check_known("kind of traffic", name, TRAFFIC_KINDS) for name in names)
+
+
+def _parse_extra(
+    option: str, text: str, example: str, noun: str, check: Callable[[list[str]], tuple[str, ...]]
+) -> ExtraEpisodes:
+    """Return the number and the checked names of a text "NUMBER:NAME,NAME"."""
     match = re.fullmatch(r"\s*([0-9]{1,9})\s*:(.+)", text)
     if match is None:
         raise ValueError(f"{option} must be like {example!r}, got {shown(text)}")
-    count, names = match.groups()
-    return check_whole(f"number of {option}", int(count), 1), [name.strip() for name in names.split(",")]
-
-
-def _check_once(option: str, text: str, noun: str, names: Sequence[str]) -> None:
+    count = check_whole(f"number of {option}", int(match[1]), 1)
+    names = check([name.strip() for name in match[2].split(",")])
     if len(set(names)) < len(names):
         raise ValueError(f"{option} names a {noun} twice: {shown(text)}; use each name once")
+    return ExtraEpisodes(count, names)
 
 
 def _check_extra_episodes(config: "TrainConfig") -> None:

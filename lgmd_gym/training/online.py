@@ -41,12 +41,7 @@ def train_online(config: TrainConfig, folder: Path, progress: bool) -> "BaseAlgo
 
 
 def make_envs(config: TrainConfig, split: str) -> "VecEnv":
-    """Return the environments of a training run: the engine, or single environments where it has no id.
-
-    Args:
-        config: Configuration of the training.
-        split: "train" or "validation".
-    """
+    """Return the environments of a training run: the engine, or single environments where it has no id."""
     import gymnasium as gym
     from joblib import cpu_count
     from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor

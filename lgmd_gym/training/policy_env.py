@@ -83,10 +83,6 @@ class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
 def policy_space(observation_space: spaces.Space, features: FeatureConfig) -> spaces.Dict:
     """Return the space of a policy's inputs.
 
-    Args:
-        observation_space: Observation space of the environment.
-        features: Inputs of the policy.
-
     Raises:
         ValueError: If an input is not in the observation.
     """

@@ -148,10 +148,6 @@ class Objective:
     def evaluate(self, agent: str, sensor_config: SensorConfig = AGENT_SENSORS) -> ObjectiveValue:
         """Return the value for an agent.
 
-        Args:
-            agent: Agent string.
-            sensor_config: Sensors in place of the agent's own.
-
         Raises:
             RuntimeError: If an episode in closed loop fails; the message is the traceback.
         """

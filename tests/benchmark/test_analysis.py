@@ -106,8 +106,8 @@ def make_series(levels, fps=10):
 def test_alarms_are_events():
     levels = np.zeros(100)
     levels[[10, 11, 15, 40]] = 50  # one alarm from 1.0 to 1.5 s, another at 4.0 s
-    assert alarm_onsets(make_series(levels), "spike_frequency", 30) == pytest.approx([1.0, 4.0])
-    assert alarm_onsets(make_series(levels), "spike_frequency", 60).size == 0
+    assert alarm_onsets(make_series(levels), 30) == pytest.approx([1.0, 4.0])
+    assert alarm_onsets(make_series(levels), 60).size == 0
 
 
 @pytest.fixture
@@ -219,7 +219,7 @@ def test_open_loop_alarms_match_the_alerts_in_the_rows(run_folder):
     threats = [row for row in rows if row["agent"] == "no-brake" and row["threat"]]
     threats.sort(key=lambda row: (row["condition"], row["case"], row["seed"]))
     for trace, row in zip([trace for trace in traces if trace.contact_time < inf], threats, strict=True):
-        first = alarm_onsets(trace.series, "spike_frequency", 30.0)[0]
+        first = alarm_onsets(trace.series, 30.0)[0]
         assert trace.contact_time - first == pytest.approx(row["ttc_at_alert"], abs=0.04)
 
 

@@ -102,14 +102,7 @@ def compare_agents(
     pairs: Iterable[tuple[str, str]],
     prefixes: tuple[str, str] = ("", ""),
 ) -> list[Comparison]:
-    """Compare pairs of agents in each condition of `rows_a`; those without a common episode have no pairs.
-
-    Args:
-        rows_a: Rows of A.
-        rows_b: Rows of B.
-        pairs: Agent of A and agent of B of each comparison.
-        prefixes: Texts before the names of the agents of A and of B.
-    """
+    """Compare pairs of agents in each condition of `rows_a`; those without a common episode have no pairs."""
     conditions = list(dict.fromkeys(row["condition"] for row in rows_a))
     return [
         compare_rows(
@@ -227,12 +220,7 @@ def change_text(item: Difference) -> str:
 
 
 def difference_figure(file: FigureFile, comparisons: list[Comparison]) -> "Figure":
-    """Plot paired differences with their 95 % intervals, one panel per quantity; save and return the figure.
-
-    Args:
-        file: Destination.
-        comparisons: One line each.
-    """
+    """Plot and save paired differences with their 95 % intervals, one panel per quantity."""
     names = list(dict.fromkeys(item.name for comparison in comparisons for item in comparison.differences))
     columns = min(3, len(names))
     rows = -(-len(names) // columns)

@@ -109,7 +109,6 @@ def froc_curves(
     traces: list[OpenLoopTrace],
     lead_time: float = LEAD_TIME,
     thresholds: Iterable[float] = THRESHOLDS,
-    signal: str = "spike_frequency",
 ) -> dict[str, list[FrocCurve]]:
     """Return the curves of each condition: one over all threats, then one per contrast.
 
@@ -117,7 +116,6 @@ def froc_curves(
         traces: Open-loop traces.
         lead_time: Latest start of a detection before contact, in [0, 4) [s].
         thresholds: Thresholds of the signal.
-        signal: Name of the series: "spike_frequency", "membrane_potential" or "ffi".
 
     Raises:
         ValueError: For a lead time outside its range.
@@ -128,7 +126,7 @@ def froc_curves(
     curves: dict[str, list[FrocCurve]] = {}
     for condition in dict.fromkeys(trace.condition for trace in traces):
         chosen = [trace for trace in traces if trace.condition == condition]
-        onsets = {level: [alarm_onsets(trace.series, signal, level) for trace in chosen] for level in levels}
+        onsets = {level: [alarm_onsets(trace.series, level) for trace in chosen] for level in levels}
         present = {trace.contrast for trace in chosen if trace.contact_time < inf}
         curves[condition] = [
             FrocCurve(condition, contrast, tuple(_points(chosen, onsets, lead_time, contrast)))
@@ -137,9 +135,9 @@ def froc_curves(
     return curves
 
 
-def alarm_onsets(series: dict[str, np.ndarray], signal: str, threshold: float) -> np.ndarray:
-    """Return the times at which alarms begin [s]."""
-    times = series["time"][series[signal] >= threshold]
+def alarm_onsets(series: dict[str, np.ndarray], threshold: float) -> np.ndarray:
+    """Return the times at which alarms of the spike frequency begin [s]."""
+    times = series["time"][series["spike_frequency"] >= threshold]
     if times.size == 0:
         return times
     return times[np.concatenate(([True], np.diff(times) > REARM_TIME))]
@@ -216,13 +214,7 @@ def _csv_values(point: FrocPoint) -> list[float]:
 
 
 def froc_figure(file: FigureFile, curves: dict[str, list[FrocCurve]], lead_time: float) -> "Figure":
-    """Plot detections against false alarms per km, one panel per condition; save and return the figure.
-
-    Args:
-        file: Destination.
-        curves: Curves by condition; one line each.
-        lead_time: Latest start of a detection before contact [s].
-    """
+    """Plot detections against false alarms per km, one panel per condition; save and return the figure."""
     size = (1.0 + 4.6 * len(curves), 3.9)
     with saved_figure(file, 1, len(curves), figsize=size, squeeze=False, sharey=True) as (figure, axes):
         for axis, (condition, of_condition) in zip(axes[0], curves.items(), strict=True):

@@ -59,14 +59,6 @@ def run_traffic_task(task: TrafficTask) -> list[Row]:
 class _PlayedDrive:
     """A drive during its play, with the agents that share its recording.
 
-    Args:
-        drive: The drive.
-        agents: The agents.
-        task: Task of the drive.
-        sensor_config: Camera and neuron parameters.
-        observer: Cameras and neurons of all drives.
-        index: Index of the drive among those of `observer`.
-
     Attributes:
         drive: The drive.
         rows: Rows of the finished agents, by agent.

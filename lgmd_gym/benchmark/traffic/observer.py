@@ -19,10 +19,6 @@ class Observer:
 
     The observations and infos equal those of `LGMDObservation` with `trace=True`.
 
-    Args:
-        sensor_config: Camera and neuron parameters.
-        num_envs: Number of episodes.
-
     Attributes:
         sensors: The cameras and neurons.
         fps: Camera frame rate [Hz].
@@ -39,11 +35,7 @@ class Observer:
         self._top_views = self.sensors.top_views
 
     def observe(self, moments: Sequence[Moment | None]) -> list[Step | None]:
-        """Process the frames of one decision of every episode and return its steps.
-
-        Args:
-            moments: The moment of every episode; None for an episode that is not played.
-        """
+        """Process the frames of one decision of every episode; None stands for one that is not played."""
         for number in range(max(len(moment.frames) for moment in moments if moment)):
             for index in self._process(moments, number):
                 frame = moments[index].frames[number]  # type: ignore[union-attr]
@@ -59,12 +51,7 @@ class Observer:
         return steps
 
     def _process(self, moments: Sequence[Moment | None], number: int) -> list[int]:
-        """Draw one frame of every episode, step the neurons, and return the episodes that have this frame.
-
-        Args:
-            moments: The moment of every episode; None for an episode that is not played.
-            number: Number of the frame in the decision.
-        """
+        """Draw one frame of every episode, step the neurons, and return the episodes that have this frame."""
         shown = np.zeros(self.sensors.num_envs, np.bool_)
         for index, moment in enumerate(moments):
             if moment is not None and number < len(moment.frames):

@@ -16,13 +16,7 @@ NEVER = -1e9  # [s]
 
 
 class LiveEpisode:
-    """An episode of traffic that continues from a decision of a recording; all cameras are drawn.
-
-    Args:
-        recording: The recording.
-        decision: The decision.
-        sensor_config: Camera and neuron parameters.
-    """
+    """An episode of traffic that continues from a decision of a recording; all cameras are drawn."""
 
     def __init__(self, recording: TrafficRecording, decision: int, sensor_config: SensorConfig) -> None:
         self.env = recording.fork(decision)
@@ -51,11 +45,6 @@ class Replay:
     A braking event ends after `EVENT_PAUSE` without a demand, or at a standstill. After a standstill only the
     driver acts for `HANDOVER`; then the agent is reset, with another seed each time, so that an agent that
     always brakes still makes progress.
-
-    Args:
-        recording: Recording to replay.
-        agent: Agent to run.
-        sensor_config: Camera and neuron parameters.
 
     Attributes:
         log: Events so far.

@@ -82,12 +82,7 @@ class EpisodeLog:
 
 
 def measure(recording: TrafficRecording, log: EpisodeLog) -> dict[str, Any]:
-    """Return the measured values of a row.
-
-    Args:
-        recording: Recording without braking, which defines a threat.
-        log: Events of the agent.
-    """
+    """Return the measured values of a row."""
     assert log.end is not None
     info = log.end.info
     moving, needed = recording.moving_and_needed

@@ -157,14 +157,7 @@ HEADINGS = (
 
 
 def traffic_table(rows: Sequence[EpisodeRow], agents: list[str], title: str, by_kind: bool = False) -> Table:
-    """Return a table with one line per agent, or per agent and kind of traffic.
-
-    Args:
-        rows: Rows of the traffic suite.
-        agents: Agents in the order of the lines.
-        title: Title of the table.
-        by_kind: Whether each kind of traffic has its own line, below that of its agent.
-    """
+    """Return a table with one line per agent, or per agent and kind of traffic."""
     table = Table(title=title, caption=f"{Sample.of(rows)}; {CAPTION}")
     table.add_column("agent\n  traffic" if by_kind else "agent", overflow="fold", min_width=15)
     for heading in HEADINGS:

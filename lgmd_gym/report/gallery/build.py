@@ -94,15 +94,7 @@ def render_page(
     agent: str,
     seeds: int,
 ) -> str:
-    """Return the page as HTML.
-
-    Args:
-        cards: Scenarios, whose videos are in `media/`.
-        outcomes: Outcomes by scenario name and agent; empty for traffic.
-        sheets: Image sheets "cameras" and "roads"; may be empty.
-        agent: Agent in the videos.
-        seeds: Number of seeds per scenario behind the outcomes.
-    """
+    """Return the page as HTML."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(

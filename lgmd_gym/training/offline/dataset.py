@@ -93,7 +93,7 @@ class OfflineDataset:
         """
         repeat = self._features.repeat
         episodes = [self.episodes[index] for index in indices]
-        lengths = np.array([self._count_decisions(episode) for episode in episodes])
+        lengths = np.array([-(-len(episode) // repeat) for episode in episodes])
         rows = np.repeat(np.arange(len(episodes)), lengths)
         columns = np.concatenate([np.arange(length) for length in lengths])
         starts = (np.cumsum(lengths) - lengths)[rows]
@@ -116,10 +116,6 @@ class OfflineDataset:
             threats=torch.tensor([item.threat for item in episodes]),
         )
 
-    def _count_decisions(self, episode: RecordedEpisode) -> int:
-        """Return the number of policy decisions in an episode."""
-        return -(-len(episode) // self._features.repeat)
-
     def _arrays(
         self, name: str, indices: Sequence[int] | np.ndarray, mirrored: Sequence[bool] | np.ndarray
     ) -> list[np.ndarray]:
@@ -136,11 +132,7 @@ class OfflineDataset:
     ) -> torch.Tensor:
         """Return an input with its history, oldest first; the first decision fills missing ones.
 
-        Args:
-            name: Name of the input.
-            arrays: The input in each episode.
-            columns: Decision of each row.
-            starts: First row of the episode of each row.
+        `columns` are the decisions of the rows, and `starts` the first rows of their episodes.
         """
         values = np.concatenate(arrays)
         length = self._features.history_of(name)
@@ -224,10 +216,6 @@ def check_mirror(names: Iterable[str]) -> None:
 @cache
 def mirror_of(name: str, size: int) -> Mirror:
     """Return the mirror image of a policy input.
-
-    Args:
-        name: Name of the input.
-        size: Number of its elements per decision.
 
     Raises:
         ValueError: For an input without a known mirror image.

@@ -72,11 +72,6 @@ def select_margin(
     """Return the margin of `MARGINS` with the highest weighted return, and its results.
 
     Of margins with the same return, the one closest to 0 is returned.
-
-    Args:
-        logits: See `evaluate`.
-        dataset: Recorded episodes.
-        false_cost: See `evaluate`.
     """
     results = zip(MARGINS, evaluate_margins(logits, dataset, MARGINS, false_cost), strict=True)
     return max(results, key=lambda item: (item[1].weighted_return, -abs(item[0])))
@@ -88,14 +83,7 @@ def evaluate_margins(
     margins: Sequence[float],
     false_cost: float = 1.0,
 ) -> list[Evaluation]:
-    """Return the results of a policy that brakes where its log odds exceed a margin, for each margin.
-
-    Args:
-        logits: See `evaluate`.
-        dataset: Recorded episodes.
-        margins: Margins of the log odds of braking.
-        false_cost: See `evaluate`.
-    """
+    """Return the results of a policy that brakes where its log odds exceed a margin, for each margin."""
     parts = []
     for start in range(0, len(dataset), BATCH_SIZE):
         batch = dataset.batch(range(len(dataset))[start : start + BATCH_SIZE])
@@ -137,10 +125,7 @@ def _first_braking(
 ) -> tuple[torch.Tensor, ...]:
     """Return for each episode its return, its weighted return, whether the policy brakes, and the contact.
 
-    Args:
-        wants_brake: Whether the policy would brake at each decision, bool (N, T).
-        batch: The episodes.
-        weighted: Weighted returns of braking at each decision, (N, T).
+    `wants_brake` and `weighted`, the weighted returns of braking, have the shape (N, T).
     """
     wants_brake = wants_brake & (batch.mask > 0.0)
     brakes = wants_brake.any(1)

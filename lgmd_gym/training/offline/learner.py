@@ -56,14 +56,7 @@ class Optimizer(NamedTuple):
 
 
 def make_optimizer(network: Any, learning_rate: float, weight_decay: float, steps: int) -> Optimizer:
-    """Return AdamW with a one-cycle schedule for a network's parameters, without those of its value function.
-
-    Args:
-        network: Network of a stable-baselines3 policy.
-        learning_rate: Maximum of the schedule.
-        weight_decay: See `torch.optim.AdamW`.
-        steps: Number of steps of the schedule.
-    """
+    """Return AdamW with a one-cycle schedule for the parameters of a network without its value function."""
     trained = [value for name, value in network.named_parameters() if "value" not in name]
     optimizer = torch.optim.AdamW(trained, learning_rate, weight_decay=weight_decay)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, learning_rate, total_steps=steps)
