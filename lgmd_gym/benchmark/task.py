@@ -64,15 +64,8 @@ class Result:
 def make_result(task: Task, episode: Episode, sensor_config: SensorConfig) -> Result:
     """Return the result of an episode that was played with a sensor configuration."""
     counterfactual = task.counterfactual or Counterfactual.of(episode)
-    row = make_row(
-        task.agent,
-        task.case,
-        task.seed,
-        episode,
-        counterfactual,
-        condition=task.condition,
-        camera=sensor_config.label,
-    )
+    camera = sensor_config.label
+    row = make_row(task.agent, task.case, task.seed, episode, counterfactual, task.condition, camera)
     return Result(row, episode.series, counterfactual)
 
 

@@ -185,13 +185,8 @@ def _part(table: Table, columns: list[Column], widths: list[int]) -> Table:
     """Return a table with some of the columns, without title and caption."""
     part = copy(table)
     part.title = part.caption = None
-    part.box, part.expand, part.show_edge, part.pad_edge, part.padding = (
-        SIMPLE_HEAD,
-        False,
-        False,
-        False,
-        (0, 1, 0, 0),
-    )
+    part.expand = part.show_edge = part.pad_edge = False
+    part.box, part.padding = SIMPLE_HEAD, (0, 1, 0, 0)
     part.columns = [
         replace(column, width=width, overflow="fold", ratio=None, min_width=None, _index=number)
         for number, (column, width) in enumerate(zip(columns, widths, strict=True))

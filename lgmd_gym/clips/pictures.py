@@ -116,11 +116,7 @@ class OverlayWriter:
         points = [place(time, value) for time, value, _ in self._history]
         if len(points) > 1:
             pen.line(points, fill=BLUE, width=3)
-        for (
-            time,
-            _,
-            spikes,
-        ) in self._history:  # one line per frame, its length proportional to the number of spikes
+        for time, _, spikes in self._history:  # one line per frame, as long as it has spikes
             if spikes > 0:
                 x = place(time, 0.0)[0]
                 pen.line((x, top + 3, x, top + 3 + 2.2 * min(spikes, 10)), fill=TEXT)
@@ -225,17 +221,9 @@ def _draw_series(axes: list[Any], series: dict[str, np.ndarray], config: Playbac
 
 def _annotate(axis: Any, at: tuple[float, float], text: str, colour: str = "0.4", data: str = "x") -> None:
     """Write a small text; the coordinate `data` is in data units, the other a fraction of the axes."""
-    units = ("data", "axes fraction") if data == "x" else ("axes fraction", "data")
-    side = "left" if data == "x" else "right"
+    if data == "x":
+        place = {"xycoords": ("data", "axes fraction"), "va": "top", "ha": "left"}
+    else:
+        place = {"xycoords": ("axes fraction", "data"), "va": "bottom", "ha": "right"}
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
-    axis.annotate(
-        text,
-        at,
-        xycoords=units,
-        va="top" if data == "x" else "bottom",
-        ha=side,
-        color=colour,
-        fontsize=8,
-        bbox=box,
-        zorder=4,
-    )
+    axis.annotate(text, at, **place, color=colour, fontsize=8, bbox=box, zorder=4)

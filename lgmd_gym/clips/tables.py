@@ -168,10 +168,8 @@ _TIMES = FIGURES[FIGURES.index(TTA_CAP) :]
 
 def score_table(title: str, result: Anticipation) -> Table:
     """Return one row per figure with its interval, number of clips and chance level."""
-    table = Table(title=f"{title}: {_description(result)}", caption=CAPTION, caption_justify="left")
-    table.add_column("figure")
-    for name in ("value", "95 % interval", "clips", "chance", "p"):
-        table.add_column(name, justify="right")
+    columns = ("value", "95 % interval", "clips", "chance", "p")
+    table = _table(("figure",), columns, f"{title}: {_description(result)}", CAPTION)
     for score in result.scores:
         interval = "–" if score.low is None else f"{_number(score, score.low)} – {_number(score, score.high)}"
         table.add_row(

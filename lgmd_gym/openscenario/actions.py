@@ -66,11 +66,11 @@ def follow_trajectory(item: Element, mover: Mover, world: ScenarioMap, time: flo
 
 def _continue(item: Element, mover: Mover, time: float, rest: Track) -> float:
     """Continue the path of an entity with another from where it is."""
-    assert mover.track is not None
-    here, distance = mover.track.at(mover.timeline.at(time).distance), mover.timeline.at(time).distance
+    distance = mover.timeline.at(time).distance
+    here = mover.path.at(distance)
     if here.distance(rest.start) > _ON_PATH or cos(here.heading - rest.start.heading) < 0.999:
         raise item.error(f"{mover.name!r} is not on its path at {time:.3g} s; begin the path where it is")
-    mover.track, mover.follows = mover.track.then(distance, rest.bends), True
+    mover.track, mover.follows = mover.path.then(distance, rest.bends), True
     return mover.timeline.time_of(distance + rest.length)
 
 

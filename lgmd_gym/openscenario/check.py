@@ -23,7 +23,7 @@ It is computed from the resolved parameters and positions of the file, without t
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import copysign, cos, inf, sin, sqrt
+from math import copysign, cos, inf, nan, sin, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,7 @@ from lgmd_gym.errors import check_path, check_whole
 from lgmd_gym.openscenario.compiler import Compiled
 from lgmd_gym.openscenario.nodes import Element, Node
 from lgmd_gym.openscenario.reader import find_files, read_cells
+from lgmd_gym.openscenario.world import Mover, ScenarioMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +42,7 @@ class Intent:
 
     time: float  # time in the file [s]
     speed: float  # ego speed [m/s]
-    # position of a point of the target in the axes of the ego's body, + left [m]; None if the file does not
-    # define it
-    lateral: float | None
+    lateral: float  # position of a point of the target in the axes of the ego's body, + left [m]
     point: float  # distance of that point ahead of the target's reference point [m]
 
 
@@ -72,16 +71,16 @@ class _Values:
 
 def intent_of(compiled: Compiled) -> Intent | None:
     """Return the intent of a cell; None if the file does not define one."""
-    if compiled.target is None or compiled.ego.track is None:
+    ego, target, values = compiled.ego, compiled.target, _Values(compiled.root.scope)
+    if target is None:
         return None
-    values, target = _Values(compiled.root.scope), compiled.target
     action = next(_synchronisations(compiled.root, target.name), None)
     try:
         if values.get("GVT_laneChangeTTC") is not None:
-            return _lane_change(compiled, values)
+            return _lane_change(ego, target, values)
         if action is not None:
-            return _synchronised(compiled, action, values)
-        return _along(compiled, values)
+            return _synchronised(compiled.world, ego, target, action, values)
+        return _along(ego, target, values)
     except KeyError:
         return None
 
@@ -102,16 +101,12 @@ def _nodes(node: Node, tag: str) -> Iterator[Node]:
         yield from _nodes(child, tag)
 
 
-def _synchronised(compiled: Compiled, action: Element, values: _Values) -> Intent:
-    ego, target = compiled.ego, compiled.target
-    assert ego.track is not None
-    assert target is not None
-    assert target.track is not None
-    goal = ego.track.nearest(compiled.world.place(action.child("TargetPositionMaster")))
+def _synchronised(world: ScenarioMap, ego: Mover, target: Mover, action: Element, values: _Values) -> Intent:
+    goal = ego.path.nearest(world.place(action.child("TargetPositionMaster")))
     speed = ego.timeline.initial_speed
-    place = compiled.world.place(action.child("TargetPosition"))
-    heading = target.track.at(target.track.nearest(place)).heading
-    seen = place._replace(heading=heading).seen_from(ego.track.at(goal))
+    place = world.place(action.child("TargetPosition"))
+    heading = target.path.at(target.path.nearest(place)).heading
+    seen = place._replace(heading=heading).seen_from(ego.path.at(goal))
     point = values.get("VRU_collisionPointOffset")
     if point is None:
         return Intent(goal / speed, speed, seen.moved(target.front).y, target.front)
@@ -120,28 +115,23 @@ def _synchronised(compiled: Compiled, action: Element, values: _Values) -> Inten
     return Intent(goal / speed, speed, copysign(beside, seen.moved(point).y), point)
 
 
-def _along(compiled: Compiled, values: _Values) -> Intent:
+def _along(ego: Mover, target: Mover, values: _Values) -> Intent:
     """Return the intent of a rear or head-on scenario."""
-    ego, target = compiled.ego, compiled.target
-    assert ego.track is not None
-    assert target is not None
     speed, width = ego.timeline.initial_speed, ego.body.width
     share, overlap = values.get("ImpactLocation"), values.get("Overlap")
-    if share is None and overlap is not None and (target.body.kind != "car"):
+    if share is None and target.body.kind != "car":
         share = overlap
-    lateral = None if share is None else width * (share / 100.0 - 0.5)
-    if share is None and overlap is not None:
-        beside = target.body.width / 2 + width / 2 - abs(overlap) / 100.0 * width
-        lateral = 0.0 if abs(overlap) == 100.0 else copysign(beside, overlap)
-    if share is None and overlap is None:
+    if share is not None:
+        lateral = width * (share / 100.0 - 0.5)
+    elif overlap is None or abs(overlap) == 100.0:
         lateral = 0.0
-    return Intent(_time(compiled, values), speed, lateral, target.body.reference)
+    else:
+        lateral = copysign(target.body.width / 2 + width / 2 - abs(overlap) / 100.0 * width, overlap)
+    return Intent(_time(ego, target, values), speed, lateral, target.body.reference)
 
 
-def _time(compiled: Compiled, values: _Values) -> float:
+def _time(ego: Mover, target: Mover, values: _Values) -> float:
     """Return the time of the contact of a rear or head-on scenario [s]."""
-    ego, target = compiled.ego, compiled.target
-    assert target is not None
     speed = values.need("Ego_speed_kph") / 3.6
     accelerating = values.get("Target_accelerationDist", "VRU_accelerationDist")
     if ego.backwards:
@@ -176,9 +166,7 @@ def _braking_lead(values: _Values, speed: float, other: float) -> float:
     return delay + lasts + (gap - closed) / (speed - final) if speed > final else inf
 
 
-def _lane_change(compiled: Compiled, values: _Values) -> Intent:
-    ego, target = compiled.ego, compiled.target
-    assert target is not None
+def _lane_change(ego: Mover, target: Mover, values: _Values) -> Intent:
     speed = values.need("Ego_speed_kph") / 3.6
     synchronised = values.need("startupTime") - ego.front / speed
     change = values.need("Trajectory_laneChangeDistance") / speed
@@ -233,10 +221,9 @@ def check_file(path: Path) -> CheckedFile:
         impact = play(cell.compiled, 0.0 if intent is None else intent.point)
         contacts += impact is not None
         if impact is not None and intent is not None:
-            lateral = float("nan") if intent.lateral is None else abs(impact.lateral - intent.lateral)
-            deviations.append((lateral, abs(impact.speed - intent.speed), abs(impact.time - intent.time)))
-    rows = np.array(deviations or [(float("nan"),) * 3])
-    worst = np.where(np.isnan(rows).all(axis=0), np.nan, np.nanmax(np.nan_to_num(rows, nan=-1.0), axis=0))
+            lateral, speed = abs(impact.lateral - intent.lateral), abs(impact.speed - intent.speed)
+            deviations.append((lateral, speed, abs(impact.time - intent.time)))
+    worst = np.max(deviations or [(nan, nan, nan)], axis=0)
     return CheckedFile(path, len(cells), contacts, *worst.tolist())
 
 

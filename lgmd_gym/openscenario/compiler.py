@@ -76,9 +76,8 @@ def road_plan(network: RoadNetwork, ego: Place, located: tuple[Road, float, floa
         return RoadPlan(kind="crossing", distance=ahead[0])
     direction = 1 if cos(ego.heading - road.at(s).heading) > 0.0 else -1
     bends = road.bends(direction, 0.0)
-    curve = None
-    if any(bend.curvature or bend.last_curvature for bend in bends):
-        curve = _curve(road, direction, t, ego)
+    curved = any(bend.curvature or bend.last_curvature for bend in bends)
+    curve = _curve(road, direction, t, ego) if curved else None
     return curve or _straight(road, direction, s, t)
 
 
@@ -110,19 +109,12 @@ def _straight(road: Road, direction: int, s: float, t: float) -> RoadPlan:
     own = sorted(
         (n for n in driving if road.direction(n) == direction), key=lambda n: -direction * driving[n]
     )
-    if not own or any(_width(road, number, s) > _WIDEST for number in own):
+    if not own or any(road.width(number, s) > _WIDEST for number in own):
         return RoadPlan()
     index = min(range(len(own)), key=lambda i: abs(driving[own[i]] - t))
     if len(own) == 1 and len(driving) > 1:
         return RoadPlan(kind="two-way")
     return RoadPlan(lanes=len(own), ego_lane=index)
-
-
-def _width(road: Road, lane: int, s: float) -> float:
-    inner = lane - (1 if lane > 0 else -1)
-    edge = 0.0 if inner == 0 else _width(road, inner, s) / 2
-    first = road.lane_centre(0, s) if inner == 0 else road.lane_centre(inner, s)
-    return 2.0 * (abs(road.lane_centre(lane, s) - first) - edge)
 
 
 EGO = "ego"  # name of the ego, in any case; without one, the first entity
@@ -224,16 +216,13 @@ def _pose(mover: Mover, time: float) -> tuple[Place, float, float]:
     """Return the pose of a body's centre in its direction of travel, its reference, and its speed."""
     motion = mover.timeline.at(time)
     reference = -mover.body.reference if mover.backwards else mover.body.reference
-    if mover.track is None:
-        raise ValueError(f"entity {mover.name!r} has no position; add a TeleportAction to Init")
-    return mover.track.at(motion.distance).moved(reference), reference, motion.speed
+    return mover.path.at(motion.distance).moved(reference), reference, motion.speed
 
 
 def _bends(mover: Mover, time: float) -> tuple[Bend, ...]:
     """Return the bends of a body's path from a time on; none for a body that never moves."""
-    assert mover.track is not None
     moves = mover.timeline.segments or mover.timeline.initial_speed > 0.0
-    return mover.track.part(mover.timeline.at(time).distance).bends if moves else ()
+    return mover.path.part(mover.timeline.at(time).distance).bends if moves else ()
 
 
 def _profile(mover: Mover, start: float) -> tuple[Segment, ...]:

@@ -321,21 +321,20 @@ class Element:
 
     def text(self, name: str, default: str | None = None) -> str:
         """Return an attribute with `$name` and `${...}` replaced by their values."""
-        self.node.read.add(name)
-        raw = self.node.attributes.get(name)
-        if raw is None:
-            if default is None:
-                raise self.error(f"{self.tag} needs the attribute {name!r}")
+        if default is not None and not self.has(name):
             return default
-        return self.resolve(raw)
+        return self.resolve(self._raw(name))
 
     def name_of(self, name: str) -> str:
         """Return an attribute with the name of a parameter, without its "$"."""
-        raw = self.node.attributes.get(name)
-        if raw is None:
+        return self._raw(name).removeprefix("$")
+
+    def _raw(self, name: str) -> str:
+        """Return an attribute as in the file."""
+        if not self.has(name):
             raise self.error(f"{self.tag} needs the attribute {name!r}")
         self.node.read.add(name)
-        return raw.removeprefix("$")
+        return self.node.attributes[name]
 
     def resolve(self, raw: str) -> str:
         """Return a text with `$name` or `${...}` replaced by its value."""

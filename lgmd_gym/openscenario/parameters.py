@@ -1,7 +1,7 @@
 """Parameters: declarations, constraints, assignments, files that vary them, and catalogs."""
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import product
 from math import floor
 from pathlib import Path
@@ -85,10 +85,8 @@ def _check_constraints(item: Element, name: str, value: str, source: Node) -> No
     texts = []
     for group in groups:
         rules = [(entry.choice("rule", RULES), entry.text("value")) for entry in group]
-        try:
+        with item.locate_errors(f"parameter {name}: "):
             met = all(compare(value, rule, bound) for rule, bound in rules)
-        except ValueError as error:
-            raise item.error(f"parameter {name}: {error}") from None
         if met:
             for other in item.all("ConstraintGroup"):
                 other.skip()
@@ -101,10 +99,14 @@ def _check_constraints(item: Element, name: str, value: str, source: Node) -> No
 def assignments(parent: Element) -> dict[str, Assignment]:
     """Return the `ParameterAssignments` of an element."""
     block = parent.find("ParameterAssignments")
-    given = {}
-    for item in () if block is None else block.all("ParameterAssignment"):
-        given[item.name_of("parameterRef")] = Assignment(item.text("value"), item.node)
-    return given
+    return {} if block is None else _assigned(block)
+
+
+def _assigned(block: Element) -> dict[str, Assignment]:
+    return {
+        item.name_of("parameterRef"): Assignment(item.text("value"), item.node)
+        for item in block.all("ParameterAssignment")
+    }
 
 
 def variations(distribution: Element) -> list[dict[str, Assignment]]:
@@ -130,14 +132,7 @@ def variations(distribution: Element) -> list[dict[str, Assignment]]:
 
 def _axis(item: Element) -> list[dict[str, Assignment]]:
     if item.tag == "DeterministicMultiParameterDistribution":
-        sets = list(item.only("ValueSetDistribution").all("ParameterValueSet"))
-        axis = [
-            {
-                entry.name_of("parameterRef"): Assignment(entry.text("value"), entry.node)
-                for entry in values.all("ParameterAssignment")
-            }
-            for values in sets
-        ]
+        axis = list(map(_assigned, item.only("ValueSetDistribution").all("ParameterValueSet")))
         if not axis or any(entry.keys() != axis[0].keys() for entry in axis):
             raise item.error("every ParameterValueSet of a distribution must assign the same parameters")
         return axis
@@ -176,8 +171,7 @@ class Catalogs:
     def __init__(self, scenario: Element) -> None:
         self.visited: list[Node] = []
         locations = scenario.find("CatalogLocations")
-        self._folders = [] if locations is None else list(_folders(locations))
-        self._entries: dict[tuple[str, str], Node] | None = None
+        self._folders = [] if locations is None else _folders(locations)
 
     def resolve(self, item: Element, *tags: str) -> Element:
         """Return an inline element with one of some tags, or the catalog entry that `item` refers to."""
@@ -189,7 +183,7 @@ class Catalogs:
     def entry(self, reference: Element, *tags: str) -> Element:
         """Return the entry of a `CatalogReference`, with the assigned parameters."""
         catalog, name = reference.text("catalogName"), reference.text("entryName")
-        entries = self._load()
+        entries = self._entries
         if (catalog, name) not in entries:
             names = {known for _, known in entries} if entries else {folder.name for folder in self._folders}
             error = unknown_name(f"entry of catalog {catalog!r}", name, names)
@@ -200,15 +194,14 @@ class Catalogs:
         self.visited.append(node)
         return Element(node, declare(Element(node, {}), assignments(reference)))
 
-    def _load(self) -> dict[tuple[str, str], Node]:
-        if self._entries is None:
-            files = [path for folder in self._folders for path in sorted(folder.glob("*.xosc"))]
-            self._entries = _entries(tuple(map(parse_file, files)))
-        return self._entries
+    @cached_property
+    def _entries(self) -> dict[tuple[str, str], Node]:
+        files = [path for folder in self._folders for path in sorted(folder.glob("*.xosc"))]
+        return _entries_of(tuple(map(parse_file, files)))
 
 
 @lru_cache(maxsize=32)
-def _entries(files: tuple[Node, ...]) -> dict[tuple[str, str], Node]:
+def _entries_of(files: tuple[Node, ...]) -> dict[tuple[str, str], Node]:
     """Return the entries of catalog files by catalog and name."""
     entries = {}
     for file in files:

@@ -48,11 +48,15 @@ class Road:
 
     def lanes(self, s: float) -> dict[int, Lane]:
         """Return the lanes at a distance [m]."""
-        return next(lanes for start, lanes in reversed(self.sections) if start <= s or start == 0.0)
+        return self._section(s)[1]
 
-    def section_start(self, s: float) -> float:
-        """Return the start of the lane section at a distance [m]."""
-        return next(start for start, _ in reversed(self.sections) if start <= s or start == 0.0)
+    def width(self, lane: int, s: float) -> float:
+        """Return the width of a lane at a distance [m]."""
+        start, lanes = self._section(s)
+        return _polynomial(lanes[lane].widths, s - start)
+
+    def _section(self, s: float) -> tuple[float, dict[int, Lane]]:
+        return next(item for item in reversed(self.sections) if item[0] <= s or item[0] == 0.0)
 
     def lane_centre(self, lane: int, s: float) -> float:
         """Return the offset of a lane's centre from the reference line, + left [m]."""
@@ -61,10 +65,10 @@ class Road:
             return total
         if lane not in lanes:
             raise unknown_name(f"lane of road {self.name}", str(lane), map(str, lanes))
-        side, local = (1 if lane > 0 else -1), s - self.section_start(s)
+        side = 1 if lane > 0 else -1
         for number in range(side, lane, side):
-            total += side * _polynomial(lanes[number].widths, local)
-        return total + side * _polynomial(lanes[lane].widths, local) / 2
+            total += side * self.width(number, s)
+        return total + side * self.width(lane, s) / 2
 
     def direction(self, lane: int) -> int:
         """Return 1 if the traffic of a lane drives along the reference line, else -1."""

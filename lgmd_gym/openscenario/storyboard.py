@@ -18,7 +18,6 @@ class Event:
     triggers: tuple[Element | None, Element | None]  # triggers of its act and of the event itself
     groups: list[tuple[str, str]]  # kind and name of the elements that contain it, and its own
     runs: list[tuple[str, ActionRun]]  # its actions; empty if none has an effect
-    compiled: tuple[Trigger, Trigger] | None = None  # the triggers in a form that can be evaluated
     started: float = inf  # start [s]; inf before
     ended: float = inf  # end [s]; inf before the start
 
@@ -39,19 +38,18 @@ class Storyboard:
                 for trigger in event.triggers:
                     if trigger is not None:
                         trigger.skip()
-        for event in waiting:
-            act, own = (read_trigger(item, world, self.states) for item in event.triggers)
-            event.compiled = act, own
+        triggers = [[read_trigger(item, world, self.states) for item in event.triggers] for event in waiting]
         now = 0.0
         while waiting:
-            times = [self._start(event, now) for event in waiting]
+            times = [_start(act, own, now) for act, own in triggers]
             now = min(times)
             if now == inf:
                 for event in waiting:
                     event.item.skip()
                 return
-            event = waiting.pop(times.index(now))
-            self._carry_out(event, now)
+            index = times.index(now)
+            triggers.pop(index)
+            self._carry_out(waiting.pop(index), now)
 
     def _matters(self, event: Event) -> bool:
         """Return whether an event changes the motion, or another event that does refers to it."""
@@ -67,13 +65,6 @@ class Storyboard:
             for reference in _references(trigger)
         )
 
-    @staticmethod
-    def _start(event: Event, now: float) -> float:
-        assert event.compiled is not None
-        act, own = event.compiled
-        begun = act.first(0.0)
-        return own.first(max(begun, now)) if begun < inf else inf
-
     def _carry_out(self, event: Event, now: float) -> None:
         event.started = event.ended = now
         for name, run in event.runs:
@@ -84,6 +75,12 @@ class Storyboard:
             members = [other for other in self.events if key in other.groups and self._matters(other)]
             start = min(other.started for other in members)
             self.states[key] = start, max(other.ended for other in members)
+
+
+def _start(act: Trigger, own: Trigger, now: float) -> float:
+    """Return the time at which an event starts, given the triggers of its act and its own [s]."""
+    begun = act.first(0.0)
+    return own.first(max(begun, now)) if begun < inf else inf
 
 
 def _references(trigger: Element) -> list[Element]:

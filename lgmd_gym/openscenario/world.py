@@ -60,11 +60,16 @@ class Mover:
     leader: "Mover | None" = None  # entity whose speed it copies
     deleted: bool = False  # whether it has been deleted at the start
 
-    def place(self, time: float = 0.0) -> Place:
-        """Return the pose of the reference point at a time [s]."""
+    @property
+    def path(self) -> Track:
+        """Path of the reference point; ValueError for an entity without a position."""
         if self.track is None:
             raise ValueError(f"entity {self.name!r} has no position; add a TeleportAction to Init")
-        place = self.track.at(self.timeline.at(time).distance)
+        return self.track
+
+    def place(self, time: float = 0.0) -> Place:
+        """Return the pose of the reference point at a time [s]."""
+        place = self.path.at(self.timeline.at(time).distance)
         return place.turned(pi) if self.backwards else place
 
     @property

@@ -197,14 +197,8 @@ def comparison_table(comparison: Comparison) -> Table:
         table.add_column(heading, justify="right")
     for item in comparison.differences:
         pairs = f"{item.higher}/{item.lower} of {item.change.n}"
-        cells = (
-            f"{item.name} [{item.unit}]",
-            f"{item.mean_a:.2f}",
-            f"{item.mean_b:.2f}",
-            change_text(item),
-            pairs,
-        )
-        table.add_row(*cells)
+        means = f"{item.mean_a:.2f}", f"{item.mean_b:.2f}"
+        table.add_row(f"{item.name} [{item.unit}]", *means, change_text(item), pairs)
     return table
 
 

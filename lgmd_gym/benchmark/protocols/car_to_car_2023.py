@@ -76,32 +76,14 @@ def _crossing(suite: str) -> tuple[Case, ...]:
     The target drives at 20 to 60 km/h and comes from the far side, the left, which is the default of the
     OpenSCENARIO file for 2026.
     """
-    targets = range(20, 70, 10)
-    from_stop = [
-        make_case(
-            suite,
-            "CCCscp",
-            f"from-stop/target{target}",
-            ego_speed=to_mps(20),
-            target_speed=to_mps(target),
-            side="left",
-            from_stop=True,
-        )
-        for target in targets
-    ]
-    moving = [
-        make_case(
-            suite,
-            "CCCscp",
-            f"v{speed}/target{target}",
-            ego_speed=to_mps(speed),
-            target_speed=to_mps(target),
-            side="left",
-        )
-        for speed in range(20, 70, 10)
-        for target in targets
-    ]
-    return (*from_stop, *moving)
+    starts: list[tuple[str, int, dict[str, bool]]] = [("from-stop", 20, {"from_stop": True})]
+    starts += [(f"v{speed}", speed, {}) for speed in range(20, 70, 10)]
+    rows: list[Case] = []
+    for start, speed, more in starts:
+        for target in range(20, 70, 10):
+            speeds = {"ego_speed": to_mps(speed), "target_speed": to_mps(target)}
+            rows.append(make_case(suite, "CCCscp", f"{start}/target{target}", **speeds, side="left", **more))
+    return tuple(rows)
 
 
 def turns(suite: str, family: str) -> tuple[Case, ...]:
@@ -120,23 +102,15 @@ def _head_on(suite: str) -> tuple[Case, ...]:
 
     The lane change of CCFhol is 44 and 60 m long, 13.9 and 19.4 m behind the overtaken car.
     """
-    straight = [
-        make_case(suite, "CCFhos", f"v{speed}", ego_speed=to_mps(speed), target_speed=to_mps(speed))
-        for speed in (50, 70)
-    ]
-    changes = [
-        make_case(
-            suite,
-            "CCFhol",
-            f"v{speed}",
-            ego_speed=to_mps(speed),
-            target_speed=to_mps(speed),
-            change_length=length,
-            following_distance=distance,
-        )
-        for speed, length, distance in ((50, 44.0, 13.9), (70, 60.0, 19.4))
-    ]
-    return (*straight, *changes)
+    rows: list[Case] = []
+    for family, speed, change in (
+        ("CCFhos", 50, {}),
+        ("CCFhos", 70, {}),
+        ("CCFhol", 50, {"change_length": 44.0, "following_distance": 13.9}),
+        ("CCFhol", 70, {"change_length": 60.0, "following_distance": 19.4}),
+    ):
+        rows += speed_cases(suite, family, [speed], target_speed=to_mps(speed), **change)
+    return tuple(rows)
 
 
 def without_targets(suite: Suite) -> Suite:

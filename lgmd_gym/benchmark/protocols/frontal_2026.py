@@ -57,11 +57,11 @@ def ncap2026() -> tuple[Case, ...]:
     return (
         *_cells(suite, "CCRs", range(10, 60, 10), LOCATIONS),
         *_cells(suite, "CCRs", range(60, 90, 10), LOCATIONS, warned=True),
-        *_slower(suite, LOCATIONS),
+        *_moving(suite, "CCRm", CCRM_SPEEDS, LOCATIONS),
         *_cells(suite, "CCRb", range(30, 90, 10), LOCATIONS, **BRAKING),
         *_pairs(suite, "CCCscp", SCP_SPEEDS, SIDES, obstructed=True),
         *turns(suite, "CCFtap"),
-        *_head_on(suite, HEAD_ON_SPEEDS, (25, 50, 75)),
+        *_moving(suite, "CCFhos", HEAD_ON_SPEEDS, (25, 50, 75)),
         *_cells(suite, "CMRs", range(10, 60, 10), (75, 50, 25)),
         *_cells(suite, "CMRs", range(60, 90, 10), (75, 50, 25), warned=True),
         *_cells(suite, "CMRb", range(30, 90, 10), (75, 50, 25), **BRAKING),
@@ -86,13 +86,13 @@ def ncap2026_extended() -> tuple[Case, ...]:
     return (
         *_cells(suite, "CCRs", range(10, 60, 10), outside),
         *_cells(suite, "CCRs", range(60, 90, 10), outside, warned=True),
-        *_slower(suite, outside),
+        *_moving(suite, "CCRm", CCRM_SPEEDS, outside),
         *_cells(suite, "CCRb", range(30, 90, 10), outside, **BRAKING),
         *_cells(suite, "CCRb", range(90, 140, 10), (*LOCATIONS, *outside), **BRAKING),
         *_pairs(suite, "CCCscp", FAST_SCP, SIDES),
         *_pairs(suite, "CCFtap", FAST_TAP),
-        *_head_on(suite, HEAD_ON_SPEEDS, (100,)),
-        *_head_on(suite, FAST_HEAD_ON, (100, 75, 50, 25)),
+        *_moving(suite, "CCFhos", HEAD_ON_SPEEDS, (100,)),
+        *_moving(suite, "CCFhos", FAST_HEAD_ON, (100, 75, 50, 25)),
         *_cells(suite, "CMRs", range(10, 60, 10), edges),
         *_cells(suite, "CMRs", range(60, 90, 10), edges, warned=True),
         *_cells(suite, "CMRb", range(30, 90, 10), edges, **BRAKING),
@@ -164,12 +164,14 @@ def _cells(
     return rows
 
 
-def _slower(suite: str, locations: Iterable[int]) -> list[Case]:
-    """Return the cells of CCRm."""
+def _moving(
+    suite: str, family: str, speeds: Iterable[tuple[int, int]], locations: Iterable[int]
+) -> list[Case]:
+    """Return the cells of all pairs of ego and target speed and impact locations."""
     return [
         case
-        for per_cent, (ego, target) in product(locations, CCRM_SPEEDS)
-        for case in _cells(suite, "CCRm", [ego], [per_cent], target_speed=to_mps(target))
+        for per_cent, (ego, target) in product(locations, speeds)
+        for case in _cells(suite, family, [ego], [per_cent], target_speed=to_mps(target))
     ]
 
 
@@ -189,15 +191,6 @@ def _pairs(
             make_case(suite, family, f"{variant}-{side}" if side else variant, **pair, **where, **arguments)
         )
     return rows
-
-
-def _head_on(suite: str, speeds: Iterable[tuple[int, int]], locations: Iterable[int]) -> list[Case]:
-    """Return the cells of CCFhos."""
-    return [
-        case
-        for per_cent, (ego, target) in product(locations, speeds)
-        for case in _cells(suite, "CCFhos", [ego], [per_cent], target_speed=to_mps(target))
-    ]
 
 
 def colour_2026(ego_kmh: float, impact_kmh: float) -> str:
