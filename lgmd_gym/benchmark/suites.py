@@ -1,56 +1,12 @@
 """Suites: the shipped ones, and a user's own as TOML or JSON, strictly checked.
 
-Case names are in km/h, arguments in SI units. A suite file:
-
-name = "mine"
-about = "dark cars, by day"
-module = "my_scenarios"             # or "my_scenarios:MyFamily", see `import_families`; optional
-
-[[cases]]
-family = "CCRs"
-speeds_kmh = [10, 20, 30]           # cases mine/CCRs/v10/dark, ...; arguments in SI units
-name = "dark"
-arguments = { shade = 40 }
-
-[[cases]]
-family = "CutIn"                    # all combinations: mine/CutIn/v70/gap6m/excess-10.8kmh, ...
-sweep.ego_speed = { start = 19.444, stop = 25.0, step = 2.778 }     # includes 25.0
-sweep.gap = [6, 8, 10]
-sweep.excess = [-3.0, -6.0]
-
-[[cases]]
-family = "CCRm"
-name = "warned"                     # mine/CCRm/warned
-fcw_driver = true
-arguments = { ego_speed = 13.89, target_speed = 5.56 }
-
-[[cases]]
-family = "parked"                   # any name
-name = "v30"                        # mine/parked/v30
-arguments = { weather = "night" }
-[cases.scenario]                    # a scenario of one's own, see `lgmd_gym.envs.families.data`
-ego_speed = 8.33
-duration = 9.0
-actors = [{ gap = 40.0, lateral_offset = 1.0 }]
-
-
-Scenario files: one scenario as TOML or JSON, a family with arguments or explicit actors.
-
-family = "CutIn"                    # a family of this package or of `module`
-arguments = { ego_speed = 19.44, gap = 8.0, excess = -5.56 }    # optional, in SI units
-name = "close"                      # last part of the case's name; optional
-module = "my_scenarios"             # see `import_families`; optional
-
-or
-
-[scenario]                          # see `lgmd_gym.envs.families.data`
-ego_speed = 19.44
-duration = 9.0
-actors = [{ gap = 40.0, lateral_offset = 1.0 }]
+Case names are in km/h, arguments in SI units. docs/howto/own_scenario.md shows suite files, whose [[cases]]
+tables are sweeps, single cases or scenarios, and scenario files, which hold one scenario.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, cast
 
@@ -107,53 +63,9 @@ def find_case(name: str) -> Case:
     return known[name]
 
 
-TEMPLATE = """\
-# A scenario of lgmd-gym. Units: m, m/s, s, rad; 70 km/h is 19.44 m/s, 50 km/h is 13.89 m/s.
-#   lgmd-gym scenario show FILE      draw it
-#   lgmd-gym drive FILE              run one episode
-#   lgmd-gym bench --suite FILE      run agents on it
-# For sweeps, write a suite file with [[cases]] tables.
-
-# name = "close"                     # last part of the case's name; without it the speed, as in "v70"
-
-# Either a family with arguments (lgmd-gym list envs):
-# family = "CutIn"
-# arguments = { ego_speed = 19.44, gap = 8.0, excess = -5.56 }
-
-# or the ego's script and all actors:
-family = "own"                       # any name
-
-[scenario]
-ego_speed = 19.44
-duration = 12.0                      # the episode ends earlier at contact or standstill
-# ego_profile = [{ start = 2.0, acceleration = -1.0, final_speed = 15.0 }]
-# ego_path = [{ length = 50.0 }, { length = 30.0, curvature = 0.01 }]
-# road = { kind = "straight", lanes = 3, ego_lane = 1 }     # or "two-way", "curve", "crossing"
-
-[[scenario.actors]]                  # the first actor is the target of the benchmark's rows
-gap = 30.0                           # from the ego's front bumper to the actor's rear
-lateral_offset = 3.5                 # centre to centre, + left; a lane is 3.5 m wide
-speed = 13.89
-# A lane change to the right, 44 m long, after 50 m straight ahead; curvature in 1/m, + left:
-path = [
-    { length = 50.0 },
-    { length = 11.0, end_curvature = -0.0145 },
-    { length = 11.0, curvature = -0.0145, end_curvature = 0.0 },
-    { length = 11.0, end_curvature = 0.0145 },
-    { length = 11.0, curvature = 0.0145, end_curvature = 0.0 },
-]
-# heading = 0.0                      # relative to the ego's, + left
-# shade = 40                         # grey level in [0, 255]; without it drawn from the seed
-
-[[scenario.actors]]
-gap = 60.0
-speed = 19.44
-length = 12.0                        # a truck; the default is a car of 4.023 x 1.712 x 1.427 m
-width = 2.5
-height = 3.5
-# kind = "car"                       # or "box", "road_marking", "pedestrian", "bicycle", "motorcycle"
-profile = [{ start = 4.0, acceleration = -3.0, final_speed = 8.0 }]     # build_up = 0.5: a ramp
-"""
+def template() -> str:
+    """Return a commented scenario file to start from."""
+    return (files("lgmd_gym.benchmark") / "scenario.toml").read_text(encoding="utf-8")
 
 
 def write_template(path: Path | str, force: bool = False) -> Path:
@@ -171,7 +83,7 @@ def write_template(path: Path | str, force: bool = False) -> Path:
         raise ValueError(f"a scenario template must have the suffix .toml, got {path.name!r}")
     check_output_file(path, "scenario file", force)
     with complete_file(path) as part:
-        part.write_text(TEMPLATE, encoding="utf-8")
+        part.write_text(template(), encoding="utf-8")
     return path
 
 

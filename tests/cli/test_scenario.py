@@ -5,7 +5,7 @@ import re
 import pytest
 
 from lgmd_gym.benchmark import get_suite
-from lgmd_gym.benchmark.suites import TEMPLATE
+from lgmd_gym.benchmark.suites import template
 from lgmd_gym.cli import main as cli
 
 
@@ -33,10 +33,10 @@ def test_template_is_a_valid_scenario(folder, capsys):
 
 
 def test_every_commented_line_of_the_template_is_valid(folder):
-    lines = re.findall(r"^# (\w+ = .*)$", TEMPLATE, re.MULTILINE)
+    lines = re.findall(r"^# (\w+ = .*)$", template(), re.MULTILINE)
     assert len(lines) == 9
     for line in lines:
-        text = TEMPLATE.replace(f"# {line}", line)
+        text = template().replace(f"# {line}", line)
         if line.startswith(("family", "arguments")):
             text = "\n".join(item for item in lines if item.startswith(("family", "arguments")))
         (folder / "own.toml").write_text(text)
@@ -50,7 +50,7 @@ def test_files_are_replaced_with_force_only(folder, capsys):
     assert "scenario file 'own.toml' exists; choose another file, or replace it with --force" in message
     assert file.read_text() == "mine"
     assert cli.run(["scenario", "new", "own.toml", "--force"]) == 0
-    assert file.read_text() == TEMPLATE
+    assert file.read_text() == template()
     assert "must have the suffix .toml, got 'own.json'" in refused(capsys, "new", "own.json")
     assert "cannot be created" in refused(capsys, "new", "nowhere/own.toml")
     assert "scenario new writes one file, got 2" in refused(capsys, "new", "a.toml", "b.toml")
