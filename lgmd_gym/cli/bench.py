@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from rich.console import Console
@@ -16,6 +15,7 @@ from lgmd_gym.cli.values import (
     Name,
     Names,
     chosen_modules,
+    default_out,
     note_unused_params,
     read_params,
     refuse_unused,
@@ -179,8 +179,7 @@ def _new(options: Bench, executor: "Executor") -> "Run":
     else:
         config = RunConfig.load(options.config)
         check_trust(config.agents, options.config, options.trust)
-    default = Path("runs") / f"{config.label}-{time.strftime('%Y%m%d-%H%M%S')}"
-    run = Run.new(config, options.out or default, executor)
+    run = Run.new(config, default_out(options.out, config.label), executor)
     if options.params is not None:
         note_unused_params(options.params, map(make_agent, config.agents))
     return run

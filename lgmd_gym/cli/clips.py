@@ -2,7 +2,6 @@
 
 import json
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,11 +30,6 @@ def print_notes(jobs: Sequence[ClipJob], annotations: Path | None, fps: float | 
             _note(f"{job.clip.name} has a variable frame rate; resampled to {job.info.fps:g} Hz")
         if annotations is not None and not job.annotated and job.event is None:
             _note(f"{job.clip.name} has no row in {annotations}; it is not in the table")
-
-
-def default_out(out: Path | None, command: str) -> Path:
-    """Return the folder of --out, or one named after the command and the time."""
-    return out or Path("runs") / f"{command}-{time.strftime('%Y%m%d-%H%M%S')}"
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from lgmd_gym.cli.console import make_console
-from lgmd_gym.cli.values import File
+from lgmd_gym.cli.values import File, default_out
 
 if TYPE_CHECKING:
     from lgmd_gym.clips.batch import ClipJob, ClipResult
@@ -48,7 +48,7 @@ def run(options: Paper) -> int:
         jobs = make_jobs([options.clips], options.crashes)
         clips.print_notes(jobs, options.crashes)
     settings = {"clips": [job.clip for job in jobs], "picture": options.picture}
-    out = clips.default_out(options.out, "paper")
+    out = default_out(options.out, "paper")
     with clips.run_folder(out, settings) as folder:
         clip_results = _experiments(options, jobs, folder)
     make_console().print(f"claims and figures: {out}", soft_wrap=True)

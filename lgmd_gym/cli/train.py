@@ -1,15 +1,13 @@
 """The `train` command; the attribute docstrings of `Train` are its help texts."""
 
 import sys
-import time
 from dataclasses import dataclass
 from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from lgmd_gym.cli.values import Count, File, Name, Names, refuse_unused
+from lgmd_gym.cli.values import Count, File, Name, Names, default_out, refuse_unused
 
 if TYPE_CHECKING:
     from lgmd_gym.training import TrainConfig
@@ -74,7 +72,7 @@ def run(options: Train) -> int:
     if options.resume is not None:
         refuse_unused(options, ("resume", "jobs"))
     _check_installed()
-    folder = options.resume or options.out or _default_folder(options.algo)
+    folder = options.resume or default_out(options.out, f"train-{options.algo}")
     progress = sys.stderr.isatty()
     try:
         if options.resume is not None:
@@ -118,7 +116,3 @@ def config_of(options: Train) -> "TrainConfig":
         extra_levels=options.extra_levels,
         extra_traffic=options.extra_traffic,
     )
-
-
-def _default_folder(algo: str) -> Path:
-    return Path("runs") / f"train-{algo}-{time.strftime('%Y%m%d-%H%M%S')}"

@@ -1,6 +1,7 @@
 """Values of options: types with a readable placeholder; reading of files, worlds and modules."""
 
 import sys
+import time
 from collections.abc import Collection, Iterable
 from dataclasses import fields
 from pathlib import Path
@@ -55,6 +56,11 @@ def note_unused_params(path: Path | None, agents: "Iterable[Agent]") -> None:
             "depend on the neuron",
             file=sys.stderr,
         )
+
+
+def default_out(out: Path | None, name: str) -> Path:
+    """Return the folder of --out, or one in `runs` with a name and the time."""
+    return out or Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
 
 
 def parse_arguments(pairs: tuple[str, ...]) -> dict[str, Any]:

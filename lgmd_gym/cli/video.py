@@ -9,7 +9,7 @@ from rich.text import Text
 from tyro.conf import Positional, arg
 
 from lgmd_gym.cli.console import make_console
-from lgmd_gym.cli.values import Count, File, Name, Number, read_params
+from lgmd_gym.cli.values import Count, File, Name, Number, default_out, read_params
 
 if TYPE_CHECKING:
     from lgmd_gym.clips.batch import ClipJob, ClipResult
@@ -83,7 +83,7 @@ def run(options: Video) -> int:
     clips.print_notes(jobs, options.crashes or options.events, options.fps)
     for job in jobs:  # decode the first frame of each clip before creating the folder
         next(iter(ClipRun(job.clip, next(iter(configs.values())))))
-    out = clips.default_out(options.out, "video")
+    out = default_out(options.out, "video")
     with clips.run_folder(out, {"clips": [job.clip for job in jobs], "configs": configs}) as folder:
         results = _process_all(options, jobs, configs, folder)
     make_console().print(f"traces and figures: {out}", soft_wrap=True)
