@@ -34,10 +34,8 @@ def entity_test(item: Element, world: ScenarioMap) -> Test:
 
 def meets(value: float, rule: str, limit: float) -> bool:
     """Return whether a rule holds; a value is equal within 1e-9."""
-    if rule in ("greaterOrEqual", "lessOrEqual", "equalTo") and abs(value - limit) <= _CLOSE:
+    if rule in ("greaterOrEqual", "lessOrEqual") and abs(value - limit) <= _CLOSE:
         return True
-    if rule == "notEqualTo":
-        return abs(value - limit) > _CLOSE
     return value > limit if rule in ("greaterThan", "greaterOrEqual") else value < limit
 
 

@@ -1,18 +1,27 @@
 """Parameters: declarations, constraints, assignments, files that vary them, and catalogs."""
 
-from collections.abc import Mapping
+import operator
+from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache
 from itertools import product
 from math import floor
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from lgmd_gym.errors import shown, unknown_name
 from lgmd_gym.openscenario.nodes import Element, Node, parse_file
 
 MAX_CELLS = 100_000
 _NUMBERS = ("double", "int", "integer", "unsignedInt", "unsignedShort")
-RULES = ("equalTo", "greaterThan", "lessThan", "greaterOrEqual", "lessOrEqual", "notEqualTo")
+_OPERATORS: dict[str, Callable[[Any, Any], bool]] = {
+    "equalTo": operator.eq,
+    "greaterThan": operator.gt,
+    "lessThan": operator.lt,
+    "greaterOrEqual": operator.ge,
+    "lessOrEqual": operator.le,
+    "notEqualTo": operator.ne,
+}
+RULES = tuple(_OPERATORS)
 
 
 class Assignment(NamedTuple):
@@ -25,21 +34,13 @@ class Assignment(NamedTuple):
 def compare(value: str, rule: str, other: str) -> bool:
     """Return whether a rule holds between two values; numbers are compared as numbers."""
     try:
-        one, two = float(value), float(other)
+        return _OPERATORS[rule](float(value), float(other))
     except ValueError:
-        if rule not in ("equalTo", "notEqualTo"):
-            raise ValueError(
-                f"rule {rule} needs numbers, got {shown(value)} and {shown(other)}; use equalTo or notEqualTo"
-            ) from None
-        return (value == other) == (rule == "equalTo")
-    return {
-        "equalTo": one == two,
-        "notEqualTo": one != two,
-        "greaterThan": one > two,
-        "lessThan": one < two,
-        "greaterOrEqual": one >= two,
-        "lessOrEqual": one <= two,
-    }[rule]
+        if rule in ("equalTo", "notEqualTo"):
+            return _OPERATORS[rule](value, other)
+        raise ValueError(
+            f"rule {rule} needs numbers, got {shown(value)} and {shown(other)}; use equalTo or notEqualTo"
+        ) from None
 
 
 def declare(parent: Element, given: Mapping[str, Assignment]) -> dict[str, str]:
