@@ -42,21 +42,20 @@ def save_figure(file: Path, draw: Callable[[BinaryIO], Any]) -> str:
     draw(drawn)
     with complete_file(file) as part:
         part.write_bytes(drawn.getvalue())
-    return _data_uri("image/svg+xml", lambda copy: copy.write(drawn.getvalue()))
+    return _data_uri("image/svg+xml", drawn.getvalue())
 
 
 def frame_uri(frame: np.ndarray) -> str:
     """Return a grey frame, uint8 of shape (height, width), as the data URI of a PNG."""
     from PIL import Image
 
-    image = Image.fromarray(frame)
-    return _data_uri("image/png", lambda file: image.save(file, "PNG", optimize=True))
-
-
-def _data_uri(kind: str, write: Callable[[BinaryIO], Any]) -> str:
     file = io.BytesIO()
-    write(file)
-    return f"data:{kind};base64,{base64.b64encode(file.getvalue()).decode()}"
+    Image.fromarray(frame).save(file, "PNG", optimize=True)
+    return _data_uri("image/png", file.getvalue())
+
+
+def _data_uri(kind: str, data: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
 
 
 def key_decisions(series: Mapping[str, np.ndarray]) -> dict[str, int]:
