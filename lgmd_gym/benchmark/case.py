@@ -275,8 +275,7 @@ def case_fields(case: Case) -> dict[str, Any]:
 
 def repetitions(keys: Iterable[Hashable]) -> list[str]:
     """Return "" for the first of equal keys, "/2" for the second, and so on, to make names distinct."""
-    seen = Counter[Hashable]()
-    suffixes = []
+    seen, suffixes = Counter[Hashable](), list[str]()
     for key in keys:
         seen[key] += 1
         suffixes.append(f"/{seen[key]}" if seen[key] > 1 else "")

@@ -102,15 +102,16 @@ def _head_on(suite: str) -> tuple[Case, ...]:
 
     The lane change of CCFhol is 44 and 60 m long, 13.9 and 19.4 m behind the overtaken car.
     """
-    rows: list[Case] = []
-    for family, speed, change in (
+    cells: tuple[tuple[str, int, dict[str, float]], ...] = (
         ("CCFhos", 50, {}),
         ("CCFhos", 70, {}),
         ("CCFhol", 50, {"change_length": 44.0, "following_distance": 13.9}),
         ("CCFhol", 70, {"change_length": 60.0, "following_distance": 19.4}),
-    ):
-        rows += speed_cases(suite, family, [speed], target_speed=to_mps(speed), **change)
-    return tuple(rows)
+    )
+    return tuple(
+        make_case(suite, family, f"v{speed}", ego_speed=to_mps(speed), target_speed=to_mps(speed), **change)
+        for family, speed, change in cells
+    )
 
 
 def without_targets(suite: Suite) -> Suite:
