@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias, cast
 
 import numpy as np
 
+from lgmd_gym.aliases import Info
 from lgmd_gym.errors import check_within
 
 if TYPE_CHECKING:
@@ -20,8 +21,6 @@ TRACE = "lgmd/trace"  # key of the infos
 
 Observations: TypeAlias = Mapping[str, np.ndarray]
 """Observations of `LGMDObservation` by name, arrays of shape (N, …)."""
-Info: TypeAlias = dict[str, Any]
-"""Info of one environment."""
 State: TypeAlias = dict[str, bool | float | np.ndarray]
 """State of an agent in one environment, by name."""
 
@@ -48,7 +47,7 @@ class Infos(Protocol):
         ...
 
 
-class InfoArrays(dict[str, Any]):
+class InfoArrays(Info):
     """`Infos` from arrays by name; arrays of `lgmd/trace` as described there."""
 
     def row(self, index: int) -> Info:
@@ -280,8 +279,8 @@ def _frame(frame: Any, function: Callable[[Any], Any]) -> Any:
     return frame._replace(time=function(frame.time), ego_speed=function(frame.ego_speed), response=response)
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """Return a scalar as a Python number, and a copy of an array."""
     if isinstance(value, np.generic):
         return cast(Any, value).item()
-    return np.array(cast(Any, value)) if isinstance(value, np.ndarray) else value
+    return np.array(cast(np.ndarray, value)) if isinstance(value, np.ndarray) else value

@@ -10,6 +10,7 @@ import numpy as np
 
 from lgmd_gym.agents.base import FPS, Infos, Observations, State
 from lgmd_gym.agents.rules import COUNT, POSITIVE, Reading, Rule, RuleParams, readings
+from lgmd_gym.aliases import Values
 from lgmd_gym.fields import number, record, whole
 from lgmd_gym.processes.extras import missing_extra
 
@@ -27,7 +28,7 @@ class ImageRule(Rule):
     _previous: np.ndarray | None = None  # last frame of each environment, uint8 (N, height, width)
 
     @property
-    def camera(self) -> dict[str, Any]:
+    def camera(self) -> Values:
         """The preset `fovea`, turned along the path."""
         return {"name": "fovea", "gaze": "path"}
 

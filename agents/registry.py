@@ -9,6 +9,7 @@ from lgmd_gym.agents.oracles import EtaOracle, StoppingDistanceOracle, TauOracle
 from lgmd_gym.agents.policies.policy import Policy, shipped_policies
 from lgmd_gym.agents.rules import AdaptiveThreshold, DangerZone, Rule, SpikeThreshold, StoppingZone
 from lgmd_gym.agents.user_agents import check_options, make_user_agent, parse_agent, parse_options
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_keys, check_known, check_text, shown
 
 AGENTS: dict[str, type[BatchAgent]] = {}
@@ -96,7 +97,7 @@ def outside_code(text: str) -> str | None:
     return f"module {name!r}" if _is_user_class(name, rest) else None
 
 
-def _split_policy(text: str) -> tuple[str, dict[str, Any]]:
+def _split_policy(text: str) -> tuple[str, Arguments]:
     """Split "FILE:OPTION=VALUE,…" into the file, which may contain ":" and "=", and the options."""
     file, _, options = text.rpartition(":")
     option, equals, _ = options.partition("=")

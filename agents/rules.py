@@ -20,6 +20,7 @@ from lgmd_gym.agents.zones import (
     zone_camera,
     zone_cameras,
 )
+from lgmd_gym.aliases import Values
 from lgmd_gym.errors import check_keys, check_type, shown
 from lgmd_gym.fields import Record, declarations, number, record, whole
 
@@ -315,7 +316,7 @@ class DangerZone(Rule):
     Params = DangerZoneParams
 
     @property
-    def camera(self) -> list[dict[str, Any]]:
+    def camera(self) -> list[Values]:
         """The ground field."""
         return [zone_camera("ground", 1.0, self.params.deceleration, self.params.reaction)]
 
@@ -414,7 +415,7 @@ class StoppingZone(Rule):
         self._zones = np.array(REACHES) <= p.reach
 
     @property
-    def camera(self) -> list[dict[str, Any]]:
+    def camera(self) -> list[Values]:
         """Ground fields, nearest zone first, then upright fields, then low fields."""
         return zone_cameras(self.params.deceleration, self.params.reaction)
 
@@ -438,7 +439,7 @@ class StoppingZone(Rule):
         return active & standing.any(axis=1)
 
 
-def _read_toml(path: object) -> dict[str, Any]:
+def _read_toml(path: object) -> Values:
     try:
         return tomllib.loads(Path(str(path)).read_text(encoding="utf-8"))
     except OSError as error:

@@ -1,8 +1,9 @@
 """Cameras of the all-round sensor: forward fields with columns, and fields at both sides of the path."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from lgmd_gym.agents.zones import CONTRAST_S, NUM_FIELDS, SPAN_M, zone_cameras
+from lgmd_gym.aliases import Values
 
 # The forward fields are those of `stopping-zone` at twice the width: a pedestrian on collision course is
 # beside the ego's lane until the last second.
@@ -43,7 +44,7 @@ NUM_FORWARD_COLUMNS = NUM_FIELDS * FORWARD_COLUMNS
 NUM_COLUMNS = NUM_FORWARD_COLUMNS + NUM_SIDE_FIELDS * len(NEURONS) * SIDE_COLUMNS
 
 
-def forward_cameras() -> list[dict[str, Any]]:
+def forward_cameras() -> list[Values]:
     """Return the channels of `stopping-zone` at twice the width, with ten columns of 0.48 m at the far end.
 
     Their stopping distance follows the car's estimate of its full braking.
@@ -62,7 +63,7 @@ def forward_cameras() -> list[dict[str, Any]]:
     ]
 
 
-def side_cameras() -> list[dict[str, Any]]:
+def side_cameras() -> list[Values]:
     """Return the channels at the sides: per neuron the near, middle and far pair, left before right."""
     return [
         {
@@ -85,6 +86,6 @@ def side_cameras() -> list[dict[str, Any]]:
     ]
 
 
-def all_round_cameras() -> list[dict[str, Any]]:
+def all_round_cameras() -> list[Values]:
     """Return the forward channels, then those at the sides."""
     return forward_cameras() + side_cameras()

@@ -2,12 +2,13 @@
 
 import inspect
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Never
 
 import numpy as np
 
 from lgmd_gym.agents.base import Agent, BatchAgent, Infos, Observations, rows_of
 from lgmd_gym.agents.rules import Rule
+from lgmd_gym.aliases import Arguments, Values
 from lgmd_gym.errors import check_flag, check_keys, shown, unknown_name
 from lgmd_gym.processes.user_modules import error_reason, import_user_module
 
@@ -20,14 +21,14 @@ TOLERANCE = 1e-6  # of rounding in actions beyond ±1
 OBSERVATION_KEY = "observation key"
 
 
-class _Named(dict[str, Any]):
+class _Named(Values):
     """A dict whose KeyError suggests the closest key."""
 
-    def __init__(self, kind: str, values: dict[str, Any]) -> None:
+    def __init__(self, kind: str, values: Values) -> None:
         super().__init__(values)
         self._kind = kind
 
-    def __missing__(self, key: object) -> Any:
+    def __missing__(self, key: object) -> Never:
         is_frame = self._kind == OBSERVATION_KEY and str(key).startswith("frame")
         hint = "set include_frame = True in the class for camera frames" if is_frame else ""
         raise KeyError(str(unknown_name(self._kind, key, self, hint)))
@@ -153,7 +154,7 @@ def make_user_agent(text: str) -> BatchAgent:
     return agents
 
 
-def parse_agent(text: str) -> tuple[str, dict[str, Any]]:
+def parse_agent(text: str) -> tuple[str, Arguments]:
     """Split "name:option=value,option=value" into the name and the options.
 
     Example:
@@ -164,7 +165,7 @@ def parse_agent(text: str) -> tuple[str, dict[str, Any]]:
     return name.strip(), parse_options(rest, text)
 
 
-def parse_options(options_text: str, text: str) -> dict[str, Any]:
+def parse_options(options_text: str, text: str) -> Arguments:
     """Split "option=value,option=value" into the options.
 
     Args:
@@ -174,7 +175,7 @@ def parse_options(options_text: str, text: str) -> dict[str, Any]:
     Raises:
         ValueError: For an option without a value, or one that occurs twice.
     """
-    options: dict[str, Any] = {}
+    options: Arguments = {}
     for part in filter(None, options_text.split(",")):
         key, equals, value = part.partition("=")
         if not equals:
@@ -187,7 +188,7 @@ def parse_options(options_text: str, text: str) -> dict[str, Any]:
     return options
 
 
-def check_options(name: str, cls: type, options: dict[str, Any]) -> None:
+def check_options(name: str, cls: type, options: Arguments) -> None:
     """Raise ValueError for an option that the constructor of an agent does not accept."""
     check_keys(f"option of agent {name}", options, inspect.signature(cls).parameters)
 
@@ -202,7 +203,9 @@ def _parse_value(text: str) -> int | float | str:
     return text
 
 
-def _check_signature(name: str, method_name: str, method: Any, arguments: dict[str, Any]) -> None:
+def _check_signature(
+    name: str, method_name: str, method: Callable[..., object], arguments: Arguments
+) -> None:
     """Raise ValueError if a method cannot be called with positional arguments."""
     try:
         signature = inspect.signature(method)

@@ -6,9 +6,11 @@ the ground field covers the road surface in front of the far end, the low field 
 0.7 of the height of the camera, and the upright field the horizon.
 """
 
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
+
+from lgmd_gym.aliases import Values
 
 REACHES = (0.28, 0.4, 0.55, 0.75, 1.0, 1.35, 1.8)
 """Reach of each zone, nearest first."""
@@ -39,7 +41,7 @@ def stopping_distance(speed: Speed, deceleration: float, reaction: float) -> Spe
     return speed**2 / (2 * deceleration) + speed * reaction
 
 
-def zone_cameras(deceleration: float = DRY_DECELERATION, reaction: float = REACTION) -> list[dict[str, Any]]:
+def zone_cameras(deceleration: float = DRY_DECELERATION, reaction: float = REACTION) -> list[Values]:
     """Return the cameras of all fields: seven ground fields, seven upright fields, three low fields.
 
     Args:
@@ -54,7 +56,7 @@ def zone_cameras(deceleration: float = DRY_DECELERATION, reaction: float = REACT
     ]
 
 
-def zone_camera(kind: str, reach: float, deceleration: float, reaction: float) -> dict[str, Any]:
+def zone_camera(kind: str, reach: float, deceleration: float, reaction: float) -> Values:
     """Return the camera of one field.
 
     Args:

@@ -6,6 +6,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.camera.scene import CLEAR, ROADS, WEATHERS, Scene, Weather
 from lgmd_gym.camera.worlds import LABORATORY, SPLIT_WORLDS, check_world
 from lgmd_gym.envs.dynamics.brake import BrakeParams, draw_brake
@@ -55,7 +56,7 @@ class Appearance(Record):
     scene: Scene = value(Scene(), lambda _, scene: Scene.make(scene), "The other fields of the scene.")
 
     @classmethod
-    def of(cls, scene: Scene | Mapping[str, Any] | None = None, **arguments: Any) -> Self:
+    def of(cls, scene: Scene | Mapping[str, object] | None = None, **arguments: Any) -> Self:
         """Return the appearance for a scene, whose world, weather and road are defaults of the arguments.
 
         Args:
@@ -64,7 +65,7 @@ class Appearance(Record):
         """
         chosen = Scene.make(scene)
         if isinstance(scene, Scene):
-            given: dict[str, Any] = {"world": chosen.world, "weather": chosen.weather, "road": chosen.road}
+            given: Arguments = {"world": chosen.world, "weather": chosen.weather, "road": chosen.road}
         else:
             fields = scene or {}
             given = {key: fields[key] for key in ("world", "weather", "road") if key in fields}

@@ -1,6 +1,8 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """Base class of the braking and traffic environments."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import asdict, fields, replace
 from numbers import Real
@@ -9,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from highway_env.envs.common.abstract import AbstractEnv
 
+from lgmd_gym.aliases import Arguments, Config, Info, Values
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.errors import (
     check_finite,
@@ -52,22 +55,20 @@ class EgoBrakeEnv(AbstractEnv):
     _given_brake_keys: frozenset[str] = frozenset()  # fields of `BrakeParams` in the configurations so far
 
     # highway-env writes render_fps into this dict, hence the copy for each instance.
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"]}
+    metadata: ClassVar[Values] = {"render_modes": ["human", "rgb_array"]}
 
-    def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
+    def __init__(self, config: Config | None = None, render_mode: str | None = None) -> None:
         if render_mode is not None:
             check_known("render mode", render_mode, type(self).metadata["render_modes"])
         self.metadata = {**type(self).metadata}  # type: ignore[misc]
         super().__init__(config=config, render_mode=render_mode)  # type: ignore[arg-type]
 
     @classmethod
-    def default_config(cls) -> dict[str, Any]:
+    def default_config(cls) -> Config:
         """Return the default configuration."""
         return super().default_config() | {"policy_frequency": 30, **asdict(BrakeParams())}
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Arguments | None = None) -> tuple[Any, Info]:
         """Begin an episode; if ``options["config"]`` is refused, the environment stays as it was.
 
         Args:
@@ -82,7 +83,7 @@ class EgoBrakeEnv(AbstractEnv):
         with self._unchanged_if_refused():
             return super().reset(seed=seed, options=options)
 
-    def configure(self, config: dict[str, Any] | None) -> None:
+    def configure(self, config: Config | None) -> None:
         """Apply a configuration; a refused one leaves the environment unchanged.
 
         Raises:
@@ -114,7 +115,7 @@ class EgoBrakeEnv(AbstractEnv):
         return replace(drawn or BrakeParams(), **{key: self.config[key] for key in keys})
 
     @contextmanager
-    def _unchanged_if_refused(self) -> Iterator[None]:
+    def _unchanged_if_refused(self) -> Generator[None, None, None]:
         """Undo all changes of the environment's attributes if an error is raised."""
         # Configurations change these two dicts in place and replace all other attributes.
         attributes, config, metadata = {**vars(self)}, {**self.config}, {**self.metadata}
@@ -129,7 +130,7 @@ class EgoBrakeEnv(AbstractEnv):
             raise
 
 
-def _checked_like(key: str, value: Any, present: Any) -> Any:
+def _checked_like(key: str, value: object, present: object) -> object:
     """Return a value of the configuration; raise ValueError unless it is of the kind of the present one."""
     if key in _WHOLE:
         check_whole(key, value, *_WHOLE[key])
@@ -144,7 +145,7 @@ def _checked_like(key: str, value: Any, present: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _check_kind(key: str, value: Any, present: bool | str | dict[str, Any]) -> None:
+def _check_kind(key: str, value: object, present: bool | str | Values) -> None:
     if isinstance(present, bool):
         check_flag(key, value)
     elif isinstance(present, str):

@@ -1,10 +1,14 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """`BrakingEnv`: the highway-env environment of all braking scenarios."""
 
 from dataclasses import asdict
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from lgmd_gym.aliases import Config, Info
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.envs.episode_source import EpisodeSource, FixedScenario
@@ -122,7 +126,7 @@ class BrakingEnv(EgoBrakeEnv):
     def __init__(
         self,
         scenario: Scenario | EpisodeSource,
-        config: dict[str, Any] | None = None,
+        config: Config | None = None,
         render_mode: str | None = None,
     ) -> None:
         if not isinstance(scenario, Scenario) and not hasattr(scenario, "draw"):
@@ -130,11 +134,11 @@ class BrakingEnv(EgoBrakeEnv):
         self._source = FixedScenario(scenario) if isinstance(scenario, Scenario) else scenario
         self.scenario = self._source.first
         self.scene = Scene()
-        self._episode_info: dict[str, Any] = {}
+        self._episode_info: Info = {}
         super().__init__(config, render_mode)
 
     @classmethod
-    def default_config(cls) -> dict[str, Any]:
+    def default_config(cls) -> Config:
         """Return the default configuration."""
         return super().default_config() | {
             "observation": {"type": "EgoState"},
@@ -144,7 +148,7 @@ class BrakingEnv(EgoBrakeEnv):
             "reward": asdict(RewardParams()),
         }
 
-    def configure(self, config: dict[str, Any] | None) -> None:
+    def configure(self, config: Config | None) -> None:
         """Apply a configuration; a refused one leaves the environment unchanged.
 
         Raises:
@@ -200,7 +204,7 @@ class BrakingEnv(EgoBrakeEnv):
         """The car under test."""
         return cast(EgoCar, self.vehicle)
 
-    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[np.ndarray, float, bool, bool, Info]:
         """Advance by one decision; see `AbstractEnv.step`."""
         if not self.controlled_vehicles:
             raise RuntimeError("the environment has no episode: call reset() before step()")
@@ -212,7 +216,7 @@ class BrakingEnv(EgoBrakeEnv):
         ended = bool(outcome.terminated[0]), bool(outcome.truncated[0])
         return self.observation_type.observe(), float(outcome.rewards[0]), *ended, self._info(None)
 
-    def _simulate(self, action: Any = None) -> None:
+    def _simulate(self, action: ArrayLike | None = None) -> None:
         """Advance by the simulation steps of one decision."""
         simulation = self.simulation
         if action is not None and not self.config["manual_control"]:
@@ -244,6 +248,6 @@ class BrakingEnv(EgoBrakeEnv):
     def _shown(self, index: int) -> "BrakingEnv":
         return self
 
-    def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
+    def _info(self, obs: object, action: object = None) -> Info:
         values = self.simulation.outcome.infos[0].tolist()
         return dict(zip(INFO_KEYS, values, strict=True)) | self._episode_info

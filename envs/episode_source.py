@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from highway_env.road.road import RoadNetwork
 
+from lgmd_gym.aliases import Info
 from lgmd_gym.camera.scene import WEATHERS, Scene
 from lgmd_gym.camera.worlds import LABORATORY, draw_world
 from lgmd_gym.envs.appearance import Appearance, brake_of
@@ -38,7 +39,7 @@ class Draw(NamedTuple):
 
     placement: Placement
     scene: Scene
-    info: dict[str, Any]
+    info: Info
     brake: BrakeParams | None = None
 
     def make_network(self) -> RoadNetwork:

@@ -21,7 +21,9 @@ INFO = np.dtype(
 
 
 @kernel(exact=True)
-def write_info(bodies: np.ndarray, episode: Any, ego: Any, paths: np.ndarray, info: Any) -> None:
+def write_info(
+    bodies: np.ndarray, episode: np.record, ego: np.record, paths: np.ndarray, info: np.record
+) -> None:
     """Write the present state of an episode to an `INFO` record.
 
     Args:

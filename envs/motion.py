@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """Motion of a scenario whose ego does not brake, for figures and checks."""
 
 from dataclasses import dataclass
@@ -53,7 +55,7 @@ def record_motion(scenario: Scenario) -> Motion:
     env = BrakingEnv(source)
     _, info = env.reset(seed=0)
     origin = np.array(env.road.ego.position, np.float64)
-    rows, done = [], False
+    rows, done = list[list[tuple[float, ...]]](), False
     while True:
         rows.append([(*(item.position - origin), item.heading, item.speed) for item in env.road.items])
         if done:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
 
+from lgmd_gym.aliases import Arguments, Config, Values
 from lgmd_gym.envs.families import FAMILIES, make_scenario
 from lgmd_gym.envs.families.data import scenario_from_data
 from lgmd_gym.envs.families.family import Family
@@ -54,7 +55,7 @@ class RandomTask(NamedTuple):
     """
 
     summary: str
-    arguments: dict[str, Any]
+    arguments: Arguments
 
 
 # The non-threats have cars ahead, beside or none: no pedestrian, no mark on the road, no object at the path.
@@ -94,12 +95,12 @@ def register_envs() -> None:
 
     A second call has no effect.
     """
-    arguments: dict[str, dict[str, Any]] = {name: {"family": name} for name in (*FAMILIES, SCENARIO)}
+    arguments: dict[str, Values] = {name: {"family": name} for name in (*FAMILIES, SCENARIO)}
     for name, task in RANDOM_TASKS.items():
         arguments[name] = {"family": RANDOM, "split": "train", **task.arguments}
     for name, defaults in arguments.items():
         if env_id(name) not in gym.registry:
-            gym.register(
+            gym.register(  # pyright: ignore[reportUnknownMemberType]
                 env_id(name),
                 entry_point=f"{__name__}:make_braking",
                 vector_entry_point="lgmd_gym.engine:BrakingVectorEnv",
@@ -135,7 +136,7 @@ def make_braking(
     include_frame: bool = False,
     include_base: bool = False,
     trace: bool = False,
-    config: dict[str, Any] | None = None,
+    config: Config | None = None,
     render_mode: str | None = None,
     **arguments: Any,
 ) -> gym.Env:
@@ -170,7 +171,7 @@ def make_braking(
     return with_camera(env, camera, neuron, params, fps, include_frame, include_base, trace)
 
 
-def make_source(family: str, arguments: dict[str, Any], others: Iterable[str] = ()) -> "EpisodeSource":
+def make_source(family: str, arguments: Arguments, others: Iterable[str] = ()) -> "EpisodeSource":
     """Return the source of the episodes of a family.
 
     Args:
@@ -192,7 +193,7 @@ def make_source(family: str, arguments: dict[str, Any], others: Iterable[str] = 
     return FixedScenario(_scenario(family, others), Appearance.of(**chosen))
 
 
-def _scenario(family: str, arguments: dict[str, Any]) -> "Scenario":
+def _scenario(family: str, arguments: Arguments) -> "Scenario":
     if family != SCENARIO:
         return make_scenario(family, **arguments)
     if SCENARIO_ARGUMENT not in arguments:
@@ -279,7 +280,7 @@ def register_traffic() -> None:
     for kind in TRAFFIC_KINDS:
         if traffic_id(kind) not in gym.registry:
             arguments = {"kind": kind, "split": "train"}
-            gym.register(traffic_id(kind), entry_point=f"{__name__}:make_traffic", kwargs=arguments)
+            gym.register(traffic_id(kind), entry_point=f"{__name__}:make_traffic", kwargs=arguments)  # pyright: ignore[reportUnknownMemberType]
 
 
 def find_kind(kind: str) -> Any:
@@ -301,12 +302,12 @@ def make_traffic(
     include_frame: bool = False,
     include_base: bool = False,
     trace: bool = False,
-    config: dict[str, Any] | None = None,
+    config: Config | None = None,
     render_mode: str | None = None,
     world: int | str | None = None,
-    weather: "str | dict[str, Any] | None" = None,
+    weather: "str | Values | None" = None,
     road: str | None = None,
-    scene: "Scene | dict[str, Any] | None" = None,
+    scene: "Scene | Values | None" = None,
     split: str = "train",
 ) -> gym.Env:
     """Return a traffic environment inside `LGMDObservation`, or without it for `camera=None`.

@@ -1,7 +1,5 @@
 """Reward of the braking environments: progress, minus contact, needless braking and jerk."""
 
-from typing import Any
-
 import numpy as np
 
 from lgmd_gym.envs.dynamics.bodies import ego_braking
@@ -44,7 +42,15 @@ class RewardParams(Record):
 
 
 @kernel(exact=True)
-def step_reward(body: Any, ego: Any, episode: Any, brake: Any, weights: Any, ttc: float, dt: float) -> float:
+def step_reward(
+    body: np.record,
+    ego: np.record,
+    episode: np.record,
+    brake: np.record,
+    weights: np.record,
+    ttc: float,
+    dt: float,
+) -> float:
     """Return the reward of the last decision.
 
     Args:

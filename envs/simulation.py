@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -20,10 +20,15 @@ from lgmd_gym.envs.decisions import (
     start_episodes,
 )
 from lgmd_gym.envs.dynamics.brake import BRAKE, BrakeParams
+from lgmd_gym.envs.dynamics.episode import Arrays
 from lgmd_gym.envs.physics_state import PhysicsState, Placement
 from lgmd_gym.envs.reward import REWARD
 from lgmd_gym.envs.scene import SceneArrays
 from lgmd_gym.kernels.threads import Threads
+
+if TYPE_CHECKING:
+    import gymnasium as gym
+    from highway_env.road.road import RoadNetwork
 
 
 class Sensors(Protocol):
@@ -42,11 +47,11 @@ class Sensors(Protocol):
         """Set the scene and the full braking [m/s²] of the episode of an environment."""
         ...
 
-    def set_road(self, index: int, road: Any) -> None:
+    def set_road(self, index: int, road: "RoadNetwork") -> None:
         """Set the road of an environment."""
         ...
 
-    def read_top_views(self, env: Any, index: int) -> None:
+    def read_top_views(self, env: "gym.Env", index: int) -> None:
         """Render the cameras of an environment that highway-env draws."""
         ...
 
@@ -117,7 +122,7 @@ class Simulation:
     sensors: Sensors | None = None
     stride = 2**31  # no step of an episode is the last one before a frame
     on_frames: Callable[[int, int, np.ndarray], None] | None = None
-    show: Callable[[int], Any] | None = None
+    show: "Callable[[int], gym.Env] | None" = None
 
     def __init__(
         self, num_envs: int, rates: Rates, weights: np.ndarray, throttle: bool, threads: int = 1
@@ -162,7 +167,7 @@ class Simulation:
             self._link()
         self.brakes[index] = brake.record(self._throttle)
 
-    def equip(self, index: int, scene: Scene, network: Any) -> None:
+    def equip(self, index: int, scene: Scene, network: "RoadNetwork") -> None:
         """Prepare the cameras, if any, for the episode of environment `index`.
 
         Args:
@@ -245,7 +250,7 @@ class Simulation:
             self._link()
         self.brakes[index] = snapshot.brake
 
-    def _run(self, part: Callable[..., None], *arguments: Any) -> None:
+    def _run(self, part: Callable[..., None], *arguments: object) -> None:
         if self._threads.count == 1:
             part(0, self.num_envs, *arguments)
         else:
@@ -278,9 +283,9 @@ class Simulation:
 
     def _link(self) -> None:
         """Collect the arrays; plain tuples are cheaper to pass to compiled functions."""
-        self.physics: Any = tuple(make_physics(self.state, self.brakes, self.weights))
-        self._clock: Any = tuple(self.clock)
-        self._results: Any = tuple(self.outcome)
+        self.physics: Arrays = tuple(make_physics(self.state, self.brakes, self.weights))
+        self._clock: Arrays = tuple(self.clock)
+        self._results: Arrays = tuple(self.outcome)
 
     def _link_scenes(self) -> None:
         sensors, num_envs = self.sensors, self.num_envs
@@ -293,4 +298,4 @@ class Simulation:
             if sensors is None
             else SceneArrays(sensors.scenes, sensors.objects, sensors.object_counts)
         )
-        self._scenes: Any = tuple(scenes)
+        self._scenes: Arrays = tuple(scenes)

@@ -1,14 +1,18 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """Action and observation types of `BrakingEnv`, which those of `TrafficEnv` extend."""
 
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.action import ActionType
 from highway_env.envs.common.observation import ObservationType
+from numpy.typing import ArrayLike
 
+from lgmd_gym.aliases import Config
 from lgmd_gym.envs.dynamics.units import MAX_SPEED
 from lgmd_gym.envs.highway.road import EgoCar
 from lgmd_gym.errors import check_items, check_keys, check_known, check_within
@@ -28,7 +32,7 @@ class Demands:
     def __init__(self, table: Sequence[float] | None = None) -> None:
         self._table = None if table is None else np.array(table, np.float64)
 
-    def read(self, actions: Any, num_envs: int) -> np.ndarray:
+    def read(self, actions: ArrayLike, num_envs: int) -> np.ndarray:
         """Return the demands in [-1, 1], float64, shape (num_envs,).
 
         Args:
@@ -48,7 +52,7 @@ class Demands:
         return self._table[values.astype(np.int64)]
 
 
-def _numbers(actions: Any, num_envs: int) -> np.ndarray:
+def _numbers(actions: ArrayLike, num_envs: int) -> np.ndarray:
     """Return the actions as float64, shape (num_envs,)."""
     try:
         values = np.asarray(actions, dtype=np.float64)
@@ -84,7 +88,7 @@ class ContinuousDemand(ActionType):
         """Class of the controlled car."""
         return EgoCar
 
-    def act(self, action: Any) -> None:
+    def act(self, action: ArrayLike) -> None:
         """Set the demand of the ego, clipped to [-1, 1].
 
         Args:
@@ -135,7 +139,7 @@ ACTIONS = {"ContinuousDemand": ContinuousDemand, "DiscreteDemand": DiscreteDeman
 
 
 def make_action(
-    env: "EgoBrakeEnv", config: dict[str, Any], types: Mapping[str, type[ContinuousDemand]] = ACTIONS
+    env: "EgoBrakeEnv", config: Config, types: Mapping[str, type[ContinuousDemand]] = ACTIONS
 ) -> ContinuousDemand:
     """Return the action type for `config["action"]`.
 

@@ -4,7 +4,6 @@ Undefined values are `inf`. The functions are compiled and read `BODY` records, 
 """
 
 from math import atan, cos, hypot, inf, sin, tan
-from typing import Any
 
 import numpy as np
 
@@ -103,12 +102,12 @@ def rate_to_avoid_crash(gap: float, closing_speed: float) -> float:
 
 
 @kernel(exact=True)
-def _is_straight(body: Any) -> bool:
+def _is_straight(body: np.record) -> bool:
     return body.path_end - body.path == 1
 
 
 @kernel(exact=True)
-def _motion(body: Any, paths: np.ndarray) -> PathMotion:
+def _motion(body: np.record, paths: np.ndarray) -> PathMotion:
     cells = paths[body.path : body.path_end]
     return PathMotion(cells, body.travelled, body.speed, body.length, body.width, body.reference)
 
@@ -136,7 +135,7 @@ def required_deceleration(bodies: np.ndarray) -> float:
 
 
 @kernel(exact=True)
-def predicted_contact(one: Any, other: Any) -> float:
+def predicted_contact(one: np.record, other: np.record) -> float:
     """Return the time to the first contact of two bodies at constant speeds and steering angles [s].
 
     The result is `inf` without a contact within `PREDICTION`.
@@ -161,7 +160,7 @@ def predicted_contact(one: Any, other: Any) -> float:
 
 
 @kernel(exact=True)
-def outline_after(body: Any, time: float) -> Rectangle:
+def outline_after(body: np.record, time: float) -> Rectangle:
     """Return the outline of a body after a time at its present speed and steering angle [s]."""
     slip = atan(tan(body.steering) / 2.0)
     course, distance = body.heading + slip, body.speed * time

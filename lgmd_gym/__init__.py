@@ -5,7 +5,7 @@ Importing this package registers the `LGMD/…` ids. Heavy modules are imported 
 
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 # Git writes the links to envs and agents as text files where `core.symlinks` is false, as on Windows.
 if not all(Path(__file__).with_name(link).is_dir() for link in ("envs", "agents")):
@@ -56,7 +56,7 @@ register_envs()
 register_traffic()
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

@@ -5,10 +5,13 @@ from difflib import SequenceMatcher, get_close_matches
 from math import inf, isinf, isnan
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeGuard, TypeVar, cast, overload
 
 import numpy as np
 
+from lgmd_gym.aliases import Values
+
+_T = TypeVar("_T")
 MAX_LISTED = 20  # names that a message lists in full
 MAX_CLOSEST = 3  # names that it suggests from a longer list
 SIMILARITY_MARGIN = 0.1  # of names that are suggested beside the closest one
@@ -34,7 +37,7 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-def check_number(name: str, value: Any) -> float:
+def check_number(name: str, value: object) -> float:
     """Return `value` as float, which may be infinite.
 
     Raises:
@@ -52,7 +55,7 @@ def check_number(name: str, value: Any) -> float:
     return value
 
 
-def check_finite(name: str, value: Any) -> float:
+def check_finite(name: str, value: object) -> float:
     """Return `value` as float, or raise ValueError if it is not a finite number."""
     number = check_number(name, value)
     if isinf(number):
@@ -60,7 +63,7 @@ def check_finite(name: str, value: Any) -> float:
     return number
 
 
-def check_within(name: str, value: Any, low: float, high: float, unit: str = "") -> float:
+def check_within(name: str, value: object, low: float, high: float, unit: str = "") -> float:
     """Return `value` as float if it is in [low, high], or raise ValueError."""
     number = check_finite(name, value)
     if not low <= number <= high:
@@ -69,14 +72,15 @@ def check_within(name: str, value: Any, low: float, high: float, unit: str = "")
     return number
 
 
-def check_positive(name: str, value: Any) -> float:
+def check_positive(name: str, value: object) -> float:
     """Return `value` as float if it is a finite number > 0, or raise ValueError."""
-    if not is_number(value) or not check_finite(name, value) > 0.0:
+    number = check_finite(name, value) if is_number(value) else 0.0
+    if not number > 0.0:
         raise ValueError(f"{name} must be a number > 0, got {shown(value)}")
-    return float(value)
+    return number
 
 
-def check_whole(name: str, value: Any, low: int, high: float = inf) -> int:
+def check_whole(name: str, value: object, low: int, high: float = inf) -> int:
     """Return `value` as int if it is a whole number in [low, high], or raise ValueError."""
     if not is_number(value) or check_finite(name, value) != int(value) or not low <= value <= high:
         interval = f">= {low}" if high == inf else f"in [{low}, {high}]"
@@ -84,27 +88,31 @@ def check_whole(name: str, value: Any, low: int, high: float = inf) -> int:
     return int(value)
 
 
-def check_flag(name: str, value: Any) -> bool:
+def check_flag(name: str, value: object) -> bool:
     """Return `value` as bool if it is one, or raise ValueError."""
     if not isinstance(value, bool | np.bool_):
         raise ValueError(f"{name} must be true or false, got {shown(value)}")
-    return bool(cast(Any, value))
+    return bool(cast(object, value))
 
 
-def check_flags(**flags: Any) -> None:
+def check_flags(**flags: object) -> None:
     """Raise ValueError for the first argument that is not a bool."""
     for name, value in flags.items():
         check_flag(name, value)
 
 
-def check_text(name: str, value: Any) -> str:
+def check_text(name: str, value: object) -> str:
     """Return `value` if it is a string, or raise ValueError."""
     if not isinstance(value, str):
         raise ValueError(f"{name} must be a string, got {shown(value)}")
     return value
 
 
-def check_type(name: str, value: Any, *types: type) -> Any:
+@overload
+def check_type(name: str, value: object, types: type[dict[Any, Any]], /) -> Values: ...
+@overload
+def check_type(name: str, value: object, *types: type[_T]) -> _T: ...
+def check_type(name: str, value: object, *types: type) -> Any:
     """Return `value` if it is an instance of one of the types, or raise ValueError.
 
     Not a TypeError, which `gym.make` repeats in several lines with all arguments.
@@ -115,12 +123,12 @@ def check_type(name: str, value: Any, *types: type) -> Any:
     return value
 
 
-def check_mapping(name: str, value: Any) -> dict[str, Any]:
+def check_mapping(name: str, value: object) -> Values:
     """Return a copy of a dict, {} for None, or raise ValueError."""
     return {} if value is None else dict(check_type(name, value, dict))
 
 
-def check_path(name: str, value: Any) -> Path:
+def check_path(name: str, value: object) -> Path:
     """Return a path, or raise ValueError if the value is no path, or one that no file can have."""
     path = Path(check_type(name, value, str, Path))
     try:
@@ -131,7 +139,7 @@ def check_path(name: str, value: Any) -> Path:
     return path
 
 
-def check_items(name: str, values: Any, types: type, kind: str = "") -> tuple[Any, ...]:
+def check_items(name: str, values: object, types: type, kind: str = "") -> tuple[Any, ...]:
     """Return a sequence as a tuple if it is a list or tuple of instances of a type, or raise ValueError."""
     items = as_tuple(values)
     if items is None or not all(isinstance(item, types) for item in items):
@@ -139,7 +147,9 @@ def check_items(name: str, values: Any, types: type, kind: str = "") -> tuple[An
     return items
 
 
-def check_size(name: str, value: Any, low: int, high: int, axes: str = "(height, width)") -> tuple[int, int]:
+def check_size(
+    name: str, value: object, low: int, high: int, axes: str = "(height, width)"
+) -> tuple[int, int]:
     """Return two integers in [low, high], or raise ValueError; also of an array of them."""
     message = f"{name} must be {axes}, each {low} to {high} px, got {shown(value)}"
     items = as_tuple(value.tolist() if isinstance(value, np.ndarray) else value)
@@ -151,22 +161,22 @@ def check_size(name: str, value: Any, low: int, high: int, axes: str = "(height,
     return int(first), int(second)
 
 
-def as_tuple(value: Any) -> tuple[Any, ...] | None:
+def as_tuple(value: object) -> tuple[Any, ...] | None:
     """Return a list or tuple as a tuple, None for other values."""
     return tuple(cast(Iterable[Any], value)) if isinstance(value, list | tuple) else None
 
 
-def is_number(value: object) -> bool:
+def is_number(value: object) -> TypeGuard[float]:
     """Return whether a value is a real number; bools are not."""
     return not isinstance(value, bool) and isinstance(value, Real)
 
 
-def is_integer(value: object) -> bool:
+def is_integer(value: object) -> TypeGuard[int]:
     """Return whether a value is an integer; bools are not."""
     return not isinstance(value, bool) and isinstance(value, Integral)
 
 
-def check_known(kind: str, name: Any, known: Collection[str], hint: str = "") -> str:
+def check_known(kind: str, name: object, known: Collection[str], hint: str = "") -> str:
     """Return `name` if it is one of the known strings, or raise `unknown_name`."""
     if not isinstance(name, str) or name not in known:
         raise unknown_name(kind, name, known, hint)

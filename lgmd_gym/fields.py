@@ -21,8 +21,9 @@ import inspect
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
-from typing import Any, ClassVar, Self, TypeVar, cast, dataclass_transform
+from typing import Any, ClassVar, Self, TypeAlias, TypeVar, cast, dataclass_transform
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.errors import (
     as_tuple,
     check_flag,
@@ -36,6 +37,10 @@ from lgmd_gym.errors import (
 _NO_VALUE = object()  # no field has this value
 _KEY = "lgmd_gym"  # of the declaration in the metadata of a dataclass field
 _R = TypeVar("_R", bound=type)
+Check: TypeAlias = Callable[[str, Any], Any]
+"""Function of a name and a value that returns the checked value or raises ValueError."""
+Field: TypeAlias = Any
+"""A declared field, which stands for a value of the type that the class annotates."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -86,8 +91,8 @@ class Declaration:
     """
 
     name: str
-    default: Any
-    check: Callable[[str, Any], Any]
+    default: object
+    check: Check
     bounds: str
     unit: str
     doc: str
@@ -97,14 +102,14 @@ class Declaration:
 
 
 def number(
-    default: Any,
+    default: object,
     within: str,
     unit: str = "",
     doc: str = "",
     *,
     search: tuple[float, float] | None = None,
     group: str = "",
-) -> Any:
+) -> Field:
     """Declare a float.
 
     Args:
@@ -117,25 +122,25 @@ def number(
     """
     interval = Interval.parse(within)
 
-    def check(name: str, value: Any) -> float:
+    def check(name: str, value: object) -> float:
         return _check_interval(name, check_number(name, value), interval, unit, value)
 
     return _field(Declaration("", default, check, str(interval), unit, doc, interval, search, group))
 
 
 def whole(
-    default: Any,
+    default: object,
     within: str,
     unit: str = "",
     doc: str = "",
     *,
     search: tuple[float, float] | None = None,
     group: str = "",
-) -> Any:
+) -> Field:
     """Declare an int; arguments as of `number`."""
     interval = Interval.parse(within)
 
-    def check(name: str, value: Any) -> int:
+    def check(name: str, value: object) -> int:
         given = check_number(name, value)
         if math.isinf(given) or given != int(given):
             raise ValueError(f"{name} must be a whole number in {interval}, got {shown(value)}")
@@ -144,11 +149,11 @@ def whole(
     return _field(Declaration("", default, check, str(interval), unit, doc, interval, search, group))
 
 
-def numbers(default: tuple[float, ...], within: str, unit: str = "", doc: str = "") -> Any:
+def numbers(default: tuple[float, ...], within: str, unit: str = "", doc: str = "") -> Field:
     """Declare a tuple of as many floats as the default has; further arguments as of `number`."""
     interval = Interval.parse(within)
 
-    def check(name: str, value: Any) -> tuple[float, ...]:
+    def check(name: str, value: object) -> tuple[float, ...]:
         items = as_tuple(value)
         if items is None or len(items) != len(default):
             raise ValueError(f"{name} must be {len(default)} numbers, got {shown(value)}")
@@ -157,28 +162,26 @@ def numbers(default: tuple[float, ...], within: str, unit: str = "", doc: str = 
     return _field(Declaration("", default, check, str(interval), unit, doc, interval))
 
 
-def flag(default: Any, doc: str = "") -> Any:
+def flag(default: object, doc: str = "") -> Field:
     """Declare a bool."""
     return _field(Declaration("", default, check_flag, "", "", doc))
 
 
-def choice(default: Any, names: Collection[str], doc: str = "") -> Any:
+def choice(default: object, names: Collection[str], doc: str = "") -> Field:
     """Declare one of some names."""
 
-    def check(name: str, value: Any) -> str:
+    def check(name: str, value: object) -> str:
         return check_known(name, value, names)
 
     return _field(Declaration("", default, check, ", ".join(map(repr, names)), "", doc))
 
 
-def text(default: Any, doc: str = "") -> Any:
+def text(default: object, doc: str = "") -> Field:
     """Declare a string."""
     return _field(Declaration("", default, check_text, "", "", doc))
 
 
-def value(
-    default: Any, check: Callable[[str, Any], Any], doc: str = "", bounds: str = "", unit: str = ""
-) -> Any:
+def value(default: object, check: Check, doc: str = "", bounds: str = "", unit: str = "") -> Field:
     """Declare a value with a check of its own, for example a nested record.
 
     Args:
@@ -191,12 +194,12 @@ def value(
     return _field(Declaration("", default, check, bounds, unit, doc))
 
 
-def optional(declared: Any) -> Any:
+def optional(declared: Field) -> Field:
     """Allow None in a declared field, and make it the default."""
     declaration: Declaration = declared.metadata[_KEY]
     inner = declaration.check
 
-    def check(name: str, value: Any) -> Any:
+    def check(name: str, value: object) -> object:
         return None if value is None else inner(name, value)
 
     bounds = f"{declaration.bounds}, or None" if declaration.bounds else ""
@@ -206,7 +209,7 @@ def optional(declared: Any) -> Any:
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def record(cls: _R) -> _R:
     """Make a class a frozen dataclass, and add its declared fields to its docstring."""
-    made: Any = dataclasses.dataclass(frozen=True, slots=True, kw_only=True)(cls)
+    made = cast(_R, dataclasses.dataclass(frozen=True, slots=True, kw_only=True)(cast(type, cls)))
     lines = [f"    {item.name}: {_documentation(item)}" for item in declarations(made)]
     if lines and "Attributes:" not in (made.__doc__ or ""):
         made.__doc__ = "\n".join([inspect.cleandoc(made.__doc__ or ""), "", "Attributes:", *lines, ""])
@@ -240,7 +243,7 @@ class Record:
         return {}
 
     @classmethod
-    def make(cls, value: Self | Mapping[str, Any] | str | None = None, **changes: Any) -> Self:
+    def make(cls, value: Self | Mapping[str, object] | str | None = None, **changes: object) -> Self:
         """Return a record from an instance, a mapping of its fields, or a preset's name.
 
         Args:
@@ -270,12 +273,12 @@ class Record:
         given = {} if value is None else dict(value)
         return cls(**cls._known(given | changes))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Values:
         """Return the fields as plain values; nested records become dicts and tuples become lists."""
         return {item.name: _plain(getattr(self, item.name)) for item in dataclasses.fields(cast(Any, self))}
 
     @classmethod
-    def _known(cls, values: Mapping[str, Any]) -> dict[str, Any]:
+    def _known(cls, values: Mapping[str, object]) -> Values:
         known = [item.name for item in dataclasses.fields(cast(Any, cls))]
         check_keys(f"{cls.label or cls.__name__} field", values, known)
         return dict(values)
@@ -292,12 +295,12 @@ def declarations(cls: type) -> tuple[Declaration, ...]:
 
 
 @cache
-def _checks(cls: type[Record]) -> tuple[tuple[str, str, Callable[[str, Any], Any], Any], ...]:
+def _checks(cls: type[Record]) -> tuple[tuple[str, str, Check, object], ...]:
     """Return name, name in messages, check, and the default that needs no check of each declared field.
 
     The last is `_NO_VALUE` if there is no default, or if the check converts or refuses it.
     """
-    found: list[tuple[str, str, Callable[[str, Any], Any], Any]] = []
+    found: list[tuple[str, str, Check, object]] = []
     for item in declarations(cls):
         label, default = f"{cls.label} {item.name}".lstrip(), item.default
         try:
@@ -308,7 +311,7 @@ def _checks(cls: type[Record]) -> tuple[tuple[str, str, Callable[[str, Any], Any
     return tuple(found)
 
 
-def declaration_of(annotation: Any) -> Declaration | None:
+def declaration_of(annotation: object) -> Declaration | None:
     """Return the declaration in an annotation such as `Annotated[float, number(...)]`; None without one."""
     for item in getattr(annotation, "__metadata__", ()):
         if isinstance(item, dataclasses.Field) and _KEY in item.metadata:
@@ -316,14 +319,14 @@ def declaration_of(annotation: Any) -> Declaration | None:
     return None
 
 
-def _field(declaration: Declaration) -> Any:
+def _field(declaration: Declaration) -> Field:
     metadata = {_KEY: declaration}
     if declaration.default is dataclasses.MISSING:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=declaration.default, metadata=metadata)
 
 
-def _check_interval(name: str, number: float, interval: Interval, unit: str, given: Any) -> float:
+def _check_interval(name: str, number: float, interval: Interval, unit: str, given: object) -> float:
     if math.isinf(number) and not (math.isinf(interval.high) and interval.has_high and number > 0):
         raise ValueError(f"{name} must be finite, got {shown(given)}")
     if number not in interval:
@@ -341,9 +344,9 @@ def _documentation(item: Declaration) -> str:
     return f"{text}; default {shown_default}." if item.default is not dataclasses.MISSING else f"{text}."
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     if isinstance(value, Record):
         return value.to_dict()
     if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(item) for item in cast(Sequence[Any], value)]
+        return [_plain(item) for item in cast(Sequence[object], value)]
     return value

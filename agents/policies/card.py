@@ -9,11 +9,12 @@ import zipfile
 import zlib
 from dataclasses import MISSING, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 from lgmd_gym.agents.base import FPS
 from lgmd_gym.agents.policies.features import NORMALIZER_SUFFIX, FeatureConfig, save_normalizer
 from lgmd_gym.agents.policies.network import WEIGHTS, NetworkSpec, describe_network
+from lgmd_gym.aliases import Arguments, Config, Values
 from lgmd_gym.errors import (
     check_items,
     check_mapping,
@@ -28,25 +29,30 @@ from lgmd_gym.processes.files import complete_file
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
+    from stable_baselines3.common.vec_env import VecNormalize
 
+    from lgmd_gym.neuron import NeuronSpec
     from lgmd_gym.sensing.channel import ChannelSpec
 
+_T = TypeVar("_T")
+TrainingEnv: TypeAlias = Any
+"""An environment of Gymnasium, or a `VecEnv` of stable-baselines3."""
 NORMALIZER = f"-vecnormalize{NORMALIZER_SUFFIX}"  # end of the name of the file with the statistics
 CARD = "lgmd_gym.json"  # member of the zip file of a policy of `lgmd-gym train`
 _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError)
 
 
-def _check_cameras(name: str, camera: Any) -> Any:
+def _check_cameras(name: str, camera: _T) -> _T:
     from lgmd_gym.sensing.channel import make_channels  # imports numba, which takes half a second
 
-    make_channels(camera)
+    make_channels(cast("ChannelSpec", camera))
     return camera
 
 
-def _check_neuron(name: str, neuron: Any) -> Any:
+def _check_neuron(name: str, neuron: _T) -> _T:
     from lgmd_gym.neuron import LGMDParams
 
-    LGMDParams.make(neuron)
+    LGMDParams.make(cast("NeuronSpec", neuron))
     return neuron
 
 
@@ -58,11 +64,11 @@ def _check_demands(name: str, demands: object) -> tuple[float, ...] | None:
 
 
 def _check_features(name: str, features: object) -> FeatureConfig:
-    return FeatureConfig.make(check_type(name, features, dict, FeatureConfig))
+    return FeatureConfig.make(cast("FeatureConfig | Values", check_type(name, features, dict, FeatureConfig)))
 
 
 def _check_network(name: str, network: object) -> NetworkSpec:
-    return NetworkSpec.make(check_type(name, network, dict, NetworkSpec))
+    return NetworkSpec.make(cast("NetworkSpec | Values", check_type(name, network, dict, NetworkSpec)))
 
 
 @record
@@ -75,7 +81,7 @@ class PolicyCard(Record):
     camera: "ChannelSpec" = value(
         MISSING, _check_cameras, "Cameras of the training, as in the argument `camera` of the environments"
     )
-    neuron: dict[str, Any] | None = optional(
+    neuron: Values | None = optional(
         value(None, _check_neuron, "Neuron parameters that differ from the defaults; None for the defaults")
     )
     features: FeatureConfig | None = optional(
@@ -114,7 +120,7 @@ def card_file(path: Path) -> Path:
     return path.with_suffix(".json")
 
 
-def read_card(path: Path) -> dict[str, Any]:
+def read_card(path: Path) -> Values:
     """Return the card of a policy file as plain values: the one inside, else the one beside it.
 
     A card of `lgmd-gym train` also has the configuration of the training.
@@ -162,13 +168,13 @@ def policy_card(path: Path) -> PolicyCard:
         raise ValueError(f"policy {shown(str(path))}: the card is damaged ({error})") from None
 
 
-def write_card(path: Path, card: dict[str, Any]) -> None:
+def write_card(path: Path, card: Values) -> None:
     """Add a card to the zip file of a stable-baselines3 model."""
     with zipfile.ZipFile(path, "a") as file:
         file.writestr(CARD, json.dumps(card, indent=1))
 
 
-def save_policy(model: "BaseAlgorithm", file: str | Path, env: Any = None) -> Path:
+def save_policy(model: "BaseAlgorithm", file: str | Path, env: TrainingEnv | None = None) -> Path:
     """Save a model of stable-baselines3 as an agent: FILE.zip, its card FILE.json, and the normalisation.
 
     The agent string is "policy:FILE.zip".
@@ -195,7 +201,7 @@ def save_policy(model: "BaseAlgorithm", file: str | Path, env: Any = None) -> Pa
     return path
 
 
-def save_card(file: str | Path, env: Any, algo: str, vec_normalize: str | None = None) -> PolicyCard:
+def save_card(file: str | Path, env: TrainingEnv, algo: str, vec_normalize: str | None = None) -> PolicyCard:
     """Write the card FILE.json for a model FILE.zip, for example of `EvalCallback` or rl-zoo.
 
     Args:
@@ -223,7 +229,7 @@ def _write(path: Path, card: PolicyCard) -> None:
         part.write_text(json.dumps(card.to_dict(), indent=1) + "\n", "utf-8")
 
 
-def _normalizer(env: Any) -> Any:
+def _normalizer(env: TrainingEnv) -> "VecNormalize | None":
     """Return the `VecNormalize` around an environment, or None."""
     try:
         from stable_baselines3.common.vec_env import VecEnv, VecFrameStack, VecNormalize
@@ -237,15 +243,16 @@ def _normalizer(env: Any) -> Any:
     return unwrap(env, VecNormalize)
 
 
-def _values(env: Any) -> dict[str, Any]:
+def _values(env: TrainingEnv) -> Values:
     """Return the fields of the card that follow from the specification of an environment."""
     from lgmd_gym.sensing.channel import LGMD, make_channels, plain_values
 
     spec: Any = env.get_attr("spec")[0] if hasattr(env, "get_attr") else getattr(env, "spec", None)
     if spec is None:
         raise ValueError(f"the environment {shown(env)} has no spec; make it with gym.make")
-    wrappers = {item.name: item.kwargs or {} for item in spec.additional_wrappers}
-    sensors = wrappers.get("LGMDObservation", spec.kwargs)
+    wrappers: dict[str, Arguments] = {item.name: item.kwargs or {} for item in spec.additional_wrappers}
+    kwargs: Arguments = spec.kwargs
+    sensors = wrappers.get("LGMDObservation", kwargs)
     config = check_mapping("config", spec.kwargs.get("config"))
     demands = _demands(env, config)
     _check_rates(env, spec.kwargs, config)
@@ -259,7 +266,7 @@ def _values(env: Any) -> dict[str, Any]:
     }
 
 
-def _check_rates(env: Any, arguments: dict[str, Any], config: dict[str, Any]) -> None:
+def _check_rates(env: TrainingEnv, arguments: Arguments, config: Config) -> None:
     """Raise ValueError if the decisions or the frames of an environment have another rate than for agents."""
     rate = config.get("policy_frequency", _attribute(env, "config", {}).get("policy_frequency", FPS))
     if rate != FPS:
@@ -272,7 +279,7 @@ def _check_rates(env: Any, arguments: dict[str, Any], config: dict[str, Any]) ->
         raise ValueError(f"fps {fps:g} Hz is not that of agents, {FPS:g} Hz; train without fps")
 
 
-def _attribute(env: Any, name: str, default: Any) -> Any:
+def _attribute(env: TrainingEnv, name: str, default: object) -> Any:
     """Return an attribute of an environment, or of the first one of a `VecEnv`; the default without it."""
     try:
         return env.get_attr(name)[0] if hasattr(env, "get_attr") else env.get_wrapper_attr(name)
@@ -280,7 +287,7 @@ def _attribute(env: Any, name: str, default: Any) -> Any:
         return default
 
 
-def _demands(env: Any, config: dict[str, Any]) -> tuple[float, ...] | None:
+def _demands(env: TrainingEnv, config: Config) -> tuple[float, ...] | None:
     from lgmd_gym.envs.spaces import DiscreteDemand
 
     action = check_mapping("action", config.get("action"))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 from multiprocessing import current_process
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -14,9 +14,14 @@ from lgmd_gym.agents.base import FPS, Observations
 from lgmd_gym.agents.rules import excitation
 from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, NUM_MOTION_FIELDS
 from lgmd_gym.agents.zones import NUM_FIELDS
+from lgmd_gym.aliases import Values
 from lgmd_gym.errors import check_items, check_known, shown
 from lgmd_gym.fields import Record, flag, number, record, value, whole
 from lgmd_gym.processes.files import complete_file
+
+if TYPE_CHECKING:
+    pass
+
 
 TIME_CONSTANTS_S = (0.1, 0.4, 1.2)
 NUM_LEVELS = 1 + len(TIME_CONSTANTS_S)  # features per field
@@ -150,7 +155,7 @@ class FeatureConfig(Record):
         Raises:
             ValueError: If an input requires other cameras, or `shrink` is larger than the frame.
         """
-        boxes = {}
+        boxes: dict[str, tuple[Any, ...]] = {}
         for name in self.inputs:
             shape = shapes.get(source_observation(name), (0,))
             if name == FRAME:
@@ -323,7 +328,8 @@ def shrink_frames(frames: np.ndarray, side: int) -> np.ndarray:
     count, height, width, channels = frames.shape
     rows, columns = height // side, width // side
     blocks = frames[:, : rows * side, : columns * side].reshape(count, rows, side, columns, side, channels)
-    return np.round(blocks.mean(axis=(2, 4), dtype=np.float32)).astype(np.uint8)
+    means: np.ndarray = blocks.mean(axis=(2, 4), dtype=np.float32)
+    return np.round(means).astype(np.uint8)
 
 
 def levels_of(name: str, signal: np.ndarray) -> np.ndarray:
@@ -397,7 +403,7 @@ class Normalizer:
 
 def save_normalizer(normalizer: Any, path: Path) -> None:
     """Write the statistics of a `VecNormalize` with a `Dict` observation to a NumPy file."""
-    arrays: dict[str, Any] = {"epsilon": normalizer.epsilon, "clip": normalizer.clip_obs}
+    arrays: Values = {"epsilon": normalizer.epsilon, "clip": normalizer.clip_obs}
     for name in normalizer.norm_obs_keys if normalizer.norm_obs else ():
         statistics = normalizer.obs_rms[name]
         arrays |= {f"mean/{name}": statistics.mean, f"var/{name}": statistics.var}

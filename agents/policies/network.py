@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: torch and stable-baselines3 state few types.
 """`NetworkSpec`: the network of a policy as plain values, so that loading it executes no code of the file."""
 
 import io
@@ -6,12 +8,13 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import MISSING
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from gymnasium import spaces
 
 from lgmd_gym.agents.policies.features import FRAME
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_items, check_keys, check_known, check_type, check_whole
 from lgmd_gym.fields import Record, record, text, value
 
@@ -39,7 +42,7 @@ def _check_inputs(name: str, inputs: object) -> dict[str, tuple[int, ...]]:
     }
 
 
-def _check_kwargs(name: str, kwargs: object) -> dict[str, Any]:
+def _check_kwargs(name: str, kwargs: object) -> Arguments:
     given = {} if kwargs is None else check_type(name, kwargs, dict)
     check_keys(f"key of {name}", given, PLAIN_KWARGS)
     _check_units(given)
@@ -56,7 +59,7 @@ class NetworkSpec(Record):
     inputs: dict[str, tuple[int, ...]] = value(
         MISSING, _check_inputs, "Shape of each input; the input `frame` is uint8, others are float32"
     )
-    policy_kwargs: dict[str, Any] = value(
+    policy_kwargs: Arguments = value(
         None,
         _check_kwargs,
         "Arguments of the policy class; the activation function by its name in `torch.nn`",

@@ -1,7 +1,6 @@
 """The ego and the actors of an episode as records, and their motion."""
 
 from math import asin, atan, inf, nan, tan
-from typing import Any
 
 import numpy as np
 
@@ -45,7 +44,7 @@ STEP_START = np.dtype(
 
 
 @kernel(exact=True)
-def copy_motion(source: Any, target: Any) -> None:
+def copy_motion(source: np.record, target: np.record) -> None:
     """Copy what the motion of a body depends on, between `BODY` and `STEP_START` records."""
     target.speed, target.acceleration = source.speed, source.acceleration
     target.script_speed, target.script_acceleration = source.script_speed, source.script_acceleration
@@ -57,13 +56,13 @@ def copy_motion(source: Any, target: Any) -> None:
 
 
 @kernel(exact=True)
-def outline_of(body: Any) -> Rectangle:
+def outline_of(body: np.record) -> Rectangle:
     """Return the outline of a body."""
     return Rectangle(body.x, body.y, body.heading, body.length, body.width)
 
 
 @kernel(exact=True)
-def move(body: Any, paths: np.ndarray, distance: float) -> None:
+def move(body: np.record, paths: np.ndarray, distance: float) -> None:
     """Move a body along its path by a distance [m]."""
     before = body.heading
     body.travelled += distance
@@ -77,7 +76,7 @@ def move(body: Any, paths: np.ndarray, distance: float) -> None:
 
 
 @kernel(exact=True)
-def step_actor(body: Any, segments: np.ndarray, paths: np.ndarray, dt: float) -> None:
+def step_actor(body: np.record, segments: np.ndarray, paths: np.ndarray, dt: float) -> None:
     """Advance an actor by `dt` [s] along its script."""
     distance = step_script(body, segments, dt)
     body.speed, body.acceleration = body.script_speed, body.script_acceleration
@@ -87,11 +86,11 @@ def step_actor(body: Any, segments: np.ndarray, paths: np.ndarray, dt: float) ->
 
 @kernel(exact=True)
 def step_ego(
-    body: Any,
-    ego: Any,
-    line: Any,
+    body: np.record,
+    ego: np.record,
+    line: np.record,
     pending: np.ndarray,
-    brake: Any,
+    brake: np.record,
     segments: np.ndarray,
     paths: np.ndarray,
     parts: np.ndarray,
@@ -127,7 +126,7 @@ def step_ego(
 
 @kernel(exact=True)
 def _advance_ego(
-    body: Any, ego: Any, brake: Any, segments: np.ndarray, duration: float, demand: float
+    body: np.record, ego: np.record, brake: np.record, segments: np.ndarray, duration: float, demand: float
 ) -> tuple[float, float]:
     """Advance the ego's speed under one demand.
 
@@ -147,7 +146,7 @@ def _advance_ego(
 
 
 @kernel(exact=True)
-def _target_acceleration(body: Any, brake: Any, demand: float) -> float:
+def _target_acceleration(body: np.record, brake: np.record, demand: float) -> float:
     """Return the ego's acceleration under a constant demand after the build-up [m/s²]."""
     if demand < 0.0:
         # A demand weaker than the scripted deceleration does not release the scripted brake.
@@ -159,6 +158,6 @@ def _target_acceleration(body: Any, brake: Any, demand: float) -> float:
 
 
 @kernel(exact=True)
-def ego_braking(body: Any, ego: Any) -> float:
+def ego_braking(body: np.record, ego: np.record) -> float:
     """Return the ego's deceleration beyond the script, >= 0 [m/s²]."""
     return 0.0 if ego.on_script else max(0.0, body.script_acceleration - body.acceleration)

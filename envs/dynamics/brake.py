@@ -1,7 +1,6 @@
 """The ego's brake: latency and dead time, then a linear build-up of the deceleration."""
 
 from math import ceil, inf
-from typing import Any
 
 import numpy as np
 
@@ -120,7 +119,7 @@ def draw_brake(world: int, wet: bool) -> BrakeParams:
 
 
 @kernel(exact=True)
-def put_demand(line: Any, pending: np.ndarray, delay: float, demand: float) -> None:
+def put_demand(line: np.record, pending: np.ndarray, delay: float, demand: float) -> None:
     """Add a demand in [-1, 1] to a `DELAY_LINE` at its current time; a repeated demand is not stored.
 
     Args:
@@ -136,7 +135,7 @@ def put_demand(line: Any, pending: np.ndarray, delay: float, demand: float) -> N
 
 
 @kernel(exact=True)
-def next_part(line: Any, pending: np.ndarray, end: float) -> tuple[float, float]:
+def next_part(line: np.record, pending: np.ndarray, end: float) -> tuple[float, float]:
     """Advance a `DELAY_LINE` to its next change of demand, at most to the time `end` [s].
 
     Returns:
@@ -177,7 +176,7 @@ class DelayLine:
 
     def advance(self, dt: float) -> list[tuple[float, float]]:
         """Advance by `dt` [s] and return (duration [s], active demand) for each part of that time."""
-        line, parts = self._line[()], []
+        line, parts = self._line[()], list[tuple[float, float]]()
         end = float(line["time"]) + dt
         while not parts or line["time"] < end:
             parts.append(next_part(line, self._pending, end))

@@ -6,12 +6,16 @@ predictions on curved paths, the motion is cut into short straight steps.
 """
 
 from math import cos, hypot, inf, sin
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from lgmd_gym.envs.dynamics.path import centre_at
 from lgmd_gym.kernels import kernel
+
+if TYPE_CHECKING:
+    from highway_env.vehicle.objects import RoadObject
+
 
 END = 0.25  # [m] from an end of the ego within which a touch belongs to that end
 TOLERANCE = 0.02  # [m] by which a corner may be farther away than the nearest one and still touch
@@ -37,25 +41,25 @@ class Contact(NamedTuple):
         relative_impact_speed: Ego speed minus the other's speed along the ego's heading [m/s].
     """
 
-    other: Any
+    other: "RoadObject"
     side: str
     impact_speed: float
     relative_impact_speed: float
 
     @classmethod
-    def between(cls, ego: Any, other: Any) -> "Contact":
+    def between(cls, ego: "RoadObject", other: "RoadObject") -> "Contact":
         """Return the contact of two road objects that currently touch."""
         side = touched_side(outline(ego), outline(other))
         return cls(other, side, float(ego.speed), float(ego.speed) - speed_along(ego, other))
 
 
-def outline(item: Any) -> Rectangle:
+def outline(item: "RoadObject") -> Rectangle:
     """Return the outline of a highway-env vehicle or road object."""
     x, y = item.position
     return Rectangle(float(x), float(y), float(item.heading), float(item.LENGTH), float(item.WIDTH))
 
 
-def speed_along(ego: Any, other: Any) -> float:
+def speed_along(ego: "RoadObject", other: "RoadObject") -> float:
     """Return the other's speed along the ego's heading [m/s]."""
     return float(other.speed * cos(float(other.heading) - float(ego.heading)))
 
@@ -148,7 +152,9 @@ class PathMotion(NamedTuple):
 
 
 @kernel(exact=True)
-def time_on_paths(one: Any, other: Any, horizon: float, step: float) -> float:  # pragma: no cover
+def time_on_paths(
+    one: "PathMotion", other: "PathMotion", horizon: float, step: float
+) -> float:  # pragma: no cover
     """Return the time at which two moving rectangles first touch [s]; `inf` beyond the horizon.
 
     Args:
@@ -176,7 +182,9 @@ def time_on_paths(one: Any, other: Any, horizon: float, step: float) -> float:  
 
 
 @kernel(exact=True)
-def gap_on_path(one: Any, standing: Rectangle, horizon: float, step: float) -> float:  # pragma: no cover
+def gap_on_path(
+    one: "PathMotion", standing: Rectangle, horizon: float, step: float
+) -> float:  # pragma: no cover
     """Return the distance along a path up to a standing rectangle [m]; `inf` beyond the horizon.
 
     Args:
@@ -202,7 +210,7 @@ def gap_on_path(one: Any, standing: Rectangle, horizon: float, step: float) -> f
 
 
 @kernel(exact=True)
-def _outline(motion: Any, distance: float) -> Rectangle:  # pragma: no cover
+def _outline(motion: "PathMotion", distance: float) -> Rectangle:  # pragma: no cover
     """Return the outline `distance` metres further along the path."""
     pose = centre_at(motion.table, motion.travelled + distance, motion.reference)
     return Rectangle(pose.x, pose.y, pose.heading, motion.length, motion.width)

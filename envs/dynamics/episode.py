@@ -5,7 +5,7 @@ speeds and distances at their ends are exact: the motion of the step is repeated
 """
 
 from math import cos, hypot, inf, isnan, sin
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from lgmd_gym.envs.dynamics.longitudinal import advance, step_script
 from lgmd_gym.envs.dynamics.path import centre_at
 from lgmd_gym.kernels import kernel
 
-Arrays: TypeAlias = tuple[Any, ...]
+Arrays: TypeAlias = tuple[np.ndarray, ...]
 """The fields of a NamedTuple of arrays, or the NamedTuple itself, which is slower to pass from Python."""
 
 
@@ -90,11 +90,11 @@ def step_environment(i: int, dt: float, physics: Arrays) -> None:
 @kernel(exact=True)
 def step_bodies(
     bodies: np.ndarray,
-    episode: Any,
-    ego: Any,
-    line: Any,
+    episode: np.record,
+    ego: np.record,
+    line: np.record,
     pending: np.ndarray,
-    brake: Any,
+    brake: np.record,
     segments: np.ndarray,
     paths: np.ndarray,
     before: np.ndarray,
@@ -138,7 +138,7 @@ def step_bodies(
 
 
 @kernel(exact=True)
-def _move_back(bodies: np.ndarray, i: int, step: Any, part: float) -> None:
+def _move_back(bodies: np.ndarray, i: int, step: "StepMotion", part: float) -> None:
     """Move a body from the end of a step to its place after a part of it."""
     body, before = bodies[i], step.before[i]
     covered, changed = body.travelled - before.travelled, body.speed != before.speed
@@ -147,7 +147,7 @@ def _move_back(bodies: np.ndarray, i: int, step: Any, part: float) -> None:
 
 
 @kernel(exact=True)
-def first_contact_of(bodies: np.ndarray, count: int, step: Any) -> tuple[float, int]:
+def first_contact_of(bodies: np.ndarray, count: int, step: "StepMotion") -> tuple[float, int]:
     """Return the time at which the ego first touches a body, and its index; else `inf` and 0.
 
     Args:
@@ -172,13 +172,13 @@ def first_contact_of(bodies: np.ndarray, count: int, step: Any) -> tuple[float, 
 
 
 @kernel(exact=True)
-def _is_uniform(body: Any, before: Any) -> bool:
+def _is_uniform(body: np.record, before: np.record) -> bool:
     """Return whether a body has kept its heading and speed in a step."""
     return body.heading == before.heading and body.speed == before.speed
 
 
 @kernel(exact=True)
-def is_terminated(bodies: np.ndarray, episode: Any, approached: bool) -> bool:
+def is_terminated(bodies: np.ndarray, episode: np.record, approached: bool) -> bool:
     """Return whether the episode is over, see `BrakingEnv`; updates `closed_in`, once per decision.
 
     Args:
@@ -211,7 +211,7 @@ def is_terminated(bodies: np.ndarray, episode: Any, approached: bool) -> bool:
 
 
 @kernel(exact=True)
-def _is_passed(ego: Any, body: Any) -> bool:
+def _is_passed(ego: np.record, body: np.record) -> bool:
     """Return whether a body is behind the ego's rear and not faster than the ego along its heading."""
     dx, dy = body.x - ego.x, body.y - ego.y
     behind = -(dx * cos(ego.heading) + dy * sin(ego.heading)) - (ego.length + body.length) / 2
@@ -219,13 +219,13 @@ def _is_passed(ego: Any, body: Any) -> bool:
 
 
 @kernel(exact=True)
-def speed_along_ego(ego: Any, body: Any) -> float:
+def speed_along_ego(ego: np.record, body: np.record) -> float:
     """Return a body's speed along the ego's heading [m/s]."""
     return body.speed * cos(body.heading - ego.heading)
 
 
 @kernel(exact=True)
-def is_truncated(episode: Any) -> bool:
+def is_truncated(episode: np.record) -> bool:
     """Return whether the scenario's duration has passed."""
     return episode.time >= episode.duration - 1e-9
 
@@ -254,7 +254,7 @@ class StepMotion(NamedTuple):
 
 
 @kernel(exact=True)
-def progress(bodies: np.ndarray, i: int, step: Any, part: float) -> tuple[float, float]:
+def progress(bodies: np.ndarray, i: int, step: "StepMotion", part: float) -> tuple[float, float]:
     """Return the distance [m] that a body has covered after a part of a step, and its speed there [m/s].
 
     Args:
@@ -275,7 +275,7 @@ def progress(bodies: np.ndarray, i: int, step: Any, part: float) -> tuple[float,
 
 
 @kernel(exact=True)
-def _ego_progress(moving: Any, step: Any, time: float) -> tuple[float, float]:
+def _ego_progress(moving: np.record, step: "StepMotion", time: float) -> tuple[float, float]:
     """Advance the motion of the ego by a time [s] as `step_ego` did; return distance [m] and speed [m/s]."""
     distance, row = 0.0, 0
     while time > 0.0:
@@ -293,7 +293,7 @@ def _ego_progress(moving: Any, step: Any, time: float) -> tuple[float, float]:
 
 
 @kernel(exact=True)
-def uniform_touch(ego: Any, body: Any, ego_before: Any, before: Any) -> float:
+def uniform_touch(ego: np.record, body: np.record, ego_before: np.record, before: np.record) -> float:
     """Return the first touch of two bodies in straight, uniform motion in a step as a part of it; else `inf`.
 
     Args:
@@ -308,7 +308,7 @@ def uniform_touch(ego: Any, body: Any, ego_before: Any, before: Any) -> float:
 
 
 @kernel(exact=True)
-def touch_time(bodies: np.ndarray, i: int, step: Any) -> float:
+def touch_time(bodies: np.ndarray, i: int, step: "StepMotion") -> float:
     """Return the time of the first touch of the ego and body i as a part of a step; `inf` without a touch.
 
     Args:
@@ -333,7 +333,7 @@ def touch_time(bodies: np.ndarray, i: int, step: Any) -> float:
 
 
 @kernel(exact=True)
-def _outline_at(bodies: np.ndarray, i: int, step: Any, part: float) -> Rectangle:
+def _outline_at(bodies: np.ndarray, i: int, step: "StepMotion", part: float) -> Rectangle:
     """Return the outline of a body at a part of a step."""
     body, start = bodies[i], step.before[i].travelled
     if body.travelled == start:

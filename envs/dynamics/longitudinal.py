@@ -6,7 +6,6 @@ closed form, and stopping distances do not depend on the step size.
 """
 
 from math import copysign, inf, sqrt
-from typing import Any
 
 import numpy as np
 
@@ -84,7 +83,7 @@ def segment_table(segments: tuple[Segment, ...]) -> np.ndarray:
 
 
 @kernel(exact=True)
-def step_script(script: Any, segments: np.ndarray, dt: float) -> float:
+def step_script(script: np.record, segments: np.ndarray, dt: float) -> float:
     """Advance a script, a record with `SCRIPT_FIELDS`, by `dt` [s]; returns the distance travelled [m].
 
     Speed is constant between the segments. A segment that starts before the previous one has ended is delayed
@@ -105,7 +104,7 @@ def step_script(script: Any, segments: np.ndarray, dt: float) -> float:
 
 
 @kernel(exact=True)
-def _advance_script(script: Any, target: float, jerk: float, duration: float) -> float:
+def _advance_script(script: np.record, target: float, jerk: float, duration: float) -> float:
     """Advance speed and time, and return the distance travelled [m]."""
     if duration <= 0.0:
         return 0.0

@@ -1,7 +1,6 @@
 """Paths along bends: the pose at a distance, and the path of a car's rear axle."""
 
 from math import cos, sin, tan
-from typing import Any
 
 import numpy as np
 
@@ -31,7 +30,7 @@ class Path:
         self.bends = bends
         self.table = path_table(start, bends)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "Path":
+    def __deepcopy__(self, memo: dict[int, object]) -> "Path":
         """Return the path itself: it is immutable, and copies of an environment share it."""
         return self
 

@@ -7,7 +7,7 @@ MIN_SPEED = 1e-3  # [m/s], apart from 0; lower speeds have no finite duration
 KMH = 1.0 / 3.6  # one km/h in m/s
 
 
-def check_speed(name: str, value: float, *, zero: bool = False) -> float:
+def check_speed(name: str, value: object, *, zero: bool = False) -> float:
     """Return `value` as float if it is a speed in (0, 40] m/s, or in [0, 40] m/s with `zero`.
 
     Raises:

@@ -1,10 +1,11 @@
 """Cars in adjacent and oncoming lanes, lane changes, and head-on threats: CCFhos and CCFhol."""
 
 from math import pi
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.envs.dynamics.script import Bend, Pose, lane_change
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.families.arguments import (
@@ -54,7 +55,7 @@ LAST_STRAIGHT = 1.5  # [s] before the contact, at which the lane change of CCFho
 TOP_KMH = 140.0  # of cars that overtake on a motorway, in random levels
 
 
-def _queue(rng: np.random.Generator) -> dict[str, Any]:
+def _queue(rng: np.random.Generator) -> Arguments:
     offset = between(3.0, 3.7)(rng) * one(1.0, -1.0)(rng)
     return {"ego_speed": kmh()(rng), "lateral_offset": offset, "cars": int(rng.integers(1, 7))}
 
@@ -123,7 +124,7 @@ def pass_between(
     return Scenario(family="PassBetween", ego_speed=ego_speed, duration=duration, actors=parked)
 
 
-def _overtaken_fast(rng: np.random.Generator) -> dict[str, Any]:
+def _overtaken_fast(rng: np.random.Generator) -> Arguments:
     ego_speed = kmh(*FAST_KMH)(rng)
     fastest = max(TOP_KMH * KMH - ego_speed, 11.0 * KMH)
     return {"ego_speed": ego_speed, "excess": between(10.0 * KMH, fastest)(rng)}
@@ -197,7 +198,7 @@ def meet_in_lane(
     return _on_two_way_road("CCFhos", ego_speed, START_TTC + AFTERMATH, target)
 
 
-def _lane_change(rng: np.random.Generator) -> dict[str, Any]:
+def _lane_change(rng: np.random.Generator) -> Arguments:
     oncoming = kmh(40.0)(rng)
     return {
         "ego_speed": kmh(30.0)(rng),

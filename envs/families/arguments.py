@@ -6,10 +6,11 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
-from lgmd_gym.fields import choice, flag, number, optional, value, whole
+from lgmd_gym.fields import Field, choice, flag, number, optional, value, whole
 
-DrawArguments = Callable[[np.random.Generator], dict[str, Any]]
+DrawArguments = Callable[[np.random.Generator], Arguments]
 """Draws the arguments of a family."""
 Sampler = Callable[[np.random.Generator], Any]
 """Draws one argument."""
@@ -18,39 +19,39 @@ FAST_KMH = (80.0, 130.0)  # of a motorway
 HEADWAY = (0.5, 3.0)  # [s]; in FMVSS 127 a lead car brakes 12 m ahead at 80 km/h, a headway of 0.54 s
 
 
-def within(bounds: str, unit: str, doc: str) -> Any:
+def within(bounds: str, unit: str, doc: str) -> Field:
     """Declare a number; see `lgmd_gym.fields.number`."""
     return number(None, bounds, unit, doc)
 
 
-def speed(doc: str, zero: bool = False) -> Any:
+def speed(doc: str, zero: bool = False) -> Field:
     """Declare a speed up to 40 m/s, above 0 or, with `zero`, from 0 on."""
     limits = "[0, 40]" if zero else "(0, 40]"
     return value(None, partial(check_speed, zero=zero), doc, limits, "m/s")
 
 
-def slower(doc: str, zero: bool = False) -> Any:
+def slower(doc: str, zero: bool = False) -> Field:
     """Declare a speed below that of the ego."""
     limits = "[0, ego_speed)" if zero else "(0, ego_speed)"
     return value(None, partial(check_speed, zero=zero), doc, limits, "m/s")
 
 
-def grey(of: str) -> Any:
+def grey(of: str) -> Field:
     """Declare a grey level that is drawn by default."""
     return optional(whole(None, "[0, 255]", doc=f"Grey level of {of}; None to draw it from the seed"))
 
 
-def maybe(bounds: str, unit: str, doc: str) -> Any:
+def maybe(bounds: str, unit: str, doc: str) -> Field:
     """Declare a number or None."""
     return optional(within(bounds, unit, doc))
 
 
-def truth(doc: str) -> Any:
+def truth(doc: str) -> Field:
     """Declare a bool."""
     return flag(None, doc)
 
 
-def one_of(names: tuple[str, ...], doc: str) -> Any:
+def one_of(names: tuple[str, ...], doc: str) -> Field:
     """Declare one of some names."""
     return choice(None, names, doc)
 
@@ -76,7 +77,7 @@ def kmh(low: float = SPEED_KMH[0], high: float = SPEED_KMH[1]) -> Sampler:
     return lambda rng: float(rng.uniform(low, high)) * KMH
 
 
-def one(first: Any, second: Any) -> Sampler:
+def one(first: object, second: object) -> Sampler:
     """Return a sampler of one of two values."""
     return lambda rng: first if rng.random() < 0.5 else second
 

@@ -6,10 +6,11 @@ report's summary leaves open are stated at each family.
 """
 
 from math import atan2, cos, exp, hypot, log, pi, sin, sqrt
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.envs.dynamics.script import Bend, Pose, Segment, arc
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.arguments import (
@@ -65,7 +66,7 @@ WideRadius = Annotated[float, within("[15, 2000]", "m", "Radius of the ego's pat
 Radius = Annotated[float, within("[15, 500]", "m", "Radius of the ego's path")]
 
 
-def _curve(rng: np.random.Generator) -> dict[str, Any]:
+def _curve(rng: np.random.Generator) -> Arguments:
     """Draw a speed, and a radius that is uniform on a logarithmic scale."""
     ego_speed = kmh(*LEVEL_SPEED_KMH)(rng)
     lowest = max(LEVEL_RADIUS[0], 1.01 * ego_speed**2 / MAX_LATERAL)
@@ -73,7 +74,7 @@ def _curve(rng: np.random.Generator) -> dict[str, Any]:
     return {"ego_speed": ego_speed, "radius": radius, "left": EITHER(rng)}
 
 
-def _standing(rng: np.random.Generator) -> dict[str, Any]:
+def _standing(rng: np.random.Generator) -> Arguments:
     return _curve(rng) | {
         "lateral_offset": between(-0.4, 0.4)(rng),
         "entry": between(0.0, 3.0)(rng) if rng.random() < 0.4 else 0.0,
@@ -104,7 +105,7 @@ def approach_standing_in_curve(
     return _in_curve("CCRsCurve", ego_speed, START_TTC + AFTERMATH, straight, curve, target)
 
 
-def _beside(rng: np.random.Generator) -> dict[str, Any]:
+def _beside(rng: np.random.Generator) -> Arguments:
     oncoming = kmh(20.0, 100.0)(rng) if EITHER(rng) else 0.0
     to_left = oncoming > 0.0 or EITHER(rng)
     offset = between(3.2, 4.0)(rng) if to_left else -between(2.9, 4.0)(rng)
@@ -141,7 +142,7 @@ def pass_cars_in_curve(
     return _in_curve("CurvePass", ego_speed, MEETINGS[-1] + AFTER_PASSING, 0.0, curve, *cars)
 
 
-def _rail(rng: np.random.Generator) -> dict[str, Any]:
+def _rail(rng: np.random.Generator) -> Arguments:
     radius = between(40.0, 200.0)(rng)
     top = min(80.0, (3.5 * radius) ** 0.5 / KMH)
     return {"ego_speed": kmh(20.0, top)(rng), "radius": radius, "left": EITHER(rng)}

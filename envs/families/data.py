@@ -12,12 +12,13 @@ profile = [{ start = 1.0, acceleration = -2.0 }]
 path = [{ length = 20.0, curvature = 0.05 }]
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.envs.dynamics.script import Bend, Segment
 from lgmd_gym.envs.families.scenario import Actor, RoadPlan, Scenario
 from lgmd_gym.errors import check_keys, check_type
@@ -34,12 +35,12 @@ _NESTED: dict[tuple[type, str], tuple[type, bool]] = {
 }
 
 
-def scenario_to_data(scenario: Scenario) -> dict[str, Any]:
+def scenario_to_data(scenario: Scenario) -> Values:
     """Return a scenario as plain data, without the fields that have their default."""
     return _to_data(check_type("scenario", scenario, Scenario))
 
 
-def scenario_from_data(data: Mapping[str, Any] | Scenario) -> Scenario:
+def scenario_from_data(data: Mapping[str, object] | Scenario) -> Scenario:
     """Return the scenario of plain data; a `Scenario` is returned as it is.
 
     Args:
@@ -52,8 +53,8 @@ def scenario_from_data(data: Mapping[str, Any] | Scenario) -> Scenario:
     return data if isinstance(data, Scenario) else _from_data(Scenario, data, "scenario")
 
 
-def _to_data(item: Any) -> dict[str, Any]:
-    data: dict[str, Any] = {}
+def _to_data(item: Any) -> Values:
+    data: Values = {}
     for field in fields(item):
         value = getattr(item, field.name)
         default = field.default_factory() if field.default_factory is not MISSING else field.default
@@ -67,22 +68,22 @@ def _to_data(item: Any) -> dict[str, Any]:
     return data
 
 
-def _from_data(kind: type, data: Any, place: str) -> Any:
+def _from_data(kind: type, data: object, place: str) -> Any:
     """Return an instance of a dataclass; `place` is for messages."""
-    check_type(place, data, dict)
-    check_keys(f"key of {place}", data, [field.name for field in fields(kind)])
+    given = check_type(place, data, dict)
+    check_keys(f"key of {place}", given, [field.name for field in fields(kind)])
     for field in fields(kind):
         required = field.default is MISSING and field.default_factory is MISSING
-        if required and field.name not in data:
+        if required and field.name not in given:
             raise ValueError(f"{place} must have the key {field.name!r}; add it")
     values = {}
-    for name, value in data.items():
+    for name, value in given.items():
         nested, several = _NESTED.get((kind, name), (None, False))
         inner = f"{place}.{name}"
         if nested is None:
             values[name] = value
         elif several:
-            parts = check_type(inner, value, list, tuple)
+            parts = cast(Sequence[object], check_type(inner, value, list, tuple))
             values[name] = tuple(_from_data(nested, part, f"{inner}[{i}]") for i, part in enumerate(parts))
         else:
             values[name] = _from_data(nested, value, inner)

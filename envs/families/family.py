@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.errors import check_keys, check_known, shown
 from lgmd_gym.fields import Declaration, declaration_of
@@ -42,7 +43,7 @@ class Level(NamedTuple):
 
     name: str
     weight: float
-    draw: Callable[[np.random.Generator], dict[str, Any]]
+    draw: Callable[[np.random.Generator], Arguments]
     family: str = ""
     threat: bool = False
     has_target: bool = True
@@ -134,7 +135,7 @@ def _checked(function: Family) -> Any:
         return function
 
     @wraps(function)
-    def call(*args: Any, **kwargs: Any) -> Any:
+    def call(*args: object, **kwargs: object) -> object:
         given = signature.bind(*args, **kwargs).arguments if args else kwargs
         for name, item in declared.items():
             if name in given:
@@ -162,5 +163,5 @@ def _documentation(name: str, item: Declaration) -> list[str]:
     return wrap(text, 104, initial_indent="    ", subsequent_indent="        ")
 
 
-def _origin(function: Family) -> tuple[Any, Any]:
+def _origin(function: Family) -> tuple[object, object]:
     return getattr(function, "__module__", None), getattr(function, "__qualname__", function)

@@ -2,10 +2,11 @@
 
 from dataclasses import replace
 from math import copysign, pi
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.arguments import (
@@ -90,7 +91,7 @@ def _overlap(rng: np.random.Generator) -> float:
     return between(0.4, 1.0)(rng) * one(1.0, -1.0)(rng)
 
 
-def _moving(rng: np.random.Generator) -> dict[str, Any]:
+def _moving(rng: np.random.Generator) -> Arguments:
     ego_speed = kmh(30.0)(rng)
     target_speed = ego_speed * between(0.2, 0.7)(rng)
     return {"ego_speed": ego_speed, "target_speed": target_speed, "overlap": _overlap(rng)}
@@ -243,7 +244,7 @@ def follow_steadily(
     return Scenario(family="Following", ego_speed=ego_speed, duration=10.0, actors=(lead,))
 
 
-def _close_release(rng: np.random.Generator) -> dict[str, Any]:
+def _close_release(rng: np.random.Generator) -> Arguments:
     """Draw a short headway, and a brake tap that takes 10 to 60 % of it."""
     ego_speed, headway = kmh(40.0, 100.0)(rng), between(1.0, 2.0)(rng)
     lost = between(0.1, 0.6)(rng) * ego_speed * headway

@@ -1,8 +1,9 @@
 """Pedestrians, two-wheelers and parked cars of the tests, and their motion before a contact."""
 
 from math import pi
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.dynamics.units import MIN_SPEED
 from lgmd_gym.envs.families.scenario import (
@@ -42,7 +43,7 @@ class RoadUser(NamedTuple):
     impact_point: float = 0.0
 
     @property
-    def fields(self) -> dict[str, Any]:
+    def fields(self) -> Values:
         """Fields of an `Actor` of this kind and size."""
         return {"kind": self.kind, "length": self.length, "width": self.width, "height": self.height}
 

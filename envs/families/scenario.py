@@ -3,12 +3,11 @@
 from dataclasses import MISSING, replace
 from functools import partial
 from math import cos, sin
-from typing import Any
 
 from lgmd_gym.envs.dynamics.script import Bend, Segment, check_profile
 from lgmd_gym.envs.dynamics.units import check_speed
 from lgmd_gym.errors import check_finite, check_items, check_known, check_type, check_whole, shown
-from lgmd_gym.fields import Record, number, optional, record, text, value, whole
+from lgmd_gym.fields import Field, Record, number, optional, record, text, value, whole
 
 EGO_LENGTH, EGO_WIDTH = 4.3, 1.8  # [m]
 WHEELBASE = 2.67  # [m]
@@ -34,12 +33,12 @@ AFTERMATH = 6.0
 """Maximum duration of an episode after the scripted contact [s], enough for a slow stop."""
 
 
-def _items(kind: type, doc: str) -> Any:
+def _items(kind: type, doc: str) -> Field:
     """Declare a tuple of instances of a class, by default empty."""
     return value((), lambda name, given: check_items(name, given, kind), doc)
 
 
-def _kind(default: str, label: str, names: tuple[str, ...], doc: str) -> Any:
+def _kind(default: str, label: str, names: tuple[str, ...], doc: str) -> Field:
     """Declare one of some names, whose messages begin with a label."""
     return value(default, lambda _, given: check_known(label, given, names), doc, ", ".join(map(repr, names)))
 
@@ -130,10 +129,11 @@ class RoadPlan(Record):
         return self.kind in ("curve", "crossing")
 
 
-def _duration(name: str, given: Any) -> float:
-    if check_finite(name, given) <= 0.0:
+def _duration(name: str, given: object) -> float:
+    duration = check_finite(name, given)
+    if duration <= 0.0:
         raise ValueError(f"{name} must be > 0 s, got {shown(given)}")
-    return float(given)
+    return duration
 
 
 @record

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from math import cos, pi, radians, sin, tan
-from typing import Annotated, Any
+from typing import Annotated
 
 from lgmd_gym.envs.dynamics.script import Bend, Pose, Segment, turn
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
@@ -47,7 +47,7 @@ BEFORE_TURN = 2.0  # [s] from the start to the turn; T0 is 1 s before it
 FRONT = REAR_AXLE + EGO_LENGTH / 2  # [m] from the rear axle to the front bumper
 
 
-def _turning_speed(name: str, given: Any) -> float:
+def _turning_speed(name: str, given: object) -> float:
     return check_within(name, check_speed(name, given), 0.0, 25.02 * KMH, "m/s")
 
 

@@ -1,7 +1,7 @@
 """The road of a braking scenario with its vehicles and objects: highway-env's view of one environment."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 from highway_env.road.road import Road, RoadNetwork
@@ -12,7 +12,6 @@ from lgmd_gym.envs.dynamics.bodies import (
     BICYCLE,
     BOX,
     CAR,
-    EGO,
     MOTORCYCLE,
     PEDESTRIAN,
     ROAD_MARKING,
@@ -120,8 +119,9 @@ class RoadMarking(_BodyItem, Landmark):
         self.shade = int(body["shade"])
 
 
-CLASSES: dict[int, Any] = {
-    EGO: EgoCar,
+Item: TypeAlias = PathCar | SolidObject | RoadMarking
+"""What a `BODY` record can be."""
+CLASSES: dict[int, type[ScriptedCar | SolidObject | RoadMarking]] = {
     CAR: ScriptedCar,
     BOX: SolidObject,
     ROAD_MARKING: RoadMarking,
@@ -157,11 +157,11 @@ class BrakingRoad(Road):
         state = simulation.state
         bodies = state.bodies[index, : state.episodes[index]["bodies"]]
         self._ego = EgoCar(self, bodies[0], self.set_demand)
-        self._items: list[Any] = [self._ego, *(CLASSES[body["kind"]](self, body) for body in bodies[1:])]
+        self._items: list[Item] = [self._ego, *(CLASSES[body["kind"]](self, body) for body in bodies[1:])]
         items = list(zip(self._items, bodies["kind"].tolist(), strict=True))
         self.vehicles = [item for item, kind in items if kind <= CAR]
         self.objects = [item for item, kind in items if kind > CAR]
-        self._obstacles: list[Any] = [item for item, kind in items[1:] if kind != ROAD_MARKING]
+        self._obstacles: list[Item] = [item for item, kind in items[1:] if kind != ROAD_MARKING]
         self._shown_steps = -1
 
     @property
@@ -171,33 +171,33 @@ class BrakingRoad(Road):
         return self._ego
 
     @property
-    def vehicles(self) -> list[Any]:  # type: ignore[override]
+    def vehicles(self) -> list[Item]:  # type: ignore[override]
         """The ego and all scripted cars."""
         self.refresh()
         return self._vehicles
 
     @vehicles.setter
-    def vehicles(self, value: list[Any]) -> None:
+    def vehicles(self, value: list[Item]) -> None:
         self._vehicles = value
 
     @property
-    def objects(self) -> list[Any]:  # type: ignore[override]
+    def objects(self) -> list[Item]:  # type: ignore[override]
         """All other objects."""
         self.refresh()
         return self._objects
 
     @objects.setter
-    def objects(self, value: list[Any]) -> None:
+    def objects(self, value: list[Item]) -> None:
         self._objects = value
 
     @property
-    def obstacles(self) -> list[Any]:
+    def obstacles(self) -> list[Item]:
         """Vehicles and solid objects that the ego can touch."""
         self.refresh()
         return self._obstacles
 
     @property
-    def items(self) -> list[Any]:
+    def items(self) -> list[Item]:
         """The ego, then all vehicles and objects in the order of their bodies."""
         self.refresh()
         return self._items

@@ -1,16 +1,19 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """Cars of the traffic environments: highway-env's drivers with fixed parameters, and the car under test."""
 
 from math import atan, cos, sin, tan
 from typing import Any, cast
 
 import numpy as np
+from highway_env.road.road import Road
 from highway_env.vehicle.behavior import IDMVehicle
 
 from lgmd_gym.envs.dynamics.brake import BrakeParams, DelayLine
 from lgmd_gym.envs.dynamics.longitudinal import advance
 from lgmd_gym.envs.families.scenario import EGO_LENGTH, EGO_WIDTH
 from lgmd_gym.envs.traffic.kernels import NO_ROUTE, UNPLANNED
-from lgmd_gym.envs.traffic.lanes import LaneTable
+from lgmd_gym.envs.traffic.lanes import Lane, LaneTable
 
 HEADWAYS = (0.4, 1.5)  # [s], IDM's time headway T; each driver draws one
 
@@ -38,6 +41,10 @@ class TrafficCar(IDMVehicle):
     DELTA = 4.0
     HEIGHT = 1.5
     IS_EGO = False
+    position: np.ndarray
+    speed: float
+    lane: Lane
+    action: dict[str, float]
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -54,11 +61,10 @@ class TrafficCar(IDMVehicle):
         number = self.route[0][2]
         return UNPLANNED if number is None else number
 
-    def state(self, lanes: LaneTable) -> tuple[Any, ...]:
+    def state(self, lanes: LaneTable) -> tuple[float, ...]:
         """Return the values of `CAR_STATE`."""
-        position: Any = self.position
-        x, y = position.tolist()
-        action: Any = self.action
+        x, y = self.position.tolist()
+        action = self.action
         return (
             *(x, y, self.heading, self.speed, lanes.numbers[self.lane_index]),
             *(lanes.numbers[self.target_lane_index], self.timer, action["steering"], action["acceleration"]),
@@ -67,14 +73,14 @@ class TrafficCar(IDMVehicle):
         )
 
     @property
-    def constants(self) -> tuple[Any, ...]:
+    def constants(self) -> tuple[float, ...]:
         """The values of `CAR_CONSTANTS`."""
         return (
             *(self.IS_EGO, self.LENGTH, self.WIDTH, self.COMFORT_ACC_MAX, self.COMFORT_ACC_MIN),
             *(self.DISTANCE_WANTED, self.TIME_WANTED, self.DELTA, 2.0),
         )
 
-    def predict_trajectory_constant_speed(self, times: Any) -> Any:
+    def predict_trajectory_constant_speed(self, times: np.ndarray) -> Any:
         """Return predicted positions and headings along the route at constant speed.
 
         highway-env's version uses the lane count of the wrong road and fails where a road has fewer lanes.
@@ -130,8 +136,8 @@ class TrafficEgo(TrafficCar):
 
     def __init__(
         self,
-        road: Any,
-        position: Any,
+        road: Road,
+        position: np.ndarray,
         heading: float = 0.0,
         speed: float = 0.0,
         brake: BrakeParams | None = None,

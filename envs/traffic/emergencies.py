@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """Emergencies in traffic: when the ego needs a braking that its driver alone does not provide in time.
 
 An emergency is a contact of the ego, on any side, or a moment in which the required deceleration reaches

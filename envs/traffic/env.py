@@ -1,20 +1,25 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """`TrafficEnv`: base of the traffic environments, with an IDM driver and an agent that can brake."""
 
+from collections.abc import Callable
 from functools import partial
 from math import cos, inf
-from typing import Any, ClassVar, cast
+from typing import ClassVar, cast
 
 import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.abstract import AbstractEnv
+from highway_env.envs.common.action import Action
 
+from lgmd_gym.aliases import Config, Info
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.envs import surrogate_safety
 from lgmd_gym.envs.appearance import Appearance, brake_of
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.envs.spaces import ContinuousDemand, DiscreteDemand, EgoState, make_action
 from lgmd_gym.envs.surrogate_safety import required_deceleration
-from lgmd_gym.envs.traffic.cars import TrafficEgo
+from lgmd_gym.envs.traffic.cars import TrafficCar, TrafficEgo
 from lgmd_gym.envs.traffic.road import TrafficRoad
 
 JAM_TIME, JAM_SPEED = 10.0, 0.5  # [s], [m/s]: the episode ends after this time below this speed
@@ -30,7 +35,7 @@ class TrafficDemand(ContinuousDemand):
         return spaces.Box(-1.0, 0.0, shape=(1,), dtype=np.float32)
 
     @property
-    def vehicle_class(self) -> Any:
+    def vehicle_class(self) -> Callable[..., TrafficEgo]:
         """Factory of the controlled car."""
         return partial(TrafficEgo, brake=cast(TrafficEnv, self.env).brake)
 
@@ -129,11 +134,11 @@ class TrafficEnv(EgoBrakeEnv):
     """Whether cars give way at intersections of their routes (highway-env's rules)."""
     warm_up: ClassVar[float] = 4.0
     """Simulated time before the episode begins [s]."""
-    settings: ClassVar[dict[str, Any]] = {}
+    settings: ClassVar[Config] = {}
     """Configuration values that differ from highway-env's environment."""
 
     @classmethod
-    def default_config(cls) -> dict[str, Any]:
+    def default_config(cls) -> Config:
         """Return the default configuration."""
         return super().default_config() | {
             "observation": {"type": "TrafficState"},
@@ -163,12 +168,12 @@ class TrafficEnv(EgoBrakeEnv):
         """Deceleration that avoids the predicted contacts [m/s²]; see `need.required_deceleration`."""
         return required_deceleration(self.road.bodies())
 
-    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Action) -> tuple[np.ndarray, float, bool, bool, Info]:
         """Advance by one decision; see `AbstractEnv.step`."""
         # IntersectionEnv.step would add a car at every decision.
         return AbstractEnv.step(self, action)
 
-    def advance(self) -> tuple[dict[str, Any], bool]:
+    def advance(self) -> tuple[Info, bool]:
         """Advance by one decision with the last demand.
 
         Returns:
@@ -182,7 +187,7 @@ class TrafficEnv(EgoBrakeEnv):
         self.time += 1 / self.config["policy_frequency"]
         self._simulate(None)
 
-    def _simulate(self, action: Any = None) -> None:
+    def _simulate(self, action: Action | None = None) -> None:
         super()._simulate(action)
         self._jam_steps = self._jam_steps + 1 if self.ego.speed < JAM_SPEED else 0
         if self.road.contact is None:
@@ -210,7 +215,7 @@ class TrafficEnv(EgoBrakeEnv):
         super()._reset()
         self.road = TrafficRoad(self.road, self.ego, self.regulated)
         self._modify_scene()
-        cars: list[Any] = [self.ego]
+        cars: list[TrafficCar] = [self.ego]
         for car in self.road.cars:
             if car is not self.ego and all(_distance(car, other) > MIN_START_DISTANCE for other in cars):
                 cars.append(car)
@@ -226,12 +231,12 @@ class TrafficEnv(EgoBrakeEnv):
         """Return whether the ego has reached the end of the road."""
         return False
 
-    def _reward(self, action: Any) -> float:
+    def _reward(self, action: Action) -> float:
         if self.road.contact is not None:
             return -1.0
         return -self.ego.braking / self.brake.max_deceleration / self.config["policy_frequency"]
 
-    def _rewards(self, action: Any) -> dict[str, float]:
+    def _rewards(self, action: Action) -> dict[str, float]:
         raise NotImplementedError
 
     def _is_terminated(self) -> bool:
@@ -241,7 +246,7 @@ class TrafficEnv(EgoBrakeEnv):
         jammed = self._jam_steps >= JAM_TIME * self.config["policy_frequency"]
         return jammed or self.time >= self.config["duration"] - 1e-9
 
-    def _info(self, obs: Any, action: Any = None) -> dict[str, Any]:
+    def _info(self, obs: object, action: object = None) -> Info:
         ego, contact, bodies = self.ego, self.road.contact, self.road.bodies()
         gap, index = surrogate_safety.lead_of(bodies, len(bodies), _NO_PATHS)
         lead = bodies[index]
@@ -264,5 +269,5 @@ class TrafficEnv(EgoBrakeEnv):
         }
 
 
-def _distance(one: Any, other: Any) -> float:
+def _distance(one: TrafficCar, other: TrafficCar) -> float:
     return float(np.hypot(*(one.position - other.position)))

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Compiled places, decisions, motion and contacts of all cars of a traffic road.
 
 The drivers are highway-env's IDM, MOBIL and bicycle model. Every result is equal to the bit to that of
@@ -52,10 +54,10 @@ intrinsic: Any = extending.intrinsic  # a decorated function is called without i
 
 
 @intrinsic
-def _fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
+def _fma(typingctx, a, b, c):
     """Return a·b + c with one rounding."""
 
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    def generate(context, builder, signature, args):
         return builder.fma(*args)
 
     return types.float64(types.float64, types.float64, types.float64), generate
@@ -88,7 +90,9 @@ def not_zero(value: float) -> float:
 
 
 @kernel(exact=True)
-def project(cars: Any, lanes: Any, polar: Any, along: Any, across: Any) -> None:
+def project(
+    cars: np.ndarray, lanes: np.ndarray, polar: np.ndarray, along: np.ndarray, across: np.ndarray
+) -> None:
     """Write the coordinates of every car along and across every lane, shape (cars, lanes) [m].
 
     Args:
@@ -114,7 +118,7 @@ def project(cars: Any, lanes: Any, polar: Any, along: Any, across: Any) -> None:
 
 
 @kernel(exact=True)
-def heading_at(lane: Any, along: float, bend: float) -> float:
+def heading_at(lane: np.record, along: float, bend: float) -> float:
     """Return the heading of a lane [rad]; `bend` is the angle of a sine lane to its axis."""
     if lane.shape == CIRCLE:
         return lane.turn * along / lane.radius + lane.phase + pi / 2 * lane.turn
@@ -122,7 +126,9 @@ def heading_at(lane: Any, along: float, bend: float) -> float:
 
 
 @kernel(exact=True)
-def locate(cars: Any, number: int, lanes: Any, along: Any, across: Any, bend: Any) -> None:
+def locate(
+    cars: np.ndarray, number: int, lanes: np.ndarray, along: np.ndarray, across: np.ndarray, bend: np.ndarray
+) -> None:
     """Assign the first `number` cars to their closest lanes, by distance [m] plus angle [rad]."""
     for i in range(number):
         best = inf
@@ -137,8 +143,15 @@ def locate(cars: Any, number: int, lanes: Any, along: Any, across: Any, bend: An
 
 @kernel(exact=True)
 def neighbours(
-    cars: Any, i: int, own: int, lanes: Any, pieces: Any, offsets: Any, along: Any, across: Any
-) -> Any:
+    cars: np.ndarray,
+    i: int,
+    own: int,
+    lanes: np.ndarray,
+    pieces: np.ndarray,
+    offsets: np.ndarray,
+    along: np.ndarray,
+    across: np.ndarray,
+) -> tuple[int, int]:
     """Return the indices of the car in front of car i and behind it on lane `own`; -1 for none.
 
     Args:
@@ -159,7 +172,8 @@ def neighbours(
             k = pieces[own, n]
             if k < 0:
                 break
-            lane, place = lanes[k], along[j, k]
+            lane: Any = lanes[k]
+            place = along[j, k]
             if not -END_MARGIN <= place < lane.length + END_MARGIN:
                 continue
             if abs(across[j, k]) > lane.width / 2 + 1.0:
@@ -181,7 +195,7 @@ COMFORT_DECELERATION = 3.0  # [m/s²], limit of the ego's deceleration towards i
 
 
 @kernel(exact=True)
-def desired_gap(driver: Any, car: Any, front: Any) -> float:
+def desired_gap(driver: np.record, car: np.record, front: np.record) -> float:
     """Return the IDM distance that a driver would keep in a car behind another one [m]."""
     closing = car.speed - front.speed * cos(front.heading - car.heading)
     comfort = 2.0 * sqrt(-driver.comfort_acceleration * driver.comfort_deceleration)
@@ -189,7 +203,7 @@ def desired_gap(driver: Any, car: Any, front: Any) -> float:
 
 
 @kernel(exact=True)
-def free_acceleration(driver: Any, car: Any, lanes: Any) -> float:
+def free_acceleration(driver: np.record, car: np.record, lanes: np.ndarray) -> float:
     """Return the IDM acceleration of a driver in a car on a free road [m/s²]."""
     target = min(max(car.target_speed, 0.0), lanes[int(car.lane)].speed_limit)
     ratio = max(car.speed, 0.0) / abs(not_zero(target))
@@ -197,7 +211,9 @@ def free_acceleration(driver: Any, car: Any, lanes: Any) -> float:
 
 
 @kernel(exact=True)
-def idm(driver: Any, cars: Any, i: int, front: int, lanes: Any, along: Any) -> float:
+def idm(
+    driver: np.record, cars: np.ndarray, i: int, front: int, lanes: np.ndarray, along: np.ndarray
+) -> float:
     """Return the IDM acceleration of a driver in car i behind another one; -1 for none [m/s²]."""
     car = cars[i]
     result = free_acceleration(driver, car, lanes)
@@ -210,7 +226,7 @@ def idm(driver: Any, cars: Any, i: int, front: int, lanes: Any, along: Any) -> f
 
 
 @kernel(exact=True)
-def follow(cars: Any, i: int, front: int, lanes: Any, along: Any) -> float:
+def follow(cars: np.ndarray, i: int, front: int, lanes: np.ndarray, along: np.ndarray) -> float:
     """Return the acceleration of car i behind another one; -1 for none [m/s²].
 
     The free-road term of IDM falls with the fourth power of speed over target speed. Without a limit, an ego
@@ -225,7 +241,15 @@ def follow(cars: Any, i: int, front: int, lanes: Any, along: Any) -> float:
 
 @kernel(exact=True)
 def accepts(
-    cars: Any, number: int, i: int, new: int, lanes: Any, pieces: Any, offsets: Any, along: Any, across: Any
+    cars: np.ndarray,
+    number: int,
+    i: int,
+    new: int,
+    lanes: np.ndarray,
+    pieces: np.ndarray,
+    offsets: np.ndarray,
+    along: np.ndarray,
+    across: np.ndarray,
 ) -> bool:
     """Return whether MOBIL recommends that car i change to lane `new`.
 
@@ -247,7 +271,7 @@ def accepts(
 
 
 @kernel(exact=True)
-def is_taken(cars: Any, number: int, i: int, along: Any) -> bool:
+def is_taken(cars: np.ndarray, number: int, i: int, along: np.ndarray) -> bool:
     """Return whether a car shortly ahead of car i also changes to its target lane."""
     car, own = cars[i], int(cars[i].lane)
     for j in range(number):
@@ -261,7 +285,14 @@ def is_taken(cars: Any, number: int, i: int, along: Any) -> bool:
 
 @kernel(exact=True)
 def change_lane(
-    cars: Any, number: int, i: int, lanes: Any, pieces: Any, offsets: Any, along: Any, across: Any
+    cars: np.ndarray,
+    number: int,
+    i: int,
+    lanes: np.ndarray,
+    pieces: np.ndarray,
+    offsets: np.ndarray,
+    along: np.ndarray,
+    across: np.ndarray,
 ) -> None:
     """Begin or abort a lane change of car i, as `IDMVehicle.change_lane_policy` does."""
     car, own = cars[i], int(cars[i].lane)
@@ -284,7 +315,7 @@ def change_lane(
 
 
 @kernel(exact=True)
-def steer(car: Any, lane: Any, along: float, across: float, bend: float) -> float:
+def steer(car: np.record, lane: np.record, along: float, across: float, bend: float) -> float:
     """Return the steering angle of a car towards the centre of its target lane [rad].
 
     Args:
@@ -304,14 +335,14 @@ def steer(car: Any, lane: Any, along: float, across: float, bend: float) -> floa
 
 @kernel(exact=True)
 def decide(
-    cars: Any,
+    cars: np.ndarray,
     number: int,
-    lanes: Any,
-    pieces: Any,
-    offsets: Any,
-    along: Any,
-    across: Any,
-    bend: Any,
+    lanes: np.ndarray,
+    pieces: np.ndarray,
+    offsets: np.ndarray,
+    along: np.ndarray,
+    across: np.ndarray,
+    bend: np.ndarray,
     first: int,
     follows: bool,
 ) -> int:
@@ -357,7 +388,7 @@ def decide(
 
 
 @kernel(exact=True)
-def move(cars: Any, number: int, slip: Any, dt: float) -> None:
+def move(cars: np.ndarray, number: int, slip: np.ndarray, dt: float) -> None:
     """Advance the cars except the ego by `dt` [s]; they never reverse. `slip` is their slip angle [rad]."""
     for i in range(number):
         car = cars[i]
@@ -381,7 +412,7 @@ MAX_APART = 8.0  # [m], sum of both coordinates beyond which two cars are not te
 
 
 @kernel(exact=True)
-def outline_between(before: Any, after: Any, part: float) -> Rectangle:
+def outline_between(before: np.record, after: np.record, part: float) -> Rectangle:
     """Return the outline of a car after a part of the way from one `CAR` record to another."""
     rest = 1.0 - part
     x, y = rest * before.x + part * after.x, rest * before.y + part * after.y
@@ -389,7 +420,7 @@ def outline_between(before: Any, after: Any, part: float) -> Rectangle:
 
 
 @kernel(exact=True)
-def find_contact(before: Any, after: Any, ego: int) -> Any:
+def find_contact(before: np.ndarray, after: np.ndarray, ego: int) -> int:
     """Return which other car or object the ego touches first within a step, without turns and acceleration.
 
     Args:
@@ -411,7 +442,7 @@ def find_contact(before: Any, after: Any, ego: int) -> Any:
 
 
 @kernel(exact=True)
-def contact_time(before: Any, after: Any, ego: int, other: int, shares: np.ndarray) -> float:
+def contact_time(before: np.ndarray, after: np.ndarray, ego: int, other: int, shares: np.ndarray) -> float:
     """Return the time at which the ego touches another record, as a part of the step.
 
     Args:
@@ -437,7 +468,7 @@ def contact_time(before: Any, after: Any, ego: int, other: int, shares: np.ndarr
 
 
 @kernel(exact=True)
-def mark_collisions(cars: Any, number: int) -> None:
+def mark_collisions(cars: np.ndarray, number: int) -> None:
     """Mark the cars other than the ego that touch each other as crashed."""
     for i in range(number):
         for j in range(i):

@@ -1,6 +1,8 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """The kinds of traffic, each based on a highway-env environment."""
 
-from typing import Any, ClassVar, cast
+from typing import ClassVar, cast
 
 from highway_env.envs.highway_env import HighwayEnv
 from highway_env.envs.intersection_env import IntersectionEnv
@@ -8,15 +10,17 @@ from highway_env.envs.merge_env import MergeGenericEnv
 from highway_env.envs.roundabout_env import RoundaboutEnv
 from highway_env.envs.two_way_env import TwoWayEnv
 
+from lgmd_gym.aliases import Config
 from lgmd_gym.envs.traffic.cars import TrafficCar
 from lgmd_gym.envs.traffic.env import TrafficEnv
+from lgmd_gym.envs.traffic.lanes import Lane
 from lgmd_gym.envs.traffic.road import TrafficRoad
 
 
 class HighwayTraffic(TrafficEnv, HighwayEnv):
     """A three-lane highway with slower cars ahead and three faster cars behind, which cut in."""
 
-    settings: ClassVar[dict[str, Any]] = {"lanes_count": 3, "vehicles_count": 11}
+    settings: ClassVar[Config] = {"lanes_count": 3, "vehicles_count": 11}
 
     def _modify_scene(self) -> None:
         for number in range(3):
@@ -30,7 +34,7 @@ class HighwayTraffic(TrafficEnv, HighwayEnv):
 class MergeTraffic(TrafficEnv, MergeGenericEnv):
     """A motorway with an access ramp from which a car merges next to the ego."""
 
-    settings: ClassVar[dict[str, Any]] = {"vehicles_count": 8, "after_merge_length": 500}
+    settings: ClassVar[Config] = {"vehicles_count": 8, "after_merge_length": 500}
 
     def _modify_scene(self) -> None:
         for car in self.road.cars:
@@ -78,7 +82,7 @@ class IntersectionTraffic(TrafficEnv, IntersectionEnv):
 
     regulated: ClassVar[bool] = True
     warm_up: ClassVar[float] = 0.0  # highway-env simulates 3 s before the episode
-    settings: ClassVar[dict[str, Any]] = {
+    settings: ClassVar[Config] = {
         "other_vehicles_type": "lgmd_gym.envs.traffic.cars.IntersectionCar",
         "destination": None,
         "initial_vehicle_count": 8,
@@ -90,8 +94,7 @@ class IntersectionTraffic(TrafficEnv, IntersectionEnv):
         self.road = TrafficRoad(self.road, None, self.regulated)  # highway-env simulates traffic on it
 
     def _modify_scene(self) -> None:
-        lane: Any = self.ego.lane
-        self.ego.target_speed = lane.speed_limit
+        self.ego.target_speed = self.ego.lane.speed_limit
 
     def _add_and_remove_cars(self) -> None:
         self._clear_vehicles()
@@ -110,7 +113,7 @@ class RoundaboutTraffic(TrafficEnv, RoundaboutEnv):
 
     def _make_road(self) -> None:
         super()._make_road()
-        for lane in cast(list[Any], self.road.network.lanes_list()):
+        for lane in cast(list[Lane], self.road.network.lanes_list()):
             lane.priority = int(hasattr(lane, "radius"))
             # At highway-env's limits of 16 to 20 m/s the lateral acceleration would exceed 1.3 g.
             lane.speed_limit = 12.0

@@ -1,12 +1,15 @@
 """The lanes of a highway-env road network as arrays for the kernels."""
 
-from typing import Any, Self
+from typing import Self, TypeAlias, cast
 
 import numpy as np
-from highway_env.road.lane import CircularLane, SineLane
-from highway_env.road.road import RoadNetwork
+from highway_env.road.lane import CircularLane, SineLane, StraightLane
+from highway_env.road.road import LaneIndex, RoadNetwork
 
 from lgmd_gym.envs.traffic.kernels import CIRCLE, LANE, SINE, STRAIGHT, project
+
+Lane: TypeAlias = StraightLane | CircularLane
+"""A lane of highway-env that has a table row; a `SineLane` is a `StraightLane`."""
 
 
 class LaneTable:
@@ -26,13 +29,13 @@ class LaneTable:
 
     def __init__(self, network: RoadNetwork) -> None:
         by_index = network.lanes_dict()
-        self.indices: list[Any] = list(by_index)
-        self.numbers: dict[Any, int] = {index: row for row, index in enumerate(self.indices)}
-        self.lanes: list[Any] = list(by_index.values())
+        self.indices: list[LaneIndex] = cast(list[LaneIndex], list(by_index))
+        self.numbers: dict[LaneIndex, int] = {index: row for row, index in enumerate(self.indices)}
+        self.lanes: list[Lane] = cast(list[Lane], list(by_index.values()))
         self.records = np.zeros(len(self.lanes), LANE)
         roads = {index[:2]: None for index in self.indices}
-        for row, (index, lane) in enumerate(by_index.items()):
-            _fill(self.records[row], lane)
+        for row, index in enumerate(self.indices):
+            _fill(self.records[row], self.lanes[row])
             start, end, number = index
             values = (list(roads).index(index[:2]), number, len(network.graph[start][end]))
             self.records[["road", "number", "lanes", "ends"]][row] = (*values, end not in network.graph)
@@ -45,7 +48,7 @@ class LaneTable:
         self.pieces = np.array([[k for k, _ in item] + [-1] * (size - len(item)) for item in pieces])
         self.offsets = np.array([[at for _, at in item] + [0.0] * (size - len(item)) for item in pieces])
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
         """Return this object."""
         return self
 
@@ -76,7 +79,7 @@ class LaneTable:
             self._zeros = np.zeros((count, len(self.lanes)))
         return self._zeros[:count]
 
-    def _connected(self, network: RoadNetwork, index: Any) -> list[tuple[int, float]]:
+    def _connected(self, network: RoadNetwork, index: LaneIndex) -> list[tuple[int, float]]:
         """Return a lane, the next and the previous lanes, each with its start along the lane [m]."""
         start, end, number = index
         pieces = [(self.numbers[index], 0.0)]
@@ -92,7 +95,7 @@ class LaneTable:
         return pieces
 
 
-def _fill(record: Any, lane: Any) -> None:
+def _fill(record: np.void, lane: Lane) -> None:
     """Write the geometry of a lane into a `LANE` record."""
     record["length"], record["width"] = lane.length, lane.width
     record["forbidden"], record["speed_limit"] = lane.forbidden, lane.speed_limit

@@ -1,19 +1,21 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """The road of the traffic environments: compiled drivers and motion, contact detection inside each step."""
 
 from array import array
 from math import hypot
-from typing import Any
+from typing import TypeAlias, cast
 
 import numpy as np
 from highway_env.road.regulation import RegulatedRoad
 from highway_env.road.road import Road
 from highway_env.utils import rotated_rectangles_intersect
-from highway_env.vehicle.objects import Landmark
+from highway_env.vehicle.objects import Landmark, RoadObject
 
 from lgmd_gym.envs.dynamics.bodies import BODY, BOX
 from lgmd_gym.envs.dynamics.contact import Contact
 from lgmd_gym.envs.dynamics.episode import PARTS
-from lgmd_gym.envs.traffic.cars import TrafficEgo
+from lgmd_gym.envs.traffic.cars import TrafficCar, TrafficEgo
 from lgmd_gym.envs.traffic.kernels import (
     ALL_DONE,
     CAR,
@@ -27,6 +29,9 @@ from lgmd_gym.envs.traffic.kernels import (
     move,
 )
 from lgmd_gym.envs.traffic.lanes import LaneTable
+
+Item: TypeAlias = TrafficCar | RoadObject
+"""A car, or a solid object."""
 
 
 class TrafficRoad(RegulatedRoad):
@@ -59,7 +64,7 @@ class TrafficRoad(RegulatedRoad):
         self.contact: Contact | None = None
         self._lanes = LaneTable(self.network)
         self._records = self._constants = np.zeros(0, CAR)
-        self._known: list[Any] = []  # the cars of `_constants`
+        self._known: list[TrafficCar] = []  # the cars of `_constants`
         self._predictions: dict[int, list[tuple[float, float, float]]] = {}
 
     @property
@@ -69,19 +74,19 @@ class TrafficRoad(RegulatedRoad):
         return self._ego
 
     @property
-    def cars(self) -> list[Any]:
+    def cars(self) -> list[TrafficCar]:
         """All cars, including the ego."""
-        return self.vehicles
+        return cast(list[TrafficCar], self.vehicles)
 
     @property
-    def obstacles(self) -> list[Any]:
+    def obstacles(self) -> list[Item]:
         """Cars and solid objects that the ego can touch."""
         return [item for item in self.items if item is not self._ego]
 
     @property
-    def items(self) -> list[Any]:
+    def items(self) -> list[Item]:
         """All cars, then the solid objects."""
-        return [*self.vehicles, *(item for item in self.objects if not isinstance(item, Landmark))]
+        return [*self.cars, *(item for item in self.objects if not isinstance(item, Landmark))]
 
     def act(self) -> None:
         """Update the decisions of all drivers."""
@@ -95,7 +100,7 @@ class TrafficRoad(RegulatedRoad):
         arguments = (cars, number, table.records, pieces, table.offsets, along, across, bends)
         waiting = decide(*arguments, 0, False)
         while waiting != ALL_DONE:
-            car: Any = self.vehicles[waiting]
+            car = self.cars[waiting]
             car.follow_road()
             cars["target_lane"][waiting] = table.numbers[car.target_lane_index]
             cars["planned_lane"][waiting] = car.planned_lane
@@ -164,7 +169,7 @@ class TrafficRoad(RegulatedRoad):
 
     def read(self) -> np.ndarray:
         """Return all cars, then the solid objects, as `CAR` records."""
-        vehicles: list[Any] = self.vehicles
+        vehicles = self.cars
         if self._known != vehicles:
             self._known, self._constants = list(vehicles), self._read_constants()
         values = array("d")
@@ -176,12 +181,13 @@ class TrafficRoad(RegulatedRoad):
 
     def _read_constants(self) -> np.ndarray:
         """Return records of all cars without their state, and of the solid objects."""
-        items: list[Any] = self.items
+        items = self.items
         cars = np.zeros(len(items), CAR)
         for number, item in enumerate(items):
-            if number < len(self.vehicles):
+            if isinstance(item, TrafficCar):
                 _numbers(cars)[number, len(CAR_STATE) :] = item.constants
                 continue
+            assert item.lane_index is not None
             cars["x"][number], cars["y"][number] = item.position
             cars["heading"][number], cars["lane"][number] = item.heading, self._lanes.numbers[item.lane_index]
             cars["length"][number], cars["width"][number] = item.LENGTH, item.WIDTH
@@ -189,10 +195,10 @@ class TrafficRoad(RegulatedRoad):
 
     def bodies(self) -> np.ndarray:
         """Return the ego, the other cars and the solid objects as `BODY` records on straight paths."""
-        vehicles: list[Any] = self.vehicles
+        vehicles = self.cars
         current = self._known == vehicles and self.contact is None and len(self._records) > 0
         cars = self._records if current else self.read()
-        ego = vehicles.index(self._ego)
+        ego = vehicles.index(self.ego)
         cars = cars[[ego, *range(ego), *range(ego + 1, len(cars))]]
         bodies = np.zeros(len(cars), BODY)
         bodies["kind"], bodies["path_end"] = BOX, 1
@@ -203,7 +209,7 @@ class TrafficRoad(RegulatedRoad):
     def _write(self, cars: np.ndarray) -> None:
         """Assign the state of `CAR` records to the cars."""
         table, ego = self._lanes, self._ego
-        vehicles: list[Any] = self.vehicles
+        vehicles = self.cars
         for car, row in zip(vehicles, _numbers(cars)[:, :9].tolist(), strict=False):
             x, y, heading, speed, lane, target, timer, steering, acceleration = row
             number = int(lane)
@@ -221,7 +227,7 @@ class TrafficRoad(RegulatedRoad):
         super().enforce_road_rules()
 
     def is_conflict_possible(  # type: ignore[override]
-        self, v1: Any, v2: Any, horizon: float = 3.0, step: float = 0.25
+        self, v1: TrafficCar, v2: TrafficCar, horizon: float = 3.0, step: float = 0.25
     ) -> bool:
         """Return whether the routes of two cars may conflict within `horizon` [s].
 
@@ -240,7 +246,7 @@ class TrafficRoad(RegulatedRoad):
                 return True
         return False
 
-    def _predict(self, car: Any, times: np.ndarray) -> list[tuple[float, float, float]]:
+    def _predict(self, car: TrafficCar, times: np.ndarray) -> list[tuple[float, float, float]]:
         """Return the predicted poses of a car: x [m], y [m] and heading [rad] at each time."""
         if id(car) not in self._predictions:
             positions, headings = car.predict_trajectory_constant_speed(times)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypedDict
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.data import scenario_from_data, scenario_to_data
@@ -63,12 +64,12 @@ class Case:
         """The text "suite/family/variant", stable across versions."""
         return f"{self.suite}/{self.family}/{self.variant}"
 
-    def argument(self, name: str, default: Any = None) -> Any:
+    def argument(self, name: str, default: object = None) -> Any:
         """Return an argument of the environment, or a default if the case does not state it."""
         return dict(self.arguments).get(name, default)
 
     @property
-    def appearance(self) -> dict[str, Any]:
+    def appearance(self) -> Values:
         """Arguments that set the appearance, such as `weather`."""
         return {name: value for name, value in self.arguments if name in APPEARANCE}
 
@@ -204,13 +205,13 @@ def to_mps(kmh: float) -> float:
     return round(kmh * KMH, 6)
 
 
-def make_case(suite: str, family: str, variant: str, **arguments: Any) -> Case:
+def make_case(suite: str, family: str, variant: str, **arguments: object) -> Case:
     """Return the case `suite/family/variant`."""
     return Case(suite, family, variant, tuple(arguments.items()))
 
 
 def scenario_case(
-    suite: str, variant: str, scenario: Scenario, fcw_driver: bool = False, **arguments: Any
+    suite: str, variant: str, scenario: Scenario, fcw_driver: bool = False, **arguments: object
 ) -> Case:
     """Return the case `suite/family/variant` with a given scenario, which it holds as plain data."""
     values = {SCENARIO_ARGUMENT: scenario_to_data(scenario)} | arguments
@@ -218,7 +219,7 @@ def scenario_case(
 
 
 def speed_cases(
-    suite: str, family: str, speeds_kmh: Sequence[int], tail: str = "", **arguments: Any
+    suite: str, family: str, speeds_kmh: Sequence[int], tail: str = "", **arguments: object
 ) -> tuple[Case, ...]:
     """Return one case per ego speed, with the same name suffix and arguments for all."""
     return tuple(
@@ -257,7 +258,7 @@ def key_of(row: EpisodeRow) -> RowKey:
 
 
 def new_row(
-    keys: tuple[str, ...], agent: str, case: Case, seed: int, condition: str = CLEAR, **values: Any
+    keys: tuple[str, ...], agent: str, case: Case, seed: int, condition: str = CLEAR, **values: object
 ) -> Any:
     """Return a row with its identity, the fields of its case and `values`; all other keys are null."""
     identity = (agent, case.suite, case.name, case.fcw_driver, seed, condition)
@@ -265,7 +266,7 @@ def new_row(
     return dict.fromkeys(keys) | dict(zip(ID_KEYS, identity, strict=True)) | fields | values
 
 
-def case_fields(case: Case) -> dict[str, Any]:
+def case_fields(case: Case) -> Values:
     """Return the `CASE_KEYS` of a case."""
     speed = None if case.argument("from_stop") else case.speed
     names = ("target_speed", "overlap", "impact_location", "side", "weather")

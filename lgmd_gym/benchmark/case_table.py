@@ -9,10 +9,11 @@ from collections.abc import Collection, Sequence
 from inspect import signature
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeAlias, cast
 
 from docstring_parser import DocstringStyle, parse
 
+from lgmd_gym.aliases import Arguments, Values
 from lgmd_gym.benchmark.case import Case, file_name, scenario_case, to_mps
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families import FAMILIES
@@ -20,6 +21,8 @@ from lgmd_gym.envs.families.data import scenario_from_data
 from lgmd_gym.envs.registration import APPEARANCE
 from lgmd_gym.errors import check_finite, check_flag, check_keys, check_type, is_number, shown
 
+Argument: TypeAlias = bool | int | float | str
+"""A value of a swept argument."""
 MAX_CASES = 10_000  # of one table
 RANGE_KEYS = ("start", "stop", "step")
 SPEED = "ego_speed"  # its part of a name is "v" and the speed in km/h
@@ -27,7 +30,7 @@ _UNIT = re.compile(r"\[(m/s²|m/s|m|s|rad)\]")
 _SUFFIXES = {"m/s²": "mps2", "m/s": "kmh", "m": "m", "s": "s", "rad": "rad"}
 
 
-def read_data(path: Path, kind: str) -> dict[str, Any]:
+def read_data(path: Path, kind: str) -> Values:
     """Return the values of a TOML file, or of a JSON file if its name ends in ".json".
 
     Raises:
@@ -36,19 +39,19 @@ def read_data(path: Path, kind: str) -> dict[str, Any]:
     is_json = path.suffix == ".json"
     try:
         text = path.read_text(encoding="utf-8")
-        values = json.loads(text, object_pairs_hook=_unique) if is_json else tomllib.loads(text)
+        values: object = json.loads(text, object_pairs_hook=_unique) if is_json else tomllib.loads(text)
     except OSError as error:
         raise ValueError(f"{kind} {str(path)!r} cannot be read: {error.strerror}") from None
     except ValueError as error:  # also of the decoders of TOML, JSON and UTF-8
         raise ValueError(f"{kind} {str(path)!r} is not {'JSON' if is_json else 'TOML'}: {error}") from None
     if not isinstance(values, dict):
         raise ValueError(f"{kind} {str(path)!r} must contain an object {{...}}, got {type(values).__name__}")
-    return values
+    return cast(Values, values)
 
 
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _unique(pairs: list[tuple[str, object]]) -> Values:
     """Return an object; the JSON module silently keeps the last of several values of a key."""
-    values: dict[str, Any] = {}
+    values: Values = {}
     for key, value in pairs:
         if key in values:
             raise ValueError(f"key {key!r} is stated twice")
@@ -60,31 +63,32 @@ class SweptArgument(NamedTuple):
     """One swept argument."""
 
     name: str  # name of the argument
-    values: Sequence[Any]  # its values, in SI units; all are different
+    values: Sequence[Argument]  # its values, in SI units; all are different
     parts: Sequence[str]  # the part of the case's name for each value; all are different
 
 
-def read_values(name: str, given: Any) -> list[Any]:
+def read_values(name: str, given: object) -> list[Argument]:
     """Return the values of a list, or of a range { start, stop, step }, which includes `stop`.
 
     Raises:
         ValueError: If there are none, one occurs twice, or they are not numbers, strings and flags.
     """
     if isinstance(given, dict):
-        return _range(name, given)
+        return _range(name, cast(Values, given))
     if not isinstance(given, list):
         raise ValueError(f"{name} must be a list, or a table with start, stop and step, got {shown(given)}")
     if not given:
         raise ValueError(f"{name} is empty; write at least one value, or remove it")
-    for index, value in enumerate(given):
+    values = cast(list[object], given)
+    for index, value in enumerate(values):
         if not isinstance(value, bool | int | float | str):
             raise ValueError(f"{name} must contain numbers, strings or true and false, got {shown(value)}")
-        if value in given[:index]:
+        if value in values[:index]:
             raise ValueError(f"{name} contains {shown(value)} twice; remove one")
-    return given
+    return cast(list[Argument], values)
 
 
-def _range(name: str, given: dict[str, Any]) -> list[Any]:
+def _range(name: str, given: Arguments) -> list[Argument]:
     check_keys(f"key of {name}", given, RANGE_KEYS)
     for key in RANGE_KEYS:
         if key not in given:
@@ -104,25 +108,26 @@ def _range(name: str, given: dict[str, Any]) -> list[Any]:
     return [round(value, 9) if isinstance(value, float) else value for value in values]
 
 
-def make_axis(family: str, name: str, given: Any) -> SweptArgument:
+def make_axis(family: str, name: str, given: object) -> SweptArgument:
     """Return the axis of an argument of a family; its parts have the unit that the docstring states.
 
     Raises:
         ValueError: See `read_values`.
     """
     values = read_values(f"sweep.{name}", given)
-    if name == SPEED and all(map(is_number, values)):
-        return SweptArgument(name, values, [f"v{text}" for text in _numbers(values, 1.0 / KMH)])
+    numbers = [value for value in values if is_number(value)]
+    if name == SPEED and len(numbers) == len(values):
+        return SweptArgument(name, values, [f"v{text}" for text in _numbers(numbers, 1.0 / KMH)])
     label, unit = file_name(name.replace("_", "-")), _unit(family, name)
-    if not all(map(is_number, values)):
+    if len(numbers) < len(values):
         return SweptArgument(name, values, [_word(label, value) for value in values])
     factor = 1.0 / KMH if unit == "m/s" else 1.0
     return SweptArgument(
-        name, values, [f"{label}{text}{_SUFFIXES.get(unit, '')}" for text in _numbers(values, factor)]
+        name, values, [f"{label}{text}{_SUFFIXES.get(unit, '')}" for text in _numbers(numbers, factor)]
     )
 
 
-def combine(axes: Sequence[SweptArgument]) -> list[tuple[str, dict[str, Any]]]:
+def combine(axes: Sequence[SweptArgument]) -> list[tuple[str, Values]]:
     """Return the variant and the arguments of each combination; the last axis changes first.
 
     Raises:
@@ -140,7 +145,7 @@ def combine(axes: Sequence[SweptArgument]) -> list[tuple[str, dict[str, Any]]]:
     ]
 
 
-def _word(label: str, value: Any) -> str:
+def _word(label: str, value: Argument) -> str:
     """Return the part of a flag or string: "left" or "not-left", or "side-left"."""
     if isinstance(value, bool):
         return label if value else f"not-{label}"
@@ -169,7 +174,7 @@ CASE_KEYS = ("family", "name", "speeds_kmh", "sweep", "fcw_driver", "arguments",
 _NAME = re.compile(r"[\w.+-]+(/[\w.+-]+)*")  # names become parts of file names
 
 
-def read_cases(suite: str, table: Any) -> list[Case]:
+def read_cases(suite: str, table: object) -> list[Case]:
     """Return the cases of one table of a suite file.
 
     Raises:
@@ -177,6 +182,7 @@ def read_cases(suite: str, table: Any) -> list[Case]:
     """
     if not isinstance(table, dict):
         raise ValueError(f"cases must be [[cases]] tables, got {table!r}")
+    table = cast(Values, table)
     check_table("a case", table, CASE_KEYS)
     family = read_name(table, "family")
     arguments = check_type("arguments", table.get("arguments", {}), dict)
@@ -185,14 +191,14 @@ def read_cases(suite: str, table: Any) -> list[Case]:
         return [_scenario_case(suite, family, table, fcw_driver)]
     axes = _axes(family, table, arguments)
     name = read_name(table, "name") if "name" in table or not axes else ""
-    cases = []
+    cases: list[Case] = []
     for variant, swept in combine(axes):
         parts = "/".join(filter(None, (variant, name)))
         cases.append(Case(suite, family, parts, tuple((arguments | swept).items()), fcw_driver=fcw_driver))
     return cases
 
 
-def check_table(kind: str, table: dict[str, Any], known: Collection[str]) -> None:
+def check_table(kind: str, table: Values, known: Collection[str]) -> None:
     """Raise ValueError for an unknown key; for an argument of the family, the message states its place."""
     family = str(table.get("family"))
     arguments = signature(FAMILIES[family]).parameters if family in FAMILIES else ()
@@ -204,7 +210,7 @@ def check_table(kind: str, table: dict[str, Any], known: Collection[str]) -> Non
     check_keys(f"key of {kind}", table, known)
 
 
-def read_name(table: dict[str, Any], key: str) -> str:
+def read_name(table: Values, key: str) -> str:
     """Return a name in a table, whose characters are allowed in names of suites and cases."""
     value = table.get(key)
     if not isinstance(value, str) or not _NAME.fullmatch(value):
@@ -212,7 +218,7 @@ def read_name(table: dict[str, Any], key: str) -> str:
     return value
 
 
-def _axes(family: str, table: dict[str, Any], arguments: dict[str, Any]) -> list[SweptArgument]:
+def _axes(family: str, table: Values, arguments: Arguments) -> list[SweptArgument]:
     """Return the swept arguments, the speed first."""
     axes = [_speeds(table["speeds_kmh"])] if "speeds_kmh" in table else []
     if axes and SPEED in arguments:
@@ -229,22 +235,23 @@ def _axes(family: str, table: dict[str, Any], arguments: dict[str, Any]) -> list
     return axes + [make_axis(family, name, sweep[name]) for name in names]
 
 
-def _speeds(given: Any) -> SweptArgument:
+def _speeds(given: object) -> SweptArgument:
     """Return the axis of `speeds_kmh`."""
-    values = given if isinstance(given, list) else read_values("speeds_kmh", given)
-    if not values or not all(is_number(speed) and speed > 0 for speed in values):
+    values = cast(list[object], given) if isinstance(given, list) else read_values("speeds_kmh", given)
+    speeds = [speed for speed in values if is_number(speed) and speed > 0]
+    if not values or len(speeds) < len(values):
         raise ValueError(f"speeds_kmh must be a list of numbers > 0, got {given!r}")
-    return SweptArgument(SPEED, [to_mps(speed) for speed in values], [f"v{speed:g}" for speed in values])
+    return SweptArgument(SPEED, [to_mps(speed) for speed in speeds], [f"v{speed:g}" for speed in speeds])
 
 
-def _scenario_case(suite: str, family: str, table: dict[str, Any], fcw_driver: bool) -> Case:
+def _scenario_case(suite: str, family: str, table: Values, fcw_driver: bool) -> Case:
     """Return the case of a table with a scenario, whose family is that of the table."""
     arguments, data = table.get("arguments", {}), table["scenario"]
     check_keys("argument of a case with a scenario", arguments, APPEARANCE)
     for key in ("speeds_kmh", "sweep"):
         if key in table:
             raise ValueError(f"{key} and scenario exclude each other; write one table per scenario")
-    data = {"family": family} | data if isinstance(data, dict) else data
+    data = {"family": family} | cast(Values, data) if isinstance(data, dict) else data
     scenario = scenario_from_data(data)
     if scenario.family != family:
         raise ValueError(

@@ -15,6 +15,7 @@ from typing import Any
 import tomli_w
 
 from lgmd_gym._version import __version__
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import NO_BRAKE, TRAFFIC, RowKey, Suite, traffic_case
 from lgmd_gym.benchmark.case_table import read_data
 from lgmd_gym.benchmark.sensors import SensorConfig
@@ -31,7 +32,7 @@ from lgmd_gym.sensing.channel import ChannelSpec, make_channels
 PACKAGES = ("numpy", "numba", "gymnasium", "highway-env", "joblib")
 
 
-def provenance() -> dict[str, Any]:
+def provenance() -> Values:
     """Return the versions, commit, processor and date of this run."""
     return {
         "lgmd_gym": __version__,
@@ -138,7 +139,7 @@ class RunConfig:
             make_channels(self.camera)
         LGMDParams.make(self.params)
         plain = SensorConfig(self.camera, self.params).plain
-        values: dict[str, Any] = {
+        values: Values = {
             "seeds": check_whole("seeds", self.seeds, 1),
             "first_seed": check_whole("first_seed", self.first_seed, 0),
             "agents": _names("agents", self.agents),
@@ -247,7 +248,7 @@ class RunConfig:
         path.write_text(head + tomli_w.dumps(values), encoding="utf-8")
         return path
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Values:
         """Return the values for TOML and JSON; a user's own suite is `SUITE_FILE`."""
         values = asdict(self) | ({"suite": SUITE_FILE} if self.own_suite else {})
         del values["modules"]

@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 
 from lgmd_gym.agents.base import Actor
+from lgmd_gym.aliases import Info, Values
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs import env_id
@@ -17,8 +18,8 @@ from lgmd_gym.envs.families.scenario import Scenario
 class Step(NamedTuple):
     """Result of a reset or of one step of an environment."""
 
-    observation: dict[str, Any]
-    info: dict[str, Any]
+    observation: Values
+    info: Info
     reward: float = 0.0
     done: bool = False
 

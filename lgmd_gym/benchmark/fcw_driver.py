@@ -1,11 +1,11 @@
 """The driver model of Euro NCAP's forward collision warning (FCW) tests."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
 from lgmd_gym.agents.base import BatchAgent, Infos, Observations
+from lgmd_gym.aliases import Values
 
 REACTION = 1.2  # [s] from the alert to braking, Euro NCAP AEB C2C v4.3.1, 8.4.6
 DECELERATION = 4.0  # [m/s²], same section
@@ -29,7 +29,7 @@ class FCWDriver(BatchAgent):
         self._delay = round(REACTION * decision_hz)
         self._allocate(agent.num_envs)
 
-    def initial(self) -> dict[str, Any]:
+    def initial(self) -> Values:
         """Return the number of decisions since the first alert, -1 before it."""
         return {"since_alert": -1}
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import CASE_KEYS, ID_KEYS, Case, Row, new_row, relative_impact
 from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.camera import CLEAR
@@ -89,7 +90,7 @@ def metric(function: Metric) -> Metric:
     return function
 
 
-def measure(pair: PairedEpisode) -> dict[str, Any]:
+def measure(pair: PairedEpisode) -> Values:
     """Return the value of every metric, None where it is invalid."""
     values = {name: function(pair) for name, function in METRICS.items()}
     return {name: value if valid else None for name, (value, valid) in values.items()}

@@ -3,12 +3,12 @@
 import traceback
 from collections import deque
 from collections.abc import Hashable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
 from lgmd_gym.agents import BatchAgent, make_agent
 from lgmd_gym.agents.base import InfoArrays
+from lgmd_gym.aliases import Arguments, Values
 from lgmd_gym.benchmark.case import key_of
 from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.fcw_driver import FCWDriver
@@ -166,7 +166,7 @@ class BatchInfos(InfoArrays):
         self["lgmd/trace"] = batch.take_trace()
         self._batch = batch
 
-    def row(self, index: int) -> dict[str, Any]:
+    def row(self, index: int) -> Values:
         """Return the info of one environment."""
         return self._batch.info_of(super().row(index), index)
 
@@ -184,6 +184,6 @@ def _player(unit: Unit) -> BatchPlayer:
     return _players[key]
 
 
-def _scenario_arguments(arguments: dict[str, Any]) -> dict[str, Any]:
+def _scenario_arguments(arguments: Arguments) -> Arguments:
     """Return the arguments without those that a simulation shares."""
     return {name: value for name, value in arguments.items() if name not in ("config", "fps")}

@@ -6,11 +6,12 @@ import re
 from errno import ENOSPC
 from hashlib import blake2b
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from lgmd_gym._version import __version__
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import ID_KEYS, TRAFFIC, Row, RowKey, key_of
 from lgmd_gym.benchmark.config import RUN_FILE, RunConfig, provenance
 from lgmd_gym.camera import CLEAR
@@ -90,7 +91,7 @@ def rows_file(path: Path) -> Path:
     return file
 
 
-def read_settings(path: Path) -> dict[str, Any]:
+def read_settings(path: Path) -> Values:
     """Return the contents of `run.json` of a run folder.
 
     Raises:
@@ -98,12 +99,12 @@ def read_settings(path: Path) -> dict[str, Any]:
     """
     file = path / "run.json"
     try:
-        settings = json.loads(file.read_text(encoding="utf-8"))
+        settings: object = json.loads(file.read_text(encoding="utf-8"))
         if not isinstance(settings, dict):
             raise ValueError
     except (OSError, ValueError):
         raise ValueError(f"{str(file)!r} is missing or damaged; start a new run") from None
-    return settings
+    return cast(Values, settings)
 
 
 def read_series(path: Path, name: str) -> dict[str, np.ndarray] | None:
@@ -124,7 +125,7 @@ def read_series(path: Path, name: str) -> dict[str, np.ndarray] | None:
 
 def _parse(file: Path) -> tuple[list[Row], bool]:
     """Return the rows of a file, and whether an incomplete last line was skipped."""
-    rows = []
+    rows: list[Row] = []
     lines = file.read_bytes().splitlines(keepends=True)
     for number, line in enumerate(lines, start=1):
         try:
@@ -147,7 +148,7 @@ def _check_rows(file: Path, rows: list[Row], config: RunConfig) -> None:
     suite = config.get_suite()
     planned, lines, faults = config.row_keys(suite), dict[RowKey, int](), dict[int, str]()
     for number, row in enumerate(rows, start=1):
-        if not isinstance(row, dict) or not {*ID_KEYS, "error"} <= row.keys():
+        if not isinstance(row, dict) or not {*ID_KEYS, "error"} <= row.keys():  # pyright: ignore[reportUnnecessaryIsInstance]
             raise _damaged(file, number)
         key = key_of(row)
         try:
@@ -242,7 +243,7 @@ class RunFolder:
         folder.mkdir(exist_ok=True)
         np.savez_compressed(folder / f"{name}.npz", allow_pickle=False, **series)
 
-    def describe(self, settings: dict[str, Any]) -> None:
+    def describe(self, settings: Values) -> None:
         """Write `run.json`: the settings, the machine and the versions."""
         replace_file(self.path / "run.json", json.dumps(settings | provenance(), indent=2) + "\n")
 

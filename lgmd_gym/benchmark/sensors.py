@@ -1,9 +1,9 @@
 """Camera and neuron of the agents under test: the user's choice, or each agent's own."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 from lgmd_gym.agents import Agent, BatchAgent
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.camera import BirdsEye
 from lgmd_gym.neuron import NeuronSpec
 from lgmd_gym.sensing.channel import Channel, ChannelSpec, make_channels, plain_values
@@ -47,7 +47,7 @@ class SensorConfig:
         return any(isinstance(channel.camera, BirdsEye) for channel in self.channels)
 
     @property
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> Arguments:
         """Keyword arguments of `LGMDObservation`."""
         return {"camera": self.camera, "params": self.params, "include_frame": self.include_frame}
 

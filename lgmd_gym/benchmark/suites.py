@@ -8,10 +8,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import tomli_w
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import TRAFFIC, Case, Suite, file_name, repetitions, scenario_case
 from lgmd_gym.benchmark.case_table import check_table, read_cases, read_data, read_name
 from lgmd_gym.benchmark.extensions import provided
@@ -91,12 +92,12 @@ SCENARIO_KEYS = ("name", "module", "family", "arguments", "scenario", "fcw_drive
 OWN = "scenarios"  # name of a suite of scenarios without a file
 
 
-def is_scenario(values: dict[str, Any]) -> bool:
+def is_scenario(values: Values) -> bool:
     """Return whether the values of a file are those of a scenario file instead of a suite file."""
     return "cases" not in values and ("family" in values or "scenario" in values)
 
 
-def read_scenario(path: Path, values: dict[str, Any]) -> Case:
+def read_scenario(path: Path, values: Values) -> Case:
     """Return the case `stem/family/name` of a scenario file; without a name it contains the ego's speed.
 
     Raises:
@@ -111,7 +112,7 @@ def read_scenario(path: Path, values: dict[str, Any]) -> Case:
     suite, given = file_name(path.stem), values.get("scenario")
     table = {key: value for key, value in values.items() if key != "module"}
     if "family" not in table:
-        given = cast(dict[str, Any], given) if isinstance(given, dict) else {}
+        given = cast(Values, given) if isinstance(given, dict) else {}
         table["family"] = given.get("family", suite)
     (case,) = read_cases(suite, {"name": "unnamed"} | table)
     if "name" in values:
@@ -237,7 +238,7 @@ def declared_modules(suite: str) -> tuple[str, ...]:
     return _modules_of(path, read_data(path, FILE_KIND))
 
 
-def _modules_of(path: Path, values: dict[str, Any]) -> tuple[str, ...]:
+def _modules_of(path: Path, values: Values) -> tuple[str, ...]:
     given = values.get("module", [])
     try:
         return check_items("module", [given] if isinstance(given, str) else given, str, "strings")
@@ -270,10 +271,10 @@ def load_suite(path: Path, modules: tuple[str, ...] = ()) -> Suite:
         name = read_name(values, "name")
         if name in SUITES or name == TRAFFIC:
             raise ValueError(f"name {name!r} is the name of a shipped suite; choose another")
-        tables: Any = values.get("cases")
+        tables: object = values.get("cases")
         if not isinstance(tables, list) or not tables:
             raise ValueError("cases must contain at least one [[cases]] table")
-        cases = tuple(case for table in cast(list[Any], tables) for case in read_cases(name, table))
+        cases = tuple(case for table in cast(list[object], tables) for case in read_cases(name, table))
         _check_cases(cases)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{kind} {str(path)!r}: {error}") from None
@@ -303,12 +304,12 @@ def copy_suite(source: Source | Path, target: Path, modules: tuple[str, ...] = (
     worker processes need their sources again.
     """
     suite = get_suite(str(source) if isinstance(source, Path) else source, modules)
-    tables = list[dict[str, Any]]()
+    tables = list[Values]()
     for case in map(_with_data, suite.cases):
         arguments = dict(case.arguments)
         scenario = arguments.pop(SCENARIO_ARGUMENT, None) if case.environment == SCENARIO else None
         family = case.environment if scenario is None else case.family
-        table: dict[str, Any] = {"family": family, "name": case.variant}
+        table: Values = {"family": family, "name": case.variant}
         table |= {"fcw_driver": True} if case.fcw_driver else {}
         table |= {"arguments": arguments} if arguments else {}
         tables.append(table | ({} if scenario is None else {"scenario": scenario}))

@@ -4,8 +4,9 @@ import csv
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from statistics import median
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple, TypeVar, cast
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import EpisodeRow, Row, case_order
 from lgmd_gym.errors import counted
 from lgmd_gym.processes.files import complete_file
@@ -101,7 +102,7 @@ def summarise(agent: str, group: str, rows: list[Row]) -> AgentSummary:
 
 def rate_of(rows: Sequence[EpisodeRow], key: str) -> Rate:
     """Return the rate of a boolean row key, with an interval that clusters by case and world."""
-    return Rate.clustered([cast(Any, row)[key] for row in rows], *cases_and_worlds(rows))
+    return Rate.clustered([cast(Values, row)[key] for row in rows], *cases_and_worlds(rows))
 
 
 def cases_and_worlds(rows: Iterable[EpisodeRow]) -> tuple[list[str], list[int | None]]:
@@ -110,7 +111,7 @@ def cases_and_worlds(rows: Iterable[EpisodeRow]) -> tuple[list[str], list[int | 
     return [case for case, _ in pairs], [world for _, world in pairs]
 
 
-def interval_text(item: Sequence[Any], style: str, scale: float = 1.0) -> str:
+def interval_text(item: Sequence[float | None], style: str, scale: float = 1.0) -> str:
     """Return a value with its interval, if it has one."""
     value, *bounds = (f"{scale * x:{style}}" for x in item[:3] if x is not None)
     return f"{value} [{','.join(bounds)}]" if bounds else value
@@ -158,7 +159,7 @@ def write_summary(rows: list[Row], path: Path) -> None:
     write_csv(path, COLUMNS, lines)
 
 
-def write_csv(path: Path, columns: Sequence[str], lines: Iterable[Sequence[Any]]) -> None:
+def write_csv(path: Path, columns: Sequence[str], lines: Iterable[Sequence[object]]) -> None:
     """Write a CSV file, complete or not at all."""
     with complete_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
@@ -166,7 +167,7 @@ def write_csv(path: Path, columns: Sequence[str], lines: Iterable[Sequence[Any]]
         writer.writerows(lines)
 
 
-def _line(item: AgentSummary, condition: str) -> list[Any]:
+def _line(item: AgentSummary, condition: str) -> list[object]:
     avoided, false, speed = item.avoided, item.false_activations, item.speed_reduction
     threats = [avoided.n, avoided.k, _bound(avoided, "low"), _bound(avoided, "high")]
     non_threats = [false.n, false.k, _bound(false, "low"), _bound(false, "high")]
@@ -236,16 +237,16 @@ def write_episodes(rows: Sequence[EpisodeRow], path: Path) -> None:
     Null is an empty field, booleans are `true` and `false`, and `error` is the last line of the traceback.
     """
     keys = list(rows[0])
-    lines = ([_field(key, cast(Any, row)[key]) for key in keys] for row in sorted(rows, key=_order))
+    lines = ([_field(key, cast(Values, row)[key]) for key in keys] for row in sorted(rows, key=_order))
     write_csv(path, [column_name(key) for key in keys], lines)
 
 
-def _order(row: EpisodeRow) -> tuple[Any, ...]:
+def _order(row: EpisodeRow) -> tuple[str, list[tuple[int, str]], str, int]:
     """Return the place of a row, which does not depend on the time at which its episode finished."""
     return row["condition"], case_order(row["case"]), row["agent"], row["seed"]
 
 
-def _field(key: str, value: Any) -> Any:
+def _field(key: str, value: object) -> object:
     """Return a value as the field of a CSV file."""
     if value is None:
         return ""

@@ -1,10 +1,10 @@
 """One task of a run: one agent in one case with one seed."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.benchmark.case import NO_BRAKE, Case, Row, RowKey, new_row
 from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.metrics import KEYS, Counterfactual, make_row
@@ -28,9 +28,9 @@ class Task:
     road: str | None = None  # road that moves the car's body, see `Appearance`
 
     @property
-    def arguments(self) -> dict[str, Any]:
+    def arguments(self) -> Arguments:
         """Arguments of the environment: those of the case, and world, road and weather of the run."""
-        chosen: dict[str, Any] = {} if self.road is None else {"road": self.road}
+        chosen: Arguments = {} if self.road is None else {"road": self.road}
         own = self.case.environment == RANDOM  # a level has a world and a weather of its own
         if not own:
             chosen["weather"] = self.condition

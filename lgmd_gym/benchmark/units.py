@@ -37,7 +37,8 @@ def make_units(tasks: Iterable[Task], workers: int, agents: tuple[str, ...] = ()
     groups: dict[Hashable, list[Task]] = {}
     for task in tasks:
         groups.setdefault(group_key(task), []).append(task)
-    units, run = [], uuid4().hex
+    units: list[Unit] = []
+    run = uuid4().hex
     if workers == 1:
         return [Unit(run, group) for group in groups.values()]
     size = min(MAX_TASKS, -(-len(tasks) // (4 * workers)))

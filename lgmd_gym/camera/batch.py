@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -140,7 +140,7 @@ class CameraBatch:
         inputs = workspace.join(self._bundle, scene_table, roads)
         draw_cameras(first, last, frames, selected, inputs.native)
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
         for place, tables in np.ndenumerate(self._tables):
             if tables is not None:

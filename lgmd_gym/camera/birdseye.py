@@ -1,13 +1,17 @@
 """BirdsEye: highway-env's top view as greyscale frames."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgmd_gym.aliases import Config
 from lgmd_gym.camera.camera import BIRDSEYE, MAX_WIDTH
 from lgmd_gym.camera.ego import check_frame
 from lgmd_gym.errors import check_size, check_within
+
+if TYPE_CHECKING:
+    import gymnasium as gym
 
 
 @dataclass(eq=False)
@@ -38,9 +42,9 @@ class BirdsEye:
             self.scaling = check_within("scaling", self.scaling, 1e-3, 1e3, "px/m")
         self._viewer: Any = None
         self._oversampling = 1
-        self._env: Any = None
+        self._env: object = None
 
-    def render(self, env: Any, out: np.ndarray | None = None) -> np.ndarray:
+    def render(self, env: "gym.Env", out: np.ndarray | None = None) -> np.ndarray:
         """Render the present top view.
 
         Args:
@@ -49,7 +53,7 @@ class BirdsEye:
         """
         if out is not None:
             check_frame(out, self.shape)
-        base = getattr(env, "unwrapped", env)
+        base: Any = getattr(env, "unwrapped", env)
         if getattr(base, "road", None) is None:
             raise ValueError("the environment has no road: call reset() before render()")
         if self._viewer is None or self._env is not base:
@@ -79,7 +83,7 @@ class BirdsEye:
         from highway_env.envs.common.graphics import EnvViewer
 
         height, width = self.shape
-        config = base.config
+        config: Config = base.config
         # The viewer's lines are at least a pixel wide: draw at the environment's resolution, then average.
         self._oversampling = max(1, -(-config["screen_width"] // width))
         scaling = self.scaling

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Motion of the car's body on an uneven road: pitch, roll, yaw and heave from a measured spectrum.
 
 Each axis is a sum of sinusoids with fixed frequencies and random phases, a function of seed, time and speed.

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, TypeAlias, cast
+from typing import TypeAlias, cast
 
 from lgmd_gym.errors import check_known, check_size, shown
 from lgmd_gym.fields import Record, choice, flag, number, optional, record, text, value
@@ -47,9 +47,9 @@ class Gaze(Record):
 
     __slots__ = ()
     label = "camera gaze"
-    kind: Any = ""
-    derotated: Any = False
-    brake_known: Any = False
+    kind: str = ""
+    derotated: bool = False
+    brake_known: bool = False
 
 
 _DEROTATED = (
@@ -111,7 +111,7 @@ GAZES: dict[str, type[Gaze]] = {"fixed": Fixed, "path": AlongPath, "stopping": T
 """Gazes by kind."""
 
 
-def make_gaze(gaze: Any) -> Gaze:
+def make_gaze(gaze: object) -> Gaze:
     """Return a gaze from an instance, its kind, or a mapping of its kind and fields.
 
     Raises:
@@ -122,8 +122,8 @@ def make_gaze(gaze: Any) -> Gaze:
     fields = {"kind": gaze} if isinstance(gaze, str) else gaze
     if not isinstance(fields, Mapping):
         raise ValueError(f"camera gaze must be one of {', '.join(GAZES)}, or a dict, got {shown(gaze)}")
-    kind = check_known("camera gaze", cast(Mapping[str, Any], fields).get("kind", "fixed"), GAZES)
-    return GAZES[kind].make(cast(Mapping[str, Any], fields))
+    kind = check_known("camera gaze", cast(Mapping[str, object], fields).get("kind", "fixed"), GAZES)
+    return GAZES[kind].make(cast(Mapping[str, object], fields))
 
 
 @record
@@ -249,7 +249,7 @@ class Camera(Record):
         return PRESETS
 
 
-CameraItem: TypeAlias = str | Camera | Mapping[str, Any]
+CameraItem: TypeAlias = str | Camera | Mapping[str, object]
 """One camera: the name of a preset, a `Camera`, or a mapping of its fields."""
 
 PRESETS: dict[str, Camera] = {

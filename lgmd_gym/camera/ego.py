@@ -1,9 +1,10 @@
 """EgoCamera: the view from the ego car of a highway-env environment."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lgmd_gym.camera.batch import CameraBatch
 from lgmd_gym.camera.camera import Camera, CameraItem
@@ -14,6 +15,10 @@ from lgmd_gym.camera.render.raster import Workspace
 from lgmd_gym.camera.road_pool import RoadPool, road_key
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.camera.scene_table import SceneTable, view_of
+
+if TYPE_CHECKING:
+    import gymnasium as gym
+
 
 _UINT8 = np.dtype(np.uint8)
 
@@ -41,15 +46,15 @@ class EgoCamera:
     def __init__(
         self,
         camera: CameraItem | None = None,
-        scene: Scene | Mapping[str, Any] | None = None,
-        **changes: Any,
+        scene: Scene | Mapping[str, object] | None = None,
+        **changes: object,
     ) -> None:
         self.camera, self.scene = Camera.make(camera, **changes), Scene.make(scene)
         self._stage: _Stage | None = _Stage(self.camera, self.scene)
-        self._lens: Any = None
+        self._lens: np.void | None = None
 
     @classmethod
-    def posed(cls, camera: Camera, scene: Scene, lens: Any) -> "EgoCamera":
+    def posed(cls, camera: Camera, scene: Scene, lens: np.void) -> "EgoCamera":
         """Return a camera posed as in a frame that a `CameraBatch` has drawn.
 
         Args:
@@ -77,7 +82,7 @@ class EgoCamera:
         return self.buffers.image
 
     def render(
-        self, env: Any, out: np.ndarray | None = None, gaze: tuple[float, float] | None = None
+        self, env: "gym.Env", out: np.ndarray | None = None, gaze: tuple[float, float] | None = None
     ) -> np.ndarray:
         """Render the present frame.
 
@@ -99,7 +104,7 @@ class EgoCamera:
         self._lens = stage.batch.lenses[0, 0, 0]
         return out
 
-    def project(self, points_m: Any) -> np.ndarray:
+    def project(self, points_m: ArrayLike) -> np.ndarray:
         """Project world points with the pose of the last frame.
 
         Args:
@@ -140,7 +145,7 @@ class _Stage:
         self._selected = np.ones((1, 1), np.bool_)
         self._turned = False  # whether the last frame had another gaze than that of the camera
 
-    def render(self, env: Any, out: np.ndarray, gaze: tuple[float, float] | None) -> None:
+    def render(self, env: "gym.Env", out: np.ndarray, gaze: tuple[float, float] | None) -> None:
         """Draw the present frame into `out`."""
         if gaze is not None or self._turned:
             self.batch.turn(0, self._scene, gaze)

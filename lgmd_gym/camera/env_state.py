@@ -2,9 +2,17 @@
 
 import math
 import struct
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from lgmd_gym.aliases import Config
+
+if TYPE_CHECKING:
+    import gymnasium as gym
+    from highway_env.road.road import Road
+    from highway_env.vehicle.kinematics import Vehicle
+
 
 SCENE = np.dtype(
     [
@@ -20,14 +28,14 @@ _RECORD = struct.Struct("=8dq")  # packing is twice as fast as assigning a recor
 class Ego(NamedTuple):
     """Road and ego of an environment, and the pose of the ego [m, rad]."""
 
-    road: Any
-    vehicle: Any
+    road: "Road"
+    vehicle: "Vehicle"
     x: float
     y: float
     heading: float
 
 
-def read_scene(env: Any, scenes: memoryview, index: int = 0) -> Ego:
+def read_scene(env: "gym.Env", scenes: memoryview, index: int = 0) -> Ego:
     """Read the present state of a highway-env environment, wrapped or not.
 
     An environment without `steps` or `config` is at time 0.
@@ -50,8 +58,9 @@ def read_scene(env: Any, scenes: memoryview, index: int = 0) -> Ego:
     if not math.isfinite(x + y + heading):
         raise ValueError(f"the ego vehicle has position ({x}, {y}) and heading {heading}")
     steps = int(getattr(base, "steps", 0) or 0)
-    rate = (getattr(base, "config", None) or {}).get("simulation_frequency", 30)
-    action = getattr(ego, "action", None) or {}
+    config: Config = getattr(base, "config", None) or {}
+    rate = config.get("simulation_frequency", 30)
+    action: dict[str, float] = getattr(ego, "action", None) or {}
     _RECORD.pack_into(
         scenes, index * _RECORD.size,
         x, y, heading, ego.speed, action.get("steering", 0.0), action.get("acceleration", 0.0), ego.LENGTH,

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """The drawable objects of a highway-env road (vehicles, obstacles, landmarks) as an array.
 
 Objects are read by duck typing, so that this module does not import highway-env.
@@ -5,13 +7,17 @@ Objects are read by duck typing, so that this module does not import highway-env
 
 import math
 import struct
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from lgmd_gym.camera.env_state import Ego
 from lgmd_gym.camera.pose import side_tangent
 from lgmd_gym.kernels import kernel
+
+if TYPE_CHECKING:
+    from highway_env.vehicle.objects import RoadObject
+
 
 MAX_RANGE = 600.0
 """Range of vehicles and obstacles from the lens; they fade in over the last sixth [m]."""
@@ -154,7 +160,7 @@ def read_objects(ego: Ego, view: View | None, records: memoryview, index: int = 
     return count
 
 
-def _write(item: Any, x: float, y: float, place: int, records: memoryview, row: int) -> None:
+def _write(item: "RoadObject", x: float, y: float, place: int, records: memoryview, row: int) -> None:
     heading = item.heading
     if not math.isfinite(heading):
         raise ValueError(f"{type(item).__name__} {place} of the road has heading {heading}")

@@ -7,9 +7,8 @@ Pixels: u to the right, v down. (0, 0) is the outer corner of the top left pixel
 column <= u < column + 1 and row <= v < row + 1.
 """
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 LENS = np.dtype(
     [
@@ -25,7 +24,7 @@ the gaze `"stopping"` the yaw relative to the car, 0 for others, whose headlight
 yaw of a derotated view, a whole number of pixels, 0 for others [px]."""
 
 
-def project(lens: Any, points_m: np.ndarray) -> np.ndarray:
+def project(lens: np.void, points_m: ArrayLike) -> np.ndarray:
     """Project world points.
 
     Args:

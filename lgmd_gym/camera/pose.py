@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Pose of a lens on the moving ego car: mount, gaze, zoom and motion of the car's body.
 
 The gaze `ToStoppingPoint` keeps a part of the road in the frame that the car reaches when it brakes: its

@@ -6,13 +6,18 @@ Lanes are read by duck typing, once per road network.
 import math
 import weakref
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from lgmd_gym.camera.clutter import draw_clutter, place_clutter
 from lgmd_gym.camera.objects import OBJECT
 from lgmd_gym.camera.roadside import guard_rails, posts_and_plants
+
+if TYPE_CHECKING:
+    from highway_env.road.lane import AbstractLane
+    from highway_env.road.road import Road, RoadNetwork
+
 
 SHOULDER = 0.5
 """Width of the asphalt beyond the outer line [m]."""
@@ -44,11 +49,13 @@ class RoadGeometry(NamedTuple):
     paved: bool
 
 
-_CACHE: weakref.WeakKeyDictionary[Any, dict[tuple[Any, ...], RoadGeometry]] = weakref.WeakKeyDictionary()
+_CACHE: weakref.WeakKeyDictionary[object, dict[tuple[object, ...], RoadGeometry]] = (
+    weakref.WeakKeyDictionary()
+)
 
 
 def road_geometry(
-    road: Any,
+    road: "Road | RoadNetwork",
     roadside: float = 0.0,
     seed: int = 0,
     rail: bool = False,
@@ -80,17 +87,17 @@ def road_geometry(
     return known[key]
 
 
-def network_of(road: Any) -> Any:
+def network_of(road: "Road | RoadNetwork") -> Any:
     """Return the network of a highway-env `Road`, or None; a `RoadNetwork` is returned as it is."""
     return road if hasattr(road, "graph") else getattr(road, "network", None)
 
 
-def _lanes(network: Any) -> list[Any]:
+def _lanes(network: "RoadNetwork") -> "list[AbstractLane]":
     lanes = [lane for ends in network.graph.values() for group in ends.values() for lane in group]
     return [lane for lane in lanes if math.isfinite(lane.length) and lane.length > 0.0]
 
 
-def _extract(lanes: list[Any], *key: Any) -> RoadGeometry:
+def _extract(lanes: "list[AbstractLane]", *key: Any) -> RoadGeometry:
     """Return the geometry of lanes; `key` is the other arguments of `road_geometry`."""
     if not lanes:
         return RoadGeometry(np.zeros((0, 8)), np.zeros(0, LINE), np.zeros(0, OBJECT), True)
@@ -102,7 +109,7 @@ def _extract(lanes: list[Any], *key: Any) -> RoadGeometry:
         surface.append(_ribbon(lane, stations))
         segments.append(_segments(lane, stations))
         for side, kind in enumerate(getattr(lane, "line_types", None) or (0, 0)):
-            if kind in (STRIPED, CONTINUOUS, CONTINUOUS_LINE):
+            if kind in (STRIPED, CONTINUOUS, CONTINUOUS_LINE):  # pyright: ignore[reportUnnecessaryContains]
                 lines.append(_line(lane, stations, side, striped=kind == STRIPED))
     if max(lane.length for lane in lanes) <= _BAY_LENGTH:
         surface.append(_car_park(np.concatenate(surface)))
@@ -130,7 +137,7 @@ def _roadside_of(
     return out[np.argsort(out["x"], kind="stable")]
 
 
-def _stations(lane: Any) -> np.ndarray:
+def _stations(lane: "AbstractLane") -> np.ndarray:
     """Return the distances along the lane between which it is drawn straight; shape (n,) [m]."""
     length = float(lane.length)
     if type(lane).__name__ == "StraightLane":  # highway-env's, with a constant width
@@ -147,19 +154,19 @@ def _stations(lane: Any) -> np.ndarray:
     return np.linspace(0.0, length, min(int(pieces) + 2, _MAX_PIECES))
 
 
-def _segments(lane: Any, stations: np.ndarray) -> np.ndarray:
+def _segments(lane: "AbstractLane", stations: np.ndarray) -> np.ndarray:
     """Return a lane in straight pieces: x0, y0, x1, y1, start along the lane, width; shape (n, 6) [m]."""
     centre = np.array([lane.position(s, 0.0) for s in stations], dtype=np.float64)
     width = np.array([lane.width_at(s) for s in stations[:-1]])
     return np.concatenate((centre[:-1], centre[1:], stations[:-1, None], width[:, None]), axis=1)
 
 
-def _edge(lane: Any, stations: np.ndarray, side: int, extra: float) -> np.ndarray:
+def _edge(lane: "AbstractLane", stations: np.ndarray, side: int, extra: float) -> np.ndarray:
     lateral = [(side - 0.5) * (lane.width_at(s) + 2.0 * extra) for s in stations]
     return np.array([lane.position(s, r) for s, r in zip(stations, lateral, strict=True)], dtype=np.float64)
 
 
-def _ribbon(lane: Any, stations: np.ndarray) -> np.ndarray:
+def _ribbon(lane: "AbstractLane", stations: np.ndarray) -> np.ndarray:
     left, right = _edge(lane, stations, 0, SHOULDER), _edge(lane, stations, 1, SHOULDER)
     return np.concatenate((left[:-1], right[:-1], right[1:], left[1:]), axis=1)
 
@@ -189,7 +196,7 @@ def _continues(quad: np.ndarray, other: np.ndarray) -> bool:
     return True
 
 
-def _line(lane: Any, stations: np.ndarray, side: int, *, striped: bool) -> np.ndarray:
+def _line(lane: "AbstractLane", stations: np.ndarray, side: int, *, striped: bool) -> np.ndarray:
     edge = _edge(lane, stations, side, 0.0)
     along = np.stack((stations[:-1], np.full(len(stations) - 1, float(striped))), axis=1)
     return np.concatenate((edge[:-1], edge[1:], along), axis=1)

@@ -3,7 +3,7 @@
 import copy
 from collections.abc import Sequence
 from hashlib import blake2b
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from lgmd_gym.camera.road_geometry import LINE, RoadGeometry, network_of, road_g
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.camera.worlds import draw_world
 from lgmd_gym.kernels.bundle import Bundle
+
+if TYPE_CHECKING:
+    from highway_env.road.road import Road, RoadNetwork
+
 
 RoadKey: TypeAlias = tuple[float, int, bool, bool, int | None]
 """What the geometry depends on besides the lanes: the arguments of `road_geometry`."""
@@ -62,12 +66,12 @@ class RoadPool:
         spans = np.zeros((num_envs, 7), dtype=np.int64)
         self.arrays = RoadArrays(np.zeros((0, 8)), np.zeros(0, LINE), np.zeros(0, OBJECT), spans)
         self.bundle = Bundle(*self.arrays)
-        self._roads: list[tuple[Any, RoadKey] | None] = [None] * num_envs
+        self._roads: list[tuple[Road | RoadNetwork, RoadKey] | None] = [None] * num_envs
         self._stored: dict[bytes, Span] = {}
         self._used = [0, 0, 0]  # rows of surface, lines and roadside
         self._shared = False  # whether a copy of this pool has the same arrays
 
-    def assign(self, index: int, road: Any, key: RoadKey) -> None:
+    def assign(self, index: int, road: "Road | RoadNetwork", key: RoadKey) -> None:
         """Set the road of an environment.
 
         A call with the same network and key as before returns at once: a network must not change.
@@ -96,7 +100,7 @@ class RoadPool:
         if fits and not self._shared:
             return
         spans = old.spans.tolist()
-        in_use = set(map(tuple, spans))
+        in_use: set[tuple[int, ...]] = set(map(tuple, spans))
         kept = {digest: span for digest, span in self._stored.items() if span in in_use}
         old_roads = {digest: _road_at(old, span) for digest, span in kept.items()}
         sizes = [_count([*old_roads.values(), road], kind) for kind in range(3)]
@@ -114,7 +118,7 @@ class RoadPool:
         self.arrays, self._stored, self._used, self._shared = arrays, stored, used, False
         self.bundle = Bundle(*arrays)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "RoadPool":
+    def __deepcopy__(self, memo: dict[int, object]) -> "RoadPool":
         """Copy with common geometry: the next new road of either pool goes into new arrays."""
         self._shared = True
         clone = copy.copy(self)

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Posts, bushes, trees and guard rails along the road."""
 
 import math

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from typing import Any, TypeAlias
+from typing import TypeAlias, cast
 
 from lgmd_gym.camera.worlds import LABORATORY, check_world
 from lgmd_gym.errors import check_whole, shown
@@ -64,7 +64,7 @@ class Weather(Record):
         return WEATHERS
 
 
-WeatherItem: TypeAlias = str | Weather | Mapping[str, Any]
+WeatherItem: TypeAlias = str | Weather | Mapping[str, object]
 """The `weather` of a scene: a name, a `Weather`, or a mapping of its fields."""
 
 CLEAR = "clear"
@@ -82,20 +82,19 @@ WEATHERS: dict[str, Weather] = {
 """Weathers by name."""
 
 
-def _check_world(_: str, world: Any) -> int | None:
+def _check_world(_: str, world: object) -> int | None:
     return None if world is None else check_world(world)
 
 
-def _check_panorama(name: str, panorama: Any) -> str:
-    path = os.fspath(panorama) if isinstance(panorama, os.PathLike) else panorama
+def _check_panorama(name: str, panorama: object) -> str:
+    given = shown(panorama)
+    path = os.fspath(cast("os.PathLike[str]", panorama)) if isinstance(panorama, os.PathLike) else panorama
     if not isinstance(path, str) or not 0 < len(path) <= _MAX_PATH:
-        raise ValueError(
-            f"{name} must be 'skyline', 'natural' or the path of an image, got {shown(panorama)}"
-        )
+        raise ValueError(f"{name} must be 'skyline', 'natural' or the path of an image, got {given}")
     return path
 
 
-def _check_lane(name: str, lane: Any) -> int | None:
+def _check_lane(name: str, lane: object) -> int | None:
     return None if lane is None else check_whole(name, lane, 0)
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,10 @@ from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, View, read_objects
 from lgmd_gym.camera.pose import MAX_TURN
 from lgmd_gym.camera.scene import ROADS, Scene
 from lgmd_gym.kernels.bundle import Bundle
+
+if TYPE_CHECKING:
+    import gymnasium as gym
+
 
 _MAX_SPREAD = math.radians(170.0)
 _MAX_DECELERATION = 12.0  # bound of the deceleration in `pose` [m/s²]
@@ -39,7 +43,7 @@ class SceneTable:
         self.bundle = Bundle(self.scenes, self.objects, self.object_counts)
         self._take_views()
 
-    def read(self, env: Any, view: View | None, index: int = 0) -> Ego:
+    def read(self, env: "gym.Env", view: View | None, index: int = 0) -> Ego:
         """Read the present state of a highway-env environment.
 
         Args:
@@ -58,10 +62,10 @@ class SceneTable:
         self._scene_bytes = self.scenes.view(np.uint8).data
         self._object_bytes = self.objects.reshape(-1).view(np.uint8).data
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         return {name: value for name, value in self.__dict__.items() if not name.endswith("_bytes")}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
         self._take_views()
 

@@ -1,11 +1,13 @@
+# pyright: standard
+# Not strict: the type of a random draw of NumPy depends on its arguments.
 """Worlds: the appearance of road, surroundings, light and vehicles, drawn from one integer."""
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_known, check_whole
 
 LABORATORY = "laboratory"
@@ -176,7 +178,7 @@ def check_world(value: object) -> int | None:
     return check_whole("world", value, 0, WORLDS - 1)
 
 
-def _draw_ground(rng: np.random.Generator) -> dict[str, Any]:
+def _draw_ground(rng: np.random.Generator) -> Arguments:
     road, verge = str(rng.choice(ASPHALTS, p=_ASPHALT_SHARES)), str(rng.choice(VERGES, p=_VERGE_SHARES))
     return {
         "asphalt": (road, int(rng.integers(TILES))),
@@ -188,7 +190,7 @@ def _draw_ground(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _draw_markings(rng: np.random.Generator) -> dict[str, Any]:
+def _draw_markings(rng: np.random.Generator) -> Arguments:
     return {
         "paint_grey": float(rng.uniform(150.0, 232.0)),
         "line_width": float(rng.uniform(0.10, 0.20)),
@@ -197,7 +199,7 @@ def _draw_markings(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _draw_surroundings(rng: np.random.Generator) -> dict[str, Any]:
+def _draw_surroundings(rng: np.random.Generator) -> Arguments:
     horizon = float(rng.uniform(155.0, 285.0))  # a bright sky is beyond white
     return {
         "skyline": int(rng.integers(SKYLINES)),
@@ -213,7 +215,7 @@ def _draw_surroundings(rng: np.random.Generator) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _draw_sun(rng: np.random.Generator) -> dict[str, Any]:
+def _draw_sun(rng: np.random.Generator) -> Arguments:
     overcast = rng.random() < _OVERCAST_SHARE
     share = 0.0 if overcast else float(rng.uniform(0.45, 0.85))
     return {
@@ -228,7 +230,7 @@ def _draw_sun(rng: np.random.Generator) -> dict[str, Any]:
     }
 
 
-def _draw_camera(rng: np.random.Generator) -> dict[str, Any]:
+def _draw_camera(rng: np.random.Generator) -> Arguments:
     return {
         "mount_height_error": float(rng.uniform(-0.1, 0.1)),
         "pitch_error_deg": float(rng.uniform(-0.5, 0.5)),

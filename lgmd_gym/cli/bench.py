@@ -1,13 +1,14 @@
 """The `bench` command; the attribute docstrings of `Bench` are its help texts."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 from rich.console import Console
 
+from lgmd_gym.aliases import Arguments, Values
 from lgmd_gym.cli.console import activity, make_console
 from lgmd_gym.cli.values import (
     Count,
@@ -167,7 +168,7 @@ def _new(options: Bench, executor: "Executor") -> "Run":
     from lgmd_gym.benchmark.config import RunConfig
     from lgmd_gym.benchmark.runner import Run, check_trust
 
-    given: dict[str, Any] = {item.name: getattr(options, item.name, None) for item in fields(RunConfig)}
+    given: Arguments = {item.name: getattr(options, item.name, None) for item in fields(RunConfig)}
     given |= {"module": options.module, "params": read_params(options.params)}
     values = {name: value for name, value in given.items() if value is not None}
     if options.config is None:
@@ -221,7 +222,7 @@ def _title(benchmark: "Run") -> str:
 
 
 @contextmanager
-def _progress(benchmark: "Run") -> Iterator["Callable[[Row], None]"]:
+def _progress(benchmark: "Run") -> Generator["Callable[[Row], None]", None, None]:
     """Show a progress bar on stderr; yield the function that counts a row."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -272,7 +273,7 @@ class Tally:
         else:
             self.non_threats += 1
             self.false += bool(
-                cast(Any, row).get("false_activation", cast(Any, row).get("false_activations"))
+                cast(Values, row).get("false_activation", cast(Values, row).get("false_activations"))
             )
 
     def rate(self, now: float) -> float:

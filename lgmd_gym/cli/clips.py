@@ -2,13 +2,13 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.config import provenance
 from lgmd_gym.clips.batch import (
     ClipJob,
@@ -33,7 +33,7 @@ def print_notes(jobs: Sequence[ClipJob], annotations: Path | None, fps: float | 
 
 
 @contextmanager
-def run_folder(out: Path, settings: dict[str, Any]) -> Iterator[Path]:
+def run_folder(out: Path, settings: Values) -> Generator[Path, None, None]:
     """Yield an unfinished run folder with `run.json`: the settings, versions and machine of the run."""
     with complete_folder(out, "run folder") as folder:
         text = json.dumps(settings | provenance(), indent=2, default=str)
@@ -114,7 +114,7 @@ def print_errors(results: Sequence[ClipResult]) -> int:
 
 
 @contextmanager
-def progress_bar(name: str, total: float) -> Iterator[Callable[[float], None]]:
+def progress_bar(name: str, total: float) -> Generator[Callable[[float], None], None, None]:
     """Show a progress bar on stderr and yield the function that sets its value."""
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 

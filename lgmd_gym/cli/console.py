@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
@@ -32,7 +32,7 @@ def make_console() -> Console:
 
 
 @contextmanager
-def activity(text: str) -> Iterator[Callable[[str], None]]:
+def activity(text: str) -> Generator[Callable[[str], None], None, None]:
     """Show a text with a spinner if stderr is a terminal; yield the function that replaces the text.
 
     The text is erased in the end. Output to stdout that is not a terminal stays there.

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from types import ModuleType
 
 from rich.console import Console
 from rich.text import Text
@@ -143,7 +143,7 @@ def check_cache() -> list[Finding]:
     return found
 
 
-def _cache_folder(module: Any) -> str:
+def _cache_folder(module: ModuleType) -> str:
     """Return the folder in which numba caches the compiled functions of a module."""
     stats = (getattr(item, "stats", None) for item in vars(module).values())
     folders = (getattr(item, "cache_path", None) for item in stats)
@@ -219,7 +219,7 @@ def _run_approach(name: str) -> tuple[tuple[bool, float], int]:
     """Run one approach; return (contact, final gap [m]) and the number of decisions."""
     import gymnasium as gym
 
-    import lgmd_gym  # noqa: F401  (registers the ids)
+    import lgmd_gym  # noqa: F401  (registers the ids)  # pyright: ignore[reportUnusedImport]
     from lgmd_gym.agents import make_agent
 
     agent = make_agent(name)

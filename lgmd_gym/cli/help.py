@@ -8,16 +8,17 @@ import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import docstring_parser
 from tyro.conf import arg
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import unknown_name
 
-_PLACEHOLDERS = {int: "N", float: "X", str: "NAME", tuple: "[NAME ...]"}
+_PLACEHOLDERS: dict[object, str] = {int: "N", float: "X", str: "NAME", tuple: "[NAME ...]"}
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -32,7 +33,7 @@ def description(cls: type) -> str:
     return "\n\n".join(" ".join(text.split()) for text in paragraphs)
 
 
-def documented(cls: Any) -> Any:
+def documented(cls: type) -> type:
     """Return options as a class whose fields carry their help text and a readable placeholder.
 
     tyro would keep the line breaks of the docstrings, and name the types of the values.
@@ -46,9 +47,9 @@ def documented(cls: Any) -> Any:
     )
 
 
-def _documented(hint: Any, text: str) -> Any:
+def _documented(hint: object, text: str) -> Any:
     kind = get_args(hint)[0] if get_origin(hint) is Annotated else hint
-    given: dict[str, Any] = {"help": " ".join(text.split())}
+    given: Arguments = {"help": " ".join(text.split())}
     if (placeholder := _PLACEHOLDERS.get(get_origin(kind) or kind)) is not None:
         given["metavar"] = placeholder
     own = arg(**given, help_behavior_hint=_default_hint)
@@ -63,7 +64,7 @@ def _default_hint(default: str) -> str:
 
 
 @contextlib.contextmanager
-def wrapped_output() -> Iterator[None]:
+def wrapped_output() -> Generator[None, None, None]:
     """Wrap at words what the block prints to stdout, to the width of the terminal; see `wrap`."""
     buffer = _Buffer()
     try:

@@ -121,7 +121,7 @@ def _parse(arguments: list[str]) -> Any:
 
 def _command_type(chosen: str) -> Any:
     """Return the union of all option classes, each with its name; the chosen command has its whole help."""
-    commands: list[Any] = []
+    commands: list[object] = []
     for name, cls in COMMANDS.items():
         if name == chosen:
             commands.append(Annotated[documented(cls), subcommand(name=name, description=description(cls))])

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
 
+from lgmd_gym.aliases import Arguments, Values
+
 if TYPE_CHECKING:
     from lgmd_gym.agents import Agent
     from lgmd_gym.benchmark.case import Case
@@ -31,7 +33,7 @@ def refuse_unused(options: Any, used: Collection[str]) -> None:
         raise ValueError(f"--resume uses the settings of its run and ignores {', '.join(given)}; remove them")
 
 
-def read_params(path: Path | None) -> dict[str, Any] | None:
+def read_params(path: Path | None) -> Values | None:
     """Return the LGMD parameters in a TOML file as plain values, or None for no file.
 
     Raises:
@@ -63,9 +65,9 @@ def default_out(out: Path | None, name: str) -> Path:
     return out or Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
 
 
-def parse_arguments(pairs: tuple[str, ...]) -> dict[str, Any]:
+def parse_arguments(pairs: tuple[str, ...]) -> Arguments:
     """Return NAME=NUMBER pairs as a dict."""
-    arguments: dict[str, Any] = {}
+    arguments: Arguments = {}
     for pair in pairs:
         name, _, value = pair.partition("=")
         try:
@@ -75,7 +77,7 @@ def parse_arguments(pairs: tuple[str, ...]) -> dict[str, Any]:
     return arguments
 
 
-def parse_world(text: str | None) -> dict[str, Any]:
+def parse_world(text: str | None) -> Values:
     """Return the argument `world` of an environment, or {} for None.
 
     Raises:

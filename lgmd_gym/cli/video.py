@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from rich.text import Text
 from tyro.conf import Positional, arg
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.values import Count, File, Name, Number, default_out, read_params
 
@@ -136,7 +137,7 @@ def _configs(options: Video) -> "dict[str, PlaybackConfig]":
     from lgmd_gym.neuron import LGMDParams
 
     names = tuple(PLAYBACK_CONFIGS) if options.configs == ("all",) else dict.fromkeys(options.configs)
-    values: dict[str, Any] = {
+    values: Values = {
         name: getattr(options, name) for name in ("neuron", "fps", "size", "drop_duplicates", "roi")
     }
     params = read_params(options.params)

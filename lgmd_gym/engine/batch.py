@@ -5,7 +5,9 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from numpy.typing import ArrayLike
 
+from lgmd_gym.aliases import Config, Info, Values
 from lgmd_gym.engine.episodes import EpisodeQueue, Prepared
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.episode_source import EpisodeSource, FixedScenario
@@ -53,7 +55,7 @@ class BrakingBatch:
     def __init__(
         self,
         sources: Sequence[EpisodeSource],
-        config: dict[str, Any] | None = None,
+        config: Config | None = None,
         camera: ChannelSpec | None = "fovea",
         neuron: str = LGMD,
         params: NeuronSpec = None,
@@ -111,7 +113,7 @@ class BrakingBatch:
                 self.traces.take(index)
         self.simulation.start(selected)
 
-    def read_demands(self, actions: Any) -> np.ndarray:
+    def read_demands(self, actions: ArrayLike) -> np.ndarray:
         """Return the longitudinal demands of actions, in [-1, 1], float64, shape (N,).
 
         Raises:
@@ -123,7 +125,7 @@ class BrakingBatch:
         """Return arrays for `observations`."""
         if self._assembly is None:
             return np.zeros((self.num_envs, 3), np.float32)
-        out: dict[str, Any] = self._assembly.empty()
+        out = self._assembly.empty()
         return out | {"base": np.zeros((self.num_envs, 3), np.float32)} if self._include_base else out
 
     def observations(self, out: Any = None) -> Any:
@@ -162,7 +164,7 @@ class BrakingBatch:
         speeds: Any = simulation.speeds
         return [TraceFrame(times, speeds, sensors.responses)]
 
-    def info_of(self, row: dict[str, Any], index: int) -> dict[str, Any]:
+    def info_of(self, row: Values, index: int) -> Values:
         """Return the info of environment `index` as a single environment has it, from its row of `infos`.
 
         A row has the constants of other episodes, too, where sources differ.
@@ -195,7 +197,7 @@ class BrakingBatch:
         if self.sensors is not None:
             self.sensors.close()
 
-    def _set_constants(self, index: int, info: dict[str, Any]) -> None:
+    def _set_constants(self, index: int, info: Info) -> None:
         """Set the keys of the info that are constant in an episode."""
         for key, value in info.items():
             if key not in self._constants:

@@ -4,11 +4,13 @@ import copy
 import os
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from gymnasium.utils import seeding
+from highway_env.road.road import RoadNetwork
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.envs.episode_source import Draw, EpisodeSource
 
 
@@ -22,7 +24,7 @@ class Prepared(NamedTuple):
     """
 
     draw: Draw
-    network: Any
+    network: RoadNetwork
     generator: np.random.Generator
 
 
@@ -76,7 +78,7 @@ class EpisodeQueue:
             self._worker.shutdown(cancel_futures=True)
         self._worker = None
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> Values:
         """Copies have no background thread, and repeat the draws that wait."""
         return self.__dict__ | {"_worker": None, "_waiting": [None] * len(self.sources)}
 

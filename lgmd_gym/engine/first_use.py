@@ -48,7 +48,7 @@ def compile_kernels() -> None:
     _step_environment()  # compiles what connects the two, and all that a helper that failed has left
 
 
-def _compile_others() -> None:
+def _compile_others() -> None:  # pyright: ignore[reportUnusedFunction]
     """Compile the kernels of motion, neuron and worlds."""
     _step_environment(camera=None)
     camera = Camera()

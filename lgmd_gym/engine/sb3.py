@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: Gymnasium and stable-baselines3 state few types.
 """`SB3VecEnv`: vector environments of Gymnasium for the algorithms of stable-baselines3."""
 
 import time
@@ -9,11 +11,13 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 
+from lgmd_gym.aliases import Arguments, Info
 from lgmd_gym.processes.extras import missing_extra
 
 try:
     from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env import VecEnv
+    from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs
 except ImportError:
     raise ImportError(str(missing_extra("SB3VecEnv", "train"))) from None
 
@@ -45,7 +49,7 @@ class EngineVecEnv(VecEnv):
         """Return the seeds of a reset of all environments, and start new statistics."""
         if any(self._options):
             raise ValueError(f"the environments have no options, got {self._options}; call set_options()")
-        seeds: Any = list(self._seeds)
+        seeds = list(self._seeds)
         self._reset_seeds()
         self._clear_statistics()
         return seeds
@@ -59,13 +63,13 @@ class EngineVecEnv(VecEnv):
         images: Any = self.envs.render() or [None] * self.num_envs
         return list(images)
 
-    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
+    def get_attr(self, attr_name: str, indices: Indices = None) -> list[object]:
         """Return an attribute of the single environments.
 
         Raises:
             AttributeError: If the vector environment has no such attribute.
         """
-        shared: dict[str, Any] = {
+        shared: Arguments = {
             "observation_space": self.observation_space,
             "action_space": self.action_space,
         }
@@ -75,7 +79,7 @@ class EngineVecEnv(VecEnv):
             return [value[index] for index in selected]
         return [value for _ in selected]
 
-    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
+    def set_attr(self, attr_name: str, value: object, indices: Indices = None) -> None:
         """Refuse to set an attribute.
 
         Raises:
@@ -87,8 +91,8 @@ class EngineVecEnv(VecEnv):
         )
 
     def env_method(
-        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
-    ) -> list[Any]:
+        self, method_name: str, *method_args: object, indices: Indices = None, **method_kwargs: object
+    ) -> list[np.ndarray | None]:
         """Call "render", the only method of the single environments.
 
         Raises:
@@ -110,7 +114,7 @@ class EngineVecEnv(VecEnv):
         self._returns += rewards
         self._lengths += 1
 
-    def _statistics(self, index: int) -> dict[str, Any]:
+    def _statistics(self, index: int) -> dict[str, float]:
         """Return the statistics of an ended episode, and start those of the next."""
         total, length = self._returns[index], self._lengths[index]
         self._returns[index] = self._lengths[index] = 0
@@ -158,7 +162,7 @@ class SB3VecEnv(EngineVecEnv):
             )
         super().__init__(_checked(env), env.single_observation_space)
 
-    def reset(self) -> Any:
+    def reset(self) -> VecEnvObs:
         """Reset all environments with the seeds of `seed`, if any; return their observations.
 
         Raises:
@@ -168,7 +172,7 @@ class SB3VecEnv(EngineVecEnv):
         self.reset_infos = _rows(infos, range(self.num_envs))
         return observations
 
-    def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[VecEnvObs, np.ndarray, np.ndarray, list[Info]]:
         """Step all environments; return observations, rewards, ends and infos."""
         observations, rewards, terminated, truncated, arrays = self.envs.step(self._actions)
         rewards, done = rewards.astype(np.float32), terminated | truncated
@@ -186,11 +190,11 @@ class SB3VecEnv(EngineVecEnv):
         return observations, rewards, done, infos
 
 
-def _make(env_id: str, num_envs: int, arguments: dict[str, Any]) -> VectorEnv:
+def _make(env_id: str, num_envs: int, arguments: Arguments) -> VectorEnv:
     given = arguments.get("autoreset_mode", AutoresetMode.SAME_STEP)
     if given not in (AutoresetMode.SAME_STEP, AutoresetMode.SAME_STEP.value):
         raise ValueError(f"autoreset_mode must be 'SameStep' for stable-baselines3, got {given!r}; omit it")
-    settings: dict[str, Any] = arguments | {"autoreset_mode": AutoresetMode.SAME_STEP.value}
+    settings: Arguments = arguments | {"autoreset_mode": AutoresetMode.SAME_STEP.value}
     return gym.make_vec(env_id, num_envs=num_envs, **settings)
 
 
@@ -210,7 +214,7 @@ def _checked(env: VectorEnv) -> VectorEnv:
     return env
 
 
-def _rows(arrays: dict[str, Any], indices: Iterable[int]) -> list[dict[str, Any]]:
+def _rows(arrays: Info, indices: Iterable[int]) -> list[Info]:
     """Return the infos of single environments from the arrays of a vector environment."""
     names = [name for name in arrays if f"_{name}" in arrays and name not in _FINAL]
     masks = [arrays[f"_{name}"] for name in names]

@@ -1,13 +1,17 @@
+# pyright: standard
+# Not strict: Gymnasium and stable-baselines3 state few types.
 """`BrakingVectorEnv`: the compiled vector environment of all braking scenarios."""
 
 import copy as copying
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
+from numpy.typing import ArrayLike
 
+from lgmd_gym.aliases import Arguments, Config, Info, Observation
 from lgmd_gym.engine.batch import BrakingBatch
 from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.registration import make_source
@@ -85,7 +89,7 @@ class BrakingVectorEnv(VectorEnv):
         include_frame: bool = False,
         include_base: bool = False,
         trace: bool = False,
-        config: dict[str, Any] | None = None,
+        config: Config | None = None,
         render_mode: str | None = None,
         threads: int = 1,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
@@ -123,8 +127,8 @@ class BrakingVectorEnv(VectorEnv):
         self._ended = np.zeros(self.num_envs, np.bool_)
 
     def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
+        self, *, seed: int | list[int | None] | None = None, options: Arguments | None = None
+    ) -> tuple[Any, Info]:
         """Reset all environments, or those selected by ``options["reset_mask"]``.
 
         Args:
@@ -145,7 +149,7 @@ class BrakingVectorEnv(VectorEnv):
         self._ended[mask] = False
         return self.read_observations(), self.read_infos(mask)
 
-    def step(self, actions: Any) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    def step(self, actions: ArrayLike) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, Info]:
         """Advance all environments by one decision.
 
         Raises:
@@ -168,13 +172,13 @@ class BrakingVectorEnv(VectorEnv):
         outcome = self.simulation.outcome
         result = outcome.rewards.copy(), outcome.terminated.copy(), outcome.truncated.copy()
         self._ended = result[1] | result[2]
-        extra: dict[str, Any] = {}
+        extra: Info = {}
         if mode == AutoresetMode.SAME_STEP and self._ended.any():
             extra = self._end_episodes(self._ended)
         infos = self.read_infos(np.ones(self.num_envs, np.bool_))
         return self.read_observations(), *result, infos | extra
 
-    def read_demands(self, actions: Any) -> np.ndarray:
+    def read_demands(self, actions: ArrayLike) -> np.ndarray:
         """Return the longitudinal demands of actions, in [-1, 1], float64, shape (num_envs,).
 
         With `simulation.step`, `read_observations`, `read_infos` and `reset`, a loop can advance some
@@ -189,7 +193,7 @@ class BrakingVectorEnv(VectorEnv):
         """Return the present observations of all environments."""
         return self.batch.observations(self._observations)
 
-    def read_infos(self, selected: np.ndarray) -> dict[str, Any]:
+    def read_infos(self, selected: np.ndarray) -> Info:
         """Return the infos of the selected environments in the format of Gymnasium's vector environments.
 
         Every key `k` has an array of shape (num_envs,), with 0, False or None in other environments, and a
@@ -203,7 +207,7 @@ class BrakingVectorEnv(VectorEnv):
             arrays["lgmd/trace"] = np.full(self.num_envs, None, dtype=object)
             for index in np.flatnonzero(selected).tolist():
                 arrays["lgmd/trace"][index] = traces.take(index)
-        infos: dict[str, Any] = {key: _only(values, selected) for key, values in arrays.items()}
+        infos: Info = {key: _only(values, selected) for key, values in arrays.items()}
         return infos | {f"_{key}": selected.copy() for key in arrays}
 
     def scenario_of(self, index: int) -> Scenario:
@@ -227,15 +231,14 @@ class BrakingVectorEnv(VectorEnv):
             return None
         if None in self.batch.episodes:
             raise RuntimeError("the environments have no episodes: call reset() before render()")
-        frames: Any = tuple(self.batch.show(index).render() for index in range(self.num_envs))
-        return frames
+        return tuple(self.batch.show(index).render() for index in range(self.num_envs))
 
-    def close_extras(self, **kwargs: Any) -> None:
+    def close_extras(self, **kwargs: object) -> None:
         """Stop background threads and close the cameras."""
         self.batch.close()
 
     @property
-    def np_random(self) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def np_random(self) -> tuple[np.random.Generator | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Random generators of the environments."""
         return tuple(self.batch.queue.generators)
 
@@ -244,7 +247,7 @@ class BrakingVectorEnv(VectorEnv):
         """Last seeds of the environments."""
         return tuple(self.batch.queue.seeds)
 
-    def _end_episodes(self, ended: np.ndarray) -> dict[str, Any]:
+    def _end_episodes(self, ended: np.ndarray) -> Info:
         """Restart environments at once; returns their final observations and infos."""
         batch = self.batch.observations()
         final = np.full(self.num_envs, None, dtype=object)
@@ -256,7 +259,9 @@ class BrakingVectorEnv(VectorEnv):
 
 
 def _item(batch: Any, index: int) -> Any:
-    return {key: value[index] for key, value in batch.items()} if isinstance(batch, dict) else batch[index]
+    if isinstance(batch, dict):
+        return {key: value[index] for key, value in cast(Observation, batch).items()}
+    return batch[index]
 
 
 def _only(values: np.ndarray, selected: np.ndarray) -> np.ndarray:
@@ -273,7 +278,7 @@ def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
     return AutoresetMode(check_known("autoreset_mode", mode, _MODES))
 
 
-def _seeds_of(seed: Any, num_envs: int) -> list[int | None]:
+def _seeds_of(seed: object, num_envs: int) -> list[int | None]:
     """Return one seed per environment; raise ValueError for another number of seeds, or an invalid seed."""
     if seed is None:
         return [None] * num_envs
@@ -287,7 +292,7 @@ def _seeds_of(seed: Any, num_envs: int) -> list[int | None]:
     return [None if value is None else int(value) for value in seeds]
 
 
-def _mask_of(mask: Any, num_envs: int) -> np.ndarray:
+def _mask_of(mask: object, num_envs: int) -> np.ndarray:
     """Return a selection of environments, bool, shape (num_envs,); None selects all.
 
     Raises:

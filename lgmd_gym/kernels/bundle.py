@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Bundle: arrays that kernels receive in one piece.
 
 A call from Python spends a quarter of a microsecond on each array of a tuple. A bundle holds the arrays in
@@ -52,5 +54,5 @@ class Bundle:
             self._native = _make_native(self.arrays)
         return self._native
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         return {"arrays": self.arrays, "_native": None}

@@ -125,4 +125,4 @@ def report_compilation() -> None:
     global _reporter
     if _reporter is None:
         _reporter = CompilationReporter()
-        event.register("numba:compile", _reporter)
+        event.register("numba:compile", _reporter)  # pyright: ignore[reportUnknownMemberType]

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """LLVM vectors of sixteen float32 or int32 lanes for numba kernels.
 
 LLVM's auto-vectoriser fails on loops over as many arrays as an LGMD pass reads and writes: it cannot prove

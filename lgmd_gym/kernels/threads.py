@@ -9,7 +9,6 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
-from typing import Any
 
 # The rest is split into smaller parts, of which faster threads take more. Every part costs overhead.
 _LARGE_SHARE = 0.7
@@ -27,7 +26,7 @@ class Threads:
         self._pool: ThreadPoolExecutor | None = None
         self._pid = 0
 
-    def run(self, kernel: Callable[..., None], num: int, args: tuple[Any, ...]) -> None:
+    def run(self, kernel: Callable[..., None], num: int, args: tuple[object, ...]) -> None:
         """Call kernel(first, last, *args) on parts of 0..num, in the calling thread and the workers."""
         parts = deque(self._parts(num))
 
@@ -59,5 +58,5 @@ class Threads:
             self._pid = os.getpid()
         return self._pool
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         return {"count": self.count, "_pool": None, "_pid": 0}

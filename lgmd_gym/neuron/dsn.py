@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """DSN: a neuron that is selective to the direction of horizontal motion."""
 
 from collections.abc import Mapping

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """SustainedEdges: a detector of edges that stand still in the frame."""
 
 from collections.abc import Mapping

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """LPLC2: a looming detector of the fly, which compares motion along four directions."""
 
 import math

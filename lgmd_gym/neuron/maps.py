@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Kernels on the maps of any model: their shift by whole pixels as the view turns, and their columns.
 
 A view that turns to the right by one pixel moves its content one pixel to the left. The state that belongs

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """What the models beside the LGMD share: parameters, the base class, and kernels of motion detectors.
 
 Equation numbers are those in the docstring of `LPLC2`.

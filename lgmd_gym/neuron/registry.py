@@ -8,6 +8,7 @@ from typing import Any, Protocol, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.errors import check_keys, check_known, check_text, shown
 from lgmd_gym.neuron.base import FrameNeuron, Layer, Response, Signal
 from lgmd_gym.neuron.lgmd.params import LGMDParams
@@ -284,9 +285,9 @@ class _Adapter(FrameNeuron):
             )
         return array
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> Values:
         return self.__dict__ | {"_lock": None}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
         self._lock = Lock()

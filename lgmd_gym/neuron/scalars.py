@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Scalar part of a step: feed-forward inhibition, membrane potential, spikes and spike frequency.
 
 The scalar state of a neuron is one float64 row. Its first eight entries are the fields of `Response`, in

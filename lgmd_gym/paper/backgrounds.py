@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,4 +170,4 @@ def _scale(picture: LuminanceMap, shape: tuple[int, int]) -> LuminanceMap:
     scale = max(shape[0] / picture.shape[0], shape[1] / picture.shape[1])
     size = max(round(picture.shape[1] * scale), shape[1]), max(round(picture.shape[0] * scale), shape[0])
     image = Image.fromarray(picture.astype(np.float32)).resize(size, Image.Resampling.BILINEAR)
-    return cast(LuminanceMap, np.asarray(image, np.float64))[: shape[0]]
+    return np.asarray(image, np.float64)[: shape[0]]

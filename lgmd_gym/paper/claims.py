@@ -89,7 +89,7 @@ def _gratings(results: ExperimentResults) -> list[ClaimResult]:
 
 
 def _looming(results: ExperimentResults) -> ClaimResult:
-    parts, passed = [], 0
+    parts, passed = list[str](), 0
     for contrast in dict.fromkeys(item.contrast for item in results.looming):
         responses = [item.response for item in results.looming if item.contrast == contrast]
         times = [response.times_above(30.0) for response in responses]
@@ -219,7 +219,7 @@ def _clips(detections: Sequence[ClipDetection]) -> list[ClaimResult]:
     total = summarize_detections(detections)
     no_crash = [item for item in detections if item.crash_s is None]
     silent = [item.clip for item in no_crash if item.alarm_frames.k == 0]
-    rows = []
+    rows: list[ClaimResult] = []
     if total.hits.n:
         significant = total.p_value < 0.05
         rows.append(

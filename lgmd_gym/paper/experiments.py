@@ -89,7 +89,7 @@ def run_stimulus(
     neurons = {model: LGMD(screen.shape, screen.fps, params) for model, params in models.items()}
     responses: dict[str, list[Response]] = {model: [] for model in models}
     picture_frames = {round(time * screen.fps) for time in picture_times}
-    pictures = []
+    pictures: list[tuple[float, Frame]] = []
     for number, frame in enumerate(stimulus_frames(screen, seconds, background, foreground)):
         if number in picture_frames:
             pictures.append((number / screen.fps, frame))
@@ -163,7 +163,7 @@ class LoomingInGrating(NamedTuple):
 
 def looming_in_gratings(on_step: StepCallback) -> list[LoomingInGrating]:
     """Return the responses to squares that loom in gratings of 2 Hz."""
-    results = []
+    results: list[LoomingInGrating] = []
     for contrast, spatial, luminance in product((0.2, 0.5, 1.0), (40.0, 60.0, 80.0), (DARK, LIGHT)):
         grating = Grating(spatial=spatial, temporal=2.0, contrast=contrast)
         square = Looming(contact=CONTACT, luminance=luminance)
@@ -212,7 +212,7 @@ def panorama(on_step: StepCallback, picture: Path | None = None) -> dict[str, St
         "passing at 0.108 m/s": (Translating(centred=1.5), (0.3, 0.9, 1.5, 2.1, 2.7)),
         "passing at 0.3 m/s": (Translating(speed=0.3, centred=1.5), (0.8, 1.15, 1.5, 1.85, 2.2)),
     }
-    responses = {}
+    responses: dict[str, StimulusResponse] = {}
     for name, (foreground, times) in objects.items():
         responses[name] = run_stimulus(background, foreground, models=models, picture_times=times)
         on_step()
@@ -237,7 +237,7 @@ class Approach(NamedTuple):
 
 def approaches(on_step: StepCallback) -> list[Approach]:
     """Return the responses to a dark square at ten values of l/|v|, as in Gabbiani et al. (1999)."""
-    results = []
+    results: list[Approach] = []
     for l_over_v in L_OVER_V:
         contact = max(2.0, 8.0 * l_over_v)
         square = Looming(l_over_v=l_over_v, contact=contact, largest=85.0)

@@ -1,13 +1,16 @@
+# pyright: standard
+# Not strict: matplotlib states few types.
 """The figures of `lgmd-gym paper`; matplotlib is imported on first use."""
 
 import math
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.paper.backgrounds import SHAPES, Grating, Screen
 from lgmd_gym.paper.claims import LOCUST_SLOPE
 from lgmd_gym.paper.experiments import (
@@ -209,7 +212,7 @@ def _draw_peaks(left: "Axes", right: "Axes", results: ExperimentResults) -> None
         left.plot(1000 * x, 1000 * (slope * x + intercept), color=colour, linewidth=1.0)
         angle = 2.0 * np.degrees(np.arctan(x / y))
         right.plot(1000 * x, angle, marker, color=colour, label=f"at the {name}")
-    locust: dict[str, Any] = {"color": "0.6", "linestyle": "--"}
+    locust: Values = {"color": "0.6", "linestyle": "--"}
     left.plot(1000 * x, 1000 * LOCUST_SLOPE * x - 27.0, label="locust: 4.7 · l/|v| - 27 ms", **locust)
     left.set_ylabel("time before contact [ms]")
     left.set_ylim(0.0, 1500.0)

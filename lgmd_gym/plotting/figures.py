@@ -1,13 +1,17 @@
+# pyright: standard
+# Not strict: matplotlib states few types.
 """Figures of episodes, scenarios, neuron layers and camera frames."""
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgmd_gym.aliases import Arguments, Values
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.plotting.style import COLOURS, FigureFile, saved_figure
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from lgmd_gym.envs.motion import Motion
@@ -38,7 +42,7 @@ def episode_figure(
         frequency, speed, gap = axes
         figure.suptitle(title)
         for index, (agent, series) in enumerate(episodes.items()):
-            line: dict[str, Any] = {"color": COLOURS[index % len(COLOURS)], "label": agent}
+            line: Arguments = {"color": COLOURS[index % len(COLOURS)], "label": agent}
             frequency.plot(series["time"], series["spike_frequency"], **line)
             speed.plot(series["time"], series["ego_speed"] / KMH, **line)
             gap.plot(series["time"], series["gap"], **line)
@@ -69,7 +73,7 @@ def _mark_end(speed: Any, gap: Any, series: dict[str, np.ndarray], colour: str) 
     gap.plot(series["time"][-1], series["gap"][-1], **marker)
 
 
-def trace_figure(file: FigureFile, episodes: dict[str, dict[str, Any]], alert_level: float) -> "Figure":
+def trace_figure(file: FigureFile, episodes: dict[str, Values], alert_level: float) -> "Figure":
     """Plot spike frequency and speed over time, one line per agent; save and return the figure.
 
     Args:
@@ -132,7 +136,7 @@ def contact_sheet(file: FigureFile, frames: dict[str, dict[str, np.ndarray]]) ->
         raise ValueError("frames must contain at least one frame, got none")
     aspect = max(frame.shape[0] / frame.shape[1] for row in frames.values() for frame in row.values())
     size = (0.3 + 2.0 * len(columns), 0.25 + 2.0 * aspect * len(frames))
-    options: dict[str, Any] = {"pil_kwargs": {"optimize": True}}
+    options: Arguments = {"pil_kwargs": {"optimize": True}}
     with saved_figure(
         file, len(frames), len(columns), grid=False, save_options=options, figsize=size, squeeze=False
     ) as (figure, axes):
@@ -171,7 +175,7 @@ def scenario_figure(file: FigureFile, title: str, motion: "Motion") -> "Figure":
     height = WIDTH * 2 * aside / (behind + ahead)
     ratios = [*[height] * len(shown), 1.7]
     size = (WIDTH, sum(ratios) + 0.45 * len(ratios))
-    options: dict[str, Any] = {"gridspec_kw": {"height_ratios": ratios}, "figsize": size}
+    options: Arguments = {"gridspec_kw": {"height_ratios": ratios}, "figsize": size}
     with saved_figure(file, len(ratios), 1, grid=False, **options) as (figure, axes):
         figure.suptitle(title)
         for axis, index in zip(axes[:-1], shown, strict=True):
@@ -200,7 +204,7 @@ def _extent(motion: "Motion", shown: np.ndarray) -> tuple[float, float, float]:
     return float(behind), float(ahead), float(np.clip(aside.max(), *ASIDE))
 
 
-def _draw_view(axis: Any, motion: "Motion", index: int) -> None:
+def _draw_view(axis: "Axes", motion: "Motion", index: int) -> None:
     """Draw the lanes, the way so far and the bodies at one time."""
     _draw_lanes(axis, motion, motion.positions[index, 0])
     for body, (x, y) in enumerate(motion.positions[index]):
@@ -213,7 +217,7 @@ def _draw_view(axis: Any, motion: "Motion", index: int) -> None:
         axis.annotate(f"{body}" if body else "ego", (x, -y), ha="center", va="center", **style)
 
 
-def _draw_lanes(axis: Any, motion: "Motion", ego: np.ndarray) -> None:
+def _draw_lanes(axis: "Axes", motion: "Motion", ego: np.ndarray) -> None:
     """Draw the lanes near the ego."""
     reach = AHEAD[1] + BEHIND[1]
     for lane in motion.network.lanes_list():
@@ -238,7 +242,7 @@ def _corners(size: np.ndarray, heading: float) -> np.ndarray:
     return corners @ np.array([(cos, sin), (-sin, cos)])
 
 
-def _draw_speeds(axis: Any, motion: "Motion", times: np.ndarray) -> None:
+def _draw_speeds(axis: "Axes", motion: "Motion", times: np.ndarray) -> None:
     """Draw the speed of every body over time, with lines at the times of the views."""
     for time in times:
         axis.axvline(time, color="0.85", linewidth=0.8, zorder=0)

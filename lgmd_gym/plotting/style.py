@@ -1,6 +1,6 @@
 """The matplotlib style of all figures, and the context manager that creates and saves one."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -8,6 +8,7 @@ from typing import Any, BinaryIO
 
 from PIL import ImageFont
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.processes.files import complete_file
 
 # Palette of Okabe and Ito, which colour-blind readers can distinguish; darkest first.
@@ -51,9 +52,9 @@ def saved_figure(
     columns: int,
     *,
     grid: bool = True,
-    save_options: dict[str, Any] | None = None,
+    save_options: Arguments | None = None,
     **subplot_options: Any,
-) -> Iterator[tuple[Any, Any]]:
+) -> Generator[tuple[Any, Any], None, None]:
     """Create a figure with subplots and yield it with its axes; save and close it at the end of the block.
 
     Args:

@@ -3,8 +3,9 @@
 import json
 from importlib.metadata import distributions
 from pathlib import Path
-from typing import Any
 from urllib.parse import unquote, urlparse
+
+from lgmd_gym.aliases import Values
 
 PACKAGE = "lgmd-gym"
 
@@ -38,7 +39,7 @@ def install_command(extra: str) -> str:
 def _source() -> tuple[Path | None, bool]:
     """Return the clone from which the package was installed, or None, and whether it is editable."""
     for item in distributions(name=PACKAGE):
-        source: dict[str, Any] = json.loads(item.read_text("direct_url.json") or "{}")
+        source: Values = json.loads(item.read_text("direct_url.json") or "{}")
         url = urlparse(str(source.get("url", "")))
         folder = Path(unquote(url.path))
         if url.scheme == "file" and "dir_info" in source and (folder / "pyproject.toml").is_file():

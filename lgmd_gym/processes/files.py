@@ -4,7 +4,7 @@ import fcntl
 import os
 import shutil
 import zlib
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from errno import ENOENT
 from pathlib import Path
@@ -58,7 +58,7 @@ class FolderLock:
 
 
 @contextmanager
-def complete_file(path: Path) -> Iterator[Path]:
+def complete_file(path: Path) -> Generator[Path, None, None]:
     """Yield the path of a temporary file in the same folder; at the end of the block it becomes `path`.
 
     An interruption, a full disk or a power cut leaves the old contents of `path`, or none. The temporary name
@@ -81,7 +81,7 @@ def complete_file(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def complete_folder(path: Path, kind: str) -> Iterator[Path]:
+def complete_folder(path: Path, kind: str) -> Generator[Path, None, None]:
     """Yield a temporary folder beside `path`; at the end of the block it becomes `path`.
 
     An exception or Ctrl-C removes it, so that the same command can be repeated. One that a killed command
@@ -204,7 +204,7 @@ def _refusal(path: Path, kind: str, error: OSError) -> ValueError:
 
 
 @contextmanager
-def _naming(path: Path) -> Iterator[None]:
+def _naming(path: Path) -> Generator[None, None, None]:
     """Add a path to input and output errors without one, such as a full disk."""
     try:
         yield

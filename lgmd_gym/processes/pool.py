@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: joblib states few types.
 """Execution of tasks in this process, in worker processes or on a Dask cluster, through joblib."""
 
 import logging
@@ -6,7 +8,7 @@ import signal
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
@@ -16,6 +18,7 @@ from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from lgmd_gym._version import __version__
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_text, check_whole
 from lgmd_gym.processes.extras import missing_extra
 
@@ -25,7 +28,7 @@ if TYPE_CHECKING:
 INTERVAL = 0.5  # [s] between two looks at the parent
 
 
-def worker_options() -> dict[str, Any]:
+def worker_options() -> Arguments:
     """Return options of `joblib.Parallel` for worker processes that end with this process.
 
     Joblib's resource tracker removes their shared memory once all of them have ended.
@@ -34,7 +37,7 @@ def worker_options() -> dict[str, Any]:
 
 
 @contextmanager
-def signals_blocked() -> Iterator[None]:
+def signals_blocked() -> Generator[None, None, None]:
     """Block SIGINT and SIGTERM while worker processes start, which inherit the block.
 
     This process receives a signal at the end of the block. A terminal sends Ctrl-C to all processes, and some
@@ -49,7 +52,7 @@ def signals_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, previous)
 
 
-def run_parallel(calls: Iterable[Any], jobs: int) -> Iterator[Any]:
+def run_parallel(calls: Iterable[object], jobs: int) -> Iterator[Any]:
     """Run calls in `jobs` worker processes and return their results in order, as they finish.
 
     Args:
@@ -166,7 +169,7 @@ class Executor:
                     )
 
     @contextmanager
-    def open(self) -> Iterator[TaskMap]:
+    def open(self) -> Generator[TaskMap, None, None]:
         """Yield a function that maps a function over tasks and yields results as they finish.
 
         Raises:
@@ -185,7 +188,7 @@ SERIAL = Executor()
 
 
 @contextmanager
-def _local(jobs: int) -> Iterator[TaskMap]:
+def _local(jobs: int) -> Generator[TaskMap, None, None]:
     from joblib import Parallel
 
     # joblib replaces a worker that has grown by 300 MB, as it does by loading PyTorch, and warns of a leak.
@@ -200,7 +203,7 @@ def _local(jobs: int) -> Iterator[TaskMap]:
 
 
 @contextmanager
-def _dask(address: str) -> Iterator[TaskMap]:
+def _dask(address: str) -> Generator[TaskMap, None, None]:
     from distributed.client import FutureCancelledError
     from distributed.comm.core import CommClosedError
     from joblib import Parallel, parallel_config

@@ -3,7 +3,7 @@
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from threading import Timer, current_thread, main_thread
 from types import FrameType
@@ -43,7 +43,7 @@ class Interruption:
 
 
 @contextmanager
-def raise_on_signals() -> Iterator[Interruption]:
+def raise_on_signals() -> Generator[Interruption, None, None]:
     """Turn signals into KeyboardInterrupt, so that a command keeps what is finished.
 
     Signals that the parent process ignores, as `nohup` does, stay ignored.

@@ -1,14 +1,22 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """Contents of the dashboard: the quantities of lamps and bars, and overlays on the camera frame."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import cos, hypot, inf, sin
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgmd_gym.aliases import Info
 from lgmd_gym.camera import EgoCamera
 from lgmd_gym.errors import check_items, check_keys
+
+if TYPE_CHECKING:
+    from highway_env.vehicle.kinematics import Vehicle
+    from highway_env.vehicle.objects import RoadObject
+
 
 BRAKING_THRESHOLD = 0.1  # [m/s²], deceleration above which the brake lamp is lit
 
@@ -44,7 +52,7 @@ class DisplayState:
         return self.deceleration > BRAKING_THRESHOLD
 
     @classmethod
-    def from_info(cls, env: Any, info: dict[str, Any], alert: bool | None = None) -> "DisplayState":
+    def from_info(cls, env: Any, info: Info, alert: bool | None = None) -> "DisplayState":
         """Return the current state.
 
         Args:
@@ -81,7 +89,7 @@ def checked_overlays(names: Iterable[str]) -> tuple[str, ...]:
     return names
 
 
-def danger_zone_edges(camera: EgoCamera, ego: Any) -> list[np.ndarray]:
+def danger_zone_edges(camera: EgoCamera, ego: "Vehicle") -> list[np.ndarray]:
     """Return the left and right edge of the danger zone in pixels of the last frame.
 
     The zone is that of `lgmd_gym.neuron.danger_zone` with its default width, for the focal length, mount and
@@ -134,7 +142,7 @@ def target_boxes(camera: EgoCamera, env: Any) -> list[tuple[float, float, float,
     return [box for _, box in sorted(boxes)]
 
 
-def _corners(body: Any) -> np.ndarray:
+def _corners(body: "Vehicle | RoadObject") -> np.ndarray:
     """Return the eight corners of a body, float64, shape (8, 3) [m]."""
     c, s = cos(float(body.heading)), sin(float(body.heading))
     x, y = body.position

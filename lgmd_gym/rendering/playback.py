@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """Playback of one episode, with the dashboard in a window or a video file."""
 
 from collections.abc import Callable, Mapping
@@ -10,6 +12,7 @@ import gymnasium as gym
 
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import Agent
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, find_case
@@ -46,7 +49,7 @@ class PlaybackResult:
     stopped: bool = False
 
 
-def make_target(target: str | Case, arguments: dict[str, Any], **options: Any) -> gym.Env:
+def make_target(target: str | Case, arguments: Arguments, **options: Any) -> gym.Env:
     """Return the environment of an id, a benchmark case or a kind of traffic.
 
     Args:
@@ -82,12 +85,12 @@ def play_episode(
     target: str | Case,
     agent: Agent,
     seed: int,
-    arguments: dict[str, Any],
+    arguments: Arguments,
     video: Path | None = None,
     live: bool = False,
     overlays: tuple[str, ...] = (),
     sensors: SensorConfig | None = None,
-    surroundings: Mapping[str, Any] | None = None,
+    surroundings: Mapping[str, object] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> PlaybackResult:
     """Run one episode, and optionally show or record the dashboard.
@@ -147,7 +150,7 @@ def _play(
     observation, info = env.reset(seed=seed)
     agent.reset(seed)
     done, decisions = False, 0
-    rate = env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
+    rate: float = env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
     while True:
         # The agent acts before the picture is drawn, because the picture shows its alert.
         action = agent.act(observation, info)

@@ -1,11 +1,13 @@
 """LGMDView: wrapper that renders camera, neuron and road in one picture."""
 
-from typing import Any
+from typing import Any, SupportsFloat
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
+from numpy.typing import ArrayLike
 
+from lgmd_gym.aliases import Arguments, Info, Values
 from lgmd_gym.errors import check_known, check_text
 from lgmd_gym.rendering.display import OVERLAYS, DisplayState, checked_overlays
 from lgmd_gym.wrappers.observation import LGMDObservation
@@ -76,7 +78,7 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
         self._title = " ".join(check_text("title", title).split())
         self._dashboard: Any = None
         self._window: Any = None
-        self._info: dict[str, Any] = {}
+        self._info: Info = {}
         self._trace_requested = self._observer.trace
         self._observer.trace = True  # the spike raster needs every camera frame, also within decisions
         self.metadata = {"render_modes": list(MODES), "render_fps": env.unwrapped.config["policy_frequency"]}  # type: ignore[attr-defined]
@@ -92,9 +94,7 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
         """The `Window` of mode "human"; None before the first picture."""
         return self._window
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Arguments | None = None) -> tuple[Any, Info]:
         """Reset the environment and the trace; in mode "human", show the picture."""
         observation, info = self.env.reset(seed=seed, options=options)
         self.agent_alert = None
@@ -105,7 +105,7 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
         self._dashboard.clear()
         return observation, self._update(info)
 
-    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[Any, SupportsFloat, bool, bool, Info]:
         """Step the environment; in mode "human", show the picture."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         return observation, reward, terminated, truncated, self._update(info)
@@ -136,7 +136,7 @@ class LGMDView(gym.Wrapper, RecordConstructorArgs):
             self._window.close()
         super().close()
 
-    def _update(self, info: dict[str, Any]) -> dict[str, Any]:
+    def _update(self, info: Info) -> Values:
         """Add the outputs of the neurons to the trace; return the info as without this wrapper."""
         self._info = info
         self._dashboard.add(info["lgmd/trace"])
@@ -153,7 +153,7 @@ def find_observation_wrapper(env: gym.Env) -> LGMDObservation:
     Raises:
         ValueError: If there is none.
     """
-    layer: Any = env
+    layer: object = env
     while isinstance(layer, gym.Wrapper):
         if isinstance(layer, LGMDObservation):
             return layer

@@ -6,7 +6,7 @@ other viewers of the process, and silently runs without a display.
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 import numpy as np
@@ -97,7 +97,7 @@ def is_headless() -> bool:
 
 
 @contextmanager
-def dummy_display() -> Iterator[None]:
+def dummy_display() -> Generator[None, None, None]:
     """Select SDL's dummy driver on a headless machine, to prevent its warnings on stderr."""
     if not is_headless():
         yield

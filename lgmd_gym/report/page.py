@@ -1,8 +1,8 @@
 """Output files of a run folder: tables, plots, and the report page, rendered with `page.html`."""
 
 from pathlib import Path
-from typing import Any
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, load_traces, write_froc
 from lgmd_gym.benchmark.analysis.tables import (
     agent_summaries,
@@ -120,7 +120,7 @@ def rate_band(rate: Rate, lower_is_better: bool = False) -> str:
     return band(1.0 - share if lower_is_better else share)
 
 
-def _condition(data: ReportData, name: str, rows: list[Row]) -> dict[str, Any]:
+def _condition(data: ReportData, name: str, rows: list[Row]) -> Values:
     """Return the tables and figures of one camera condition."""
     braking = [agent for agent in data.agents if agent != NO_BRAKE]
     points, verdict = data.suite.points, data.suite.verdict

@@ -14,6 +14,7 @@ import numpy as np
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.registry import outside_code
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.analysis.compare import Comparison, change_text, compare_agents, difference_figure
 from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, froc_figure, load_traces, write_froc
 from lgmd_gym.benchmark.case import Row, Suite, case_order, key_of, relative_impact
@@ -100,7 +101,7 @@ class ReportData:
 
     path: Path
     config: RunConfig
-    settings: dict[str, Any]  # contents of run.json
+    settings: Values  # contents of run.json
     suite: Suite
     rows: list[Row]
     agents: list[str]  # no-brake first
@@ -218,7 +219,7 @@ def froc_section(data: ReportData) -> str | None:
     return save_figure(data.figures / "froc.svg", draw)
 
 
-def comparison_section(data: ReportData) -> dict[str, Any] | None:
+def comparison_section(data: ReportData) -> Values | None:
     """Return the paired differences and their figure; None if no two agents completed the same episode."""
     pairs = combinations([agent for agent in data.agents if agent != NO_BRAKE], 2)
     comparisons = [item for item in compare_agents(data.rows, data.rows, pairs) if item.pairs]
@@ -251,7 +252,7 @@ def _difference_lines(comparisons: list[Comparison]) -> list[tuple[Any, ...]]:
     ]
 
 
-def episode_section(data: ReportData) -> list[dict[str, Any]]:
+def episode_section(data: ReportData) -> list[Values]:
     """Return the illustrated episodes: time series of all agents, and camera frames of one."""
     agent, episodes = illustrated_agent(data.agents), []
     for rows in by_condition(without_fcw_driver(data.rows)).values():
@@ -268,7 +269,7 @@ def episode_section(data: ReportData) -> list[dict[str, Any]]:
     return episodes
 
 
-def _save_episode(data: ReportData, name: str, episodes: dict[str, dict[str, Any]]) -> str:
+def _save_episode(data: ReportData, name: str, episodes: dict[str, Values]) -> str:
     """Write figure and data of an episode with all agents; return the figure as a data URI."""
     lines = [
         (agent, *(round(float(value), 4) for value in values))

@@ -9,7 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import ArrayLike
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.neuron import Response
 from lgmd_gym.sensing.kernels import SIGNALS
 from lgmd_gym.sensing.sensor_array import SensorArray
@@ -114,7 +116,7 @@ class Assembly:
         return {name: np.zeros((num_envs, *shape), dtype) for name, shape, dtype in self._shapes}
 
     def observations(
-        self, speeds: Any, yaw_rates: Any, out: dict[str, np.ndarray] | None = None
+        self, speeds: ArrayLike, yaw_rates: ArrayLike, out: dict[str, np.ndarray] | None = None
     ) -> dict[str, np.ndarray]:
         """Return the present observations of all environments, without the key `base`.
 
@@ -146,7 +148,7 @@ class Assembly:
         return dict(zip(self._keys, values.T, strict=True)) | {"lgmd/alert": alerts}
 
 
-def row_of(arrays: Mapping[str, np.ndarray], index: int) -> dict[str, Any]:
+def row_of(arrays: Mapping[str, np.ndarray], index: int) -> Values:
     """Return the values of one environment: arrays of observations, numbers and objects of infos."""
     return {key: values[index] if values.ndim > 1 else values.item(index) for key, values in arrays.items()}
 

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from typing import Any, TypeAlias, cast
 
 from lgmd_gym import neuron as models
+from lgmd_gym.aliases import Values
 from lgmd_gym.camera.birdseye import BirdsEye
 from lgmd_gym.camera.camera import BIRDSEYE, PRESETS, Camera, CameraItem
 from lgmd_gym.errors import as_tuple, check_keys, shown
@@ -14,7 +15,7 @@ LGMD = "lgmd"
 """Name of the usual neuron."""
 
 
-def make_camera(camera: Any) -> Camera | BirdsEye:
+def make_camera(camera: CameraItem | BirdsEye | None) -> Camera | BirdsEye:
     """Return a camera, or highway-env's top view for "birdseye" or a mapping with that name.
 
     Raises:
@@ -22,10 +23,10 @@ def make_camera(camera: Any) -> Camera | BirdsEye:
     """
     if isinstance(camera, BirdsEye):
         return camera
-    name = cast(Mapping[str, Any], camera).get("name") if isinstance(camera, Mapping) else camera
+    name = camera.get("name") if isinstance(camera, Mapping) else camera
     if not (isinstance(name, str) and name == BIRDSEYE):
         return Camera.make(camera)
-    fields = dict(camera) if isinstance(camera, Mapping) else {}
+    fields: Values = dict(camera) if isinstance(camera, Mapping) else {}
     check_keys("field of the top view", fields, ("name", "shape", "scaling"))
     return BirdsEye(**{key: field for key, field in fields.items() if key != "name"})
 
@@ -99,12 +100,14 @@ def make_channels(camera: ChannelSpec, neuron: str = LGMD) -> tuple[Channel, ...
 def _make_channel(item: Any, neuron: str) -> Channel:
     if isinstance(item, Channel):
         return item
-    if isinstance(item, Mapping) and "camera" not in item and {"neuron", "columns"} & item.keys():
+    is_mapping: bool = isinstance(item, Mapping)
+    given = cast(Mapping[str, object], item if is_mapping else {})
+    if "camera" not in given and {"neuron", "columns"} & given.keys():
         raise ValueError(
-            f"neuron and columns are fields of a channel, not of a camera, got {shown(item)}; "
+            f"neuron and columns are fields of a channel, not of a camera, got {shown(given)}; "
             "use {'camera': …, 'neuron': …, 'columns': …}"
         )
-    fields = item if isinstance(item, Mapping) and "camera" in item else {"camera": item}
+    fields: Mapping[str, object] = given if "camera" in given else {"camera": item}
     return Channel.make({"neuron": neuron, **fields})
 
 
@@ -120,5 +123,6 @@ def plain_values(value: Any) -> Any:
     elif hasattr(value, "to_dict"):
         value = value.to_dict()
     if isinstance(value, Mapping):
-        return {key: plain_values(item) for key, item in value.items() if item is not None}
+        fields = cast(Mapping[str, object], value)
+        return {key: plain_values(item) for key, item in fields.items() if item is not None}
     return value

@@ -1,11 +1,12 @@
 """Drawing: the cameras of one or more environments, and their frames."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.camera.batch import CameraBatch
 from lgmd_gym.camera.birdseye import BirdsEye
 from lgmd_gym.camera.camera import Camera
@@ -18,6 +19,9 @@ from lgmd_gym.camera.road_pool import RoadPool, road_key
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.camera.scene_table import SceneTable, view_of
 from lgmd_gym.kernels.bundle import Bundle
+
+if TYPE_CHECKING:
+    from highway_env.road.road import Road, RoadNetwork
 
 
 class FrameGroup:
@@ -47,7 +51,7 @@ class FrameGroup:
         self.batch.draw(first, last, scene_table, roads, self.frames, selected, workspace)
         self._workspaces.append(workspace)
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> Values:
         return self.__dict__ | {"_workspaces": []}
 
 
@@ -86,7 +90,7 @@ class Drawing:
         self.groups: list[FrameGroup] = []
         self.group_of: list[int] = []
         self._locations = {k: (g, row) for g, group in enumerate(groups) for row, k in enumerate(group)}
-        known: dict[Any, int] = {}
+        known: dict[tuple[Camera | None, ...], int] = {}
         for group in groups:
             members = [self._cameras[k] for k in group]
             key = tuple(_without_name(camera) for camera in members)
@@ -114,7 +118,7 @@ class Drawing:
             if enabled[camera]:
                 top_view.render(env, self.frame_of(camera, index))
 
-    def set_road(self, index: int, road: Any) -> None:
+    def set_road(self, index: int, road: "Road | RoadNetwork") -> None:
         """Set the road of an environment; see `SensorArray.set_road`."""
         self._roads.assign(index, road, road_key(self._scenes[index][0]))
 

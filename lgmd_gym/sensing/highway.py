@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """What cameras need from a highway-env environment: a frame rate, and a callback after each step."""
 
 import warnings

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Kernels that select the cameras to process, and collect the outputs of their neurons.
 
 Their arrays arrive in one piece, see `Bundle`.

@@ -1,7 +1,7 @@
 """SensorArray: the cameras and neurons of one or more environments."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 import gymnasium as gym
 import numpy as np
@@ -16,6 +16,9 @@ from lgmd_gym.sensing.channel import LGMD, Channel, ChannelSpec, make_channels
 from lgmd_gym.sensing.drawing import Drawing
 from lgmd_gym.sensing.kernels import NUMBERS, SIGNALS
 from lgmd_gym.sensing.neurons import NeuronGroup
+
+if TYPE_CHECKING:
+    from highway_env.road.road import Road, RoadNetwork
 
 
 class SensorArray:
@@ -158,7 +161,7 @@ class SensorArray:
         """Render the enabled cameras of environment `index` that highway-env draws."""
         self._drawing.render_top_views(env, index, self.enabled[index])
 
-    def set_road(self, index: int, road: Any) -> None:
+    def set_road(self, index: int, road: "Road | RoadNetwork") -> None:
         """Set the road of environment `index`, a highway-env `Road` or `RoadNetwork`.
 
         A call with the same network as before returns at once: a network must not change. One thread at a
@@ -167,7 +170,7 @@ class SensorArray:
         self._drawing.set_road(index, road)
 
     def set_scene(
-        self, index: int, scene: Scene | Mapping[str, Any] | None, max_deceleration: float = USUAL_BRAKE
+        self, index: int, scene: Scene | Mapping[str, object] | None, max_deceleration: float = USUAL_BRAKE
     ) -> None:
         """Set the scene of environment `index`.
 
@@ -290,11 +293,11 @@ class SensorArray:
         fields = {name: self._numbers[:, field] for field, name in enumerate(NUMBERS)}
         self.responses = Response(**fields, spikes=self._spikes, alert=self._alerts)
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         linked = ("scenes", "objects", "object_counts", "responses", "signals")
         return {name: value for name, value in self.__dict__.items() if name not in linked}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
+    def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
         self._link()
 

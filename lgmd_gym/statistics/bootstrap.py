@@ -1,13 +1,14 @@
+# pyright: standard
+# Not strict: the type of a random draw of NumPy depends on its arguments.
 """Interquartile mean, and a stratified bootstrap over training runs and cases."""
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lgmd_gym.statistics.intervals import DRAWS
 
 
-def interquartile_mean(values: Any) -> Any:
+def interquartile_mean(values: ArrayLike) -> np.ndarray:
     """Return the mean of the middle half along the last axis; of fewer than four values, the mean of all.
 
     Example:

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: Gymnasium and stable-baselines3 state few types.
 """Checkpoints, evaluations and the episode log of an online training run, complete after a kill."""
 
 import csv
@@ -13,11 +15,13 @@ from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import ResultsWriter
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.processes.files import complete_file, is_intact_zip
 from lgmd_gym.training.config import VALIDATION_SEED
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
+    from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
     from stable_baselines3.common.vec_env import VecEnv
 
 DATA = "data"  # member of every model file of stable-baselines3
@@ -49,7 +53,7 @@ def load_checkpoint(algorithm: "type[BaseAlgorithm]", folder: Path, envs: "VecEn
     return None
 
 
-def _load_buffer(model: Any, path: Path) -> bool:
+def _load_buffer(model: "OffPolicyAlgorithm", path: Path) -> bool:
     try:
         model.load_replay_buffer(path)
     except DAMAGED:
@@ -170,7 +174,7 @@ class MonitorLog(BaseCallback):
             writer.writerows(rows)
         self._writer = ResultsWriter(str(self._path), extra_keys=(TIMESTEPS,), override_existing=False)
 
-    def _rows_until(self, timesteps: int) -> list[dict[str, Any]]:
+    def _rows_until(self, timesteps: int) -> list[Values]:
         if not self._path.exists():
             return []
         with self._path.open(encoding="utf-8") as file:

@@ -13,6 +13,7 @@ from lgmd_gym.agents import AGENTS, HOLD, make_agent
 from lgmd_gym.agents.base import FPS
 from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
+from lgmd_gym.aliases import Arguments, Config, Values
 from lgmd_gym.envs.families.distribution import EXTRA_FAMILIES, check_families
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, traffic_id
 from lgmd_gym.errors import (
@@ -40,11 +41,11 @@ LEVELS_EXAMPLE = f"400:{','.join(EXTRA_FAMILIES[:2])}"
 TRAFFIC_EXAMPLE = "400:intersection,roundabout"
 
 
-def _check_env_kwargs(name: str, env_kwargs: object) -> dict[str, Any]:
-    given = {} if env_kwargs is None else check_type(name, env_kwargs, dict)
+def _check_env_kwargs(name: str, env_kwargs: object) -> Arguments:
+    given: Arguments = {} if env_kwargs is None else check_type(name, env_kwargs, dict)
     if "camera" in given:
         raise ValueError(f"{name} contains the camera {shown(given['camera'])}; use the option camera")
-    config = given.get("config") or {}
+    config: Config = given.get("config") or {}
     rates = {"fps": given.get("fps"), "policy_frequency": config.get("policy_frequency")}
     for key, rate in rates.items():
         if rate not in (None, FPS):
@@ -55,13 +56,13 @@ def _check_env_kwargs(name: str, env_kwargs: object) -> dict[str, Any]:
     return given
 
 
-def _check_algo_kwargs(name: str, algo_kwargs: object) -> dict[str, Any]:
-    given = {} if algo_kwargs is None else check_type(name, algo_kwargs, dict)
+def _check_algo_kwargs(name: str, algo_kwargs: object) -> Arguments:
+    given: Arguments = {} if algo_kwargs is None else check_type(name, algo_kwargs, dict)
     check_type("policy_kwargs", given.get("policy_kwargs"), dict, type(None))
     return given
 
 
-def _check_camera(name: str, camera: Any) -> Any:
+def _check_camera(name: str, camera: ChannelSpec) -> Any:
     make_channels(camera)
     return plain_values(camera)
 
@@ -108,7 +109,7 @@ class TrainConfig(Record):
         "Environment id; an id that is registered with the argument `split`, as those of random levels and "
         'traffic, is trained on the split "train" and evaluated on the split "validation"',
     )
-    env_kwargs: dict[str, Any] = value(None, _check_env_kwargs, "Further arguments of `gym.make`")
+    env_kwargs: Arguments = value(None, _check_env_kwargs, "Further arguments of `gym.make`")
     camera: ChannelSpec = value(CAMERAS, _check_camera, "Camera or cameras, see `LGMDObservation`")
     demands: tuple[float, ...] = value(
         (),
@@ -124,7 +125,7 @@ class TrainConfig(Record):
         'Number of policy decisions over all environments; for "offline" number of recorded episodes',
     )
     policy: str = text("MultiInputPolicy", "stable-baselines3's name of the network")
-    algo_kwargs: dict[str, Any] = value(
+    algo_kwargs: Arguments = value(
         None, _check_algo_kwargs, "Further arguments of the algorithm, as in the YAML file"
     )
     seed: int = whole(0, f"[0, {MAX_SEED}]", "", "Seed of the network and the environments")
@@ -212,19 +213,22 @@ class TrainConfig(Record):
         if check_items("inputs", inputs, str, "names"):
             values["features"] |= {"inputs": inputs}
         features = values["features"] = FeatureConfig.make(values["features"])
-        defaults = {"demands": DEMANDS[algo], "eval_episodes": 600 if algo == OFFLINE else 96}
+        defaults: Arguments = {"demands": DEMANDS[algo], "eval_episodes": 600 if algo == OFFLINE else 96}
         agent = features.cameras_of
         if agent is not None:
             defaults["camera"] = _cameras_of(agent)
-        return cls(**{**defaults, **values, "algo": algo, "env_id": env_id, **given})
+        merged: Arguments = {**defaults, **values, "algo": algo, "env_id": env_id, **given}
+        return cls(**merged)
 
     @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> "TrainConfig":
+    def from_dict(cls, values: Values) -> "TrainConfig":
         """Return the configuration that `to_dict` returned; unknown keys raise ValueError."""
         check_keys("training option", values, (item.name for item in fields(cls)))
-        return cls(**{**values, "features": FeatureConfig.make(values.get("features", {}))})
+        features = FeatureConfig.make(values.get("features", {}))
+        merged: Arguments = values | {"features": features}
+        return cls(**merged)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Values:
         """Return the configuration as plain values."""
         return asdict(self) | {"features": self.features.to_dict()}
 
@@ -244,9 +248,9 @@ class TrainConfig(Record):
                 f"env {self.env_id!r} cannot be made ({error}); see lgmd-gym list envs"
             ) from None
 
-    def env_arguments(self, split: str) -> dict[str, Any]:
+    def env_arguments(self, split: str) -> Arguments:
         """Return the arguments of `gym.make` and `gym.make_vec` for a split."""
-        arguments: dict[str, Any] = self.env_kwargs | {"camera": self.camera}
+        arguments: Arguments = self.env_kwargs | {"camera": self.camera}
         if "split" in gym.spec(self.env_id).kwargs:
             arguments.setdefault("split", split)
         if self.demands:

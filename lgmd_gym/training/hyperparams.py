@@ -2,8 +2,9 @@
 
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import cast
 
+from lgmd_gym.aliases import Arguments, Values
 from lgmd_gym.errors import (
     check_finite,
     check_known,
@@ -20,7 +21,7 @@ ALGORITHMS = ("ppo", "sac", "dqn", OFFLINE)
 WRAPPER = "lgmd_gym.training.PolicyWrapper"
 
 
-def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> dict[str, Any]:
+def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> Values:
     """Return the attributes of `TrainConfig` in a hyperparameter file; `features` is a dict.
 
     Args:
@@ -39,10 +40,10 @@ def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> dict[s
     entry = entries.get(env_id, entries.get("default"))
     if not isinstance(entry, dict):
         raise unknown_name("entry of the hyperparameters for", env_id, entries)
-    algo_kwargs = dict(entry)
+    algo_kwargs = dict(cast(Arguments, entry))
     if algo_kwargs.pop("normalize", False):
         raise ValueError("normalize is not supported: PolicyWrapper scales observations by constants")
-    values: dict[str, Any] = {"features": _features(algo_kwargs.pop("env_wrapper", None))}
+    values: Values = {"features": _features(algo_kwargs.pop("env_wrapper", None))}
     if "policy" in algo_kwargs:
         values["policy"] = algo_kwargs.pop("policy")
     if "env_kwargs" in algo_kwargs:
@@ -69,11 +70,11 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _read_yaml(path: Path) -> dict[str, Any]:
+def _read_yaml(path: Path) -> Values:
     import yaml
 
     try:
-        entries = yaml.safe_load(path.read_text(encoding="utf-8"))
+        entries: object = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ValueError(f"hyperparameters {str(path)!r} cannot be read: {error.strerror}") from None
     except yaml.YAMLError as error:
@@ -81,17 +82,17 @@ def _read_yaml(path: Path) -> dict[str, Any]:
         raise ValueError(f"hyperparameters {str(path)!r} are not valid YAML: {first}") from None
     if not isinstance(entries, dict):
         raise ValueError(f"hyperparameters {str(path)!r} must have one entry per environment id")
-    return entries
+    return cast(Values, entries)
 
 
-def _features(wrappers: object) -> dict[str, Any]:
+def _features(wrappers: object) -> Values:
     """Return the arguments of `PolicyWrapper` in rl-zoo's `env_wrapper`."""
     if wrappers is None:
         return {}
-    items = wrappers if isinstance(wrappers, list) else [wrappers]
+    items = cast(list[object], wrappers) if isinstance(wrappers, list) else [wrappers]
     if len(items) != 1:
         raise ValueError(f"env_wrapper must contain {WRAPPER} only, got {len(items)} wrappers")
-    item = {items[0]: None} if isinstance(items[0], str) else items[0]
-    if not isinstance(item, dict) or list(item) != [WRAPPER]:
+    item: object = {items[0]: None} if isinstance(items[0], str) else items[0]
+    if not isinstance(item, dict) or list(cast(Values, item)) != [WRAPPER]:
         raise ValueError(f"env_wrapper must be {WRAPPER} alone, got {shown(items[0])}")
-    return dict(check_type("arguments of PolicyWrapper", item[WRAPPER] or {}, dict))
+    return dict(check_type("arguments of PolicyWrapper", cast(Values, item)[WRAPPER] or {}, dict))

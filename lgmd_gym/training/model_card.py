@@ -2,10 +2,11 @@
 
 import csv
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.processes.files import complete_file
 from lgmd_gym.training.config import TrainConfig
 
@@ -93,9 +94,9 @@ def best_result(folder: Path) -> Result | None:
     return None
 
 
-def _metadata(config: TrainConfig, result: Result | None) -> dict[str, Any]:
+def _metadata(config: TrainConfig, result: Result | None) -> Values:
     """Return the YAML metadata of the Hub."""
-    metadata: dict[str, Any] = {
+    metadata: Values = {
         "library_name": "stable-baselines3",
         "tags": ["reinforcement-learning", "deep-reinforcement-learning", "stable-baselines3", config.env_id],
     }
@@ -111,11 +112,11 @@ def _metadata(config: TrainConfig, result: Result | None) -> dict[str, Any]:
     return metadata
 
 
-def _shown(config: TrainConfig) -> dict[str, Any]:
+def _shown(config: TrainConfig) -> Values:
     """Return the configuration without local paths, and without cameras, which the policy contains."""
     values = config.to_dict()
     return {
-        name: list(value) if isinstance(value, tuple) else value
+        name: list(cast(tuple[object, ...], value)) if isinstance(value, tuple) else value
         for name, value in values.items()
         if name not in ("camera", "recordings")
     }

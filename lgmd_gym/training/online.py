@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.training.config import TrainConfig
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def _make_model(config: TrainConfig, folder: Path, envs: "VecEnv") -> Any:
     )
 
 
-def algorithm_kwargs(config: TrainConfig) -> dict[str, Any]:
+def algorithm_kwargs(config: TrainConfig) -> Arguments:
     """Return the arguments of the algorithm, each "lin_x" replaced by a linear decay from x to 0."""
     from stable_baselines3.common.utils import LinearSchedule
 

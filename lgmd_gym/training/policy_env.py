@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: Gymnasium and stable-baselines3 state few types.
 """The inputs, history and decision rate of a policy: for one environment, and for those of the engine."""
 
 from typing import Any
@@ -7,8 +9,10 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
 from gymnasium.vector import AutoresetMode
+from numpy.typing import ArrayLike
 
 from lgmd_gym.agents.policies.features import ZONE_INPUTS, FeatureConfig, FeatureHistory, source_observation
+from lgmd_gym.aliases import Arguments, Info, Values
 from lgmd_gym.engine import BrakingVectorEnv
 from lgmd_gym.engine.sb3 import EngineVecEnv
 
@@ -43,15 +47,15 @@ class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
         self.observation_space = policy_space(env.observation_space, self.features)
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        self, *, seed: int | None = None, options: Arguments | None = None
+    ) -> tuple[dict[str, np.ndarray], Info]:
         """Reset the environment and fill the history with the first observation."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._history.reset()
         self._update(observation)
         return self._stack(), info
 
-    def step(self, action: Any) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[dict[str, np.ndarray], float, bool, bool, Info]:
         """Repeat an action for `repeat` steps, or until the episode ends if it latches."""
         reward_sum, steps = 0.0, 0
         latched = self.features.latches(self._demand(action))
@@ -68,7 +72,7 @@ class PolicyWrapper(gym.Wrapper, RecordConstructorArgs):
             terminated, truncated = True, False
         return self._stack(), self.features.reward_scale * reward_sum, terminated, truncated, info
 
-    def _update(self, observation: dict[str, Any]) -> None:
+    def _update(self, observation: Values) -> None:
         self._history.update({name: np.asarray(values)[None] for name, values in observation.items()})
 
     def _stack(self) -> dict[str, np.ndarray]:
@@ -136,7 +140,7 @@ class PolicyVecEnv(EngineVecEnv):
         """
         return self._restart(np.ones(self.num_envs, np.bool_), self._take_seeds())
 
-    def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[Info]]:
         """Advance each environment by one decision; return observations, rewards, ends and infos."""
         demands = self.envs.read_demands(self._actions)
         latched = self.features.latches(demands)
@@ -148,7 +152,7 @@ class PolicyVecEnv(EngineVecEnv):
         rewards = (self.features.reward_scale * self._rewards).astype(np.float32)
         self._count(rewards)
         observations = self._history.stack()
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        infos: list[Info] = [{} for _ in range(self.num_envs)]
         if done.any():
             # The policy decides nothing after it latches its brake, so a truncation is a termination.
             self._end_episodes(done, outcome.truncated & ~terminated, observations, infos)
@@ -182,7 +186,7 @@ class PolicyVecEnv(EngineVecEnv):
         done: np.ndarray,
         truncated: np.ndarray,
         observations: dict[str, np.ndarray],
-        infos: list[dict[str, Any]],
+        infos: list[Info],
     ) -> None:
         """Fill in the infos of ended episodes, restart them and replace their observations."""
         finals = self.envs.read_infos(done)

@@ -6,13 +6,13 @@ from functools import partial
 from itertools import chain
 from json import dumps, loads
 from pathlib import Path
-from typing import Any
 
 import gymnasium as gym
 
 import lgmd_gym
 from lgmd_gym.agents import HOLD
 from lgmd_gym.agents.policies.features import FRAME
+from lgmd_gym.aliases import Values
 from lgmd_gym.camera import BirdsEye
 from lgmd_gym.envs.registration import TRAFFIC_KINDS
 from lgmd_gym.sensing.channel import make_channels
@@ -54,7 +54,7 @@ class RecordingSet:
     seeds: range  # seeds of the environment
     record: RecordFunction  # returns the episodes of each seed
     option: str = ""  # options of the command line that record these episodes
-    settings: dict[str, Any] = field(default_factory=dict)  # settings that only these episodes depend on
+    settings: Values = field(default_factory=Values)  # settings that only these episodes depend on
     chunk_size: int = LEVEL_CHUNK_SIZE  # largest number of seeds recorded by one task of a process
 
 
@@ -82,7 +82,7 @@ def _level_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
 
 
 def _traffic_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
-    sets = []
+    sets: list[RecordingSet] = []
     if config.traffic_episodes:
         option = f" --traffic-episodes {config.traffic_episodes}"
         usual = ExtraEpisodes(config.traffic_episodes, tuple(TRAFFIC_KINDS))
@@ -135,10 +135,10 @@ def _frame_shrink(config: TrainConfig) -> int | None:
     return config.features.shrink if FRAME in config.features.inputs else None
 
 
-def origin_of(config: TrainConfig) -> dict[str, Any]:
+def origin_of(config: TrainConfig) -> Values:
     """Return the settings that recorded episodes depend on, as plain values."""
     values = config.to_dict()
-    origin: dict[str, Any] = {"format": FORMAT, "lgmd_gym": lgmd_gym.__version__}
+    origin: Values = {"format": FORMAT, "lgmd_gym": lgmd_gym.__version__}
     origin |= {name: values[name] for name in ("env_id", "env_kwargs", "camera", "demands")}
     return loads(dumps(origin | {"shrink": _frame_shrink(config)}))  # lists in place of tuples
 
@@ -206,9 +206,7 @@ def _folder_of(recordings: RecordingSet, training: str | Path) -> Path:
     return Path(training) / "episodes" / recordings.name
 
 
-def _record_missing(
-    recordings: RecordingSet, files: Path, origin: dict[str, Any], progress: bool, jobs: int
-) -> None:
+def _record_missing(recordings: RecordingSet, files: Path, origin: Values, progress: bool, jobs: int) -> None:
     from tqdm import tqdm
 
     files.mkdir(parents=True, exist_ok=True)
@@ -220,7 +218,7 @@ def _record_missing(
             if is_complete(file) and check_file(file, origin) == len(part):
                 bar.update(len(part))
                 continue
-            by_seed = []
+            by_seed: list[list[RecordedEpisode]] = []
             for episodes in record_parallel(recordings.record, part, jobs, recordings.chunk_size):
                 by_seed.append(episodes)
                 bar.update()

@@ -188,7 +188,7 @@ def _train_offline(config: TrainConfig, folder: Path, progress: bool, jobs: int)
                 for name, value in metrics.items():
                     logger.record(name, value)
                 logger.dump(epoch)
-                bar.set_postfix({name: f"{value:.2f}" for name, value in metrics.items()})
+                bar.set_postfix({name: f"{value:.2f}" for name, value in metrics.items()})  # pyright: ignore[reportUnknownMemberType]
                 bar.update(epoch - bar.n)
 
             return learner.learn(train_data, validation_data, log, jobs)

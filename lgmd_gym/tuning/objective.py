@@ -10,13 +10,14 @@ import json
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from math import inf
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from joblib import delayed
 
 from lgmd_gym.agents import BRAKE, HOLD, Agent, BatchAgent, Rule, make_agent
 from lgmd_gym.agents.base import Infos, Observations, rows_of
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import Row, level_case
 from lgmd_gym.benchmark.metrics import Counterfactual, make_row
 from lgmd_gym.benchmark.player import play_agent, run_task
@@ -35,8 +36,6 @@ MAX_SEEDS = 1000  # the seeds of the splits do not overlap
 MAX_CACHED = 4  # sensor configurations whose recordings are kept
 AGENT_SENSORS = SensorConfig()  # each agent's own cameras
 MINIMAL_SENSORS = SensorConfig(camera={"name": "wide", "shape": [8, 8]})  # for agents without sensors
-
-Values: TypeAlias = dict[str, Any]  # an observation or an info
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from typing import Any
 
 from lgmd_gym.agents import AGENTS, Rule, make_agent
 from lgmd_gym.agents.rules import CAMERA
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.camera import PRESETS
 from lgmd_gym.errors import check_flag, check_items, check_known
@@ -18,7 +19,7 @@ SHIFT = 0.2  # relative shift of each parameter in the sensitivity table
 
 # A flat dict: the rule's parameters by name, the camera preset as "camera" and neuron parameters as in
 # "neuron.sigma_3". Missing parameters keep their defaults.
-Proposal = dict[str, Any]
+Proposal = Values
 
 
 @dataclass(frozen=True, kw_only=True)

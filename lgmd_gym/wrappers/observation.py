@@ -2,12 +2,14 @@
 
 import json
 import warnings
-from typing import Any, cast
+from typing import Any, SupportsFloat, cast
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
+from numpy.typing import ArrayLike
 
+from lgmd_gym.aliases import Arguments, Info, Observation, Values
 from lgmd_gym.camera import Scene
 from lgmd_gym.errors import check_flags, check_mapping
 from lgmd_gym.neuron import LGMDParams, NeuronSpec, Response
@@ -100,7 +102,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         include_frame: bool = False,
         include_base: bool = False,
         trace: bool = False,
-        scene: Scene | dict[str, Any] | None = None,
+        scene: Scene | Values | None = None,
     ) -> None:
         check_highway_env(env)
         gym.Wrapper.__init__(self, env)
@@ -129,9 +131,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
             scene=_to_json(scene),
         )
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Arguments | None = None) -> tuple[Observation, Info]:
         """Reset the environment and the neurons, and process the first frame.
 
         Raises:
@@ -160,7 +160,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
             base_env.restart_sensors()
         return self._observation(base, *self._take_motion()), self._extend_info(info)
 
-    def step(self, action: Any) -> tuple[dict[str, Any], Any, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[Observation, SupportsFloat, bool, bool, Info]:
         """Step the environment and process its camera frames."""
         if not self._was_reset:
             raise RuntimeError("reset must be called before step")
@@ -234,7 +234,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         else:
             self.sensors.set_scene(0, self._scene)
 
-    def _check_frequency(self, options: dict[str, Any] | None) -> None:
+    def _check_frequency(self, options: Arguments | None) -> None:
         """Refuse a simulation frequency in the options of a reset before the environment applies it."""
         config = check_mapping("config", check_mapping("options", options).get("config"))
         if "simulation_frequency" in config:
@@ -256,7 +256,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
             time = self._substeps / self._simulation_frequency
             self._traces.append(0, time, float(self._highway_env.vehicle.speed))
 
-    def _on_frames(self, *_: Any) -> None:
+    def _on_frames(self, *_: object) -> None:
         if self._traces is None:  # switched off during the episode
             return
         simulation = self._highway_env.simulation
@@ -274,13 +274,13 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         (last_steps, last_heading), self._last = self._last, (steps, heading)
         return speed, mean_yaw_rate(heading, last_heading, (steps - last_steps) / self._simulation_frequency)
 
-    def _observation(self, base: Any, speed: float, yaw_rate: float) -> dict[str, Any]:
+    def _observation(self, base: np.ndarray, speed: float, yaw_rate: float) -> Observation:
         observation = row_of(self._assembly.observations(speed, yaw_rate), 0)
         if self.include_base:
             observation["base"] = base
         return observation
 
-    def _extend_info(self, info: dict[str, Any]) -> dict[str, Any]:
+    def _extend_info(self, info: Info) -> Info:
         info = info | row_of(self._assembly.infos(), 0)
         if self._traces is not None:
             info["lgmd/trace"] = self._traces.take(0)
@@ -297,11 +297,11 @@ def _check_no_cameras(env: gym.Env) -> None:
         env = env.env
 
 
-def _to_json(value: Any) -> Any:
+def _to_json(value: object) -> object:
     """Return an argument as plain JSON values, for `EnvSpec.to_json`."""
     return json.loads(json.dumps(plain_values(value), default=_number_to_json))
 
 
-def _number_to_json(value: Any) -> Any:
+def _number_to_json(value: object) -> object:
     """Return a number or path that JSON does not know."""
     return cast(Any, value).item() if isinstance(value, np.generic) else str(value)

@@ -40,6 +40,7 @@ ORDER = (
     "kernels",
     "fields",
     "errors",
+    "aliases",
 )
 # Within these folders, the sub-folders in the same order; "" is the folder's own files.
 ORDER_WITHIN = {
@@ -149,7 +150,7 @@ def test_import_is_fast():
 
 def test_the_package_folder_contains_four_modules_and_folders():
     flat = {path.name for path in (ROOT / "lgmd_gym").glob("*.py")}
-    assert flat == {"__init__.py", "__main__.py", "_version.py", "errors.py", "fields.py"}
+    assert flat == {"__init__.py", "__main__.py", "_version.py", "aliases.py", "errors.py", "fields.py"}
 
 
 def test_every_package_states_its_contents_in_one_sentence():

@@ -8,11 +8,12 @@ All arms have the same case samples, so their differences are paired by case.
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from rich.table import Table
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import Row
 from lgmd_gym.benchmark.run_folder import read_case_rows
 from lgmd_gym.benchmark.summary import (
@@ -184,7 +185,7 @@ def _share(values: np.ndarray, samples: np.ndarray, rows: list[Row], key: str) -
     low, high = _bounds(samples, len(values))
     if low is None or high is None:
         return Estimate(value, None, None, n)
-    size = effective_size([bool(row[key]) for row in rows], *cases_and_worlds(rows))
+    size = effective_size([bool(cast(Values, row)[key]) for row in rows], *cases_and_worlds(rows))
     wilson_low, wilson_high = wilson(value * size, size)
     return Estimate(value, min(low, wilson_low), max(high, wilson_high), n)
 
@@ -222,7 +223,7 @@ def _case_means(
         values: dict[str, list[float]] = {}
         for row in rows:
             if row[key] is not None and threats in (None, row["threat"]):
-                values.setdefault(row["case"], []).append(float(row[key]))
+                values.setdefault(row["case"], []).append(float(cast(Values, row)[key]))
         for case, of_case in values.items():
             line[cases.index(case)] = np.mean(of_case)
     return means

@@ -146,7 +146,7 @@ def paired_difference(quantity: Quantity, pairs: list[tuple[Row, Row]]) -> Diffe
     ]
     if not defined:
         return None
-    values = [(scale * a[key], scale * b[key]) for a, b in defined]
+    values: list[tuple[float, float]] = [(scale * a[key], scale * b[key]) for a, b in defined]
     changes, n = [b - a for a, b in values], len(values)
     clusters = cases_and_worlds(a for a, _ in defined)
     return Difference(

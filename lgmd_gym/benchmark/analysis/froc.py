@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: matplotlib states few types.
 """Free-response detection curve (FROC) of the neuron: detection rate against false alarms per km.
 
 The input is the open-loop traces of a run: the time series of `no-brake`. A threshold is swept over the
@@ -12,7 +14,7 @@ from dataclasses import dataclass
 from itertools import compress
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -25,6 +27,7 @@ from lgmd_gym.plotting.style import COLOURS, FigureFile, saved_figure
 from lgmd_gym.statistics.intervals import Rate, poisson_interval
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 REARM_TIME = 1.0  # time below the threshold after which the next alarm is a new event [s]
@@ -233,7 +236,7 @@ def froc_figure(file: FigureFile, curves: dict[str, list[FrocCurve]], lead_time:
     return figure
 
 
-def _plot_froc(axis: Any, curve: FrocCurve, colour: str) -> None:
+def _plot_froc(axis: "Axes", curve: FrocCurve, colour: str) -> None:
     points = curve.points
     false_per_km = [point.false_per_km for point in points]
     detected = [point.detected.k / max(point.detected.n, 1) for point in points]
@@ -245,7 +248,9 @@ def _plot_froc(axis: Any, curve: FrocCurve, colour: str) -> None:
         _label_thresholds(axis, points, list(zip(false_per_km, detected, strict=True)))
 
 
-def _label_thresholds(axis: Any, points: tuple[FrocPoint, ...], positions: list[tuple[float, float]]) -> None:
+def _label_thresholds(
+    axis: "Axes", points: tuple[FrocPoint, ...], positions: list[tuple[float, float]]
+) -> None:
     """Write some thresholds next to their points; equal points share a label."""
     labels: dict[tuple[float, float], list[str]] = {}
     for point, position in zip(points, positions, strict=True):

@@ -57,7 +57,7 @@ def limit_results(rows: list[Row], agent: str, suite: Suite) -> list[LimitResult
     if suite.limit is None:
         return []
     threats = [row for row in rows if row["agent"] == agent and row["error"] is None and row["threat"]]
-    results = []
+    results: list[LimitResult] = []
     for case in sorted({row["case"] for row in threats}, key=case_order):
         of_case = [row for row in threats if row["case"] == case]
         met, limits = zip(*map(suite.limit, of_case), strict=True)
@@ -71,7 +71,8 @@ def limit_lines(rows: list[Row], agents: list[str], suite: Suite) -> list[CaseLi
     """Return the runs that meet the protocol's limit, per case; empty for suites without limits."""
     by_agent = {agent: {item.case: item for item in limit_results(rows, agent, suite)} for agent in agents}
     limits = {case: item.limit for results in by_agent.values() for case, item in results.items()}
-    lines, short = [], _short_names(rows)
+    lines: list[CaseLine] = []
+    short = _short_names(rows)
     for case in sorted(limits, key=case_order):
         line = CaseLine(short[case], limits[case], [])
         for results in by_agent.values():

@@ -12,8 +12,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import product
 from math import radians
-from typing import Any
 
+from lgmd_gym.aliases import Arguments, Values
 from lgmd_gym.benchmark.case import Case, Points, Row, Suite, make_case, relative_impact, speed_cases, to_mps
 from lgmd_gym.benchmark.protocols.car_to_car_2023 import (
     GATE,
@@ -38,7 +38,7 @@ FAST_SCP = tuple(
     (a, b) for slow, fast in product((20, 30), (70, 80)) for a, b in ((slow, fast), (fast, slow))
 )
 FAST_TAP = (*((speed, 80) for speed in (10, 15, 20, 25)), (25, 30), (25, 45), (25, 60))
-BRAKING: dict[str, Any] = {"headway": 1.0, "deceleration": 4.0}  # of CCRb and CMRb
+BRAKING: Values = {"headway": 1.0, "deceleration": 4.0}  # of CCRb and CMRb
 CROSSING = range(10, 70, 10)
 # Euro NCAP Frontal Collisions 2026, 5.3.1: ego speed -> upper edges of the colours, relative impact speed,
 # both in km/h. An edge belongs to the worse colour.
@@ -138,7 +138,7 @@ def ncap2026_robustness() -> tuple[Case, ...]:
     ):
         rows += speed_cases(suite, "CCRb", [50], f"/{variant}", **(BRAKING | change))
     for family, ego, target in (("CCCscp", 40, 40), ("CCFtap", 15, 45), ("CCFhos", 50, 50)):
-        cars: dict[str, Any] = {"obstructed": True} if family == "CCCscp" else {}
+        cars: Arguments = {"obstructed": True} if family == "CCCscp" else {}
         rows += _pairs(suite, family, ((ego, target - 5), (ego, target + 5)), **cars)
     return tuple(rows)
 
@@ -150,13 +150,13 @@ def _cells(
     locations: Iterable[int],
     lights: Iterable[str] = ("day",),
     warned: bool = False,
-    **arguments: Any,
+    **arguments: object,
 ) -> list[Case]:
     """Return the cells of all ego speeds, impact locations and lights."""
     rows: list[Case] = []
     for per_cent, light in product(locations, lights):
         tail = f"{'-warned' if warned else ''}/location{per_cent}{'-night' if light == 'night' else ''}"
-        more: dict[str, Any] = {"weather": "night"} if light == "night" else {}
+        more: Arguments = {"weather": "night"} if light == "night" else {}
         cells = speed_cases(
             suite, family, list(speeds), tail, impact_location=per_cent / 100, **arguments, **more
         )
@@ -180,7 +180,7 @@ def _pairs(
     family: str,
     speeds: Iterable[tuple[int, int]],
     sides: Iterable[str] = (),
-    **arguments: Any,
+    **arguments: object,
 ) -> list[Case]:
     """Return a cell for every pair of ego and target speed, and every side."""
     rows: list[Case] = []

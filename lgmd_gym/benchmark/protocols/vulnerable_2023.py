@@ -1,7 +1,5 @@
 """Euro NCAP's test protocol AEB/LSS VRU v4.5.1 (February 2024, implementation 2023)."""
 
-from typing import Any
-
 from lgmd_gym.benchmark.case import Case, Suite, make_case, speed_cases, to_mps
 from lgmd_gym.benchmark.protocols.car_to_car_2023 import row_colour_2023, turns, without_targets
 
@@ -34,7 +32,9 @@ def ncap2023_vru() -> tuple[Case, ...]:
     )
 
 
-def _located(suite: str, family: str, speeds: list[int], per_cent: int, **arguments: Any) -> tuple[Case, ...]:
+def _located(
+    suite: str, family: str, speeds: list[int], per_cent: int, **arguments: object
+) -> tuple[Case, ...]:
     where = {"impact_location": per_cent / 100}
     return speed_cases(suite, family, speeds, f"/location{per_cent}", **where, **arguments)
 

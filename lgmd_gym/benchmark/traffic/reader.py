@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: highway-env states few types.
 """Reading of traffic environments: the state at every camera frame, for later drawing."""
 
 from typing import Any, NamedTuple
@@ -5,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgmd_gym.agents import to_action
+from lgmd_gym.aliases import Info
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.sensing.assembly import mean_yaw_rate
 from lgmd_gym.sensing.highway import on_road_step
@@ -24,7 +27,7 @@ class SceneFrame(NamedTuple):
 class Moment(NamedTuple):
     """Result of a reset or of one decision of a traffic environment, before its frames are drawn."""
 
-    info: dict[str, Any]  # info of the environment
+    info: Info  # info of the environment
     speed: float  # ego speed [m/s]
     yaw_rate: float  # mean yaw rate of the decision [rad/s]
     frames: tuple[SceneFrame, ...]  # camera frames since the last decision

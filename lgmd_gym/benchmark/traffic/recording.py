@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from lgmd_gym.aliases import Config
 from lgmd_gym.benchmark.traffic.reader import Moment, SceneReader
 from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.registration import make_traffic
@@ -70,7 +71,7 @@ def record_traffic(
     index: int,
     fps: float,
     appearance: Appearance,
-    config: dict[str, Any] | None = None,
+    config: Config | None = None,
 ) -> TrafficRecording:
     """Record one episode of traffic without an agent.
 

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Any
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import ID_KEYS, EpisodeRow
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.metrics import NUISANCE
@@ -73,7 +73,7 @@ class BrakingEvent:
 class EpisodeLog:
     """Events of one agent in one episode."""
 
-    events: list[BrakingEvent] = field(default_factory=list)  # braking events in order
+    events: list[BrakingEvent] = field(default_factory=list[BrakingEvent])  # braking events in order
     alerts: int = 0
     stops: int = 0  # number of standstills caused by braking events that count
     end: Step | None = None  # last step
@@ -81,7 +81,7 @@ class EpisodeLog:
     peak: float = 0.0  # highest deceleration beyond the driver's [m/s²]
 
 
-def measure(recording: TrafficRecording, log: EpisodeLog) -> dict[str, Any]:
+def measure(recording: TrafficRecording, log: EpisodeLog) -> Values:
     """Return the measured values of a row."""
     assert log.end is not None
     info = log.end.info

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 from rich.table import Table
 
@@ -116,7 +116,7 @@ def write_traffic_summary(rows: Sequence[EpisodeRow], path: Path) -> None:
     write_csv(path, COLUMNS, lines)
 
 
-def _line(item: TrafficSummary, condition: str) -> list[Any]:
+def _line(item: TrafficSummary, condition: str) -> list[object]:
     """Return the values of `COLUMNS`; rates are empty without distance."""
     counts = (item.false_activations, *item.false_bounds)
     driven = item.distance > 0.0

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """What stands beside a road, spans it, or lies and queues on its lanes."""
 
 from collections.abc import Callable

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Placement of clutter along the lanes of a road."""
 
 import math

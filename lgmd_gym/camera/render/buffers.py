@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """The arrays that the kernels of a frame share, by name, and the horizon."""
 
 from typing import NamedTuple
@@ -34,7 +36,7 @@ class View(NamedTuple):
     """One camera, posed: a `LENS` record, and a row of `Views`."""
 
     lens: np.ndarray
-    look: np.ndarray
+    look: np.record
     beam: np.ndarray
     sky: np.ndarray
     sky_aim: np.ndarray

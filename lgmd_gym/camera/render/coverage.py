@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Polygons as coverage of pixels: clipping, projection, and edges in an accumulator of differences.
 
 An edge in one column of the frame, or with at most one column per row, is added cell by cell; a shallower one

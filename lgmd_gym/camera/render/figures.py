@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Pedestrians and riders: poses of their joints, limbs and wheels.
 
 A limb is one polygon: its outline, as seen from the lens. That is a third of the faces that a box shows, it

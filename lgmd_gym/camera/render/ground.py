@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """The ground in a frame: visible band, road and paint, and the shading of its rows.
 
 A narrow field below the horizon contains a few metres of road, and most objects of a roadside are beyond it.
@@ -10,7 +12,7 @@ the sides of a frame of 160 columns.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -135,13 +137,13 @@ class Surface(NamedTuple):
         sunny: Whether the sun casts shadows.
     """
 
-    asphalt: Any
-    asphalt_gain: Any
-    verge: Any
-    verge_gain: Any
-    paint: Any
-    shadow_limit: Any
-    cast: Any
+    asphalt: float
+    asphalt_gain: float
+    verge: float
+    verge_gain: float
+    paint: float
+    shadow_limit: float
+    cast: float
     sunny: bool
 
 

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Light and air: weather, headlights, fog, the veil of scattered light, and glare.
 
 A ray of the camera meets droplets in the headlights. Droplets at the distance x scatter their share of it

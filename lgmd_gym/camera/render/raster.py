@@ -1,7 +1,8 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """The kernels that pose and draw the cameras of many environments, their tables and scratch memory."""
 
 import math
-from typing import Any
 
 import numba as nb
 import numpy as np
@@ -239,7 +240,7 @@ class Workspace:
             self._joined = Bundle(batch.arrays, scene_table.arrays, roads.arrays, models, self._arrays)
         return self._joined
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return Workspace, (self._shape,)
 
 

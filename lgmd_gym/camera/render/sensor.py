@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """The image sensor: motion blur, exposure and contrast control, tone curve and noise.
 
 The mean approximates the true light where nothing moves by more than two pixels between images. The number of

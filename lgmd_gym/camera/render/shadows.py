@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Soft shadows below objects, marks on the ground, and shadows that the sun casts.
 
 The shadow of a box is the convex hull of its outline at two heights, each shifted away from the sun. That of

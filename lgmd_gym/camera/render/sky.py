@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Sky above the horizon: gradient and skyline, or a panorama."""
 
 import math

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Solid objects: which are visible, their order from far to near, and how they are drawn."""
 
 import math

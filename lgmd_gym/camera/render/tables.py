@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Lookup tables of a camera in its scene, which kernels reach by their addresses.
 
 The cameras of a batch have tables of many worlds. One call draws them all, because it finds the tables of
@@ -6,11 +8,9 @@ each in `SharedTables.places` rather than among its arguments.
 
 from typing import Any, NamedTuple
 
-import numba as nb
 import numpy as np
-from numba import types
+from numba import carray, extending, types  # pyright: ignore[reportPrivateImportUsage]
 from numba.core import cgutils
-from numba.extending import intrinsic
 
 from lgmd_gym.camera.camera import Camera
 from lgmd_gym.camera.effects import noise_table
@@ -69,10 +69,10 @@ class SharedTables:
         )
         self.places = np.array([_place_of(table) for table in self.tables], np.int64)
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "SharedTables":
+    def __deepcopy__(self, memo: dict[int, object]) -> "SharedTables":
         return self
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return SharedTables, self._arguments
 
 
@@ -80,6 +80,9 @@ def _place_of(table: np.ndarray) -> tuple[int, int, int]:
     """Return the address and the lengths of an array with one or two dimensions."""
     length, width = (*table.shape, 0)[:2]
     return table.__array_interface__["data"][0], length, width
+
+
+intrinsic: Any = extending.intrinsic  # a decorated function is called without its typing context
 
 
 @intrinsic
@@ -96,10 +99,10 @@ def _pointer(typing_context, address):
 def tables_at(places):
     """Return the `Tables` in `SharedTables.places`."""
     return Tables(
-        asphalt=nb.carray(_pointer(places[0, 0]), (places[0, 1],), np.uint8),
-        verge=nb.carray(_pointer(places[1, 0]), (places[1, 1],), np.uint8),
-        level_start=nb.carray(_pointer(places[2, 0]), (places[2, 1], places[2, 2]), np.int64),
-        skyline=nb.carray(_pointer(places[3, 0]), (places[3, 1], places[3, 2]), np.float32),
-        noise=nb.carray(_pointer(places[4, 0]), (places[4, 1],), np.float32),
-        panorama=nb.carray(_pointer(places[5, 0]), (places[5, 1], places[5, 2]), np.float32),
+        asphalt=carray(_pointer(places[0, 0]), (places[0, 1],), np.uint8),
+        verge=carray(_pointer(places[1, 0]), (places[1, 1],), np.uint8),
+        level_start=carray(_pointer(places[2, 0]), (places[2, 1], places[2, 2]), np.int64),
+        skyline=carray(_pointer(places[3, 0]), (places[3, 1], places[3, 2]), np.float32),
+        noise=carray(_pointer(places[4, 0]), (places[4, 1],), np.float32),
+        panorama=carray(_pointer(places[5, 0]), (places[5, 1], places[5, 2]), np.float32),
     )

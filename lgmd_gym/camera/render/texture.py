@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Ground textures: noise with features, filtered copies, and samples of them along the rows of a frame.
 
 A texture is an array of deviations in units of its standard deviation, shape (texels along x, along y),

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """General kernel: all structural options of `LGMDParams` in plain loops; `kernels` has the fast kernel."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
 """Fast kernel: the paper's model in three passes over float32 maps, sixteen pixels at a time.
 
 The kernel covers ON and OFF paths without residue, the recursive delay and up to two persistent frames

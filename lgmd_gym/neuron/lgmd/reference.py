@@ -70,7 +70,7 @@ class ReferenceLGMD:
         """Return the discrete gain of a first-order low-pass filter, dt / (dt + tau)."""
         return self.dt / (self.dt + tau)
 
-    def step(self, frame: NDArray) -> Response:
+    def step(self, frame: np.ndarray) -> Response:
         """Process one frame of luminance in 0-255, shape (H, W)."""
         p = self.params
         luminance = np.asarray(frame, float) * self.mask

@@ -11,6 +11,7 @@ import numpy as np
 from joblib import delayed
 
 from lgmd_gym.agents.policies.features import FRAME, SCALES, shrink_frames
+from lgmd_gym.aliases import Values
 from lgmd_gym.engine.first_use import compile_kernels
 from lgmd_gym.processes.files import complete_file, is_intact_zip
 from lgmd_gym.processes.pool import run_parallel
@@ -91,7 +92,7 @@ PER_DECISION = ("rewards", "braking_returns", "braking_contacts")
 PREFIX = "observations/"
 
 
-def save(by_seed: list[list[RecordedEpisode]], file: Path, origin: dict[str, Any]) -> None:
+def save(by_seed: list[list[RecordedEpisode]], file: Path, origin: Values) -> None:
     """Write episodes to a file; an interrupted write leaves no file.
 
     Args:
@@ -100,7 +101,7 @@ def save(by_seed: list[list[RecordedEpisode]], file: Path, origin: dict[str, Any
         origin: Settings that the episodes were recorded with, as plain values.
     """
     episodes = [episode for group in by_seed for episode in group]
-    arrays: dict[str, Any] = {
+    arrays: Values = {
         "origin": np.array(json.dumps(origin)),
         "counts": np.array([len(group) for group in by_seed]),
         "lengths": np.array([len(episode) for episode in episodes]),
@@ -133,7 +134,7 @@ def load(file: Path) -> list[list[RecordedEpisode]]:
         return [[next(episodes) for _ in range(count)] for count in archive["counts"]]
 
 
-def check_file(file: Path, origin: dict[str, Any]) -> int:
+def check_file(file: Path, origin: Values) -> int:
     """Return the number of seeds in a file without loading its episodes.
 
     Args:

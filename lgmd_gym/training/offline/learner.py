@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from lgmd_gym.agents.base import HOLD
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_flag, check_positive, check_whole, check_within
 from lgmd_gym.training.offline.dataset import EpisodeBatch, OfflineDataset, check_mirror
 from lgmd_gym.training.offline.evaluation import (
@@ -118,7 +119,7 @@ class OfflineLearner:
         mirror: bool = False,
         select_margin: bool = False,
         bfloat16: bool = False,
-        policy_kwargs: dict[str, Any] | None = None,
+        policy_kwargs: Arguments | None = None,
     ) -> None:
         self.n_epochs = check_whole("n_epochs", n_epochs, 1)
         self.batch_size = check_whole("batch_size", batch_size, 1)

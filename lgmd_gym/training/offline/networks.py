@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import torch
 
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import shown
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from stable_baselines3.common.type_aliases import GymEnv
 
 
-def make_model(policy: str, env: "GymEnv", seed: int, policy_kwargs: dict[str, Any]) -> "PPO":
+def make_model(policy: str, env: "GymEnv", seed: int, policy_kwargs: Arguments) -> "PPO":
     """Return a PPO model; only its network and its file format are used."""
     from stable_baselines3 import PPO
 
@@ -25,7 +26,7 @@ def make_model(policy: str, env: "GymEnv", seed: int, policy_kwargs: dict[str, A
     return PPO(policy, env, 2e-3, 2, 2, seed=seed, device="cpu", policy_kwargs=policy_kwargs)
 
 
-def network_arguments(changes: dict[str, Any]) -> dict[str, Any]:
+def network_arguments(changes: Arguments) -> Arguments:
     """Return the arguments of a network: the defaults of `OfflineLearner` with some changes."""
     return {"activation_fn": torch.nn.ReLU, "net_arch": {"pi": [64, 64], "vf": []}} | changes
 
@@ -42,7 +43,7 @@ def check_without_frames(network: Any, name: str, required: object) -> None:
         raise ValueError(f"{name} must be {value} for a policy on frames; set {name}: {value}")
 
 
-def merged_layers(policy_kwargs: dict[str, Any], count: int) -> dict[str, Any]:
+def merged_layers(policy_kwargs: Arguments, count: int) -> Arguments:
     """Return the arguments of a network that is as wide as `count` networks together.
 
     Raises:

@@ -17,6 +17,7 @@ import gymnasium as gym
 import numpy as np
 
 from lgmd_gym.agents.base import HOLD
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.engine import BrakingVectorEnv
 from lgmd_gym.envs.simulation import Simulation
 from lgmd_gym.training.offline.episodes import (
@@ -208,7 +209,7 @@ class LevelRecorder:
     """
 
     env_id: str  # id of braking environments
-    arguments: dict[str, Any]  # arguments of `gym.make_vec`; `camera` is required
+    arguments: Arguments  # arguments of `gym.make_vec`; `camera` is required
     brake: float = -1.0  # demand that brakes, < 0
     shrink: int | None = None  # see `select_signals`
 

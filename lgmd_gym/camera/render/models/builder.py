@@ -166,8 +166,8 @@ class Figure:
 
     size: tuple[float, float, float]
     joints: np.ndarray = field(default_factory=lambda: np.zeros((MAX_JOINTS, 3)))
-    parts: list[tuple[float, ...]] = field(default_factory=list)
-    places: list[Place] = field(default_factory=list)
+    parts: list[tuple[float, ...]] = field(default_factory=list[tuple[float, ...]])
+    places: list[Place] = field(default_factory=list[Place])
     used: int = _FIRST_FREE
 
     def joint(self, x: float, y: float, z: float, index: int | None = None) -> int:
@@ -241,7 +241,7 @@ class Figure:
         The lens is ahead on the left, behind on the left, ahead on the right, behind on the right. Parts that
         change places as the lens passes abeam or behind the figure are beside each other in the view then.
         """
-        rows = []
+        rows: list[np.ndarray] = []
         for way, side in ((1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)):
             near = [_LENGTHWISE * way * x + side * y + rank for x, y, rank in self.places]
             rows.append(np.argsort(near, kind="stable"))
