@@ -127,7 +127,8 @@ class SpeedProfile:
 
     def __init__(self, speed: float, segments: tuple[Segment, ...] = ()) -> None:
         check_profile(speed, segments)
-        self._script = np.zeros((), SCRIPT_FIELDS)
+        # Fields of its record are attributes, also without compilation.
+        self._script = np.zeros((), SCRIPT_FIELDS).view(np.recarray)
         self._script["script_speed"], self._script["segment_end"] = speed, len(segments)
         self._segments = segment_table(segments)
 

@@ -7,11 +7,14 @@ contact is 5 s after the start.
 from math import pi
 
 import pytest
+from numba import config
 from support.scenarios import check_actor, invalid, scenario
 
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.families.distribution import draw_scenario, level_generator
 from lgmd_gym.envs.families.scenario import RoadPlan
+
+compiled_only = pytest.mark.skipif(config.DISABLE_JIT, reason="an environment needs compilation")
 
 
 def test_queue_in_the_adjacent_lane():
@@ -101,6 +104,7 @@ def test_slower_car_cuts_in(gap, excess, before, duration):
     assert (made.ego_speed, made.duration) == (20.0, duration)
 
 
+@compiled_only
 def test_slower_car_moves_into_the_lane_and_is_hit():
     env = BrakingEnv(scenario("CutIn", ego_speed=20.0, gap=20.0, excess=-4.0, change_length=32.0))
     env.reset(seed=0)
@@ -125,6 +129,7 @@ def test_slower_car_moves_into_the_lane_and_is_hit():
     assert info["relative_impact_speed"] == pytest.approx(4.0)
 
 
+@compiled_only
 def test_much_slower_car_is_passed():
     """At 15 m/s faster, the ego covers 2 m and both lengths in 0.7 s of a change of 6.4 s."""
     env = BrakingEnv(scenario("CutIn", ego_speed=20.0, gap=2.0, excess=-15.0, change_length=32.0))

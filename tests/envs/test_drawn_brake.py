@@ -5,6 +5,7 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 import pytest
+from numba import config
 from support.brakes import DrawnBrakes
 from support.rollouts import BRAKE, HOLD, rollout
 
@@ -13,6 +14,8 @@ from lgmd_gym.envs.dynamics.brake import BrakeParams, draw_brake
 from lgmd_gym.envs.episode_source import FixedScenario
 
 WORLDS = range(400)
+
+compiled_only = pytest.mark.skipif(config.DISABLE_JIT, reason="an environment needs compilation")
 
 
 class OneBrake:
@@ -61,6 +64,7 @@ def test_refused_worlds(world, wet):
         draw_brake(world, wet)
 
 
+@compiled_only
 def test_episode_has_its_own_brake():
     weak = BrakeParams(max_deceleration=5.0, dead_time=0.5, build_up=0.1)
     source = OneBrake(weak)
@@ -78,6 +82,7 @@ def test_episode_has_its_own_brake():
     assert values.max() == pytest.approx(9.0)
 
 
+@compiled_only
 def test_long_delay_lines_hold_every_demand():
     """A brake whose dead time is longer than the configured one gets a longer delay line."""
     late = BrakeParams(dead_time=1.0)
@@ -90,6 +95,7 @@ def test_long_delay_lines_hold_every_demand():
         assert one[1:] == other[1:]
 
 
+@compiled_only
 def test_configuration_takes_precedence():
     weak = BrakeParams(max_deceleration=5.0, dead_time=0.5, build_up=0.1)
     env = BrakingEnv(OneBrake(weak), config={"max_deceleration": 9.0})
@@ -103,6 +109,7 @@ def test_configuration_takes_precedence():
     assert env.brake.build_up == 0.1
 
 
+@compiled_only
 def test_reward_refers_to_the_brake_of_the_episode():
     """At full needless braking, a step of 1/30 s costs 2/30 with every brake, and progress is 1/30 · v/v₀."""
     for limit in (5.0, 9.0):
@@ -113,6 +120,7 @@ def test_reward_refers_to_the_brake_of_the_episode():
         assert results[-1][1] == pytest.approx(progress - 2 / 30, abs=1e-6)
 
 
+@compiled_only
 def test_agents_cannot_read_the_brake():
     """Until the first braking, observation and info are those of the default brake."""
     scenario = make_scenario("CCRs", ego_speed=10.0)
@@ -122,6 +130,7 @@ def test_agents_cannot_read_the_brake():
         assert one[-1] == other[-1]
 
 
+@compiled_only
 @pytest.mark.parametrize(("weather", "wet"), [("clear", False), ("rain", True), ("fog", False)])
 def test_registered_ids_draw_the_brake_of_the_world(weather, wet):
     env = gym.make("LGMD/CCRs-v0", camera=None, world=12, weather=weather)
@@ -129,12 +138,14 @@ def test_registered_ids_draw_the_brake_of_the_world(weather, wet):
     assert env.unwrapped.brake == draw_brake(12, wet)
 
 
+@compiled_only
 def test_the_laboratory_has_the_configured_brake():
     env = gym.make("LGMD/CCRs-v0", camera=None, world="laboratory")
     env.reset(seed=0)
     assert env.unwrapped.brake == BrakeParams()
 
 
+@compiled_only
 def test_configured_keys_replace_those_of_the_world():
     env = gym.make("LGMD/CCRs-v0", camera=None, world=12, config={"max_deceleration": 6.0})
     env.reset(seed=0)
