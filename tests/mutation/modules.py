@@ -47,7 +47,15 @@ _SEEN = (
 )
 MODULES = {
     "reward": Module(("envs/reward.py",), ("tests/envs/test_formulas.py",)),
-    "info": Module(("envs/info.py", "envs/surrogate_safety.py"), ("tests/envs/test_formulas.py",)),
+    "info": Module(
+        ("envs/info.py", "envs/surrogate_safety.py"),
+        ("tests/envs/test_formulas.py",),
+        (
+            "required_deceleration",
+            "predicted_contact",
+            "outline_after",
+        ),  # of traffic, which steps environments
+    ),
     "dynamics": Module(
         _under(
             "envs/dynamics",
