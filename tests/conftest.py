@@ -6,6 +6,7 @@ import pytest
 from hypothesis import settings
 from support.clips import install_moviepy, write_lossless
 
+from lgmd_gym.engine.first_use import compile_kernels
 from lgmd_gym.paper.backgrounds import Plain, Screen
 from lgmd_gym.paper.stimuli import Looming, stimulus_frames
 
@@ -14,6 +15,12 @@ os.environ.setdefault("LGMD_GYM_QUIET", "1")
 # A first example may include the compilation of a kernel.
 settings.register_profile("compiled", deadline=None)
 settings.load_profile("compiled")
+
+
+def pytest_configure(config):
+    """Compile the kernels before the processes of pytest-xdist start, which would both do so."""
+    if config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
+        compile_kernels()
 
 
 @pytest.fixture(scope="session")

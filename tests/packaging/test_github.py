@@ -86,12 +86,12 @@ def test_the_workflow_runs_the_test_command_of_the_readme():
 
 def test_slow_tests_and_lint_run_once():
     steps = commands(workflow("test")["jobs"]["test"])
-    checks = (ROOT / ".ci" / "run").read_text()
+    checks = [line.removesuffix(" &") for line in (ROOT / ".ci" / "run").read_text().splitlines()]
     for name in ("Slow tests", "Lint, spelling and types"):
         assert steps[name]["if"] == "matrix.os == 'ubuntu-latest' && matrix.python == '3.11'"
-        assert [line for line in steps[name]["run"].split(" && ") if f"\n{line}\n" not in checks] == []
+        assert [line for line in steps[name]["run"].split(" && ") if line not in checks] == []
     _, build = commands(workflow("docs")["jobs"]["build"])
-    assert f"\n{build}\n" in checks
+    assert build in checks
 
 
 def test_only_publishing_jobs_get_a_token_and_they_build_nothing():
