@@ -270,7 +270,7 @@ def test_an_agent_that_needs_memory_does_not_replace_the_worker_processes(tmp_pa
     (tmp_path / "large_agent.py").write_text(LARGE_AGENT)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    config = RunConfig(suite="quick", seeds=3, agents=("large_agent:Large",))
+    config = RunConfig(suite="quick", seeds=1, agents=("large_agent:Large",))
     assert Run.new(config, tmp_path / "run", Executor(jobs=2)).play()
     processes = {path.stem for path in tmp_path.glob("*.pid")} - {str(os.getpid())}
     assert len(processes) == 2

@@ -34,7 +34,11 @@ def deviation(case):
 
 
 @pytest.mark.parametrize(
-    "suite", ["ncap2023-vru", "ncap2026", "ncap2026-extended", "r152-vru", "fmvss127-pedestrian"]
+    "suite",
+    [
+        *("ncap2023-vru", "ncap2026", "r152-vru", "fmvss127-pedestrian"),
+        pytest.param("ncap2026-extended", marks=pytest.mark.slow),
+    ],
 )
 def test_contact_is_at_the_impact_location(suite):
     cases = [case for case in SUITES[suite].cases if case.family in (*POINTS, *AHEAD, "CPRA")]

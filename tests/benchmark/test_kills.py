@@ -1,7 +1,6 @@
-"""`bench --jobs 2` that is stopped at random times loses, repeats and leaves nothing."""
+"""A stopped `bench --jobs 2` loses, repeats and leaves nothing; tests/fuzz/kills.py has random times."""
 
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -41,44 +40,45 @@ def suite(tmp_path_factory):
     return path
 
 
-def bench(suite, out, tag):
-    """Start the command."""
-    options = ["--agents", "spike-threshold", "ttc-oracle", "--seeds", "8", "--no-plots", "--no-report"]
-    return kills.start(["bench", "--suite", suite, "--out", out, *options], tag)
+OPTIONS = ["--agents", "spike-threshold", "ttc-oracle", "--seeds", "4", "--no-plots", "--no-report"]
 
 
 @pytest.fixture(scope="module")
 def complete(suite, tmp_path_factory):
-    """Rows of a complete run, and its duration [s]."""
-    out, started = tmp_path_factory.mktemp("runs") / "complete", time.monotonic()
-    bench(suite, out, "complete").communicate(timeout=120)
-    return sorted_rows(read_rows(out)), time.monotonic() - started
+    """Folder of a complete run in one process."""
+    out = tmp_path_factory.mktemp("runs") / "complete"
+    assert cli.run(["bench", "--suite", str(suite), "--out", str(out), *OPTIONS, "--jobs", "1"]) == 0
+    return out
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", kills.CODES)
-@pytest.mark.parametrize("seed", [1])
-def test_stopped_command_leaves_nothing_and_resumes(suite, complete, tmp_path, number, seed):
-    """The signal goes to the command alone (SIGTERM, SIGKILL) or to its workers, too (SIGINT)."""
-    rows, duration = complete
-    out, tag = tmp_path / "run", f"{os.getpid()}-{number}-{seed}"
-    process = bench(suite, out, tag)
-    time.sleep(random.Random(f"{number} {seed}").uniform(0.1, 1.0) * duration)
-    owners, finished = {process.pid, *kills.processes(tag)}, process.poll() is not None
-    if not finished:
-        (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
-    _, errors = process.communicate(timeout=120)
+@pytest.mark.parametrize(
+    ("number", "count"), [(signal.SIGINT, 12), (signal.SIGTERM, 1), (signal.SIGKILL, 24)]
+)
+def test_stopped_command_leaves_nothing_and_resumes(suite, complete, tmp_path, capsys, number, count):
+    """SIGTERM and SIGKILL go to the command alone, SIGINT also to its workers, as from a terminal."""
+    rows = sorted_rows(read_rows(complete))
+    out, tag = tmp_path / "run", f"{os.getpid()}-{number}"
+    process = kills.start(["bench", "--suite", suite, "--out", out, *OPTIONS], tag)
+    kills.wait_for_rows(out, count, process)
+    owners = {process.pid, *kills.processes(tag)}
+    (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
+    printed, errors = process.communicate(timeout=120)
     # Python restores the default handler of SIGTERM at the very end.
-    expected = (0,) if finished else (kills.CODES[number], -number)
-    assert process.returncode in expected, errors
+    assert process.returncode in (kills.CODES[number], -number), errors
     assert "Traceback" not in errors
     kills.wait_until_gone(tag, owners)
-    if out.exists():
-        kept = read_rows(out)
-        assert all(row in rows for row in kept)
-        options = ["--jobs", "1", "--no-plots", "--no-report"]
-        assert cli.run(["bench", "--resume", str(out), *options]) == 0
-        assert sorted_rows(read_rows(out)) == rows
+    kept = read_rows(out)
+    assert count <= len(kept) < len(rows) == 48
+    assert all(row in rows for row in kept)
+    if number == signal.SIGINT:
+        assert f"interrupted: {len(kept)} of 48" in printed
+        assert (out / "summary.csv").exists()
+    assert cli.run(["bench", "--resume", str(out), "--jobs", "1", "--no-plots", "--no-report"]) == 0
+    assert f"resuming with {len(kept)} of 48" in capsys.readouterr().out
+    assert sorted_rows(read_rows(out)) == rows
+    for name in ("summary.csv", "froc.csv"):
+        assert (out / name).read_bytes() == (complete / name).read_bytes()
 
 
 def test_sigterm_ends_a_command_like_ctrl_c_with_its_own_code(monkeypatch, capsys):

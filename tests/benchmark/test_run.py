@@ -64,12 +64,6 @@ def test_bounding_agents_and_the_neuron_behave_as_documented(quick_run):
         assert not any(row["false_activation"] for row in rows("spike-threshold", family))
 
 
-def test_number_of_processes_does_not_change_the_rows(quick_run, tmp_path):
-    run = new_run(tmp_path / "two", jobs=2, agents=BOUNDS[1:], seeds=1)
-    assert run.play()
-    assert sorted_rows(run.rows) == sorted_rows(quick_run.rows)
-
-
 def test_interrupted_run_keeps_its_rows(tmp_path):
     run = new_run(tmp_path / "run", agents=["no-brake"], seeds=1)
 

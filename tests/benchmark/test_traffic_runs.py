@@ -118,7 +118,7 @@ def test_interrupted_run_is_resumed_with_the_missing_episodes(tmp_path):
 
 @pytest.mark.slow
 def test_number_of_processes_does_not_change_the_rows(tmp_path):
-    values = {"suite": "traffic", "kinds": ["merge", "intersection"], "seeds": 2}
+    values = {"suite": "traffic", "kinds": ["merge", "intersection"], "seeds": 1}
     agents = ["spike-threshold", "random-brake"]
     rows = []
     for jobs in (1, 2):

@@ -61,6 +61,7 @@ ARGUMENTS = {
         ]
     },
 }
+TO_THE_CONTACT = ("base", "known brake", "reward")  # the contact is at 5 s
 
 
 def random_actions(rng, num_envs):
@@ -95,14 +96,7 @@ def compare(family, mode, threads, steps, draw=random_demands, num_envs=3, seed=
 
 @pytest.mark.parametrize(
     ("mode", "threads"),
-    [
-        ("NextStep", 2),
-        ("SameStep", 1),
-        ("Disabled", 2),
-        pytest.param("NextStep", 1, marks=pytest.mark.slow),
-        pytest.param("SameStep", 2, marks=pytest.mark.slow),
-        pytest.param("Disabled", 1, marks=pytest.mark.slow),
-    ],
+    [("NextStep", 2), ("SameStep", 1), ("Disabled", 2)],
 )
 def test_random_levels(mode, threads):
     assert compare("RandomBraking", mode, threads, 260, include_frame=True, trace=True) >= 3
@@ -112,7 +106,8 @@ def test_random_levels(mode, threads):
 def test_arguments(case):
     arguments = ARGUMENTS[case]
     rate = arguments.get("config", {}).get("policy_frequency", 30)
-    assert compare("CCRs", "SameStep", 2, int(5.3 * rate), hold_or_brake, **arguments, **FAST) >= 3
+    steps = int((5.3 if case in TO_THE_CONTACT else 2.7) * rate)
+    assert compare("CCRs", "SameStep", 2, steps, hold_or_brake, **arguments, **FAST) >= 2
 
 
 @pytest.mark.parametrize("rate", [10, 30])
@@ -138,19 +133,19 @@ def test_families(family):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("family", "mode"), zip(FAMILIES, cycle(MODES)))
-def test_every_family(family, mode):
+@pytest.mark.parametrize(
+    ("family", "mode", "threads", "draw"),
+    list(zip(FAMILIES, cycle(MODES), cycle((1, 2)), cycle((random_demands, random_actions)))),
+)
+def test_every_family(family, mode, threads, draw):
     """`test_random_levels` draws families in every mode."""
-    for threads, draw in ((1, random_demands), (2, random_actions)):
-        compare(family, mode, threads, 400, draw, num_envs=2, include_frame=True, trace=True)
+    compare(family, mode, threads, 300, draw, num_envs=2, include_frame=True, trace=True)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", MODES)
-def test_two_hundred_random_levels(mode):
-    """Run thousands of steps in 20 environments with random actions until 70 episodes have ended per mode."""
-    episodes, seed = 0, 0
-    while episodes < 70:
-        threads, draw = (1, 2, 4)[seed % 3], (random_demands, random_actions)[seed % 2]
-        episodes += compare("RandomBraking", mode, threads, 250, draw, 20, 1000 * seed, include_frame=True)
-        seed += 1
+@pytest.mark.parametrize(
+    ("mode", "threads", "draw"),
+    [("NextStep", 1, random_demands), ("SameStep", 2, random_actions), ("Disabled", 4, random_demands)],
+)
+def test_many_random_levels(mode, threads, draw):
+    assert compare("RandomBraking", mode, threads, 350, draw, 20, 1000 * threads, include_frame=True) >= 10

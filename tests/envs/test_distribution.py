@@ -61,7 +61,7 @@ def test_every_family_is_drawn():
 def test_levels_are_valid():
     """Every drawn argument is in range, and so is every field of the scenario made from it."""
     for split in ("train", "validation", "test"):
-        for level in range(1500):
+        for level in range(700):
             draw_scenario(level_generator(split, level))
             draw_scenario(level_generator(split, level), EXTRA_FAMILIES)
 
@@ -70,13 +70,12 @@ def test_levels_are_valid():
 def test_extra_families_are_drawn_where_they_are_named(threat):
     """A standing target is a threat in every level; a car next to the lane or a missing target is not."""
     names = [name for name in EXTRA_FAMILIES if DECLARED[name].threat is threat]
-    env = random_env(split="validation", families=names)
-    families = set()
-    for seed in range(200):
-        _, scenario, _, collision, _ = run_episode(env, seed)
-        assert collision is threat, scenario
-        families.add(scenario.family)
-    assert families == {DECLARED[name].family for name in names}
+    for name in names:
+        env = random_env(split="validation", families=[name])
+        for seed in range(3):
+            _, scenario, _, collision, _ = run_episode(env, seed)
+            assert collision is threat, scenario
+            assert scenario.family == DECLARED[name].family
 
 
 def test_levels_without_targets_are_twins():
@@ -154,7 +153,7 @@ def test_levels_include_the_headways_of_fmvss127():
 def test_only_threats_have_contact_without_braking():
     env = random_env(split="validation")
     families = set()
-    for seed in range(120):
+    for seed in range(70):
         _, scenario, _, collision, _ = run_episode(env, seed)
         assert collision is (scenario.family in THREATS), scenario
         families.add(scenario.family)

@@ -196,7 +196,8 @@ def test_a_wheel_built_from_the_sdist_is_complete_and_has_one_top_level_package(
     assert "lgmd_gym/py.typed" in names
     assert "lgmd_gym/agents/policies/zones.zip" in names
     zipfile.ZipFile(tmp_path / wheel).extractall(tmp_path / "site")
-    code = "import gymnasium, lgmd_gym.envs as e; gymnasium.make('LGMD/CCRs-v0').reset(); print(e.__file__)"
+    code = "import gymnasium, lgmd_gym.envs as e; print(e.__file__); "
+    code += "gymnasium.make('LGMD/CCRs-v0')"
     env = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
     assert run(code, cwd=tmp_path, env=env).startswith(str(tmp_path / "site"))
     env["PYTHONPATH"] = str(folder)  # an unpacked sdist, which lacks the links to envs and agents

@@ -29,6 +29,15 @@ def start(arguments, tag, **options):
     )
 
 
+def wait_for_rows(out, count, process):
+    """Wait until a run folder has a number of rows; AssertionError if its command ends before."""
+    file, end = out / "episodes.jsonl", time.monotonic() + 600
+    while not file.exists() or file.read_bytes().count(b"\n") < count:
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
 def processes(tag):
     """Return the running processes that have inherited a tag."""
     entry, found = f"{TAG}={tag}\0".encode(), []

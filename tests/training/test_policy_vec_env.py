@@ -46,8 +46,8 @@ def test_steps_equal_those_of_single_environments(name):
         vec_env.seed(5)
     assert_equal(singles.reset(), envs.reset())
     rng, ends = np.random.default_rng(0), 0
-    for _ in range(40 if name == "zones" else 80):
-        braking = rng.random(NUM_ENVS) < 0.05
+    for _ in range(40):
+        braking = rng.random(NUM_ENVS) < 0.08
         actions = np.where(braking, BRAKE, HOLD) if config.demands else -0.6 * braking[:, None]
         expected, reward, done, infos = singles.step(actions)
         observations, rewards, dones, rows = envs.step(actions)
@@ -57,7 +57,7 @@ def test_steps_equal_those_of_single_environments(name):
         for index in np.flatnonzero(done):
             assert_same_info(infos[index], rows[index])
             ends += 1
-    assert ends > 3
+    assert ends >= 3
     assert not any(rows[index] for index in np.flatnonzero(~dones))
 
 

@@ -31,16 +31,16 @@ def test_the_value_is_avoided_energy_minus_the_cost_of_false_activations():
 
 
 @pytest.mark.parametrize(
-    ("agent", "levels", "seeds"),
+    ("agent", "levels", "cases"),
     [
-        ("frame-difference", 6, 0),
+        ("frame-difference", 4, 0),
         pytest.param("spike-threshold:threshold=150,frames=3", 12, 0, marks=pytest.mark.slow),
-        pytest.param("frame-difference", 12, 0, marks=pytest.mark.slow),
-        pytest.param("stopping-zone", 17, 1, marks=pytest.mark.slow),
+        pytest.param("stopping-zone", 9, 5, marks=pytest.mark.slow),
     ],
 )
-def test_replay_on_recordings_equals_closed_loop(agent, levels, seeds):
-    objective, rule = Objective("train", levels, seeds), make_agent(agent)
+def test_replay_on_recordings_equals_closed_loop(agent, levels, cases):
+    objective, rule = Objective("train", levels, seeds=min(cases, 1)), make_agent(agent)
+    del objective.tasks[levels + cases :]
     objective.evaluate("no-brake")
     objective.evaluate("spike-threshold")  # recordings of other sensors must not interfere
     sensors = SensorConfig().for_agent(rule)

@@ -143,7 +143,8 @@ def test_bench_accepts_the_options_that_tune_prints(tmp_path, monkeypatch, capsy
     printed = capsys.readouterr().out.splitlines()[-1].split(": ", 1)[1].split()
     assert printed[0] == "--agents"
     assert "--params" in printed
-    assert cli.run(["bench", *printed, "--suite", "small.toml", "--seeds", "1", "--jobs", "1"]) == 0
+    quick = ["--jobs", "1", "--no-plots", "--no-report"]
+    assert cli.run(["bench", *printed, "--suite", "small.toml", "--seeds", "1", *quick]) == 0
     assert cli.run(["tune", *small, *space]) == 2
     assert "--best 'best.toml' exists; choose another file" in capsys.readouterr().err
 
