@@ -11,6 +11,7 @@ import sys
 import gymnasium as gym
 import numpy as np
 from highway_env.road.road import RoadNetwork
+from numba.core import config
 
 from lgmd_gym.camera import Camera
 from lgmd_gym.camera.render.raster import draw_cameras
@@ -27,8 +28,8 @@ _HELPER = f"from {__name__} import _compile_others; _compile_others()"
 
 
 def compile_kernels() -> None:
-    """Compile the kernels of a braking environment, unless numba's cache has them."""
-    if all(map(is_cached, (draw_cameras, advance))):
+    """Compile the kernels of a braking environment, unless numba's cache has them or it compiles nothing."""
+    if config.DISABLE_JIT or all(map(is_cached, (draw_cameras, advance))):
         return
     environment = os.environ | {VARIABLE: "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with signals_blocked():

@@ -146,6 +146,14 @@ def test_cached_kernels_start_no_process(monkeypatch):
     first_use.compile_kernels()
 
 
+def test_nothing_is_compiled_with_numba_disabled(monkeypatch):
+    monkeypatch.setattr(first_use.config, "DISABLE_JIT", 1)
+    monkeypatch.setattr(first_use, "is_cached", lambda kernel: kernel.signatures)  # a plain function has none
+    monkeypatch.setattr(first_use.subprocess, "Popen", lambda *_, **__: pytest.fail("started a process"))
+    monkeypatch.setattr(first_use, "advance", lambda: None)
+    first_use.compile_kernels()
+
+
 @pytest.mark.slow
 def test_a_second_process_compiles_what_is_not_camera(tmp_path):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "LGMD_GYM_QUIET": "1"}
