@@ -6,7 +6,6 @@ import pytest
 from hypothesis import settings
 from support.clips import install_moviepy, write_lossless
 
-from lgmd_gym.engine.first_use import compile_kernels
 from lgmd_gym.paper.backgrounds import Plain, Screen
 from lgmd_gym.paper.stimuli import Looming, stimulus_frames
 
@@ -20,6 +19,8 @@ settings.load_profile("compiled")
 def pytest_configure(config):
     """Compile the kernels before the processes of pytest-xdist start, which would both do so."""
     if config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
+        from lgmd_gym.engine.first_use import compile_kernels
+
         compile_kernels()
 
 
