@@ -194,7 +194,7 @@ class LatchingAgent(BatchAgent):
         raise NotImplementedError
 
 
-class Actor(Protocol):
+class Driver(Protocol):
     """What drives in a single environment; an `Agent` is one."""
 
     @property

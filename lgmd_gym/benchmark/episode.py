@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 import numpy as np
 
-from lgmd_gym.agents.base import Actor
+from lgmd_gym.agents.base import Driver
 from lgmd_gym.aliases import Info, Values
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.sensors import SensorConfig
@@ -74,7 +74,7 @@ def make_env(case: Case, sensor_config: SensorConfig, arguments: Mapping[str, An
     return gym.make(env_id(case.environment), trace=True, **sensor_config.for_agent().arguments | chosen)
 
 
-def rollout(env: gym.Env, agent: Actor, seed: int) -> Iterator[tuple[Step, np.ndarray]]:
+def rollout(env: gym.Env, agent: Driver, seed: int) -> Iterator[tuple[Step, np.ndarray]]:
     """Yield every step of an episode, including the final one, and the agent's action on it."""
     step = Step(*env.reset(seed=seed))
     agent.reset(seed)

@@ -14,7 +14,7 @@ from lgmd_gym.benchmark.metrics import Counterfactual
 from lgmd_gym.benchmark.player import play_unit
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.task import NO_BRAKE, Result, Task
-from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
+from lgmd_gym.benchmark.traffic.batch import TrafficDrive, TrafficTask, run_traffic_task
 from lgmd_gym.benchmark.units import make_units
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.appearance import Appearance
@@ -132,7 +132,7 @@ class TrafficPlan(Plan):
         done = {key_of(row) for row in rows}
         tasks = list[TrafficTask]()
         for condition, sensor_config in self.sensor_configs.items():
-            drives = list[Drive]()
+            drives = list[TrafficDrive]()
             for seed in self.config.seed_range:
                 for index, kind in enumerate(self.kinds):
                     key = (traffic_case(kind, seed).name, seed, condition)
@@ -141,7 +141,7 @@ class TrafficPlan(Plan):
                         world = self.config.world(seed, index)
                         chosen = LABORATORY if world is None else world
                         appearance = Appearance(world=chosen, weather=condition, road=self.config.road)
-                        drives.append(Drive(kind, seed, agents, appearance))
+                        drives.append(TrafficDrive(kind, seed, agents, appearance))
             for first in range(0, len(drives), DRIVES_PER_TASK):
                 batch = tuple(drives[first : first + DRIVES_PER_TASK])
                 tasks.append(TrafficTask(batch, sensor_config, condition))

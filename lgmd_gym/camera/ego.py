@@ -14,7 +14,7 @@ from lgmd_gym.camera.render.buffers import Buffers
 from lgmd_gym.camera.render.raster import Workspace
 from lgmd_gym.camera.road_pool import RoadPool, road_key
 from lgmd_gym.camera.scene import Scene
-from lgmd_gym.camera.scene_table import SceneTable, view_of
+from lgmd_gym.camera.scene_table import SceneTable, sector_of
 
 if TYPE_CHECKING:
     import gymnasium as gym
@@ -141,7 +141,7 @@ class _Stage:
         self.workspace = Workspace(camera.shape)
         self._scene, self._key = scene, road_key(scene)
         self._scene_table, self._roads = SceneTable(), RoadPool(1)
-        self._view = view_of([in_scene(camera, scene)], scene)
+        self._sector = sector_of([in_scene(camera, scene)], scene)
         self._selected = np.ones((1, 1), np.bool_)
         self._turned = False  # whether the last frame had another gaze than that of the camera
 
@@ -150,7 +150,7 @@ class _Stage:
         if gaze is not None or self._turned:
             self.batch.turn(0, self._scene, gaze)
             self._turned = gaze is not None
-        ego = self._scene_table.read(env, None if self._turned else self._view)
+        ego = self._scene_table.read(env, None if self._turned else self._sector)
         self._roads.assign(0, ego.road, self._key)
         self.batch.draw(
             0,

@@ -103,7 +103,7 @@ _BODY_LONG_M, _BODY_WIDE_M, _TRAILER_LONG_M = 5.2, 2.3, 10.0
 _HASH_MASK, _HASH_FACTOR = 0xFFFFFFFF, 0x045D9F3B
 
 
-class View(NamedTuple):
+class Sector(NamedTuple):
     """Directions that the cameras of a car look in: from `first` to `last`, at most 170° apart.
 
     Attributes:
@@ -117,12 +117,12 @@ class View(NamedTuple):
     reach: float
 
 
-def read_objects(ego: Ego, view: View | None, records: memoryview, index: int = 0) -> int:
+def read_objects(ego: Ego, sector: Sector | None, records: memoryview, index: int = 0) -> int:
     """Read all objects of a road that may be visible, except the ego; returns their number.
 
     Args:
         ego: The ego and its road.
-        view: Directions of view, to skip objects behind all lenses; None for all around.
+        sector: Directions of view, to skip objects behind all lenses; None for all around.
         records: Bytes of `OBJECT` records, shape (environments, 512).
         index: Index of the environment.
 
@@ -132,10 +132,10 @@ def read_objects(ego: Ego, view: View | None, records: memoryview, index: int = 
     road, vehicle, x, y, heading = ego
     reach = (MAX_RANGE + _MOUNT_REACH) ** 2
     rear, a_x, a_y, b_x, b_y = -math.inf, 0.0, 0.0, 0.0, 0.0
-    if view is not None:
-        rear = -view.reach - 0.5 * vehicle.LENGTH
-        a_x, a_y = math.cos(heading + view.first), math.sin(heading + view.first)
-        b_x, b_y = math.cos(heading + view.last), math.sin(heading + view.last)
+    if sector is not None:
+        rear = -sector.reach - 0.5 * vehicle.LENGTH
+        a_x, a_y = math.cos(heading + sector.first), math.sin(heading + sector.first)
+        b_x, b_y = math.cos(heading + sector.last), math.sin(heading + sector.last)
     count, start = 0, index * MAX_DRAWN
     for group in (road.vehicles, road.objects):
         for place, item in enumerate(group):

@@ -9,7 +9,7 @@ import numpy as np
 from lgmd_gym.camera.body_motion import MAX_DEG, PITCH, ROLL, YAW
 from lgmd_gym.camera.camera import Camera, Fixed, ToStoppingPoint
 from lgmd_gym.camera.env_state import SCENE, Ego, read_scene
-from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, View, read_objects
+from lgmd_gym.camera.objects import MAX_DRAWN, OBJECT, Sector, read_objects
 from lgmd_gym.camera.pose import MAX_TURN
 from lgmd_gym.camera.scene import ROADS, Scene
 from lgmd_gym.kernels.bundle import Bundle
@@ -43,19 +43,19 @@ class SceneTable:
         self.bundle = Bundle(self.scenes, self.objects, self.object_counts)
         self._take_views()
 
-    def read(self, env: "gym.Env", view: View | None, index: int = 0) -> Ego:
+    def read(self, env: "gym.Env", sector: Sector | None, index: int = 0) -> Ego:
         """Read the present state of a highway-env environment.
 
         Args:
             env: The environment, wrapped or not, after its first reset.
-            view: See `read_objects`.
+            sector: See `read_objects`.
             index: Index of the environment.
 
         Raises:
             ValueError: If the environment has no road or ego yet, or a pose is not finite.
         """
         ego = read_scene(env, self._scene_bytes, index)
-        self.object_counts[index] = read_objects(ego, view, self._object_bytes, index)
+        self.object_counts[index] = read_objects(ego, sector, self._object_bytes, index)
         return ego
 
     def _take_views(self) -> None:
@@ -70,7 +70,7 @@ class SceneTable:
         self._take_views()
 
 
-def view_of(cameras: Sequence[Camera], scene: Scene) -> View | None:
+def sector_of(cameras: Sequence[Camera], scene: Scene) -> Sector | None:
     """Return the directions that cameras look in; None if they look all around, or if there are none."""
     if not cameras or any(_may_look_behind(camera, scene) for camera in cameras):
         return None
@@ -82,7 +82,7 @@ def view_of(cameras: Sequence[Camera], scene: Scene) -> View | None:
         return None
     mounts = [camera.mount for camera in cameras]
     reach = max(abs(mount.setback_m) for mount in mounts) + max(abs(mount.left_m) for mount in mounts)
-    return View(math.radians(first), math.radians(last), reach)
+    return Sector(math.radians(first), math.radians(last), reach)
 
 
 def _max_turn_deg(camera: Camera) -> float:

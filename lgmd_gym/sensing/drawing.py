@@ -12,12 +12,12 @@ from lgmd_gym.camera.birdseye import BirdsEye
 from lgmd_gym.camera.camera import Camera
 from lgmd_gym.camera.effects import in_scene
 from lgmd_gym.camera.ego import EgoCamera
-from lgmd_gym.camera.objects import View
+from lgmd_gym.camera.objects import Sector
 from lgmd_gym.camera.pose import USUAL_BRAKE, known_deceleration
 from lgmd_gym.camera.render.raster import Workspace
 from lgmd_gym.camera.road_pool import RoadPool, road_key
 from lgmd_gym.camera.scene import Scene
-from lgmd_gym.camera.scene_table import SceneTable, view_of
+from lgmd_gym.camera.scene_table import SceneTable, sector_of
 from lgmd_gym.kernels.bundle import Bundle
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class Drawing:
         ]
         self.scene_table, self._roads = SceneTable(num_envs), RoadPool(num_envs)
         self._scenes = [(Scene(), USUAL_BRAKE)] * num_envs
-        self._views: dict[int, View | None] = {}  # by environment
+        self._sectors: dict[int, Sector | None] = {}  # by environment
         self.groups: list[FrameGroup] = []
         self.group_of: list[int] = []
         self._locations = {k: (g, row) for g, group in enumerate(groups) for row, k in enumerate(group)}
@@ -104,12 +104,12 @@ class Drawing:
 
     def read(self, env: gym.Env, index: int) -> None:
         """Read the present state of a highway-env environment; see `SensorArray.read`."""
-        if index not in self._views:
+        if index not in self._sectors:
             scene = self._scenes[index][0]
             cameras = [in_scene(camera, scene) for camera in self._cameras if camera is not None]
-            self._views[index] = view_of(cameras, scene)
+            self._sectors[index] = sector_of(cameras, scene)
         base: Any = env.unwrapped
-        self.scene_table.read(base, self._views[index], index)
+        self.scene_table.read(base, self._sectors[index], index)
         self.set_road(index, base.road)
 
     def render_top_views(self, env: gym.Env, index: int, enabled: np.ndarray) -> None:
@@ -131,7 +131,7 @@ class Drawing:
         if self.known_decelerations is not None:
             self.known_decelerations[index] = known_deceleration(scene, max_deceleration)
         self._scenes[index] = scene, max_deceleration
-        self._views.pop(index, None)
+        self._sectors.pop(index, None)
 
     def draw(self, group: int, first: int, last: int, selected: np.ndarray) -> None:
         """Draw selected cameras of a distinct group; see `FrameGroup.draw`."""

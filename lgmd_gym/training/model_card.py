@@ -44,7 +44,7 @@ print(agent.agent.card)
 """
 
 
-class Result(NamedTuple):
+class EvaluationResult(NamedTuple):
     """The best evaluation of a training run on the validation split."""
 
     mean: float  # mean return
@@ -77,24 +77,24 @@ def write_model_card(config: TrainConfig, folder: Path, version: str) -> None:
         part.write_text(f"---\n{metadata}---\n\n{page}", encoding="utf-8")
 
 
-def best_result(folder: Path) -> Result | None:
+def best_result(folder: Path) -> EvaluationResult | None:
     """Return the best evaluation in a training folder; None without one."""
     online, offline = folder / "best" / "evaluations.npz", folder / "log" / "progress.csv"
     if online.exists():
         with np.load(online) as log:
             results = log["results"]
         best = results[results.mean(axis=1).argmax()]
-        return Result(float(best.mean()), float(best.std()), best.size)
+        return EvaluationResult(float(best.mean()), float(best.std()), best.size)
     if offline.exists():
         with offline.open(encoding="utf-8") as file:
             rows = [*csv.DictReader(file)]
         # The policy is that of the first epoch with the final best return, which may be a weighted one.
         chosen = [row["mean_return"] for row in rows if row["best_return"] == rows[-1]["best_return"]]
-        return Result(float(chosen[0]), None, None) if rows else None
+        return EvaluationResult(float(chosen[0]), None, None) if rows else None
     return None
 
 
-def _metadata(config: TrainConfig, result: Result | None) -> Values:
+def _metadata(config: TrainConfig, result: EvaluationResult | None) -> Values:
     """Return the YAML metadata of the Hub."""
     metadata: Values = {
         "library_name": "stable-baselines3",

@@ -11,7 +11,7 @@ from support.traffic import Recorded
 from lgmd_gym.agents import BRAKE, HOLD, make_agent, to_action
 from lgmd_gym.benchmark.episode import Step, rollout
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.traffic.batch import Drive, TrafficTask, run_traffic_task
+from lgmd_gym.benchmark.traffic.batch import TrafficDrive, TrafficTask, run_traffic_task
 from lgmd_gym.benchmark.traffic.recording import fork, look_ahead
 from lgmd_gym.benchmark.traffic.replay import RESEED, LiveEpisode
 from lgmd_gym.benchmark.traffic.rows import KEYS, BrakingEvent, measure
@@ -159,7 +159,7 @@ def test_live_episode_continues_in_the_world_of_the_recording():
 
 def test_rows_of_a_batch_equal_those_of_single_drives():
     agents = ("stopping-zone", "spike-threshold")
-    drives = (Drive("merge", 1, agents[:1]), Drive("intersection", 1, agents))
+    drives = (TrafficDrive("merge", 1, agents[:1]), TrafficDrive("intersection", 1, agents))
     batch = run_traffic_task(TrafficTask(drives, SENSORS))
     single = [
         run_traffic_task(TrafficTask((replace(drive, agents=(agent,)),), SENSORS))[0]
@@ -173,7 +173,7 @@ def test_rows_of_a_batch_equal_those_of_single_drives():
 
 def test_failure_in_one_drive_leaves_the_others(monkeypatch, wall_kinds):
     monkeypatch.setitem(TRAFFIC_KINDS, "empty", "support.traffic:Missing")
-    drives = (Drive("empty", 0, ("no-brake",)), Drive("wall", 0, ("no-brake",)))
+    drives = (TrafficDrive("empty", 0, ("no-brake",)), TrafficDrive("wall", 0, ("no-brake",)))
     failed, played = run_traffic_task(TrafficTask(drives, SENSORS))
     assert "Missing" in failed["error"]
     assert played["error"] is None

@@ -7,13 +7,13 @@ from support.cameras import ego_camera, rig
 from support.roads import add_car, straight_env
 
 from lgmd_gym.camera import Scene
-from lgmd_gym.camera.scene_table import SceneTable, view_of
+from lgmd_gym.camera.scene_table import SceneTable, sector_of
 
 
 def read(env, *cameras):
     """Return the x of the objects that are read for these cameras."""
     world = SceneTable()
-    world.read(env, view_of([item.camera for item in cameras], Scene()))
+    world.read(env, sector_of([item.camera for item in cameras], Scene()))
     return world.objects["x"][0, : world.object_counts[0]].tolist()
 
 
@@ -39,11 +39,11 @@ def test_no_object_that_is_left_out_would_be_in_the_frame():
         for yaw_deg, gaze in ((0.0, "path"), (75.0, "fixed"), (-140.0, "fixed")):
             camera = ego_camera(hfov_deg=150.0, yaw_deg=yaw_deg, gaze=gaze, shape=(40, 100), road="rough")
             frame = camera.render(env)
-            camera._stage._view = None  # read all objects
+            camera._stage._sector = None  # read all objects
             np.testing.assert_array_equal(camera.render(env), frame)
         camera = ego_camera(gaze="stopping", offset_m=8.0, span_m=9.0, lift=-0.6, road="rough")
         frame = camera.render(env)
-        camera._stage._view = None
+        camera._stage._sector = None
         np.testing.assert_array_equal(camera.render(env), frame)
 
 
@@ -61,7 +61,7 @@ def test_copies_read_into_their_own_records():
 def test_cameras_that_may_see_the_ground_right_below_them_look_all_around():
     """With a row to spare, the lower side of these frames is straight down at a pitch of 15.1°."""
     camera = rig(shape=(60, 20), hfov_deg=100.0)
-    assert view_of([rig(camera, pitch_deg=-15.0).camera], Scene()) is not None
+    assert sector_of([rig(camera, pitch_deg=-15.0).camera], Scene()) is not None
     for fields in ({"pitch_deg": -15.3}, {"pitch_deg": 15.3}, {"dive_deg": 0.1}, {"road": "smooth"}):
         changed = rig(camera, **{"pitch_deg": -15.0, **fields})
-        assert view_of([rig(shape=(60, 20)).camera, changed.camera], changed.scene) is None
+        assert sector_of([rig(shape=(60, 20)).camera, changed.camera], changed.scene) is None

@@ -20,7 +20,7 @@ IN_LABORATORY = Appearance(world=LABORATORY)
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class TrafficDrive:
     """One seed of a kind of traffic and the agents to run in it."""
 
     kind: str  # kind of traffic
@@ -33,7 +33,7 @@ class Drive:
 class TrafficTask:
     """A batch of drives under one condition."""
 
-    drives: tuple[Drive, ...]
+    drives: tuple[TrafficDrive, ...]
     sensor_config: SensorConfig  # camera and neuron parameters
     condition: str = CLEAR  # name of the weather, for the rows
 
@@ -49,7 +49,7 @@ def run_traffic_task(task: TrafficTask) -> list[Row]:
     for name, sensor_config in sensor_configs.items():
         same = [agents for known, agents in groups if known == sensor_config]
         same[0].append(name) if same else groups.append((sensor_config, [name]))
-    rows: dict[tuple[Drive, str], Row] = {}
+    rows: dict[tuple[TrafficDrive, str], Row] = {}
     for sensor_config, agents in groups:
         for drive in _play(task, sensor_config, set(agents)):
             rows |= {(drive.drive, agent): row for agent, row in drive.rows.items()}
@@ -68,7 +68,7 @@ class _PlayedDrive:
 
     def __init__(
         self,
-        drive: Drive,
+        drive: TrafficDrive,
         agents: list[str],
         task: TrafficTask,
         sensor_config: SensorConfig,

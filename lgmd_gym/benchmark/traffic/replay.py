@@ -1,7 +1,7 @@
 """Replay of one agent on a recording of traffic; simulated live from its first braking on."""
 
 from lgmd_gym.agents import HOLD
-from lgmd_gym.agents.base import Actor
+from lgmd_gym.agents.base import Driver
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.observer import Observer
@@ -51,7 +51,7 @@ class Replay:
         done: Whether the episode has ended.
     """
 
-    def __init__(self, recording: TrafficRecording, agent: Actor, sensor_config: SensorConfig) -> None:
+    def __init__(self, recording: TrafficRecording, agent: Driver, sensor_config: SensorConfig) -> None:
         self.recording, self.agent, self.sensor_config = recording, agent, sensor_config
         self.log = EpisodeLog()
         self.done = False
