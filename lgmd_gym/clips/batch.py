@@ -2,11 +2,11 @@
 
 import csv
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -83,7 +83,7 @@ def read_events(path: Path, clips: Sequence[VideoInfo]) -> dict[Path, ClipEvent]
     return events
 
 
-def _clip(field: str | None, clips: Sequence[Path], listed: dict[Path, Any], where: str) -> Path:
+def _clip(field: str | None, clips: Sequence[Path], listed: Collection[Path], where: str) -> Path:
     """Return the clip that a CSV field names; `listed` has the clips of the rows before."""
     name = (field or "").strip()
     matching = [clip for clip in clips if name in (clip.name, clip.stem)]

@@ -70,7 +70,7 @@ class OverlayWriter:
     def __enter__(self) -> "OverlayWriter":
         return self
 
-    def __exit__(self, *_: Any) -> None:
+    def __exit__(self, *_: object) -> None:
         self._writer.close()
 
     def _text(

@@ -158,7 +158,8 @@ def cap_level(alarms: np.ndarray, clips: np.ndarray | int, cap: float) -> np.nda
         cap: Highest permitted share.
     """
     below = alarms <= cap * clips + _ROUNDING
-    return np.where(below.any(axis=1), below.argmax(axis=1), alarms.shape[1])
+    lowest: np.ndarray = below.argmax(axis=1)
+    return np.where(below.any(axis=1), lowest, alarms.shape[1])
 
 
 def figures(
@@ -224,7 +225,8 @@ def _target_level(recall: np.ndarray) -> np.ndarray:
     """Return the index of the highest level with the recall `TARGET_RECALL`; the number of levels without."""
     enough = recall >= TARGET_RECALL - _ROUNDING
     size = recall.shape[1]
-    return np.where(enough.any(axis=1), size - 1 - enough[:, ::-1].argmax(axis=1), size)
+    last: np.ndarray = size - 1 - enough[:, ::-1].argmax(axis=1)
+    return np.where(enough.any(axis=1), last, size)
 
 
 def _steps(recall: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Read, check and write video files of any length with PyAV."""
 
 from array import array
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from fractions import Fraction
 from functools import cache
@@ -85,7 +85,7 @@ def _is_playlist(path: Path) -> bool:
 
 
 @contextmanager
-def open_video(path: Path) -> Iterator["tuple[InputContainer, VideoStream]"]:
+def open_video(path: Path) -> Generator["tuple[InputContainer, VideoStream]", None, None]:
     """Open a local file and yield its container and first video stream, cover pictures excepted.
 
     Only the file itself can be opened: a playlist cannot load anything from the network.

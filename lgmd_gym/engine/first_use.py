@@ -29,7 +29,7 @@ _HELPER = f"from {__name__} import _compile_others; _compile_others()"
 
 def compile_kernels() -> None:
     """Compile the kernels of a braking environment, unless numba's cache has them or it compiles nothing."""
-    if config.DISABLE_JIT or all(map(is_cached, (draw_cameras, advance))):
+    if config.DISABLE_JIT or all(map(is_cached, (draw_cameras, advance))):  # pyright: ignore[reportAttributeAccessIssue, reportUnknownMemberType]
         return
     environment = os.environ | {VARIABLE: "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with signals_blocked():

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: joblib states few types.
 """Comparison of played cells with the intent of their file.
 
 The intent of a file: when, where and how fast the ego touches the target if it does not brake.

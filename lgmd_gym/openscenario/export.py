@@ -7,7 +7,6 @@ A segment with a build-up is a `SpeedProfileAction` with `maxAccelerationRate` o
 
 from math import cos, pi, sin
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree as ET
 
 from lgmd_gym.benchmark.case import Case
@@ -98,9 +97,11 @@ def _mark(lane: ET.Element, kind: str) -> None:
 EGO_HEIGHT = 1.5  # [m]
 DATE = "2026-01-01T00:00:00"  # constant, so that exports are reproducible
 TAIL = 500.0  # [m], straight at the end of a trajectory
-_WEATHER = {"night": ("Sun", {"azimuth": "0", "elevation": "0", "illuminance": "0.1"})}
-_WEATHER |= {"fog": ("Fog", {"visualRange": "100"})}
-_WEATHER |= {"rain": ("Precipitation", {"precipitationIntensity": "10", "precipitationType": "rain"})}
+_WEATHER = {
+    "night": ("Sun", {"azimuth": "0", "elevation": "0", "illuminance": "0.1"}),
+    "fog": ("Fog", {"visualRange": "100"}),
+    "rain": ("Precipitation", {"precipitationIntensity": "10", "precipitationType": "rain"}),
+}
 _KINDS = {"car": "car", "bicycle": "bicycle", "motorcycle": "motorbike"}
 _OBJECTS = {"box": "obstacle", "road_marking": "roadMark"}
 
@@ -184,7 +185,7 @@ def _ego(scenario: Scenario) -> Actor:
     )
 
 
-def _add(parent: ET.Element, tag: str, **attributes: Any) -> ET.Element:
+def _add(parent: ET.Element, tag: str, **attributes: object) -> ET.Element:
     """Append an element; floats are written with all digits."""
     texts = {
         name: repr(value) if isinstance(value, float) else str(value) for name, value in attributes.items()

@@ -114,7 +114,7 @@ class Track:
             point = self.at(distance)
             return hypot(point.x - place.x, point.y - place.y)
 
-        candidates, before = [], 0.0
+        candidates, before = list[float](), 0.0
         for bend in (*self.bends, Bend(max(high - self.length, 1.0))):
             if bend.curvature == bend.last_curvature == 0.0:
                 ahead = place.seen_from(self.at(before)).x

@@ -5,12 +5,11 @@ The standard library's expat reports line numbers, so that no further package is
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 from xml.parsers import expat
 
 from lgmd_gym.errors import shown, unknown_name
@@ -29,10 +28,22 @@ def _round(value: float) -> float:
     return math.copysign(math.floor(abs(value) + 0.5), value)
 
 
+def _sign(value: float) -> float:
+    return float((value > 0.0) - (value < 0.0))
+
+
+def _floor(value: float) -> float:
+    return float(math.floor(value))
+
+
+def _ceil(value: float) -> float:
+    return float(math.ceil(value))
+
+
 _FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
     "round": (1, _round),
-    "floor": (1, lambda value: float(math.floor(value))),
-    "ceil": (1, lambda value: float(math.ceil(value))),
+    "floor": (1, _floor),
+    "ceil": (1, _ceil),
     "sqrt": (1, math.sqrt),
     "pow": (2, math.pow),
     "sin": (1, math.sin),
@@ -41,7 +52,7 @@ _FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
     "asin": (1, math.asin),
     "acos": (1, math.acos),
     "atan": (1, math.atan),
-    "sign": (1, lambda value: float((value > 0.0) - (value < 0.0))),
+    "sign": (1, _sign),
     "abs": (1, math.fabs),
     "max": (2, max),
     "min": (2, min),
@@ -79,7 +90,7 @@ def format_value(value: Value) -> str:
 
 
 def _tokens(text: str) -> list[str]:
-    tokens, position = [], 0
+    tokens, position = list[str](), 0
     end = len(text.rstrip())
     while position < end:
         match = _TOKEN.match(text, position)
@@ -241,9 +252,9 @@ class Node:
     attributes: dict[str, str]  # attributes as in the file
     file: Path
     line: int  # line of the start tag, from 1
-    children: list["Node"] = field(default_factory=list)  # child nodes
+    children: list["Node"] = field(default_factory=list["Node"])  # child nodes
     used: bool = False  # whether a reader has used the node
-    read: set[str] = field(default_factory=set)  # names of the attributes that were used
+    read: set[str] = field(default_factory=set[str])  # names of the attributes that were used
 
     def error(self, message: str) -> LocatedError:
         """Return an error with the file and line."""
@@ -274,7 +285,7 @@ def _parse(path: Path, data: bytes) -> Node:
         (open_nodes[-1].children if open_nodes else roots).append(node)
         open_nodes.append(node)
 
-    def refuse(*_: Any) -> None:
+    def refuse(*_: object) -> None:
         raise LocatedError(f"{path}:{parser.CurrentLineNumber}: a document type is not supported; remove it")
 
     parser.StartElementHandler, parser.EndElementHandler = start, lambda _: open_nodes.pop()
@@ -306,7 +317,7 @@ class Element:
         return self.node.error(message)
 
     @contextmanager
-    def locate_errors(self, prefix: str = "") -> Iterator[None]:
+    def locate_errors(self, prefix: str = "") -> Generator[None, None, None]:
         """Add a prefix, the file and the line to a ValueError of the block; a located one stays as it is."""
         try:
             yield

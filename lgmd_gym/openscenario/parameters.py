@@ -83,7 +83,7 @@ def _check_type(name: str, kind: str, value: str, source: Node) -> None:
 def _check_constraints(item: Element, name: str, value: str, source: Node) -> None:
     """Check that all constraints of one of the groups hold."""
     groups = [list(group.all("ValueConstraint")) for group in item.all("ConstraintGroup")]
-    texts = []
+    texts: list[str] = []
     for group in groups:
         rules = [(entry.choice("rule", RULES), entry.text("value")) for entry in group]
         with item.locate_errors(f"parameter {name}: "):
@@ -204,7 +204,7 @@ class Catalogs:
 @lru_cache(maxsize=32)
 def _entries_of(files: tuple[Node, ...]) -> dict[tuple[str, str], Node]:
     """Return the entries of catalog files by catalog and name."""
-    entries = {}
+    entries: dict[tuple[str, str], Node] = {}
     for file in files:
         for catalog in file.children:
             if catalog.tag == "Catalog":
@@ -214,7 +214,7 @@ def _entries_of(files: tuple[Node, ...]) -> dict[tuple[str, str], Node]:
 
 
 def _folders(locations: Element) -> list[Path]:
-    folders = []
+    folders: list[Path] = []
     for node in locations.node.children:
         directory = Element(node, locations.scope).child("Directory")
         folder = locations.node.file.parent / directory.text("path")

@@ -133,7 +133,7 @@ def read_all(paths: Sequence[str | Path]) -> Suite:
     while all(len(parts) > common + 1 and parts[common] == stems[0][common] for parts in stems):
         common += 1
     suite = file_name(stems[0][common - 1])
-    cases = []
+    cases: list[Case] = []
     for file, parts in zip(files, stems, strict=True):
         inside = "/".join(file_name(part) for part in parts[common:])
         cases += [_case(suite, cell, f"{inside}/") for cell in read_cells(file)]
@@ -183,7 +183,8 @@ def _root(path: Path) -> Element:
 
 
 def _cells(path: Path, file: Path, root: Node, given: Iterable[dict[str, Assignment]]) -> list[Cell]:
-    cells, varied = [], []
+    cells: list[Compiled] = []
+    varied: list[dict[str, str]] = []
     for assignments in given:
         scope = declare(Element(root, {}), assignments)
         family = file_name(scope.get(FAMILY, file.stem))

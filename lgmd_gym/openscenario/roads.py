@@ -90,7 +90,7 @@ class Road:
             direction: 1 for the direction of the reference line, -1 for the opposite.
             t: Offset from the reference line, + left of it [m].
         """
-        bends, line = [], self.line.part(0.0, self.length).bends
+        bends, line = list[Bend](), self.line.part(0.0, self.length).bends
         for bend in line:
             constant = bend.curvature == bend.last_curvature
             if t != 0.0 and not constant:
@@ -201,7 +201,7 @@ def _links(item: Element) -> Iterator[tuple[str, End]]:
 
 
 def _lanes(section: Element) -> dict[int, Lane]:
-    lanes = {}
+    lanes: dict[int, Lane] = {}
     for side in section.all("left", "right"):
         for lane in side.all("lane"):
             widths = tuple(_width(width, "sOffset") for width in lane.all("width"))
@@ -272,7 +272,7 @@ class Route:
                 direction = 1 if after > s else -1
             way = network.route(road.name, direction, other.name)
             steps += way if not steps or steps[-1] != way[0] else way[1:]
-        legs, length = [], 0.0
+        legs, length = list[Leg](), 0.0
         for road, direction in steps:
             legs.append(Leg(road, direction, length))
             length += road.length

@@ -28,7 +28,7 @@ class Storyboard:
 
     events: list[Event]  # the events, in the order of the file
     # start and end of acts, maneuvers, events and actions by kind and name [s]
-    states: States = field(default_factory=dict)
+    states: States = field(default_factory=States)
 
     def play(self, world: ScenarioMap) -> None:
         """Carry out all events that have an effect, in the order of their triggers."""
@@ -85,7 +85,7 @@ def _start(act: Trigger, own: Trigger, now: float) -> float:
 
 def _references(trigger: Element) -> list[Element]:
     """Return the references to elements of the storyboard in a trigger."""
-    found = []
+    found: list[Element] = []
     for group in trigger.all("ConditionGroup"):
         for condition in group.all("Condition"):
             for value in condition.all("ByValueCondition"):
@@ -115,7 +115,7 @@ def run_init(board: Element, world: ScenarioMap) -> Element | None:
 
 def read_story(board: Element, world: ScenarioMap) -> Storyboard:
     """Return the events of all stories."""
-    events = []
+    events: list[Event] = []
     for story in board.all("Story"):
         story = Element(story.node, declare(story, {}))
         for act in story.all("Act"):
@@ -139,7 +139,7 @@ def _group_events(
     maneuvers = [*group.all("Maneuver")]
     maneuvers += [world.catalogs.entry(item, "Maneuver") for item in group.all("CatalogReference")]
     outer = [("story", story.text("name")), ("act", act.text("name")), ("maneuverGroup", group.text("name"))]
-    events = []
+    events: list[Event] = []
     for maneuver in maneuvers:
         for event in maneuver.all("Event"):
             _once(event)

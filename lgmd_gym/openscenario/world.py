@@ -85,7 +85,7 @@ class Mover:
 
 def read_entities(scenario: Element, catalogs: Catalogs) -> dict[str, Mover]:
     """Return the entities of a scenario by name."""
-    movers = {}
+    movers: dict[str, Mover] = {}
     for item in scenario.child("Entities").all("ScenarioObject"):
         name = item.text("name")
         found = catalogs.resolve(item, "Vehicle", "Pedestrian", "MiscObject")
@@ -251,7 +251,7 @@ class ScenarioMap:
         item = self.catalogs.resolve(parent, "Route")
         if item.flag("closed"):
             raise item.error("a closed Route is not supported; use closed=false")
-        stops = []
+        stops: list[tuple[Road, int | None, float]] = []
         for waypoint in item.all("Waypoint"):
             waypoint.choice("routeStrategy", ("shortest", "fastest", "leastIntersections", "random"))
             position = waypoint.child("Position").only("LanePosition", "RoadPosition")
@@ -308,7 +308,7 @@ class ScenarioMap:
         return Track(start, (Bend(length),))
 
     def _spline(self, shape: Element, current: Place | None) -> Track:
-        start, bends = current, []
+        start, bends = current, list[Bend]()
         for number, part in enumerate(shape.all("ClothoidSplineSegment")):
             position = part.find("PositionStart")
             if position is not None and number > 0:

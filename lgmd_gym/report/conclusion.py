@@ -2,10 +2,12 @@
 
 import inspect
 import re
+from typing import cast
 
 from lgmd_gym.agents.policies.card import policy_card, read_card
 from lgmd_gym.agents.policies.policy import Policy, find_policy
 from lgmd_gym.agents.registry import AGENTS, make_agent
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.analysis.tables import limit_results
 from lgmd_gym.benchmark.case import Row, Suite
 from lgmd_gym.benchmark.summary import (
@@ -71,7 +73,7 @@ def _agent_sentence(rows: list[Row], agent: str, kinds: set[bool]) -> str:
     """Return the sentence of one agent on the kinds of episodes, with and without a threat, in all rows."""
     summary = summarise(agent, "", [row for row in rows if row["agent"] == agent])
     avoided, false = summary.avoided, summary.false_activations
-    parts = []
+    parts: list[str] = []
     if True in kinds:
         parts.append(_avoided_text(summary) if avoided.n else "completed no threat")
     if False in kinds:
@@ -139,7 +141,8 @@ def agent_note(text: str, trusted: bool = True) -> str:
         agent = make_agent(text)
     except Exception:  # any error of the user's module or constructor
         return "A class from outside this package, which cannot be loaded."
-    return _first_sentence(type(getattr(agent.agent, "objects", [agent.agent])[0]))
+    objects: list[object] = getattr(agent.agent, "objects", [agent.agent])
+    return _first_sentence(type(objects[0]))
 
 
 def _first_sentence(kind: type) -> str:
@@ -162,6 +165,6 @@ def _policy_note(path: str) -> str:
     )
     demands = f"{len(card.demands)} levels of demand" if card.demands else "a continuous demand"
     sensors = counted(cameras, "camera")
-    algo = training.get("algo") if isinstance(training, dict) else card.algo
+    algo = cast(Values, training).get("algo") if isinstance(training, dict) else card.algo
     method = "offline training" if algo == "offline" else str(algo).upper()
     return f"Learned policy ({method}) with {sensors}, the inputs {inputs}, and {demands}."

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import fmean
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from lgmd_gym.benchmark.analysis.tables import agent_summaries
 from lgmd_gym.benchmark.case import Row, Suite, relative_impact
@@ -60,7 +60,7 @@ class ReportFigure(NamedTuple):
     panels: list[Element]  # SVG elements
     legend: list[str]  # agents in the order of their marks; empty without marks
     columns: Sequence[str]  # header of the CSV file
-    lines: Sequence[Sequence[Any]]  # lines of the CSV file
+    lines: Sequence[Sequence[object]]  # lines of the CSV file
 
     def write(self, folder: Path) -> None:
         """Write `<name>.svg` and `<name>.csv` into a folder; existing files are replaced."""
@@ -99,7 +99,7 @@ def impact_points(rows: list[Row], agents: list[str], condition: str) -> list[Im
     for row in without_fcw_driver(rows):
         if row["threat"] and row["error"] is None:
             groups.setdefault(row["family"], []).append(row)
-    points = []
+    points: list[ImpactPoint] = []
     for family, part in sorted(groups.items()):
         speeds = {round(row["ego_speed"] / KMH) for row in part}
         step = 1 if len(speeds) <= MAX_SPEEDS else COARSE
@@ -183,7 +183,7 @@ def _percent(rate: Rate) -> str:
     return f"{rate.k} of {rate.n} [{100 * rate.low:.0f}–{100 * rate.high:.0f} %]"
 
 
-def _rate_line(item: AgentSummary, condition: str) -> list[Any]:
+def _rate_line(item: AgentSummary, condition: str) -> list[object]:
     rates = [
         value
         for rate in (item.avoided, item.false_activations)

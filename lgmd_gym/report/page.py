@@ -199,7 +199,7 @@ def _write(path: Path, plots: bool, report: bool, trust: bool) -> list[Path]:
 def _plot_cases(path: Path, config: RunConfig) -> list[Path]:
     """Draw one figure per case: all agents with the first seed."""
     alert_level = LGMDParams.make(config.params).t_sf
-    folder, seed, files = path / "plots", config.first_seed, []
+    folder, seed, files = path / "plots", config.first_seed, list[Path]()
     folder.mkdir(exist_ok=True)
     for condition in config.conditions:
         for case in get_suite(config.suite).cases:

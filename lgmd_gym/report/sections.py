@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class CapturedFrame(NamedTuple):
     caption: str
 
 
-def save_figure(file: Path, draw: Callable[[BinaryIO], Any]) -> str:
+def save_figure(file: Path, draw: Callable[[BinaryIO], object]) -> str:
     """Write the SVG that a function draws to a file, and return it as a data URI."""
     drawn = io.BytesIO()
     draw(drawn)
@@ -80,7 +80,7 @@ def capture_frames(task: Task, decisions: Mapping[str, int]) -> list[CapturedFra
     """
     actor = make_agent(task.agent)
     env = make_env(task.case, task.sensor_config.for_agent(actor), task.arguments)
-    frames, last = [], max(decisions.values())
+    frames, last = list[CapturedFrame](), max(decisions.values())
     try:
         for decision, (step, _) in enumerate(rollout(env, actor, task.seed)):
             if labels := [label for label, index in decisions.items() if index == decision]:
@@ -231,7 +231,7 @@ def comparison_section(data: ReportData) -> Values | None:
     return {"figure": save_figure(data.figures / "differences.svg", draw), "lines": lines}
 
 
-def _difference_lines(comparisons: list[Comparison]) -> list[tuple[Any, ...]]:
+def _difference_lines(comparisons: list[Comparison]) -> list[tuple[object, ...]]:
     """Return the values of `DIFFERENCE_COLUMNS`; an undefined bound is None, an empty field."""
     return [
         (
@@ -254,7 +254,7 @@ def _difference_lines(comparisons: list[Comparison]) -> list[tuple[Any, ...]]:
 
 def episode_section(data: ReportData) -> list[Values]:
     """Return the illustrated episodes: time series of all agents, and camera frames of one."""
-    agent, episodes = illustrated_agent(data.agents), []
+    agent, episodes = illustrated_agent(data.agents), list[Values]()
     for rows in by_condition(without_fcw_driver(data.rows)).values():
         for description, row in extreme_episodes(rows, agent, data.config.first_seed).items():
             by_agent = {name: data.series({**row, "agent": name}) for name in data.agents}

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: joblib states few types.
 """Objective of the parameter search: impact energy avoided in threats, and false activations elsewhere.
 
 A latching rule drives as `no-brake` does until it brakes, and then brakes to a standstill. Episodes without

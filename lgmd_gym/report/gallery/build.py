@@ -4,15 +4,16 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from markupsafe import Markup, escape
 from PIL import Image
 
-import lgmd_gym  # noqa: F401  (registers the ids)
+import lgmd_gym  # noqa: F401  (registers the ids)  # pyright: ignore[reportUnusedImport]
 from lgmd_gym._version import __version__
 from lgmd_gym.agents import make_agent
+from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import Case, Row, relative_impact
 from lgmd_gym.benchmark.config import DEFAULT_AGENTS
 from lgmd_gym.benchmark.player import run_task
@@ -100,7 +101,7 @@ def render_page(
     environment = Environment(
         loader=PackageLoader("lgmd_gym.report.gallery", "."), autoescape=True, undefined=StrictUndefined
     )
-    environment.filters.update(code=_code, paragraphs=_paragraphs)
+    cast(Values, environment.filters).update(code=_code, paragraphs=_paragraphs)
     groups: dict[str, list[ScenarioCard]] = {"threats": [], "non-threats": [], "traffic": []}
     for card in cards:
         groups[_group(card, outcomes[card.name])].append(card)

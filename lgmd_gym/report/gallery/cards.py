@@ -3,7 +3,6 @@
 import inspect
 import re
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -14,6 +13,7 @@ from docstring_parser import DocstringStyle, parse
 from PIL import Image
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.camera import WEATHERS, EgoCamera
 from lgmd_gym.clips import VideoWriter
 from lgmd_gym.envs import FAMILIES, env_id
@@ -82,7 +82,7 @@ class ScenarioCard:
     target: str  # argument of `lgmd-gym drive`
     docstring: ParsedDocstring  # docstring of the scenario
     traffic: bool = False  # whether it is a kind of traffic, in which single episodes are not evaluated
-    arguments: Mapping[str, Any] = field(default_factory=dict)  # arguments of the environment
+    arguments: Arguments = field(default_factory=Arguments)  # arguments of the environment
 
 
 def scenario_cards(names: tuple[str, ...] = ()) -> list[ScenarioCard]:
@@ -188,7 +188,7 @@ def camera_sheet() -> dict[str, dict[str, np.ndarray]]:
 
 def _road_frames(env_id: str, cameras: dict[str, EgoCamera]) -> dict[str, np.ndarray]:
     """Return one frame per camera after some simulation steps without steering or braking."""
-    import highway_env  # noqa: F401  (registers the environments)
+    import highway_env  # noqa: F401  (registers the environments)  # pyright: ignore[reportUnusedImport]
 
     seed, steps = ROADS[env_id]
     config = {"simulation_frequency": 30, "policy_frequency": 30}

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: torch and stable-baselines3 state few types.
 """`OfflineDataset`: batches of recorded episodes in the form that a policy is trained on.
 
 A level and its mirror image, left and right exchanged, have the same outcomes. Mirrored inputs are therefore

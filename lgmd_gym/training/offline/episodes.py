@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: joblib states few types.
 """Episodes without braking, with the outcome of braking at each of their decisions, and their files."""
 
 import json

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: torch and stable-baselines3 state few types.
 """The objective of `OfflineLearner`, and the evaluation of a deterministic policy, on recorded episodes.
 
 With a latching brake, a policy is a probability p_t of braking at each decision, and the return of every

@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: torch and stable-baselines3 state few types.
 """`OfflineLearner`: gradient ascent on the expected return over recorded episodes, see `evaluation`."""
 
 from collections.abc import Callable, Sequence

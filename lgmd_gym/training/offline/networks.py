@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: torch and stable-baselines3 state few types.
 """Networks of `OfflineLearner`: models of stable-baselines3, their standardisation, and merged ensembles.
 
 Adam's steps are equally long for all weights, so that it learns faster from features of equal spread; the

@@ -17,7 +17,7 @@ import gymnasium as gym
 import numpy as np
 
 from lgmd_gym.agents.base import HOLD
-from lgmd_gym.aliases import Arguments
+from lgmd_gym.aliases import Arguments, Info
 from lgmd_gym.engine import BrakingVectorEnv
 from lgmd_gym.envs.simulation import Simulation
 from lgmd_gym.training.offline.episodes import (
@@ -79,7 +79,7 @@ def _rounds(length: int) -> Rounds:
     while intervals := [(first, last) for first, last in intervals if last - first > 1]:
         middles = [(first + last) // 2 for first, last in intervals]
         known.update(zip(middles, (yield middles), strict=True))
-        refined = []
+        refined: list[tuple[int, int]] = []
         for (first, last), middle in zip(intervals, middles, strict=True):
             if not _interpolate(first, middle, last, known):
                 refined += [(first, middle), (middle, last)]
@@ -105,9 +105,9 @@ class _Run:
     """One episode without braking; a snapshot is taken at every `STRIDE`-th decision."""
 
     family: str
-    observations: list[Observation] = field(default_factory=list)
-    rewards: list[float] = field(default_factory=list)
-    snapshots: list[Any] = field(default_factory=list)
+    observations: list[Observation] = field(default_factory=list[Observation])
+    rewards: list[float] = field(default_factory=list[float])
+    snapshots: list[Any] = field(default_factory=list[Any])
     threat: bool = False
 
     def to_episode(self, outcomes: list[BrakingOutcome]) -> RecordedEpisode:
@@ -190,7 +190,7 @@ def _family_of(env: gym.Env) -> str:
 
 
 def _brake_to_end(env: Any, brake: int) -> BrakingOutcome:
-    episode_return, done, info = 0.0, False, {}
+    episode_return, done, info = 0.0, False, Info()
     while not done:
         _, reward, terminated, truncated, info = env.step(brake)
         episode_return, done = episode_return + float(reward), terminated or truncated

@@ -80,7 +80,8 @@ def run_episode(env: gym.Env, seed: int, shrink: int | None = None) -> tuple[lis
         shrink: See `select_signals`.
     """
     base: Any = env.unwrapped
-    observations, demanding = [], []
+    observations: list[Observation] = []
+    demanding: list[float] = []
     policy_hz = base.config["policy_frequency"]
     for step, _ in rollout(env, make_agent(NO_BRAKE), seed):
         if step.done:
@@ -100,10 +101,11 @@ def segment_bounds(non_threat: list[bool], policy_hz: float) -> list[tuple[int, 
         policy_hz: Decision rate [Hz].
     """
     edges = np.flatnonzero(np.diff([0, *map(int, non_threat), 0])).reshape(-1, 2)
-    bounds = []
+    bounds: list[tuple[int, int]] = []
     for first, last in edges[edges[:, 1] - edges[:, 0] >= MIN_LENGTH * policy_hz]:
         count = int(np.ceil((last - first) / (MAX_LENGTH * policy_hz)))
-        bounds += pairwise(np.linspace(first, last, count + 1).round().astype(int).tolist())
+        ends = np.linspace(float(first), float(last), count + 1)
+        bounds += pairwise(ends.round().astype(int).tolist())
     return bounds
 
 
