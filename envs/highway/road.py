@@ -119,7 +119,7 @@ class RoadMarking(_BodyItem, Landmark):
         self.shade = int(body["shade"])
 
 
-Item: TypeAlias = PathCar | SolidObject | RoadMarking
+RoadItem: TypeAlias = PathCar | SolidObject | RoadMarking
 """What a `BODY` record can be."""
 CLASSES: dict[int, type[ScriptedCar | SolidObject | RoadMarking]] = {
     CAR: ScriptedCar,
@@ -157,11 +157,11 @@ class BrakingRoad(Road):
         state = simulation.state
         bodies = state.bodies[index, : state.episodes[index]["bodies"]]
         self._ego = EgoCar(self, bodies[0], self.set_demand)
-        self._items: list[Item] = [self._ego, *(CLASSES[body["kind"]](self, body) for body in bodies[1:])]
+        self._items: list[RoadItem] = [self._ego, *(CLASSES[body["kind"]](self, body) for body in bodies[1:])]
         items = list(zip(self._items, bodies["kind"].tolist(), strict=True))
         self.vehicles = [item for item, kind in items if kind <= CAR]
         self.objects = [item for item, kind in items if kind > CAR]
-        self._obstacles: list[Item] = [item for item, kind in items[1:] if kind != ROAD_MARKING]
+        self._obstacles: list[RoadItem] = [item for item, kind in items[1:] if kind != ROAD_MARKING]
         self._shown_steps = -1
 
     @property
@@ -171,33 +171,33 @@ class BrakingRoad(Road):
         return self._ego
 
     @property
-    def vehicles(self) -> list[Item]:  # type: ignore[override]
+    def vehicles(self) -> list[RoadItem]:  # type: ignore[override]
         """The ego and all scripted cars."""
         self.refresh()
         return self._vehicles
 
     @vehicles.setter
-    def vehicles(self, value: list[Item]) -> None:
+    def vehicles(self, value: list[RoadItem]) -> None:
         self._vehicles = value
 
     @property
-    def objects(self) -> list[Item]:  # type: ignore[override]
+    def objects(self) -> list[RoadItem]:  # type: ignore[override]
         """All other objects."""
         self.refresh()
         return self._objects
 
     @objects.setter
-    def objects(self, value: list[Item]) -> None:
+    def objects(self, value: list[RoadItem]) -> None:
         self._objects = value
 
     @property
-    def obstacles(self) -> list[Item]:
+    def obstacles(self) -> list[RoadItem]:
         """Vehicles and solid objects that the ego can touch."""
         self.refresh()
         return self._obstacles
 
     @property
-    def items(self) -> list[Item]:
+    def items(self) -> list[RoadItem]:
         """The ego, then all vehicles and objects in the order of their bodies."""
         self.refresh()
         return self._items

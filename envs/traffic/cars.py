@@ -13,7 +13,7 @@ from lgmd_gym.envs.dynamics.brake import BrakeParams, DelayLine
 from lgmd_gym.envs.dynamics.longitudinal import advance
 from lgmd_gym.envs.families.scenario import EGO_LENGTH, EGO_WIDTH
 from lgmd_gym.envs.traffic.kernels import NO_ROUTE, UNPLANNED
-from lgmd_gym.envs.traffic.lanes import Lane, LaneTable
+from lgmd_gym.envs.traffic.lanes import HighwayLane, LaneTable
 
 HEADWAYS = (0.4, 1.5)  # [s], IDM's time headway T; each driver draws one
 
@@ -43,7 +43,7 @@ class TrafficCar(IDMVehicle):
     IS_EGO = False
     position: np.ndarray
     speed: float
-    lane: Lane
+    lane: HighwayLane
     action: dict[str, float]
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:

@@ -13,7 +13,7 @@ from highway_env.envs.two_way_env import TwoWayEnv
 from lgmd_gym.aliases import Config
 from lgmd_gym.envs.traffic.cars import TrafficCar
 from lgmd_gym.envs.traffic.env import TrafficEnv
-from lgmd_gym.envs.traffic.lanes import Lane
+from lgmd_gym.envs.traffic.lanes import HighwayLane
 from lgmd_gym.envs.traffic.road import TrafficRoad
 
 
@@ -113,7 +113,7 @@ class RoundaboutTraffic(TrafficEnv, RoundaboutEnv):
 
     def _make_road(self) -> None:
         super()._make_road()
-        for lane in cast(list[Lane], self.road.network.lanes_list()):
+        for lane in cast(list[HighwayLane], self.road.network.lanes_list()):
             lane.priority = int(hasattr(lane, "radius"))
             # At highway-env's limits of 16 to 20 m/s the lateral acceleration would exceed 1.3 g.
             lane.speed_limit = 12.0

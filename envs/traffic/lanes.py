@@ -8,7 +8,7 @@ from highway_env.road.road import LaneIndex, RoadNetwork
 
 from lgmd_gym.envs.traffic.kernels import CIRCLE, LANE, SINE, STRAIGHT, project
 
-Lane: TypeAlias = StraightLane | CircularLane
+HighwayLane: TypeAlias = StraightLane | CircularLane
 """A lane of highway-env that has a table row; a `SineLane` is a `StraightLane`."""
 
 
@@ -31,7 +31,7 @@ class LaneTable:
         by_index = network.lanes_dict()
         self.indices: list[LaneIndex] = cast(list[LaneIndex], list(by_index))
         self.numbers: dict[LaneIndex, int] = {index: row for row, index in enumerate(self.indices)}
-        self.lanes: list[Lane] = cast(list[Lane], list(by_index.values()))
+        self.lanes: list[HighwayLane] = cast(list[HighwayLane], list(by_index.values()))
         self.records = np.zeros(len(self.lanes), LANE)
         roads = {index[:2]: None for index in self.indices}
         for row, index in enumerate(self.indices):
@@ -95,7 +95,7 @@ class LaneTable:
         return pieces
 
 
-def _fill(record: np.void, lane: Lane) -> None:
+def _fill(record: np.void, lane: HighwayLane) -> None:
     """Write the geometry of a lane into a `LANE` record."""
     record["length"], record["width"] = lane.length, lane.width
     record["forbidden"], record["speed_limit"] = lane.forbidden, lane.speed_limit

@@ -30,7 +30,7 @@ from lgmd_gym.envs.traffic.kernels import (
 )
 from lgmd_gym.envs.traffic.lanes import LaneTable
 
-Item: TypeAlias = TrafficCar | RoadObject
+TrafficItem: TypeAlias = TrafficCar | RoadObject
 """A car, or a solid object."""
 
 
@@ -79,12 +79,12 @@ class TrafficRoad(RegulatedRoad):
         return cast(list[TrafficCar], self.vehicles)
 
     @property
-    def obstacles(self) -> list[Item]:
+    def obstacles(self) -> list[TrafficItem]:
         """Cars and solid objects that the ego can touch."""
         return [item for item in self.items if item is not self._ego]
 
     @property
-    def items(self) -> list[Item]:
+    def items(self) -> list[TrafficItem]:
         """All cars, then the solid objects."""
         return [*self.cars, *(item for item in self.objects if not isinstance(item, Landmark))]
 

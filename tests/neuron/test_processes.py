@@ -79,6 +79,12 @@ def test_neuron_imports_only_errors_fields_and_kernels():
                 imported |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 imported.add(node.module or "")
-    below = "lgmd_gym.processes.user_modules", "lgmd_gym.errors", "lgmd_gym.fields", "lgmd_gym.kernels"
+    below = (
+        "lgmd_gym.processes.user_modules",
+        "lgmd_gym.aliases",
+        "lgmd_gym.errors",
+        "lgmd_gym.fields",
+        "lgmd_gym.kernels",
+    )
     own = {name for name in imported if name.startswith(("lgmd_gym.neuron", *below))}
     assert {name for name in imported - own if name.split(".")[0] not in allowed} == set()

@@ -13,7 +13,7 @@ import numpy as np
 from joblib import delayed
 
 from lgmd_gym.agents.policies.features import FRAME, SCALES, shrink_frames
-from lgmd_gym.aliases import Values
+from lgmd_gym.aliases import Observation, Values
 from lgmd_gym.engine.first_use import compile_kernels
 from lgmd_gym.processes.files import complete_file, is_intact_zip
 from lgmd_gym.processes.pool import run_parallel
@@ -21,8 +21,6 @@ from lgmd_gym.processes.pool import run_parallel
 CHUNK_SIZE = 4  # seeds recorded by one task of a process
 SIGNALS = (*SCALES, "column_potential")  # recorded if present
 TRAFFIC = "traffic"  # `family` of episodes in traffic
-
-Observation: TypeAlias = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True, slots=True)
