@@ -235,7 +235,7 @@ class Workspace:
         """Return the inputs of `draw_cameras`; they are remembered until a road has to move."""
         parts = batch, scene_table, roads
         if parts != self._parts:
-            models = tuple(tuple(all_models(linear)) for linear in (False, True))
+            models = tuple(tuple(all_models(linear=linear)) for linear in (False, True))
             self._parts = parts
             self._joined = Bundle(batch.arrays, scene_table.arrays, roads.arrays, models, self._arrays)
         return self._joined
