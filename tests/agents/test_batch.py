@@ -107,7 +107,7 @@ def check_rows(name, steps, trace=True, draw=None):
 def test_rows_of_several_environments_equal_those_of_one(name, trace):
     if name == "flow-divergence":
         pytest.importorskip("cv2")
-    demands = check_rows(name + OPTIONS.get(name, ""), 300, trace)
+    demands = check_rows(name + OPTIONS.get(name, ""), 150, trace)
     if name not in ("no-brake", "always-brake", "flow-divergence"):
         assert 0.02 < np.mean(demands < 0.0) < 0.999, "the sequences hardly test the rule"
 

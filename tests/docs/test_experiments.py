@@ -50,6 +50,7 @@ def test_picture(tmp_path):
     assert film.n_frames > 20
 
 
+@pytest.mark.slow
 def test_ablations(tmp_path, capsys):
     example = load("ablations")
     arguments = ["--worlds", "2", "--seeds", "1", "--every", "14", "--to", str(tmp_path / "arms.png")]
@@ -158,6 +159,7 @@ def test_detections():
         script.lines(["b"], *runs)
 
 
+@pytest.mark.slow
 def test_frontier(tmp_path, capsys, monkeypatch):
     script, picture = load("frontier"), tmp_path / "frontier.png"
     arguments = ["frontier.py", "--suites", "r152-vru", "--camera", "standard", "--to", str(picture)]

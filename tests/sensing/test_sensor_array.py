@@ -123,7 +123,7 @@ def test_the_scene_of_the_next_road_need_not_fit_the_last_one():
 
 def test_scenes_change_at_any_time():
     envs, sensors = scenes(), make_array()
-    for step in range(8):
+    for step in range(5):
         move(envs, step)
         for index, env in enumerate(envs):
             scene = Scene.make(SCENES[(index + step // 2) % 4])

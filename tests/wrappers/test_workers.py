@@ -7,6 +7,7 @@ from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from support.rollouts import HOLD, rollout
 
 
+@pytest.mark.slow
 def test_worker_processes_give_equal_observations():
     envs = AsyncVectorEnv([lambda: gym.make("lgmd_gym:LGMD/CCRs-v0")], context="spawn")
     try:
