@@ -7,6 +7,8 @@ import numpy as np
 from support.cameras import ego_camera
 from support.roads import add_car, straight_env
 
+from lgmd_gym.camera.render.models import all_models
+
 DIGEST = """
 import hashlib, sys
 sys.path.insert(0, {tests!r})
@@ -29,6 +31,12 @@ def test_same_seed_gives_same_frames_in_another_process(request, capsys):
     exec(code, {})
     assert capsys.readouterr().out == other
     assert len(other.strip()) == 64
+
+
+def test_the_tables_of_models_are_built_once():
+    for name in ("wide", "fovea"):
+        ego_camera(name).render(straight_env())
+    assert all_models.cache_info().misses <= 2  # with and without linear light
 
 
 def test_seed_changes_texture_and_shades():

@@ -51,10 +51,8 @@ def posed(kind, heading, ahead=8.0, left=0.3, speed=1.4, travelled=0.5, **fields
         (3.0, {"speed": 0.0, "ahead": 5.0}),
         (-1.4, {"height_m": 3.5, "pitch_deg": -35.0, "ahead": 4.0}),
         (1.3, {"ahead": 2.2, "left": 0.5}),
-        *(
-            pytest.param(*values, marks=pytest.mark.slow)
-            for values in ((2.4, FOG), (-2.0, {"travelled": 0.9}))
-        ),
+        pytest.param(2.4, FOG, marks=pytest.mark.slow),
+        pytest.param(-2.0, {"travelled": 0.9}, marks=pytest.mark.slow),
     ],
 )
 def test_figure_is_drawn_as_along_the_rays(kind, heading, fields):
