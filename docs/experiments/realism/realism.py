@@ -16,6 +16,7 @@ from results import comparison_tables, realism_figure, summary_line, write_compa
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.cli import clips
 from lgmd_gym.cli.console import make_console
+from lgmd_gym.cli.values import default_out
 from lgmd_gym.clips.batch import ClipJob, make_jobs
 from lgmd_gym.errors import check_whole, check_within
 
@@ -30,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     jobs = make_jobs([options.clips], options.crashes)
     clips.print_notes(jobs, options.crashes)
     optics = common_optics(jobs, options.clip_hfov_deg, options.ignore_bottom)
-    out = clips.default_out(options.out, "realism")
+    out = default_out(options.out, "realism")
     settings = {
         "clips": [job.clip for job in jobs],
         "optics": optics._asdict(),
