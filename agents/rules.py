@@ -41,21 +41,13 @@ def excitation(membrane_potential: ArrayLike) -> np.ndarray:
 
 
 class Reading(NamedTuple):
-    """Neuron outputs and ego motion of N environments for one camera frame.
+    """Neuron outputs and ego motion of N environments for one camera frame."""
 
-    Attributes:
-        frequency: Highest spike frequency of all cameras, shape (N,) [spikes/s].
-        potential: Membrane potentials K of eq. 10, shape (N, cameras).
-        speed: Ego speeds, shape (N,) [m/s].
-        yaw_rate: Ego yaw rates, means over the decision interval, shape (N,) [rad/s].
-        due: Environments that have this frame, bool, shape (N,).
-    """
-
-    frequency: np.ndarray
-    potential: np.ndarray
-    speed: np.ndarray
-    yaw_rate: np.ndarray
-    due: np.ndarray
+    frequency: np.ndarray  # highest spike frequency of all cameras, shape (N,) [spikes/s]
+    potential: np.ndarray  # membrane potentials K of eq. 10, shape (N, cameras)
+    speed: np.ndarray  # ego speeds, shape (N,) [m/s]
+    yaw_rate: np.ndarray  # ego yaw rates, means over the decision interval, shape (N,) [rad/s]
+    due: np.ndarray  # environments that have this frame, bool, shape (N,)
 
 
 def readings(observations: Observations, infos: Infos) -> Iterator[Reading]:

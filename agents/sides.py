@@ -13,19 +13,12 @@ SIDE_WIDTH_PX, SIDE_COLUMNS = 80, 5
 
 
 class SidePair(NamedTuple):
-    """A pair of fields, left and right of the path.
+    """A pair of fields, left and right of the path."""
 
-    Attributes:
-        yaw_deg: Angle between the path and the optical axis [degrees].
-        hfov_deg: Horizontal field of view [degrees].
-        pitch_deg: Upward tilt of the optical axis [degrees].
-        height_px: Height of the frame [px].
-    """
-
-    yaw_deg: float
-    hfov_deg: float
-    pitch_deg: float
-    height_px: int
+    yaw_deg: float  # angle between the path and the optical axis [degrees]
+    hfov_deg: float  # horizontal field of view [degrees]
+    pitch_deg: float  # upward tilt of the optical axis [degrees]
+    height_px: int  # height of the frame [px]
 
 
 # On collision course, a pedestrian (5 km/h) is at a bearing of 5 to 14° for ego speeds of 60 to 20 km/h, a

@@ -19,35 +19,21 @@ from lgmd_gym.kernels import kernel
 
 
 class Clock(NamedTuple):
-    """Progress of the present decision, the environments along the first axis.
+    """Progress of the present decision, the environments along the first axis."""
 
-    Attributes:
-        demands: Longitudinal demands, float64, shape (N,).
-        remaining: Simulation steps left in the decision, int64, shape (N,); −1 for no decision.
-        due: Output: whether a camera frame is due, bool, shape (N,).
-        headings: Heading before the decision, float64, shape (N,) [rad].
-    """
-
-    demands: np.ndarray
-    remaining: np.ndarray
-    due: np.ndarray
-    headings: np.ndarray
+    demands: np.ndarray  # longitudinal demands, float64, shape (N,)
+    remaining: np.ndarray  # simulation steps left in the decision, int64, shape (N,); −1 for no decision
+    due: np.ndarray  # output: whether a camera frame is due, bool, shape (N,)
+    headings: np.ndarray  # heading before the decision, float64, shape (N,) [rad]
 
 
 class Outcome(NamedTuple):
-    """Results of the present decision, the environments along the first axis.
+    """Results of the present decision, the environments along the first axis."""
 
-    Attributes:
-        infos: `INFO` records, shape (N,).
-        rewards: float64, shape (N,).
-        terminated: bool, shape (N,).
-        truncated: bool, shape (N,).
-    """
-
-    infos: np.ndarray
-    rewards: np.ndarray
-    terminated: np.ndarray
-    truncated: np.ndarray
+    infos: np.ndarray  # `INFO` records, shape (N,)
+    rewards: np.ndarray  # float64, shape (N,)
+    terminated: np.ndarray  # bool, shape (N,)
+    truncated: np.ndarray  # bool, shape (N,)
 
 
 def make_physics(state: PhysicsState, brakes: np.ndarray, weights: np.ndarray) -> Physics:

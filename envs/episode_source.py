@@ -27,19 +27,13 @@ from lgmd_gym.envs.physics_state import Placement, place
 
 
 class Draw(NamedTuple):
-    """The next episode of an environment.
+    """The next episode of an environment."""
 
-    Attributes:
-        placement: The scenario, placed on the road.
-        scene: The scene, for cameras and brake.
-        info: Additional keys of the episode's info.
-        brake: Brake of the ego in this episode; None for that of the environment's configuration. Keys given
-            in the configuration take precedence.
-    """
-
-    placement: Placement
-    scene: Scene
-    info: Info
+    placement: Placement  # the scenario, placed on the road
+    scene: Scene  # the scene, for cameras and brake
+    info: Info  # additional keys of the episode's info
+    # brake of the ego in this episode; None for that of the environment's configuration. Keys given in the
+    # configuration take precedence
     brake: BrakeParams | None = None
 
     def make_network(self) -> RoadNetwork:

@@ -17,30 +17,19 @@ _NO_DEMAND = np.zeros(1, np.float32)
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Positions and speeds of the ego and all actors; the ego is the first body.
-
-    Attributes:
-        scenario: The scenario.
-        times: Time after the start, float64, shape (T,) [s].
-        positions: Centres in highway-env's axes, x along the ego's first heading and y to its right, relative
-            to the ego's first position, float64, shape (T, bodies, 2) [m].
-        headings: Headings, + right, float64, shape (T, bodies) [rad].
-        speeds: Speeds, float64, shape (T, bodies) [m/s].
-        sizes: Length and width of every body, float64, shape (bodies, 2) [m].
-        contact: Whether the last time is that of a contact of the ego.
-        network: Lanes, in highway-env's own position.
-        origin: Ego's first position there, float64, shape (2,) [m].
-    """
+    """Positions and speeds of the ego and all actors; the ego is the first body."""
 
     scenario: Scenario
-    times: np.ndarray
+    times: np.ndarray  # time after the start, float64, shape (T,) [s]
+    # centres in highway-env's axes, x along the ego's first heading and y to its right, relative to the ego's
+    # first position, float64, shape (T, bodies, 2) [m]
     positions: np.ndarray
-    headings: np.ndarray
-    speeds: np.ndarray
-    sizes: np.ndarray
-    contact: bool
-    network: RoadNetwork
-    origin: np.ndarray
+    headings: np.ndarray  # headings, + right, float64, shape (T, bodies) [rad]
+    speeds: np.ndarray  # speeds, float64, shape (T, bodies) [m/s]
+    sizes: np.ndarray  # length and width of every body, float64, shape (bodies, 2) [m]
+    contact: bool  # whether the last time is that of a contact of the ego
+    network: RoadNetwork  # lanes, in highway-env's own position
+    origin: np.ndarray  # ego's first position there, float64, shape (2,) [m]
 
     @property
     def names(self) -> list[str]:

@@ -43,24 +43,15 @@ class Placement(NamedTuple):
     """A scenario placed on the road, ready to be loaded into a `PhysicsState`.
 
     The target is the first solid actor of the scenario.
-
-    Attributes:
-        scenario: The scenario.
-        start: Initial pose of the ego.
-        actors: Actors in the order of their bodies: cars, then other objects.
-        bodies: `BODY` records, the ego first; rows of paths and segments count from 0.
-        segments: Table of the scripts' segments, float64, shape (n, 4).
-        paths: Table of the paths' cells, float64, shape (n, 6).
-        target: Index of the target's body; 0 without a solid actor.
     """
 
     scenario: Scenario
-    start: Pose
-    actors: tuple[Actor, ...]
-    bodies: np.ndarray
-    segments: np.ndarray
-    paths: np.ndarray
-    target: int
+    start: Pose  # initial pose of the ego
+    actors: tuple[Actor, ...]  # actors in the order of their bodies: cars, then other objects
+    bodies: np.ndarray  # `BODY` records, the ego first; rows of paths and segments count from 0
+    segments: np.ndarray  # table of the scripts' segments, float64, shape (n, 4)
+    paths: np.ndarray  # table of the paths' cells, float64, shape (n, 6)
+    target: int  # index of the target's body; 0 without a solid actor
 
 
 def place(scenario: Scenario, rng: np.random.Generator) -> Placement:

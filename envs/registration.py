@@ -47,15 +47,10 @@ SCENARIO_ARGUMENT = "scenario"
 
 
 class RandomTask(NamedTuple):
-    """An id of random levels.
+    """An id of random levels."""
 
-    Attributes:
-        summary: One sentence on its levels.
-        arguments: Default arguments that differ from those of `RandomLevels`.
-    """
-
-    summary: str
-    arguments: Arguments
+    summary: str  # one sentence on its levels
+    arguments: Arguments  # default arguments that differ from those of `RandomLevels`
 
 
 # The non-threats have cars ahead, beside or none: no pedestrian, no mark on the road, no object at the path.

@@ -21,17 +21,11 @@ from lgmd_gym.kernels import kernel
 
 
 class SceneArrays(NamedTuple):
-    """What the cameras see, the environments along the first axis; see `SensorArray`.
+    """What the cameras see, the environments along the first axis; see `SensorArray`."""
 
-    Attributes:
-        scenes: `SCENE` records, shape (N,).
-        objects: `OBJECT` records, shape (N, objects).
-        counts: Number of objects, int64, shape (N,).
-    """
-
-    scenes: np.ndarray
-    objects: np.ndarray
-    counts: np.ndarray
+    scenes: np.ndarray  # `SCENE` records, shape (N,)
+    objects: np.ndarray  # `OBJECT` records, shape (N, objects)
+    counts: np.ndarray  # number of objects, int64, shape (N,)
 
 
 @kernel(exact=True)

@@ -66,15 +66,10 @@ class Sensors(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rates:
-    """Frequencies that all environments of a simulation share.
+    """Frequencies that all environments of a simulation share."""
 
-    Attributes:
-        simulation: Simulation steps per second [Hz].
-        policy: Decisions per second, a divisor of `simulation` [Hz].
-    """
-
-    simulation: float
-    policy: float
+    simulation: float  # simulation steps per second [Hz]
+    policy: float  # decisions per second, a divisor of `simulation` [Hz]
 
     @property
     def steps(self) -> int:
@@ -83,15 +78,10 @@ class Rates:
 
 
 class Snapshot(NamedTuple):
-    """State of an episode between two decisions, without its cameras and neurons.
+    """State of an episode between two decisions, without its cameras and neurons."""
 
-    Attributes:
-        state: See `PhysicsState.save`.
-        brake: `BRAKE` record.
-    """
-
-    state: dict[str, np.ndarray]
-    brake: np.ndarray
+    state: dict[str, np.ndarray]  # see `PhysicsState.save`
+    brake: np.ndarray  # `BRAKE` record
 
 
 class Simulation:

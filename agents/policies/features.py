@@ -31,19 +31,12 @@ GAINS = 1.0 / (1.0 + FPS * np.array(TIME_CONSTANTS_S)[:, None])
 
 
 class FieldInput(NamedTuple):
-    """Definition of a policy input.
+    """Definition of a policy input."""
 
-    Attributes:
-        source: Observation that it is computed from.
-        factor: Factor of the values before the logarithm.
-        first: First of its values: a camera, or a column of `column_potential`.
-        last: Last one + 1.
-    """
-
-    source: str
-    factor: float
-    first: int = 0
-    last: int = NUM_FIELDS
+    source: str  # observation that it is computed from
+    factor: float  # factor of the values before the logarithm
+    first: int = 0  # first of its values: a camera, or a column of `column_potential`
+    last: int = NUM_FIELDS  # last one + 1
 
     @property
     def size(self) -> int:

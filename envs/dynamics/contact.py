@@ -32,19 +32,12 @@ class Rectangle(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """The ego's first contact.
+    """The ego's first contact."""
 
-    Attributes:
-        other: Vehicle or obstacle in contact with the ego.
-        side: Part of the ego in contact: "front" (bumper with its corners), "rear" or "side".
-        impact_speed: Ego speed at the contact [m/s].
-        relative_impact_speed: Ego speed minus the other's speed along the ego's heading [m/s].
-    """
-
-    other: "RoadObject"
-    side: str
-    impact_speed: float
-    relative_impact_speed: float
+    other: "RoadObject"  # vehicle or obstacle in contact with the ego
+    side: str  # part of the ego in contact: "front" (bumper with its corners), "rear" or "side"
+    impact_speed: float  # ego speed at the contact [m/s]
+    relative_impact_speed: float  # ego speed minus the other's speed along the ego's heading [m/s]
 
     @classmethod
     def between(cls, ego: "RoadObject", other: "RoadObject") -> "Contact":

@@ -39,33 +39,19 @@ decision."""
 
 
 class Physics(NamedTuple):
-    """Arrays of the physics, the environments along the first axis.
+    """Arrays of the physics, the environments along the first axis."""
 
-    Attributes:
-        bodies: See `PhysicsState`.
-        episodes: See `PhysicsState`.
-        egos: See `PhysicsState`.
-        lines: See `PhysicsState`.
-        pending: See `PhysicsState`.
-        segments: See `PhysicsState`.
-        paths: See `PhysicsState`.
-        before: See `PhysicsState`.
-        parts: See `PhysicsState`.
-        brakes: `BRAKE` records, shape (N,).
-        weights: `REWARD` records, shape (N,).
-    """
-
-    bodies: np.ndarray
-    episodes: np.ndarray
-    egos: np.ndarray
-    lines: np.ndarray
-    pending: np.ndarray
-    segments: np.ndarray
-    paths: np.ndarray
-    before: np.ndarray
-    parts: np.ndarray
-    brakes: np.ndarray
-    weights: np.ndarray
+    bodies: np.ndarray  # see `PhysicsState`
+    episodes: np.ndarray  # see `PhysicsState`
+    egos: np.ndarray  # see `PhysicsState`
+    lines: np.ndarray  # see `PhysicsState`
+    pending: np.ndarray  # see `PhysicsState`
+    segments: np.ndarray  # see `PhysicsState`
+    paths: np.ndarray  # see `PhysicsState`
+    before: np.ndarray  # see `PhysicsState`
+    parts: np.ndarray  # see `PhysicsState`
+    brakes: np.ndarray  # `BRAKE` records, shape (N,)
+    weights: np.ndarray  # `REWARD` records, shape (N,)
 
 
 @kernel(exact=True)
@@ -234,23 +220,14 @@ PARTS = 16  # of a step
 
 
 class StepMotion(NamedTuple):
-    """What the motion of the bodies within a step depends on.
+    """What the motion of the bodies within a step depends on."""
 
-    Attributes:
-        before: `STEP_START` records of the bodies, and one more as scratch memory.
-        parts: See `step_ego`.
-        jerk: Slope of every change of the ego's acceleration [m/s³].
-        segments: Table of the scripts' segments.
-        paths: Table of the paths' cells.
-        dt: Duration of the step [s].
-    """
-
-    before: np.ndarray
-    parts: np.ndarray
-    jerk: float
-    segments: np.ndarray
-    paths: np.ndarray
-    dt: float
+    before: np.ndarray  # `STEP_START` records of the bodies, and one more as scratch memory
+    parts: np.ndarray  # see `step_ego`
+    jerk: float  # slope of every change of the ego's acceleration [m/s³]
+    segments: np.ndarray  # table of the scripts' segments
+    paths: np.ndarray  # table of the paths' cells
+    dt: float  # duration of the step [s]
 
 
 @kernel(exact=True)

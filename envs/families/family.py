@@ -30,23 +30,14 @@ _NAME = re.compile(r"[\w.-]+")  # allowed in ids of Gymnasium and in names of ca
 
 
 class Level(NamedTuple):
-    """How often random levels contain a family, and with which arguments.
+    """How often random levels contain a family, and with which arguments."""
 
-    Attributes:
-        name: Name by which levels are selected: that of the family or of a variant, such as "FastCCRs".
-        weight: Relative frequency among the threats or the non-threats.
-        draw: Function that draws the arguments of the family.
-        family: Name of the family.
-        threat: Whether the ego has contact without braking.
-        has_target: Whether the scenario has its target, or is without it, see `without_target`.
-    """
-
-    name: str
-    weight: float
-    draw: Callable[[np.random.Generator], Arguments]
-    family: str = ""
-    threat: bool = False
-    has_target: bool = True
+    name: str  # name by which levels are selected: that of the family or of a variant, such as "FastCCRs"
+    weight: float  # relative frequency among the threats or the non-threats
+    draw: Callable[[np.random.Generator], Arguments]  # function that draws the arguments of the family
+    family: str = ""  # name of the family
+    threat: bool = False  # whether the ego has contact without braking
+    has_target: bool = True  # whether the scenario has its target, or is without it, see `without_target`
 
 
 LEVELS: dict[str, Level] = {}

@@ -24,22 +24,14 @@ SIDES = {"right": 1.0, "left": -1.0}
 
 
 class RoadUser(NamedTuple):
-    """A target of the tests.
+    """A target of the tests."""
 
-    Attributes:
-        kind: Kind of actor.
-        length: Length [m].
-        width: Width [m].
-        height: Height [m].
-        impact_point: Distance of the point that defines the impact location ahead of the centre [m]: the hip
-            of a pedestrian, 0.36 m (adult) or 0.396 m (child) behind the front of the box, and the crankshaft
-            of a bicycle.
-    """
-
-    kind: str
-    length: float
-    width: float
-    height: float
+    kind: str  # kind of actor
+    length: float  # length [m]
+    width: float  # width [m]
+    height: float  # height [m]
+    # distance of the point that defines the impact location ahead of the centre [m]: the hip of a pedestrian,
+    # 0.36 m (adult) or 0.396 m (child) behind the front of the box, and the crankshaft of a bicycle
     impact_point: float = 0.0
 
     @property
@@ -59,17 +51,11 @@ SMALL_CAR = RoadUser("car", 4.316, 1.79, 1.48)
 
 
 class RunUp(NamedTuple):
-    """Motion of a road user up to a contact.
+    """Motion of a road user up to a contact."""
 
-    Attributes:
-        speed: Speed at the start [m/s].
-        profile: Change of the speed.
-        distance: Distance covered up to the contact [m].
-    """
-
-    speed: float
-    profile: tuple[Segment, ...]
-    distance: float
+    speed: float  # speed at the start [m/s]
+    profile: tuple[Segment, ...]  # change of the speed
+    distance: float  # distance covered up to the contact [m]
 
 
 def run_up(contact: float, speed: float, steady: float, acceleration_distance: float) -> RunUp:

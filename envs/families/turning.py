@@ -197,17 +197,11 @@ def lead_turns_off(
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """A turn of 90° of the ego's front axle: clothoid, arc and clothoid.
+    """A turn of 90° of the ego's front axle: clothoid, arc and clothoid."""
 
-    Attributes:
-        radius: Radius of the arc [m].
-        clothoid_deg: Change of heading on each clothoid [degrees].
-        arc_deg: Change of heading on the arc [degrees].
-    """
-
-    radius: float
-    clothoid_deg: float
-    arc_deg: float
+    radius: float  # radius of the arc [m]
+    clothoid_deg: float  # change of heading on each clothoid [degrees]
+    arc_deg: float  # change of heading on the arc [degrees]
 
     def bends(self, left: bool) -> tuple[Bend, ...]:
         """Return the path of the front axle."""
@@ -224,19 +218,12 @@ TURNS = {10: Turn(9.0, 20.62, 48.76), 15: Turn(11.75, 20.93, 48.14), 25: Turn(14
 
 @dataclass(frozen=True, slots=True)
 class TurningEgo:
-    """The ego's turn up to the contact.
+    """The ego's turn up to the contact."""
 
-    Attributes:
-        path: Path of the rear axle.
-        junction: Distance from the ego's initial centre to the centre of the crossing road [m].
-        contact: Time of the contact [s].
-        front: Middle of the ego's front at the contact, relative to that at the start, + left; heading.
-    """
-
-    path: tuple[Bend, ...]
-    junction: float
-    contact: float
-    front: Pose
+    path: tuple[Bend, ...]  # path of the rear axle
+    junction: float  # distance from the ego's initial centre to the centre of the crossing road [m]
+    contact: float  # time of the contact [s]
+    front: Pose  # middle of the ego's front at the contact, relative to that at the start, + left; heading
 
     def scenario(self, name: str, speed: float, actor: Actor) -> Scenario:
         """Return the scenario with an actor."""

@@ -24,14 +24,10 @@ EMERGENCY = 5.0  # [m/s²], required deceleration of an emergency
 
 @dataclass(frozen=True, slots=True)
 class Emergencies:
-    """The emergencies of an episode without braking by the agent.
+    """The emergencies of an episode without braking by the agent."""
 
-    Attributes:
-        contact: Time of the ego's contact [s]; None without contact.
-        demanding: Times of decisions with a required deceleration of `EMERGENCY` or more, ascending [s].
-    """
-
-    contact: float | None
+    contact: float | None  # time of the ego's contact [s]; None without contact
+    # times of decisions with a required deceleration of `EMERGENCY` or more, ascending [s]
     demanding: tuple[float, ...]
 
     def time_until(self, time: float, horizon: float = HORIZON) -> float | None:

@@ -72,17 +72,11 @@ _MODELS: dict[type, tuple[int, float]] = {}
 
 
 class Body(NamedTuple):
-    """A body that a vehicle may have.
-
-    Attributes:
-        model: Its model.
-        lowest: Lower end of its usual heights [m].
-        highest: Upper end [m].
-    """
+    """A body that a vehicle may have."""
 
     model: int
-    lowest: float
-    highest: float
+    lowest: float  # lower end of its usual heights [m]
+    highest: float  # upper end [m]
 
 
 BODY_MODELS = {
@@ -104,17 +98,11 @@ _HASH_MASK, _HASH_FACTOR = 0xFFFFFFFF, 0x045D9F3B
 
 
 class Sector(NamedTuple):
-    """Directions that the cameras of a car look in: from `first` to `last`, at most 170° apart.
+    """Directions that the cameras of a car look in: from `first` to `last`, at most 170° apart."""
 
-    Attributes:
-        first: Yaw to the left of or at all optical axes, relative to the ego's heading [rad].
-        last: Yaw to the right of or at all optical axes [rad].
-        reach: Maximum distance of a lens from the ego's front, rear or centreline [m].
-    """
-
-    first: float
-    last: float
-    reach: float
+    first: float  # yaw to the left of or at all optical axes, relative to the ego's heading [rad]
+    last: float  # yaw to the right of or at all optical axes [rad]
+    reach: float  # maximum distance of a lens from the ego's front, rear or centreline [m]
 
 
 def read_objects(ego: Ego, sector: Sector | None, records: memoryview, index: int = 0) -> int:

@@ -34,19 +34,12 @@ _BAY_LENGTH = 20.0  # a network whose longest lane is no longer than this is a c
 
 
 class RoadGeometry(NamedTuple):
-    """The static part of a road.
+    """The static part of a road."""
 
-    Attributes:
-        surface: Asphalt as quads, float64, shape (n, 8): x, y of the corners in turn [m].
-        lines: Markings, `LINE` records, shape (n,).
-        roadside: Posts, trees and guard rails, `OBJECT` records sorted by x, shape (n,).
-        paved: Whether all ground is asphalt, as for a road without lanes.
-    """
-
-    surface: np.ndarray
-    lines: np.ndarray
-    roadside: np.ndarray
-    paved: bool
+    surface: np.ndarray  # asphalt as quads, float64, shape (n, 8): x, y of the corners in turn [m]
+    lines: np.ndarray  # markings, `LINE` records, shape (n,)
+    roadside: np.ndarray  # posts, trees and guard rails, `OBJECT` records sorted by x, shape (n,)
+    paved: bool  # whether all ground is asphalt, as for a road without lanes
 
 
 _CACHE: weakref.WeakKeyDictionary[object, dict[tuple[object, ...], RoadGeometry]] = (

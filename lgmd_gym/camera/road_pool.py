@@ -32,19 +32,13 @@ def road_key(scene: Scene) -> RoadKey:
 
 
 class RoadArrays(NamedTuple):
-    """Roads as the kernels read them.
+    """Roads as the kernels read them."""
 
-    Attributes:
-        surface: Asphalt of all roads, float64, shape (n, 8); see `RoadGeometry`.
-        lines: Markings of all roads, `LINE` records.
-        roadside: Posts, trees and rails of all roads, `OBJECT` records.
-        spans: First and last + 1 row of `surface`, `lines` and `roadside`, and 1 for an all-paved ground,
-            per environment, int64, shape (num_envs, 7).
-    """
-
-    surface: np.ndarray
-    lines: np.ndarray
-    roadside: np.ndarray
+    surface: np.ndarray  # asphalt of all roads, float64, shape (n, 8); see `RoadGeometry`
+    lines: np.ndarray  # markings of all roads, `LINE` records
+    roadside: np.ndarray  # posts, trees and rails of all roads, `OBJECT` records
+    # first and last + 1 row of `surface`, `lines` and `roadside`, and 1 for an all-paved ground, per
+    # environment, int64, shape (num_envs, 7)
     spans: np.ndarray
 
 

@@ -66,74 +66,45 @@ class World:
     """The appearance of an episode.
 
     Grey levels are display-coded, 255 for white, in the light of a clear or overcast day.
-
-    Attributes:
-        number: Number of the world; -1 for the laboratory.
-        asphalt: Kind of the road's texture and its tile.
-        verge: Kind of the verge's texture and its tile.
-        asphalt_grey: Mean grey of the road.
-        asphalt_contrast: Contrast of the road, as a multiple of 9 grey levels per standard deviation.
-        verge_grey: Mean grey of the verge.
-        verge_contrast: Contrast of the verge, as a multiple of 16 grey levels per standard deviation.
-        paint_grey: Grey of road markings.
-        line_width: Width of the markings [m].
-        dash: Length and period of a lane line's dashes [m].
-        lane_width: Width of the lanes of braking scenarios [m].
-        skyline: Number of the skyline.
-        hill_scale: Height of the hills, as a multiple of the laboratory's.
-        tree_scale: Height of the tree line, as a multiple of the laboratory's.
-        greys: Grey of the sky at the zenith and at the horizon, of hills and of trees.
-        leaf_contrast: Standard deviation of the grey of the trees.
-        roadside: Density of posts and plants, as a multiple of the natural density.
-        guard_rail: Whether guard rails run along the outer edges of the road.
-        sun_azimuth_deg: Direction of the sun, from +x towards +y [degrees].
-        sun_elevation_deg: Elevation of the sun [degrees].
-        sun_share: Share of the light on a horizontal surface that comes directly from the sun; 0 under an
-            overcast sky.
-        street_light: Light at night apart from headlights, as a share of daylight.
-        beam: Peak of the light of the ego's low beam, as a share of daylight.
-        under_body: Share of the light that is missing below the middle of a vehicle.
-        mount_height_error: Height of the lens above that of its mount [m].
-        pitch_error_deg: Upward tilt of the optical axis relative to its mount [degrees].
-        yaw_error_deg: Turn of the optical axis to the right relative to its mount [degrees].
-        noise: Sensor noise as a multiple of the usual noise.
-        exposure_grey: Mean grey to which the automatic exposure brings the road and its surroundings by day.
-        night_exposure: The same at night, as a share of that by day.
-        exposure_s: Time constant of the automatic exposure [s]; 0 for a fixed exposure.
-        contrast: Slope of the camera's tone curve at that grey; 1 for the square root of the light alone.
     """
 
-    number: int = -1
-    asphalt: tuple[str, int] = ("asphalt", 0)
-    verge: tuple[str, int] = ("verge", 0)
-    asphalt_grey: float = 104.0
+    number: int = -1  # number of the world; -1 for the laboratory
+    asphalt: tuple[str, int] = ("asphalt", 0)  # kind of the road's texture and its tile
+    verge: tuple[str, int] = ("verge", 0)  # kind of the verge's texture and its tile
+    asphalt_grey: float = 104.0  # mean grey of the road
+    # contrast of the road, as a multiple of 9 grey levels per standard deviation
     asphalt_contrast: float = 1.0
-    verge_grey: float = 76.0
+    verge_grey: float = 76.0  # mean grey of the verge
+    # contrast of the verge, as a multiple of 16 grey levels per standard deviation
     verge_contrast: float = 1.0
-    paint_grey: float = 208.0
-    line_width: float = 0.15
-    dash: tuple[float, float] = (3.0, 4.33)
-    lane_width: float = 3.5
-    skyline: int = -1
-    hill_scale: float = 1.0
-    tree_scale: float = 1.0
+    paint_grey: float = 208.0  # grey of road markings
+    line_width: float = 0.15  # width of the markings [m]
+    dash: tuple[float, float] = (3.0, 4.33)  # length and period of a lane line's dashes [m]
+    lane_width: float = 3.5  # width of the lanes of braking scenarios [m]
+    skyline: int = -1  # its number
+    hill_scale: float = 1.0  # height of the hills, as a multiple of the laboratory's
+    tree_scale: float = 1.0  # height of the tree line, as a multiple of the laboratory's
+    # grey of the sky at the zenith and at the horizon, of hills and of trees
     greys: tuple[float, float, float, float] = (172.0, 214.0, 128.0, 78.0)
-    leaf_contrast: float = 12.0
-    roadside: float = 1.0
-    guard_rail: bool = False
-    sun_azimuth_deg: float = 143.13
-    sun_elevation_deg: float = 53.13
+    leaf_contrast: float = 12.0  # standard deviation of the grey of the trees
+    roadside: float = 1.0  # density of posts and plants, as a multiple of the natural density
+    guard_rail: bool = False  # whether guard rails run along the outer edges of the road
+    sun_azimuth_deg: float = 143.13  # direction of the sun, from +x towards +y [degrees]
+    sun_elevation_deg: float = 53.13  # elevation of the sun [degrees]
+    # share of the light on a horizontal surface that comes directly from the sun; 0 under an overcast sky
     sun_share: float = 0.0
-    street_light: float = 0.04
-    beam: float = 1.25
-    under_body: float = 0.66
-    mount_height_error: float = 0.0
-    pitch_error_deg: float = 0.0
-    yaw_error_deg: float = 0.0
-    noise: float = 0.0
+    street_light: float = 0.04  # light at night apart from headlights, as a share of daylight
+    beam: float = 1.25  # peak of the light of the ego's low beam, as a share of daylight
+    under_body: float = 0.66  # share of the light that is missing below the middle of a vehicle
+    mount_height_error: float = 0.0  # height of the lens above that of its mount [m]
+    pitch_error_deg: float = 0.0  # upward tilt of the optical axis relative to its mount [degrees]
+    yaw_error_deg: float = 0.0  # turn of the optical axis to the right relative to its mount [degrees]
+    noise: float = 0.0  # sensor noise as a multiple of the usual noise
+    # mean grey to which the automatic exposure brings the road and its surroundings by day
     exposure_grey: float = 110.0
-    night_exposure: float = 0.5
-    exposure_s: float = 0.0
+    night_exposure: float = 0.5  # the same at night, as a share of that by day
+    exposure_s: float = 0.0  # time constant of the automatic exposure [s]; 0 for a fixed exposure
+    # slope of the camera's tone curve at that grey; 1 for the square root of the light alone
     contrast: float = 1.0
 
     @property

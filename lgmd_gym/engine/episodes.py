@@ -17,17 +17,11 @@ from lgmd_gym.envs.episode_source import Draw, EpisodeSource
 
 
 class Prepared(NamedTuple):
-    """An episode that is ready to be loaded.
+    """An episode that is ready to be loaded."""
 
-    Attributes:
-        draw: The episode.
-        network: Its highway-env road network.
-        generator: The random generator after the draw.
-    """
-
-    draw: Draw
-    network: RoadNetwork
-    generator: np.random.Generator
+    draw: Draw  # the episode
+    network: RoadNetwork  # its highway-env road network
+    generator: np.random.Generator  # the random generator after the draw
 
 
 class EpisodeQueue:

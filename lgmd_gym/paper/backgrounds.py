@@ -15,19 +15,12 @@ PAPER_SPEED = 0.108  # the paper's constant linear speed [m/s]
 
 @dataclass(frozen=True, kw_only=True)
 class Screen:
-    """A flat screen in front of the eye.
+    """A flat screen in front of the eye."""
 
-    Attributes:
-        shape: (height, width) [px].
-        fps: Frame rate [Hz].
-        px_per_m: Pixels per metre on the screen; an assumption, since the paper states none.
-        distance: Distance between eye and screen [m].
-    """
-
-    shape: tuple[int, int] = SHAPES["looming"]
-    fps: float = 30.0
-    px_per_m: float = 1000.0
-    distance: float = 0.3
+    shape: tuple[int, int] = SHAPES["looming"]  # (height, width) [px]
+    fps: float = 30.0  # frame rate [Hz]
+    px_per_m: float = 1000.0  # pixels per metre on the screen; an assumption, since the paper states none
+    distance: float = 0.3  # distance between eye and screen [m]
 
     def __post_init__(self) -> None:
         if min(self.shape) < 1:
@@ -45,13 +38,9 @@ class Screen:
 
 @dataclass(frozen=True, kw_only=True)
 class Plain:
-    """A uniform background.
+    """A uniform background."""
 
-    Attributes:
-        luminance: Luminance in 0-255.
-    """
-
-    luminance: float = 127.5
+    luminance: float = 127.5  # in 0-255
 
     def render(self, time: float, screen: Screen) -> LuminanceMap:
         """Return luminance in 0-255, shape (height, width)."""
@@ -60,21 +49,13 @@ class Plain:
 
 @dataclass(frozen=True, kw_only=True)
 class Grating:
-    """A drifting sinusoidal grating.
+    """A drifting sinusoidal grating."""
 
-    Attributes:
-        spatial: Spatial frequency [periods/m].
-        temporal: Temporal frequency [Hz].
-        contrast: Michelson contrast in [0, 1].
-        direction: Direction of the drift [deg], 0 to the right, 90 upwards.
-        mean: Mean luminance; contrast 1 around 127.5 spans 0-255.
-    """
-
-    spatial: float = 40.0
-    temporal: float = 2.0
-    contrast: float = 1.0
-    direction: float = 0.0
-    mean: float = 127.5
+    spatial: float = 40.0  # spatial frequency [periods/m]
+    temporal: float = 2.0  # temporal frequency [Hz]
+    contrast: float = 1.0  # michelson contrast in [0, 1]
+    direction: float = 0.0  # direction of the drift [deg], 0 to the right, 90 upwards
+    mean: float = 127.5  # mean luminance; contrast 1 around 127.5 spans 0-255
 
     def render(self, time: float, screen: Screen) -> LuminanceMap:
         """Return luminance in 0-255, shape (height, width), averaged over each pixel."""

@@ -29,19 +29,12 @@ MIN_SELECTIVITY = 1.0 / 3.0  # selectivity index of twice as many spikes in appr
 
 
 class ClaimResult(NamedTuple):
-    """One row of the table of claims.
+    """One row of the table of claims."""
 
-    Attributes:
-        claim: Claim of the paper.
-        measured: Measurement, in words.
-        result: `HOLDS`, `PARTLY` or `FAILS`.
-        factor: Parameter or stimulus property that the result depends on.
-    """
-
-    claim: str
-    measured: str
-    result: str
-    factor: str
+    claim: str  # claim of the paper
+    measured: str  # measurement, in words
+    result: str  # `HOLDS`, `PARTLY` or `FAILS`
+    factor: str  # parameter or stimulus property that the result depends on
 
 
 def evaluate_claims(

@@ -40,23 +40,14 @@ StepCallback = Callable[[], object]
 
 @dataclass(frozen=True)
 class StimulusResponse:
-    """Responses of several models to one stimulus.
+    """Responses of several models to one stimulus."""
 
-    Attributes:
-        time: Time of each frame [s], shape (frames,).
-        frequency: Spike frequency of each model [spikes/s], shape (frames,).
-        potential: Membrane potential K of each model, shape (frames,).
-        spikes: Spikes per frame of each model, shape (frames,).
-        ffi: F̂ of the first model [grey levels], shape (frames,).
-        pictures: (time [s], frame) at selected times.
-    """
-
-    time: np.ndarray
-    frequency: dict[str, np.ndarray]
-    potential: dict[str, np.ndarray]
-    spikes: dict[str, np.ndarray]
-    ffi: np.ndarray
-    pictures: list[tuple[float, Frame]]
+    time: np.ndarray  # time of each frame [s], shape (frames,)
+    frequency: dict[str, np.ndarray]  # spike frequency of each model [spikes/s], shape (frames,)
+    potential: dict[str, np.ndarray]  # membrane potential K of each model, shape (frames,)
+    spikes: dict[str, np.ndarray]  # spikes per frame of each model, shape (frames,)
+    ffi: np.ndarray  # F̂ of the first model [grey levels], shape (frames,)
+    pictures: list[tuple[float, Frame]]  # (time [s], frame) at selected times
 
     def times_above(self, level: float, model: str = "paper") -> np.ndarray:
         """Return the times at which the spike frequency is at or above a level [s]."""
@@ -105,17 +96,11 @@ def run_stimulus(
 
 
 class GratingResponse(NamedTuple):
-    """Responses to a grating without an object.
-
-    Attributes:
-        grating: The grating.
-        potential: Highest membrane potential K of each model.
-        ffi: Mean F̂ [grey levels].
-    """
+    """Responses to a grating without an object."""
 
     grating: Grating
-    potential: dict[str, float]
-    ffi: float
+    potential: dict[str, float]  # highest membrane potential K of each model
+    ffi: float  # mean F̂ [grey levels]
 
 
 def gratings(on_step: StepCallback) -> list[GratingResponse]:
@@ -146,19 +131,12 @@ def grating_response(grating: Grating, on_step: StepCallback = lambda: None) -> 
 
 
 class LoomingInGrating(NamedTuple):
-    """A square that looms in a grating.
+    """A square that looms in a grating."""
 
-    Attributes:
-        contrast: Contrast of the grating.
-        spatial: Spatial frequency of the grating [periods/m].
-        luminance: Luminance of the square in 0-255.
-        response: Responses of the models.
-    """
-
-    contrast: float
-    spatial: float
-    luminance: float
-    response: StimulusResponse
+    contrast: float  # contrast of the grating
+    spatial: float  # spatial frequency of the grating [periods/m]
+    luminance: float  # luminance of the square in 0-255
+    response: StimulusResponse  # responses of the models
 
 
 def looming_in_gratings(on_step: StepCallback) -> list[LoomingInGrating]:
@@ -174,17 +152,11 @@ def looming_in_gratings(on_step: StepCallback) -> list[LoomingInGrating]:
 
 
 class LuminanceLeads(NamedTuple):
-    """Alarm times of a dark and a light square on the same background.
+    """Alarm times of a dark and a light square on the same background."""
 
-    Attributes:
-        background: Luminance of the background in 0-255.
-        dark: Time from the first alarm (30 spikes/s) to contact of a dark square [s].
-        light: The same for a light square [s].
-    """
-
-    background: float
-    dark: float
-    light: float
+    background: float  # luminance of the background in 0-255
+    dark: float  # time from the first alarm (30 spikes/s) to contact of a dark square [s]
+    light: float  # the same for a light square [s]
 
 
 def light_and_dark(on_step: StepCallback) -> list[LuminanceLeads]:
@@ -220,19 +192,12 @@ def panorama(on_step: StepCallback, picture: Path | None = None) -> dict[str, St
 
 
 class Approach(NamedTuple):
-    """Response to an approach.
+    """Response to an approach."""
 
-    Attributes:
-        l_over_v: Half size over speed [s].
-        peak: Time from the peak of the spike frequency to contact [s].
-        alarm: Time from the first alarm to contact [s]; NaN without alarm.
-        response: Responses of the models.
-    """
-
-    l_over_v: float
-    peak: float
-    alarm: float
-    response: StimulusResponse
+    l_over_v: float  # half size over speed [s]
+    peak: float  # time from the peak of the spike frequency to contact [s]
+    alarm: float  # time from the first alarm to contact [s]; NaN without alarm
+    response: StimulusResponse  # responses of the models
 
 
 def approaches(on_step: StepCallback) -> list[Approach]:

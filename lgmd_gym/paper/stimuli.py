@@ -28,32 +28,20 @@ class Background(Protocol):
 
 
 class ScreenBox(NamedTuple):
-    """Position of an object on the screen.
+    """Position of an object on the screen."""
 
-    Attributes:
-        x: Centre, to the right of the screen's centre [px].
-        y: Centre, below the screen's centre [px].
-        half_width: Half the width [px].
-        half_height: Half the height [px].
-    """
-
-    x: float
-    y: float
-    half_width: float
-    half_height: float
+    x: float  # centre, to the right of the screen's centre [px]
+    y: float  # centre, below the screen's centre [px]
+    half_width: float  # half the width [px]
+    half_height: float  # half the height [px]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ForegroundObject:
-    """Moving object in front of the background.
+    """Moving object in front of the background."""
 
-    Attributes:
-        luminance: Luminance in 0-255.
-        outline: Outline of the object.
-    """
-
-    luminance: float = 20.0
-    outline: Literal["square", "disc"] = "square"
+    luminance: float = 20.0  # in 0-255
+    outline: Literal["square", "disc"] = "square"  # outline of the object
 
     def box(self, time: float, screen: Screen) -> ScreenBox:
         """Return the position at a time [s]."""
@@ -62,17 +50,11 @@ class ForegroundObject:
 
 @dataclass(frozen=True, kw_only=True)
 class Looming(ForegroundObject):
-    """An object that approaches the eye at constant speed; its angle is 2·atan(l/|v| / time to contact).
+    """An object that approaches the eye at constant speed; its angle is 2·atan(l/|v| / time to contact)."""
 
-    Attributes:
-        l_over_v: Half its size over its speed [s].
-        contact: Time of contact with the eye [s].
-        largest: Angular half size at which it stops [deg].
-    """
-
-    l_over_v: float = 0.1
-    contact: float = 3.0
-    largest: float = 40.0
+    l_over_v: float = 0.1  # half its size over its speed [s]
+    contact: float = 3.0  # time of contact with the eye [s]
+    largest: float = 40.0  # angular half size at which it stops [deg]
 
     def box(self, time: float, screen: Screen) -> ScreenBox:
         """Return the position at a time [s]."""
@@ -85,13 +67,10 @@ class Looming(ForegroundObject):
 
 @dataclass(frozen=True, kw_only=True)
 class Receding(Looming):
-    """An object that moves away from the eye at constant speed: `Looming` with reversed time.
+    """An object that moves away from the eye at constant speed: `Looming` with reversed time."""
 
-    Attributes:
-        contact: Time at which the object is at the eye [s]. It is static until its angular half size falls
-            below `largest`.
-    """
-
+    # time at which the object is at the eye [s]. It is static until its angular half size falls below
+    # `largest`
     contact: float = 0.0
 
     def box(self, time: float, screen: Screen) -> ScreenBox:
@@ -101,17 +80,11 @@ class Receding(Looming):
 
 @dataclass(frozen=True, kw_only=True)
 class Translating(ForegroundObject):
-    """An object of constant size that moves sideways across the screen.
+    """An object of constant size that moves sideways across the screen."""
 
-    Attributes:
-        half_size: Half its size on the screen [m].
-        speed: Speed on the screen [m/s], + to the right.
-        centred: Time at which it is at the centre of the screen [s].
-    """
-
-    half_size: float = 0.04
-    speed: float = PAPER_SPEED
-    centred: float = 2.0
+    half_size: float = 0.04  # half its size on the screen [m]
+    speed: float = PAPER_SPEED  # speed on the screen [m/s], + to the right
+    centred: float = 2.0  # time at which it is at the centre of the screen [s]
 
     def box(self, time: float, screen: Screen) -> ScreenBox:
         """Return the position at a time [s]."""
@@ -121,17 +94,11 @@ class Translating(ForegroundObject):
 
 @dataclass(frozen=True, kw_only=True)
 class Elongating(ForegroundObject):
-    """An object whose edges move outwards at constant speed on the screen.
+    """An object whose edges move outwards at constant speed on the screen."""
 
-    Attributes:
-        start: Half size at time 0 [m].
-        speed: Speed of each edge [m/s].
-        all_round: Whether the upper and lower edges move as well.
-    """
-
-    start: float = 0.01
-    speed: float = PAPER_SPEED
-    all_round: bool = True
+    start: float = 0.01  # half size at time 0 [m]
+    speed: float = PAPER_SPEED  # speed of each edge [m/s]
+    all_round: bool = True  # whether the upper and lower edges move as well
 
     def box(self, time: float, screen: Screen) -> ScreenBox:
         """Return the position at a time [s]."""

@@ -23,28 +23,17 @@ BRAKING_THRESHOLD = 0.1  # [m/s²], deceleration above which the brake lamp is l
 
 @dataclass(frozen=True, slots=True)
 class DisplayState:
-    """State of an episode after a decision; undefined values are infinite.
+    """State of an episode after a decision; undefined values are infinite."""
 
-    Attributes:
-        time: Time since the reset [s].
-        speed: Ego speed [m/s].
-        gap: Free distance along the ego's path [m].
-        ttc: Time to contact [s].
-        deceleration: Ego deceleration, >= 0 [m/s²]; in environments of this package, only the part beyond
-            the script.
-        alert: Whether the neuron, or the agent if it reports alerts, is in alert.
-        contact: Whether the ego has had contact.
-        impact_speed: Relative speed at contact [m/s].
-    """
-
-    time: float
-    speed: float
-    gap: float = inf
-    ttc: float = inf
+    time: float  # time since the reset [s]
+    speed: float  # ego speed [m/s]
+    gap: float = inf  # free distance along the ego's path [m]
+    ttc: float = inf  # time to contact [s]
+    # ego deceleration, >= 0 [m/s²]; in environments of this package, only the part beyond the script
     deceleration: float = 0.0
-    alert: bool = False
-    contact: bool = False
-    impact_speed: float = inf
+    alert: bool = False  # whether the neuron, or the agent if it reports alerts, is in alert
+    contact: bool = False  # whether the ego has had contact
+    impact_speed: float = inf  # relative speed at contact [m/s]
 
     @property
     def braking(self) -> bool:

@@ -14,60 +14,34 @@ MAX_DENSITY = 200.0
 class Clutter:
     """Densities of the pieces of clutter along a road, 0 to 200 [1/km].
 
-    Attributes:
-        sign: Traffic signs, per outer edge.
-        board: Direction signs on two posts, per outer edge.
-        lamp_post: Lamp posts with an arm towards the road, per outer edge.
-        power_pole: Power poles, per outer edge.
-        overhanging_tree: Trees with a crown that reaches over the road, per outer edge.
-        thicket: Dense trees and bushes of 24 m, per outer edge.
-        avenue: Rows of four trees, per outer edge.
-        wall: Walls of 30 m, per outer edge.
-        hedge: Hedges of 10 m, per outer edge.
-        house: Houses, per outer edge.
-        parked_car: Parked vehicles, per outer edge.
-        bollard: Bollards, per outer edge.
-        drain: Drains at the edge of the asphalt, per outer edge.
-        gantry: Gantries with one to three panels, per road.
-        bridge: Bridges over the road, per road.
-        tunnel: Underpasses of 30 to 60 m, per road.
-        signal: Traffic signals with an arm over the road, per road.
-        zebra: Zebra crossings, per road.
-        arrow: Arrows on the asphalt, per lane.
-        patch: Dark and light patches of tar, per lane.
-        manhole: Manholes, per lane.
-        joint: Joints across the lane, per lane.
-        skid: Pairs of skid marks, per lane.
-        queue: Queues of standing cars, per km of the lane that `place_clutter` is given.
-
     Raises:
         ValueError: For a density out of range.
     """
 
-    sign: float = 0.0
-    board: float = 0.0
-    lamp_post: float = 0.0
-    power_pole: float = 0.0
-    overhanging_tree: float = 0.0
-    thicket: float = 0.0
-    avenue: float = 0.0
-    wall: float = 0.0
-    hedge: float = 0.0
-    house: float = 0.0
-    parked_car: float = 0.0
-    bollard: float = 0.0
-    drain: float = 0.0
-    gantry: float = 0.0
-    bridge: float = 0.0
-    tunnel: float = 0.0
-    signal: float = 0.0
-    zebra: float = 0.0
-    arrow: float = 0.0
-    patch: float = 0.0
-    manhole: float = 0.0
-    joint: float = 0.0
-    skid: float = 0.0
-    queue: float = 0.0
+    sign: float = 0.0  # traffic signs, per outer edge
+    board: float = 0.0  # direction signs on two posts, per outer edge
+    lamp_post: float = 0.0  # lamp posts with an arm towards the road, per outer edge
+    power_pole: float = 0.0  # power poles, per outer edge
+    overhanging_tree: float = 0.0  # trees with a crown that reaches over the road, per outer edge
+    thicket: float = 0.0  # dense trees and bushes of 24 m, per outer edge
+    avenue: float = 0.0  # rows of four trees, per outer edge
+    wall: float = 0.0  # walls of 30 m, per outer edge
+    hedge: float = 0.0  # hedges of 10 m, per outer edge
+    house: float = 0.0  # houses, per outer edge
+    parked_car: float = 0.0  # parked vehicles, per outer edge
+    bollard: float = 0.0  # bollards, per outer edge
+    drain: float = 0.0  # drains at the edge of the asphalt, per outer edge
+    gantry: float = 0.0  # gantries with one to three panels, per road
+    bridge: float = 0.0  # bridges over the road, per road
+    tunnel: float = 0.0  # underpasses of 30 to 60 m, per road
+    signal: float = 0.0  # traffic signals with an arm over the road, per road
+    zebra: float = 0.0  # zebra crossings, per road
+    arrow: float = 0.0  # arrows on the asphalt, per lane
+    patch: float = 0.0  # dark and light patches of tar, per lane
+    manhole: float = 0.0  # manholes, per lane
+    joint: float = 0.0  # joints across the lane, per lane
+    skid: float = 0.0  # pairs of skid marks, per lane
+    queue: float = 0.0  # queues of standing cars, per km of the lane that `place_clutter` is given
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -12,25 +12,15 @@ _WIDEST = 40  # roads are measured up to this width [m]
 
 
 class Places(NamedTuple):
-    """Places on a road with the direction of travel; arrays of shape (n,).
+    """Places on a road with the direction of travel; arrays of shape (n,)."""
 
-    Attributes:
-        x: Position on the outer edge of a lane, or on its centre line [m].
-        y: The same [m].
-        cos: Direction of travel.
-        sin: The same.
-        side: 1 if the outer edge is to the right of the direction of travel, -1 to the left.
-        width: Width of the lane, or of the road that a kind spans [m].
-        kind: Number of the kind of clutter.
-    """
-
-    x: np.ndarray
-    y: np.ndarray
-    cos: np.ndarray
-    sin: np.ndarray
-    side: np.ndarray
-    width: np.ndarray
-    kind: np.ndarray
+    x: np.ndarray  # position on the outer edge of a lane, or on its centre line [m]
+    y: np.ndarray  # the same [m]
+    cos: np.ndarray  # direction of travel
+    sin: np.ndarray  # the same
+    side: np.ndarray  # 1 if the outer edge is to the right of the direction of travel, -1 to the left
+    width: np.ndarray  # width of the lane, or of the road that a kind spans [m]
+    kind: np.ndarray  # number of the kind of clutter
 
     def select(self, chosen: np.ndarray) -> "Places":
         """Return some of the places."""
@@ -48,15 +38,10 @@ class Places(NamedTuple):
 
 
 class Sites(NamedTuple):
-    """Where the clutter of one kind is; arrays of shape (n,).
+    """Where the clutter of one kind is; arrays of shape (n,)."""
 
-    Attributes:
-        place: Index of the place in `Places`.
-        width: Its width [m].
-    """
-
-    place: np.ndarray
-    width: np.ndarray
+    place: np.ndarray  # index of the place in `Places`
+    width: np.ndarray  # its width [m]
 
     def select(self, chosen: np.ndarray) -> "Sites":
         """Return some of the sites."""

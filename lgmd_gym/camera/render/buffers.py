@@ -13,23 +13,14 @@ from lgmd_gym.kernels import kernel
 
 
 class Views(NamedTuple):
-    """Per-camera arrays.
+    """Per-camera arrays."""
 
-    Attributes:
-        looks: `LOOK` records, shape (cameras,).
-        beams: Fall-off of the low beam over the columns, float32, shape (cameras, width).
-        skies: The last sky, float32, shape (cameras, height, width).
-        sky_aims: Yaw, pitch and roll of the last sky, float64, shape (cameras, 3).
-        noise_starts: Index of the frame's first number in the noise table, int64, shape (cameras,).
-        exposures: State of exposure and contrast control, see `sensor`, float64, shape (cameras, 7).
-    """
-
-    looks: np.ndarray
-    beams: np.ndarray
-    skies: np.ndarray
-    sky_aims: np.ndarray
-    noise_starts: np.ndarray
-    exposures: np.ndarray
+    looks: np.ndarray  # `LOOK` records, shape (cameras,)
+    beams: np.ndarray  # fall-off of the low beam over the columns, float32, shape (cameras, width)
+    skies: np.ndarray  # the last sky, float32, shape (cameras, height, width)
+    sky_aims: np.ndarray  # yaw, pitch and roll of the last sky, float64, shape (cameras, 3)
+    noise_starts: np.ndarray  # index of the frame's first number in the noise table, int64, shape (cameras,)
+    exposures: np.ndarray  # state of exposure and contrast control, see `sensor`, float64, shape (cameras, 7)
 
 
 class View(NamedTuple):
@@ -45,46 +36,32 @@ class View(NamedTuple):
 
 
 class Buffers(NamedTuple):
-    """Scratch memory.
+    """Scratch memory."""
 
-    Attributes:
-        image: Light of the last frame, float32, shape (height, width) [grey levels].
-        exposure: Light summed over the exposure, float32, shape (height, width).
-        lens: The lens at one time of the exposure, a `LENS` record, shape (1,).
-        ground: Coverage differences of road, paint, soft shadows and shadows that the sun casts, float32,
-            shape (4, height, width + 2).
-        solids: Coverage differences of a solid and of its grey, float32, shape (2, height, width + 2).
-        corners: Corners of a polygon as (depth, right, down), float64, shape (16, 3) [m].
-        uv: Projected corners of a polygon, float64, shape (20, 2) [px].
-        quad: x, y of four corners on the ground, float64, shape (8,) [m].
-        axes: Axes of an object, see `place_object`, float64, shape (5, 3).
-        greys: Grey and light of the polygons of all models, float64, shape (polygons, 2).
-        joints: Joints of a figure, see `pose_figure`; then in camera axes, float64, shape (56, 3) [m].
-        order: Indices of the objects in drawing order, int64, shape (512,).
-        distances: Distances of the objects from the lens, float64, shape (512,) [m].
-        extents: Middle and half of an object's azimuths [quarter turns] and its least and greatest distance
-            [m] as seen from the lens, float64, shape (512, 4).
-        directions: Azimuth of the horizon in each column relative to the lens [rad] and length of its
-            direction [px], float64, shape (2, width).
-        outlines: Skyline in each column, see `sky`, float32, shape (5, width).
-    """
-
-    image: np.ndarray
-    exposure: np.ndarray
-    lens: np.ndarray
+    image: np.ndarray  # light of the last frame, float32, shape (height, width) [grey levels]
+    exposure: np.ndarray  # light summed over the exposure, float32, shape (height, width)
+    lens: np.ndarray  # the lens at one time of the exposure, a `LENS` record, shape (1,)
+    # coverage differences of road, paint, soft shadows and shadows that the sun casts, float32, shape (4,
+    # height, width + 2)
     ground: np.ndarray
+    # coverage differences of a solid and of its grey, float32, shape (2, height, width + 2)
     solids: np.ndarray
-    corners: np.ndarray
-    uv: np.ndarray
-    quad: np.ndarray
-    axes: np.ndarray
-    greys: np.ndarray
+    corners: np.ndarray  # corners of a polygon as (depth, right, down), float64, shape (16, 3) [m]
+    uv: np.ndarray  # projected corners of a polygon, float64, shape (20, 2) [px]
+    quad: np.ndarray  # x, y of four corners on the ground, float64, shape (8,) [m]
+    axes: np.ndarray  # axes of an object, see `place_object`, float64, shape (5, 3)
+    greys: np.ndarray  # grey and light of the polygons of all models, float64, shape (polygons, 2)
+    # joints of a figure, see `pose_figure`; then in camera axes, float64, shape (56, 3) [m]
     joints: np.ndarray
-    order: np.ndarray
-    distances: np.ndarray
+    order: np.ndarray  # indices of the objects in drawing order, int64, shape (512,)
+    distances: np.ndarray  # distances of the objects from the lens, float64, shape (512,) [m]
+    # middle and half of an object's azimuths [quarter turns] and its least and greatest distance [m] as seen
+    # from the lens, float64, shape (512, 4)
     extents: np.ndarray
+    # azimuth of the horizon in each column relative to the lens [rad] and length of its direction [px],
+    # float64, shape (2, width)
     directions: np.ndarray
-    outlines: np.ndarray
+    outlines: np.ndarray  # skyline in each column, see `sky`, float32, shape (5, width)
 
 
 class GroundLayer(NamedTuple):
@@ -131,19 +108,12 @@ def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
 
 
 class Horizon(NamedTuple):
-    """Row coordinates of the horizon [px].
+    """Row coordinates of the horizon [px]."""
 
-    Attributes:
-        left: At the left side of the frame.
-        slope: Change per column.
-        top: At the side where it is higher in the image.
-        bottom: At the other side.
-    """
-
-    left: float
-    slope: float
-    top: float
-    bottom: float
+    left: float  # at the left side of the frame
+    slope: float  # change per column
+    top: float  # at the side where it is higher in the image
+    bottom: float  # at the other side
 
 
 @kernel

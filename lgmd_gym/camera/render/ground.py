@@ -131,11 +131,7 @@ def _without_traces(road):
 
 
 class Surface(NamedTuple):
-    """Light of the ground in all lanes of a vector; see `LOOK` for the terms.
-
-    Attributes:
-        sunny: Whether the sun casts shadows.
-    """
+    """Light of the ground in all lanes of a vector; see `LOOK` for the terms."""
 
     asphalt: float
     asphalt_gain: float
@@ -144,7 +140,7 @@ class Surface(NamedTuple):
     paint: float
     shadow_limit: float
     cast: float
-    sunny: bool
+    sunny: bool  # whether the sun casts shadows
 
 
 @kernel(inline=True)

@@ -260,19 +260,12 @@ _TRACE = nb.float32(1e-3)  # less grey comes from rounding
 
 
 class Air(NamedTuple):
-    """The light on an object and the air between it and the lens.
+    """The light on an object and the air between it and the lens."""
 
-    Attributes:
-        light: Light on the object; 1 by day.
-        transmission: Share of the object's contrast that remains behind the fog.
-        opacity: Share of the object that is drawn; below 1 near the end of its range.
-        away: Distance of the object [m].
-    """
-
-    light: float
-    transmission: float
-    opacity: float
-    away: float
+    light: float  # light on the object; 1 by day
+    transmission: float  # share of the object's contrast that remains behind the fog
+    opacity: float  # share of the object that is drawn; below 1 near the end of its range
+    away: float  # distance of the object [m]
 
 
 @kernel

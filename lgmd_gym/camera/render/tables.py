@@ -22,23 +22,14 @@ from lgmd_gym.kernels import kernel
 
 
 class Tables(NamedTuple):
-    """Lookup tables.
+    """Lookup tables."""
 
-    Attributes:
-        asphalt: `Texture.data`.
-        verge: `Texture.data`.
-        level_start: `Texture.level_start` of both.
-        skyline: See `skyline`.
-        noise: See `noise_table`.
-        panorama: See `panorama_table`.
-    """
-
-    asphalt: np.ndarray
-    verge: np.ndarray
-    level_start: np.ndarray
-    skyline: np.ndarray
-    noise: np.ndarray
-    panorama: np.ndarray
+    asphalt: np.ndarray  # `Texture.data`
+    verge: np.ndarray  # `Texture.data`
+    level_start: np.ndarray  # `Texture.level_start` of both
+    skyline: np.ndarray  # see `skyline`
+    noise: np.ndarray  # see `noise_table`
+    panorama: np.ndarray  # see `panorama_table`
 
 
 PLACES = (len(Tables._fields), 3)

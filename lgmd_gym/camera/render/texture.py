@@ -127,16 +127,13 @@ _STD_CODE = 36.0  # standard deviation of the stored bytes around 128
 
 
 class Texture(NamedTuple):
-    """Rip-map: box averages of a texture over 2^i x 2^j texels.
+    """Rip-map: box averages of a texture over 2^i x 2^j texels."""
 
-    Attributes:
-        data: All levels, uint8, flat; 128 is the mean, and 36 one standard deviation of the finest level.
-            Each row of a level, along y, ends with a copy of its first texel: two neighbouring texels are
-            next to each other in memory, at the end of the period too.
-        level_start: Index of the first texel of level (i, j), int64, shape (levels along x, along y).
-    """
-
+    # all levels, uint8, flat; 128 is the mean, and 36 one standard deviation of the finest level. Each row of
+    # a level, along y, ends with a copy of its first texel: two neighbouring texels are next to each other in
+    # memory, at the end of the period too
     data: np.ndarray
+    # index of the first texel of level (i, j), int64, shape (levels along x, along y)
     level_start: np.ndarray
 
 
@@ -204,29 +201,17 @@ def _ripmap(tile: np.ndarray) -> Texture:
 
 
 class TextureLine(NamedTuple):
-    """A straight line over one level of a rip-map.
+    """A straight line over one level of a rip-map."""
 
-    Attributes:
-        start: Index of the level's first texel.
-        x: Texel of pixel 0 along x.
-        y: Texel of pixel 0 along y.
-        dx: Texels per pixel along x.
-        dy: Texels per pixel along y.
-        log_x: log2 of the level's size along x.
-        log_y: log2 of the level's size along y.
-        bend: Change of the scale along the line due to roll, as a share per pixel; 0 for even spacing.
-        middle: Column coordinate where `dx` and `dy` hold [px].
-    """
-
-    start: int
-    x: float
-    y: float
-    dx: float
-    dy: float
-    log_x: int
-    log_y: int
-    bend: float
-    middle: float
+    start: int  # index of the level's first texel
+    x: float  # texel of pixel 0 along x
+    y: float  # texel of pixel 0 along y
+    dx: float  # texels per pixel along x
+    dy: float  # texels per pixel along y
+    log_x: int  # log2 of the level's size along x
+    log_y: int  # log2 of the level's size along y
+    bend: float  # change of the scale along the line due to roll, as a share per pixel; 0 for even spacing
+    middle: float  # column coordinate where `dx` and `dy` hold [px]
 
 
 @kernel
@@ -326,21 +311,13 @@ def fixed_line(line):
 
 
 class RowBend(NamedTuple):
-    """Places of the pixels of a row that is not evenly spaced: t / (1 + rate·t) steps from a column.
+    """Places of the pixels of a row that is not evenly spaced: t / (1 + rate·t) steps from a column."""
 
-    Attributes:
-        rate: Change of the scale per pixel.
-        least: Lower bound of 1 + rate·t, which keeps texels within the range of int32; 0 is the horizon.
-        x: Texels along x per t² / (1 + rate·t), in 16.16 fixed point.
-        y: Texels along y, likewise.
-        first: t of pixel 0 [px].
-    """
-
-    rate: float
-    least: float
-    x: float
-    y: float
-    first: float
+    rate: float  # change of the scale per pixel
+    least: float  # lower bound of 1 + rate·t, which keeps texels within the range of int32; 0 is the horizon
+    x: float  # texels along x per t² / (1 + rate·t), in 16.16 fixed point
+    y: float  # texels along y, likewise
+    first: float  # t of pixel 0 [px]
 
 
 @kernel

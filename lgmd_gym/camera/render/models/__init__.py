@@ -35,37 +35,26 @@ _MAX_CORNERS = 8
 
 
 class Models(NamedTuple):
-    """Polygons of all models; see `ModelBuilder` for the terms.
+    """Polygons of all models; see `ModelBuilder` for the terms."""
 
-    Attributes:
-        corners: float64, shape (polygons, 8, 3), anticlockwise from outside.
-        corners_used: Number of corners, int64, shape (polygons,).
-        parent: Index of a detail's face, -1 for a face, int64, shape (polygons,).
-        role: BODY, FIXED, TAIL or LAMP, int64, shape (polygons,).
-        value: Meaning depends on the role, float64, shape (polygons,).
-        fine: Apparent height of the object at which a detail starts to fade in; it is complete at twice
-            that height, float64, shape (polygons,) [px].
-        solids: First and last + 1 polygon of each solid, int64, shape (solids, 2).
-        models: First and last + 1 solid of each model, int64, shape (models, 2).
-        splits: Height from below which the solids of a model are drawn in reverse, as a share of its height,
-            float64, shape (models,).
-        lamps: Distance of a model's headlights from its middle as a share of its width, 0 for one lamp that
-            shines in all directions, below 0 for one headlight, and their height as a share of its height, 0
-            for none, float64, shape (models, 2).
-        figures: Tables of the models that have no solids: pedestrians and two-wheelers.
-    """
-
-    corners: np.ndarray
-    corners_used: np.ndarray
-    parent: np.ndarray
-    role: np.ndarray
-    value: np.ndarray
+    corners: np.ndarray  # float64, shape (polygons, 8, 3), anticlockwise from outside
+    corners_used: np.ndarray  # number of corners, int64, shape (polygons,)
+    parent: np.ndarray  # index of a detail's face, -1 for a face, int64, shape (polygons,)
+    role: np.ndarray  # BODY, FIXED, TAIL or LAMP, int64, shape (polygons,)
+    value: np.ndarray  # meaning depends on the role, float64, shape (polygons,)
+    # apparent height of the object at which a detail starts to fade in; it is complete at twice that height,
+    # float64, shape (polygons,) [px]
     fine: np.ndarray
-    solids: np.ndarray
-    models: np.ndarray
+    solids: np.ndarray  # first and last + 1 polygon of each solid, int64, shape (solids, 2)
+    models: np.ndarray  # first and last + 1 solid of each model, int64, shape (models, 2)
+    # height from below which the solids of a model are drawn in reverse, as a share of its height, float64,
+    # shape (models,)
     splits: np.ndarray
+    # distance of a model's headlights from its middle as a share of its width, 0 for one lamp that shines in
+    # all directions, below 0 for one headlight, and their height as a share of its height, 0 for none,
+    # float64, shape (models, 2)
     lamps: np.ndarray
-    figures: FigureTables
+    figures: FigureTables  # tables of the models that have no solids: pedestrians and two-wheelers
 
 
 @lru_cache(maxsize=2)

@@ -155,18 +155,14 @@ ANY, AHEAD, BEHIND, HAIR = (0.0, 1.0), (1.7, 0.5), (-1.7, 0.5), (-1.7, 1.0)  # `
 
 @dataclass
 class Figure:
-    """A figure that grows with each call, in nominal metres: forward, left and up from its centre.
+    """A figure that grows with each call, in nominal metres: forward, left and up from its centre."""
 
-    Attributes:
-        size: Nominal length, width and height [m].
-        joints: Joints at rest, shape (56, 3) [m].
-        parts: Fields of `PART` of each part.
-        places: Place of each part in the order of drawing: forward, left, and a rank [m].
-    """
-
-    size: tuple[float, float, float]
+    size: tuple[float, float, float]  # nominal length, width and height [m]
+    # joints at rest, shape (56, 3) [m]
     joints: np.ndarray = field(default_factory=lambda: np.zeros((MAX_JOINTS, 3)))
+    # fields of `PART` of each part
     parts: list[tuple[float, ...]] = field(default_factory=list[tuple[float, ...]])
+    # place of each part in the order of drawing: forward, left, and a rank [m]
     places: list[Place] = field(default_factory=list[Place])
     used: int = _FIRST_FREE
 

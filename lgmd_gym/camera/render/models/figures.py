@@ -47,21 +47,13 @@ _SIDES = ((0, 1.0), (1, -1.0))  # left and right: index, sign of the lateral pos
 
 
 class FigureTables(NamedTuple):
-    """Tables of all figures.
+    """Tables of all figures."""
 
-    Attributes:
-        sizes: Nominal length, width and height, float64, shape (figures, 3) [m].
-        joints: Joints at rest, float64, shape (figures, 56, 3) [m].
-        parts: `PART` records, shape (figures, 48).
-        counts: Number of parts and of joints, int64, shape (figures, 2).
-        orders: See `Figure.orders`, int64, shape (figures, 4, 48).
-    """
-
-    sizes: np.ndarray
-    joints: np.ndarray
-    parts: np.ndarray
-    counts: np.ndarray
-    orders: np.ndarray
+    sizes: np.ndarray  # nominal length, width and height, float64, shape (figures, 3) [m]
+    joints: np.ndarray  # joints at rest, float64, shape (figures, 56, 3) [m]
+    parts: np.ndarray  # `PART` records, shape (figures, 48)
+    counts: np.ndarray  # number of parts and of joints, int64, shape (figures, 2)
+    orders: np.ndarray  # see `Figure.orders`, int64, shape (figures, 4, 48)
 
 
 def _add_leg(f: Figure, index: int, y: float, thigh: tuple[float, float], value: float) -> None:

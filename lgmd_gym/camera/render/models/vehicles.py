@@ -118,35 +118,20 @@ Range = tuple[float, float]
 
 
 class BodyShape(NamedTuple):
-    """Proportions of a vehicle with a body and a cabin, as shares of its length, width and height.
+    """Proportions of a vehicle with a body and a cabin, as shares of its length, width and height."""
 
-    Attributes:
-        split: Height at which the cabin begins.
-        clearance: Height of the gap below the bumpers, as a share of the body's height.
-        floor: Rear and front of the cabin at its foot, from the middle.
-        roof: Rear and front of the roof, from the middle.
-        roof_half: Half of the roof's width.
-        tail: Width and lower and upper end of a tail lamp on the rear of the body.
-        lamp_height: Height of the headlights.
-        rear_window: Windows on the rear of the cabin, from the left.
-        glass: Lower and upper end of the windows on the cabin.
-        panes: Side windows, from the rear of the cabin.
-        axles: Rear and front axle, from the rear.
-        wheel: Half of a wheel's length.
-    """
-
-    split: float
-    clearance: float
-    floor: Range
-    roof: Range
-    roof_half: float
-    tail: tuple[float, float, float]
-    lamp_height: float
-    rear_window: tuple[Range, ...]
-    glass: Range
-    panes: tuple[Range, ...]
-    axles: Range
-    wheel: float
+    split: float  # height at which the cabin begins
+    clearance: float  # height of the gap below the bumpers, as a share of the body's height
+    floor: Range  # rear and front of the cabin at its foot, from the middle
+    roof: Range  # rear and front of the roof, from the middle
+    roof_half: float  # half of the roof's width
+    tail: tuple[float, float, float]  # width and lower and upper end of a tail lamp on the rear of the body
+    lamp_height: float  # height of the headlights
+    rear_window: tuple[Range, ...]  # windows on the rear of the cabin, from the left
+    glass: Range  # lower and upper end of the windows on the cabin
+    panes: tuple[Range, ...]  # side windows, from the rear of the cabin
+    axles: Range  # rear and front axle, from the rear
+    wheel: float  # half of a wheel's length
 
 
 SMALL = BodyShape(
