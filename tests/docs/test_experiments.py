@@ -66,7 +66,7 @@ def test_ablations(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_target_signal(capsys):
-    areas = load("target_signal").main(["--levels", "12", "--jobs", "1"])
+    areas = load("target_signal").main(["--levels", "20", "--jobs", "1"])
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("| fields at the sides | all | CBFA | ")
     assert len(lines) == 2 + len(areas) == 8

@@ -143,7 +143,8 @@ def play_in_copies(tasks: list[Task], jobs: int, score: Score) -> None:
 
     No test and no copy is left at the end, also after Ctrl-C and SIGTERM.
     """
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for number in SIGNALS:  # also SIGINT, which a shell's background processes ignore
+        signal.signal(number, signal.default_int_handler)
     with tempfile.TemporaryDirectory(prefix="lgmd-gym-mutants-") as folder:
         try:
             copies = [Path(folder) / str(number) for number in range(jobs)]

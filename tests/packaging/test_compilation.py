@@ -2,7 +2,6 @@
 
 import importlib
 import io
-import os
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -155,11 +154,16 @@ def test_nothing_is_compiled_with_numba_disabled(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_second_process_compiles_what_is_not_camera(tmp_path):
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "LGMD_GYM_QUIET": "1"}
-    code = """from lgmd_gym.engine.first_use import advance, compile_kernels, draw_cameras
-compile_kernels()
-print(*(sum(kernel.stats.cache_hits.values()) for kernel in (advance, draw_cameras)))"""
-    command = [sys.executable, "-c", code]
-    loaded = subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout
-    assert loaded.split() == ["1", "0"]
+def test_a_second_process_compiles_what_is_not_camera(monkeypatch):
+    started, popen, uses = [], subprocess.Popen, []
+
+    def start(*arguments, **options):
+        started.append(popen(*arguments, **options))
+        return started[0]
+
+    monkeypatch.setattr(first_use.subprocess, "Popen", start)
+    monkeypatch.setattr(first_use, "is_cached", lambda kernel: False)
+    for name in ("_draw_camera", "_step_environment"):
+        monkeypatch.setattr(first_use, name, lambda *_, name=name: uses.append((name, started[0].poll())))
+    first_use.compile_kernels()
+    assert uses == [("_draw_camera", None), ("_step_environment", 0)]  # at once, then after its end
