@@ -68,7 +68,7 @@ class BrakingBatch:
         self.num_envs, self._config = len(sources), config or {}
         self.single = BrakingEnv(sources[0], config=config)
         self.simulation = self.single.make_simulation(self.num_envs, threads)
-        self.queue = EpisodeQueue(sources, ahead=threads > 1, with_roads=camera is not None)
+        self.queue = EpisodeQueue(sources, ahead=threads > 1)
         self.episodes: list[Prepared | None] = [None] * self.num_envs
         self.sensors: SensorArray | None = None
         self.space: gym.Space[Any] = self.single.observation_space

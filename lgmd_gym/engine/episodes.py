@@ -11,8 +11,6 @@ from gymnasium.utils import seeding
 from highway_env.road.road import RoadNetwork
 
 from lgmd_gym.aliases import Values
-from lgmd_gym.camera.road_geometry import road_geometry
-from lgmd_gym.camera.road_pool import road_key
 from lgmd_gym.envs.episode_source import Draw, EpisodeSource
 
 
@@ -32,18 +30,17 @@ class EpisodeQueue:
     Args:
         sources: Source of every environment.
         ahead: Whether to draw the next episodes in a background thread while the present ones run.
-        with_roads: Whether to prepare the geometry of their roads for cameras, too, which takes longer.
 
     Attributes:
         generators: Random generator of every environment; None before the first seed.
         seeds: The last seeds.
     """
 
-    def __init__(self, sources: Sequence[EpisodeSource], ahead: bool, with_roads: bool = False) -> None:
+    def __init__(self, sources: Sequence[EpisodeSource], ahead: bool) -> None:
         self.sources = list(sources)
         self.generators: list[np.random.Generator | None] = [None] * len(sources)
         self.seeds: list[int | None] = [None] * len(sources)
-        self._ahead, self._with_roads = ahead, with_roads
+        self._ahead = ahead
         self._waiting: list[Future[Prepared] | None] = [None] * len(sources)
         self._worker: ThreadPoolExecutor | None = None
         self._pid = 0
@@ -61,12 +58,12 @@ class EpisodeQueue:
         assert generator is not None
         # The worker of a parent process does not exist after a fork; its draws are repeated.
         ready = waiting is not None and self._pid == os.getpid()
-        prepared = waiting.result() if ready and waiting else self._prepare(index, generator)
+        prepared = waiting.result() if ready and waiting else _prepare(self.sources[index], generator)
         self.generators[index] = prepared.generator
         if self._ahead:
             # The worker draws from a copy, so that a new seed can replace the generator at any time.
             copied = copy.deepcopy(prepared.generator)
-            self._waiting[index] = self._own_worker().submit(self._prepare, index, copied)
+            self._waiting[index] = self._own_worker().submit(_prepare, self.sources[index], copied)
         return prepared
 
     def close(self) -> None:
@@ -86,9 +83,7 @@ class EpisodeQueue:
             self._pid = os.getpid()
         return self._worker
 
-    def _prepare(self, index: int, generator: np.random.Generator) -> Prepared:
-        draw = self.sources[index].draw(generator)
-        network = draw.make_network()
-        if self._with_roads:
-            road_geometry(network, *road_key(draw.scene))  # remembers it for the network
-        return Prepared(draw, network, generator)
+
+def _prepare(source: EpisodeSource, generator: np.random.Generator) -> Prepared:
+    draw = source.draw(generator)
+    return Prepared(draw, draw.make_network(), generator)
