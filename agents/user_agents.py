@@ -134,14 +134,16 @@ def make_user_agent(text: str) -> BatchAgent:
             f"agent {shown(name)} must not be a subclass of Agent, which wraps agents; derive it from "
             "BatchAgent or from no class"
         )
-    if issubclass(kind, Rule):  # its parameters check their own names
-        return kind(**options)
-    check_options(name, agent_class, options)
+    has_params = issubclass(kind, Rule) and kind.__init__ is Rule.__init__  # which check their own names
+    if not has_params:
+        check_options(name, agent_class, options)
 
     def make() -> Any:
         try:
             return agent_class(**options)
         except Exception as error:  # of the class's own code
+            if has_params and isinstance(error, ValueError):
+                raise
             raise ValueError(f"agent {shown(name)} cannot be created ({error_reason(error)})") from error
 
     if issubclass(kind, BatchAgent):

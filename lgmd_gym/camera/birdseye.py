@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgmd_gym.aliases import Config
+from lgmd_gym.aliases import Config, Values
 from lgmd_gym.camera.camera import BIRDSEYE, MAX_WIDTH
 from lgmd_gym.camera.ego import check_frame
 from lgmd_gym.errors import check_size, check_within
@@ -73,6 +73,10 @@ class BirdsEye:
             return grey
         out[...] = grey
         return out
+
+    def __getstate__(self) -> Values:
+        """Copies have no viewer: a surface of pygame cannot be copied."""
+        return self.__dict__ | {"_viewer": None, "_env": None}
 
     def close(self) -> None:
         """Release the environment and the surface."""

@@ -21,36 +21,52 @@ from lgmd_gym.envs.registration import env_id
 from lgmd_gym.kernels.compilation import VARIABLE
 from lgmd_gym.kernels.kernel import is_cached
 from lgmd_gym.neuron import LGMD
-from lgmd_gym.processes.pool import signals_blocked
+from lgmd_gym.processes.pool import signals_blocked, watch_parent
 from lgmd_gym.sensing.drawing import Drawing
 
 _HELPER = f"from {__name__} import _compile_others; _compile_others()"
 
 
 def compile_kernels() -> None:
-    """Compile the kernels of a braking environment, unless numba's cache has them or it compiles nothing."""
+    """Compile the kernels of a braking environment with the LGMD, unless numba's cache has them.
+
+    Those of other neurons and of traffic are compiled where they are used.
+    """
     if config.DISABLE_JIT or all(map(is_cached, (draw_cameras, advance))):  # pyright: ignore[reportAttributeAccessIssue, reportUnknownMemberType]
         return
-    environment = os.environ | {VARIABLE: "1", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    with signals_blocked():
-        helper = subprocess.Popen(
-            [sys.executable, "-c", _HELPER],
-            env=environment,
+    helper = None
+    try:
+        with signals_blocked():
+            helper = _start_helper()
+        _draw_camera(RoadNetwork.straight_road_network(2), Scene())
+        if helper is not None:
+            helper.wait()
+    finally:
+        if helper is not None:
+            helper.kill()
+            helper.wait()
+    _step_environment()  # compiles what connects the two, and all that a helper that failed has left
+
+
+def _start_helper() -> "subprocess.Popen[bytes] | None":
+    """Start the second process; None if the system cannot."""
+    # The same modules as in this process: -P leaves out the working directory, unless it is in the path.
+    path = os.pathsep.join(str(folder) or os.getcwd() for folder in sys.path)
+    try:
+        return subprocess.Popen(
+            [sys.executable, "-P", "-c", _HELPER],
+            env=os.environ | {VARIABLE: "1", "PYTHONPATH": path},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-    try:
-        _draw_camera(RoadNetwork.straight_road_network(2), Scene())
-        helper.wait()
-    finally:
-        helper.kill()
-        helper.wait()
-    _step_environment()  # compiles what connects the two, and all that a helper that failed has left
+    except (OSError, TypeError, ValueError):
+        return None
 
 
 def _compile_others() -> None:  # pyright: ignore[reportUnusedFunction]
-    """Compile the kernels of motion, neuron and worlds."""
+    """Compile the kernels of motion, the LGMD and worlds; end with the first process."""
+    watch_parent(os.getppid())
     _step_environment(camera=None)
     camera = Camera()
     LGMD(camera.shape).step(np.zeros(camera.shape, np.uint8))

@@ -81,7 +81,10 @@ def is_cached(kernel: Any) -> bool:
     if kernel.signatures:
         return True
     file = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
-    return bool(file is not None and file._load_index())
+    try:
+        return bool(file is not None and file._load_index())
+    except (ImportError, AttributeError):  # of unpickling the types of an earlier version of this package
+        return False
 
 
 class Kernel(CPUDispatcher):

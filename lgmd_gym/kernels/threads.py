@@ -7,7 +7,7 @@ in a parent process kills forked workers.
 import os
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from itertools import pairwise
 
 # The rest is split into smaller parts, of which faster threads take more. Every part costs overhead.
@@ -39,7 +39,11 @@ class Threads:
                 kernel(first, last, *args)
 
         futures = [self._own_pool().submit(work) for _ in range(min(self.count, num) - 1)]
-        work()
+        try:
+            work()
+        finally:  # also after Ctrl-C, no thread still writes to the arrays
+            parts.clear()
+            wait(futures)
         for future in futures:
             future.result()
 

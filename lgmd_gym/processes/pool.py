@@ -33,7 +33,7 @@ def worker_options() -> Arguments:
 
     Joblib's resource tracker removes their shared memory once all of them have ended.
     """
-    return {"initializer": _watch_parent, "initargs": (os.getpid(),)}
+    return {"initializer": watch_parent, "initargs": (os.getpid(),)}
 
 
 @contextmanager
@@ -43,6 +43,9 @@ def signals_blocked() -> Generator[None, None, None]:
     This process receives a signal at the end of the block. A terminal sends Ctrl-C to all processes, and some
     schedulers send SIGTERM to all; workers would end with tracebacks before this process stops them.
     """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
     # Joblib starts this with the first worker, and its start unblocks both signals.
     resource_tracker.ensure_running()
     previous = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
@@ -66,7 +69,7 @@ def run_parallel(calls: Iterable[object], jobs: int) -> Iterator[Any]:
         return parallel(calls)
 
 
-def _watch_parent(parent: int) -> None:
+def watch_parent(parent: int) -> None:
     """End this process soon after its parent process; a parent killed by SIGKILL cannot end it."""
 
     def watch() -> None:

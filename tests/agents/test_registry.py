@@ -30,6 +30,16 @@ class MyRule(FrequencyRule):
     name, Params = "mine", SpikeThresholdParams
 
 
+class Gain(FrequencyRule):
+    """A user's rule with a constructor of its own."""
+
+    name, Params = "gain", SpikeThresholdParams
+
+    def __init__(self, gain=1.0):
+        super().__init__()
+        self.gain = 1.0 / gain
+
+
 class Derived(Agent):
     """What earlier versions expected of a user."""
 
@@ -38,6 +48,14 @@ def test_options_of_a_users_rule_are_its_parameters():
     assert make_agent(f"{__name__}:MyRule:threshold=45.5").agent.params.threshold == 45.5
     with pytest.raises(ValueError, match="unknown option of agent mine 'treshold'; did you mean 'threshold'"):
         make_agent(f"{__name__}:MyRule:treshold=45.5")
+
+
+def test_errors_of_a_users_rule_name_it():
+    assert make_agent(f"{__name__}:Gain:gain=2").agent.gain == 0.5
+    with pytest.raises(ValueError, match=r"unknown option of agent .*:Gain 'gian'; did you mean 'gain'"):
+        make_agent(f"{__name__}:Gain:gian=2")
+    with pytest.raises(ValueError, match=r"Gain. cannot be created .ZeroDivisionError"):
+        make_agent(f"{__name__}:Gain:gain=0")
 
 
 def test_a_subclass_of_the_adapter_is_refused():

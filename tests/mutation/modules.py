@@ -50,11 +50,8 @@ MODULES = {
     "info": Module(
         ("envs/info.py", "envs/surrogate_safety.py"),
         ("tests/envs/test_formulas.py",),
-        (
-            "required_deceleration",
-            "predicted_contact",
-            "outline_after",
-        ),  # of traffic, which steps environments
+        # Tests of these, which only traffic uses, step environments.
+        ("required_deceleration", "predicted_contact", "outline_after"),
     ),
     "dynamics": Module(
         _under(

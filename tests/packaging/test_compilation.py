@@ -167,3 +167,22 @@ def test_a_second_process_compiles_what_is_not_camera(monkeypatch):
         monkeypatch.setattr(first_use, name, lambda *_, name=name: uses.append((name, started[0].poll())))
     first_use.compile_kernels()
     assert uses == [("_draw_camera", None), ("_step_environment", 0)]  # at once, then after its end
+
+
+@pytest.mark.parametrize("executable", ["", None, "/no/such/python"])
+def test_without_a_second_process_the_first_one_compiles_all(monkeypatch, executable):
+    used = []
+    monkeypatch.setattr(first_use, "is_cached", lambda kernel: False)
+    monkeypatch.setattr(sys, "executable", executable)
+    for name in ("_draw_camera", "_step_environment"):
+        monkeypatch.setattr(first_use, name, lambda *_, name=name: used.append(name))
+    first_use.compile_kernels()
+    assert used == ["_draw_camera", "_step_environment"]
+
+
+def test_an_index_that_names_a_removed_module_is_no_cache():
+    def load_index():
+        raise ModuleNotFoundError("No module named 'lgmd_gym.moved'")
+
+    file = SimpleNamespace(_load_index=load_index)
+    assert not is_cached(SimpleNamespace(signatures=[], _cache=SimpleNamespace(_cache_file=file)))
