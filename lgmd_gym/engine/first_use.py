@@ -1,7 +1,7 @@
 """Compilation of the kernels at the first use, in two processes at once.
 
-Numba compiles a kernel at its first call, one after the other. The kernel that draws cameras takes two thirds
-of the time, so that a second process compiles the others meanwhile, for numba's cache.
+Numba compiles one kernel after the other, each at its first call. The kernel that draws cameras takes two
+thirds of the time, so that a second process compiles motion and neuron meanwhile, for numba's cache.
 """
 
 import os
@@ -15,7 +15,6 @@ from numba.core import config
 
 from lgmd_gym.camera import Camera
 from lgmd_gym.camera.render.raster import draw_cameras
-from lgmd_gym.camera.scene import Scene
 from lgmd_gym.envs.decisions import advance
 from lgmd_gym.envs.registration import env_id
 from lgmd_gym.kernels.compilation import VARIABLE
@@ -38,7 +37,7 @@ def compile_kernels() -> None:
     try:
         with signals_blocked():
             helper = _start_helper()
-        _draw_camera(RoadNetwork.straight_road_network(2), Scene())
+        _draw_camera()
         if helper is not None:
             helper.wait()
     finally:
@@ -65,18 +64,17 @@ def _start_helper() -> "subprocess.Popen[bytes] | None":
 
 
 def _compile_others() -> None:  # pyright: ignore[reportUnusedFunction]
-    """Compile the kernels of motion, the LGMD and worlds; end with the first process."""
+    """Compile the kernels of motion and of the LGMD; end with the first process."""
     watch_parent(os.getppid())
     _step_environment(camera=None)
     camera = Camera()
     LGMD(camera.shape).step(np.zeros(camera.shape, np.uint8))
 
 
-def _draw_camera(network: RoadNetwork, scene: Scene) -> None:
+def _draw_camera() -> None:
     """Draw one frame."""
     drawing = Drawing([Camera()], [[0]], 1)
-    drawing.set_scene(0, scene, max_deceleration=9.0)
-    drawing.set_road(0, network)
+    drawing.set_road(0, RoadNetwork.straight_road_network(2))
     drawing.draw(0, 0, 1, np.ones((1, 1), np.bool_))
 
 

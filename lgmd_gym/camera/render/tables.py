@@ -6,10 +6,10 @@ The cameras of a batch have tables of many worlds. One call draws them all, beca
 each in `SharedTables.places` rather than among its arguments.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import carray, extending, types  # pyright: ignore[reportPrivateImportUsage]
+from numba import carray, types  # pyright: ignore[reportPrivateImportUsage]
 from numba.core import cgutils
 
 from lgmd_gym.camera.camera import Camera
@@ -19,6 +19,7 @@ from lgmd_gym.camera.render.texture import ground_texture
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.camera.worlds import draw_world
 from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import intrinsic
 
 
 class Tables(NamedTuple):
@@ -71,9 +72,6 @@ def _place_of(table: np.ndarray) -> tuple[int, int, int]:
     """Return the address and the lengths of an array with one or two dimensions."""
     length, width = (*table.shape, 0)[:2]
     return table.__array_interface__["data"][0], length, width
-
-
-intrinsic: Any = extending.intrinsic  # a decorated function is called without its typing context
 
 
 @intrinsic
