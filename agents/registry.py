@@ -8,9 +8,10 @@ from lgmd_gym.agents.image_rules import FlowDivergence, FrameDifference
 from lgmd_gym.agents.oracles import EtaOracle, StoppingDistanceOracle, TauOracle, TTCOracle
 from lgmd_gym.agents.policies.policy import Policy, shipped_policies
 from lgmd_gym.agents.rules import AdaptiveThreshold, DangerZone, Rule, SpikeThreshold, StoppingZone
-from lgmd_gym.agents.user_agents import check_options, make_user_agent, parse_agent, parse_options
+from lgmd_gym.agents.user_agents import check_options, make_user_agent, parse_agent
 from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_keys, check_known, check_text, shown
+from lgmd_gym.fields import parse_options
 
 AGENTS: dict[str, type[BatchAgent]] = {}
 _A = TypeVar("_A", bound=type[BatchAgent])
@@ -103,7 +104,7 @@ def _split_policy(text: str) -> tuple[str, Arguments]:
     option, equals, _ = options.partition("=")
     if not file or not equals or not option.strip().isidentifier():
         return text, {}
-    return file, parse_options(options, f"{Policy.name}:{text}")
+    return file, parse_options("agent", options, f"{Policy.name}:{text}")
 
 
 def _is_user_class(name: str, rest: str) -> bool:

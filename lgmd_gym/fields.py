@@ -23,7 +23,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache
 from typing import Any, ClassVar, Self, TypeAlias, TypeVar, cast, dataclass_transform
 
-from lgmd_gym.aliases import Values
+from lgmd_gym.aliases import Arguments, Values
 from lgmd_gym.errors import (
     as_tuple,
     check_flag,
@@ -309,6 +309,44 @@ def _checks(cls: type[Record]) -> tuple[tuple[str, str, Check, object], ...]:
             unchanged = False
         found.append((item.name, label, item.check, default if unchanged else _NO_VALUE))
     return tuple(found)
+
+
+def parse_options(kind: str, options: str, text: str) -> Arguments:
+    """Split "option=value,option=value" into the options; numbers become int or float.
+
+    Args:
+        kind: What has the options, as in "agent", for error messages.
+        options: The options.
+        text: Text that contains them, for error messages.
+
+    Raises:
+        ValueError: For an option without a value, or one that occurs twice.
+
+    Example:
+        >>> parse_options("agent", "threshold=45,frames=2", "spike-threshold:threshold=45,frames=2")
+        {'threshold': 45, 'frames': 2}
+    """
+    found: Arguments = {}
+    for part in filter(None, options.split(",")):
+        key, equals, given = part.partition("=")
+        if not equals:
+            raise ValueError(
+                f"{kind} option {shown(part)} in {shown(text)} has no value; write {shown(key)[1:-1]}=VALUE"
+            )
+        if key.strip() in found:
+            raise ValueError(f"{kind} option {shown(key.strip())} occurs twice in {shown(text)}; use it once")
+        found[key.strip()] = _parse_value(given.strip())
+    return found
+
+
+def _parse_value(text: str) -> int | float | str:
+    """Return an int or float if `text` is a number, else `text`."""
+    for number in (int, float):
+        try:
+            return number(text)
+        except ValueError:
+            continue
+    return text
 
 
 def declaration_of(annotation: object) -> Declaration | None:

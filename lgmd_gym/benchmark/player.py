@@ -62,18 +62,22 @@ class BatchPlayer:
         task: A task of the group.
         num_envs: Number of environments.
         agent: An agent in place of that of the task; None for that of the task.
+        by_channel: Whether the series of episodes have the spike frequency of each channel, too.
 
     Raises:
         ValueError: If the agent, a camera or an argument is invalid.
     """
 
-    def __init__(self, task: Task, num_envs: int, agent: BatchAgent | None = None) -> None:
+    def __init__(
+        self, task: Task, num_envs: int, agent: BatchAgent | None = None, *, by_channel: bool = False
+    ) -> None:
         agent, arguments = agent or make_agent(task.agent).agent, task.arguments
         self._sensor_config = task.sensor_config.for_agent(agent)
         source = make_source(task.case.environment, _scenario_arguments(arguments))
         config, fps = arguments.get("config"), arguments.get("fps")
         self._batch = BrakingBatch([source] * num_envs, config, fps=fps, **self._sensor_config.arguments)
-        self._recorder = SeriesRecorder(num_envs, self._batch.simulation.rates.policy)
+        channels = [channel.name for channel in self._sensor_config.channels] if by_channel else ()
+        self._recorder = SeriesRecorder(num_envs, self._batch.simulation.rates.policy, channels)
         self._agent = self._make_agent(agent, task.has_driver)
         self._tasks: list[Task | None] = [None] * num_envs
         self._returns = np.zeros(num_envs)

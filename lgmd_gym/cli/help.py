@@ -10,10 +10,10 @@ import sys
 import textwrap
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import docstring_parser
-from tyro.conf import arg
+from tyro.conf import arg, subcommand
 
 from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import unknown_name
@@ -36,14 +36,29 @@ def description(cls: type) -> str:
 def documented(cls: type) -> type:
     """Return options as a class whose fields carry their help text and a readable placeholder.
 
-    tyro would keep the line breaks of the docstrings, and name the types of the values.
+    tyro would keep the line breaks of the docstrings, and name the types of the values. A class with
+    `SUBCOMMANDS` has the options of one of them as its field `command`.
     """
+    if hasattr(cls, "SUBCOMMANDS"):
+        return _with_subcommands(cls)
     texts = {item.arg_name: item.description or "" for item in docstring_parser.parse_from_object(cls).params}
     hints = get_type_hints(cls, include_extras=True)
     fields = {name: _documented(hint, texts[name]) for name, hint in hints.items()}
     defaults = {name: vars(cls)[name] for name in fields if name in vars(cls)}
     return dataclass(frozen=True, kw_only=True)(
         type(cls.__name__, (cls,), {"__annotations__": fields, **defaults})
+    )
+
+
+def _with_subcommands(cls: Any) -> type:
+    """Return options whose field `command` has those of one subcommand."""
+    commands = tuple(
+        Annotated[documented(item), subcommand(name=name, description=description(item))]
+        for name, item in cls.SUBCOMMANDS.items()
+    )
+    union = Union[commands]  # noqa: UP007  (built from a table)
+    return dataclass(frozen=True, kw_only=True)(
+        type(cls.__name__, (cls,), {"__annotations__": {"command": union}})
     )
 
 

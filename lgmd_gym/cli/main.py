@@ -3,6 +3,7 @@
 import contextlib
 import io
 import sys
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Annotated, Any, Union
 
@@ -18,6 +19,7 @@ from lgmd_gym.cli.drive import Drive
 from lgmd_gym.cli.gallery import Gallery
 from lgmd_gym.cli.help import description, documented, one_line, summary, wrapped_output
 from lgmd_gym.cli.list import List
+from lgmd_gym.cli.neurons import Neurons
 from lgmd_gym.cli.paper import Paper
 from lgmd_gym.cli.scenario import Scenario
 from lgmd_gym.cli.train import Train
@@ -33,6 +35,7 @@ Examples:
   lgmd-gym drive LGMD/CCRs-v0 --video out.mp4  record one approach as a video
   lgmd-gym compare runs/A runs/B               compare two runs in pairs
   lgmd-gym video CLIP.mp4                      plot the spikes for a video clip
+  lgmd-gym neurons compare lgmd off-only       compare neuron models
   lgmd-gym tune --agent stopping-zone          search the parameters of a rule
 
 Arguments are in SI units; case names contain speeds in km/h. Every command has its own --help.
@@ -46,6 +49,7 @@ COMMANDS: dict[str, type] = {
     "compare": Compare,
     "drive": Drive,
     "video": Video,
+    "neurons": Neurons,
     "paper": Paper,
     "train": Train,
     "tune": Tune,
@@ -99,6 +103,7 @@ def _parse(arguments: list[str]) -> Any:
         raise ValueError(f"a command is required: {', '.join(COMMANDS)}; see lgmd-gym --help")
     if arguments[0] not in (*COMMANDS, "-h", "--help"):
         raise unknown_name("command", arguments[0], COMMANDS)
+    command = _named_command(arguments)
     stderr = io.StringIO()
     try:
         with contextlib.redirect_stderr(stderr), wrapped_output():
@@ -116,7 +121,26 @@ def _parse(arguments: list[str]) -> Any:
     except SystemExit as stop:
         if not stop.code:
             raise
-        raise ValueError(one_line(stderr.getvalue(), arguments[0])) from None
+        raise ValueError(one_line(stderr.getvalue(), command)) from None
+
+
+def _named_command(arguments: list[str]) -> str:
+    """Return the command, with its subcommand if it has some.
+
+    Raises:
+        ValueError: For a missing or unknown subcommand.
+    """
+    command, *rest = arguments
+    known: dict[str, type] = getattr(COMMANDS.get(command), "SUBCOMMANDS", {})
+    if not known or (rest and rest[0] in ("-h", "--help")):
+        return command
+    if not rest:
+        raise ValueError(
+            f"{command} requires a subcommand: {', '.join(known)}; see lgmd-gym {command} --help"
+        )
+    if rest[0] not in known:
+        raise unknown_name(f"subcommand of {command}", rest[0], known)
+    return f"{command} {rest[0]}"
 
 
 def _command_type(chosen: str) -> Any:
@@ -126,5 +150,7 @@ def _command_type(chosen: str) -> Any:
         if name == chosen:
             commands.append(Annotated[documented(cls), subcommand(name=name, description=description(cls))])
         else:
-            commands.append(Annotated[cls, subcommand(name=name, description=summary(cls))])
+            # The options of subcommands are not needed here.
+            given: Any = dataclass(type(name, (), {})) if hasattr(cls, "SUBCOMMANDS") else cls
+            commands.append(Annotated[given, subcommand(name=name, description=summary(cls))])
     return Union[tuple(commands)]  # noqa: UP007  (built from a table)

@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 from lgmd_gym.fields import record
 from lgmd_gym.kernels import kernel
 from lgmd_gym.neuron.base import Layer
-from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
+from lgmd_gym.neuron.lgmd.params import NeuronSpec
 from lgmd_gym.neuron.motion import (
     MotionNeuron,
     MotionParams,
     detect_motion_right,
     filter_light,
+    register_model,
     start,
     update_delay,
 )
-from lgmd_gym.neuron.registry import register
 from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
 from lgmd_gym.neuron.validation import Frames
 
@@ -135,8 +135,4 @@ def _step(
         fire(row, const, total / pixels)
 
 
-def _make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams) -> DSN:
-    return DSN(shape, fps, num=num, spikes=params)
-
-
-register("dsn", _make, takes_params=True)
+register_model("dsn", DSN, DSNParams, "Neuron that is selective to motion to the right.")

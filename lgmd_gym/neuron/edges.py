@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from lgmd_gym.fields import number, record
 from lgmd_gym.kernels import kernel
 from lgmd_gym.neuron.base import Layer
-from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
-from lgmd_gym.neuron.motion import ModelParams, MotionNeuron, start
-from lgmd_gym.neuron.registry import register
+from lgmd_gym.neuron.lgmd.params import NeuronSpec
+from lgmd_gym.neuron.motion import ModelParams, MotionNeuron, register_model, start
 from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
 from lgmd_gym.neuron.validation import Frames
 
@@ -136,8 +135,6 @@ def _step(first, last, frames, active, scalars, const, gain, light, edges) -> No
         fire(row, const, mean)
 
 
-def _make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams) -> SustainedEdges:
-    return SustainedEdges(shape, fps, num=num, spikes=params)
-
-
-register("edges", _make, takes_params=True)
+register_model(
+    "edges", SustainedEdges, SustainedEdgesParams, "Detector of edges that stand still in the frame."
+)

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from lgmd_gym.fields import flag, record, whole
 from lgmd_gym.kernels import kernel
 from lgmd_gym.neuron.base import Layer
-from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
+from lgmd_gym.neuron.lgmd.params import NeuronSpec
 from lgmd_gym.neuron.motion import (
     MotionNeuron,
     MotionParams,
     detect_motion_down,
     detect_motion_right,
     filter_light,
+    register_model,
     start,
     update_delay,
 )
-from lgmd_gym.neuron.registry import register
 from lgmd_gym.neuron.scalars import AGE, GAIN_G, LATENCY, F, W, fire
 from lgmd_gym.neuron.validation import Frames
 
@@ -213,8 +213,4 @@ def _step(
         fire(row, const, response)
 
 
-def _make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams) -> LPLC2:
-    return LPLC2(shape, fps, num=num, spikes=params)
-
-
-register("lplc2", _make, takes_params=True)
+register_model("lplc2", LPLC2, LPLC2Params, "Looming detector of the fly, radial motion along four arms.")

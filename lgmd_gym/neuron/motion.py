@@ -6,16 +6,18 @@ Equation numbers are those in the docstring of `LPLC2`.
 """
 
 import math
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lgmd_gym.fields import Record, number, record
+from lgmd_gym.fields import Record, declarations, number, record
 from lgmd_gym.kernels import kernel
 from lgmd_gym.neuron.base import FrameNeuron, Signal, spiking_signals
 from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.maps import shift_light, shift_rows
+from lgmd_gym.neuron.registry import register
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
 from lgmd_gym.neuron.validation import Frames
 
@@ -46,6 +48,26 @@ class MotionParams(ModelParams):
         """Return the gains dt / (dt + τ) of the mean light and of the delay at a frame rate [Hz]."""
         dt = 1000.0 / fps
         return dt / (dt + self.tau_mean_ms), dt / (dt + self.tau_delay_ms)
+
+
+SPIKE_OPTIONS = ("tau_s", "t_sfa", "sigma_4", "t_sp", "n_ts", "t_sf")
+"""Fields of `LGMDParams` that the spikes of every model have."""
+
+
+def register_model(
+    name: str, model: "Callable[..., MotionNeuron]", params: type[ModelParams], about: str
+) -> None:
+    """Register a model whose options are its own parameters, and those of the spikes."""
+    own = tuple(item.name for item in declarations(params))
+
+    def make(
+        shape: tuple[int, int], fps: float, num: int, spikes: LGMDParams, **options: object
+    ) -> MotionNeuron:
+        of_spikes = {key: item for key, item in options.items() if key not in own}
+        chosen = params.make({key: item for key, item in options.items() if key in own})
+        return model(shape, fps, chosen, num, spikes=LGMDParams.make(spikes, **of_spikes))
+
+    register(name, make, takes_params=True, options=(*own, *SPIKE_OPTIONS), about=about)
 
 
 class MotionNeuron(FrameNeuron):

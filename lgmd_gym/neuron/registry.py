@@ -1,6 +1,7 @@
 """Registry of neuron models by name, and the adapter of models that are plain Python."""
 
-from collections.abc import Callable, Mapping
+import inspect
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from threading import Lock
 from typing import Any, Protocol, cast
@@ -8,8 +9,9 @@ from typing import Any, Protocol, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lgmd_gym.aliases import Values
-from lgmd_gym.errors import check_keys, check_known, check_text, shown
+from lgmd_gym.aliases import Arguments, Values
+from lgmd_gym.errors import check_keys, check_known, check_text, shown, unknown_name
+from lgmd_gym.fields import parse_options
 from lgmd_gym.neuron.base import FrameNeuron, Layer, Response, Signal
 from lgmd_gym.neuron.lgmd.params import LGMDParams
 from lgmd_gym.neuron.validation import Frames
@@ -54,22 +56,34 @@ class Model(Protocol):
 class _Registered:
     factory: Callable[..., object]
     takes_params: bool
+    options: tuple[str, ...] | None  # None for any
+    about: str
 
 
 _MODELS: dict[str, _Registered] = {}
 
 
-def register(name: str, factory: Callable[..., object], *, takes_params: bool = False) -> None:
+def register(
+    name: str,
+    factory: Callable[..., object],
+    *,
+    takes_params: bool = False,
+    options: Iterable[str] | None = None,
+    about: str | None = None,
+) -> None:
     """Register a neuron model, which cameras then use by its name.
 
     Args:
         name: Name of the model.
         factory: Function or class that is called with (shape, fps, num): (height, width) of the frames [px],
-            frame rate [Hz] and number of neurons; it returns a `Model` or a `FrameNeuron`.
+            frame rate [Hz] and number of neurons; it returns a `Model` or a `FrameNeuron`. Options of a
+            specification such as "mine:gain=2" become keyword arguments.
         takes_params: Whether it also takes a fourth argument, the `LGMDParams` in use.
+        options: Names of the options; None for the further arguments of the factory.
+        about: Description in one line; None for the first line of the factory's docstring.
 
     Raises:
-        ValueError: If the name is empty or taken, or the factory cannot be called.
+        ValueError: If the name is empty, taken or contains a colon, or the factory cannot be called.
 
     Example:
         >>> class Change:
@@ -91,35 +105,112 @@ def register(name: str, factory: Callable[..., object], *, takes_params: bool = 
     """
     if not check_text("name", name):
         raise ValueError("the name of a neuron model must not be empty")
+    if ":" in name:
+        raise ValueError(f"the name of a neuron model must not contain a colon, got {shown(name)}")
     if name in _MODELS:
         raise ValueError(f"the neuron model {name!r} is registered already; choose another name")
     if not callable(factory):
         raise ValueError(f"factory must be a function or class, got {shown(factory)}")
-    _MODELS[name] = _Registered(factory=factory, takes_params=takes_params)
+    known = _further_arguments(factory, 3 + takes_params) if options is None else tuple(options)
+    lines = (inspect.getdoc(factory) or "").splitlines()
+    _MODELS[name] = _Registered(factory, takes_params, known, about or (lines[0] if lines else ""))
+
+
+def _further_arguments(factory: Callable[..., object], count: int) -> tuple[str, ...] | None:
+    """Return the names of the arguments of a factory after the first `count`; None for any name."""
+    try:
+        arguments = list(inspect.signature(factory).parameters.values())
+    except (TypeError, ValueError):  # compiled code without a signature
+        return None
+    kinds = inspect.Parameter
+    if any(item.kind is kinds.VAR_KEYWORD for item in arguments):
+        return None
+    positional = [
+        item for item in arguments if item.kind in (kinds.POSITIONAL_ONLY, kinds.POSITIONAL_OR_KEYWORD)
+    ]
+    named = [*positional[count:], *(item for item in arguments if item.kind is kinds.KEYWORD_ONLY)]
+    return tuple(item.name for item in named)
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of the registered models."""
+    """Return the names of the registered models, presets of the LGMD included."""
     return tuple(_MODELS)
 
 
+def base_name(text: str) -> str:
+    """Return the registered name in a specification, without its options; see `check_model`."""
+    return _parse("neuron", text)[0]
+
+
+def describe(name: str) -> tuple[str, tuple[str, ...] | None]:
+    """Return the description of a registered model in one line, and its options; None for any.
+
+    Raises:
+        ValueError: For an unknown name, with the nearest registered one.
+    """
+    registered = _MODELS[check_known("neuron", name, _MODELS)]
+    return registered.about, registered.options
+
+
 def check_model(field: str, name: str) -> str:
-    """Return the name of a registered model, or of one that is imported and registered: MODULE:FACTORY.
+    """Return the specification of a model after a check of its names.
 
     Args:
         field: Name of the argument, for the message.
-        name: The name.
+        name: "NAME[:OPTION=VALUE,…]" for a registered model, as in "off-only:t_sp=0.78", or
+            "MODULE:FACTORY[:OPTION=VALUE,…]" for one of a module, which is imported and registered.
 
     Raises:
-        ValueError: For another name, with the nearest registered one, or a module that cannot be imported.
+        ValueError: For an unknown model or option, with the nearest known one, or a module that cannot be
+            imported.
     """
-    module, colon, factory = check_text(field, name).partition(":")
+    _parse(field, name)
+    return name
+
+
+def _parse(field: str, text: str) -> tuple[str, Arguments]:
+    """Return the registered name and the options of a specification; see `check_model`."""
+    name, colon, rest = check_text(field, text).partition(":")
     if colon and name not in _MODELS:
-        found: object = getattr(import_user_module(module, f"{field} {name!r}"), factory, None)
-        if not callable(found):
-            raise ValueError(f"{field} {name!r} cannot be imported: {module} has no function {factory}")
-        register(name, found)
-    return check_known(field, name, _MODELS)
+        factory, _, rest = rest.partition(":")
+        if "=" in factory:
+            raise unknown_name(field, name, _MODELS)
+        module, name = name, f"{name}:{factory}"
+        if name not in _MODELS:
+            _MODELS[name] = _imported(module, factory, f"{field} {name!r}")
+    check_known(field, name, _MODELS, "a model of your own is MODULE:FACTORY")
+    options = {
+        key: {"true": True, "false": False}.get(str(value), value)
+        for key, value in parse_options(field, rest, text).items()
+    }
+    known = _MODELS[name].options
+    if known is not None:
+        check_keys(f"option of {field} {name!r}", options, known)
+    return name, options
+
+
+def import_models(text: str) -> None:
+    """Import a module that registers models, or register one as MODULE:FACTORY.
+
+    Args:
+        text: "MODULE", or "MODULE:FACTORY".
+
+    Raises:
+        ValueError: If the module cannot be imported or has no such factory.
+    """
+    if ":" in text:
+        check_model("neuron", text)
+    else:
+        import_user_module(text, f"module {text!r}")
+
+
+def _imported(module: str, factory: str, kind: str) -> _Registered:
+    """Return the factory of a module of the user."""
+    found: object = getattr(import_user_module(module, kind), factory, None)
+    if not callable(found):
+        raise ValueError(f"{kind} cannot be imported: {module} has no function {factory}")
+    lines = (inspect.getdoc(found) or "").splitlines()
+    return _Registered(found, False, _further_arguments(found, 3), lines[0] if lines else "")
 
 
 def make(
@@ -135,7 +226,7 @@ def make(
     """Return neurons of a registered model.
 
     Args:
-        name: Name of the model.
+        name: Name of the model, with options as in "off-only:t_sp=0.78"; see `check_model`.
         shape: (height, width) of the frames [px].
         fps: Frame rate [Hz].
         num: Number of neurons; None for a single one with scalar outputs.
@@ -145,12 +236,17 @@ def make(
         derotated: Whether the state will be shifted, see `FrameNeuron.step`.
 
     Raises:
-        ValueError: For an unknown name, or a model without columns or shift where they are needed.
+        ValueError: For an unknown name or option, or a model without columns or shift where they are needed.
+
+    Example:
+        >>> make("lgmd:t_sp=0.78", (4, 8)).params == make("lgmd", (4, 8), params=LGMDParams(t_sp=0.78)).params
+        True
     """
-    registered = _MODELS[check_model("neuron", name)]
+    key, options = _parse("neuron", name)
+    registered = _MODELS[key]
     params = LGMDParams() if params is None else params
     further = (params,) if registered.takes_params else ()
-    model = registered.factory(shape, fps, 1 if num is None else num, *further)
+    model = registered.factory(shape, fps, 1 if num is None else num, *further, **options)
     if not isinstance(model, FrameNeuron):
         model = _Adapter(name, cast(Model, model), shape, fps, num, params)
     if columns:

@@ -217,6 +217,20 @@ def binomial_tail(k: int, n: int, p: float) -> float:
     return math.fsum(math.comb(n, i) * p**i * (1.0 - p) ** (n - i) for i in range(k, n + 1))
 
 
+def exact_sign_test(gained: int, lost: int) -> float:
+    """Return the two-sided p of a paired comparison of outcomes (McNemar's exact test).
+
+    Args:
+        gained: Number of pairs in which only the second succeeded.
+        lost: Number of pairs in which only the first succeeded.
+
+    Example:
+        >>> exact_sign_test(5, 0)
+        0.0625
+    """
+    return min(1.0, 2.0 * binomial_tail(max(gained, lost), gained + lost, 0.5))
+
+
 def cluster_mean(
     values: Sequence[float],
     clusters: Sequence[Hashable],

@@ -19,6 +19,7 @@ HOMES = {"lgmd_gym": ROOT / "lgmd_gym", "lgmd_gym.envs": ROOT / "envs", "lgmd_gy
 # The folders of the package, highest first. A folder imports only from folders further down.
 ORDER = (
     "cli",
+    "comparison",
     "report",
     "training",
     "tuning",

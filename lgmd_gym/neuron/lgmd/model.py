@@ -1,14 +1,17 @@
 """LGMD: the stateful neuron."""
 
+from functools import partial
 from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lgmd_gym.aliases import Values
+from lgmd_gym.fields import declarations
 from lgmd_gym.neuron import maps
 from lgmd_gym.neuron.base import FrameNeuron, Layer, Signal, spiking_signals
 from lgmd_gym.neuron.lgmd import general, kernels
-from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
+from lgmd_gym.neuron.lgmd.params import PRESETS, LGMDParams, NeuronSpec, preset_changes
 from lgmd_gym.neuron.registry import register
 from lgmd_gym.neuron.scalars import initial_scalars, pack_constants
 from lgmd_gym.neuron.validation import Frames, checked_region
@@ -148,8 +151,34 @@ class LGMD(FrameNeuron):
         self._previous = self._previous.astype(np.float32, copy=False)
 
 
-def _make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams) -> LGMD:
-    return LGMD(shape, fps, num=num, params=params)
+def _make(
+    shape: tuple[int, int],
+    fps: float,
+    num: int,
+    params: LGMDParams,
+    *,
+    preset: str | None = None,
+    **options: object,
+) -> LGMD:
+    """Return neurons with the changes of a preset, then those of options, to the parameters in use."""
+    changes: Values = {} if preset is None else preset_changes(preset)
+    return LGMD(shape, fps, num=num, params=LGMDParams.make(params, **changes | options))
 
 
-register("lgmd", _make, takes_params=True)
+OPTIONS = tuple(item.name for item in declarations(LGMDParams) if not isinstance(item.default, tuple))
+_ABOUT = {
+    "lgmd": "LGMD1 of Fu et al. (2019), as on the page of the neuron.",
+    "literal": "LGMD with the equations as printed in the paper.",
+    "released": "LGMD as in the first author's C# release of 2019.",
+    "fixed-inhibition": "LGMD without adaptation to F; a high F silences it.",
+    "off-only": "LGMD without its ON path; responds to dark objects.",
+}
+register("lgmd", _make, takes_params=True, options=OPTIONS, about=_ABOUT["lgmd"])
+for _preset in PRESETS:
+    register(
+        _preset,
+        partial(_make, preset=_preset),
+        takes_params=True,
+        options=OPTIONS,
+        about=_ABOUT[_preset],
+    )

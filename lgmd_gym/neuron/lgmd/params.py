@@ -2,12 +2,13 @@
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Literal, Self, TypeAlias
 
 import tomli_w
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.errors import check_path
 from lgmd_gym.fields import Record, choice, flag, number, numbers, record, whole
 
@@ -223,6 +224,21 @@ class LGMDParams(Record):
     def to_toml(self, path: str | Path) -> None:
         """Write every field to a TOML file, which `from_toml` reads."""
         Path(path).write_text(tomli_w.dumps(self.to_dict()), encoding="utf-8")
+
+
+PRESETS: dict[str, Callable[[], LGMDParams]] = {
+    "literal": LGMDParams.literal,
+    "released": LGMDParams.released,
+    "fixed-inhibition": LGMDParams.fixed_inhibition,
+    "off-only": LGMDParams.off_only,
+}
+"""Named parameter sets of the LGMD, each also the name of a registered neuron model."""
+
+
+def preset_changes(name: str) -> Values:
+    """Return the fields of a preset that differ from the defaults, as plain values."""
+    defaults = LGMDParams().to_dict()
+    return {key: item for key, item in PRESETS[name]().to_dict().items() if item != defaults[key]}
 
 
 NeuronSpec: TypeAlias = LGMDParams | Mapping[str, object] | None

@@ -1,0 +1,173 @@
+"""The `neurons` command and its subcommands; the attribute docstrings of their options are help texts."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from tyro.conf import Positional, arg
+
+from lgmd_gym.cli.console import activity, make_console
+from lgmd_gym.cli.values import Count, File, Names, Number, default_out
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from lgmd_gym.report.document import DataTable
+
+MAX_ROWS = 45  # of a table in the terminal; longer ones are in the report
+
+
+@dataclass(frozen=True, kw_only=True)
+class ListModels:
+    """List the neuron models, the presets of the LGMD, and their options.
+
+    A model with options is written NAME:OPTION=VALUE,OPTION=VALUE, and one of your own MODULE:FACTORY.
+    """
+
+    module: Names = None
+    """Modules with neuron models of your own: my_neurons, or my_neurons:Mine."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CompareModels:
+    """Compare neuron models on stimuli, clips and simulated approaches, and write one report.
+
+    All models process the same frames. The folder contains report.html, report.md, results.json, a CSV file
+    for each table, the figures and run.json.
+    """
+
+    models: Annotated[Positional[tuple[str, ...]], arg(metavar="[NEURON ...]")] = ()
+    """Models and presets with options, for example off-only:t_sp=0.78; MODULE:FACTORY for a model of your
+    own. Default: the ten of the page "Which neuron?"."""
+    module: Names = None
+    """Modules that register neuron models of your own."""
+    parts: Annotated[tuple[str, ...], arg(metavar="PART [PART ...]")] = (
+        "stimuli",
+        "clips",
+        "simulation",
+        "cost",
+    )
+    """Parts of the report: stimuli, clips (with --clips), simulation, cost."""
+    clips: Annotated[tuple[Path, ...] | None, arg(metavar="PATH [PATH ...]")] = None
+    """Video files, or folders with video files; requires --crashes."""
+    crashes: File = None
+    """CSV file with the columns clip,crash_frame (empty for no crash)."""
+    clip_fps: Number = None
+    """Frame rate to resample clips to [Hz]. Default: the clip's."""
+    clip_cap: float = 0.1
+    """Highest share of earlier frames of clips in alarm."""
+    camera: str = "fovea"
+    """Camera preset of the simulation."""
+    suites: Annotated[tuple[str, ...], arg(metavar="NAME [NAME ...]")] = ("quick",)
+    """Suites of the simulation."""
+    seeds: Count = None
+    """Number of seeds per case. Default: 20, with --quick 3."""
+    first_world: int = 6100
+    """First of 20 worlds that choose the thresholds; 6000 to 7999 are for validation."""
+    test_world: Count = None
+    """First of 20 worlds that are played once with these thresholds, for example 8000. Default: none."""
+    quick: bool = False
+    """Fewer seeds and rounds: a first look in about a minute."""
+    jobs: int = 1
+    """Number of processes."""
+    out: File = None
+    """Run folder; must not exist. Default: runs/neurons-DATE-TIME."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Neurons:
+    """Compare neuron models, or list them."""
+
+    SUBCOMMANDS: ClassVar[dict[str, type]] = {"compare": CompareModels, "list": ListModels}
+
+    command: object
+
+
+def run(options: Neurons) -> int:
+    """Run a subcommand and return its exit code."""
+    return next(
+        RUN[name](options.command)
+        for name, cls in Neurons.SUBCOMMANDS.items()
+        if isinstance(options.command, cls)
+    )
+
+
+def list_models(options: ListModels) -> int:
+    """Print a table of the models."""
+    from rich.table import Table
+
+    from lgmd_gym import neuron
+
+    for module in options.module or ():
+        neuron.import_models(module)
+    table = Table("neuron", "description", title="neuron models")
+    for name in neuron.names():
+        about, known = neuron.describe(name)
+        given = "any" if known is None else ", ".join(known)
+        if name in neuron.PRESETS:
+            given = "as of lgmd"
+        table.add_row(name, f"{about}\noptions: {given}" if given else about)
+    make_console().print(table)
+    return 0
+
+
+def compare_models(options: CompareModels) -> int:
+    """Write the report of a comparison and print where it is."""
+    from lgmd_gym import neuron
+    from lgmd_gym.cli.clips import run_folder
+    from lgmd_gym.clips.batch import make_jobs
+    from lgmd_gym.comparison.models import PAGE_MODELS
+    from lgmd_gym.comparison.run import Comparison, compare
+    from lgmd_gym.comparison.simulation import Worlds
+    from lgmd_gym.report.document import DataTable
+
+    if (options.clips is None) != (options.crashes is None):
+        raise ValueError(
+            "--clips and --crashes must be used together: videos, and a CSV with clip,crash_frame"
+        )
+    for module in options.module or ():
+        neuron.import_models(module)
+    jobs = [] if options.clips is None else make_jobs(options.clips, options.crashes)
+    seeds = options.seeds or (3 if options.quick else 20)
+    worlds = Worlds(
+        suites=options.suites, seeds=seeds, first_world=options.first_world, camera=options.camera
+    )
+    settings = Comparison(
+        models=options.models or PAGE_MODELS,
+        parts=options.parts,
+        worlds=worlds,
+        test=None if options.test_world is None else replace(worlds, first_world=options.test_world),
+        clip_jobs=tuple(job for job in jobs if job.annotated),
+        clip_fps=options.clip_fps,
+        clip_cap=options.clip_cap,
+        quick=options.quick,
+        jobs=options.jobs,
+    )
+    out = default_out(options.out, "neurons")
+    values = {**vars(options), "clips": [job.clip for job in settings.clip_jobs], "models": settings.models}
+    with run_folder(out, values) as folder:
+        document = compare(settings, folder, activity)
+    console = make_console()
+    for section in document.sections:
+        for item in section.shown:
+            if isinstance(item, DataTable) and len(item.rows) <= MAX_ROWS:
+                console.print(_table(section.title, item))
+    console.print(f"report: {out / 'report.html'}", soft_wrap=True)
+    return 0
+
+
+def _table(title: str, data: "DataTable") -> "Table":
+    """Return a table for the terminal."""
+    from rich.table import Table
+
+    table = Table(title=f"{title}: {data.name}", caption=data.caption or None, caption_justify="left")
+    for index, name in enumerate(data.columns):
+        table.add_column(name, justify="right" if index else "left", overflow="fold")
+    for row in data.texts():
+        table.add_row(*row)
+    return table
+
+
+# The function of each subcommand.
+RUN: dict[str, Callable[[Any], int]] = {"compare": compare_models, "list": list_models}
