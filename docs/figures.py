@@ -10,7 +10,7 @@ import numpy as np
 import lgmd_gym  # noqa: F401  (registers the environments)
 from lgmd_gym import LGMD, LGMDParams
 from lgmd_gym.paper.backgrounds import Grating, Screen
-from lgmd_gym.paper.stimuli import Looming, Receding, Translating, stimulus_frames
+from lgmd_gym.paper.stimuli import Looming, Receding, Translating, stimulus_frames, stimulus_set
 from lgmd_gym.plotting.figures import layers_figure
 from lgmd_gym.plotting.style import COLOURS, saved_figure
 
@@ -30,6 +30,7 @@ def main(folder: Path) -> None:
     layers(folder / "layers.png")
     responses(folder / "responses.png")
     adaptation(folder / "adaptation.png")
+    stimuli(folder / "stimuli.png")
 
 
 def layers(path: Path) -> None:
@@ -77,6 +78,29 @@ def adaptation(path: Path) -> None:
         for axis in axes:
             axis.set_xlabel("time [s]")
         axes[0].legend()
+
+
+SHOWN_STIMULI = (
+    "looming-square-dark-100ms", "looming-disc-light-100ms", "receding-disc-dark-100ms",
+    "translating-square-light-0.3mps", "elongating-square-dark-0.108mps", "elongating-bar-light-0.108mps",
+    "grating-60-per-m-2hz", "looming-in-grating-40-per-m-contrast-0.2-light", "looming-in-panorama-dark",
+    "translating-in-panorama-light-0.3mps",
+)  # fmt: skip
+
+
+def stimuli(path: Path) -> None:
+    """Draw four frames of ten stimuli of the set, with the label and the angular size of each."""
+    known = stimulus_set()
+    with saved_figure(path, len(SHOWN_STIMULI) // 2, 8, figsize=(12.0, 6.0), grid=False) as (_, axes):
+        for row, name in zip(axes.reshape(-1, 4), SHOWN_STIMULI, strict=True):
+            frames, truth = list(known[name].frames(SCREEN)), known[name].truth(SCREEN)
+            row[0].set_title(name, fontsize=7, loc="left")
+            for axis, number in zip(row, (24, 42, 60, 81), strict=True):
+                axis.imshow(frames[number], cmap="gray", vmin=0, vmax=255)
+                axis.set(xticks=[], yticks=[])
+                state = truth[number]
+                size = f", {state.angular_size_deg:.0f}°" if state.label != "none" else ""
+                axis.set_xlabel(f"{state.time_s:.1f} s: {state.label}{size}", fontsize=6)
 
 
 BOXES = {

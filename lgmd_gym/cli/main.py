@@ -22,6 +22,7 @@ from lgmd_gym.cli.list import List
 from lgmd_gym.cli.neurons import Neurons
 from lgmd_gym.cli.paper import Paper
 from lgmd_gym.cli.scenario import Scenario
+from lgmd_gym.cli.stimuli import Stimuli
 from lgmd_gym.cli.train import Train
 from lgmd_gym.cli.tune import Tune
 from lgmd_gym.cli.video import Video
@@ -51,6 +52,7 @@ COMMANDS: dict[str, type] = {
     "video": Video,
     "neurons": Neurons,
     "paper": Paper,
+    "stimuli": Stimuli,
     "train": Train,
     "tune": Tune,
     "list": List,

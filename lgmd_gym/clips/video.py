@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from lgmd_gym.errors import check_finite, check_path, check_size, check_within, shown
+from lgmd_gym.errors import check_finite, check_flag, check_path, check_size, check_within, shown
 from lgmd_gym.processes.files import check_new_file
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def _rate(stamps: np.ndarray, tick: float, named: float) -> tuple[float, bool]:
     return round(named if abs(fps - named) < 1e-3 * fps else fps, 4), len(regular) < len(intervals)
 
 
-CLIP_SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif", ".webm", ".m4v", ".mpg", ".ts")
+CLIP_SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif", ".webm", ".m4v", ".mpg", ".ts", ".y4m")
 MAX_SIZE = 16384  # [px]
 MIN_SIZE = 3  # width of the neuron's neighbourhood [px]
 _MOST_MISSING = 2.0  # a file that ends up to this many frames early counts as complete
@@ -312,28 +312,35 @@ def find_clips(paths: Iterable[str | Path]) -> list[Path]:
 
 
 SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif")
+LOSSLESS_CODECS = {".mkv": "ffv1", ".y4m": "rawvideo"}  # by suffix
 
 
 class VideoWriter:
-    """Write RGB pictures to a video file; use it in a `with` block.
+    """Write pictures to a video file; use it in a `with` block.
 
-    The codec is H.264, or GIF for the suffix .gif.
+    The codec is H.264, or GIF for the suffix .gif. A lossless video is grey: FFV1 for the suffix .mkv, or
+    uncompressed for .y4m. `VideoReader` with `luma` returns exactly its pictures, and the same pictures give
+    the same file.
 
     Args:
         path: Video file, which must not exist; the suffix selects the container.
         fps: Pictures per second [Hz].
-        quality: Quality from 0 (small file) to 10 (lossless); ignored for a GIF.
+        quality: Quality from 0 (small file) to 10 (hardly any loss); ignored for a GIF and a lossless video.
+        lossless: Whether to write grey pictures without loss.
 
     Raises:
         ValueError: For an unknown suffix, a file that exists, or a folder that does not exist.
     """
 
-    def __init__(self, path: str | Path, fps: float, quality: float = 7.0) -> None:
+    def __init__(self, path: str | Path, fps: float, quality: float = 7.0, *, lossless: bool = False) -> None:
         self.path = check_path("path", path)
         self.fps = check_within("fps", fps, 1e-3, 1000.0, "Hz")
         self.quality = check_within("quality", quality, 0.0, 10.0)
-        if self.path.suffix.lower() not in SUFFIXES:
-            raise ValueError(f"video must have a suffix among {', '.join(SUFFIXES)}, got {shown(str(path))}")
+        self.lossless = check_flag("lossless", lossless)
+        suffixes = tuple(LOSSLESS_CODECS) if lossless else SUFFIXES
+        if self.path.suffix.lower() not in suffixes:
+            kind = "lossless video" if lossless else "video"
+            raise ValueError(f"{kind} must have a suffix among {', '.join(suffixes)}, got {shown(str(path))}")
         if not self.path.parent.is_dir():
             raise ValueError(f"folder {str(self.path.parent)!r} of the video does not exist; create it first")
         check_new_file(self.path, "video")
@@ -345,13 +352,17 @@ class VideoWriter:
         """Append a picture.
 
         Args:
-            picture: RGB, uint8, shape (height, width, 3) with even height and width, the same for all.
+            picture: RGB, uint8, shape (height, width, 3) with even height and width; of a lossless video
+                grey, uint8, shape (height, width) of any size. The same size for all.
 
         Raises:
-            ValueError: For a picture of odd size or of another size than the first.
+            ValueError: For a picture of another kind, of odd size or of another size than the first.
         """
         from av import VideoFrame
 
+        if picture.dtype != np.uint8 or picture.ndim != (2 if self.lossless else 3):
+            shape = "(height, width)" if self.lossless else "(height, width, 3)"
+            raise ValueError(f"picture must be uint8 of shape {shape}, got {picture.dtype} {picture.shape}")
         size = (picture.shape[1], picture.shape[0])
         self._stream = self._stream or self._open(size)
         if size != (self._stream.width, self._stream.height):
@@ -359,8 +370,10 @@ class VideoWriter:
                 f"picture must have the size of the first, {self._stream.width}×{self._stream.height} px, "
                 f"got {size[0]}×{size[1]}"
             )
-        rgb = VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
-        frame = rgb.reformat(format=self._stream.pix_fmt, interpolation="AREA")
+        pixels = np.ascontiguousarray(picture)
+        frame = VideoFrame.from_ndarray(pixels, format="gray" if self.lossless else "rgb24")
+        if not self.lossless:
+            frame = frame.reformat(format=self._stream.pix_fmt, interpolation="AREA")
         frame.pts = self._count
         self._count += 1
         self._container.mux(self._stream.encode(frame))
@@ -390,12 +403,19 @@ class VideoWriter:
     def _open(self, size: tuple[int, int]) -> Any:
         """Open the file and return its video stream."""
         import av
+        from av.codec.context import Flags
 
-        if size[0] % 2 or size[1] % 2:
+        if not self.lossless and (size[0] % 2 or size[1] % 2):
             raise ValueError(f"width and height of a picture must be even, got {size[0]}×{size[1]} px")
         rate = Fraction(self.fps).limit_denominator(10_000)
-        self._container = av.open(str(self.path), "w")
-        if self.path.suffix.lower() == ".gif":
+        options = {"fflags": "+bitexact"} if self.lossless else {}  # no time and no version of ffmpeg
+        self._container = av.open(str(self.path), "w", options=options)
+        suffix = self.path.suffix.lower()
+        if self.lossless:
+            stream = self._container.add_stream(LOSSLESS_CODECS[suffix], rate=rate)
+            stream.pix_fmt = "gray"
+            stream.codec_context.flags |= Flags.bitexact
+        elif suffix == ".gif":
             stream = self._container.add_stream("gif", rate=rate)
             stream.pix_fmt = "rgb8"
         else:

@@ -44,6 +44,7 @@ COMMANDS: dict[str, tuple[list[str], list[str]]] = {
     "video": (["--configs", "--crashes", "--crash-frame", "--out", "--params", "--threshold", "--fps",
                "--drop-duplicates", "--size", "--roi"], ["--configs", "none"]),
     "paper": (["--out", "--clips", "--crashes", "--picture"], ["--picture", "none"]),
+    "stimuli": (["--out", "--fps", "--size", "--suffix", "--picture", "--check"], ["--suffix", "none"]),
     "train": (["--algo", "--env", "--camera", "--sensors-of", "--inputs", "--demands", "--n-timesteps",
                "--seed", "--hyperparams", "--eval-freq", "--eval-episodes", "--recordings", "--resume",
                "--traffic-episodes", "--jobs", "--out"], ["--hyperparams", "none"]),

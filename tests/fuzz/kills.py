@@ -136,6 +136,7 @@ COMMANDS = {
     "gallery": Command("gallery --families CCRs --seeds 1 --out out", None, names_of),
     "compare": Command("compare run --out out.png", None, bytes_of),
     "paper": Command("paper --out out", None, traces_of),
+    "stimuli": Command("stimuli looming-* --out out", None, names_of),
 }  # fmt: skip
 
 
