@@ -23,8 +23,12 @@ from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.runner import Run
 from lgmd_gym.benchmark.summary import INTERVAL_TEXT, Sample, summaries
 from lgmd_gym.cli.main import COMMANDS
+from lgmd_gym.clips import study
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.traffic.env import TrafficEnv
+from lgmd_gym.paper.claims import claims_text, evaluate_claims
+from lgmd_gym.paper.experiments import run_experiments
+from lgmd_gym.paper.plots import clip_figures, paper_figures
 from lgmd_gym.processes.pool import Executor
 from lgmd_gym.report.gallery.cards import ScenarioCard, record_video
 from lgmd_gym.statistics.intervals import Rate
@@ -48,6 +52,7 @@ def main(out: Path) -> None:
     (out / "environments.md").write_text(overview_tables(returns), encoding="utf-8")
     (out / "commands.md").write_text(commands_page(), encoding="utf-8")
     (out / "benchmark.md").write_text(benchmark_table(), encoding="utf-8")
+    paper_results(out, static / "paper")
     figures.main(static)
     architecture.main(static / "architecture.svg")
 
@@ -77,6 +82,19 @@ def benchmark_table() -> str:
 
 def _rate(rate: Rate) -> str:
     return f"{rate.k}/{rate.n} ({100 * rate.low:.0f}–{100 * rate.high:.0f} %)"
+
+
+def paper_results(out: Path, folder: Path) -> None:
+    """Repeat the experiments of the paper; write its claims, the tables of clips and the figures."""
+    folder.mkdir(exist_ok=True)
+    results = run_experiments(lambda: None)
+    traces = study.read_traces(Path(__file__).parent / "clip_traces.csv")
+    crashes = study.published_crashes([trace.clip for trace in traces])
+    claims = evaluate_claims(results, study.detections_of(traces, crashes)[study.HEADLINE])
+    (out / "claims.md").write_text(claims_text(claims), encoding="utf-8")
+    (out / "clips.md").write_text(study.results_text(traces, crashes), encoding="utf-8")
+    paper_figures(results, folder)
+    clip_figures(traces, crashes, folder)
 
 
 def commands_page() -> str:

@@ -27,9 +27,9 @@ def print_notes(jobs: Sequence[ClipJob], annotations: Path | None, fps: float | 
     """Print which clips are resampled and which have no annotation."""
     for job in jobs:
         if job.info.variable and fps is None:
-            _note(f"{job.clip.name} has a variable frame rate; resampled to {job.info.fps:g} Hz")
+            note(f"{job.clip.name} has a variable frame rate; resampled to {job.info.fps:g} Hz")
         if annotations is not None and not job.annotated and job.event is None:
-            _note(f"{job.clip.name} has no row in {annotations}; it is not in the table")
+            note(f"{job.clip.name} has no row in {annotations}; it is not in the table")
 
 
 @contextmanager
@@ -109,7 +109,7 @@ def print_errors(results: Sequence[ClipResult]) -> int:
     """Print the errors of truncated clips; return 2 if there are any, else 0."""
     errors = dict.fromkeys(result.error for result in results if result.error)
     for error in errors:
-        _note(f"{error}; the trace up to that frame is kept")
+        note(f"{error}; the trace up to that frame is kept")
     return 2 if errors else 0
 
 
@@ -129,6 +129,6 @@ def progress_bar(name: str, total: float) -> Generator[Callable[[float], None], 
         yield lambda completed: bar.update(task, completed=completed)
 
 
-def _note(text: str) -> None:
+def note(text: str) -> None:
     """Print a line to stderr."""
     print(f"lgmd-gym: {text}", file=sys.stderr)

@@ -31,7 +31,7 @@ class Video:
     """Video files in any format that ffmpeg reads, or folders with video files."""
     configs: tuple[str, ...] = ("paper",)
     """Named configurations of the neuron, compared in one table if several: paper, conservative, paper-18hz,
-    t_sf-60, t_sp-0.78, released, off-only, fixed-inhibition; or all."""
+    paper-18hz-30, t_sf-60, t_sp-0.78, literal, released, off-only, fixed-inhibition; or all."""
     crashes: File = None
     """CSV file with the columns clip,crash_frame (empty for no crash); prints the detection table."""
     crash_frame: Count = None

@@ -150,6 +150,12 @@ class ClipJob(NamedTuple):
     crash_frame: int | None  # frame of the crash, at the frame rate of the file; None without one
     # event and evaluated part, for the scores of anticipation; None if the clip is not scored
     event: ClipEvent | None = None
+    title: str = ""  # name of the clip in tables; empty for that of the file
+
+    @property
+    def name(self) -> str:
+        """Name of the clip in tables."""
+        return self.title or self.clip.stem
 
     @property
     def crash_s(self) -> float | None:
@@ -270,17 +276,17 @@ def process_clip(
 
 def detect_from_trace(job: ClipJob, result: ClipResult) -> ClipDetection:
     """Return the alarms of a processed clip relative to its crash, from its trace file."""
-    table = _trace(result, "spike_frequency", "alert")
-    return detect(job.clip.stem, table[:, 0], table[:, 1] > 0.0, result.summary.fps, job.crash_s)
+    table = read_trace(result, "spike_frequency", "alert")
+    return detect(job.name, table[:, 0], table[:, 1] > 0.0, result.summary.fps, job.crash_s)
 
 
 def scored_from_trace(job: ClipJob, event: ClipEvent, result: ClipResult) -> ScoredClip:
     """Return the spike frequency of a processed clip up to its event, from its trace file."""
-    frequency = _trace(result, "spike_frequency")[:, 0]
+    frequency = read_trace(result, "spike_frequency")[:, 0]
     return ScoredClip.of(job.clip.name, frequency, result.summary.fps, *event)
 
 
-def _trace(result: ClipResult, *columns: str) -> np.ndarray:
+def read_trace(result: ClipResult, *columns: str) -> np.ndarray:
     """Return columns of a trace file, shape (frames, columns)."""
     numbers = [TRACE_COLUMNS.index(name) for name in columns]
     return np.loadtxt(result.trace, delimiter=",", skiprows=1, usecols=numbers, ndmin=2)

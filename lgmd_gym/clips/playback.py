@@ -76,13 +76,16 @@ class PlaybackConfig:
         return ", ".join([f"T_sf = {self.params.t_sf:g} spikes/s {at}", *model, *listed, *extra])
 
 
-# The paper's model, variants with fewer false alarms, ablations and the previous model.
+# The paper's model at the clip's rate and at that of the paper (T_sf of 15 and 30, the ends of its range),
+# variants with fewer false alarms, and the presets of `LGMDParams`.
 PLAYBACK_CONFIGS = {
     "paper": PlaybackConfig(),
     "conservative": PlaybackConfig(params=LGMDParams(sigma_3=1.5), drop_duplicates=0.25),
     "paper-18hz": PlaybackConfig(params=LGMDParams(t_sf=15.0), fps=18.0),
+    "paper-18hz-30": PlaybackConfig(fps=18.0),
     "t_sf-60": PlaybackConfig(params=LGMDParams(t_sf=60.0)),
     "t_sp-0.78": PlaybackConfig(params=LGMDParams(t_sp=0.78, t_sf=15.0)),
+    "literal": PlaybackConfig(params=LGMDParams.literal()),
     "released": PlaybackConfig(params=LGMDParams.released()),
     "off-only": PlaybackConfig(params=LGMDParams.off_only()),
     "fixed-inhibition": PlaybackConfig(params=LGMDParams.fixed_inhibition()),

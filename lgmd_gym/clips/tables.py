@@ -31,7 +31,8 @@ DETECTION_CAPTION = (
 CONFIG_CAPTION = (
     "hits: crashes with an onset in the 1.5 s before. Chance: probability of an onset in any 1.5 s, from the "
     "earlier frames of all clips. p: probability of at least as many hits, each at the upper bound of the "
-    "chance. A ranking on the same clips that the configurations were selected on is optimistic."
+    "chance, times the number of configurations (Bonferroni). A ranking on the same clips that the "
+    "configurations were selected on is optimistic."
 )
 CLIP_COLUMNS = (
     "frames",
@@ -77,41 +78,54 @@ def clip_table(results: Sequence[ClipResult]) -> Table:
 def detection_table(title: str, detections: Sequence[ClipDetection]) -> Table:
     """Return one row per clip and one for all: onset before the crash, and its probability by chance."""
     table = _table(("clip",), DETECTION_COLUMNS, title, DETECTION_CAPTION)
-    for item in detections:
-        hit = "–" if item.crash_s is None else "no" if item.lead_s is None else "yes"
-        table.add_row(
-            item.clip,
-            _seconds(item.crash_s, "none"),
-            hit,
-            _seconds(item.lead_s),
-            *_chance_cells(item),
-            f"{item.peak:.0f}",
-        )
-    total = summarize_detections(detections)
-    hits, lead = f"{total.hits.k} of {total.hits.n}", _seconds(total.lead_s)
+    *rows, total = detection_rows(detections)
+    for row in rows:
+        table.add_row(*row)
     table.add_section()
-    table.add_row("all", "", hits, lead, *_chance_cells(total), f"p = {total.p_value:.1g}")
+    table.add_row(*total)
     return table
 
 
-def config_table(detections: Mapping[str, Sequence[ClipDetection]], descriptions: Mapping[str, str]) -> Table:
+def detection_rows(detections: Sequence[ClipDetection]) -> list[tuple[str, ...]]:
+    """Return the cells of one row per clip and one for all: the clip, then `DETECTION_COLUMNS`."""
+    rows: list[tuple[str, ...]] = []
+    for item in detections:
+        hit = "–" if item.crash_s is None else "no" if item.lead_s is None else "yes"
+        times = _seconds(item.crash_s, "none"), hit, _seconds(item.lead_s)
+        rows.append((item.clip, *times, *_chance_cells(item), f"{item.peak:.0f}"))
+    total = summarize_detections(detections)
+    hits = "", f"{total.hits.k} of {total.hits.n}", _seconds(total.lead_s)
+    return [*rows, ("all", *hits, *_chance_cells(total), f"p = {total.p_value:.1g}")]
+
+
+def config_row(total: DetectionSummary, tests: int) -> list[str]:
+    """Return the cells of `CONFIG_COLUMNS` for one configuration.
+
+    Args:
+        total: Its detections.
+        tests: Number of configurations, by which p is multiplied.
+    """
+    alarm = 100.0 * total.alarm_frames.k / max(total.alarm_frames.n, 1)
+    return [
+        f"{total.hits.k}/{total.hits.n}",
+        _interval(total.chance),
+        f"{min(total.p_value * tests, 1.0):.1g}",
+        _seconds(total.lead_s),
+        f"{alarm:.0f}",
+        f"{total.silent_clips.k}/{total.silent_clips.n}",
+    ]
+
+
+def config_table(
+    detections: Mapping[str, Sequence[ClipDetection]],
+    descriptions: Mapping[str, str],
+    title: str = "configurations over all clips",
+) -> Table:
     """Return one row per configuration over all clips."""
-    table = _table(
-        ("configuration", "alarm"), CONFIG_COLUMNS, "configurations over all clips", CONFIG_CAPTION
-    )
+    table = _table(("configuration", "alarm"), CONFIG_COLUMNS, title, CONFIG_CAPTION)
     for name, items in detections.items():
-        total = summarize_detections(items)
-        alarm = 100.0 * total.alarm_frames.k / max(total.alarm_frames.n, 1)
-        table.add_row(
-            name,
-            descriptions[name],
-            f"{total.hits.k}/{total.hits.n}",
-            _interval(total.chance),
-            f"{total.p_value:.1g}",
-            _seconds(total.lead_s),
-            f"{alarm:.0f}",
-            f"{total.silent_clips.k}/{total.silent_clips.n}",
-        )
+        row = config_row(summarize_detections(items), len(detections))
+        table.add_row(name, descriptions[name], *row)
     return table
 
 

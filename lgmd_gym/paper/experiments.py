@@ -10,8 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from lgmd_gym.neuron import LGMD, LGMDParams, Response
-from lgmd_gym.paper.backgrounds import SHAPES, Grating, Panorama, Plain, Screen
+from lgmd_gym.paper.backgrounds import PAPER_SPEED, SHAPES, Grating, Panorama, Plain, Screen
 from lgmd_gym.paper.stimuli import (
+    DARK,
+    LIGHT,
     Background,
     ForegroundObject,
     Frame,
@@ -23,7 +25,9 @@ from lgmd_gym.paper.stimuli import (
 
 FPS = 30.0
 SCREEN = Screen(fps=FPS)
-DARK, LIGHT, GREY = 20.0, 235.0, 127.5
+GREY = 127.5
+SHADES = {"dark": DARK, "light": LIGHT}
+FAST = 0.3  # speed of a fast passing object on the screen [m/s]
 # The paper's model and an ablation.
 MODELS = {
     "paper": LGMDParams(),
@@ -34,7 +38,7 @@ TEMPORAL = (0.5, 1.0, 2.0, 7.0, 14.0)  # [Hz]
 CONTRASTS = (0.05, 0.1, 0.2, 0.3, 0.5, 1.0)
 L_OVER_V = (0.01, 0.02, 0.03, 0.04, 0.05, 0.075, 0.1, 0.15, 0.2, 0.3)  # [s]
 CONTACT = 3.0  # time of contact of the looming object [s]
-PICTURE_TIMES = (1.0, 2.3, 2.6, 2.8, 2.93)  # [s]
+PICTURE_TIMES = (1.0, 2.3, 2.6, 2.8)  # [s]
 StepCallback = Callable[[], object]
 
 
@@ -176,14 +180,15 @@ def panorama(on_step: StepCallback, picture: Path | None = None) -> dict[str, St
     """Return the responses to an object that approaches, recedes or translates in a shifting panorama."""
     background = Panorama(picture=picture)
     models = {**MODELS, "T_sp = 0.78": LGMDParams(t_sp=0.78), "sigma_3 = 2": LGMDParams(sigma_3=2.0)}
-    objects: dict[str, tuple[ForegroundObject | None, tuple[float, ...]]] = {
-        "panorama alone": (None, (1.5,)),
-        "approaching, dark": (Looming(contact=CONTACT), PICTURE_TIMES),
-        "approaching, light": (Looming(contact=CONTACT, luminance=LIGHT), PICTURE_TIMES),
-        "receding": (Receding(contact=0.4), (0.4, 0.6, 0.8, 1.1, 2.0)),
-        "passing at 0.108 m/s": (Translating(centred=1.5), (0.3, 0.9, 1.5, 2.1, 2.7)),
-        "passing at 0.3 m/s": (Translating(speed=0.3, centred=1.5), (0.8, 1.15, 1.5, 1.85, 2.2)),
-    }
+    objects: dict[str, tuple[ForegroundObject | None, tuple[float, ...]]] = {"panorama alone": (None, (1.5,))}
+    for shade, luminance in SHADES.items():
+        slow, fast = (Translating(speed=v, centred=1.5, luminance=luminance) for v in (PAPER_SPEED, FAST))
+        objects |= {
+            f"approaching, {shade}": (Looming(contact=CONTACT, luminance=luminance), PICTURE_TIMES),
+            f"receding, {shade}": (Receding(contact=0.4, luminance=luminance), (0.4, 0.6, 0.8, 1.1)),
+            f"passing at 0.108 m/s, {shade}": (slow, (0.3, 0.9, 1.5, 2.1)),
+            f"passing at 0.3 m/s, {shade}": (fast, (0.8, 1.15, 1.5, 1.85)),
+        }
     responses: dict[str, StimulusResponse] = {}
     for name, (foreground, times) in objects.items():
         responses[name] = run_stimulus(background, foreground, models=models, picture_times=times)
@@ -257,7 +262,7 @@ class ExperimentResults:
     selectivity: dict[str, dict[str, int]]
 
 
-STEPS = 30 + 30 + 18 + 6 + 6 + len(L_OVER_V) + 4  # calls of `on_step` in `run_experiments`
+STEPS = 30 + 30 + 18 + 6 + 9 + len(L_OVER_V) + 4  # calls of `on_step` in `run_experiments`
 
 
 def run_experiments(on_step: StepCallback, picture: Path | None = None) -> ExperimentResults:

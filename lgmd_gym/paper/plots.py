@@ -3,7 +3,8 @@
 """The figures of `lgmd-gym paper`; matplotlib is imported on first use."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import product
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -11,15 +12,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lgmd_gym.aliases import Values
+from lgmd_gym.clips.playback import PLAYBACK_CONFIGS
+from lgmd_gym.clips.published import NEW
+from lgmd_gym.clips.study import HEADLINE, ClipTrace, Crash
+from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.paper.backgrounds import SHAPES, Grating, Screen
 from lgmd_gym.paper.claims import LOCUST_SLOPE
 from lgmd_gym.paper.experiments import (
     CONTACT,
     CONTRASTS,
-    DARK,
     FPS,
     L_OVER_V,
     MODELS,
+    SHADES,
     SPATIAL,
     TEMPORAL,
     ExperimentResults,
@@ -28,15 +33,16 @@ from lgmd_gym.paper.experiments import (
     line_fit,
 )
 from lgmd_gym.paper.stimuli import stimulus_frames
-from lgmd_gym.plotting.style import COLOURS, STYLE, load_pyplot
+from lgmd_gym.plotting.style import COLOURS, STYLE, load_pyplot, saved_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.gridspec import SubplotSpec
+    from matplotlib.gridspec import GridSpecFromSubplotSpec, SubplotSpec
     from matplotlib.image import AxesImage
 
 ALARM_LEVEL = 30.0  # T_sf [spikes/s]
+ALARM_RANGE = (15.0, 30.0)  # T_sf in the paper [spikes/s]
 MODEL_COLOURS = dict(zip(MODELS, COLOURS, strict=False))
 
 
@@ -109,66 +115,137 @@ def _heat_map(
 
 
 def _looming(plt: ModuleType, results: ExperimentResults) -> "Figure":
-    """Draw a square that looms in gratings: frames, spike frequency and F̂, one column per contrast."""
-    contrasts = list(dict.fromkeys(item.contrast for item in results.looming))
-    figure = plt.figure(figsize=(11.0, 7.4), layout="constrained")
+    """Draw dark and light squares that loom in gratings: six panels of frames, spike frequency and K."""
+    spatial = list(dict.fromkeys(item.spatial for item in results.looming))
+    figure = plt.figure(figsize=(11.0, 8.6), layout="constrained")
     figure.suptitle("A square looms in a drifting grating, l/|v| = 100 ms, 30 Hz")
-    grid = figure.add_gridspec(3, len(contrasts), height_ratios=(0.9, 1.2, 0.8))
+    grid = figure.add_gridspec(2, len(spatial))
     shared: list[Axes | None] = [None, None]
-    for column, contrast in enumerate(contrasts):
-        items = [item for item in results.looming if item.contrast == contrast]
-        _strip(figure, grid[0, column], items[0].response, f"grating of contrast {contrast:g}")
-        upper = figure.add_subplot(grid[1, column], sharey=shared[0])
-        lower = figure.add_subplot(grid[2, column], sharex=upper, sharey=shared[1])
-        shared = [shared[0] or upper, shared[1] or lower]
-        for item, colour in zip(items, np.repeat(COLOURS[:3], 2), strict=True):
-            dark, response = item.luminance == DARK, item.response
-            label = f"{'dark' if dark else 'light'}, {item.spatial:g}/m"
-            style = {"color": colour, "linestyle": "-" if dark else "--", "linewidth": 1.1}
-            upper.plot(response.time - CONTACT, response.frequency["paper"], label=label, **style)
-            lower.plot(response.time - CONTACT, response.ffi, **style)
-        upper.axhline(ALARM_LEVEL, color=COLOURS[5], linewidth=1.2)
-        lower.axhline(10.0, color="0.5", linestyle=":", linewidth=1.0)
-        upper.set_xlim(-1.5, 0.0)
-        lower.set_xlabel("time to contact [s]")
-        if column == 0:
-            upper.set_ylabel("spike frequency [spikes/s]\n(orange: T_sf = 30 at 30 Hz)")
-            lower.set_ylabel("F̂ (dotted: 10,\ninhibition grows above)")
-            upper.legend(fontsize=7, loc="upper left")
+    for (row, (shade, luminance)), (column, periods) in product(
+        enumerate(SHADES.items()), enumerate(spatial)
+    ):
+        panel = [item for item in results.looming if (item.luminance, item.spatial) == (luminance, periods)]
+        cells = grid[row, column].subgridspec(3, 1, height_ratios=(0.45, 1.0, 0.6))
+        _strip(figure, cells[0], panel[-1].response, f"{shade} square, {periods:g} periods/m")
+        axes = _response_axes(figure, cells, shared, (row, column), last_row=1)
+        for item, colour in zip(panel, COLOURS, strict=False):
+            response, time = item.response, item.response.time - CONTACT
+            label = f"contrast {item.contrast:g} (F̂ {response.ffi[5:60].mean():.0f})"
+            axes[0].plot(time, response.frequency["paper"], color=colour, label=label)
+            axes[1].plot(time, response.potential["paper"], color=colour)
+        axes[1].set_xlim(-1.5, 0.0)
+        if row == 1:
+            axes[1].set_xlabel("time to contact [s]")
+        axes[0].legend(fontsize=7, loc="upper left", bbox_to_anchor=(0.0, 0.93))
     return figure
 
 
 def _panorama(plt: ModuleType, results: ExperimentResults) -> "Figure":
-    """Draw objects that approach, recede and translate in a shifting panorama, one column each."""
-    names = ("approaching, dark", "receding", "passing at 0.108 m/s", "passing at 0.3 m/s")
-    figure = plt.figure(figsize=(12.0, 8.0), layout="constrained")
-    figure.suptitle("An object in a shifting panorama, 30 Hz (orange: T_sf = 30 spikes/s)")
-    grid = figure.add_gridspec(5, len(names), height_ratios=(0.9, 0.7, 0.45, 1.1, 0.7))
-    for column, name in enumerate(names):
-        response = results.panorama[name]
-        _strip(figure, grid[0, column], response, name)
-        axes = [figure.add_subplot(grid[row, column]) for row in (1, 2, 3, 4)]
-        axes[0].plot(response.time, response.potential["paper"], color=COLOURS[6])
-        axes[0].axhline(0.7, color="0.5", linestyle=":", linewidth=1.0)
-        axes[0].set_ylim(0.45, 1.02)
-        axes[1].vlines(response.time, 0.0, response.spikes["paper"], color=COLOURS[0], linewidth=1.0)
-        axes[1].set_ylim(0.0, 10.0)
-        for model, colour in MODEL_COLOURS.items():
-            axes[2].plot(response.time, response.frequency[model], color=colour, label=model, linewidth=1.2)
-        axes[2].axhline(ALARM_LEVEL, color=COLOURS[5], linewidth=1.2)
-        axes[2].set_ylim(0.0, 250.0)
-        axes[3].plot(response.time, response.ffi, color=COLOURS[2])
-        axes[3].axhline(10.0, color="0.5", linestyle=":", linewidth=1.0)
-        axes[3].set_ylim(0.0, 40.0)
-        axes[3].set_xlabel("time [s]")
-        labels = ("K (dotted: T_sp)", "spikes\nper frame", "spike frequency\n[spikes/s]", "F̂")
-        for axis, label in zip(axes, labels, strict=True):
-            axis.set_xlim(0.0, CONTACT)
-            axis.set_ylabel(label if column == 0 else "")
-            axis.tick_params(labelbottom=axis is axes[3], labelleft=column == 0)
-        if column == 0:
-            axes[2].legend(fontsize=7, loc="upper left")
+    """Draw dark and light squares that approach, recede and pass in a panorama: six panels."""
+    motions = {
+        "approaches": ("approaching",),
+        "recedes": ("receding",),
+        "passes": ("passing at 0.108 m/s", "passing at 0.3 m/s"),
+    }
+    figure = plt.figure(figsize=(11.0, 8.6), layout="constrained")
+    figure.suptitle("A square in a shifting panorama, 30 Hz")
+    grid = figure.add_gridspec(2, len(motions))
+    shared: list[Axes | None] = [None, None]
+    for (row, shade), (column, (title, names)) in product(enumerate(SHADES), enumerate(motions.items())):
+        responses = {name: results.panorama[f"{name}, {shade}"] for name in names}
+        cells = grid[row, column].subgridspec(3, 1, height_ratios=(0.45, 1.0, 0.6))
+        _strip(figure, cells[0], responses[names[-1]], f"{shade} square {title}")
+        axes = _response_axes(figure, cells, shared, (row, column), last_row=1)
+        for (name, response), colour in zip(responses.items(), COLOURS, strict=False):
+            axes[0].plot(response.time, response.frequency["paper"], color=colour, label=name)
+            axes[1].plot(response.time, response.potential["paper"], color=colour)
+        axes[1].set_xlim(0.0, CONTACT)
+        if row == 1:
+            axes[1].set_xlabel("time [s]")
+        if len(names) > 1:
+            axes[0].legend(fontsize=7, loc="upper right")
     return figure
+
+
+def _response_axes(
+    figure: "Figure",
+    cells: "GridSpecFromSubplotSpec",
+    shared: "list[Axes | None]",
+    place: tuple[int, int],
+    last_row: int,
+) -> "tuple[Axes, Axes]":
+    """Return the axes of spike frequency and K of one panel, with the levels of the alarm and of spikes.
+
+    Args:
+        figure: The figure.
+        cells: Cells of the panel; the axes are in the second and third.
+        shared: Axes of the first panel, whose scale all panels have; those of this panel if there is none.
+        place: Row and column of the panel.
+        last_row: Row with numbers on the axis of time.
+    """
+    upper = figure.add_subplot(cells[1], sharey=shared[0])
+    lower = figure.add_subplot(cells[2], sharex=upper, sharey=shared[1])
+    shared[:] = shared[0] or upper, shared[1] or lower
+    upper.axhspan(*ALARM_RANGE, color=COLOURS[5], alpha=0.4, linewidth=0.0)
+    lower.axhline(LGMDParams().t_sp, color="0.5", linestyle=":", linewidth=1.0)
+    lower.set_ylim(0.45, 1.03)
+    upper.tick_params(labelbottom=False, labelleft=place[1] == 0)
+    lower.tick_params(labelbottom=place[0] == last_row, labelleft=place[1] == 0)
+    if place[1] == 0:
+        upper.set_ylabel("spikes/s\n(orange: T_sf of the paper)", fontsize=8)
+        lower.set_ylabel("K\n(dotted: T_sp)", fontsize=8)
+    return upper, lower
+
+
+def clip_figures(traces: Sequence[ClipTrace], crashes: Sequence[Crash], folder: Path) -> list[Path]:
+    """Draw the responses to clips with and without a crash at the paper's setting, and return the files."""
+    by_clip = {trace.clip: trace for trace in traces if trace.configuration == HEADLINE}
+    paths: list[Path] = []
+    for name, crashed in (("5-crashes", True), ("6-near-misses", False)):
+        panels = [
+            (crash, by_clip[crash.clip])
+            for crash in crashes
+            if (crash.crash_s is not None) == crashed and crash.clip in by_clip
+        ]
+        if not panels:
+            continue
+        columns = min(len(panels), 5)
+        rows = -(-len(panels) // columns)
+        paths.append(folder / f"{name}.png")
+        size = (2.3 * columns + 0.6, 2.1 * rows + 0.5)
+        with saved_figure(paths[-1], rows, columns, figsize=size, squeeze=False) as (figure, axes):
+            figure.suptitle(f"{PLAYBACK_CONFIGS[HEADLINE].describe()}; orange: 15 to 30 spikes/s; red: crash")
+            for axis in axes.flat[len(panels) :]:
+                axis.set_axis_off()
+            for index, (axis, (crash, trace)) in enumerate(zip(axes.flat, panels, strict=False)):
+                _clip_panel(axis, crash, trace, index % columns == 0, index % columns == columns - 1)
+                axis.set_xlabel("time [s]" if index + columns >= len(panels) else "")
+    return paths
+
+
+def _clip_panel(axis: "Axes", crash: Crash, trace: ClipTrace, left: bool, right: bool) -> None:
+    """Draw spike frequency and K of one clip, with labels at the left and right end of a row."""
+    time = np.arange(len(trace.spike_frequency)) / trace.fps
+    axis.axhspan(*ALARM_RANGE, color=COLOURS[5], alpha=0.4, linewidth=0.0)
+    axis.fill_between(time, trace.spike_frequency, step="mid", color=COLOURS[0], alpha=0.75, linewidth=0.0)
+    axis.set_ylim(0.0, 150.0)
+    axis.set_xlim(0.0, time[-1])
+    axis.set_title(f"{crash.clip}{' (new)' if crash.group == NEW else ''}", fontsize=8)
+    twin = axis.twinx()
+    twin.plot(time, trace.membrane_potential, color=COLOURS[6], linewidth=1.1)
+    twin.set_ylim(0.0, 1.02)
+    twin.grid(visible=False)
+    twin.spines["right"].set_visible(True)
+    if crash.crash_s is not None:
+        axis.axvline(crash.crash_s, color="red", linewidth=1.4)
+        spread = crash.crash_s - crash.tolerance_s, crash.crash_s + crash.tolerance_s
+        axis.axvspan(*spread, color="red", alpha=0.2, linewidth=0.0)
+    if left:
+        axis.set_ylabel("spikes/s")
+    if right:
+        twin.set_ylabel("K", color=COLOURS[6])
+    twin.tick_params(labelright=right)
+    axis.tick_params(labelleft=left)
 
 
 def _biology(plt: ModuleType, results: ExperimentResults) -> "Figure":
@@ -226,20 +303,12 @@ def _draw_peaks(left: "Axes", right: "Axes", results: ExperimentResults) -> None
 
 
 def _strip(figure: "Figure", cell: "SubplotSpec", response: StimulusResponse, title: str) -> None:
-    """Draw the last four stored frames of a stimulus in two columns."""
-    inner = cell.subgridspec(2, 2, wspace=0.03)
-    for index, (time, frame) in enumerate(response.pictures[-4:]):
-        axis = figure.add_subplot(inner[index // 2, index % 2])
+    """Draw the stored frames of a stimulus in one row."""
+    inner = cell.subgridspec(1, len(response.pictures), wspace=0.03)
+    for index, (time, frame) in enumerate(response.pictures):
+        axis = figure.add_subplot(inner[0, index])
         axis.imshow(frame, cmap="gray", vmin=0, vmax=255)
         axis.set_axis_off()
-        axis.text(
-            0.02,
-            0.96,
-            f"{time:.2f} s",
-            transform=axis.transAxes,
-            va="top",
-            fontsize=6.5,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
-        )
+        axis.text(0.5, -0.05, f"{time:.2f} s", transform=axis.transAxes, va="top", ha="center", fontsize=6)
         if index == 0:
             axis.set_title(title, fontsize=8, loc="left")

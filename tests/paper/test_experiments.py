@@ -59,8 +59,13 @@ def results():
         looming=[looming(0.2, late), looming(1.0, dataclasses.replace(late, frequency=weaker))],
         light_dark=[experiments.LuminanceLeads(60.0, 0.5, 1.0)],
         panorama={
-            "panorama alone": silent, "approaching, dark": late, "approaching, light": late,
-            "receding": early, "passing at 0.108 m/s": silent, "passing at 0.3 m/s": silent,
+            "panorama alone": silent,
+            **{
+                f"{motion}, {shade}": response
+                for shade in experiments.SHADES
+                for motion, response in (("approaching", late), ("receding", early),
+                                         ("passing at 0.108 m/s", silent), ("passing at 0.3 m/s", silent))
+            },
         },
         approaches=approaches(LOCUST_SLOPE),
         selectivity=spike_counts(approach=90),
@@ -95,13 +100,16 @@ def test_a_claim_fails_with_its_measurement(results, start, change, expected):
 def test_claims_about_the_panorama_depend_on_the_times_of_the_alarms(results):
     continuous = stimulus_response(np.full(90, 50.0))
     for name, start, expected in (
-        ("receding", "receding", FAILS),
-        ("passing at 0.3 m/s", "translating", PARTLY),
-        ("passing at 0.108 m/s", "translating", FAILS),
+        ("receding, light", "receding", PARTLY),
+        ("passing at 0.3 m/s, dark", "translating", PARTLY),
+        ("passing at 0.108 m/s, light", "translating", FAILS),
         ("approaching, dark", "approaching", PARTLY),
     ):
         changed = dataclasses.replace(results, panorama={**results.panorama, name: continuous})
         assert result_of(changed, start) == expected
+    both = dict.fromkeys(("receding, dark", "receding, light"), continuous)
+    changed = dataclasses.replace(results, panorama={**results.panorama, **both})
+    assert result_of(changed, "receding") == FAILS
 
 
 def test_the_claim_about_crash_clips_requires_more_hits_than_by_chance(results):
@@ -146,7 +154,8 @@ def test_a_fast_grating_saturates_k_at_low_contrast_only():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--clips", "."], "--clips and --crashes must be used together"),
+        (["--crashes", "my.csv"], "--crashes my.csv annotates clips: add --clips with their folder"),
+        (["--clips", "."], "folder '.' contains no video file"),
         (["--picture", "nowhere.png"], "picture 'nowhere.png' cannot be read"),
         (["--out", "/proc/nowhere/run"], "cannot be created"),
         (["--clips", "nowhere", "--crashes", "nowhere.csv"], "clip 'nowhere' does not exist"),

@@ -18,14 +18,11 @@ from lgmd_gym.clips.playback import (
     DuplicateFilter,
     PlaybackConfig,
 )
+from lgmd_gym.clips.published import find_published
+from lgmd_gym.clips.study import HEADLINE, read_traces
 from lgmd_gym.neuron import Response
 
 VIDEOS = Path(os.environ.get("LGMD_VIDEOS", Path(__file__).parents[3] / "shared" / "data" / "videos"))
-# 0-based crash frames from the README of the clips; None without a crash.
-CRASHES = {
-    "c01": 65, "c02": 85, "c06": 88, "c12": 84, "head-on-balloon": 287, "vehicle-following-crash": 91,
-    "sudden-turning": 99, "nc03": None, "nc07": None,
-}  # fmt: skip
 
 
 def noisy(frame, rng, amplitude):
@@ -157,33 +154,46 @@ def test_the_p_value_uses_the_upper_bound_of_the_chance_level():
     assert total.p_value == pytest.approx(total.chance.high**2)
 
 
-# The development clips, which are not part of the project
+# The published clips, which are not part of the project
 
 
 @pytest.fixture(scope="module")
-def detections():
-    """Detections on every clip with two configurations."""
-    missing = [name for name in CRASHES if not (VIDEOS / f"{name}.mp4").exists()]
-    if missing:
-        pytest.skip(f"no clips {', '.join(missing)}: set LGMD_VIDEOS to the folder of the dash-camera clips")
-    found = {}
-    for config in ("paper", "conservative"):
-        for name, crash in CRASHES.items():
-            responses = [f.response for f in ClipRun(VIDEOS / f"{name}.mp4", PLAYBACK_CONFIGS[config])]
-            frequencies, alarm = zip(*((r.spike_frequency, r.alert) for r in responses), strict=True)
-            crash_s = None if crash is None else crash / 30.0
-            found[config, name] = detect(name, frequencies, alarm, 30.0, crash_s)
-    return found
+def jobs():
+    """All published clips."""
+    if not VIDEOS.is_dir():
+        pytest.skip("no clips: set LGMD_VIDEOS to the folder of the published clips")
+    files = find_published(VIDEOS)
+    if files.missing:
+        pytest.skip(f"no clips {', '.join(clip.name for clip in files.missing)} in {VIDEOS}")
+    return files.jobs
 
 
 @pytest.mark.parametrize(
     ("config", "hits", "onsets", "alarm_frames"), [("paper", 5, 5, 102), ("conservative", 7, 1, 41)]
 )
-def test_detection_on_the_development_clips(detections, config, hits, onsets, alarm_frames):
-    """The numbers of docs/paper.md; `conservative` was selected on these clips."""
-    total = summarize_detections(item for (name, _), item in detections.items() if name == config)
+def test_detection_on_the_clips_used_for_choices(jobs, config, hits, onsets, alarm_frames):
+    """The numbers of docs/clips.md; `conservative` was selected on these clips."""
+    found = {}
+    for job in jobs[:9]:
+        responses = [f.response for f in ClipRun(job.clip, PLAYBACK_CONFIGS[config])]
+        frequencies, alarm = zip(*((r.spike_frequency, r.alert) for r in responses), strict=True)
+        found[job.name] = detect(job.name, frequencies, alarm, 30.0, job.crash_s)
+    total = summarize_detections(found.values())
     assert (total.hits.k, total.hits.n, total.chance.onsets) == (hits, 7, onsets)
     assert (total.alarm_frames.k, total.alarm_frames.n) == (alarm_frames, 845)
-    near_miss = detections[config, "nc03"]
-    assert near_miss.alarm_frames.k == 0
-    assert near_miss.peak < 30
+    assert found["nc03"].alarm_frames.k == 0
+    assert found["nc03"].peak < 30
+
+
+def test_the_traces_of_the_documentation(jobs):
+    """At the setting of the paper, for every frame of the 16 clips."""
+    traces = read_traces(Path(__file__).parents[2] / "docs" / "clip_traces.csv")
+    stored = {trace.clip: trace for trace in traces if trace.configuration == HEADLINE}
+    assert list(stored) == [job.name for job in jobs]
+    for job in jobs:
+        responses = [f.response for f in ClipRun(job.clip, PLAYBACK_CONFIGS[HEADLINE])]
+        frequency, potential = zip(
+            *((r.spike_frequency, r.membrane_potential) for r in responses), strict=True
+        )
+        np.testing.assert_allclose(stored[job.name].spike_frequency, frequency, rtol=1e-5)
+        np.testing.assert_allclose(stored[job.name].membrane_potential, potential, atol=6e-4)
