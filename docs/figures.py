@@ -1,6 +1,7 @@
 """Generate the figures of the page on the neuron."""
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ def main(folder: Path) -> None:
     layers(folder / "layers.png")
     responses(folder / "responses.png")
     adaptation(folder / "adaptation.png")
+    edges(folder / "edges.png")
     stimuli(folder / "stimuli.png")
 
 
@@ -78,6 +80,48 @@ def adaptation(path: Path) -> None:
         for axis in axes:
             axis.set_xlabel("time [s]")
         axes[0].legend()
+
+
+def edge_frames(speed: float, acceleration: float, count: int) -> Iterator[np.ndarray]:
+    """Yield frames of 40 × 400 px with a dark edge that moves to the right [px/frame, px/frame²]."""
+    for number in range(count):
+        position = 20.0 + speed * number + 0.5 * acceleration * number**2
+        covered = np.clip(position - np.arange(400), 0.0, 1.0)
+        yield np.tile(np.rint(127.5 - 107.5 * covered), (40, 1)).astype(np.uint8)
+
+
+def share_left(speed: float, acceleration: float = 0.0) -> list[tuple[float, float]]:
+    """Return the speed [px/frame] and S / E of the frames with an edge, from the seventh on."""
+    neuron, shares = LGMD((40, 400)), list[tuple[float, float]]()
+    for number, frame in enumerate(edge_frames(speed, acceleration, 80)):
+        neuron.step(frame)
+        excitation, moved = neuron.layers["E"].sum(), speed * number + 0.5 * acceleration * number**2
+        if number > 6 and moved < 360.0:
+            shares.append((speed + acceleration * number, float(neuron.layers["S"].sum() / excitation)))
+    return shares
+
+
+def edges(path: Path) -> None:
+    """Draw what the inhibition leaves of edges over their speed, and K and K̂ for two constant speeds."""
+    speeds = (0.25, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
+    with saved_figure(path, 1, 2, figsize=(8.6, 3.0)) as (_, (left, right)):
+        constant = [np.mean([share for _, share in share_left(speed)]) for speed in speeds]
+        left.plot(speeds, constant, "o-", color=COLOURS[2], label="constant speed")
+        for acceleration, colour in ((0.1, COLOURS[1]), (0.5, COLOURS[5])):
+            left.plot(*np.transpose(share_left(0.5, acceleration)), ".", color=colour,
+                      label=f"accelerating by {acceleration:g} px/frame²")  # fmt: skip
+        left.set(xscale="log", ylim=(0.0, 1.0), xlabel="speed [px/frame]", ylabel="S / E")
+        left.legend(fontsize=7)
+        for speed, colour in ((4.0, COLOURS[2]), (3.6, COLOURS[1])):
+            neuron = LGMD((40, 400))
+            steps = [neuron.step(frame) for frame in edge_frames(speed, 0.0, 90)]
+            time, spikes = np.arange(len(steps)) / 30.0, sum(step.spikes for step in steps)
+            label = f"{speed:g} px/frame: {spikes} spikes"
+            right.plot(time, [step.membrane_potential for step in steps], color=colour, label=label)
+            right.plot(time, [step.adapted_potential for step in steps], "--", color=colour)
+        right.axhline(LGMDParams().t_sp, color="0.5", linestyle=":", linewidth=1.0)
+        right.set(ylim=(0.48, 1.02), xlabel="time [s]", ylabel="K (dashed: K̂, dotted: T_sp)")
+        right.legend(fontsize=7)
 
 
 SHOWN_STIMULI = (
