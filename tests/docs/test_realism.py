@@ -1,6 +1,7 @@
 """The experiment `realism`: comparison of simulated drives with clips."""
 
 import csv
+import hashlib
 import re
 from importlib import import_module
 
@@ -9,6 +10,9 @@ import pytest
 from PIL import Image
 from support.clips import write_lossless
 from support.examples import load
+
+from lgmd_gym.clips import published
+from lgmd_gym.clips.published import PublishedClip
 
 command = load("realism/realism")
 comparison, drives = import_module("comparison"), import_module("drives")
@@ -224,6 +228,30 @@ def test_crashes_and_named_nights(clips, tmp_path, monkeypatch):
     groups = {row["name"]: row["group"] for row in rows_of(out / "drives.csv") if row["kind"] == "real"}
     assert groups == {"dark.mkv": "day", "dusk.mkv": "day", "noon.mkv": "night"}
     assert [lengths[index] for index in range(3)] == [30, 17, 30]
+
+
+@pytest.mark.usefixtures("short_drives")
+def test_a_group_of_the_published_clips(clips, tmp_path, monkeypatch, capsys):
+    """The clips of a group are recognised by their contents, and the package's crash frames apply."""
+    annotated = tuple(
+        PublishedClip(f"{name} clip", frame, 2, group, digest(clips / f"{name}.mkv"), "", "")
+        for name, frame, group in (("noon", 20, "new"), ("dusk", None, "new"), ("dark", 25, "used"))
+    )
+    for module in (command, published):
+        monkeypatch.setattr(module, "published_clips", lambda: annotated)
+    out = tmp_path / "run"
+    run("--clips", clips, "--group", "new", "--seeds", 1, "--out", out)
+    drives = [row["name"] for row in rows_of(out / "drives.csv") if row["kind"] == "real"]
+    assert drives == ["noon.mkv", "dusk.mkv"]
+    (clips / "noon.mkv").unlink()
+    with pytest.raises(ValueError, match="has 1 of the 2 clips of the group 'new'"):
+        run("--clips", clips, "--group", "new", "--out", tmp_path / "other")
+    with pytest.raises(ValueError, match="--group uses the annotation of the package; remove --crashes"):
+        run("--clips", clips, "--group", "used", "--crashes", "my.csv", "--out", tmp_path / "other")
+
+
+def digest(path):
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 @pytest.mark.parametrize(

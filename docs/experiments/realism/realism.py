@@ -18,6 +18,7 @@ from lgmd_gym.cli import clips
 from lgmd_gym.cli.console import make_console
 from lgmd_gym.cli.values import default_out
 from lgmd_gym.clips.batch import ClipJob, make_jobs
+from lgmd_gym.clips.published import NEW, USED, find_published, published_clips
 from lgmd_gym.errors import check_whole, check_within
 
 
@@ -28,8 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     worlds = SPLIT_WORLDS["train"][: check_whole("worlds", options.worlds, 0, len(SPLIT_WORLDS["train"]))]
     check_within("clip_hfov_deg", options.clip_hfov_deg, 10.0, 160.0, "degrees")
     check_within("ignore_bottom", options.ignore_bottom, 0.0, 0.5)
-    jobs = make_jobs([options.clips], options.crashes)
-    clips.print_notes(jobs, options.crashes)
+    jobs = _jobs(options.clips, options.crashes, options.group)
     optics = common_optics(jobs, options.clip_hfov_deg, options.ignore_bottom)
     out = default_out(options.out, "realism")
     settings = {
@@ -44,11 +44,31 @@ def main(arguments: Sequence[str] | None = None) -> None:
     make_console().print(f"tables and figure: {out}", soft_wrap=True)
 
 
+def _jobs(folder: Path, crashes: Path | None, group: str | None) -> list[ClipJob]:
+    """Return the clips of a folder, or those of a group of the published clips in it."""
+    if group is None:
+        jobs = make_jobs([folder], crashes)
+        clips.print_notes(jobs, crashes)
+        return jobs
+    if crashes is not None:
+        raise ValueError("--group uses the annotation of the package; remove --crashes")
+    names = {clip.name for clip in published_clips() if clip.group == group}
+    jobs = [job for job in find_published(folder).jobs if job.name in names]
+    if len(jobs) < len(names):
+        raise ValueError(f"{str(folder)!r} has {len(jobs)} of the {len(names)} clips of the group {group!r}")
+    return jobs
+
+
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Return the options."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--clips", type=Path, required=True, help="folder of driving clips")
     parser.add_argument("--crashes", type=Path, help="CSV file with the columns clip,crash_frame")
+    parser.add_argument(
+        "--group",
+        choices=(USED, NEW),
+        help="published clips of the folder, by SHA-256, with the annotation of the package",
+    )
     parser.add_argument("--out", type=Path, help="folder to write; default: runs/realism-DATE-TIME")
     parser.add_argument(
         "--clip-hfov-deg",
