@@ -10,6 +10,7 @@ length; the rate can still be estimated, with an exact interval.
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,9 @@ from lgmd_gym.statistics.intervals import Rate, binomial_tail, poisson_interval
 WINDOW_S = 1.5  # window before a crash: 45 frames at 30 Hz
 SILENCE_S = 1.0 / 3.0  # time without alarm before an onset: 10 frames at 30 Hz
 SETTLE_S = 8.0 / 30.0  # settling time of the filters: 8 frames at 30 Hz
+
+
+_interval = cache(poisson_interval)  # tables of many clips have the same few numbers of onsets
 
 
 class ChanceLevel(NamedTuple):
@@ -35,7 +39,7 @@ class ChanceLevel(NamedTuple):
         """Return the chance level for a number of onsets in a number of seconds."""
         if seconds <= 0.0:
             return cls(onsets, 0.0, math.nan, 0.0, 1.0)
-        low, high = poisson_interval(onsets)
+        low, high = _interval(onsets)
         bounds = (1.0 - math.exp(-count * WINDOW_S / seconds) for count in (onsets, low, high))
         return cls(onsets, seconds, *bounds)
 

@@ -9,12 +9,14 @@ import pytest
 from support.clips import write_lossless
 
 from lgmd_gym.cli import main as cli
-from lgmd_gym.clips import published, study
+from lgmd_gym.clips import playback, published, study
 from lgmd_gym.clips.playback import PLAYBACK_CONFIGS
 from lgmd_gym.clips.published import NEW, USED, PublishedClip, find_published, published_clips
 from lgmd_gym.clips.study import ClipTrace, Crash, detections_of, groups_of, read_traces, write_traces
 from lgmd_gym.clips.tables import config_row
 from lgmd_gym.paper import experiments, plots
+
+CONFIGS = ("paper", "paper-18hz", "paper-18hz-30")
 
 
 def test_the_annotation_of_sixteen_clips():
@@ -73,7 +75,8 @@ def test_a_folder_without_a_published_clip_is_refused(tmp_path, clip, capsys):
 
 @pytest.fixture
 def short_paper(monkeypatch):
-    """`lgmd-gym paper` without its experiments on stimuli."""
+    """`lgmd-gym paper` with three configurations and without its experiments on stimuli."""
+    monkeypatch.setattr(playback, "PLAYBACK_CONFIGS", {name: PLAYBACK_CONFIGS[name] for name in CONFIGS})
     monkeypatch.setattr(experiments, "run_experiments", lambda *_: None)
     monkeypatch.setattr(plots, "paper_figures", lambda *_: [])
     claims = {}
@@ -94,7 +97,7 @@ def test_the_command_evaluates_published_clips(folder, short_paper, tmp_path, ca
     assert [item.clip for item in short_paper["all"]] == ["loom", "still"]
     traces = read_traces(out / "clip_traces.csv")
     assert {(trace.configuration, trace.clip) for trace in traces} == {
-        (name, clip) for name in PLAYBACK_CONFIGS for clip in ("loom", "still")
+        (name, clip) for name in CONFIGS for clip in ("loom", "still")
     }
     with (out / "my square" / "trace-paper-18hz.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
