@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from support.clips import ffmpeg
 
 from lgmd_gym.cli import main as cli
 from lgmd_gym.clips.video import VideoReader, VideoWriter, luma
@@ -194,6 +195,18 @@ def test_the_command_writes_videos_and_ground_truth(tmp_path, capsys):
     assert list(rows[42].values()) == ["42", "1.400000", "recede", "11.421186", "-1.000000", "0.100000"]
     assert run("--check", out) == 0
     assert f"5 stimuli equal their manifest, SHA-256 {manifest['sha256']}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("suffix", ["mkv", "y4m"])
+def test_the_hash_is_that_of_ffmpeg(suffix, tmp_path):
+    """As docs/howto/stimuli.md states, without this package."""
+    stimuli, screen = (
+        choose_stimuli(["looming-in-grating-80-per-m-contrast-1-light"]),
+        set_screen(30.0, (99, 71)),
+    )
+    (entry,) = write_stimuli(tmp_path, stimuli, screen, suffix=suffix)["stimuli"].values()
+    ffmpeg("-i", tmp_path / entry["video"], "-f", "rawvideo", "-pix_fmt", "gray", tmp_path / "raw")
+    assert hashlib.sha256((tmp_path / "raw").read_bytes()).hexdigest() == entry["frames_sha256"]
 
 
 def test_a_picture_of_the_user_is_the_panorama(tmp_path, capsys):
