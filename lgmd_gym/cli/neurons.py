@@ -39,7 +39,7 @@ class CompareModels:
 
     models: Annotated[Positional[tuple[str, ...]], arg(metavar="[NEURON ...]")] = ()
     """Models and presets with options, for example off-only:t_sp=0.78; MODULE:FACTORY for a model of your
-    own. Default: the ten of the page "Which neuron?"."""
+    own. Default: those of the page "Which neuron?"."""
     module: Names = None
     """Modules that register neuron models of your own."""
     parts: Annotated[tuple[str, ...], arg(metavar="PART [PART ...]")] = (
@@ -76,10 +76,28 @@ class CompareModels:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Events:
+    """Run the LGMD on recorded events of an event camera, and write its trace to a CSV file.
+
+    The recording is a .npz file with the arrays x, y, t [s] and p (0 and 1, or -1 and 1), and optionally
+    shape (height, width). The trace has one row per interval.
+    """
+
+    recording: Annotated[Positional[Path], arg(metavar="FILE.npz")]
+    """The recording."""
+    neuron: str = "events"
+    """Model with options, for example events:gain=15,t_sp=0.78."""
+    fps: float = 30.0
+    """Intervals per second in which events are counted [Hz]."""
+    out: File = None
+    """CSV file; must not exist. Default: the name of the recording with -trace.csv."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Neurons:
     """Compare neuron models, or list them."""
 
-    SUBCOMMANDS: ClassVar[dict[str, type]] = {"compare": CompareModels, "list": ListModels}
+    SUBCOMMANDS: ClassVar[dict[str, type]] = {"compare": CompareModels, "events": Events, "list": ListModels}
 
     command: object
 
@@ -157,6 +175,39 @@ def compare_models(options: CompareModels) -> int:
     return 0
 
 
+def run_events(options: Events) -> int:
+    """Write the trace of a recording and print a summary."""
+    import csv
+
+    import numpy as np
+
+    from lgmd_gym import neuron
+    from lgmd_gym.neuron import EventLGMD, EventRecording
+    from lgmd_gym.processes.files import check_new_file, complete_file
+
+    recording = EventRecording.read(options.recording)
+    model = neuron.make(options.neuron, recording.shape, options.fps)
+    if not isinstance(model, EventLGMD):
+        raise ValueError(f"--neuron must be events with options, got {options.neuron!r}")
+    out = options.out or options.recording.with_name(f"{options.recording.stem}-trace.csv")
+    check_new_file(out, "--out")
+    alerts, peak, number = 0, 0.0, -1
+    with complete_file(out) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(("interval", "time_s", "on", "off", *neuron.Response._fields))
+        model.step_events(np.zeros(recording.shape, np.int32))  # so that the first events are a change
+        for number, counts in enumerate(recording.counts(options.fps)):
+            outputs = model.step_events(counts)
+            on, off = int(counts[counts > 0].sum()), int(-counts[counts < 0].sum())
+            values = (f"{float(value):.6g}" for value in outputs.values())
+            writer.writerow((number, f"{number / options.fps:.4f}", on, off, *values))
+            alerts, peak = alerts + bool(outputs["alert"]), max(peak, outputs["spike_frequency"])
+    height, width = recording.shape
+    print(f"{len(recording.t)} events of {width}×{height} px in {number + 1} intervals at {options.fps:g} Hz")
+    print(f"highest spike frequency {peak:g}/s, {alerts} intervals in alert; trace: {out}")
+    return 0
+
+
 def _table(title: str, data: "DataTable") -> "Table":
     """Return a table for the terminal."""
     from rich.table import Table
@@ -170,4 +221,8 @@ def _table(title: str, data: "DataTable") -> "Table":
 
 
 # The function of each subcommand.
-RUN: dict[str, Callable[[Any], int]] = {"compare": compare_models, "list": list_models}
+RUN: dict[str, Callable[[Any], int]] = {
+    "compare": compare_models,
+    "events": run_events,
+    "list": list_models,
+}
