@@ -100,12 +100,17 @@ def paper_results(out: Path, folder: Path) -> None:
 def commands_page() -> str:
     """Return the help text of every command."""
     parts = ["# Commands", "The output of `lgmd-gym COMMAND --help` for every command."]
-    for name in COMMANDS:
-        text = subprocess.run(
-            [sys.executable, "-m", "lgmd_gym", name, "--help"], capture_output=True, text=True, check=True
-        ).stdout
+    for name in [name for command in COMMANDS for name in subcommands(command)]:
+        command = [sys.executable, "-m", "lgmd_gym", *name.split(), "--help"]
+        text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         parts.append(f"## lgmd-gym {name}\n\n```text\n{text.rstrip()}\n```")
     return "\n\n".join(parts) + "\n"
+
+
+def subcommands(command: str) -> list[str]:
+    """Return a command with each of its subcommands, or alone."""
+    known = getattr(COMMANDS[command], "SUBCOMMANDS", {})
+    return [f"{command} {name}" for name in known] or [command]
 
 
 if __name__ == "__main__":

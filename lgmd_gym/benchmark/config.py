@@ -25,8 +25,8 @@ from lgmd_gym.camera.worlds import SPLIT_WORLDS, WORLDS
 from lgmd_gym.envs.appearance import MIXED, Appearance
 from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.registration import TRAFFIC_KINDS
-from lgmd_gym.errors import as_tuple, check_items, check_keys, check_known, check_whole, shown
-from lgmd_gym.neuron import LGMDParams, NeuronSpec
+from lgmd_gym.errors import as_tuple, check_items, check_keys, check_known, check_text, check_whole, shown
+from lgmd_gym.neuron import LGMDParams, NeuronSpec, check_model, outside_code
 from lgmd_gym.sensing.channel import ChannelSpec, make_channels
 
 PACKAGES = ("numpy", "numba", "gymnasium", "highway-env", "joblib")
@@ -110,6 +110,8 @@ class RunConfig:
         road: Road that moves the car's body, see `Appearance`.
         camera: See `LGMDObservation`; None for each agent's own, see `Agent.camera`.
         params: See `LGMDObservation`; None for each agent's own or the defaults.
+        neuron: Model of cameras without one of their own, as in "off-only:t_sp=0.78" or
+            "my_module:Mine"; None for the LGMD.
         kinds: Kinds of traffic; None for all. Only for the suite "traffic".
         modules: Modules with scenario families of the user, see `import_families`; a run folder stores the
             scenarios instead.
@@ -128,6 +130,7 @@ class RunConfig:
     road: str | None = None
     camera: ChannelSpec | None = None
     params: NeuronSpec = None
+    neuron: str | None = None
     kinds: tuple[str, ...] | None = None
     modules: tuple[str, ...] = ()
 
@@ -151,6 +154,8 @@ class RunConfig:
             "params": plain.params,
         }
         Appearance(road=self.road)  # checks it
+        if self.neuron is not None and outside_code(check_text("neuron", self.neuron)) is None:
+            check_model("neuron", self.neuron)  # that of a module is imported when the run is checked
         if self.suite == TRAFFIC:
             kinds = tuple(TRAFFIC_KINDS) if self.kinds is None else self.kinds
             values["kinds"] = _names("kinds", kinds, "kind of traffic", TRAFFIC_KINDS)
@@ -175,7 +180,7 @@ class RunConfig:
     @property
     def sensor_config(self) -> SensorConfig:
         """Camera and neuron parameters."""
-        return SensorConfig(self.camera, self.params)
+        return SensorConfig(self.camera, self.params, neuron=self.neuron)
 
     def sensors(self, condition: str) -> SensorConfig:
         """Return camera and neuron parameters for a weather, which the environment shows.

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import lgmd_gym
+from lgmd_gym import neuron
 from lgmd_gym.agents.registry import outside_code
 from lgmd_gym.benchmark.case import Row, key_of
 from lgmd_gym.benchmark.config import RUN_FILE, RunConfig, provenance
@@ -69,19 +70,21 @@ def _short(file: str) -> str:
 INTERRUPTED = "interrupted"
 
 
-def check_trust(agents: Iterable[str], source: Path, trust: bool) -> None:
-    """Print the modules and policy files that agents load, one line each to stderr.
+def check_trust(config: RunConfig, source: Path, trust: bool) -> None:
+    """Print the modules and policy files that agents and the neuron load, one line each to stderr.
 
     Raises:
-        ValueError: If the user does not trust the file and an agent loads code from outside this package.
+        ValueError: If the user does not trust the file and it names code from outside this package.
     """
-    for agent in agents:
-        code = outside_code(agent)
+    named = [("agent", agent, outside_code(agent)) for agent in config.agents]
+    if config.neuron is not None:
+        named.append(("neuron", config.neuron, neuron.outside_code(config.neuron)))
+    for kind, text, code in named:
         if code is None:
             continue
         if not trust:
             raise ValueError(
-                f"{str(source)!r} names agent {agent!r}, which runs the code of {code}; if you trust it, "
+                f"{str(source)!r} names {kind} {text!r}, which runs the code of {code}; if you trust it, "
                 "add --trust"
             )
         print(f"lgmd-gym: loading {code}, named in {str(source)!r}", file=sys.stderr)
@@ -140,7 +143,7 @@ class Run:
             config = RunConfig.load(path / RUN_FILE)
             run = cls(config, folder, executor)
             if len(run.rows) < run.total:
-                check_trust(config.agents, path / RUN_FILE, trust)
+                check_trust(config, path / RUN_FILE, trust)
                 _check(config, executor)
             return run
         except BaseException:

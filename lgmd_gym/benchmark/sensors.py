@@ -21,6 +21,9 @@ class SensorConfig:
     # see `LGMDObservation`. None selects the agent's own parameters if the camera is its own
     params: NeuronSpec = None
     include_frame: bool = False  # whether the frames are part of the observation
+    # model of the cameras without one of their own, see `lgmd_gym.neuron.check_model`; None for the LGMD. The
+    # result of `for_agent` has it in its cameras
+    neuron: str | None = None
 
     def for_agent(self, agent: Agent | BatchAgent | None = None) -> "SensorConfig":
         """Return the config with the agent's own camera and parameters in place of None."""
@@ -29,7 +32,10 @@ class SensorConfig:
         if camera is None:
             camera = getattr(agent, "camera", None)
             params = getattr(agent, "neuron", None) if params is None else params
-        return SensorConfig(DEFAULT_CAMERA if camera is None else camera, params, include_frame)
+        camera = DEFAULT_CAMERA if camera is None else camera
+        if self.neuron is not None:
+            camera = plain_values(make_channels(camera, self.neuron))
+        return SensorConfig(camera, params, include_frame)
 
     @property
     def plain(self) -> "SensorConfig":

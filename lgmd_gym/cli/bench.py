@@ -66,6 +66,9 @@ class Bench:
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
     params: File = None
     """TOML file of LGMD parameters."""
+    neuron: Name = None
+    """Neuron model of cameras without their own, with options as in off-only:t_sp=0.78 (see `lgmd-gym neurons
+    list`), or MODULE:FACTORY for one of your own. Default: lgmd."""
     config: File = None
     """run.toml of an earlier run to repeat; replaces the options above."""
     resume: File = None
@@ -132,7 +135,8 @@ def _print_stop(benchmark: "Run", console: Console) -> None:
 
     kept = f"{len(benchmark.rows)} of {benchmark.total} episodes kept"
     resume = f"continue with lgmd-gym bench --resume {benchmark.folder.path}"
-    resume += " --trust" if any(map(outside_code, benchmark.config.agents)) else ""
+    own_neuron = ":" in (benchmark.config.neuron or "")
+    resume += " --trust" if own_neuron or any(map(outside_code, benchmark.config.agents)) else ""
     if failing_agent(benchmark.rows):
         resume = "correct the agent and start a new run, because --resume repeats no failed episode"
     console.print(f"{benchmark.stop_reason}: {kept}; {resume}", style="yellow", soft_wrap=True)
@@ -179,7 +183,7 @@ def _new(options: Bench, executor: "Executor") -> "Run":
         raise ValueError(f"--config replaces {flags}; remove the options, or change the file")
     else:
         config = RunConfig.load(options.config)
-        check_trust(config.agents, options.config, options.trust)
+        check_trust(config, options.config, options.trust)
     run = Run.new(config, default_out(options.out, config.label), executor)
     if options.params is not None:
         note_unused_params(options.params, map(make_agent, config.agents))
@@ -216,6 +220,7 @@ def _title(benchmark: "Run") -> str:
     rate = next((f" at {row['fps']:g} Hz" for row in benchmark.rows if row["fps"]), "")  # none in failed rows
     first = f" from {config.first_seed} on" if config.first_seed else ""
     camera = f"camera {config.sensor_config.label}{rate}"
+    camera += f", neuron {config.neuron}" if config.neuron else ""
     worlds = f"up to {counted(config.worlds, 'world')}" if config.worlds else "the laboratory"
     seeds = f"{counted(config.seeds, 'seed')}{first} in {worlds}"
     return f"{benchmark.plan.suite.name}: {camera}, T_sf = {level:g} spikes/s, {seeds}"

@@ -56,6 +56,8 @@ class Drive:
     """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
     params: File = None
     """TOML file of LGMD parameters."""
+    neuron: Name = None
+    """Neuron model of cameras without their own, with options, or MODULE:FACTORY. Default: lgmd."""
     module: Names = None
     """Modules with scenario families of your own: my_scenarios, or my_scenarios:MyFamily."""
     trust: bool = False
@@ -76,7 +78,7 @@ def run(options: Drive) -> int:
     note_unused_params(options.params, [agent])
     target = find_target(options.target, options.case, options.module, options.trust)
     arguments = parse_arguments(options.set)
-    sensors = SensorConfig(options.camera, read_params(options.params))
+    sensors = SensorConfig(options.camera, read_params(options.params), neuron=options.neuron)
     surroundings = parse_world(options.world)
     if options.condition is not None:
         surroundings["weather"] = options.condition

@@ -27,6 +27,8 @@ class Train:
     """Environment id; random levels and traffic are trained on the split train, evaluated on validation."""
     camera: Names = None
     """Camera presets, one neuron each. Default: those that the inputs require, else fovea tele wide."""
+    neuron: Name = None
+    """Neuron model of cameras without their own, with options, or MODULE:FACTORY. Default: lgmd."""
     sensors_of: Name = None
     """Agent whose cameras are used instead, for example stopping-zone; all-round adds fields at the sides."""
     inputs: Names = None
@@ -99,7 +101,7 @@ def config_of(options: Train) -> "TrainConfig":
     from lgmd_gym.training import TrainConfig
 
     cameras = list(options.camera or ())
-    return TrainConfig.from_hyperparams(
+    config = TrainConfig.from_hyperparams(
         options.algo,
         options.env,
         options.hyperparams,
@@ -116,3 +118,4 @@ def config_of(options: Train) -> "TrainConfig":
         extra_levels=options.extra_levels,
         extra_traffic=options.extra_traffic,
     )
+    return config if options.neuron is None else config.with_neuron(options.neuron)

@@ -137,6 +137,18 @@ def names() -> tuple[str, ...]:
     return tuple(_MODELS)
 
 
+def outside_code(text: str) -> str | None:
+    """Return what a specification would import from outside this package; None for nothing.
+
+    Example:
+        >>> outside_code("my_module:Mine:gain=2")
+        "module 'my_module'"
+    """
+    name, colon, rest = text.partition(":")
+    known = not colon or name in _MODELS or f"{name}:{rest.partition(':')[0]}" in _MODELS
+    return None if known else f"module {name!r}"
+
+
 def base_name(text: str) -> str:
     """Return the registered name in a specification, without its options; see `check_model`."""
     return _parse("neuron", text)[0]

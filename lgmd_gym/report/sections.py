@@ -12,6 +12,7 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
+from lgmd_gym import neuron
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.registry import outside_code
 from lgmd_gym.aliases import Values
@@ -129,13 +130,18 @@ class ReportData:
         """Agents whose code is outside this package and not trusted."""
         return [] if self.trust else [agent for agent in self.agents if outside_code(agent)]
 
+    @property
+    def neuron_not_loaded(self) -> bool:
+        """Whether the code of the neuron is outside this package and not trusted."""
+        return not self.trust and neuron.outside_code(self.config.neuron or "lgmd") is not None
+
     def series(self, row: Row) -> dict[str, np.ndarray] | None:
         """Return the time series of a row; None if they are not stored."""
         return read_series(self.path, series_name(key_of(row)))
 
     def frames(self, row: Row, decisions: dict[str, int]) -> list[CapturedFrame]:
         """Return camera frames of a row's episode, see `capture_frames`; none of `agents_not_loaded`."""
-        if row["agent"] in self.agents_not_loaded:
+        if row["agent"] in self.agents_not_loaded or self.neuron_not_loaded:
             return []
         case, condition = self.suite.by_name[row["case"]], row["condition"]
         task = Task(

@@ -220,6 +220,17 @@ class TrainConfig(Record):
         merged: Arguments = {**defaults, **values, "algo": algo, "env_id": env_id, **given}
         return cls(**merged)
 
+    def with_neuron(self, neuron: str) -> "TrainConfig":
+        """Return the configuration with a neuron model for the cameras without one of their own.
+
+        Args:
+            neuron: Specification of the model, see `lgmd_gym.neuron.check_model`.
+
+        Raises:
+            ValueError: For an unknown model or option, or a module that cannot be imported.
+        """
+        return replace(self, camera=plain_values(make_channels(self.camera, neuron)))
+
     @classmethod
     def from_dict(cls, values: Values) -> "TrainConfig":
         """Return the configuration that `to_dict` returned; unknown keys raise ValueError."""
