@@ -10,7 +10,7 @@ from lgmd_gym.neuron import FrameNeuron
 from lgmd_gym.paper.stimuli import Frame
 
 PAGE_MODELS = (
-    *("lgmd", "literal", "released", "fixed-inhibition", "off-only", "adaptive-threshold"),
+    *("lgmd", "literal", "released", "fixed-inhibition", "off-only", "adaptive-threshold", "events"),
     *("lplc2", "dsn", "edges", "difference"),
 )
 """The models of the page "Which neuron?"."""

@@ -79,8 +79,7 @@ def of_stimuli(results: Sequence[StimulusResult], folder: Path) -> Section:
                     f"first {ALARM:g}/s before contact [s]",
                 ),
                 leads,
-                ("", "", ".0f", ".1f", ".2f"),
-                "A lead of 3 s is an alarm from the first frames on, not a response to the approach.",
+                hidden=True,
             ),
         ),
     )
@@ -149,7 +148,7 @@ def of_clips(
                     "peak [spikes/s]",
                 ),
                 per_clip,
-                ("", "", ".3g", ".2f", ".0f", ".2f", ".0f"),
+                hidden=True,
             ),
         ),
     )

@@ -310,3 +310,18 @@ def test_traffic_causes():
     head, _, line = script.table([(kind, onset), ("merge", onset)])
     assert head == "| in front of the ego | merge | two-way | all | ego speed [m/s] | distance [m] |"
     assert line.startswith(f"| {onset.situation} | 1 | 1 | 2 | {onset.speed:.1f} | ")
+
+
+def test_which_neuron(tmp_path):
+    """The text before the marker stays, the sections are replaced, and figures are beside the page."""
+    script, run, page = load("which_neuron"), tmp_path / "run", tmp_path / "which_neuron.md"
+    run.mkdir()
+    (run / "a.png").write_bytes(b"1")
+    (run / "report.md").write_text("# Title\n\nIntroduction.\n\n## One\n\n![text](a.png)\n")
+    page.write_text(f"# Page\n\nConclusion.\n\n{script.MARKER}\n\n## Old\n")
+    for _ in range(2):
+        script.main(run, page)
+        assert page.read_text() == (
+            f"# Page\n\nConclusion.\n\n{script.MARKER}\n\n## One\n\n![text](which_neuron/a.png)\n"
+        )
+    assert (tmp_path / "which_neuron" / "a.png").read_bytes() == b"1"
