@@ -18,6 +18,10 @@ SIMILARITY_MARGIN = 0.1  # of names that are suggested beside the closest one
 MAX_SHOWN = 160  # characters of a value in a message
 
 
+class InputNote(UserWarning):
+    """Part of a valid file that has no effect, such as an event that never starts; commands print it."""
+
+
 def shown(value: object) -> str:
     """Return a value for a message: its `repr` in one line, shortened to `MAX_SHOWN` characters."""
     try:

@@ -1,7 +1,6 @@
 """Common parts of the commands that process clips: run folder, progress bar, notes."""
 
 import json
-import sys
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +9,7 @@ from rich.console import Console
 
 from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.config import provenance
+from lgmd_gym.cli.console import note
 from lgmd_gym.clips.batch import (
     ClipJob,
     ClipResult,
@@ -127,8 +127,3 @@ def progress_bar(name: str, total: float) -> Generator[Callable[[float], None], 
     with Progress(*columns, console=Console(stderr=True)) as bar:
         task = bar.add_task(name, total=total)
         yield lambda completed: bar.update(task, completed=completed)
-
-
-def note(text: str) -> None:
-    """Print a line to stderr."""
-    print(f"lgmd-gym: {text}", file=sys.stderr)

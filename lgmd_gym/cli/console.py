@@ -2,15 +2,19 @@
 
 import os
 import sys
+import warnings
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, ConsoleRenderable, RenderHook
 from rich.table import Column, Table
 from rich.text import Text
+
+from lgmd_gym.errors import InputNote
 
 WIDTH = 80  # columns of a file or pipe
 GAP = 2  # columns of the terminal between two columns of a table
@@ -47,6 +51,28 @@ def activity(text: str) -> Generator[Callable[[str], None], None, None]:
     with Progress(*columns, console=console, transient=True, redirect_stdout=redirect) as progress:
         task = progress.add_task(text)
         yield lambda new: progress.update(task, description=new)
+
+
+def note(text: str) -> None:
+    """Print a line to stderr."""
+    print(f"lgmd-gym: {text}", file=sys.stderr)
+
+
+@contextmanager
+def printed_notes() -> Generator[None, None, None]:
+    """Print each `InputNote` of the block once, as one line to stderr."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("default", InputNote)
+        show = warnings.showwarning
+
+        def shown(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+            if issubclass(category, InputNote):
+                note(str(message))
+            else:
+                show(message, category, *place, **more)
+
+        warnings.showwarning = shown
+        yield
 
 
 def io_reason(error: OSError) -> str:

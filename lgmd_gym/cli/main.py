@@ -13,7 +13,7 @@ from tyro.conf import subcommand
 from lgmd_gym._version import __version__
 from lgmd_gym.cli.bench import Bench
 from lgmd_gym.cli.compare import Compare
-from lgmd_gym.cli.console import activity, drop_output, io_reason
+from lgmd_gym.cli.console import activity, drop_output, io_reason, printed_notes
 from lgmd_gym.cli.doctor import Doctor
 from lgmd_gym.cli.drive import Drive
 from lgmd_gym.cli.gallery import Gallery
@@ -84,7 +84,8 @@ def _run(argv: list[str] | None) -> int:
         name = next(name for name, cls in COMMANDS.items() if isinstance(command, cls))
         with activity("loading"):
             module = import_module(f"lgmd_gym.cli.{name}")
-        code = module.run(command)
+        with printed_notes():
+            code = module.run(command)
         sys.stdout.flush()
         return code
     except (ValueError, TypeError, OverflowError) as error:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from rich.table import Table
 from tyro.conf import Positional, arg
 
-from lgmd_gym.cli.console import make_console
+from lgmd_gym.cli.console import make_console, note
 from lgmd_gym.cli.values import File, Name, Names, find_target, parse_arguments
 from lgmd_gym.errors import counted
 
@@ -118,6 +118,8 @@ def _check(options: Scenario) -> int:
     for item in checked:
         table.add_row(*_row(item))
     console.print(table)
+    for text in (text for item in checked for text in item.notes):
+        note(text)
     cells, contacts = sum(item.cells for item in checked), sum(item.contacts for item in checked)
     wall = time.perf_counter() - start
     console.print(

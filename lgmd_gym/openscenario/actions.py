@@ -131,6 +131,7 @@ def speed(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float
         value = other + value if delta else other * value
     shape = dynamics.choice("dynamicsShape", ("step", "linear"))
     dimension = dynamics.choice("dynamicsDimension", ("time", "rate", "distance"))
+    dynamics.choice("followingMode", ("position",), "position")
     amount = dynamics.number("value")
     if value < 0.0 and (time > 0.0 or shape != "step"):
         raise target.error("driving backwards is supported from the start only; use a step in Init")
@@ -211,7 +212,7 @@ def longitudinal_distance(item: Element, mover: Mover, world: ScenarioMap, time:
     only_at_start(item, time)
     if mover.follows or mover.start is None:
         raise item.error(f"{mover.name!r} must have a position and no trajectory; add a TeleportAction")
-    item.choice("coordinateSystem", ("entity", "road", "lane"), "entity")
+    system = item.choice("coordinateSystem", ("entity", "road", "lane"), "entity")
     known = ("leadingReferencedEntity", "trailingReferencedEntity")
     ahead = item.choice("displacement", known, known[1]) == known[0]
     if item.has("distance"):
@@ -223,12 +224,28 @@ def longitudinal_distance(item: Element, mover: Mover, world: ScenarioMap, time:
     if item.flag("freespace"):
         own = (mover.rear if same else mover.front) if ahead else (mover.front if same else mover.rear)
         distance += own + (other.front if ahead else other.rear)
-    moved = base.moved(distance if ahead else -distance, place.seen_from(base).y)
+    distance = distance if ahead else -distance
+    moved = base.moved(distance, place.seen_from(base).y)
+    if system != "entity":
+        _check_straight(item, world, base, distance)
     mover.start = Place(moved.x, moved.y, place.heading)
     settle(world, mover)
     if item.flag("continuous"):
         mover.timeline, mover.leader = Timeline(other.timeline.at(time).speed), other
     return time
+
+
+def _check_straight(item: Element, world: ScenarioMap, base: Place, distance: float) -> None:
+    """Raise ValueError if a distance along the road is not one along the axis of an entity [m]."""
+    road, s, t = world.locate(base)
+    along = distance if cos(base.heading - road.at(s).heading) > 0.0 else -distance
+    inside = 0.0 <= s + along <= road.length
+    if not inside or road.at(s + along, t).distance(base.moved(distance)) > _ON_PATH:
+        system = item.text("coordinateSystem")
+        raise item.error(
+            f"LongitudinalDistanceAction coordinateSystem={system!r} is supported on a straight road, "
+            "parallel to it; use a LanePosition"
+        )
 
 
 def synchronize(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
@@ -261,7 +278,9 @@ def _final_speed(item: Element, master: Mover, arrival: float) -> tuple[float | 
     found = block.only("AbsoluteSpeed", "RelativeSpeedToMaster")
     value = found.number("value")
     if found.tag == "RelativeSpeedToMaster":
-        value += master.timeline.at(arrival).speed
+        speed = master.timeline.at(arrival).speed
+        delta = found.choice("speedTargetValueType", ("delta", "factor")) == "delta"
+        value = speed + value if delta else speed * value
     if value < 0.0:
         raise found.error(f"the final speed must be >= 0 m/s, got {value:g}")
     distance, time = found.find("TargetDistanceSteadyState"), found.find("TargetTimeSteadyState")

@@ -34,7 +34,7 @@ import numpy as np
 from lgmd_gym.errors import check_path, check_whole
 from lgmd_gym.openscenario.compiler import Compiled
 from lgmd_gym.openscenario.nodes import Element, Node
-from lgmd_gym.openscenario.reader import find_files, read_cells
+from lgmd_gym.openscenario.reader import find_files, notes_of, read_cells
 from lgmd_gym.openscenario.world import Mover, ScenarioMap
 
 
@@ -195,6 +195,7 @@ class CheckedFile:
     location: float  # deviation of the impact location [m]
     speed: float  # deviation of the impact speed [m/s]
     time: float  # deviation of the time of impact [s]
+    notes: tuple[str, ...]  # notes of the reader, see `reader.notes_of`
 
 
 def check_files(paths: Sequence[str | Path], jobs: int = 1) -> Iterator[CheckedFile]:
@@ -226,7 +227,7 @@ def check_file(path: Path) -> CheckedFile:
             lateral, speed = abs(impact.lateral - intent.lateral), abs(impact.speed - intent.speed)
             deviations.append((lateral, speed, abs(impact.time - intent.time)))
     worst = np.max(deviations or [(nan, nan, nan)], axis=0)
-    return CheckedFile(path, len(cells), contacts, *worst.tolist())
+    return CheckedFile(path, len(cells), contacts, *worst.tolist(), notes=notes_of(cells))
 
 
 def play(compiled: Compiled, point: float) -> Impact | None:

@@ -46,7 +46,7 @@ def weather_of(environment: Element | None) -> str:
     if weather is None:
         return CLEAR
     sun, fog, rain = (weather.find(tag) for tag in ("Sun", "Fog", "Precipitation"))
-    if sun is not None and sun.has("illuminance") and sun.number("illuminance") < NIGHT_LUX:
+    if sun is not None and _illuminance(sun) < NIGHT_LUX:
         found.add("night")
     if fog is not None and fog.number("visualRange") < FOG:
         found.add("fog")
@@ -56,6 +56,14 @@ def weather_of(environment: Element | None) -> str:
     if len(found) > 1:
         raise weather.error(f"the weathers {', '.join(sorted(found))} cannot be combined; use one")
     return found.pop() if found else CLEAR
+
+
+def _illuminance(sun: Element) -> float:
+    """Return the illuminance of the sun [lx]; `intensity` is its name in OpenSCENARIO 1.1."""
+    for name in ("illuminance", "intensity"):
+        if sun.has(name):
+            return sun.number(name)
+    raise sun.error("Sun needs the attribute 'illuminance'")
 
 
 def road_plan(network: RoadNetwork, ego: Place, located: tuple[Road, float, float]) -> RoadPlan:
@@ -130,11 +138,11 @@ IGNORED_TAGS = frozenset(_TAGS.split())
 """Elements without an effect on us, with all that they contain."""
 _ATTRIBUTES = (
     "name z mass model model3d role h p r Weather.fractionalCloudCover Weather.cloudState Sun.elevation "
-    "Sun.azimuth Sun.intensity Sun.illuminance Weather.atmosphericPressure Weather.temperature "
+    "Sun.azimuth Weather.atmosphericPressure Weather.temperature "
     "FrontAxle.maxSteering FrontAxle.wheelDiameter FrontAxle.trackWidth FrontAxle.positionZ "
     "RearAxle.maxSteering RearAxle.wheelDiameter RearAxle.trackWidth RearAxle.positionZ "
     "Vehicle.vehicleCategory Pedestrian.pedestrianCategory MiscObject.miscObjectCategory "
-    "Precipitation.precipitationIntensity Precipitation.intensity Controller.controllerType"
+    "Sun.intensity Precipitation.precipitationIntensity Precipitation.intensity Controller.controllerType"
 )
 IGNORED_ATTRIBUTES = frozenset(_ATTRIBUTES.split())
 """Attributes without an effect on us."""
@@ -154,6 +162,7 @@ class Compiled:
     world: ScenarioMap  # the world, for positions
     root: Element  # root element with the values of the parameters
     properties: dict[str, str]  # properties of the file
+    notes: tuple[str, ...]  # what has no effect although it is supported, with file and line
 
 
 def compile_scenario(root: Element, family: str) -> Compiled:
@@ -166,17 +175,19 @@ def compile_scenario(root: Element, family: str) -> Compiled:
     board = root.child("Storyboard")
     environment = run_init(board, world)
     weather = weather_of(environment)
-    read_story(board, world).play(world)
+    notes = tuple(read_story(board, world).play(world))
     for node in (root.node, *catalogs.visited):
         check_used(node, IGNORED_TAGS, IGNORED_ATTRIBUTES)
     ego = next((item for name, item in movers.items() if name.lower() == EGO), None)
     if ego is None:
         raise root.child("Entities").error("the scenario needs an entity with the name Ego")
     with root.locate_errors():
-        return _compile(root, world, ego, family, weather)
+        return _compile(root, world, ego, family, weather, notes)
 
 
-def _compile(root: Element, world: ScenarioMap, ego: Mover, family: str, weather: str) -> Compiled:
+def _compile(
+    root: Element, world: ScenarioMap, ego: Mover, family: str, weather: str, notes: tuple[str, ...]
+) -> Compiled:
     others = [item for item in world.movers.values() if item is not ego and not item.deleted]
     contact, target = _first_contact(ego, [item for item in others if item.body.kind != "road_marking"])
     header = root.find("FileHeader")
@@ -202,7 +213,7 @@ def _compile(root: Element, world: ScenarioMap, ego: Mover, family: str, weather
         ego_width=ego.body.width,
         ego_reference=_pose(ego, start)[1] if _bends(ego, start) else 0.0,
     )
-    return Compiled(scenario, weather, start, contact, ego, target, world, root, properties)
+    return Compiled(scenario, weather, start, contact, ego, target, world, root, properties, notes)
 
 
 def _start(contact: float, movers: list[Mover]) -> float:

@@ -5,8 +5,9 @@ The ego drives undisturbed, as on a test track without a braking system.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, inf
+from math import hypot, inf
 
+from lgmd_gym.openscenario.distances import Target, read_distance, relative_velocity
 from lgmd_gym.openscenario.motion import first_true
 from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.parameters import RULES, compare
@@ -46,17 +47,42 @@ def _limit(item: Element) -> Callable[[float], bool]:
 
 def _speed(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     met = _limit(item)
-    return lambda time: met(mover.timeline.at(time).speed * (-1.0 if mover.backwards else 1.0))
+    if _direction(item) is None:
+        return lambda time: met(mover.timeline.at(time).speed)
+    return lambda time: met(mover.signed_speed(time))
 
 
 def _relative_speed(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     met, other = _limit(item), world.mover(item)
+    if item.has("direction"):
+        item.choice("direction", ("longitudinal",))
+        return lambda time: met(-relative_velocity(mover, other, other.place(time), time)[0])
     return lambda time: met(mover.timeline.at(time).speed - other.timeline.at(time).speed)
 
 
 def _acceleration(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     met = _limit(item)
-    return lambda time: met(mover.timeline.at(time).acceleration)
+    sign = -1.0 if mover.backwards else 1.0
+    if _direction(item) is not None:
+        return lambda time: met(sign * mover.timeline.at(time).acceleration)
+
+    def holds(time: float) -> bool:
+        now = mover.timeline.at(time)
+        return met(hypot(now.acceleration, now.speed**2 * mover.path.curvature(now.distance)))
+
+    return holds
+
+
+def _direction(item: Element) -> str | None:
+    """Return the direction of a speed or acceleration; None for the total one, which is never negative."""
+    if item.has("direction"):
+        return item.choice("direction", ("longitudinal",))
+    if item.number("value") < 0.0:
+        raise item.error(
+            f"{item.tag} without direction compares the total, which is never negative, with "
+            f'{item.number("value"):g}; add direction="longitudinal"'
+        )
+    return None
 
 
 def _traveled_distance(item: Element, mover: Mover, world: ScenarioMap) -> Test:
@@ -75,31 +101,9 @@ def _stand_still(item: Element, mover: Mover, world: ScenarioMap) -> Test:
     return holds
 
 
-def _gap(one: Mover, other: Mover, freespace: bool, time: float) -> tuple[float, float]:
-    """Return distance along and across the axis of the first entity; free space is along it, >= 0 [m]."""
-    seen = other.place(time).seen_from(one.place(time))
-    along = seen.x
-    if freespace:
-        ahead, behind = along - one.front - other.rear, -along - one.rear - other.front
-        return max(ahead, behind, 0.0), seen.y
-    return abs(along), seen.y
-
-
 def _relative_distance(item: Element, mover: Mover, world: ScenarioMap) -> Test:
-    met, other, freespace = _limit(item), world.mover(item), item.flag("freespace")
-    kinds = ("longitudinal", "lateral", "cartesianDistance", "euclidianDistance")
-    kind = item.choice("relativeDistanceType", kinds)
-    item.choice("coordinateSystem", ("entity",), "entity")
-    if freespace and kind != "longitudinal":
-        raise item.error("freespace is supported for longitudinal distances only; use freespace=false")
-
-    def holds(time: float) -> bool:
-        along, across = _gap(mover, other, freespace, time)
-        if kind == "longitudinal":
-            return met(along)
-        return met(abs(across) if kind == "lateral" else (along**2 + across**2) ** 0.5)
-
-    return holds
+    met, other, distance = _limit(item), Target(world.mover(item)), read_distance(item, None)
+    return lambda time: met(distance.between(mover, other, time))
 
 
 def _reach_position(item: Element, mover: Mover, world: ScenarioMap) -> Test:
@@ -108,51 +112,26 @@ def _reach_position(item: Element, mover: Mover, world: ScenarioMap) -> Test:
 
 
 def _distance(item: Element, mover: Mover, world: ScenarioMap) -> Test:
-    met, place = _limit(item), world.place(item.child("Position"))
-    _no_freespace(item)
-    return lambda time: met(mover.place(time).distance(place))
+    met, place, distance = _limit(item), world.place(item.child("Position")), read_distance(item)
+    return lambda time: met(distance.between(mover, Target(None, place), time))
 
 
 def _time_to_collision(item: Element, mover: Mover, world: ScenarioMap) -> Test:
-    met, freespace = _limit(item), item.flag("freespace")
-    target = item.child("TimeToCollisionConditionTarget").only("EntityRef", "Position")
-    if target.tag == "EntityRef":
-        other = world.mover(target)
-        return lambda time: met(_closing_time(mover, other, freespace, time))
-    place = world.place(target)
-    _no_freespace(item)
-
-    def holds(time: float) -> bool:
-        speed = mover.timeline.at(time).speed
-        ahead = place.seen_from(mover.place(time)).x
-        return met(ahead / speed if speed > 0.0 and ahead > 0.0 else _NEVER)
-
-    return holds
-
-
-def _closing_time(one: Mover, other: Mover, freespace: bool, time: float) -> float:
-    """Return the present distance divided by the closing speed along the first entity's axis [s]."""
-    here, there = one.place(time), other.place(time)
-    along = _gap(one, other, freespace, time)[0]
-    closing = one.timeline.at(time).speed
-    closing -= other.timeline.at(time).speed * cos(there.heading - here.heading)
-    ahead = there.seen_from(here).x > 0.0
-    return along / closing if closing > 0.0 and ahead else _NEVER
+    met, distance = _limit(item), read_distance(item)
+    found = item.child("TimeToCollisionConditionTarget").only("EntityRef", "Position")
+    is_entity = found.tag == "EntityRef"
+    target = Target(world.mover(found)) if is_entity else Target(None, world.place(found))
+    return lambda time: met(min(distance.time_to_collision(mover, target, time), _NEVER))
 
 
 def _time_headway(item: Element, mover: Mover, world: ScenarioMap) -> Test:
-    met, other, freespace = _limit(item), world.mover(item), item.flag("freespace")
+    met, other, distance = _limit(item), Target(world.mover(item)), read_distance(item)
 
     def holds(time: float) -> bool:
         speed = mover.timeline.at(time).speed
-        return met(_gap(mover, other, freespace, time)[0] / speed if speed > 0.0 else _NEVER)
+        return met(distance.between(mover, other, time) / speed if speed > 0.0 else _NEVER)
 
     return holds
-
-
-def _no_freespace(item: Element) -> None:
-    if item.flag("freespace"):
-        raise item.error(f"{item.tag} with freespace to a position is not supported; use freespace=false")
 
 
 _ENTITY: dict[str, Callable[[Element, Mover, ScenarioMap], Test]] = {
@@ -186,6 +165,8 @@ class Condition:
     jump: Callable[[], float] | None
     edge: str  # edge at which it triggers
     delay: float  # delay of the trigger [s]
+    name: str = ""  # name in the file
+    switch: bool = False  # whether it compares a parameter, so that it is constant on purpose
 
     def first(self, start: float) -> float:
         """Return the first time at or after a start at which the condition triggers [s]; inf for never."""
@@ -199,6 +180,19 @@ class Condition:
         else:
             found = self._change(begin, not self.holds(begin))
         return max(found + self.delay, start)
+
+    def reason(self, start: float) -> str:
+        """Return why the condition does not trigger at or after a start [s]; empty if it does."""
+        if self.first(start) < inf:
+            return ""
+        holds = self.holds(max(start - self.delay, 0.0))
+        if self.edge == "none" or (self.edge == "rising") != holds:
+            return f"condition {self.name!r} never {'ceases to hold' if holds else 'holds'}"
+        state, edge = ("holds", "rising") if holds else ("does not hold", "falling")
+        return (
+            f"condition {self.name!r} {state} from the beginning, so that it has no {edge} edge; "
+            'use conditionEdge="none"'
+        )
 
     def _change(self, start: float, value: bool) -> float:
         """Return the first time at or after a start at which `holds` has a value [s]."""
@@ -232,6 +226,24 @@ class Trigger:
             return start
         return min((self._of_group(group, start) for group in self._groups), default=inf)
 
+    def reason(self, start: float) -> str:
+        """Return why it never triggers at or after a start [s]; empty if parameters switch it off."""
+        on = [
+            group
+            for group in self._groups
+            if not any(condition.switch and condition.reason(start) for condition in group)
+        ]
+        reasons = [self._group_reason(group, start) for group in on]
+        return "; ".join(dict.fromkeys(reasons))
+
+    def _group_reason(self, group: list[Condition], start: float) -> str:
+        names = ", ".join(repr(condition.name) for condition in group)
+        together = (
+            f"the conditions {names} never trigger at the same time; an edge lasts an instant, "
+            'conditionEdge="none" does not'
+        )
+        return next(filter(None, (condition.reason(start) for condition in group)), together)
+
     def _of_group(self, group: list[Condition], start: float) -> float:
         time = max(condition.first(start) for condition in group)
         for _ in range(1000):
@@ -260,12 +272,15 @@ def read_trigger(item: Element | None, world: ScenarioMap, states: States) -> Tr
 
 def _condition(item: Element, world: ScenarioMap, states: States) -> Condition:
     edge, delay = item.choice("conditionEdge", EDGES), item.number("delay", 0.0)
+    if delay < 0.0:
+        raise item.error(f"Condition delay must be >= 0 s, got {delay:g}")
     kind = item.only("ByValueCondition", "ByEntityCondition")
     if kind.tag == "ByValueCondition":
         holds, jump = _by_value(kind, states)
     else:
         holds, jump = entity_test(kind, world), None
-    return Condition(holds, jump, edge, delay)
+    switch = kind.find("ParameterCondition") is not None
+    return Condition(holds, jump, edge, delay, item.text("name", ""), switch)
 
 
 def _by_value(item: Element, states: States) -> tuple[Test, Callable[[], float] | None]:

@@ -84,6 +84,14 @@ class Track:
         pose = self._path.pose(distance)
         return Place(pose.x, -pose.y, -pose.heading).moved(0.0, left)
 
+    def curvature(self, distance: float) -> float:
+        """Return the curvature at a distance along the path [1/m]."""
+        for bend in self.bends:
+            if 0.0 <= distance < bend.length:
+                return bend.curvature + (bend.last_curvature - bend.curvature) * distance / bend.length
+            distance -= bend.length
+        return 0.0
+
     def part(self, start: float, end: float = inf) -> "Track":
         """Return the path from a distance on, without its bends beyond another."""
         bends: list[Bend] = [Bend(-start)] if start < -_SHORTEST and self.bends else []

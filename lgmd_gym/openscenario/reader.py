@@ -1,6 +1,8 @@
 """Reading of OpenSCENARIO XML 1.1 to 1.3 as suites."""
 
 import re
+import warnings
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from os.path import normpath
@@ -8,7 +10,7 @@ from pathlib import Path
 
 from lgmd_gym.benchmark.case import Case, Suite, file_name, repetitions, scenario_case
 from lgmd_gym.camera import CLEAR
-from lgmd_gym.errors import check_path, counted
+from lgmd_gym.errors import InputNote, check_path, counted
 from lgmd_gym.openscenario.compiler import Compiled, compile_scenario
 from lgmd_gym.openscenario.nodes import Element, Node, parse_file
 from lgmd_gym.openscenario.parameters import Assignment, declare, variations
@@ -91,13 +93,31 @@ class Cell:
     fcw_driver: bool  # whether the driver brakes after the alert
 
 
+def notes_of(cells: Sequence[Cell]) -> tuple[str, ...]:
+    """Return the notes of the cells of a file, each once, with the number of cells if it is not all."""
+    counts = Counter(note for cell in cells for note in cell.compiled.notes)
+    total = len(cells)
+    return tuple(
+        note if count == total else f"{note} (in {count} of {counted(total, 'cell')})"
+        for note, count in counts.items()
+    )
+
+
+def _noted(cells: list[Cell]) -> list[Cell]:
+    """Return cells, and warn of their notes."""
+    for note in notes_of(cells):
+        warnings.warn(note, InputNote, stacklevel=3)
+    return cells
+
+
 def read(path: str | Path) -> Suite:
     """Return the cells of an OpenSCENARIO file as a suite.
 
     A case is named `stem/family/variant`: the file's stem, the parameter `Scenario_ID` or else the stem of
     the scenario file, and the ego's speed in km/h with the other varied parameters. In a cell of a file with
     "_FCW" in its stem or `Scenario_ID`, the driver brakes after the agent's alert (`Case.fcw_driver`). An
-    `Environment` at night, in fog or in rain sets the weather.
+    `Environment` at night, in fog or in rain sets the weather. An event that never starts gives a warning of
+    the class `lgmd_gym.errors.InputNote`.
 
     Args:
         path: A scenario, or a file that varies the parameters of one.
@@ -108,7 +128,7 @@ def read(path: str | Path) -> Suite:
     """
     path = check_path("path", path)
     suite = file_name(path.stem)
-    cases = tuple(_case(suite, cell) for cell in read_cells(path))
+    cases = tuple(_case(suite, cell) for cell in _noted(read_cells(path)))
     return Suite(name=suite, cases=cases, about=f"OpenSCENARIO {path.name}")
 
 
@@ -136,7 +156,7 @@ def read_all(paths: Sequence[str | Path]) -> Suite:
     cases: list[Case] = []
     for file, parts in zip(files, stems, strict=True):
         inside = "/".join(file_name(part) for part in parts[common:])
-        cases += [_case(suite, cell, f"{inside}/") for cell in read_cells(file)]
+        cases += [_case(suite, cell, f"{inside}/") for cell in _noted(read_cells(file))]
     return Suite(name=suite, cases=tuple(cases), about=f"OpenSCENARIO, {counted(len(files), 'file')}")
 
 

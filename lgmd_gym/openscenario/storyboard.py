@@ -5,7 +5,7 @@ from math import inf
 
 from lgmd_gym.openscenario.actions import ActionRun, global_action, private_action, settle
 from lgmd_gym.openscenario.conditions import States, Trigger, read_trigger
-from lgmd_gym.openscenario.nodes import Element
+from lgmd_gym.openscenario.nodes import Element, Node
 from lgmd_gym.openscenario.parameters import declare
 from lgmd_gym.openscenario.world import Mover, ScenarioMap
 
@@ -18,6 +18,8 @@ class Event:
     triggers: tuple[Element | None, Element | None]  # triggers of its act and of the event itself
     groups: list[tuple[str, str]]  # kind and name of the elements that contain it, and its own
     runs: list[tuple[str, ActionRun]]  # its actions; empty if none has an effect
+    maneuver: Node  # the maneuver that contains it
+    skips: bool  # whether it does not start while another event of its maneuver runs (priority "skip")
     started: float = inf  # start [s]; inf before
     ended: float = inf  # end [s]; inf before the start
 
@@ -30,26 +32,42 @@ class Storyboard:
     # start and end of acts, maneuvers, events and actions by kind and name [s]
     states: States = field(default_factory=States)
 
-    def play(self, world: ScenarioMap) -> None:
-        """Carry out all events that have an effect, in the order of their triggers."""
+    def play(self, world: ScenarioMap) -> list[str]:
+        """Carry out all events that have an effect, in the order of their triggers.
+
+        Returns:
+            A note with file and line for each event with an effect that never starts, unless a
+            `ParameterCondition` switches it off.
+        """
         waiting = [event for event in self.events if self._matters(event)]
         for event in self.events:
             if event not in waiting:
                 for trigger in event.triggers:
                     if trigger is not None:
                         trigger.skip()
-        triggers = [[read_trigger(item, world, self.states) for item in event.triggers] for event in waiting]
-        now = 0.0
+        triggers = [
+            (read_trigger(act, world, self.states), read_trigger(own, world, self.states))
+            for act, own in (event.triggers for event in waiting)
+        ]
+        now = last = 0.0
         while waiting:
             times = [_start(act, own, now) for act, own in triggers]
             now = min(times)
             if now == inf:
-                for event in waiting:
-                    event.item.skip()
-                return
+                break
             index = times.index(now)
             triggers.pop(index)
             self._carry_out(waiting.pop(index), now)
+            last = now
+        for event in waiting:
+            event.item.skip()
+        notes: list[str] = []
+        for event, (act, own) in zip(waiting, triggers, strict=True):
+            reason = _reason(act, own, last)
+            if event.runs and reason:
+                name = event.item.text("name", "")
+                notes.append(str(event.item.error(f"event {name!r} never starts: {reason}")))
+        return notes
 
     def _matters(self, event: Event) -> bool:
         """Return whether an event changes the motion, or another event that does refers to it."""
@@ -66,6 +84,13 @@ class Storyboard:
         )
 
     def _carry_out(self, event: Event, now: float) -> None:
+        if event.skips and any(
+            other.maneuver is event.maneuver and other.started <= now < other.ended for other in self.events
+        ):
+            raise event.item.error(
+                f"Event priority='skip' while another event of its Maneuver runs, at {now:.3g} s, is not "
+                "supported; use override"
+            )
         event.started = event.ended = now
         for name, run in event.runs:
             end = run(now)
@@ -81,6 +106,21 @@ def _start(act: Trigger, own: Trigger, now: float) -> float:
     """Return the time at which an event starts, given the triggers of its act and its own [s]."""
     begun = act.first(0.0)
     return own.first(max(begun, now)) if begun < inf else inf
+
+
+def _reason(act: Trigger, own: Trigger, now: float) -> str:
+    """Return why an event never starts; empty if parameters switch it off.
+
+    Args:
+        act: Trigger of its act.
+        own: Its own trigger.
+        now: Last start of another event [s].
+    """
+    begun = act.first(0.0)
+    if begun < inf:
+        return own.reason(max(begun, now))
+    reason = act.reason(0.0)
+    return f"its act does not: {reason}" if reason else ""
 
 
 def _references(trigger: Element) -> list[Element]:
@@ -143,10 +183,11 @@ def _group_events(
     for maneuver in maneuvers:
         for event in maneuver.all("Event"):
             _once(event)
-            event.choice("priority", ("override", "overwrite", "parallel", "skip"))
+            priority = event.choice("priority", ("override", "overwrite", "parallel", "skip"))
             names = [*outer, ("maneuver", maneuver.text("name")), ("event", event.text("name"))]
             runs = [run for action in event.all("Action") for run in _runs(action, movers, world)]
-            events.append(Event(event, (trigger, event.find("StartTrigger")), names, runs))
+            triggers = trigger, event.find("StartTrigger")
+            events.append(Event(event, triggers, names, runs, maneuver.node, priority == "skip"))
     return events
 
 

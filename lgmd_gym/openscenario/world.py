@@ -72,6 +72,11 @@ class Mover:
         place = self.path.at(self.timeline.at(time).distance)
         return place.turned(pi) if self.backwards else place
 
+    def signed_speed(self, time: float) -> float:
+        """Return the speed in the direction of the body at a time [s], negative backwards [m/s]."""
+        speed = self.timeline.at(time).speed
+        return -speed if self.backwards else speed
+
     @property
     def front(self) -> float:
         """Distance from the reference point to the front [m]."""
@@ -201,7 +206,7 @@ class ScenarioMap:
         _check_upright(orientation)
         if orientation.choice("type", ("absolute", "relative"), "absolute") == "relative":
             return base.turned(orientation.number("h", 0.0))
-        return base._replace(heading=orientation.number("h", base.heading))
+        return base._replace(heading=orientation.number("h"))
 
     def _WorldPosition(self, item: Element, time: float) -> Place:
         _check_upright(item)
@@ -283,7 +288,7 @@ class ScenarioMap:
             return self._polyline(shape)
         if shape.tag == "Clothoid":
             length, first = shape.number("length"), shape.number("curvature")
-            slope = shape.number("curvaturePrime" if shape.has("curvaturePrime") else "curvatureDot", 0.0)
+            slope = shape.number("curvatureDot" if shape.has("curvatureDot") else "curvaturePrime")
             bend = Bend(length, first, first + slope * length if slope else None)
             return Track(self.place(shape.child("Position")), (bend,))
         return self._spline(shape, current)

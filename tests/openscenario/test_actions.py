@@ -69,10 +69,11 @@ def test_synchronisation(tmp_path):
     master = SYNC.replace(
         '<AbsoluteSpeed value="4">', '<RelativeSpeedToMaster value="-6" speedTargetValueType="delta">'
     ).replace("/AbsoluteSpeed", "/RelativeSpeedToMaster")
-    (same,) = segments(
-        tmp_path, story("Target", event("E", master.replace(' speedTargetValueType="delta"', "")))
+    factor = master.replace(
+        'value="-6" speedTargetValueType="delta"', 'value="0.4" speedTargetValueType="factor"'
     )
-    assert same == found
+    for action in (master, factor):
+        assert segments(tmp_path, story("Target", event("E", action, at(0.5)))) == [found]
 
 
 def test_distances_are_set_at_the_start(tmp_path):
@@ -99,6 +100,40 @@ def test_a_continuous_distance_copies_the_speed(tmp_path):
     init = START + teleport("Third", lane_position(170, 1)) + keep
     found = segments(tmp_path, story("Target", event("E", AWAY, at(1))), init, "Third", entities=entities)
     assert found == [Segment(start=1.0, acceleration=2.0, final_speed=6.0)]
+
+
+def test_a_distance_along_a_bend_is_refused(tmp_path):
+    """On a straight road along the entity, coordinates of road and entity agree; round the corner not."""
+    action = (
+        '<LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" distance="30" freespace="false" '
+        'continuous="false" displacement="leadingReferencedEntity" coordinateSystem="road"/>'
+        "</LongitudinalAction>"
+    )
+    init = (
+        teleport("Ego", lane_position(40))
+        + private("Ego", speed(5))
+        + teleport("Target", lane_position(45))
+        + private("Target", action)
+    )
+    found = compiled(tmp_path, scenario(init), roads=CORNER)
+    assert found.world.movers["Target"].place().x == pytest.approx(70.0)
+    with pytest.raises(
+        ValueError, match=r"case\.xosc:\d+: .*coordinateSystem='road' is supported on a straight"
+    ):
+        compiled(tmp_path, scenario(init.replace('"30"', '"80"')), roads=CORNER)
+
+
+@pytest.mark.parametrize(
+    ("mode", "message"), [("position", ""), ("follow", "followingMode='follow' is not supp")]
+)
+def test_following_mode_of_a_change_of_speed(tmp_path, mode, message):
+    action = AWAY.replace("dynamicsShape", f'followingMode="{mode}" dynamicsShape')
+    text = scenario(START, story("Target", event("E", action, at(1))))
+    if not message:
+        assert compiled(tmp_path, text).world.movers["Target"].timeline.segments[0].start == 1.0
+        return
+    with pytest.raises(ValueError, match=rf"case\.xosc:\d+: .*{message}"):
+        compiled(tmp_path, text)
 
 
 def delete(time):

@@ -4,9 +4,12 @@ The ego starts at s = 100 m with 10 m/s; the target stands 60 m ahead of it. Bot
 reference point in their centre: the ego has contact after 5.6 s.
 """
 
+import re
+
 import pytest
 from support.openscenario import (
     AWAY,
+    CORNER,
     START,
     at,
     compiled,
@@ -14,11 +17,15 @@ from support.openscenario import (
     event,
     lane_position,
     parameter,
+    private,
     scenario,
     segments,
     speed,
     story,
+    teleport,
     value_condition,
+    vehicle,
+    world_position,
 )
 
 from lgmd_gym.openscenario.conditions import meets
@@ -50,6 +57,9 @@ TTC = (
 TTC_PLACE = TTC.replace(
     '<EntityRef entityRef="Target"/>', f"<Position>{lane_position(180)}</Position>"
 ).replace("true", "false")
+# The target 10 m to the left; between the boxes, 56 m and 8 m.
+BESIDE = START.replace(lane_position(160), '<RelativeObjectPosition entityRef="Ego" dx="60" dy="10"/>')
+HEADWAY = '<TimeHeadwayCondition entityRef="Target" value="4" rule="lessOrEqual" freespace="false"/>'
 PLACE = f"<Position>{lane_position(130)}</Position>"
 REACH = f'<ReachPositionCondition tolerance="2">{PLACE}</ReachPositionCondition>'
 NEAR = f'<DistanceCondition value="15" rule="lessThan" freespace="false">{PLACE}</DistanceCondition>'
@@ -67,18 +77,141 @@ NEAR = f'<DistanceCondition value="15" rule="lessThan" freespace="false">{PLACE}
         (TTC, 3.6),  # 56 m less 36 m at 10 m/s
         (TTC_PLACE, 6.0),  # 80 m less 60 m
         ('<TimeHeadwayCondition entityRef="Target" value="3" rule="lessOrEqual" freespace="true"/>', 2.6),
+        (HEADWAY, 2.0),
         (REACH, 2.8),
         (NEAR, 1.5),
         ('<SpeedCondition value="9.5" rule="greaterThan"/>', 0.0),
         ('<SpeedCondition value="9.5" rule="lessThan"/>', None),
         (relative("RelativeSpeedCondition", "greaterThan", 9), 0.0),
-        ('<AccelerationCondition value="-1" rule="lessThan"/>', None),
+        ('<AccelerationCondition value="-1" rule="lessThan" direction="longitudinal"/>', None),
+        ('<AccelerationCondition value="1" rule="lessThan"/>', 0.0),
+        ('<SpeedCondition value="9.5" rule="greaterThan" direction="longitudinal"/>', 0.0),
+        (relative("RelativeSpeedCondition", "greaterThan", 9, 'direction="longitudinal"'), 0.0),
         ('<StandStillCondition duration="1"/>', None),
     ],
 )
 def test_conditions_of_entities(tmp_path, condition, time):
     found = started(tmp_path, entity_condition(condition))
     assert found == (None if time is None else pytest.approx(time, abs=1e-6))
+
+
+@pytest.mark.parametrize(
+    ("more", "time"),
+    [
+        ("", 6.0 - (40.0**2 - 10.0**2) ** 0.5 / 10.0),  # Euclidean without a type
+        ('relativeDistanceType="euclidianDistance"', 6.0 - (40.0**2 - 10.0**2) ** 0.5 / 10.0),
+        ('relativeDistanceType="cartesianDistance"', 6.0 - (40.0**2 - 10.0**2) ** 0.5 / 10.0),
+        ('relativeDistanceType="longitudinal" coordinateSystem="entity"', 2.0),
+        ('relativeDistanceType="lateral"', 0.0),
+        ('alongRoute="false" routingAlgorithm="undefined"', 6.0 - (40.0**2 - 10.0**2) ** 0.5 / 10.0),
+    ],
+)
+def test_distance_types_of_a_headway(tmp_path, more, time):
+    found = started(tmp_path, entity_condition(HEADWAY.replace("/>", f" {more}/>")), init=BESIDE)
+    assert found == pytest.approx(time, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "time"),
+    [
+        ("longitudinal", 20, 3.6),
+        ("lateral", 8.5, 0.0),
+        ("euclidianDistance", 10, 5.0),  # 6 m along and 8 m across
+    ],
+)
+def test_free_space_between_boxes(tmp_path, kind, value, time):
+    condition = distance(kind, value, rule="lessOrEqual", freespace="true")
+    assert started(tmp_path, entity_condition(condition), init=BESIDE) == pytest.approx(time, abs=1e-6)
+
+
+def test_free_space_to_a_body_that_faces_the_other_way(tmp_path):
+    """The reference points are rear axles, 1 m behind the centres: 60 - 3 - 3 m between the fronts."""
+    oncoming = START.replace(lane_position(160), world_position(160, -1.75, 3.141592653589793))
+    found = segments(
+        tmp_path,
+        story("Target", event("E", AWAY, entity_condition(distance("longitudinal", 20, freespace="true")))),
+        oncoming,
+        entities=vehicle("Ego", x=1.0) + vehicle("Target", x=1.0),
+    )
+    assert found[0].start == pytest.approx(3.4, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "time"), [("", 2.5, 4.0), ("longitudinal", 2, 4.0), ("longitudinal", 2.5, 3.5)]
+)
+def test_time_to_collision_uses_its_distance(tmp_path, kind, value, time):
+    """The Euclidean time is (x² + 10²) / (10 x) s at x = 60 - 10 t: 2.5 s at 20 m."""
+    more = f'relativeDistanceType="{kind}"' if kind else ""
+    condition = TTC.replace('freespace="true"', f'freespace="false" {more}').replace(
+        'value="2"', f'value="{value}"'
+    )
+    assert started(tmp_path, entity_condition(condition), init=BESIDE) == pytest.approx(time, abs=1e-6)
+
+
+CORNER_ROUTE = (
+    '<RoutingAction><AcquirePositionAction><Position><RoadPosition roadId="2" s="90" t="0"/></Position>'
+    "</AcquirePositionAction></RoutingAction>"
+)
+
+
+def test_total_acceleration_in_a_curve(tmp_path):
+    """10 m/s on the arc with a radius of 11.75 m, 30 m ahead: 8.5 m/s² across, none along."""
+    init = private(
+        "Ego", f"<TeleportAction><Position>{lane_position(70)}</Position></TeleportAction>", speed(10)
+    ) + teleport("Target", world_position(111.75, 60))
+    init = init.replace("</Private>", f"<PrivateAction>{CORNER_ROUTE}</PrivateAction></Private>", 1)
+    for more, expected in (("", [3.0]), ('direction="longitudinal"', [])):
+        trigger = entity_condition(f'<AccelerationCondition value="8" rule="greaterThan" {more}/>')
+        found = compiled(tmp_path, scenario(init, story("Target", event("E", AWAY, trigger))), roads=CORNER)
+        starts = [item.start for item in found.world.movers["Target"].timeline.segments]
+        assert starts == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("trigger", "reason"),
+    [
+        (value_condition('<SimulationTimeCondition value="1" rule="lessThan"/>', "rising"),
+         "condition 'c' holds from the beginning, so that it has no rising edge"),
+        (value_condition('<SimulationTimeCondition value="0" rule="lessThan"/>', "falling"),
+         "condition 'c' does not hold from the beginning, so that it has no falling edge"),
+        (entity_condition('<SpeedCondition value="9.5" rule="lessThan"/>'), "condition 'c' never holds"),
+        (entity_condition('<SpeedCondition value="9.5" rule="greaterThan"/>', edge="falling"),
+         "condition 'c' never ceases to hold"),
+    ],
+)  # fmt: skip
+def test_events_that_never_start_are_noted(tmp_path, trigger, reason):
+    found = compiled(tmp_path, scenario(START, story("Target", event("E", AWAY, trigger))))
+    (note,) = found.notes
+    assert re.search(rf"case\.xosc:\d+: event 'E' never starts: {reason}", note)
+
+
+def test_reasons_for_events_that_never_start(tmp_path):
+    never = value_condition('<SimulationTimeCondition value="1" rule="lessThan"/>', "rising")
+    apart = both(at(1).replace('"none" delay="0"', '"rising" delay="2"'),
+                 at(1.5).replace('"none" delay="0"', '"rising" delay="2"'))  # fmt: skip
+    texts = [
+        story("Target", event("E", AWAY, apart)),
+        story("Target", event("E", AWAY, at(1)), trigger=never),
+        story("Target", event("E", AWAY, at(1))),
+        story("Target", event("Light", "<AppearanceAction><LightStateAction/></AppearanceAction>", never)),
+    ]
+    notes = [compiled(tmp_path, scenario(START, text)).notes for text in texts]
+    assert "the conditions 'c', 'c' never trigger at the same time" in notes[0][0]
+    assert "its act does not: condition 'c' holds from the beginning" in notes[1][0]
+    assert notes[2:] == [(), ()]  # it starts; and it has no effect
+    off = value_condition('<ParameterCondition parameterRef="x" rule="equalTo" value="1"/>')
+    for text in (event("E", AWAY, off), event("E", AWAY, both(off, at(1)))):
+        found = compiled(tmp_path, scenario(START, story("Target", text), parameters=parameter("x", "3")))
+        assert found.notes == ()  # switched off by a parameter
+
+
+def test_an_event_that_would_be_skipped_is_refused(tmp_path):
+    first, second = event("First", AWAY, at(1)), event("Second", speed(0, "rate", "linear", 3), at(2))
+    text = scenario(START, story("Target", first, second.replace("override", "skip")))
+    with pytest.raises(ValueError, match=r"case\.xosc:\d+: Event priority='skip' while another .* at 2 s"):
+        compiled(tmp_path, text)
+    late = scenario(START, story("Target", first, second.replace("override", "skip").replace('"2"', '"5"')))
+    assert len(compiled(tmp_path, late).world.movers["Target"].timeline.segments) == 2
 
 
 def test_standstill_of_the_target(tmp_path):
@@ -177,9 +310,21 @@ def test_an_event_without_effect_can_start_others(tmp_path):
         (at(1, "equalTo"), "SimulationTimeCondition rule='equalTo' is not supported"),
         (value_condition('<ParameterCondition parameterRef="y" rule="equalTo" value="1"/>'),
          "unknown parameter 'y'"),
-        (entity_condition(distance("lateral", 1, freespace="true")), "freespace is supported for long"),
+        (entity_condition('<AccelerationCondition value="-1" rule="lessThan"/>'),
+         "without direction compares"),
+        (entity_condition('<SpeedCondition value="-1" rule="lessThan"/>'), "without direction compares"),
+        (entity_condition('<SpeedCondition value="1" rule="lessThan" direction="vertical"/>'),
+         "direction='vertical' is not supported; use longitudinal"),
+        (entity_condition(HEADWAY.replace("/>", ' alongRoute="true"/>')), "alongRoute=true is not"),
+        (entity_condition(HEADWAY.replace("/>", ' coordinateSystem="road"/>')),
+         "coordinateSystem='road' is not"),
+        (entity_condition(HEADWAY.replace("/>", ' routingAlgorithm="fastest"/>')),
+         "routingAlgorithm='fastest' is not"),
+        (entity_condition(NEAR.replace('freespace="false"', 'coordinateSystem="lane" freespace="false"')),
+         "coordinateSystem='lane' is not"),
         (entity_condition(distance("longitudinal", 1).replace("/>", ' coordinateSystem="lane"/>')),
          "coordinateSystem='lane' is not supported; use entity"),
+        (entity_condition(REACH, delay=-1), "Condition delay must be >= 0 s, got -1"),
         ("<StartTrigger/>", "StartTrigger must contain a Condition"),
     ],
 )  # fmt: skip
