@@ -1,6 +1,8 @@
 """`Policy`: a stable-baselines3 model as an agent."""
 
+import copy
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -16,6 +18,7 @@ from lgmd_gym.agents.policies.features import (
     announce_pickle,
     load_normalizer,
 )
+from lgmd_gym.agents.policies.network import dense_layers, run_dense
 from lgmd_gym.errors import check_path, check_text, check_within, shown, unknown_name
 from lgmd_gym.processes.extras import missing_extra
 
@@ -133,6 +136,10 @@ class Policy(BatchAgent):
         self.features = raw if self.card.features is None else self.card.features
         name = self.card.vec_normalize
         self._normalizer = None if name is None else load_normalizer(file.parent / name)
+        dense = dense_layers(self.network)
+        self._values = (
+            partial(action_values, self.network) if dense is None else partial(run_dense, dense, names)
+        )
         super().__init__()
 
     def _check_network(self, file: Path, names: tuple[str, ...]) -> None:
@@ -216,7 +223,7 @@ class Policy(BatchAgent):
     def decide(self, inputs: dict[str, np.ndarray]) -> list[float]:
         """Return the demands for the inputs of several environments, arrays of shape (M, …)."""
         count = len(next(iter(inputs.values())))
-        values = action_values(self.network, inputs) if self.card.demands and count > 1 else None
+        values = self._values(inputs) if self.card.demands and count > 1 else None
         if values is None or values.shape[1] < 2:
             return [self._decide_alone(inputs, row) for row in range(count)]
         second, best = np.sort(values, axis=1)[:, -2:].T
@@ -230,9 +237,13 @@ class Policy(BatchAgent):
 
     def _decide_alone(self, inputs: dict[str, np.ndarray], row: int) -> float:
         """Return the demand for the inputs of one environment, by themselves."""
+        demands = self.card.demands
+        if demands:
+            values = self._values({name: values[row : row + 1] for name, values in inputs.items()})
+            if values is not None:
+                return demands[int(values[0].argmax())]
         alone = {name: values[row] for name, values in inputs.items()}
         action, _ = self.network.predict(alone, deterministic=True)
-        demands = self.card.demands
         return demands[int(action)] if demands else float(np.reshape(action, -1)[0])
 
     def _allocate(self, num_envs: int) -> None:
@@ -301,7 +312,7 @@ def _load_network(path: Path, card: PolicyCard) -> Any:
     torch.set_num_threads(1)  # small network; episodes run in parallel processes; see `Policy`
     try:
         if card.network is not None:
-            return card.network.load(path, card.algo, len(card.demands) if card.demands else None)
+            return _described_network(path, card)
         announce_pickle(path)
         return getattr(stable_baselines3, card.algo.upper()).load(path, device="cpu").policy
     except Exception as error:  # of the archive, pickle, PyTorch or stable-baselines3
@@ -310,3 +321,23 @@ def _load_network(path: Path, card: PolicyCard) -> Any:
             f"policy {shown(str(path))} cannot be loaded with algo {shown(card.algo)} ({reason}); "
             "correct its card, or train it again"
         ) from None
+
+
+_LOADED: dict[tuple[object, ...], Any] = {}  # the last networks
+_MAX_LOADED = 4
+
+
+def _described_network(path: Path, card: PolicyCard) -> Any:
+    """Return the network that a card describes; a copy, because a margin changes it.
+
+    The last networks are remembered: loading takes half a second, and a benchmark makes an agent per episode.
+    """
+    assert card.network is not None
+    state = path.stat()
+    key = (path.resolve(), state.st_mtime_ns, state.st_size, repr(card))
+    if key not in _LOADED:
+        network = card.network.load(path, card.algo, len(card.demands) if card.demands else None)
+        if len(_LOADED) >= _MAX_LOADED:
+            _LOADED.clear()
+        _LOADED[key] = network
+    return copy.deepcopy(_LOADED[key])

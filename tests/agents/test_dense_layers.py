@@ -1,0 +1,62 @@
+"""Networks of vectors only are run without the checks of stable-baselines3, with the same values."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.policies.network import NetworkSpec, dense_layers, run_dense
+from lgmd_gym.agents.policies.policy import Policy, action_values
+
+INPUTS = {"columns": (6,), "ego_speed": (1,)}
+FRAME = INPUTS | {"frame": (1, 36, 36)}
+
+
+def network(policy="MultiInputPolicy", algo="ppo", actions=2, inputs=INPUTS, **kwargs):
+    return NetworkSpec(policy=policy, inputs=inputs, policy_kwargs=kwargs).build(algo, actions)
+
+
+@pytest.mark.parametrize("name", ["zones", "all-round"])
+@pytest.mark.parametrize("count", [1, 5])
+def test_margins_between_the_actions_of_the_shipped_policies_are_the_same(name, count):
+    policy = Policy(name)
+    names, rng = tuple(policy.network.observation_space.spaces), np.random.default_rng(3)
+    spaces = policy.network.observation_space.spaces
+    inputs = {key: rng.random((count, *space.shape), np.float32) for key, space in spaces.items()}
+    layers = dense_layers(policy.network)
+    assert layers is not None
+    direct, reference = run_dense(layers, names, inputs), action_values(policy.network, inputs)
+    assert direct.shape == reference.shape == (count, 2)
+    assert np.allclose(np.diff(direct), np.diff(reference), rtol=1e-5, atol=1e-5)
+
+
+def test_q_values_are_the_same():
+    policy = network(algo="dqn", actions=3, net_arch=[8])
+    inputs = {"columns": np.ones((2, 6), np.float32), "ego_speed": np.full((2, 1), 0.5, np.float32)}
+    layers = dense_layers(policy)
+    assert layers is not None
+    values = run_dense(layers, ("columns", "ego_speed"), inputs)
+    assert np.allclose(values, action_values(policy, inputs), atol=1e-6)
+
+
+def test_networks_with_frames_or_continuous_actions_are_left_to_stable_baselines3():
+    assert dense_layers(network(inputs=FRAME)) is None
+    assert dense_layers(network(actions=None)) is None
+
+
+def test_a_margin_changes_only_its_own_policy():
+    plain, late, again = (Policy("zones", margin) for margin in (0.0, 2.0, 0.0))
+    bias, brake = plain.network.action_net.bias, int(np.argmin(plain.card.demands))
+    assert late.network.action_net.bias[brake].item() == pytest.approx(bias[brake].item() - 2.0)
+    assert again.network.action_net.bias.tolist() == bias.tolist()
+
+
+def test_a_changed_file_is_loaded_again(tmp_path):
+    from lgmd_gym.agents.policies.policy import SHIPPED
+
+    file = tmp_path / "mine.zip"
+    file.write_bytes((SHIPPED / "zones.zip").read_bytes())
+    first = make_agent(f"policy:{file}").agent.network.action_net.weight.shape
+    file.write_bytes((SHIPPED / "all-round.zip").read_bytes())
+    assert make_agent(f"policy:{file}").agent.network.action_net.weight.shape != first
