@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     import gymnasium as gym
     from highway_env.road.road import RoadNetwork
 
+    from lgmd_gym.camera.road_geometry import RoadGeometry
+
 
 class Sensors(Protocol):
     """Cameras of the environments, and what processes their frames; see `SensorArray`."""
@@ -157,17 +159,20 @@ class Simulation:
             self._link()
         self.brakes[index] = brake.record(self._throttle)
 
-    def equip(self, index: int, scene: Scene, network: "RoadNetwork") -> None:
+    def equip(
+        self, index: int, scene: Scene, network: "RoadNetwork", geometry: "RoadGeometry | None" = None
+    ) -> None:
         """Prepare the cameras, if any, for the episode of environment `index`.
 
         Args:
             index: Index of the environment.
             scene: Scene of the episode.
             network: highway-env road network of the episode.
+            geometry: Its geometry in the scene, if it is known.
         """
         if self.sensors is not None:
             self.sensors.set_scene(index, scene, float(self.brakes["max_deceleration"][index]))
-            self.sensors.set_road(index, network)
+            self.sensors.set_road(index, network, geometry)
 
     def start(self, selected: np.ndarray) -> None:
         """Start the loaded episodes of the selected environments, bool, shape (N,), with a first frame."""

@@ -70,6 +70,23 @@ Fields of `Mount`, `Scene` and `ImageSensor`; amplitude of the road in `ROADS`; 
 """
 
 
+SHAKE = np.dtype(
+    [
+        *((name, np.int64) for name in ("seed", "stabilised")),
+        *((name, np.float64) for name in ("time_s", "pitch", "roll", "yaw", "heave")),
+    ]
+)
+"""The motion of the body at one time, which all cameras of a car share: seed, whether the rotations are those
+that a gyroscope leaves, time [s]; rotations [degrees] and heave [m] at `MEAN_SPEED`."""
+
+
+def no_shake() -> np.ndarray:
+    """Return a `SHAKE` record of no time, shape (1,)."""
+    shake = np.zeros(1, SHAKE)
+    shake["time_s"] = np.nan
+    return shake
+
+
 def mount_of(camera: Camera, scene: Scene, max_deceleration: float = USUAL_BRAKE) -> np.ndarray:
     """Return the `MOUNT` record of a camera, shape ().
 
@@ -179,28 +196,36 @@ def aim_focal(aim, depth):
 
 
 @kernel(exact=True, arrays=True)
-def _rotation(mount, axis, time_s):
-    """Return the rotation of a lens about one axis due to the road, at `MEAN_SPEED` [degrees]."""
+def _shake_body(mount, time_s, shake):
+    """Write the motion of the body due to the road to a `SHAKE` record, unless it is that already."""
+    if shake.time_s == time_s and shake.seed == mount.seed and shake.stabilised == mount.stabilised:
+        return
+    shake.time_s, shake.seed, shake.stabilised = time_s, mount.seed, mount.stabilised
+    shake.heave = body_motion(mount.seed, HEAVE, time_s)
     if mount.stabilised != 0:
-        return residual_motion(mount.seed, axis, time_s)
-    return body_motion(mount.seed, axis, time_s)
+        shake.pitch = residual_motion(mount.seed, PITCH, time_s)
+        shake.roll = residual_motion(mount.seed, ROLL, time_s)
+        shake.yaw = residual_motion(mount.seed, YAW, time_s)
+    else:
+        shake.pitch = body_motion(mount.seed, PITCH, time_s)
+        shake.roll = body_motion(mount.seed, ROLL, time_s)
+        shake.yaw = body_motion(mount.seed, YAW, time_s)
 
 
 @kernel(exact=True, arrays=True)
-def _tilt(mount, scene, time_s, turn, gain):
+def _tilt(mount, scene, turn, gain, shake):
     """Return the pitch upwards and the roll to the right of a camera due to the road and braking [rad].
 
     Args:
         mount: `MOUNT` record.
         scene: `SCENE` record.
-        time_s: Time [s].
         turn: Direction of the camera relative to the car [rad]; to its side, the pitch of the body is roll.
         gain: See `road_gain`.
+        shake: `SHAKE` record.
     """
     pitch = roll = 0.0
     if gain > 0.0:
-        body_pitch = gain * _rotation(mount, PITCH, time_s)
-        body_roll = gain * _rotation(mount, ROLL, time_s)
+        body_pitch, body_roll = gain * shake.pitch, gain * shake.roll
         c, s = math.cos(turn), math.sin(turn)
         pitch, roll = body_pitch * c - body_roll * s, body_roll * c + body_pitch * s
     if mount.dive_deg > 0.0:
@@ -219,13 +244,14 @@ def _yaw_on_car(mount, scene):
 
 
 @kernel(exact=True, arrays=True)
-def pose_lens(mount, scene, ago_s, lens):
+def pose_lens(mount, scene, ago_s, shake, lens):
     """Write the pose of a camera's lens to a `LENS` record.
 
     Args:
         mount: `MOUNT` record.
         scene: `SCENE` record.
         ago_s: Time before the scene, at which the ego was on its present circle [s].
+        shake: `SHAKE` record of the car's last lens, which is brought to this time.
         lens: Record to write.
     """
     x, y, heading, time_s = scene.x, scene.y, scene.heading, scene.time_s
@@ -244,11 +270,12 @@ def pose_lens(mount, scene, ago_s, lens):
     c, s = math.cos(heading), math.sin(heading)
     z = mount.height
     gain = road_gain(mount.road, scene.speed)
-    tilt, roll = _tilt(mount, scene, time_s, math.radians(yaw_deg), gain)
     if gain > 0.0:
-        # Above the ground.
-        z = max(z + gain * body_motion(mount.seed, HEAVE, time_s), 0.1 * z)
-        yaw_deg += gain * _rotation(mount, YAW, time_s)
+        _shake_body(mount, time_s, shake)
+    tilt, roll = _tilt(mount, scene, math.radians(yaw_deg), gain, shake)
+    if gain > 0.0:
+        z = max(z + gain * shake.heave, 0.1 * z)  # above the ground
+        yaw_deg += gain * shake.yaw
     yaw = heading + math.radians(yaw_deg) + rounding
     pitch, focal = math.radians(mount.pitch_deg) + tilt, mount.focal
     lens.turn = 0.0

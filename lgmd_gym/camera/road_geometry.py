@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from lgmd_gym.camera.clutter import draw_clutter, place_clutter
-from lgmd_gym.camera.objects import OBJECT
+from lgmd_gym.camera.objects import OBJECT, sorted_by_x
 from lgmd_gym.camera.roadside import guard_rails, posts_and_plants
 
 if TYPE_CHECKING:
@@ -73,11 +73,13 @@ def road_geometry(
         known = _CACHE.setdefault(network, {})
     except TypeError:  # not hashable or without weak references: no cache
         return _extract(_lanes(network), *key)
-    if key not in known:
+    geometry = known.get(key)  # another thread may clear the dictionary at any time
+    if geometry is None:
+        geometry = _extract(_lanes(network), *key)
         if len(known) >= _MAX_KNOWN:  # each world has a roadside of its own
             known.clear()
-        known[key] = _extract(_lanes(network), *key)
-    return known[key]
+        known[key] = geometry
+    return geometry
 
 
 def network_of(road: "Road | RoadNetwork") -> Any:
@@ -119,15 +121,13 @@ def _roadside_of(
 ) -> np.ndarray:
     """Return the roadside, cached by the shape of the lanes, because each reset builds a new network."""
     pieces = np.frombuffer(segments).reshape(-1, 6)
-    out = posts_and_plants(pieces, roadside, seed)
-    parts = [out]
+    parts = [posts_and_plants(pieces, roadside, seed)]
     if rail:
         parts.append(guard_rails(pieces))
     if cluttered:
         clutter = draw_clutter(np.random.default_rng([seed, 11]))
         parts.append(place_clutter(pieces, clutter, seed, queue_lane=queue_lane))
-    out = np.concatenate(parts)
-    return out[np.argsort(out["x"], kind="stable")]
+    return sorted_by_x(parts)
 
 
 def _stations(lane: "AbstractLane") -> np.ndarray:

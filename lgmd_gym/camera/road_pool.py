@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Sequence
-from hashlib import blake2b
+from hashlib import sha256
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
@@ -29,6 +29,11 @@ def road_key(scene: Scene) -> RoadKey:
     rail = scene.guard_rail or world.guard_rail
     queue_lane = scene.queue_lane if world.drawn else None
     return scene.roadside * world.roadside, scene.noise_seed, rail, world.drawn, queue_lane
+
+
+def scene_geometry(road: "Road | RoadNetwork", scene: Scene) -> RoadGeometry:
+    """Return the geometry of a road in a scene."""
+    return road_geometry(road, *road_key(scene))
 
 
 class RoadArrays(NamedTuple):
@@ -65,7 +70,9 @@ class RoadPool:
         self._used = [0, 0, 0]  # rows of surface, lines and roadside
         self._shared = False  # whether a copy of this pool has the same arrays
 
-    def assign(self, index: int, road: "Road | RoadNetwork", key: RoadKey) -> None:
+    def assign(
+        self, index: int, road: "Road | RoadNetwork", key: RoadKey, geometry: RoadGeometry | None = None
+    ) -> None:
         """Set the road of an environment.
 
         A call with the same network and key as before returns at once: a network must not change.
@@ -74,11 +81,12 @@ class RoadPool:
             index: Environment.
             road: A highway-env `Road` or `RoadNetwork`.
             key: `road_key` of the scene.
+            geometry: Its `road_geometry` for this key, if it is known.
         """
         network, known = network_of(road), self._roads[index]
         if known is not None and network is known[0] and key == known[1]:
             return
-        geometry = road_geometry(network, *key)
+        geometry = road_geometry(network, *key) if geometry is None else geometry
         digest = _digest(geometry)
         if digest not in self._stored:
             self._reserve(geometry)
@@ -125,10 +133,10 @@ class RoadPool:
 
 def _digest(road: RoadGeometry) -> bytes:
     """Return a digest of a geometry's contents."""
-    digest = blake2b(bytes([road.paved]), digest_size=16)
+    digest = sha256(bytes([road.paved]))
     for rows in _rows(road):
         digest.update(len(rows).to_bytes(8, "little"))
-        digest.update(rows.tobytes())
+        digest.update(rows.view(np.uint8).data)
     return digest.digest()
 
 
@@ -138,7 +146,8 @@ def _append(arrays: RoadArrays, used: list[int], road: RoadGeometry) -> Span:
     for kind, rows in enumerate(_rows(road)):
         start = used[kind]
         used[kind] = end = start + len(rows)
-        arrays[kind][start:end] = rows
+        # As bytes: structured rows are copied field by field.
+        arrays[kind][start:end].view(np.uint8)[:] = rows.view(np.uint8)
         span += [start, end]
     return *span, int(road.paved)
 

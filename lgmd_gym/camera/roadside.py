@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from lgmd_gym.camera.objects import MODEL_POST, MODEL_RAIL, MODEL_TREE, OBJECT
+from lgmd_gym.camera.objects import MODEL_POST, MODEL_RAIL, MODEL_TREE, OBJECT, sorted_by_x, take
 from lgmd_gym.kernels import kernel
 
 PLANT_RANGE = 150.0
@@ -42,10 +42,9 @@ def posts_and_plants(segments: np.ndarray, density: float, seed: int) -> np.ndar
     width = height * np.where(bush, rng.uniform(1.2, 1.7, len(plants)), rng.uniform(0.55, 0.8, len(plants)))
     plants["length"], plants["width"], plants["height"] = width, width, height
     plants["shade"] = rng.uniform(38.0, 82.0, len(plants))
-    plants = plants[clear_of(_positions(plants), segments, _PLANT_CLEARANCE + 0.5 * width)]
-    posts = posts[clear_of(_positions(posts), segments, np.full(len(posts), 0.6))]
-    both = np.concatenate((posts, plants))
-    return both[np.argsort(both["x"], kind="stable")]
+    plants = take(plants, clear_of(_positions(plants), segments, _PLANT_CLEARANCE + 0.5 * width))
+    posts = take(posts, clear_of(_positions(posts), segments, np.full(len(posts), 0.6)))
+    return sorted_by_x((posts, plants))
 
 
 def guard_rails(segments: np.ndarray) -> np.ndarray:

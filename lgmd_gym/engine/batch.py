@@ -68,7 +68,7 @@ class BrakingBatch:
         self.num_envs, self._config = len(sources), config or {}
         self.single = BrakingEnv(sources[0], config=config)
         self.simulation = self.single.make_simulation(self.num_envs, threads)
-        self.queue = EpisodeQueue(sources, ahead=threads > 1)
+        self.queue = EpisodeQueue(sources, ahead=threads > 1, shown=camera is not None)
         self.episodes: list[Prepared | None] = [None] * self.num_envs
         self.sensors: SensorArray | None = None
         self.space: gym.Space[Any] = self.single.observation_space
@@ -106,7 +106,7 @@ class BrakingBatch:
             prepared = self.queue.next(index)
             draw, brake = prepared.draw, self.single.episode_brake(prepared.draw.brake)
             self.simulation.load(index, draw.placement, brake)
-            self.simulation.equip(index, draw.scene, prepared.network)
+            self.simulation.equip(index, draw.scene, prepared.network, prepared.geometry)
             self.episodes[index] = prepared
             self._set_constants(index, draw.info)
             if self.traces is not None:

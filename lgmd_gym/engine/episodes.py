@@ -11,6 +11,8 @@ from gymnasium.utils import seeding
 from highway_env.road.road import RoadNetwork
 
 from lgmd_gym.aliases import Values
+from lgmd_gym.camera.road_geometry import RoadGeometry
+from lgmd_gym.camera.road_pool import scene_geometry
 from lgmd_gym.envs.episode_source import Draw, EpisodeSource
 
 
@@ -19,6 +21,7 @@ class Prepared(NamedTuple):
 
     draw: Draw  # the episode
     network: RoadNetwork  # its highway-env road network
+    geometry: RoadGeometry | None  # what cameras draw of it, if it was drawn ahead
     generator: np.random.Generator  # the random generator after the draw
 
 
@@ -30,17 +33,18 @@ class EpisodeQueue:
     Args:
         sources: Source of every environment.
         ahead: Whether to draw the next episodes in a background thread while the present ones run.
+        shown: Whether cameras draw the roads.
 
     Attributes:
         generators: Random generator of every environment; None before the first seed.
         seeds: The last seeds.
     """
 
-    def __init__(self, sources: Sequence[EpisodeSource], ahead: bool) -> None:
+    def __init__(self, sources: Sequence[EpisodeSource], ahead: bool, shown: bool) -> None:
         self.sources = list(sources)
         self.generators: list[np.random.Generator | None] = [None] * len(sources)
         self.seeds: list[int | None] = [None] * len(sources)
-        self._ahead = ahead
+        self._ahead, self._shown = ahead, shown
         self._waiting: list[Future[Prepared] | None] = [None] * len(sources)
         self._worker: ThreadPoolExecutor | None = None
         self._pid = 0
@@ -58,12 +62,14 @@ class EpisodeQueue:
         assert generator is not None
         # The worker of a parent process does not exist after a fork; its draws are repeated.
         ready = waiting is not None and self._pid == os.getpid()
-        prepared = waiting.result() if ready and waiting else _prepare(self.sources[index], generator)
+        prepared = waiting.result() if ready and waiting else _prepare(self.sources[index], generator, False)
         self.generators[index] = prepared.generator
         if self._ahead:
             # The worker draws from a copy, so that a new seed can replace the generator at any time.
             copied = copy.deepcopy(prepared.generator)
-            self._waiting[index] = self._own_worker().submit(_prepare, self.sources[index], copied)
+            self._waiting[index] = self._own_worker().submit(
+                _prepare, self.sources[index], copied, self._shown
+            )
         return prepared
 
     def close(self) -> None:
@@ -84,6 +90,8 @@ class EpisodeQueue:
         return self._worker
 
 
-def _prepare(source: EpisodeSource, generator: np.random.Generator) -> Prepared:
+def _prepare(source: EpisodeSource, generator: np.random.Generator, shown: bool) -> Prepared:
     draw = source.draw(generator)
-    return Prepared(draw, draw.make_network(), generator)
+    network = draw.make_network()
+    geometry = scene_geometry(network, draw.scene) if shown else None
+    return Prepared(draw, network, geometry, generator)

@@ -15,6 +15,7 @@ from lgmd_gym.camera.ego import EgoCamera
 from lgmd_gym.camera.objects import Sector
 from lgmd_gym.camera.pose import USUAL_BRAKE, known_deceleration
 from lgmd_gym.camera.render.raster import Workspace
+from lgmd_gym.camera.road_geometry import RoadGeometry
 from lgmd_gym.camera.road_pool import RoadPool, road_key
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.camera.scene_table import SceneTable, sector_of
@@ -118,9 +119,9 @@ class Drawing:
             if enabled[camera]:
                 top_view.render(env, self.frame_of(camera, index))
 
-    def set_road(self, index: int, road: "Road | RoadNetwork") -> None:
+    def set_road(self, index: int, road: "Road | RoadNetwork", geometry: RoadGeometry | None = None) -> None:
         """Set the road of an environment; see `SensorArray.set_road`."""
-        self._roads.assign(index, road, road_key(self._scenes[index][0]))
+        self._roads.assign(index, road, road_key(self._scenes[index][0]), geometry)
 
     def set_scene(self, index: int, scene: Scene, max_deceleration: float) -> None:
         """Set the scene of an environment; see `SensorArray.set_scene`."""

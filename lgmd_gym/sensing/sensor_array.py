@@ -9,6 +9,7 @@ import numpy as np
 from lgmd_gym import neuron as models
 from lgmd_gym.camera import BirdsEye, Camera, EgoCamera
 from lgmd_gym.camera.pose import USUAL_BRAKE
+from lgmd_gym.camera.road_geometry import RoadGeometry
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.kernels.threads import Threads
 from lgmd_gym.neuron import Layer, LGMDParams, Response
@@ -161,13 +162,18 @@ class SensorArray:
         """Render the enabled cameras of environment `index` that highway-env draws."""
         self._drawing.render_top_views(env, index, self.enabled[index])
 
-    def set_road(self, index: int, road: "Road | RoadNetwork") -> None:
-        """Set the road of environment `index`, a highway-env `Road` or `RoadNetwork`.
+    def set_road(self, index: int, road: "Road | RoadNetwork", geometry: RoadGeometry | None = None) -> None:
+        """Set the road of environment `index`.
 
         A call with the same network as before returns at once: a network must not change. One thread at a
         time may call this method and `set_scene`, also while others process other environments.
+
+        Args:
+            index: Index of the environment.
+            road: A highway-env `Road` or `RoadNetwork`.
+            geometry: Its geometry in the scene, if it is known, see `scene_geometry`.
         """
-        self._drawing.set_road(index, road)
+        self._drawing.set_road(index, road, geometry)
 
     def set_scene(
         self, index: int, scene: Scene | Mapping[str, object] | None, max_deceleration: float = USUAL_BRAKE

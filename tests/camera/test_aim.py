@@ -24,6 +24,7 @@ from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.pose import (
     CALIBRATED,
     ESTIMATE_ERROR,
+    SHAKE,
     aim_depth,
     known_deceleration,
     mount_of,
@@ -153,7 +154,8 @@ def test_a_stabilised_lens_keeps_a_small_part_of_the_motion(axis):
 def lens_of(**params):
     lens = record(LENS)
     mount = mount_of(*rig(**params)).view(np.recarray)[()]
-    pose_lens(mount, record(SCENE, length=LENGTH, speed=16.0, time_s=2.3, acceleration=-8.0), 0.0, lens)
+    scene = record(SCENE, length=LENGTH, speed=16.0, time_s=2.3, acceleration=-8.0)
+    pose_lens(mount, scene, 0.0, record(SHAKE, time_s=math.nan), lens)
     return lens
 
 

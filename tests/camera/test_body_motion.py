@@ -1,6 +1,6 @@
 """Motion of the body: its spectrum against the measured one, and its effect on the pose."""
 
-from math import pi, radians, sqrt
+from math import nan, pi, radians, sqrt
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from lgmd_gym.camera.body_motion import (
 )
 from lgmd_gym.camera.env_state import SCENE
 from lgmd_gym.camera.pinhole import LENS
-from lgmd_gym.camera.pose import mount_of, pose_lens
+from lgmd_gym.camera.pose import SHAKE, mount_of, pose_lens
 
 SECONDS, RATE_HZ = 400, 105  # three times the 35 Hz of the measured change of pitch
 
@@ -31,7 +31,8 @@ def posed(ago=0.0, scene=(), **params):
     """Return the lens of a camera 2 m behind the front of a car of 4 m at the speed of the recording."""
     mount = mount_of(*rig(setback_m=2.0, **params)).view(np.recarray)[()]
     lens = record(LENS)
-    pose_lens(mount, record(SCENE, **({"length": 4.0, "speed": MEAN_SPEED} | dict(scene))), ago, lens)
+    state = record(SCENE, **({"length": 4.0, "speed": MEAN_SPEED} | dict(scene)))
+    pose_lens(mount, state, ago, record(SHAKE, time_s=nan), lens)
     return lens
 
 

@@ -1,6 +1,6 @@
 """Projection and pose of the camera: every expected value is computed by hand."""
 
-from math import asin, atan, cos, pi, radians, sin, tan
+from math import asin, atan, cos, nan, pi, radians, sin, tan
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from support.records import lens_of, record
 
 from lgmd_gym.camera.env_state import SCENE
 from lgmd_gym.camera.pinhole import LENS, project
-from lgmd_gym.camera.pose import mount_of, pose_lens
+from lgmd_gym.camera.pose import SHAKE, mount_of, pose_lens
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,8 @@ def posed(params=(), ago=0.0, **scene):
     params = {"setback_m": 0.5, "left_m": 0.25, "height_m": 1.5} | dict(params)
     mount = mount_of(*rig(**params)).view(np.recarray)[()]
     lens = record(LENS)
-    pose_lens(mount, record(SCENE, **({"length": 4.0, "speed": 10.0} | scene)), ago, lens)
+    state = record(SCENE, **({"length": 4.0, "speed": 10.0} | scene))
+    pose_lens(mount, state, ago, record(SHAKE, time_s=nan), lens)
     return lens
 
 

@@ -6,7 +6,7 @@ import numba as nb
 import numpy as np
 import pytest
 from support.cameras import rig
-from support.records import lens_of, records
+from support.records import frustum_of, lens_of, records
 
 from lgmd_gym.camera.effects import look_of
 from lgmd_gym.camera.render.buffers import GroundLayer
@@ -124,8 +124,9 @@ LINE_WIDTH = 0.15
 def painted(*lines, yaw=0.0, x=0.0, y=0.0, shape=(160, 120)):
     """Return the area painted by lines (x0, y0, x1, y1, start, striped) in square metres by column [px]."""
     coverage = np.zeros((4, shape[0], shape[1] + 2), np.float32)
-    layer = GroundLayer(coverage, np.zeros((16, 3)), np.zeros((20, 2)), np.zeros(8))
-    lens = lens_of(yaw, -pi / 2 + 1e-9, z=10.0, x=x, y=y, shape=shape)
+    pose = {"yaw": yaw, "pitch": -pi / 2 + 1e-9, "z": 10.0, "x": x, "y": y, "shape": shape}
+    lens = lens_of(**pose)
+    layer = GroundLayer(coverage, np.zeros((16, 3)), np.zeros((20, 2)), np.zeros(8), frustum_of(**pose))
     names = LINE.names
     pieces = records(LINE, *(dict(zip(names, map(float, line), strict=True)) for line in lines))
     add_lines(layer, lens, pieces, LOOK)
@@ -182,8 +183,8 @@ def test_far_stripes_are_painted_as_their_mean():
     """Beyond three periods per pixel, stripes are a line with 3/4.33 of its paint."""
     shape = (80, 120)
     coverage = np.zeros((4, shape[0], shape[1] + 2), np.float32)
-    layer = GroundLayer(coverage, np.zeros((16, 3)), np.zeros((20, 2)), np.zeros(8))
-    lens = lens_of(shape=shape)
+    lens, frustum = lens_of(shape=shape), frustum_of(shape=shape)
+    layer = GroundLayer(coverage, np.zeros((16, 3)), np.zeros((20, 2)), np.zeros(8), frustum)
     solid = coverage.copy()
     # Z²/(f·h) = 3·4.33 m at Z = 36 m; from 40 m on no stripe is separate.
     for striped, target in ((1.0, coverage), (0.0, solid)):

@@ -3,7 +3,7 @@
 from math import atan, inf, tan
 
 import pytest
-from support.records import lens_of
+from support.records import frustum_of, lens_of
 
 from lgmd_gym.camera.render.ground import ViewedLine, _separate_stripes, _visible_part
 
@@ -28,32 +28,32 @@ from lgmd_gym.camera.render.ground import ViewedLine, _separate_stripes, _visibl
     ],
 )
 def test_visible_part_of_a_line(line, length, expected):
-    assert _visible_part(lens_of(), ViewedLine(*line, 0.15), length) == pytest.approx(expected)
+    assert _visible_part(frustum_of(), ViewedLine(*line, 0.15), length) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("ahead", [-0.6, -0.4, 2.3, 2001.0])
 def test_crossing_line_outside_the_view(ahead):
-    a, b = _visible_part(lens_of(), ViewedLine(ahead, -5.0, 0.0, 1.0, 0.15), 10.0)
+    a, b = _visible_part(frustum_of(), ViewedLine(ahead, -5.0, 0.0, 1.0, 0.15), 10.0)
     assert not b > a
 
 
 @pytest.mark.parametrize("pitch", [-0.1, 0.0, 0.1])
 def test_lower_side_of_a_pitched_frame(pitch):
-    a, _ = _visible_part(lens_of(pitch=pitch, z=2.0), ViewedLine(0.0, 0.0, 1.0, 0.0, 0.15), 100.0)
+    a, _ = _visible_part(frustum_of(pitch=pitch, z=2.0), ViewedLine(0.0, 0.0, 1.0, 0.0, 0.15), 100.0)
     assert a == pytest.approx(2 / tan(atan(0.4) - pitch) - 0.15)
 
 
 def test_frame_above_the_horizon_shows_no_line():
-    a, b = _visible_part(lens_of(pitch=0.5), ViewedLine(0.0, 0.0, 1.0, 0.0, 0.15), 100.0)
+    a, b = _visible_part(frustum_of(pitch=0.5), ViewedLine(0.0, 0.0, 1.0, 0.0, 0.15), 100.0)
     assert not b > a
 
 
 def test_lines_right_below_a_lens_that_looks_down():
     # The frame contains the ground behind the lens.
-    a, b = _visible_part(lens_of(pitch=-1.5, z=2.0), ViewedLine(10.0, 0.0, -1.0, 0.0, 0.15), 100.0)
+    a, b = _visible_part(frustum_of(pitch=-1.5, z=2.0), ViewedLine(10.0, 0.0, -1.0, 0.0, 0.15), 100.0)
     assert (a, b) == (0.0, 100.0)
     # With a pitch of -1 rad, the lower side of the frame is 1.38 rad below the horizon.
-    a, b = _visible_part(lens_of(pitch=-1.0, z=2.0), ViewedLine(10.0, 0.0, -1.0, 0.0, 0.15), 100.0)
+    a, b = _visible_part(frustum_of(pitch=-1.0, z=2.0), ViewedLine(10.0, 0.0, -1.0, 0.0, 0.15), 100.0)
     assert (a, b) == (0.0, pytest.approx(10.0 - 2.0 / tan(1.0 + atan(0.4)) + 0.15))
 
 

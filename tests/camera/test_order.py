@@ -6,15 +6,20 @@ from support.records import lens_of
 from support.roads import box_record
 
 from lgmd_gym.camera.objects import MODEL_MARK, MODEL_TREE
-from lgmd_gym.camera.render.solids import order_objects, visible
+from lgmd_gym.camera.render.seen import Seen, aim_frustum, make_seen, order_objects, seen_by
 
 
 def drawing_order(*records, **lens):
     """Return the indices of the visible objects in drawing order."""
-    objects = np.concatenate(records).view(np.recarray)
-    order, distances, extents = np.zeros(8, np.int64), np.zeros(8), np.zeros((8, 4))
-    n = order_objects(lens_of(**lens), objects, len(objects), order, distances, extents)
-    return order[:n].tolist()
+    arrays = (array.view(np.recarray) if array.dtype.names else array for array in make_seen(1))
+    seen, posed, count = Seen(*arrays), lens_of(**lens), len(records)
+    aim_frustum(posed, seen.frusta[0])
+    for i, record in enumerate(records):
+        seen.objects[i] = record[0]
+        seen.lenses[i] = seen_by(seen.frusta, 1, seen.objects[i], False)
+    seen.counts[0] = count
+    order_objects(posed, posed.focal, 1, seen)
+    return seen.order[: seen.counts[1]].tolist()
 
 
 def test_car_is_in_front_of_the_wall_whose_centre_is_nearer():
@@ -39,8 +44,8 @@ def test_deck_hides_what_is_below_it_only_from_above(height, order):
 
 @pytest.mark.parametrize(("height", "seen"), [(4.9, True), (5.0, False), (6.9, False), (7.0, True)])
 def test_lens_under_a_deck_is_outside_it(height, seen):
-    deck = box_record(2.0, 0.0, (10.0, 30.0, 7.0), base=5.0).view(np.recarray)[0]
-    assert visible(lens_of(z=height), deck) == seen
+    deck = box_record(2.0, 0.0, (10.0, 30.0, 7.0), base=5.0)
+    assert (drawing_order(deck, z=height) == [0]) == seen
 
 
 def test_marks_come_last():

@@ -5,6 +5,7 @@ from math import cos, inf, sin
 import numpy as np
 
 from lgmd_gym.camera.pinhole import LENS
+from lgmd_gym.camera.render.seen import FRUSTUM, aim_frustum
 from lgmd_gym.envs.dynamics.bodies import BODY, CAR
 from lgmd_gym.envs.dynamics.brake import BRAKE
 
@@ -44,3 +45,10 @@ def lens_of(yaw=0.0, pitch=0.0, focal=100.0, shape=(80, 120), roll=0.0, **positi
     turns = {f"{name}_{key}": f(x) for key, x in angles.items() for name, f in (("cos", cos), ("sin", sin))}
     centre = {"centre_u": shape[1] / 2, "centre_v": shape[0] / 2}
     return record(LENS, focal=focal, **({"z": 1.0} | position), **angles, **turns, **centre)
+
+
+def frustum_of(**lens):
+    """Return the `FRUSTUM` record of a lens, given as in `lens_of`."""
+    frustum = record(FRUSTUM)
+    aim_frustum(lens_of(**lens), frustum)
+    return frustum

@@ -11,7 +11,7 @@ import numpy as np
 from lgmd_gym.camera.clutter.kinds import ACROSS, BESIDE, ON_LANE, queues
 from lgmd_gym.camera.clutter.settings import Clutter
 from lgmd_gym.camera.clutter.sites import Sites, edge_places, lane_places, records_of, with_road_width
-from lgmd_gym.camera.objects import MODEL_MARK, OBJECT
+from lgmd_gym.camera.objects import MODEL_MARK, OBJECT, sorted_by_x, take
 from lgmd_gym.camera.roadside import is_clear
 from lgmd_gym.errors import check_type, check_whole
 from lgmd_gym.kernels import kernel
@@ -63,8 +63,7 @@ def place_clutter(
         lane = np.split(segments, lanes[1:])[queue_lane]
         queued, _ = _place(lane_places, {"queue": queues}, lane, clutter, rng, x_range)
         marks = np.concatenate((queued, marks))
-    records = np.concatenate((beside[_without_conflicts(beside, owner, segments)], marks))
-    return records[np.argsort(records["x"], kind="stable")]
+    return sorted_by_x((take(beside, _without_conflicts(beside, owner, segments)), marks))
 
 
 def _place(draw: Any, kinds: Kinds, segments: np.ndarray, clutter: Clutter, *how: Any) -> Any:

@@ -158,6 +158,8 @@ def part(
         Columns for `records_of`, float64, shape (12, n).
     """
     columns = np.empty((12, len(sites.place)))
+    if len(sites.place) == 0:  # most kinds in most worlds
+        return columns
     values = (sites.place, along, out, turn, *size, shade, base, model, distance, braking)
     for row, value in zip(columns, values, strict=True):
         row[:] = value

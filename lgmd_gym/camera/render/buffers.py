@@ -6,10 +6,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgmd_gym.camera.objects import MAX_DRAWN
 from lgmd_gym.camera.pinhole import LENS
 from lgmd_gym.camera.render.models.builder import MAX_JOINTS
 from lgmd_gym.kernels import kernel
+
+STAGES = (
+    *("pose", "selection", "sky", "roads and lines", "soft shadows", "cast shadows", "ground"),
+    *("vehicles", "roadside", "sensor"),
+)
+"""Stages of a frame, in which profiles measure time; see `clock.mark`."""
+POSE, SELECTION, SKY, LINES, SOFT_SHADOWS, CAST_SHADOWS, GROUND, VEHICLES, ROADSIDE, SENSOR = (
+    np.int64(1 + k) for k in range(len(STAGES))
+)
 
 
 class Views(NamedTuple):
@@ -53,24 +61,21 @@ class Buffers(NamedTuple):
     greys: np.ndarray  # grey and light of the polygons of all models, float64, shape (polygons, 2)
     # joints of a figure, see `pose_figure`; then in camera axes, float64, shape (56, 3) [m]
     joints: np.ndarray
-    order: np.ndarray  # indices of the objects in drawing order, int64, shape (512,)
-    distances: np.ndarray  # distances of the objects from the lens, float64, shape (512,) [m]
-    # middle and half of an object's azimuths [quarter turns] and its least and greatest distance [m] as seen
-    # from the lens, float64, shape (512, 4)
-    extents: np.ndarray
     # azimuth of the horizon in each column relative to the lens [rad] and length of its direction [px],
     # float64, shape (2, width)
     directions: np.ndarray
+    clock: np.ndarray  # ticks at the last mark, then per stage, int64, shape (11,)
     outlines: np.ndarray  # skyline in each column, see `sky`, float32, shape (5, width)
 
 
 class GroundLayer(NamedTuple):
-    """The `Buffers` that polygons on the ground are added to."""
+    """The `Buffers` that polygons on the ground are added to, and the `FRUSTUM` of the lens."""
 
     coverage: np.ndarray
     corners: np.ndarray
     uv: np.ndarray
     quad: np.ndarray
+    frustum: np.record
 
 
 class SolidLayer(NamedTuple):
@@ -99,10 +104,8 @@ def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
         axes=np.zeros((5, 3)),
         greys=np.zeros((polygons, 2)),
         joints=np.zeros((MAX_JOINTS, 3)),
-        order=np.zeros(MAX_DRAWN, dtype=np.int64),
-        distances=np.zeros(MAX_DRAWN),
-        extents=np.zeros((MAX_DRAWN, 4)),
         directions=np.zeros((2, width)),
+        clock=np.zeros(1 + len(STAGES), dtype=np.int64),
         outlines=np.zeros((5, width), dtype=np.float32),
     )
 

@@ -31,9 +31,9 @@ from lgmd_gym.camera.render.models.builder import (
     TOE,
     WHEEL,
 )
+from lgmd_gym.camera.render.seen import distance
 from lgmd_gym.camera.render.solids import (
     compose,
-    distance,
     grey_of,
     outside,
     place_corners,

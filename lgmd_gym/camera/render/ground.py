@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from lgmd_gym.camera.pose import half_frame, side_tangent
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, sum_differences, winding
 from lgmd_gym.camera.render.light import row_air, through_air
 from lgmd_gym.camera.render.texture import (
@@ -44,46 +43,6 @@ from lgmd_gym.kernels.simd import (
     store_part,
 )
 
-_MARGIN_M = 0.2  # of the height of an object
-_MARGIN = 1.1  # factor on the height
-
-
-@kernel
-def ground_band(lens):
-    """Return least and greatest distance ahead of the ground in the frame [m]; infinite above the horizon.
-
-    The frame is the upright rectangle around the rolled one.
-    """
-    t = half_frame(lens)[1] / lens.focal
-    upper, lower = lens.sin_pitch + t * lens.cos_pitch, t * lens.cos_pitch - lens.sin_pitch
-    near = lens.z * (lens.cos_pitch + t * lens.sin_pitch) / lower if lower > 1e-9 else math.inf
-    far = lens.z * (lens.cos_pitch - t * lens.sin_pitch) / -upper if upper < -1e-9 else math.inf
-    return near, far
-
-
-@kernel
-def outside_band(lens, ahead, radius):
-    """Return whether a circle on the ground, its centre at a distance ahead [m], is outside the frame."""
-    near, far = ground_band(lens)
-    return ahead + radius < near or ahead - radius > far
-
-
-@kernel
-def above_or_below(lens, obj):
-    """Return whether an object on the ground is entirely above or below the frame, with its soft shadow."""
-    ahead = (obj.x - lens.x) * lens.cos_yaw + (obj.y - lens.y) * lens.sin_yaw
-    # With its shadow, see `solids.visible`.
-    radius = 0.5 * math.sqrt(obj.length**2 + obj.width**2) + 0.4 + 0.1 * obj.height
-    if ahead - radius > ground_band(lens)[1]:
-        return True
-    # The plane through the lens and the lower side of the frame, at the highest and farthest point.
-    t = half_frame(lens)[1] / lens.focal
-    lower = t * lens.cos_pitch - lens.sin_pitch
-    top = _MARGIN * obj.height + _MARGIN_M
-    farthest = ahead + radius if lower > 0.0 else ahead - radius
-    return (lens.z - top) * (lens.cos_pitch + t * lens.sin_pitch) - lower * farthest > 0.0
-
-
 # Channels of the ground layer; int64, because kernels are compiled anew for each literal argument.
 ROAD, PAINT, SHADOW, CAST = np.int64(0), np.int64(1), np.int64(2), np.int64(3)
 
@@ -100,8 +59,7 @@ def add_ground_quad(layer, k, lens, quad, weight):
         corners[i, 0] = ahead * lens.cos_pitch - lens.z * lens.sin_pitch
         corners[i, 1] = dy * lens.cos_yaw - dx * lens.sin_yaw
         corners[i, 2] = ahead * lens.sin_pitch + lens.z * lens.cos_pitch
-    near, far = ground_band(lens)
-    if farthest > near and nearest < far:
+    if farthest > layer.frustum.near and nearest < layer.frustum.far:
         add_quad(layer, k, lens, weight)
 
 
@@ -272,15 +230,13 @@ def _add_stroke(layer, lens, line, a, b, weight):
 
 
 @kernel
-def _visible_part(lens, line, length):
+def _visible_part(frustum, line, length):
     """Return the part [a, b] of a line between the near plane, the far end and the sides of the view [m].
 
     The lower side of the frame also bounds it: a narrow view begins tens of metres ahead.
     """
     ahead, across, d_ahead, d_across, width = line
-    tan = side_tangent(lens)
-    low = half_frame(lens)[1] / lens.focal
-    rise, drop = low * lens.cos_pitch - lens.sin_pitch, lens.z * (lens.cos_pitch + low * lens.sin_pitch)
+    tan, rise, drop = frustum.tangent, frustum.slope, frustum.z * frustum.drop
     a, b = 0.0, length
     for side in range(5 if tan >= 0.0 else 0):
         if side == 0:
@@ -356,7 +312,7 @@ def add_lines(layer, lens, lines, look):
             d_across=dy * c - dx * s,
             width=look.line_width,
         )
-        a, b = _visible_part(lens, line, length)
+        a, b = _visible_part(layer.frustum, line, length)
         if not b > a:
             continue
         if piece.striped == 0.0:

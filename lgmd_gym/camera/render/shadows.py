@@ -20,13 +20,13 @@ from lgmd_gym.camera.objects import (
     MODEL_POST,
     MODEL_RAIL,
     MODEL_TREE,
+    behind,
     is_figure,
     light_of_code,
 )
-from lgmd_gym.camera.pose import side_tangent
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
-from lgmd_gym.camera.render.ground import CAST, PAINT, SHADOW, add_ground_quad, outside_band
-from lgmd_gym.camera.render.solids import distance, first_from
+from lgmd_gym.camera.render.ground import CAST, PAINT, SHADOW, add_ground_quad
+from lgmd_gym.camera.render.seen import beside, distance, first_from, outside_band
 from lgmd_gym.kernels import kernel
 
 # Legs and wheels keep less of the sky's light from the road than a body close above it.
@@ -80,7 +80,7 @@ def add_shadow(layer, lens, obj, look):
     centre = (obj.x + lean * look.sun_x, obj.y + lean * look.sun_y)
     ahead = (centre[0] - lens.x) * lens.cos_yaw + (centre[1] - lens.y) * lens.sin_yaw
     widest = max(look.under_first, look.under_first + look.under_step * look.under_rings, 0.0)
-    if outside_band(lens, ahead, 0.5 * (obj.length + obj.width) + 1.5 * widest):
+    if outside_band(layer.frustum, ahead, 0.5 * (obj.length + obj.width) + 1.5 * widest):
         return
     if obj.model == MODEL_TREE:
         dark = min(0.4, 0.8 - distance(lens, obj) / 60.0)
@@ -123,7 +123,7 @@ def add_cast_shadows(layer, view, objects, count, roadside):
     stretch = min(1.0 / look.sun_z, _MOST_SHIFT)
     away = (-look.sun_x * stretch, -look.sun_y * stretch)
     for i in range(count):
-        if objects[i].model != MODEL_MARK:
+        if objects[i].model != MODEL_MARK and not behind(layer.frustum, objects[i]):
             _add_shadow_of(layer, lens, objects[i], away)
     n, low = roadside.shape[0], first_from(roadside, lens.x - _FADE_END)
     while low < n and roadside[low].x < lens.x + _FADE_END:
@@ -146,12 +146,7 @@ def _add_shadow_of(layer, lens, obj, away):
     mx, my = dx + 0.5 * obj.height * away[0], dy + 0.5 * obj.height * away[1]
     radius = 0.5 * (obj.length + obj.width + shift)
     ahead, across = mx * lens.cos_yaw + my * lens.sin_yaw, my * lens.cos_yaw - mx * lens.sin_yaw
-    if outside_band(lens, ahead, radius):
-        return
-    tan = side_tangent(lens)
-    if tan >= 0.0 and (
-        ahead < -radius or abs(across) > max(ahead, 0.0) * tan + radius * math.sqrt(1.0 + tan * tan)
-    ):
+    if outside_band(layer.frustum, ahead, radius) or beside(layer.frustum, ahead, across, radius):
         return
     weight = min(1.0, (_FADE_END - distance) / (_FADE_END - _FADE_START))
     if obj.model == MODEL_TREE:

@@ -1,6 +1,6 @@
 # pyright: standard
 # Not strict: numba infers the types of the arguments of kernels.
-"""Solid objects: which are visible, their order from far to near, and how they are drawn."""
+"""Solid objects: the faces that are turned towards the lens, and how they are drawn."""
 
 import math
 from typing import NamedTuple
@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from lgmd_gym.camera.objects import MODEL_MARK, is_picture
-from lgmd_gym.camera.pose import side_tangent
+from lgmd_gym.camera.objects import is_picture
 from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_project, sum_differences
 from lgmd_gym.camera.render.light import row_slope, veil_at
 from lgmd_gym.camera.render.models.builder import BODY, LAMP, TAIL, UNDER
+from lgmd_gym.camera.render.seen import distance
 from lgmd_gym.kernels import kernel
 from lgmd_gym.kernels.simd import (
     LANES,
@@ -25,235 +25,6 @@ from lgmd_gym.kernels.simd import (
     splat,
     store_part,
 )
-
-
-@kernel
-def distance(lens, obj):
-    """Return the distance of an object's centre from the lens, on the ground [m]."""
-    dx, dy = obj.x - lens.x, obj.y - lens.y
-    return math.sqrt(dx * dx + dy * dy)
-
-
-@kernel
-def first_from(roadside, x):
-    """Return the index of the first object of a roadside, which is sorted by x, at or beyond x."""
-    low, high = 0, roadside.shape[0]
-    while low < high:
-        middle = (low + high) // 2
-        if roadside[middle].x < x:
-            low = middle + 1
-        else:
-            high = middle
-    return low
-
-
-@kernel
-def visible(lens, obj):
-    """Return whether an object may be in the frame and the lens is outside it."""
-    dx, dy = obj.x - lens.x, obj.y - lens.y
-    if dx * dx + dy * dy > obj.range**2:
-        return False
-    # With its shadow.
-    radius = 0.5 * math.sqrt(obj.length**2 + obj.width**2) + 0.4 + 0.1 * obj.height
-    ahead = dx * lens.cos_yaw + dy * lens.sin_yaw
-    across = dy * lens.cos_yaw - dx * lens.sin_yaw
-    tan = side_tangent(lens)
-    reach = radius * math.sqrt(1.0 + tan * tan)
-    if tan >= 0.0 and (ahead < -radius or abs(across) > max(ahead, 0.0) * tan + reach):
-        return False
-    if obj.model == MODEL_MARK:
-        return True
-    lx = -dx * obj.cos - dy * obj.sin
-    ly = dx * obj.sin - dy * obj.cos
-    inside = abs(lx) < 0.5 * obj.length and abs(ly) < 0.5 * obj.width
-    return not (inside and obj.base <= lens.z < obj.height)
-
-
-class Footprint(NamedTuple):
-    """A rectangle on the ground: centre, heading, size [m]."""
-
-    x: float
-    y: float
-    cos: float
-    sin: float
-    length: float
-    width: float
-
-
-@kernel
-def _footprint(lens, obj, away):
-    """Return the rectangle that an object covers; that of a flat picture is a line across the view."""
-    if not is_picture(obj.model):
-        return Footprint(x=obj.x, y=obj.y, cos=obj.cos, sin=obj.sin, length=obj.length, width=obj.width)
-    scale = 1.0 / max(away, 1e-6)
-    cos, sin = scale * (obj.x - lens.x), scale * (obj.y - lens.y)
-    return Footprint(x=obj.x, y=obj.y, cos=cos, sin=sin, length=0.0, width=obj.width)
-
-
-@kernel
-def _separating_side(a, b, px, py):
-    """Find a side of box a that separates it from box b.
-
-    Returns 1 if the point (px, py) is on a's side of it (a may hide b, but not the reverse), -1 if it is on
-    b's side, 0 if there is no such side.
-    """
-    dx, dy = b.x - a.x, b.y - a.y
-    bx, by = dx * a.cos + dy * a.sin, dy * a.cos - dx * a.sin
-    cos, sin = abs(a.cos * b.cos + a.sin * b.sin), abs(b.sin * a.cos - b.cos * a.sin)
-    half_x = 0.5 * (cos * b.length + sin * b.width)
-    half_y = 0.5 * (sin * b.length + cos * b.width)
-    ex, ey = px - a.x, py - a.y
-    lx, ly = ex * a.cos + ey * a.sin, ey * a.cos - ex * a.sin
-    side_x = abs(bx) - half_x - 0.5 * a.length
-    side_y = abs(by) - half_y - 0.5 * a.width
-    if side_x < 0.0 and side_y < 0.0:
-        return 0
-    if side_x >= side_y:
-        beyond = lx * (1.0 if bx > 0.0 else -1.0) > 0.5 * a.length + 0.5 * side_x
-    else:
-        beyond = ly * (1.0 if by > 0.0 else -1.0) > 0.5 * a.width + 0.5 * side_y
-    return -1 if beyond else 1
-
-
-@kernel
-def _hides(a, b, lens, away_a, away_b):
-    """Return whether object a must be drawn after object b: a plane between them has the lens on a's side."""
-    if a.base > 0.0 and a.base >= b.height:
-        return lens.z > 0.5 * (a.base + b.height)
-    if b.base > 0.0 and b.base >= a.height:
-        return lens.z < 0.5 * (b.base + a.height)
-    if is_picture(a.model) and is_picture(b.model):
-        return away_a < away_b
-    box_a, box_b = _footprint(lens, a, away_a), _footprint(lens, b, away_b)
-    side = _separating_side(box_a, box_b, lens.x, lens.y)
-    if side == 0:
-        side = -_separating_side(box_b, box_a, lens.x, lens.y)
-    if side == 0:
-        return away_a < away_b
-    return side > 0
-
-
-@kernel
-def _turn(x, y):
-    """Return a number from 0 to 4 that grows with the azimuth of a vector; each quarter turn adds 1."""
-    size = abs(x) + abs(y)
-    if size == 0.0:
-        return 0.0
-    return 1.0 - x / size if y >= 0.0 else 3.0 + x / size
-
-
-@kernel
-def _wrapped(turn):
-    """Return a difference of two turns between -2 and 2."""
-    return turn - 4.0 if turn > 2.0 else turn + 4.0 if turn < -2.0 else turn
-
-
-@kernel
-def _write_extent(lens, obj, away, extent):
-    """Write the middle and the half of an object's azimuths, and bounds of its distance."""
-    box = _footprint(lens, obj, away)
-    dx, dy = box.x - lens.x, box.y - lens.y
-    radius = 0.5 * math.sqrt(box.length * box.length + box.width * box.width)
-    extent[2], extent[3] = away - radius, away + radius
-    along, across = abs(dx * box.cos + dy * box.sin), abs(dy * box.cos - dx * box.sin)
-    if along <= 0.5 * box.length and across <= 0.5 * box.width:
-        extent[0], extent[1] = 0.0, 4.0  # all around the lens
-        return
-    centre, low, high = _turn(dx, dy), 0.0, 0.0
-    for i in range(4):
-        lx = (0.5 if i < 2 else -0.5) * box.length
-        ly = (0.5 if i % 2 == 0 else -0.5) * box.width
-        turn = _turn(dx + lx * box.cos - ly * box.sin, dy + lx * box.sin + ly * box.cos)
-        low, high = min(low, _wrapped(turn - centre)), max(high, _wrapped(turn - centre))
-    # Half a pixel on both sides: objects next to each other share pixels.
-    extent[0], extent[1] = centre + 0.5 * (low + high), 0.5 * (high - low) + 0.5 / lens.focal
-
-
-@kernel
-def _meets_view(one, other):
-    """Return whether the azimuths of two extents overlap, and the first is not entirely beyond the other."""
-    if one[2] > other[3]:
-        return False
-    apart = abs(one[0] - other[0])  # below 8, because middles are from -2 to 6
-    return min(min(apart, abs(apart - 4.0)), 8.0 - apart) < one[1] + other[1]
-
-
-@kernel
-def _farther(lens, objects, order, first, n, at, distances, extents):
-    """Return the place, from `first` on, of an object to be drawn before that at place `at`; -1 if none."""
-    i = order[at]
-    for k in range(first, n):
-        j = order[k]
-        if (
-            k != at
-            and _meets_view(extents[i], extents[j])
-            and _hides(objects[i], objects[j], lens, distances[i], distances[j])
-        ):
-            return k
-    return -1
-
-
-@kernel
-def _correct_order(lens, objects, order, n, distances, extents):
-    """Move objects that are drawn too early behind those they hide; the others stay in order.
-
-    Only objects with common azimuths hide each other, so that this order exists unless three or more long
-    objects hide each other in turn.
-    """
-    for i in range(n):
-        j = order[i]
-        _write_extent(lens, objects[j], distances[j], extents[j])
-    for first in range(n - 1):
-        at = first
-        for _ in range(n):
-            behind = _farther(lens, objects, order, first, n, at, distances, extents)
-            if behind < 0:
-                break
-            at = behind
-        moved = order[at]
-        for k in range(at, first, -1):
-            order[k] = order[k - 1]
-        order[first] = moved
-
-
-@kernel
-def order_objects(lens, objects, count, order, distances, extents):
-    """Sort the visible objects from far to near; marks, which lie flat, come last.
-
-    Args:
-        lens: `LENS` record.
-        objects: `OBJECT` records.
-        count: Number of objects.
-        order: Output: indices of the visible objects.
-        distances: Output: distances of their centres [m], by index.
-        extents: Output: see `Buffers`.
-
-    Returns:
-        Number of visible objects.
-    """
-    n = 0
-    # From the end: the roadside comes last, sorted by x, so that driving along x meets the far ones first.
-    for i in range(count - 1, -1, -1):
-        if objects[i].model == MODEL_MARK or not visible(lens, objects[i]):
-            continue
-        distances[i] = distance(lens, objects[i])
-        k = n
-        while k > 0:
-            j = order[k - 1]
-            if not _hides(objects[j], objects[i], lens, distances[j], distances[i]):
-                break
-            order[k] = j
-            k -= 1
-        order[k] = i
-        n += 1
-    # The insertion compares neighbours only, and objects side by side are not in a transitive order.
-    _correct_order(lens, objects, order, n, distances, extents)
-    for i in range(count - 1, -1, -1):
-        if objects[i].model == MODEL_MARK and visible(lens, objects[i]):
-            order[n] = i
-            n += 1
-    return n
-
 
 _HALF = 0.55  # reach of the models from their centre, as a share of their length and width
 _TRACE = nb.float32(1e-3)  # less grey comes from rounding
@@ -278,7 +49,7 @@ def to_axes(lens, x, y, z, out, i):
     out[i, 2] = down * lens.cos_roll - right * lens.sin_roll
 
 
-@kernel
+@kernel(inline=True)
 def place_object(lens, look, obj, axes):
     """Write an object in camera axes: centre of its underside, its size [m], direction of the sun."""
     c, s = obj.cos, obj.sin
@@ -294,7 +65,7 @@ def place_object(lens, look, obj, axes):
     to_axes(lens, look.sun_x, look.sun_y, look.sun_z, axes, np.int64(4))
 
 
-@kernel
+@kernel(inline=True)
 def place_corners(fractions, n, axes, corners):
     """Place the first n corners of a polygon, given as fractions of an object's axes, in camera axes."""
     for i in range(n):
@@ -303,7 +74,7 @@ def place_corners(fractions, n, axes, corners):
             corners[i, k] = axes[0, k] + a * axes[1, k] + b * axes[2, k] + c * axes[3, k]
 
 
-@kernel
+@kernel(inline=True)
 def outside(lens, axes):
     """Return whether an object is entirely beyond the left, right, upper or lower side of the frame.
 
@@ -354,9 +125,9 @@ def grey_of(role, value, light, obj, look, air):
     return min(grey * light, 250.0)
 
 
-@kernel
-def draw_object(image, view, obj, models, air, layer):
-    """Draw one object over the image."""
+@kernel(inline=True)
+def draw_object(image, view, obj, index, models, air, layer, seen):
+    """Draw one object, that at `index` of `seen.objects`, over the image."""
     lens, look = view.lens, view.look
     place_object(lens, look, obj, layer.axes)
     if outside(lens, layer.axes):
@@ -366,9 +137,18 @@ def draw_object(image, view, obj, models, air, layer):
     first, last = models.models[obj.model, 0], models.models[obj.model, 1]
     # From below the top of its body, a car's cabin is behind the body.
     reverse = lens.z < models.splits[obj.model] * obj.height
+    if seen.faces[index, 1] < 0:
+        _find_faces(layer, look, models, (first, last, reverse), seen, index)
+    at = seen.faces[index, 0]
+    end = at + seen.faces[index, 1]
     for k in range(last - first):
         solid = last - 1 - k if reverse else first + k
-        u0, v0, u1, v1 = _add_solid(layer, lens, look, obj, models, solid, size, air)
+        start = at
+        while at < end and models.solids[solid, 0] <= seen.polygons[at] < models.solids[solid, 1]:
+            at += 1
+        if at == start:
+            continue
+        u0, v0, u1, v1 = _add_solid(layer, lens, look, obj, models, (start, at), size, air, seen)
         if u1 >= u0:
             height, width = image.shape
             rows = (int(max(v0, 0.0)), int(min(math.ceil(v1), height)))
@@ -376,16 +156,42 @@ def draw_object(image, view, obj, models, air, layer):
             compose(image, layer, rows, columns, air, view)
 
 
-@kernel
-def _add_solid(layer, lens, look, obj, models, solid, size, air):
-    """Add the faces and details of one solid that are in the frame.
+@kernel(inline=True)
+def _find_faces(layer, look, models, solids, seen, index):
+    """Write the polygons of an object that are turned towards the eye, in the order of drawing.
+
+    `solids` is (first, last + 1, whether they are drawn in reverse).
+    """
+    first, last, reverse = solids
+    corners, greys = layer.corners, layer.greys
+    start = at = seen.counts[2]
+    for k in range(last - first):
+        solid = last - 1 - k if reverse else first + k
+        for p in range(models.solids[solid, 0], models.solids[solid, 1]):
+            parent = models.parent[p]
+            if parent >= 0:
+                light = greys[parent, 1]
+            else:
+                place_corners(models.corners[p], np.int64(3), layer.axes, corners)
+                light = _face_light(corners, layer.axes, look)
+            greys[p, 1] = light
+            if light > 0.0:
+                seen.polygons[at], seen.lights[at] = p, light
+                at += 1
+    seen.faces[index, 0], seen.faces[index, 1], seen.counts[2] = start, at - start, at
+
+
+@kernel(inline=True)
+def _add_solid(layer, lens, look, obj, models, part, size, air, seen):
+    """Add the faces and details of one solid that are in the frame, `part` of `seen.polygons`.
 
     Returns the bounds (u0, v0, u1, v1) of all of them [px]; u1 < u0 if there is none.
     """
     corners, uv, greys = layer.corners, layer.uv, layer.greys
     height, width = layer.coverage.shape[1], layer.coverage.shape[2] - 2
     u0, v0, u1, v1 = 1e9, 1e9, -1e9, -1e9
-    for p in range(models.solids[solid, 0], models.solids[solid, 1]):
+    for at in range(part[0], part[1]):
+        p = seen.polygons[at]
         n, parent = models.corners_used[p], models.parent[p]
         greys[p, 1] = 0.0
         weight = air.opacity
@@ -394,10 +200,10 @@ def _add_solid(layer, lens, look, obj, models, solid, size, air):
             weight *= min(1.0, size / models.fine[p] - 1.0)
             if greys[parent, 1] == 0.0 or weight <= 0.0:
                 continue
-        place_corners(models.corners[p], n, layer.axes, corners)
-        light = greys[parent, 1] if parent >= 0 else _face_light(corners, layer.axes, look) * air.light
+        light = seen.lights[at] * air.light
         if light <= 0.0:
             continue
+        place_corners(models.corners[p], n, layer.axes, corners)
         m = clip_and_project(lens, corners, n, uv)
         if m < 3:
             continue

@@ -104,6 +104,12 @@ def all_models(linear: bool) -> Models:
     )
 
 
+def most_polygons(models: Models) -> int:
+    """Return the largest number of polygons of a model."""
+    sizes = models.solids[:, 1] - models.solids[:, 0]
+    return max(int(sizes[first:last].sum()) for first, last in models.models)
+
+
 def _light_of(b: ModelBuilder) -> np.ndarray:
     """Return the values of all polygons as light: multiples of the body's light, or light up to 255."""
     value = np.array(b.value, dtype=np.float64)
