@@ -22,8 +22,15 @@ from lgmd_gym import LGMD, EgoCamera
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
-SIZES, THREADS = (1, 16, 64, 256), (1, 2)
+SIZES, THREADS = (1, 16, 64), (1, 2)
+KINDS = {
+    "worlds": ("LGMD/CCRs-v0", {}),
+    "random levels": ("LGMD/RandomBraking-v0", {}),
+    "laboratory": ("LGMD/CCRs-v0", {"world": "laboratory"}),
+}  # environments of the engine: every world and episode its own, the same with random scenarios, one place
+COMMON_SIZE = 64  # environments of every kind; the others are measured in worlds only
 ROUND = 256  # frames per round and vector environment
+EPISODE = 200  # frames of an episode: a round of the engine contains the start of one in each environment
 PEER_ENVS = 16  # environments of highway-env in a vector
 AGENTS, WORLD = ("stopping-zone", "policy:all-round"), 8_000
 
@@ -101,9 +108,10 @@ def agent_loop(name):
     return step
 
 
-def engine(count, threads=1):
-    """Return a function that steps `count` environments of the engine by one camera frame."""
-    envs = gym.make_vec("LGMD/CCRs-v0", num_envs=count, threads=threads, world="laboratory")
+def engine(kind, count, threads=1):
+    """Return a function that steps `count` environments of the engine by one camera frame; see `KINDS`."""
+    env_id, arguments = KINDS[kind]
+    envs = gym.make_vec(env_id, num_envs=count, threads=threads, **arguments)
     envs.reset(seed=0)
     return lambda: envs.step(np.zeros((count, 1)))
 
@@ -149,12 +157,12 @@ def top_views(kind):
 
 
 def engine_rates():
-    """Return the frames/s of a top view, and of the engine by number of environments and threads."""
-    kinds = [(count, threads) for count in SIZES for threads in THREADS]
-    calls = [engine(*kind) for kind in kinds]
-    repeats = [60, *(max(1, ROUND // count) for count, _ in kinds)]
-    peer, *seconds = interleaved(top_view(), *calls, rounds=11, repeats=repeats)
-    return 1 / peer, {kind: kind[0] / value for kind, value in zip(kinds, seconds, strict=True)}
+    """Return the frames/s of a top view, and of the engine by kind, number of environments and threads."""
+    sizes = {kind: SIZES if kind == "worlds" else (COMMON_SIZE,) for kind in KINDS}
+    cases = [(kind, count, threads) for kind in KINDS for count in sizes[kind] for threads in THREADS]
+    calls = [engine(*case) for case in cases]
+    peer, *seconds = interleaved(top_view(), *calls, rounds=5, repeats=[60, *[EPISODE] * len(cases)])
+    return 1 / peer, {case: case[1] / value for case, value in zip(cases, seconds, strict=True)}
 
 
 def peer_rates():
@@ -175,13 +183,13 @@ def envpool_rate():
     return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
 
-def shares(count=64):
+def shares(kind, count=64):
     """Return the shares of camera, neuron, physics and the rest in a step of the engine on one thread."""
     from lgmd_gym.camera.batch import CameraBatch
     from lgmd_gym.envs.simulation import Simulation
 
     parts = {(CameraBatch, "draw"): 0.0, (LGMD, "step_range"): 0.0, (Simulation, "step"): 0.0}
-    step, originals = engine(count), {key: getattr(*key) for key in parts}
+    step, originals = engine(kind, count), {key: getattr(*key) for key in parts}
 
     def timed(key):
         def call(*arguments):
@@ -222,8 +230,10 @@ def plot(peer, rates, path):
     figure = Figure(figsize=(7.0, 3.2), layout="constrained")
     axis = figure.subplots()
     for threads, colour in zip(THREADS, COLOURS[1:], strict=False):
-        label = f"engine, {numbered(threads, 'thread')}"
-        axis.plot(SIZES, [rates[count, threads] for count in SIZES], "o-", color=colour, label=label)
+        label = f"engine in worlds, {numbered(threads, 'thread')}"
+        axis.plot(
+            SIZES, [rates["worlds", count, threads] for count in SIZES], "o-", color=colour, label=label
+        )
     axis.axhline(peer, color=COLOURS[0], linestyle="--", label="highway-env, grey top view, one environment")
     axis.set_xscale("log", base=2)
     axis.set_xticks(SIZES, [str(count) for count in SIZES])
@@ -250,19 +260,20 @@ def engine_rows(path):
     peer, rates = engine_rates()
     if path is not None:
         plot(peer, rates, path)
-    for (count, threads), rate in rates.items():
-        what = f"engine, {numbered(count, 'environment')}, {numbered(threads, 'thread')}"
+    for (kind, count, threads), rate in rates.items():
+        what = f"engine, {kind}, {numbered(count, 'environment')}, {numbered(threads, 'thread')}"
         yield what, f"{rate:,.0f} frames/s", f"{rate / peer:.1f}× highway-env with its grey top view"
     names = "camera", "neuron", "physics", "rest"
-    parts = [f"{name} {share:.0%}" for name, share in zip(names, shares(), strict=True)]
-    yield "engine, 64 environments, 1 thread: shares", ", ".join(parts), ""
+    for kind in KINDS:
+        parts = [f"{name} {share:.0%}" for name, share in zip(names, shares(kind), strict=True)]
+        yield f"engine, {kind}, 64 environments, 1 thread: shares", ", ".join(parts), ""
     one, *several = peer_rates()
     for kind, rate in zip(("SyncVectorEnv", "AsyncVectorEnv"), several, strict=True):
         what = f"highway-env with its grey top view, {PEER_ENVS} environments, `{kind}`"
         yield what, f"{rate:,.0f} frames/s", f"{rate / one:.1f}× one environment"
     if (rate := envpool_rate()) is not None:
         what = "EnvPool's highway-v0, 2 vehicles, no frames, 64 environments, 2 threads"
-        yield what, f"{rate:,.0f} decisions/s", f"{rate / rates[64, 2]:.1f}× the engine with frames"
+        yield what, f"{rate:,.0f} decisions/s", f"{rate / rates['worlds', 64, 2]:.1f}× the engine with frames"
 
 
 def rows(path=None):
@@ -281,9 +292,16 @@ def rows(path=None):
         (seconds,) = interleaved(camera(name, vehicles))
         height, width = EgoCamera(name).shape
         yield f"camera `{name}`, {width}×{height}, {vehicles} vehicles", f"{seconds * 1e6:.0f} µs", ""
-    ours, theirs = interleaved(closed_loop("LGMD/CCRs-v0", world="laboratory"), top_view(), repeats=60)
-    what = "closed loop, 2 vehicles, 160×90, physics 60 Hz"
-    yield what, f"{1 / ours:,.0f} frames/s", f"{theirs / ours:.1f}× highway-env with its grey top view"
+    places = {f"world {WORLD}": WORLD, "laboratory": "laboratory"}
+    loops = [closed_loop("LGMD/CCRs-v0", world=world) for world in places.values()]
+    theirs, *ours = interleaved(top_view(), *loops, repeats=60)
+    for place, seconds in zip(places, ours, strict=True):
+        what = f"closed loop, {place}, 2 vehicles, 160×90, physics 60 Hz"
+        yield (
+            what,
+            f"{1 / seconds:,.0f} frames/s",
+            f"{theirs / seconds:.1f}× highway-env with its grey top view",
+        )
     # The cost of the smallest camera and its neuron is subtracted with that of the simulation.
     bare = closed_loop("LGMD/CCRs-v0", camera={"name": "wide", "shape": [8, 8]}, world=WORLD)
     least, *seconds = interleaved(bare, *map(agent_loop, AGENTS), repeats=100)

@@ -1,5 +1,8 @@
 """The scripts in docs/experiments run: one short test each, not a check of their results."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +24,25 @@ def test_bodies(tmp_path):
     assert list(sheet) == ["motorcycle", "small"]
     assert list(sheet["small"]) == ["day, side", "day, rear", "day, front"]
     assert sheet["motorcycle"]["day, front"].max() == 255  # the headlight
+
+
+@pytest.mark.slow
+def test_frame_profile(tmp_path):
+    """The script measures in a process of its own, because it compiles the kernels anew."""
+    command = [
+        sys.executable,
+        EXPERIMENTS / "frame_profile.py",
+        *["--worlds", "1", "--frames", "3", "--engine", "2"],
+    ]
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path), "LGMD_GYM_QUIET": "1"}
+    done = subprocess.run(command, env=os.environ | cache, capture_output=True, text=True, check=True)
+    header, _, *rows = [line.split("|")[1:-1] for line in done.stdout.splitlines() if line.startswith("|")]
+    assert [name.strip() for name in header[:2]] == ["µs per frame", "pose"]
+    assert [row[0].strip() for row in rows][::8] == ["laboratory", "engine, worlds, clear"]
+    for _, *values, total in rows:
+        *stages, rest = map(float, values)
+        assert sum(stages) + rest == pytest.approx(float(total), abs=1.0)
+        assert min(stages[1], *stages[6:8]) > 0.0  # selection, ground, vehicles
 
 
 @pytest.mark.slow
