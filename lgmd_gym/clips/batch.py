@@ -126,7 +126,8 @@ def _seconds(name: str, text: str | None, info: VideoInfo, where: str) -> float 
     except ValueError:
         raise ValueError(f"{where}: {name} must be a time in seconds, or empty, got {text!r}") from None
     if not 0.0 <= seconds <= info.duration:
-        end = f"{info.duration:.2f} s ({info.frames} frames at {info.fps:g} Hz)"
+        rate = "of a variable rate" if info.variable else f"at {info.fps:g} Hz"
+        end = f"{info.duration:.2f} s ({info.frames} frames {rate})"
         raise ValueError(f"{where}: {name} must be in the clip, 0 to {end}, got {text!r}")
     return seconds
 
@@ -160,7 +161,7 @@ class ClipJob(NamedTuple):
     @property
     def crash_s(self) -> float | None:
         """Time of the crash [s]."""
-        return None if self.crash_frame is None else self.crash_frame / self.info.fps
+        return None if self.crash_frame is None else self.info.time_of(self.crash_frame)
 
 
 @dataclass
@@ -216,7 +217,7 @@ def _job(info: VideoInfo, annotated: bool, crash: int | None, event: ClipEvent |
     if crash is not None and not 0 <= crash < info.frames:
         raise ValueError(f"crash frame of {info.path.name} must be in 0 to {info.frames - 1}, got {crash}")
     if event is not None and event.event_s is not None:
-        crash = round(event.event_s * info.fps)
+        crash = info.frame_at(event.event_s)
     return ClipJob(info.path, info, annotated, crash, event)
 
 

@@ -1,8 +1,8 @@
 """Read, check and write video files of any length with PyAV."""
 
 from array import array
-from collections.abc import Generator, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from fractions import Fraction
 from functools import cache
 from itertools import chain
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from lgmd_gym.clips.decoding import decode, is_untimed, open_video, stamp_of, upright
 from lgmd_gym.errors import check_finite, check_flag, check_path, check_size, check_within, shown
 from lgmd_gym.processes.files import check_new_file
 
@@ -34,6 +35,7 @@ class VideoInfo(NamedTuple):
         frames: Number of frames in the file.
         variable: Whether the intervals between frames vary.
         missing: Part of the duration in the file's header for which the file has no data [s].
+        times: Time of each frame of a variable rate since the first one [s]; empty for a constant rate.
     """
 
     path: Path
@@ -41,11 +43,24 @@ class VideoInfo(NamedTuple):
     frames: int
     variable: bool
     missing: float
+    times: tuple[float, ...] = ()
 
     @property
     def duration(self) -> float:
-        """Number of frames divided by the frame rate [s]."""
-        return self.frames / self.fps
+        """Time from the first frame to the end of the last one [s]."""
+        return self.times[-1] + 1.0 / self.fps if self.times else self.frames / self.fps
+
+    def time_of(self, frame: int) -> float:
+        """Return the time of a frame, 0-based, since the first one [s]; beyond the last one the end."""
+        if not self.times:
+            return frame / self.fps
+        return self.times[frame] if frame < len(self.times) else self.duration
+
+    def frame_at(self, time: float) -> int:
+        """Return the frame nearest to a time since the first one [s]."""
+        if not self.times:
+            return round(time * self.fps)
+        return int(np.argmin(np.abs(np.array([*self.times, self.duration]) - time)))
 
 
 def probe(path: str | Path) -> VideoInfo:
@@ -69,12 +84,13 @@ def probe(path: str | Path) -> VideoInfo:
         tick = float(stream.time_base)
         named = float(stream.average_rate or stream.base_rate or _DEFAULT_FPS)
         fps, variable = _rate(stamps, tick, named)
+        times = tuple(((stamps - stamps[0]) * tick).tolist()) if variable else ()
         missing = 0.0
         if stream.duration and len(stamps):
             missing = stream.duration * tick - (end - stamps[0] * tick)
         elif container.duration:
             missing = container.duration / 1e6 - file_end
-    return VideoInfo(path, fps, frames, variable, max(float(missing), 0.0))
+    return VideoInfo(path, fps, frames, variable, max(float(missing), 0.0), times)
 
 
 def _is_playlist(path: Path) -> bool:
@@ -84,44 +100,22 @@ def _is_playlist(path: Path) -> bool:
     return head.startswith((b"#EXTM3U", b"ffconcat")) or b"<MPD" in head
 
 
-@contextmanager
-def open_video(path: Path) -> Generator["tuple[InputContainer, VideoStream]", None, None]:
-    """Open a local file and yield its container and first video stream, cover pictures excepted.
-
-    Only the file itself can be opened: a playlist cannot load anything from the network.
-
-    Raises:
-        ValueError: If the file is not a video or has no video stream.
-    """
-    import av
-    from av.error import FFmpegError
-    from av.stream import Disposition
-
-    try:
-        container = av.open(f"file:{path}", options={"protocol_whitelist": "file"})
-    except FFmpegError as error:
-        raise ValueError(f"clip {str(path)!r} is truncated or not a video: {error.strerror}") from None
-    with container:
-        for stream in container.streams.video:
-            if not stream.disposition & Disposition.attached_pic:
-                yield container, stream
-                return
-        raise ValueError(f"clip {str(path)!r} has no video stream")
-
-
 def _scan(container: "InputContainer", stream: "VideoStream") -> tuple[int, np.ndarray, float, float]:
     """Return the frames and sorted time stamps [ticks] of a stream, its end and that of all streams [s]."""
     frames, stamps = 0, array("q")  # eight bytes per frame: 2 MB for two hours
     end = file_end = 0.0
+    untimed = is_untimed(container)
     for packet in container.demux(container.streams.video + container.streams.audio):
         in_video = packet.stream is stream
         frames += in_video and packet.size > 0
-        if packet.pts is None:
+        stamp = stamp_of(packet, untimed)
+        if stamp is None:
             continue
-        packet_end = float((packet.pts + (packet.duration or 0)) * packet.time_base)
+        packet_end = float((stamp + (packet.duration or 0)) * packet.time_base)
         file_end = max(file_end, packet_end)
         if in_video:
-            stamps.append(packet.pts)
+            if packet.size > 0:  # an empty one holds the picture before it
+                stamps.append(stamp)
             end = max(end, packet_end)
     return frames, np.sort(np.frombuffer(stamps, np.int64)), end, file_end
 
@@ -143,9 +137,6 @@ CLIP_SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif", ".webm", ".m4v", ".mpg"
 MAX_SIZE = 16384  # [px]
 MIN_SIZE = 3  # width of the neuron's neighbourhood [px]
 _MOST_MISSING = 2.0  # a file that ends up to this many frames early counts as complete
-# Rotation in the file's metadata [deg, counterclockwise] to the filters that undo it.
-_UPRIGHT = {90: ("transpose=cclock",), -90: ("transpose=clock",), 180: ("hflip", "vflip")}
-_UPRIGHT[-180] = _UPRIGHT[180]
 
 
 class TruncatedVideoError(ValueError):
@@ -155,9 +146,9 @@ class TruncatedVideoError(ValueError):
 class VideoReader:
     """The pictures of a video file as RGB arrays; iterate over it any number of times.
 
-    Each decoded frame gives one picture, uint8, shape (height, width, 3), rotated as the file's metadata
-    requires. A file of variable frame rate is resampled to its median rate. Memory does not depend on the
-    length of the file. `luma` converts pictures to grey.
+    Each decoded frame gives one picture, uint8, shape (height, width, 3), turned and mirrored as the file's
+    metadata requires. A file of variable frame rate is resampled to its median rate. Memory does not depend
+    on the length of the file. `luma` converts pictures to grey.
 
     Args:
         path: Any video file that ffmpeg can read.
@@ -211,7 +202,7 @@ class VideoReader:
     def _pictures(self, container: "InputContainer", stream: "VideoStream") -> Iterator[np.ndarray]:
         """Yield the decoded, rotated, resampled and scaled pictures."""
         graph = None
-        for frame in chain(_decode(container, stream, self.info.fps), [None]):  # None ends the stream
+        for frame in chain(decode(container, stream, self.info.fps), [None]):  # None ends the stream
             if graph is None:
                 if frame is None:
                     return
@@ -225,7 +216,7 @@ class VideoReader:
         """Return the filters from decoded frames like `frame` to pictures; the file starts at `start` [s]."""
         from av.filter import Graph
 
-        filters = [*_UPRIGHT.get(frame.rotation, ())]
+        filters = [*upright(frame, self.info.path)]
         if self._resample:
             filters += [f"setpts=PTS-{start:.6f}/TB", f"fps={self.fps:.6f}"]
         if self._size is not None:
@@ -238,25 +229,6 @@ class VideoReader:
             nodes.append(graph.add(name, arguments or None))
         graph.link_nodes(*nodes).configure()
         return graph
-
-
-def _decode(container: "InputContainer", stream: "VideoStream", fps: float) -> Iterator["VideoFrame"]:
-    """Yield the frames of a stream, each with a time stamp; packets that cannot be decoded are skipped."""
-    from av.error import InvalidDataError
-
-    assert stream.time_base is not None
-    count, interval = 0, 1.0 / (fps * float(stream.time_base))
-    untimed = container.format.name == "avi"  # the format has a constant rate and no time stamps
-    for packet in container.demux(stream):
-        try:
-            frames = packet.decode()
-        except InvalidDataError:
-            continue
-        for frame in frames:
-            if untimed or frame.pts is None:
-                frame.pts = round(count * interval)
-            count += 1
-            yield frame
 
 
 @cache

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 from PIL import Image
-from support.clips import make_test_clip, truncate, write_lossless
+from support.clips import ffmpeg, make_test_clip, truncate, write_lossless
 
 from lgmd_gym.cli import main as cli
 from lgmd_gym.clips import VideoReader
+from lgmd_gym.clips.batch import make_jobs
 from lgmd_gym.clips.playback import PLAYBACK_CONFIGS, ClipRun, PlaybackConfig
 
 
@@ -86,6 +87,25 @@ def test_events_of_a_folder_are_scored(tmp_path, clip, looming, capsys):
     loom, still = rows_of(out / "clip_scores.csv")
     assert float(loom["score_at_0.5_s"]) == max(before[:35])
     assert (float(still["evaluated_s"]), still["score_at_0.5_s"]) == (0.5, "")
+
+
+def test_times_of_a_clip_with_a_gap(tmp_path, capsys):
+    """4 s with a missing second: trace, event, crash frame and errors share one notion of time."""
+    clip = tmp_path / "gap.avi"
+    ffmpeg("-f", "lavfi", "-i", "testsrc2=size=64x48:rate=30:duration=4", "-vf",
+           "select='not(between(t,1,1.99))'", "-fps_mode", "vfr", "-c:v", "ffv1", clip)  # fmt: skip
+    events = tmp_path / "events.csv"
+    events.write_text("file,event_s\ngap,3.5\n")
+    assert run(clip, "--events", events, "--no-plots", "--out", tmp_path / "run") == 0
+    rows = rows_of(tmp_path / "run" / "gap" / "trace.csv")
+    assert (len(rows), rows[-1]["time_s"]) == (120, "3.9667")
+    (job,) = make_jobs([clip], events=events)
+    assert (job.crash_frame, job.crash_s) == (75, pytest.approx(3.5))
+    (job,) = make_jobs([clip], crash_frame=30)  # the first frame after the gap
+    assert job.crash_s == pytest.approx(2.0)
+    events.write_text("file,event_s\ngap,4.1\n")
+    assert run(clip, "--events", events, "--out", tmp_path / "other") == 2
+    assert "event_s must be in the clip, 0 to 4.00 s (90 frames" in capsys.readouterr().err
 
 
 def test_a_truncated_clip_keeps_its_trace_and_gives_exit_code_2(tmp_path, capsys):

@@ -58,6 +58,77 @@ def test_pictures_are_rotated_upright(tmp_path, angle):
     assert np.abs(next(iter(VideoReader(rotated))) - expected).mean() < 2.0
 
 
+@pytest.mark.parametrize(
+    ("options", "show"),
+    [
+        (("-display_hflip",), lambda picture: picture[:, ::-1]),
+        (("-display_vflip",), lambda picture: picture[::-1]),
+        (("-display_rotation", "90", "-display_hflip"), lambda picture: np.rot90(picture)[:, ::-1]),
+        (("-display_rotation", "-90", "-display_hflip"), lambda picture: np.rot90(picture, -1)[:, ::-1]),
+        (("-display_rotation", "180", "-display_vflip"), lambda picture: picture[:, ::-1]),
+    ],
+)
+def test_mirrored_display_matrices(tmp_path, options, show):
+    """The 8 combinations of quarter turns and mirrors; ffmpeg itself shows the same picture."""
+    original = make_test_clip(tmp_path / "wide.mp4", source="testsrc2=size=64x48:rate=30:duration=0.1")
+    path, shown = tmp_path / "mirrored.mp4", tmp_path / "shown.y4m"
+    ffmpeg(*options, "-i", original, "-c", "copy", path)
+    ffmpeg("-i", path, "-frames:v", "1", shown)
+    (first, *_) = VideoReader(original)
+    (found, *_), (expected, *_) = VideoReader(path), VideoReader(shown)
+    assert np.abs(luma(found).astype(int) - luma(expected)).max() <= 1
+    turned = show(luma(first))
+    assert np.abs(luma(found).astype(int) - turned).max() <= 1
+
+
+def test_a_slanted_display_matrix_is_refused(tmp_path):
+    original = make_test_clip(tmp_path / "wide.mp4", source="testsrc2=size=64x48:rate=30:duration=0.1")
+    ffmpeg("-display_rotation", "30", "-i", original, "-c", "copy", tmp_path / "slanted.mp4")
+    with pytest.raises(ValueError, match="no combination of quarter turns and mirrors"):
+        next(iter(VideoReader(tmp_path / "slanted.mp4")))
+
+
+GAP = "select='not(between(t,1,1.99))',setpts=PTS"  # of 3 s at 30 Hz
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("gap.avi", ("-c:v", "ffv1")),
+        ("gap.mp4", ()),
+        ("gap.mkv", ("-c:v", "ffv1")),
+    ],
+)
+def test_frames_keep_their_times_in_every_format(tmp_path, name, options):
+    """A second is missing: the frames after it are at 2 s and later, not at 1 s, and the clip has 3 s."""
+    path = tmp_path / name
+    ffmpeg("-f", "lavfi", "-i", "testsrc2=size=64x48:rate=30:duration=3", "-vf", GAP, "-fps_mode", "vfr",
+           *options, path)  # fmt: skip
+    whole = make_test_clip(
+        tmp_path / "whole.mkv", "-c:v", "ffv1", source="testsrc2=size=64x48:rate=30:duration=3"
+    )
+    info, pictures, full = probe(path), list(VideoReader(path)), list(VideoReader(whole))
+    assert (info.frames, info.variable, info.fps) == (60, True, 30.0)
+    assert info.duration == pytest.approx(3.0, abs=0.001)
+    assert (info.time_of(29), info.time_of(30)) == pytest.approx((29 / 30, 2.0), abs=0.001)
+    assert (info.frame_at(2.4), info.frame_at(1.9), info.frame_at(3.0)) == (42, 30, 60)
+    assert len(pictures) == 90
+    for number in (0, 29, 61, 75, 89):
+        assert np.abs(luma(pictures[number]).astype(int) - luma(full[number])).mean() < 4.0
+
+
+def test_frames_out_of_order_without_times_of_display(tmp_path):
+    """AVI numbers the packets: with B frames, the picture before the gap may take the number after it."""
+    path = tmp_path / "gap.avi"
+    ffmpeg("-f", "lavfi", "-i", "testsrc2=size=64x48:rate=30:duration=3", "-vf", GAP, "-fps_mode", "vfr",
+           "-c:v", "mpeg4", "-bf", "2", path)  # fmt: skip
+    info = probe(path)
+    assert (info.frames, info.variable) == (60, True)
+    assert info.duration == pytest.approx(3.0, abs=0.04)
+    assert info.time_of(32) == pytest.approx(2.07, abs=0.04)
+    assert len(list(VideoReader(path))) == pytest.approx(90, abs=1)
+
+
 def test_resampling_selects_the_nearest_frames_and_scaling_averages_pixels(clip, looming):
     reader = VideoReader(clip, fps=10.0, size=(48, 24))
     pictures = [luma(picture) for picture in reader]
