@@ -116,3 +116,23 @@ def test_earlier_pose_is_on_the_same_circle():
 def test_body_dives_in_proportion_to_the_deceleration(acceleration, clipped):
     lens = posed({"dive_deg": 0.25, "pitch_deg": 1.0}, acceleration=acceleration)
     assert lens.pitch == pytest.approx(radians(1.0 + 0.25 * clipped))
+
+
+def moved(shake, seed=3, time_s=1.5, stabiliser=None):
+    """Return yaw, pitch, roll and height of a lens on a rough road, posed with a given `SHAKE` record."""
+    camera, scene = rig(road="rough", seed=seed, stabiliser=stabiliser)
+    mount = mount_of(camera, scene).view(np.recarray)[()]
+    lens = record(LENS)
+    pose_lens(mount, record(SCENE, length=4.0, speed=10.0, time_s=time_s), 0.0, shake, lens)
+    return lens.yaw, lens.pitch, lens.roll, lens.z
+
+
+@pytest.mark.parametrize("change", [{"seed": 4}, {"time_s": 1.6}, {"stabiliser": "gyroscope"}])
+def test_motion_of_the_body_is_kept_for_one_time_of_one_car(change):
+    shake = record(SHAKE, time_s=nan)
+    first, other, again = moved(shake), moved(shake, **change), moved(shake)
+    assert first == again == moved(record(SHAKE, time_s=nan))
+    assert other == moved(record(SHAKE, time_s=nan), **change)
+    assert all(a != b for a, b in zip(first[:3], other[:3], strict=True))
+    shake.pitch += 1.0
+    assert moved(shake)[1] != first[1]  # that of the record is used
