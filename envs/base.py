@@ -78,7 +78,7 @@ class EgoBrakeEnv(AbstractEnv):
         Raises:
             ValueError: If a configuration key is unknown or a value is out of range.
         """
-        check_mapping("options", options)
+        check_keys("option", check_mapping("options", options), ("config",))
         seed = None if seed is None else check_whole("seed", seed, 0)
         with self._unchanged_if_refused():
             return super().reset(seed=seed, options=options)

@@ -55,6 +55,10 @@ class EpisodeQueue:
             self.generators[index], self.seeds[index] = seeding.np_random(seed)
             self._waiting[index] = None
 
+    def assign(self, index: int, source: EpisodeSource) -> None:
+        """Draw the next episodes of an environment from another source; a waiting draw is dropped."""
+        self.sources[index], self._waiting[index] = source, None
+
     def next(self, index: int) -> Prepared:
         """Return the next episode of a seeded environment."""
         waiting, self._waiting[index] = self._waiting[index], None

@@ -69,15 +69,16 @@ class EngineVecEnv(VecEnv):
         Raises:
             AttributeError: If the vector environment has no such attribute.
         """
-        shared: Arguments = {
+        spaces: Arguments = {
             "observation_space": self.observation_space,
             "action_space": self.action_space,
         }
-        value = shared[attr_name] if attr_name in shared else getattr(self.envs, attr_name)
         selected = self._get_indices(indices)
-        if attr_name in ("np_random", "np_random_seed"):
-            return [value[index] for index in selected]
-        return [value for _ in selected]
+        if attr_name in spaces:
+            return [spaces[attr_name] for _ in selected]
+        envs: Any = self.envs.unwrapped
+        values = envs.get_attr(attr_name)
+        return [values[index] for index in selected]
 
     def set_attr(self, attr_name: str, value: object, indices: Indices = None) -> None:
         """Refuse to set an attribute.
@@ -87,20 +88,27 @@ class EngineVecEnv(VecEnv):
         """
         raise AttributeError(
             f"the environments share compiled state and have no attribute {attr_name!r} to set; "
-            "pass arguments to SB3VecEnv"
+            "pass arguments to SB3VecEnv, or call env_method('set_arguments', {…})"
         )
 
     def env_method(
         self, method_name: str, *method_args: object, indices: Indices = None, **method_kwargs: object
-    ) -> list[np.ndarray | None]:
-        """Call "render", the only method of the single environments.
+    ) -> list[Any]:
+        """Call "render", or "set_arguments" with a mapping, see `BrakingVectorEnv.set_arguments`.
 
         Raises:
             AttributeError: For another method.
         """
+        if method_name == "set_arguments":
+            selected = np.zeros(self.num_envs, np.bool_)
+            selected[list(self._get_indices(indices))] = True
+            envs: Any = self.envs.unwrapped
+            envs.set_arguments(*method_args, **method_kwargs, selected=selected)
+            return [None for _ in self._get_indices(indices)]
         if method_name != "render":
             raise AttributeError(
-                f"the environments share compiled state and have no method {method_name!r}; known: render"
+                f"the environments share compiled state and have no method {method_name!r}; "
+                "known: render, set_arguments"
             )
         images = self.get_images()
         return [images[index] for index in self._get_indices(indices)]

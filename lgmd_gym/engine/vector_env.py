@@ -3,7 +3,7 @@
 """`BrakingVectorEnv`: the compiled vector environment of all braking scenarios."""
 
 import copy as copying
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from lgmd_gym.aliases import Arguments, Config, Info, Observation
 from lgmd_gym.engine.batch import BrakingBatch
+from lgmd_gym.engine.episodes import Prepared
 from lgmd_gym.envs.families.scenario import Scenario
 from lgmd_gym.envs.registration import make_source
 from lgmd_gym.errors import (
@@ -30,8 +31,9 @@ from lgmd_gym.sensing.channel import LGMD, ChannelSpec
 
 _NAMES = (
     *("num_envs", "camera", "neuron", "params", "fps", "include_frame", "include_base", "trace", "config"),
-    *("render_mode", "threads", "autoreset_mode", "copy"),
+    *("render_mode", "max_episode_steps", "threads", "autoreset_mode", "copy"),
 )
+_PER_ENV = ("scenario", "scene", "brake", "np_random", "np_random_seed")
 
 MAX_ENVS = 65536
 _MODES = {mode.value for mode in AutoresetMode}
@@ -61,6 +63,8 @@ class BrakingVectorEnv(VectorEnv):
         trace: See `LGMDObservation`.
         config: Configuration of `BrakingEnv`, for all environments.
         render_mode: None or "rgb_array" (highway-env's top view of every environment).
+        max_episode_steps: Number of decisions after which episodes are truncated, >= 1, as by Gymnasium's
+            `TimeLimit`; None for the durations of the scenarios only.
         threads: Number of threads of a step, including the calling one.
         autoreset_mode: Gymnasium's autoreset mode: "NextStep", "SameStep" or "Disabled".
         copy: Whether observations are new arrays; if not, the next step overwrites them.
@@ -91,6 +95,7 @@ class BrakingVectorEnv(VectorEnv):
         trace: bool = False,
         config: Config | None = None,
         render_mode: str | None = None,
+        max_episode_steps: int | None = None,
         threads: int = 1,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = True,
@@ -98,7 +103,11 @@ class BrakingVectorEnv(VectorEnv):
     ) -> None:
         self.num_envs = check_whole("num_envs", num_envs, 1, MAX_ENVS)
         threads = check_whole("threads", threads, 1, MAX_THREADS)
+        self._family, self._arguments = family, arguments
         source = make_source(family, arguments, _NAMES)
+        self.max_episode_steps = max_episode_steps
+        if max_episode_steps is not None:
+            check_whole("max_episode_steps", max_episode_steps, 1)
         check_flags(include_frame=include_frame, include_base=include_base, trace=trace, copy=copy)
         if render_mode is not None and not (isinstance(render_mode, str) and render_mode == "rgb_array"):
             raise ValueError(
@@ -125,6 +134,7 @@ class BrakingVectorEnv(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self._observations = None if copy else batch.empty()
         self._ended = np.zeros(self.num_envs, np.bool_)
+        self._elapsed = np.zeros(self.num_envs, np.int64)  # decisions of the present episodes
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: Arguments | None = None
@@ -146,7 +156,7 @@ class BrakingVectorEnv(VectorEnv):
             if mask[index]:
                 self.batch.queue.seed(index, value)
         self.batch.start(mask)
-        self._ended[mask] = False
+        self._ended[mask], self._elapsed[mask] = False, 0
         return self.read_observations(), self.read_infos(mask)
 
     def step(self, actions: ArrayLike) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, Info]:
@@ -171,10 +181,14 @@ class BrakingVectorEnv(VectorEnv):
             self.batch.start(restart)
         outcome = self.simulation.outcome
         result = outcome.rewards.copy(), outcome.terminated.copy(), outcome.truncated.copy()
+        self._elapsed = np.where(restart, 0, self._elapsed + 1)
+        if self.max_episode_steps is not None:
+            result[2][self._elapsed >= self.max_episode_steps] = True
         self._ended = result[1] | result[2]
         extra: Info = {}
         if mode == AutoresetMode.SAME_STEP and self._ended.any():
             extra = self._end_episodes(self._ended)
+            self._elapsed[self._ended] = 0
         infos = self.read_infos(np.ones(self.num_envs, np.bool_))
         return self.read_observations(), *result, infos | extra
 
@@ -216,10 +230,84 @@ class BrakingVectorEnv(VectorEnv):
         Raises:
             RuntimeError: Before its first reset.
         """
-        prepared = self.batch.episodes[index]
-        if prepared is None:
-            raise RuntimeError("the environments have no episodes: call reset() before scenario_of()")
-        return prepared.draw.placement.scenario
+        return self._episode(index, "scenario_of()").draw.placement.scenario
+
+    def set_arguments(
+        self, arguments: Arguments | Sequence[Arguments | None], selected: np.ndarray | None = None
+    ) -> None:
+        """Change arguments of the scenario family from the next episodes on, for example for a curriculum.
+
+        Args:
+            arguments: Arguments such as `ego_speed`, or `start_level` and `num_levels` of random levels; the
+                others stay those of the construction. Or one mapping per environment, None to change nothing.
+            selected: Environments, bool, shape (num_envs,); None for all.
+
+        Raises:
+            ValueError: If an argument is unknown or out of range; then nothing changes.
+
+        Example:
+            >>> envs = gym.make_vec("LGMD/CCRs-v0", num_envs=2)
+            >>> envs.unwrapped.set_arguments([{"ego_speed": 5.0}, {"ego_speed": 15.0}])
+            >>> envs.reset(seed=0)[1]["ego_speed"].tolist()
+            [5.0, 15.0]
+        """
+        mask = _mask_of(selected, self.num_envs, "selected")
+        given = [arguments] * self.num_envs if isinstance(arguments, Mapping) else list(arguments)
+        if len(given) != self.num_envs:
+            raise ValueError(f"arguments must be one mapping or {self.num_envs} mappings, got {len(given)}")
+        chosen = [index for index in np.flatnonzero(mask).tolist() if given[index] is not None]
+        sources = [
+            make_source(self._family, self._arguments | check_mapping("arguments", given[index]), _NAMES)
+            for index in chosen
+        ]
+        for index, source in zip(chosen, sources, strict=True):
+            self.batch.queue.assign(index, source)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute of every environment.
+
+        Args:
+            name: "scenario", "scene" or "brake" of the present episodes, "np_random" or "np_random_seed"; or
+                an attribute that all environments share, such as "render_mode".
+
+        Raises:
+            AttributeError: If the environments have no such attribute.
+            RuntimeError: For an attribute of an episode before the first reset.
+        """
+        if name in ("np_random", "np_random_seed"):
+            return getattr(self, name)
+        if name in _PER_ENV:
+            return tuple(self._attribute_of(index, name) for index in range(self.num_envs))
+        if name in ("action_space", "observation_space"):
+            name = f"single_{name}"
+        if not hasattr(self, name):
+            raise AttributeError(f"the environments have no attribute {name!r}; known: {', '.join(_PER_ENV)}")
+        return (getattr(self, name),) * self.num_envs
+
+    def call(self, name: str, *args: object, **kwargs: object) -> tuple[Any, ...]:
+        """Return the results of a method of every environment: "render", or those of `get_attr`.
+
+        Raises:
+            AttributeError: For another method; see `get_attr`.
+        """
+        if name == "render" and not args and not kwargs:
+            return self.render() or (None,) * self.num_envs
+        if args or kwargs or name in ("reset", "step", "close"):
+            raise AttributeError(
+                f"the environments share compiled state and have no method {name!r} of their own; "
+                "use the method of the vector, or set_arguments"
+            )
+        return self.get_attr(name)
+
+    def set_attr(self, name: str, values: object) -> None:
+        """Refuse to set an attribute.
+
+        Raises:
+            AttributeError: Always; an attribute would have no effect.
+        """
+        raise AttributeError(
+            f"the environments share compiled state and have no attribute {name!r} to set; use set_arguments"
+        )
 
     def render(self) -> tuple[Any, ...] | None:
         """Return highway-env's top view of every environment, uint8, (height, width, 3), or None.
@@ -246,6 +334,19 @@ class BrakingVectorEnv(VectorEnv):
     def np_random_seed(self) -> Any:
         """Last seeds of the environments."""
         return tuple(self.batch.queue.seeds)
+
+    def _episode(self, index: int, what: str) -> Prepared:
+        prepared = self.batch.episodes[index]
+        if prepared is None:
+            raise RuntimeError(f"the environments have no episodes: call reset() before {what}")
+        return prepared
+
+    def _attribute_of(self, index: int, name: str) -> object:
+        """Return an attribute of the present episode of environment `index`; see `get_attr`."""
+        draw = self._episode(index, name).draw
+        if name == "brake":
+            return self.batch.single.episode_brake(draw.brake)
+        return draw.scene if name == "scene" else draw.placement.scenario
 
     def _end_episodes(self, ended: np.ndarray) -> Info:
         """Restart environments at once; returns their final observations and infos."""
@@ -292,7 +393,7 @@ def _seeds_of(seed: object, num_envs: int) -> list[int | None]:
     return [None if value is None else int(value) for value in seeds]
 
 
-def _mask_of(mask: object, num_envs: int) -> np.ndarray:
+def _mask_of(mask: object, num_envs: int, name: str = "options['reset_mask']") -> np.ndarray:
     """Return a selection of environments, bool, shape (num_envs,); None selects all.
 
     Raises:
@@ -301,9 +402,7 @@ def _mask_of(mask: object, num_envs: int) -> np.ndarray:
     if mask is None:
         return np.ones(num_envs, np.bool_)
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (num_envs,):
-        raise ValueError(
-            f"options['reset_mask'] must be a bool array of shape ({num_envs},), got {shown(mask)}"
-        )
+        raise ValueError(f"{name} must be a bool array of shape ({num_envs},), got {shown(mask)}")
     if not mask.any():
-        raise ValueError("options['reset_mask'] must select at least one environment, got none")
+        raise ValueError(f"{name} must select at least one environment, got none")
     return mask
