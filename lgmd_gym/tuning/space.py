@@ -14,7 +14,7 @@ from lgmd_gym.fields import Declaration, declarations
 from lgmd_gym.neuron import LGMDParams
 
 CAMERA_KEY, NEURON_PREFIX = "camera", "neuron."  # keys of a proposal in addition to the rule's parameters
-NEURON_FACTOR = 2.0  # neuron parameters are searched from default / factor to default * factor
+NEURON_FACTOR = 2.0  # neuron parameters are searched from default / factor to default * factor, in bounds
 SHIFT = 0.2  # relative shift of each parameter in the sensitivity table
 
 # A flat dict: the rule's parameters by name, the camera preset as "camera" and neuron parameters as in
@@ -74,8 +74,7 @@ class SearchSpace:
         if self.cameras:
             proposal[CAMERA_KEY] = trial.suggest_categorical(CAMERA_KEY, self.cameras)
         for name in check_items("neuron", self.neuron, str, "names"):
-            key, default = NEURON_PREFIX + name, neuron_defaults()[name]
-            low, high = default / NEURON_FACTOR, default * NEURON_FACTOR
+            key, (low, high) = NEURON_PREFIX + name, neuron_range(name)
             proposal[key] = trial.suggest_float(key, low, high, log=True)
         return proposal
 
@@ -133,6 +132,13 @@ def rule_class(agent: str) -> type[Rule]:
     rules = {name: cls for name, cls in AGENTS.items() if issubclass(cls, Rule)}
     check_known("rule", agent, rules)
     return rules[agent]
+
+
+def neuron_range(name: str) -> tuple[float, float]:
+    """Return the searched range of a neuron parameter: half to twice its default, within its bounds."""
+    default, (declared,) = neuron_defaults()[name], [x for x in declarations(LGMDParams) if x.name == name]
+    highest = declared.interval.high if declared.interval else inf
+    return default / NEURON_FACTOR, min(default * NEURON_FACTOR, highest)
 
 
 def neuron_defaults() -> dict[str, float]:
