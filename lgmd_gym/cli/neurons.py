@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from tyro.conf import Positional, arg
 
 from lgmd_gym.cli.console import activity, make_console
-from lgmd_gym.cli.values import Count, File, Names, Number, default_out
+from lgmd_gym.cli.values import Count, File, Names, Number, default_out, read_params
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -94,10 +94,34 @@ class Events:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Neurons:
-    """Compare neuron models, or list them."""
+class ExportC:
+    """Write the LGMD as C99 source for a robot: lgmd.h, lgmd.c and main.c, a program for stdin.
 
-    SUBCOMMANDS: ClassVar[dict[str, type]] = {"compare": CompareModels, "events": Events, "list": ListModels}
+    Compile with cc -std=c99 -O2 -o lgmd main.c lgmd.c -lm; -DLGMD_FIXED gives 16-bit integer maps.
+    """
+
+    out: Annotated[Positional[Path], arg(metavar="FOLDER")]
+    """Folder of the files; lgmd.h and lgmd.c are replaced, an existing main.c is kept."""
+    shape: Annotated[tuple[int, int], arg(metavar="HEIGHT WIDTH")] = (72, 99)
+    """Size of the frames [px]."""
+    fps: float = 30.0
+    """Frame rate [Hz]."""
+    neuron: str = "lgmd"
+    """LGMD or one of its presets, with options, for example off-only:t_sp=0.78."""
+    params: File = None
+    """TOML file of LGMD parameters; the preset and the options change them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Neurons:
+    """Compare neuron models, list them, run one on events, or export one as C source."""
+
+    SUBCOMMANDS: ClassVar[dict[str, type]] = {
+        "compare": CompareModels,
+        "events": Events,
+        "list": ListModels,
+        "export-c": ExportC,
+    }
 
     command: object
 
@@ -208,6 +232,26 @@ def run_events(options: Events) -> int:
     return 0
 
 
+def export_c_source(options: ExportC) -> int:
+    """Write the C source of a neuron and print how to compile it."""
+    from lgmd_gym import neuron
+    from lgmd_gym.neuron.export_c import export_c
+
+    params = neuron.LGMDParams.make(read_params(options.params))
+    model = neuron.make(options.neuron, (1, 1), options.fps, params=params)
+    if type(model) is not neuron.LGMD:
+        raise ValueError(
+            f"neuron must be the LGMD or one of its presets, got {options.neuron!r}; others have no C source"
+        )
+    paths = export_c(options.out, options.shape, options.fps, model.params)
+    console = make_console()
+    console.print(f"written: {', '.join(map(str, paths))}", soft_wrap=True)
+    program = options.out / "lgmd"
+    source = f"{options.out / 'main.c'} {options.out / 'lgmd.c'}"
+    console.print(f"compile with cc -std=c99 -O2 -o {program} {source} -lm", soft_wrap=True)
+    return 0
+
+
 def _table(title: str, data: "DataTable") -> "Table":
     """Return a table for the terminal."""
     from rich.table import Table
@@ -225,4 +269,5 @@ RUN: dict[str, Callable[[Any], int]] = {
     "compare": compare_models,
     "events": run_events,
     "list": list_models,
+    "export-c": export_c_source,
 }

@@ -8,7 +8,7 @@ parameters for the compiled neuron.
 
 import math
 from collections.abc import Collection
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import NamedTuple, cast
 
 import torch
@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from lgmd_gym.errors import check_items, check_known
-from lgmd_gym.fields import Declaration, Record, declarations, number, record
+from lgmd_gym.fields import Declaration, Record, declarations, flag, number, record
 from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.validation import checked_fps
 
@@ -49,6 +49,11 @@ class Softness(Record):
         "Width of the lower bound 0 of the spikes of a frame. In place of floor(x), a frame has x - 1/2 "
         "spikes, the mean of floor(x + d) over a uniform d in [-1/2, 1/2].",
     )
+    surrogate: bool = flag(
+        False,
+        "Whether only the gradients are smooth (surrogate gradients), and the outputs those of the "
+        "hard model.",
+    )
 
 
 class LayerResponse(NamedTuple):
@@ -71,7 +76,7 @@ class LayerState(NamedTuple):
     luminance: Tensor  # last frame (N, H, W)
     past_p: Tensor  # P of the last n_p frames, newest first (N, n_p, H, W)
     paths: Tensor  # E of the ON and the OFF path (N, 2, H, W)
-    delayed: Tensor  # memory of the delay per path and ring of neighbours (N, 2, 3, H, W)
+    delayed: Tensor  # memory of the delay per ring of neighbours and path (3, N, 2, H, W)
     g: Tensor  # G (N, H, W)
     f: Tensor  # F (N,)
     k: Tensor  # K (N,)
@@ -87,7 +92,8 @@ class LGMDLayer(nn.Module):
     """LGMD neurons whose parameters can be learned.
 
     Without `softness` the outputs are those of the reference model, and gradients pass only through values
-    above the thresholds; spikes have none. With `softness` all outputs but the alert have gradients.
+    above the thresholds; spikes have none. With `softness` all outputs but the alert have gradients, which
+    are surrogates of hard thresholds if it says so.
 
     Each learned parameter is an `nn.Parameter` with the value divided by its start, so that one learning
     rate suits all. `values` has the values in their units. Call `clamp_` after each step of the optimizer.
@@ -235,7 +241,7 @@ class LGMDLayer(nn.Module):
         p, zeros = self.params, luminance.new_zeros
         k, none = values["k_0"].expand(n), zeros(n)
         state = LayerState(
-            1, luminance, zeros(n, p.n_p, h, w), zeros(n, 2, h, w), zeros(n, 2, 3, h, w), zeros(n, h, w),
+            1, luminance, zeros(n, p.n_p, h, w), zeros(n, 2, h, w), zeros(3, n, 2, h, w), zeros(n, h, w),
             none, k, k, zeros(n, p.window),
         )  # fmt: skip
         return self._response(state, values["sigma_1"].expand(n), self._latency(none, values), values), state
@@ -272,10 +278,10 @@ class LGMDLayer(nn.Module):
         paths = torch.stack([photo, -photo], 1).clamp(min=0.0)
         if self.params.on_off_residue > 0.0 or "on_off_residue" in self.learned:
             paths = paths + values["on_off_residue"] * state.paths
-        now = torch.stack(_rings(paths), 2)
-        gains, weights = (x.view(3, 1, 1) for x in (self._gain(values["tau_2"]), values["weights"]))
-        delayed = now if self._is_warm(state) else state.delayed + gains * (now - state.delayed)
-        inhibition = (weights * delayed).sum(2)
+        now = torch.stack(_rings(paths))
+        gains = self._gain(values["tau_2"])
+        delayed = now if self._is_warm(state) else torch.lerp(state.delayed, now, gains.view(3, 1, 1, 1, 1))
+        inhibition = (values["weights"] @ delayed.view(3, -1)).view_as(paths)
         s_on, s_off = (paths - w[:, None, None, None] * inhibition).clamp(min=0.0).unbind(1)  # eq. 7
         s = values["theta_1"] * s_on + values["theta_2"] * s_off + values["theta_3"] * s_on * s_off  # eq. 8
         return s, paths, now if self.params.delay == "two-tap" else delayed
@@ -286,10 +292,7 @@ class LGMDLayer(nn.Module):
         local = (centre + nearest + diagonal)[:, 0] / 9.0
         omega = values["delta_c"] + local.abs().amax((1, 2), keepdim=True) / values["c_w"]
         g = s * local / omega
-        above = g * values["c_de"] - values["t_de"]
-        if self.softness is None:
-            return torch.where(above >= 0.0, g, 0.0)
-        return g * torch.sigmoid(above / self.softness.grouping)
+        return g * self._switch(g * values["c_de"] - values["t_de"], "grouping")
 
     def _potentials(
         self, mean_g: Tensor, f: Tensor, state: LayerState, values: dict[str, Tensor]
@@ -301,18 +304,29 @@ class LGMDLayer(nn.Module):
         keep = 1.0 / (1.0 + self.params.frame_interval_ms(self.fps) / values["tau_s"])
         adapts = self._switch(values["t_sfa"] - rise, "adaptation")
         adapted = keep * torch.lerp(k, state.k_hat + rise, adapts)
-        if self.softness is None:
-            return k, adapted.clamp(min=0.5)
-        return k, 0.5 + _softplus(adapted - 0.5, self.softness.floor)
+        return k, 0.5 + self._bounded(adapted - 0.5, (adapted - 0.5).clamp(min=0.0), "floor")
 
     def _switch(self, above: Tensor, width: str, *, strict: bool = False) -> Tensor:
         """Return 1 where a value is at or above 0 (above 0 if strict), 0 elsewhere; smooth with softness."""
+        hard = (above > 0.0 if strict else above >= 0.0).to(above)
         if self.softness is None:
-            return (above > 0.0 if strict else above >= 0.0).to(above)
-        return torch.sigmoid(above / asdict(self.softness)[width])
+            return hard
+        return self._soft_or_hard(torch.sigmoid(above / getattr(self.softness, width)), hard)
+
+    def _bounded(self, value: Tensor, hard: Tensor, width: str) -> Tensor:
+        """Return `hard`, or with softness a value with the smooth lower bound 0."""
+        if self.softness is None:
+            return hard
+        size = getattr(self.softness, width)
+        return self._soft_or_hard(size * functional.softplus(value / size), hard)
+
+    def _soft_or_hard(self, soft: Tensor, hard: Tensor) -> Tensor:
+        """Return smooth values, or hard ones with the gradients of the smooth ones."""
+        surrogate = self.softness is not None and self.softness.surrogate
+        return soft + (hard - soft).detach() if surrogate else soft
 
     def _spikes(self, drive: Tensor) -> Tensor:
-        return drive.floor() if self.softness is None else _softplus(drive - 0.5, self.softness.spikes)
+        return self._bounded(drive - 0.5, drive.detach().floor(), "spikes")
 
     def _response(
         self, state: LayerState, w: Tensor, latency: Tensor, values: dict[str, Tensor]
@@ -331,10 +345,6 @@ def _rings(image: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     sides, middle = padded[..., :-2, :] + padded[..., 2:, :], padded[..., 1:-1, :]
     nearest = sides[..., 1:-1] + middle[..., :-2] + middle[..., 2:]
     return image, nearest, sides[..., :-2] + sides[..., 2:]
-
-
-def _softplus(value: Tensor, width: float) -> Tensor:
-    return width * functional.softplus(value / width)
 
 
 def _scale(start: Tensor) -> Tensor:

@@ -3,11 +3,13 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.examples import EXAMPLES, EXPERIMENTS, load
 
 from lgmd_gym.benchmark import get_suite
 from lgmd_gym.envs.registration import RANDOM, RANDOM_TASKS, make_source
+from lgmd_gym.neuron import LGMDParams
 
 
 def test_every_script_has_a_test():
@@ -75,3 +77,19 @@ def test_easy_levels_are_those_of_the_easy_task():
         assert case.scenario == make_source(RANDOM, given).first
     assert {case.scenario.family for case in cases} == set(task["families"])
     assert len(cases) == 200
+
+
+@pytest.mark.slow
+def test_fit_neuron(tmp_path, capsys):
+    """A few steps change the parameters, and the separation is that of counts by hand."""
+    pytest.importorskip("torch")
+    example = load("fit_neuron")
+    counts = np.array([[1.0, 2.0, 4.0, 10.0], [2.0, 0.0, 4.0, 10.0]])
+    assert example.separation(counts.sum(0)) == pytest.approx(3 / 8 - 2 / 20)
+    assert example.paired(counts, counts) == (0.0, 0.0, 0.0)
+    small = ["--levels", "6", "--steps", "2", "--validation", "3"]
+    results = example.main([*small, "--out", str(tmp_path / "fitted.toml")])
+    params = LGMDParams.from_toml(tmp_path / "fitted.toml")
+    assert params != LGMDParams()
+    assert {name: table.shape[1] for name, table in results.items()} == {"paper": 4, "fitted": 4}
+    assert "fitted minus paper" in capsys.readouterr().out

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from golden.sequences import grating, looming, natural, random
 
+from lgmd_gym.cli import main as cli
 from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.neuron.export_c import FILES, c_sources, export_c
 from lgmd_gym.neuron.lgmd.reference import ReferenceLGMD
@@ -204,6 +205,43 @@ def test_fixed_point_refuses_what_it_does_not_cover(tmp_path):
         done = subprocess.run(command, capture_output=True, text=True)
         assert done.returncode != 0
         assert "LGMD_FIXED requires " + reason in done.stderr
+
+
+def test_an_existing_main_is_kept(tmp_path):
+    for name in FILES:
+        (tmp_path / name).write_text("own")
+    paths = export_c(tmp_path, SHAPE)
+    assert [path.name for path in paths] == list(FILES)
+    assert [path.read_text() == "own" for path in paths] == [False, False, True]
+
+
+def test_the_command_exports_presets_with_options_and_parameters(tmp_path, capsys):
+    LGMDParams(sigma_3=2.0).to_toml(tmp_path / "params.toml")
+    out = tmp_path / "new" / "c"
+    given = ["--shape", "48", "64", "--fps", "25", "--params", str(tmp_path / "params.toml")]
+    assert cli.run(["neurons", "export-c", str(out), *given, "--neuron", "off-only:t_sp=0.78"]) == 0
+    header = (out / "lgmd.h").read_text()
+    expected = LGMDParams(theta_1=0.0, t_sp=0.78, sigma_3=2.0)
+    assert header == c_sources((48, 64), 25.0, expected)["lgmd.h"]
+    assert "#define LGMD_HEIGHT 48 " in header
+    printed = capsys.readouterr().out
+    assert f"cc -std=c99 -O2 -o {out / 'lgmd'} {out / 'main.c'} {out / 'lgmd.c'} -lm" in printed
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--neuron", "dsn"], "neuron must be the LGMD or one of its presets, got 'dsn'"),
+        (["--neuron", "lgmd:tsp=1"], "did you mean 't_sp'"),
+        (["--shape", "0", "64"], "shape must be (height, width)"),
+    ],
+)
+def test_invalid_options_of_the_command_are_one_line(options, message, tmp_path, capsys):
+    assert cli.run(["neurons", "export-c", str(tmp_path / "c"), *options]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "c").exists()
 
 
 def test_sources_allocate_nothing_and_name_every_parameter():

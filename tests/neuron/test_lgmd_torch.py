@@ -142,6 +142,19 @@ def test_narrow_thresholds_approach_the_hard_model():
     assert torch.allclose(soft.spikes[:, 1:], (drive[:, 1:] - 0.5).clamp(min=0.0), atol=1e-4)
 
 
+def test_surrogate_gradients_keep_the_hard_outputs():
+    frames = torch.from_numpy(clips()).double()
+    hard, _ = LGMDLayer()(frames)
+    layer = LGMDLayer(learn=["t_de", "t_sp", "sigma_3"], softness=Softness(surrogate=True))
+    response, _ = layer(frames)
+    for ours, theirs in zip(response, hard, strict=True):
+        torch.testing.assert_close(ours, theirs, rtol=1e-9, atol=1e-9)
+    response.spike_frequency.sum().backward()
+    assert {name: float(item.grad) < 0.0 for name, item in layer.learned.items()} == dict.fromkeys(
+        layer.learned, True
+    )
+
+
 def test_hard_outputs_have_gradients_above_the_thresholds():
     layer = LGMDLayer(learn=["sigma_3", "t_de"])
     response, _ = layer(torch.from_numpy(clips()))

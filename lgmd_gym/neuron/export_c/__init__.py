@@ -24,7 +24,7 @@ def export_c(
     """Write `lgmd.h`, `lgmd.c` and `main.c` to a folder and return their paths.
 
     Args:
-        folder: Folder, which is created; files of these names are replaced.
+        folder: Folder, which is created. The first two files are replaced; an existing `main.c` is kept.
         shape: (height, width) of the frames [px].
         fps: Frame rate [Hz].
         params: Parameters of the neuron, or a mapping of them; None for the defaults.
@@ -36,7 +36,8 @@ def export_c(
     sources = c_sources(shape, fps, params)
     place.mkdir(parents=True, exist_ok=True)
     for name, text in sources.items():
-        (place / name).write_text(text, encoding="utf-8")
+        if name != "main.c" or not (place / name).exists():
+            (place / name).write_text(text, encoding="utf-8")
     return [place / name for name in sources]
 
 
