@@ -4,7 +4,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ PANELS = (
     *("dark square approaches", "dark square recedes", "passes at 0.3 m/s"),
     *("approaches in panorama", "passes in panorama", "approaches in grating"),
 )
+LONG_NAME = 20  # characters of a model above which a legend has fewer columns
 _STYLES = ("-", "--", ":")
 _FALSE_TICKS = (0.0, 0.25, 1.0, 3.0, 10.0, 30.0, 100.0)
 
@@ -32,7 +33,7 @@ def _line(index: int) -> Values:
     return {
         "color": COLOURS[index % len(COLOURS)],
         "linestyle": _STYLES[index // len(COLOURS) % len(_STYLES)],
-        "linewidth": 1.1 + 0.35 * index,
+        "linewidth": 1.0 + 0.14 * index,
         "zorder": 3.0 - 0.05 * index,
     }
 
@@ -51,7 +52,7 @@ def stimulus_figure(file: Path, results: Sequence[StimulusResult]) -> None:
         for axis in axes[1]:
             axis.set_xlabel("time [s]; contact at 3 s")
         figure.supylabel("spike frequency [spikes/s]", fontsize=9)
-        _legend(figure, axes.flat[0], len(models))
+        _legend(figure, axes.flat[0])
 
 
 def approach_figure(file: Path, results: Sequence[StimulusResult]) -> None:
@@ -68,7 +69,7 @@ def approach_figure(file: Path, results: Sequence[StimulusResult]) -> None:
         axes[1].set_yscale("symlog", linthresh=50.0)
         for axis in axes:
             axis.set_xlabel("l/|v| [s]")
-        _legend(figure, axes[0], len(models))
+        _legend(figure, axes[0])
 
 
 def froc_figure(file: Path, curves: Mapping[str, Sequence[FrocPoint]], lead_s: float) -> None:
@@ -85,7 +86,7 @@ def froc_figure(file: Path, curves: Mapping[str, Sequence[FrocPoint]], lead_s: f
         axis.set_xlim(-0.05, 32.0)
         axis.set_xlabel("false alarms per km")
         axis.set_ylabel(f"threats with an alarm 4 to {lead_s:g} s before contact")
-        _legend(figure, axis, len(curves) + 1)
+        _legend(figure, axis)
 
 
 def closed_loop_figure(file: Path, summaries: Sequence[AgentSummary]) -> None:
@@ -120,8 +121,7 @@ def _rates(axis: "Axes", rates: Sequence[Rate], names: Sequence[str]) -> None:
     axis.set_ylim(len(names) - 0.5, -0.5)
 
 
-def _legend(figure: object, axis: "Axes", count: int) -> None:
+def _legend(figure: Any, axis: "Axes") -> None:
     handles, labels = axis.get_legend_handles_labels()
-    figure.legend(  # pyright: ignore[reportAttributeAccessIssue]
-        handles, labels, loc="outside lower center", ncols=min(count, 5), fontsize=8
-    )
+    columns = 3 if max(map(len, labels)) > LONG_NAME else 5
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=8)

@@ -80,7 +80,7 @@ def compare(settings: Comparison, folder: Path, on_part: Progress) -> Document:
         parts += _simulation(settings, folder, on_part)
     if "cost" in settings.parts:
         with on_part("cost"):
-            rounds = 2 if settings.quick else 7
+            rounds = 3 if settings.quick else 15
             parts.append(sections.of_cost(cost.measure(settings.models, rounds)))
     document = Document("Which neuron?", sections.introduction(settings.models), tuple(parts))
     document.write(folder)

@@ -83,22 +83,25 @@ class EventCamera:
         self._first = np.ones(self.num, np.bool_)
         self._noise = [self._generator() for _ in range(self.num)]
 
-    def step(self, frames: Frames, active: NDArray[np.bool_] | None = None) -> Counts:
+    def step(
+        self, frames: Frames, active: NDArray[np.bool_] | None = None, out: Counts | None = None
+    ) -> Counts:
         """Return the events since the last frame of each active view; those of the others are 0.
 
         Args:
             frames: Grey luminance in 0-255, shape (N, height, width).
             active: Views with a new frame, shape (N,); None for all.
+            out: Array for the events, of which those of other views stay; a new one if None.
 
         Returns:
             Events, + for ON, int32, shape (N, height, width); 0 for the first frame.
         """
-        events = np.zeros((self.num, *self.shape), np.int32)
+        events = np.zeros((self.num, *self.shape), np.int32) if out is None else out
         for n in range(self.num) if active is None else np.flatnonzero(active).tolist():
             light = frames[n]
             log = self._log[light] if light.dtype == np.uint8 else self._log_of(light)
             if self._first[n]:
-                self._memory[n], self._first[n] = log, False
+                self._memory[n], self._first[n], events[n] = log, False, 0
                 continue
             steps = np.trunc((log - self._memory[n]) / np.float32(self.params.threshold))
             self._memory[n] += np.float32(self.params.threshold) * steps
@@ -158,6 +161,8 @@ class EventLGMD(LGMD):
     ) -> None:
         super().__init__(shape, fps, params, num)
         self.camera = EventCamera(self.shape, self.fps, events, self._count)
+        self._counts = np.zeros((self._count, *self.shape), np.int32)
+        self._light = np.full(self._counts.shape, _REST, np.uint8)
         self._given: Counts | None = None
 
     def step_events(self, counts: ArrayLike) -> Values:
@@ -182,11 +187,20 @@ class EventLGMD(LGMD):
         """Step the active neurons among first..last-1; see `FrameNeuron.step_range`."""
         chosen = np.zeros(self._count, np.bool_)
         chosen[first:last] = active[first:last]
-        counts = self.camera.step(frames, chosen) if self._given is None else self._given
+        counts = self._given
+        if counts is None:
+            counts = self.camera.step(frames, chosen, self._counts)
         # The kernel computes the change of light against the last frame: rest against rest plus events.
         self._previous[chosen] = _REST
-        light = np.clip(np.rint(_REST + self.camera.params.gain * counts), 0, 255).astype(self._frames_dtype)
-        super().step_range(first, last, light, active)
+        gain = np.float32(self.camera.params.gain)
+        for n in np.flatnonzero(chosen).tolist():
+            light = _REST + gain * counts[n]
+            self._light[n] = np.clip(np.rint(light, out=light), 0.0, 255.0, out=light)
+        super().step_range(first, last, self._light, active)
+
+    def _use_floats(self) -> None:
+        super()._use_floats()
+        self._light = self._light.astype(np.float32)  # the kernel takes both frames of one type
 
     def shift_range(
         self,

@@ -1,5 +1,6 @@
 """Specifications of models: names, presets and options in one text, as of agents."""
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -130,3 +131,20 @@ def test_the_adaptive_threshold_gates_the_spike_frequency_by_its_mean():
     assert 5 < sum(passed) < len(passed) - 5
     gated.reset()
     assert gated._mean.tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("model", ["events:noise_hz=5", "adaptive-threshold:gain=1.1", "difference:sigma=1"])
+def test_a_single_environment_is_a_row_of_the_engine(model):
+    options = {"ego_speed": 8.0, "world": "laboratory", "neuron": model, "camera": {"shape": (40, 60)}}
+    single = gym.make("LGMD/CCRs-v0", **options)
+    batch = gym.make_vec("LGMD/CCRs-v0", 3, threads=2, **options)
+    one, many = single.reset(seed=2)[0], batch.reset(seed=[1, 2, 3])[0]
+    excited = False
+    for _ in range(15):
+        for name in ("spike_frequency", "membrane_potential", "ffi"):
+            assert (one[name] == many[name][1]).all()
+        assert one in single.observation_space
+        excited |= one["membrane_potential"][0] > 0.5
+        one, *_ = single.step(np.array([-0.5], np.float32))
+        many, *_ = batch.step(np.full((3, 1), -0.5, np.float32))
+    assert excited
