@@ -107,7 +107,7 @@ def draw_ground(image, view, coverage, tables, horizon):
         shade_row(image, i, horizon, coverage, view, tables)
 
 
-@kernel(inline=True)
+@kernel
 def draw_solids(image, view, models, seen, n, member, vehicles, layer, clock):
     """Draw the solid objects that a lens sees from far to near, and their glare."""
     lens, look = view.lens, view.look

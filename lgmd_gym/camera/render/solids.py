@@ -49,7 +49,7 @@ def to_axes(lens, x, y, z, out, i):
     out[i, 2] = down * lens.cos_roll - right * lens.sin_roll
 
 
-@kernel(inline=True)
+@kernel
 def place_object(lens, look, obj, axes):
     """Write an object in camera axes: centre of its underside, its size [m], direction of the sun."""
     c, s = obj.cos, obj.sin
@@ -65,7 +65,7 @@ def place_object(lens, look, obj, axes):
     to_axes(lens, look.sun_x, look.sun_y, look.sun_z, axes, np.int64(4))
 
 
-@kernel(inline=True)
+@kernel
 def place_corners(fractions, n, axes, corners):
     """Place the first n corners of a polygon, given as fractions of an object's axes, in camera axes."""
     for i in range(n):
@@ -74,7 +74,7 @@ def place_corners(fractions, n, axes, corners):
             corners[i, k] = axes[0, k] + a * axes[1, k] + b * axes[2, k] + c * axes[3, k]
 
 
-@kernel(inline=True)
+@kernel
 def outside(lens, axes):
     """Return whether an object is entirely beyond the left, right, upper or lower side of the frame.
 
@@ -156,7 +156,7 @@ def draw_object(image, view, obj, index, models, air, layer, seen):
             compose(image, layer, rows, columns, air, view)
 
 
-@kernel(inline=True)
+@kernel
 def _find_faces(layer, look, models, solids, seen, index):
     """Write the polygons of an object that are turned towards the eye, in the order of drawing.
 
