@@ -52,6 +52,11 @@ COMMANDS: dict[str, tuple[list[str], list[str]]] = {
               "--study", "--best"], ["--jobs", "0"]),
     "gallery": (["--out", "--families", "--agent", "--seeds"], ["--seeds", "0"]),
     "list": ([], []),
+    "neurons list": (["--module"], ["--module", "none"]),
+    "neurons compare": (["--parts", "--clips", "--crashes", "--clip-fps", "--clip-cap", "--camera", "--suites",
+                         "--seeds", "--first-world", "--test-world", "--jobs", "--module", "--out"],
+                        ["--parts", "none"]),
+    "neurons events": (["--neuron", "--fps", "--out"], ["--fps", "0"]),
 }  # fmt: skip
 
 
@@ -59,7 +64,7 @@ def command_line(rng: random.Random) -> list[str]:
     """Return a random command line."""
     command = rng.choice(list(COMMANDS))
     options, short = COMMANDS[command]
-    line = [command, *rng.choices(NAMES, k=rng.choice((0, 1, 1, 2)))]
+    line = [*command.split(), *rng.choices(NAMES, k=rng.choice((0, 1, 1, 2)))]
     for option in rng.sample(options, min(len(options), rng.randint(0, 3))):
         line += [option, *rng.choices(NAMES, k=rng.choice((1, 1, 1, 2, 4)))]
     return line + short
