@@ -53,9 +53,9 @@ COMMANDS: dict[str, tuple[list[str], list[str]]] = {
     "gallery": (["--out", "--families", "--agent", "--seeds"], ["--seeds", "0"]),
     "list": ([], []),
     "neurons list": (["--module"], ["--module", "none"]),
-    "neurons compare": (["--parts", "--clips", "--crashes", "--clip-fps", "--clip-cap", "--camera", "--suites",
-                         "--seeds", "--first-world", "--test-world", "--jobs", "--module", "--out"],
-                        ["--parts", "none"]),
+    "neurons compare": (["--parts", "--clips", "--crashes", "--clip-fps", "--clip-cap", "--camera",
+                         "--suites", "--seeds", "--first-world", "--test-world", "--jobs", "--module",
+                         "--out"], ["--parts", "none"]),
     "neurons events": (["--neuron", "--fps", "--out"], ["--fps", "0"]),
 }  # fmt: skip
 
