@@ -1,6 +1,5 @@
 """Rules on the neuron: thresholds of the spike frequency, and of the excitation of camera fields."""
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
@@ -23,6 +22,7 @@ from lgmd_gym.agents.zones import (
 from lgmd_gym.aliases import Values
 from lgmd_gym.errors import check_keys, check_type, shown
 from lgmd_gym.fields import Record, declarations, number, record, whole
+from lgmd_gym.processes.inputs import read_toml
 
 POSITIVE, COUNT = "(0, inf)", "[1, inf)"
 CAMERA = "camera"  # group of the parameters that determine the cameras of a rule
@@ -433,7 +433,7 @@ class StoppingZone(Rule):
 
 def _read_toml(path: object) -> Values:
     try:
-        return tomllib.loads(Path(str(path)).read_text(encoding="utf-8"))
+        return read_toml(Path(str(path)))
     except OSError as error:
         raise ValueError(f"agent file {shown(str(path))} cannot be read: {error.strerror}") from None
     except ValueError as error:  # also of a path with a null character

@@ -8,7 +8,8 @@ import json
 import zipfile
 import zlib
 from dataclasses import MISSING, replace
-from pathlib import Path
+from errno import EFBIG
+from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 from lgmd_gym.agents.base import FPS
@@ -19,6 +20,7 @@ from lgmd_gym.errors import (
     check_items,
     check_mapping,
     check_path,
+    check_text,
     check_type,
     check_within,
     shown,
@@ -26,6 +28,7 @@ from lgmd_gym.errors import (
 from lgmd_gym.fields import Record, optional, record, text, value
 from lgmd_gym.processes.extras import missing_extra
 from lgmd_gym.processes.files import complete_file
+from lgmd_gym.processes.inputs import check_regular, read_json
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -38,6 +41,7 @@ _T = TypeVar("_T")
 TrainingEnv: TypeAlias = Any
 """An environment of Gymnasium, or a `VecEnv` of stable-baselines3."""
 NORMALIZER = f"-vecnormalize{NORMALIZER_SUFFIX}"  # end of the name of the file with the statistics
+MAX_POLICY = 1_000_000_000  # bytes of a policy file and its members
 CARD = "lgmd_gym.json"  # member of the zip file of a policy of `lgmd-gym train`
 _ZIP_ERRORS = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError)
 
@@ -71,6 +75,13 @@ def _check_network(name: str, network: object) -> NetworkSpec:
     return NetworkSpec.make(cast("NetworkSpec | Values", check_type(name, network, dict, NetworkSpec)))
 
 
+def _check_normalizer(name: str, file: object) -> str:
+    text = check_text(name, file)
+    if text != PureWindowsPath(text).name or text in ("", ".", ".."):
+        raise ValueError(f"{name} must be the name of a file beside the policy, got {shown(text)}")
+    return text
+
+
 @record
 class PolicyCard(Record):
     """Description of a policy, as JSON in `FILE.json` beside the model `FILE.zip`."""
@@ -100,10 +111,11 @@ class PolicyCard(Record):
         )
     )
     vec_normalize: str | None = optional(
-        text(
+        value(
             None,
-            "Statistics of a `VecNormalize`, beside the card: a file .npz of `save_card`, or one of "
-            "`VecNormalize.save`, which is unpickled; None for a training without it",
+            _check_normalizer,
+            "Name of the statistics of a `VecNormalize`, beside the card: a file .npz of `save_card`, or, "
+            "without `network`, one of `VecNormalize.save`, which is unpickled; None for no statistics",
         )
     )
     network: NetworkSpec | None = optional(
@@ -113,6 +125,15 @@ class PolicyCard(Record):
             "Network, with which loading executes no code of the file; None to unpickle the file",
         )
     )
+
+    def check(self) -> None:
+        """Raise ValueError for a network of plain values with statistics that would be unpickled."""
+        name = self.vec_normalize
+        if self.network is not None and name is not None and not name.endswith(NORMALIZER_SUFFIX):
+            raise ValueError(
+                f"vec_normalize must be a file {NORMALIZER_SUFFIX} of save_card in a card with network, got "
+                f"{shown(name)}, which would be unpickled"
+            )
 
 
 def card_file(path: Path) -> Path:
@@ -129,7 +150,11 @@ def read_card(path: Path) -> Values:
         ValueError: If the file does not exist, is not a zip file or has no card.
     """
     try:
+        check_regular(path, MAX_POLICY)
         with zipfile.ZipFile(path) as file:
+            size = sum(item.file_size for item in file.infolist())
+            if size > MAX_POLICY:
+                raise OSError(EFBIG, f"it unpacks to {size} bytes, more than {MAX_POLICY}")
             if CARD in file.namelist():
                 return check_type("card", json.loads(file.read(CARD)), dict)
             if WEIGHTS not in file.namelist():  # a truncated file may look like a zip file
@@ -139,7 +164,7 @@ def read_card(path: Path) -> Values:
     except _ZIP_ERRORS:
         raise ValueError(f"{shown(str(path))} is not a policy file of stable-baselines3") from None
     try:
-        return check_type("card", json.loads(card_file(path).read_text("utf-8")), dict)
+        return check_type("card", read_json(card_file(path)), dict)
     except FileNotFoundError:
         raise ValueError(
             f"policy {shown(str(path))} has no card; write {shown(str(card_file(path)))} with "

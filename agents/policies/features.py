@@ -2,6 +2,7 @@
 
 import pickle
 import sys
+import zipfile
 from collections.abc import Mapping
 from functools import cache
 from multiprocessing import current_process
@@ -18,6 +19,7 @@ from lgmd_gym.aliases import Values
 from lgmd_gym.errors import check_items, check_known, shown
 from lgmd_gym.fields import Record, flag, number, record, value, whole
 from lgmd_gym.processes.files import complete_file
+from lgmd_gym.processes.inputs import MAX_BYTES, check_members, check_regular, read_bytes
 
 if TYPE_CHECKING:
     pass
@@ -412,10 +414,14 @@ def load_normalizer(path: Path) -> Any:
     """
     try:
         if path.suffix == NORMALIZER_SUFFIX:
+            check_regular(path)
+            with zipfile.ZipFile(path) as archive:
+                check_members(archive, MAX_BYTES)
             with np.load(path, allow_pickle=False) as arrays:
                 return Normalizer(dict(arrays))
+        data = read_bytes(path)
         announce_pickle(path)
-        normalizer: Any = pickle.loads(path.read_bytes())
+        normalizer: Any = pickle.loads(data)
     except OSError as error:
         raise ValueError(f"vec_normalize {shown(str(path))} cannot be read: {error.strerror}") from None
     except Exception as error:  # any exception of the unpickled code

@@ -7,6 +7,8 @@ import json
 import zipfile
 from collections.abc import Mapping
 from dataclasses import MISSING
+from itertools import pairwise
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +19,7 @@ from lgmd_gym.agents.policies.features import FRAME
 from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_items, check_keys, check_known, check_type, check_whole
 from lgmd_gym.fields import Record, record, text, value
+from lgmd_gym.processes.inputs import check_members
 
 if TYPE_CHECKING:
     import torch
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
 
 WEIGHTS = "policy.pth"  # member of every model file of stable-baselines3
 MAX_UNITS = 10_000  # of a layer or an input, so that a damaged card does not fill the memory
+MAX_WEIGHTS = 50_000_000  # of a network, about
+MAX_BYTES = 1_000_000_000  # of the unpacked weights
 PLAIN_KWARGS = (
     "net_arch", "activation_fn", "ortho_init", "use_sde", "log_std_init", "full_std", "use_expln",
     "clip_mean", "squash_output", "features_extractor_kwargs", "share_features_extractor", "normalize_images",
@@ -65,6 +70,25 @@ class NetworkSpec(Record):
         "Arguments of the policy class; the activation function by its name in `torch.nn`",
     )
 
+    def check(self) -> None:
+        """Raise ValueError for a network with too many weights, before it is built."""
+        sizes = {name: prod(shape) for name, shape in self.inputs.items()}
+        kwargs = self.policy_kwargs or {}
+        features = sum(size for name, size in sizes.items() if name != FRAME)
+        count = max(sizes.values(), default=0)
+        if FRAME in sizes:  # a convolution, with about as many outputs as pixels, and a layer
+            outputs = max(_whole(kwargs.get("features_extractor_kwargs"), 256))
+            features += outputs
+            count = max(count, sizes[FRAME] * outputs)
+        arch = kwargs.get("net_arch")
+        lists = list(arch.values()) if isinstance(arch, dict) else [arch]
+        for layers in lists:
+            units = [features, *_whole(layers, 0)]
+            count += sum(before * after for before, after in pairwise(units))
+        count *= max(_whole(kwargs.get("n_critics"), 1))
+        if count > MAX_WEIGHTS:
+            raise ValueError(f"the network must have at most {MAX_WEIGHTS} weights, got about {count}")
+
     @property
     def observation_space(self) -> spaces.Dict:
         """Space of the inputs."""
@@ -104,7 +128,12 @@ class NetworkSpec(Record):
         import torch
 
         with zipfile.ZipFile(path) as file:
+            check_members(file, MAX_BYTES)
             data = io.BytesIO(file.read(WEIGHTS))
+        if zipfile.is_zipfile(data):
+            with zipfile.ZipFile(data) as inside:
+                check_members(inside, MAX_BYTES)
+        data.seek(0)
         weights = torch.load(data, map_location="cpu", weights_only=True)
         network = self.build(algo, num_actions)
         expected, given = _shapes(network.state_dict()), _shapes(weights)
@@ -196,6 +225,15 @@ def _box(name: str, shape: tuple[int, ...]) -> spaces.Box:
 
 def _actions(count: int | None) -> spaces.Space:
     return spaces.Box(-1.0, 1.0, (1,)) if count is None else spaces.Discrete(count)
+
+
+def _whole(values: object, default: int) -> list[int]:
+    """Return the numbers in nested values; a default without one."""
+    if isinstance(values, dict | list | tuple):
+        items = values.values() if isinstance(values, dict) else values
+        found = [number for item in items for number in _whole(item, -1) if number >= 0]
+        return found or [default]
+    return [int(values)] if isinstance(values, int | float) and values >= 0 else [default]
 
 
 def _check_units(value: object) -> None:

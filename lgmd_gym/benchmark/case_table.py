@@ -1,10 +1,8 @@
 """Tables of suite files as cases: one case, one per speed, or one per combination of a sweep."""
 
 import inspect
-import json
 import math
 import re
-import tomllib
 from collections.abc import Collection, Sequence
 from inspect import signature
 from itertools import product
@@ -20,6 +18,7 @@ from lgmd_gym.envs.families import FAMILIES
 from lgmd_gym.envs.families.data import scenario_from_data
 from lgmd_gym.envs.registration import APPEARANCE
 from lgmd_gym.errors import check_finite, check_flag, check_keys, check_type, is_number, shown
+from lgmd_gym.processes.inputs import read_json, read_toml
 
 Argument: TypeAlias = bool | int | float | str
 """A value of a swept argument."""
@@ -38,8 +37,7 @@ def read_data(path: Path, kind: str) -> Values:
     """
     is_json = path.suffix == ".json"
     try:
-        text = path.read_text(encoding="utf-8")
-        values: object = json.loads(text, object_pairs_hook=_unique) if is_json else tomllib.loads(text)
+        values: object = read_json(path, _unique) if is_json else read_toml(path)
     except OSError as error:
         raise ValueError(f"{kind} {str(path)!r} cannot be read: {error.strerror}") from None
     except ValueError as error:  # also of the decoders of TOML, JSON and UTF-8

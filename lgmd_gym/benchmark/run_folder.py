@@ -16,6 +16,7 @@ from lgmd_gym.benchmark.case import ID_KEYS, TRAFFIC, Row, RowKey, key_of
 from lgmd_gym.benchmark.config import RUN_FILE, RunConfig, provenance
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.processes.files import FolderLock, new_folder, replace_file
+from lgmd_gym.processes.inputs import read_bytes, read_json
 
 _MAX_BYTES = 220  # file systems allow 255 with the suffix
 # These texts stay distinct with "_" for their separators: a case with slashes, and an agent with options.
@@ -99,7 +100,7 @@ def read_settings(path: Path) -> Values:
     """
     file = path / "run.json"
     try:
-        settings: object = json.loads(file.read_text(encoding="utf-8"))
+        settings: object = read_json(file)
         if not isinstance(settings, dict):
             raise ValueError
     except (OSError, ValueError):
@@ -126,7 +127,7 @@ def read_series(path: Path, name: str) -> dict[str, np.ndarray] | None:
 def _parse(file: Path) -> tuple[list[Row], bool]:
     """Return the rows of a file, and whether an incomplete last line was skipped."""
     rows: list[Row] = []
-    lines = file.read_bytes().splitlines(keepends=True)
+    lines = read_bytes(file, None).splitlines(keepends=True)
     for number, line in enumerate(lines, start=1):
         try:
             if not line.endswith(b"\n"):

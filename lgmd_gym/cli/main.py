@@ -91,6 +91,9 @@ def _run(argv: list[str] | None) -> int:
     except (ValueError, TypeError, OverflowError) as error:
         print(f"lgmd-gym: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    except MemoryError as error:
+        print(f"lgmd-gym: the memory is full ({error or 'no size given'})", file=sys.stderr)
+        return 2
     except OSError as error:
         print(f"lgmd-gym: {io_reason(error)}", file=sys.stderr)
         drop_output()

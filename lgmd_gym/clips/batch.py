@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from lgmd_gym.clips.playback import TRACE_COLUMNS, ClipRun, ClipSummary, Playbac
 from lgmd_gym.clips.scores import ScoredClip
 from lgmd_gym.clips.video import TruncatedVideoError, VideoInfo, find_clips, probe
 from lgmd_gym.errors import unknown_name
+from lgmd_gym.processes.inputs import read_text
 
 _EMPTY = ("", "none", "-")
 EVENT_COLUMNS = ("file", "event_s", "start_s", "end_s")
@@ -102,14 +104,16 @@ def _rows(
 ) -> list[dict[str, str | None]]:
     """Return the rows of a CSV file that has at least the needed columns, and only `known` ones if given."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file, skipinitialspace=True)
-            columns = [str(name) for name in reader.fieldnames or ()]
-            if unknown := [name for name in columns if known and name not in known]:
-                raise ValueError(f"{path}: {unknown_name('column', unknown[0], known or ())}")
-            if missing := [name for name in needed if name not in columns]:
-                raise ValueError(f"{path} lacks the column {missing[0]!r}; it needs {','.join(needed)}")
-            return list(reader)
+        text = read_text(path)
+        if ";" in text.partition("\n")[0]:
+            raise ValueError(f"{path}: the columns are separated by semicolons; separate them with commas")
+        reader = csv.DictReader(StringIO(text, newline=""), skipinitialspace=True)
+        columns = [str(name) for name in reader.fieldnames or ()]
+        if unknown := [name for name in columns if known and name not in known]:
+            raise ValueError(f"{path}: {unknown_name('column', unknown[0], known or ())}")
+        if missing := [name for name in needed if name not in columns]:
+            raise ValueError(f"{path} lacks the column {missing[0]!r}; it needs {','.join(needed)}")
+        return list(reader)
     except OSError as error:
         raise ValueError(f"{kind} {str(path)!r} cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error) as error:

@@ -167,6 +167,11 @@ class Compiled:
 
 def compile_scenario(root: Element, family: str) -> Compiled:
     """Return a concrete scenario."""
+    with root.locate_errors():
+        return _compile_board(root, family)
+
+
+def _compile_board(root: Element, family: str) -> Compiled:
     catalogs = Catalogs(root)
     movers = read_entities(root, catalogs)
     network = root.child("RoadNetwork").child("LogicFile")
@@ -181,8 +186,7 @@ def compile_scenario(root: Element, family: str) -> Compiled:
     ego = next((item for name, item in movers.items() if name.lower() == EGO), None)
     if ego is None:
         raise root.child("Entities").error("the scenario needs an entity with the name Ego")
-    with root.locate_errors():
-        return _compile(root, world, ego, family, weather, notes)
+    return _compile(root, world, ego, family, weather, notes)
 
 
 def _compile(

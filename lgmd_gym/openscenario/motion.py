@@ -10,6 +10,7 @@ from typing import NamedTuple
 from lgmd_gym.envs.dynamics.path import Path
 from lgmd_gym.envs.dynamics.script import Bend, Pose, Segment
 
+MAX_CURVED = 100_000.0  # [m] of bends in a path
 _SHORTEST = 1e-9  # [m], below which a section of a path is dropped
 
 
@@ -69,6 +70,12 @@ class Track:
 
     start: Place  # pose at distance 0
     bends: tuple[Bend, ...] = ()  # bends in driving order
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for bends that would need too many cells."""
+        curved = sum(bend.length for bend in self.bends if not _is_straight(bend))
+        if not curved <= MAX_CURVED:
+            raise ValueError(f"the bends of a path must be at most {MAX_CURVED:g} m long, got {curved:g} m")
 
     @cached_property
     def _path(self) -> Path:

@@ -13,6 +13,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from lgmd_gym.errors import shown, unknown_name
+from lgmd_gym.processes.inputs import read_bytes
 
 Value = float | bool
 MAX_LENGTH = 5000  # characters
@@ -237,7 +238,7 @@ def _as_bool(value: Value) -> bool:
     return value
 
 
-MAX_BYTES = 20_000_000
+MAX_LEVELS = 200  # of elements within elements
 
 
 class LocatedError(ValueError):
@@ -268,11 +269,9 @@ def parse_file(path: Path) -> Node:
         ValueError: If the file cannot be read, is too large, is not XML, or declares a document type.
     """
     try:
-        data = path.read_bytes()
+        data = read_bytes(path)
     except OSError as error:
         raise ValueError(f"{path} cannot be read: {error.strerror}") from None
-    if len(data) > MAX_BYTES:
-        raise ValueError(f"{path} has {len(data)} bytes, more than {MAX_BYTES}; split the file")
     return _parse(path, data)
 
 
@@ -282,6 +281,8 @@ def _parse(path: Path, data: bytes) -> Node:
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         node = Node(tag, attributes, path, parser.CurrentLineNumber)
+        if len(open_nodes) == MAX_LEVELS:
+            raise node.error(f"{tag} is within more than {MAX_LEVELS} elements; remove levels")
         (open_nodes[-1].children if open_nodes else roots).append(node)
         open_nodes.append(node)
 
@@ -294,6 +295,10 @@ def _parse(path: Path, data: bytes) -> Node:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         raise LocatedError(f"{path}:{error.lineno}: not XML: {expat.ErrorString(error.code)}") from None
+    except (LookupError, ValueError) as error:  # of an encoding that Python does not have, or of many bytes
+        if isinstance(error, LocatedError):
+            raise
+        raise LocatedError(f"{path}:1: the encoding cannot be read ({error}); save it as UTF-8") from None
     return roots[0]
 
 
@@ -318,13 +323,18 @@ class Element:
 
     @contextmanager
     def locate_errors(self, prefix: str = "") -> Generator[None, None, None]:
-        """Add a prefix, the file and the line to a ValueError of the block; a located one stays as it is."""
+        """Add a prefix, the file and the line to a ValueError of the block; a located one stays as it is.
+
+        A number that is too large or small for the arithmetic becomes a ValueError as well.
+        """
         try:
             yield
         except LocatedError:
             raise
         except ValueError as error:
             raise self.error(f"{prefix}{error}") from None
+        except ArithmeticError as error:
+            raise self.error(f"{prefix}a number is too large or too small ({error})") from None
 
     def has(self, name: str) -> bool:
         """Return whether the element has an attribute."""

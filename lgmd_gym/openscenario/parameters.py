@@ -74,7 +74,7 @@ def _check_type(name: str, kind: str, value: str, source: Node) -> None:
             raise source.error(
                 f"parameter {name} of type {kind} must be a number, got {shown(value)}"
             ) from None
-        if kind != "double" and number != floor(number):
+        if kind != "double" and not number.is_integer():
             raise source.error(f"parameter {name} of type {kind} must be a whole number, got {shown(value)}")
     elif kind == "boolean" and value not in ("true", "false", "0", "1"):
         raise source.error(f"parameter {name} must be true or false, got {shown(value)}")
@@ -156,9 +156,10 @@ def _range(values: Element) -> list[str]:
     low, high = limits.number("lowerLimit"), limits.number("upperLimit")
     if step <= 0.0 or high < low:
         raise values.error(f"a range needs stepWidth > 0 and upperLimit >= lowerLimit, got {step:g}")
-    count = floor((high - low) / step + 1e-9) + 1
-    if count > MAX_CELLS:
-        raise values.error(f"a range must have at most {MAX_CELLS} values, got {count}")
+    steps = (high - low) / step
+    if not steps < MAX_CELLS:
+        raise values.error(f"a range must have at most {MAX_CELLS} values, got {steps:g}")
+    count = floor(steps + 1e-9) + 1
     return [format(low + number * step, ".12g") for number in range(count)]
 
 

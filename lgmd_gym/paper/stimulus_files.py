@@ -15,6 +15,7 @@ from lgmd_gym.clips.video import VideoReader, VideoWriter, luma
 from lgmd_gym.errors import check_mapping, check_path, check_text, unknown_name
 from lgmd_gym.paper.backgrounds import SHAPES, Panorama, Screen
 from lgmd_gym.paper.stimuli import SET_VERSION, Stimulus, Truth, stimulus_set
+from lgmd_gym.processes.inputs import read_json
 
 MANIFEST = "manifest.json"
 SET_NAME = "lgmd-gym stimuli"
@@ -98,7 +99,7 @@ def check_stimuli(folder: str | Path) -> Values:
     """
     folder = check_path("folder", folder)
     try:
-        manifest = check_mapping(MANIFEST, json.loads((folder / MANIFEST).read_text(encoding="utf-8")))
+        manifest = check_mapping(MANIFEST, read_json(folder / MANIFEST))
         entries = {name: check_mapping(name, entry) for name, entry in manifest["stimuli"].items()}
         files = [
             (folder / check_text("video", entry["video"]), folder / check_text("truth", entry["truth"]))

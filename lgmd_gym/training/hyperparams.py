@@ -15,6 +15,7 @@ from lgmd_gym.errors import (
     shown,
     unknown_name,
 )
+from lgmd_gym.processes.inputs import read_text
 
 OFFLINE = "offline"  # the algorithm of `lgmd_gym.training.offline.learner`
 ALGORITHMS = ("ppo", "sac", "dqn", OFFLINE)
@@ -74,7 +75,7 @@ def _read_yaml(path: Path) -> Values:
     import yaml
 
     try:
-        entries: object = yaml.safe_load(path.read_text(encoding="utf-8"))
+        entries: object = yaml.safe_load(read_text(path))
     except OSError as error:
         raise ValueError(f"hyperparameters {str(path)!r} cannot be read: {error.strerror}") from None
     except yaml.YAMLError as error:

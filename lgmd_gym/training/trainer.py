@@ -13,6 +13,7 @@ from lgmd_gym.agents.policies.card import write_card
 from lgmd_gym.agents.policies.network import describe_network
 from lgmd_gym.errors import check_keys, check_whole
 from lgmd_gym.processes.files import FolderLock, complete_file, new_folder
+from lgmd_gym.processes.inputs import read_json
 from lgmd_gym.processes.user_modules import error_reason
 from lgmd_gym.sensing.channel import plain_values
 from lgmd_gym.training.config import TrainConfig
@@ -77,7 +78,7 @@ def resume(folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
     """
     check_whole("jobs", jobs, 1)
     try:
-        values = json.loads((folder / CONFIG_FILE).read_text(encoding="utf-8"))
+        values = read_json(folder / CONFIG_FILE)
     except (OSError, ValueError):
         raise ValueError(
             f"{str(folder)!r} contains no training to resume (no readable {CONFIG_FILE})"

@@ -1,6 +1,8 @@
 """Models of stable-baselines3 that were saved by hand act as agents with a card beside them."""
 
 import json
+import os
+import zipfile
 
 import gymnasium as gym
 import pytest
@@ -10,6 +12,8 @@ import lgmd_gym
 from lgmd_gym import benchmark
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies import PolicyCard, save_card, save_policy
+from lgmd_gym.agents.policies import card as card_module
+from lgmd_gym.agents.policies.network import NetworkSpec
 from lgmd_gym.camera import Camera
 
 pytest.importorskip("stable_baselines3")
@@ -124,6 +128,14 @@ def test_a_file_without_card_names_the_remedy(model, tmp_path):
     ({"vec_normalize": "nix.pkl"}, "vec_normalize .*nix.pkl' cannot be read: No such file"),
     ({"vec_normalize": "nix.npz"}, "vec_normalize .*nix.npz' cannot be read: No such file"),
     ({"vec_normalize": "model.json"}, "vec_normalize .* cannot be loaded"),
+    ({"vec_normalize": "../stats.pkl"}, "vec_normalize must be the name of a file beside the policy"),
+    ({"vec_normalize": "/tmp/stats.npz"}, "vec_normalize must be the name of a file beside the policy"),
+    ({"vec_normalize": "C:\\stats.npz"}, "vec_normalize must be the name of a file beside the policy"),
+    ({"vec_normalize": "..\\stats.npz"}, "vec_normalize must be the name of a file beside the policy"),
+    ({"vec_normalize": ".."}, "vec_normalize must be the name of a file beside the policy"),
+    ({"vec_normalize": ""}, "vec_normalize must be the name of a file"),
+    ({"vec_normalize": "pipe.npz"}, "it is a device or pipe, not a regular file"),
+    ({"vec_normalize": "pipe.pkl"}, "it is a device or pipe, not a regular file"),
     ({"cameras": "fovea"}, "unknown card field 'cameras'; did you mean 'camera'?"),
     ({"demands": [2.0]}, r"demand must be in \[-1, 1\], got 2.0"),
     ({"neuron": {"t_ff": 1}}, "unknown LGMD field 't_ff'"),
@@ -132,9 +144,62 @@ def test_a_wrong_card_is_refused(model, values, words, tmp_path):
     path = tmp_path / "model.zip"
     model.save(path)
     path.with_suffix(".json").write_text(json.dumps({"algo": "ppo", "camera": "fovea"} | values))
+    for name in ("pipe.npz", "pipe.pkl"):
+        os.mkfifo(tmp_path / name)
     with pytest.raises(ValueError, match=words) as caught:
         make_agent(f"policy:{path}")
     assert "\n" not in str(caught.value)
+
+
+LARGE_LAYER = {
+    "inputs": {"frame": [1, 500, 500]},
+    "policy_kwargs": {"features_extractor_kwargs": {"cnn_output_dim": 512}},
+}
+NETWORK = {"policy": "MultiInputPolicy", "inputs": {"ego_speed": [1]}, "policy_kwargs": {}}
+
+
+def test_a_card_with_a_network_unpickles_nothing(tmp_path):
+    """The file would run code if it were unpickled; without the network it is announced and unpickled."""
+    card = {"algo": "ppo", "camera": "fovea", "network": NETWORK, "vec_normalize": "stats.pkl"}
+    with pytest.raises(ValueError, match=r"must be a file \.npz of save_card .*would be unpickled"):
+        PolicyCard.make(card)
+    assert PolicyCard.make(card | {"vec_normalize": "stats.npz"}).vec_normalize == "stats.npz"
+    assert PolicyCard.make(card | {"network": None}).vec_normalize == "stats.pkl"
+
+
+@pytest.mark.parametrize(
+    ("values", "fits"),
+    [
+        ({"policy_kwargs": {"net_arch": [7000, 7000]}}, True),  # 49,007,000 weights
+        ({"policy_kwargs": {"net_arch": [7100, 7100]}}, False),  # 50,417,100
+        ({"policy_kwargs": {"net_arch": [10000] * 200}}, False),
+        ({"policy_kwargs": {"net_arch": {"pi": [10, 10], "vf": [10000, 10000]}}}, False),
+        ({"policy_kwargs": {"net_arch": [1000, 1000], "n_critics": 60}}, False),
+        ({"inputs": {"frame": [1, 90, 160]}}, True),
+        ({"inputs": {"frame": [1, 2000, 2000]}}, False),
+        (LARGE_LAYER, False),
+        ({"inputs": {"spike_frequency": [10000, 10000]}}, False),
+    ],
+)  # fmt: skip
+def test_a_network_with_too_many_weights_is_refused_before_it_is_built(values, fits):
+    if fits:
+        NetworkSpec.make(NETWORK | values)
+        return
+    with pytest.raises(ValueError, match="the network must have at most 50000000 weights, got about"):
+        NetworkSpec.make(NETWORK | values)
+
+
+@pytest.mark.parametrize("name", ["policy.pth", "other"])
+def test_a_small_file_that_unpacks_to_much_is_refused(tmp_path, monkeypatch, name):
+    """The limit is 1 GB; here 1 MB, for zeros that take 2 kB in the file."""
+    assert card_module.MAX_POLICY == 1_000_000_000
+    monkeypatch.setattr(card_module, "MAX_POLICY", 1_000_000)
+    card = json.dumps({"algo": "ppo", "camera": "fovea", "network": NETWORK})
+    with zipfile.ZipFile(tmp_path / "bomb.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("lgmd_gym.json", card)
+        archive.writestr(name, bytes(1_200_000))
+    with pytest.raises(ValueError, match=f"unpacks to {1_200_000 + len(card)} bytes, more than 1000000"):
+        make_agent(f"policy:{tmp_path / 'bomb.zip'}")
 
 
 def test_cards_of_other_environments(tmp_path):

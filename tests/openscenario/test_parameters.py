@@ -1,7 +1,17 @@
 """Parameters: declarations, constraints, and files that vary them."""
 
 import pytest
-from support.openscenario import HEADER, START, element, parameter, scenario, values, variation, write
+from support.openscenario import (
+    HEADER,
+    START,
+    compiled,
+    element,
+    parameter,
+    scenario,
+    values,
+    variation,
+    write,
+)
 
 from lgmd_gym.openscenario.parameters import variations
 from lgmd_gym.openscenario.reader import read_cells
@@ -56,6 +66,8 @@ def test_texts_are_compared_as_texts(tmp_path):
     ("kind", "value", "message"),
     [
         ("double", "fast", "parameter x of type double must be a number, got 'fast'"),
+        ("int", "inf", "parameter x of type int must be a whole number, got 'inf'"),
+        ("unsignedShort", "nan", "parameter x of type unsignedShort must be a whole number, got 'nan'"),
         ("int", "1.5", "parameter x of type int must be a whole number, got '1.5'"),
         ("boolean", "yes", "parameter x must be true or false, got 'yes'"),
         ("real", "1", "parameterType='real' is not supported; use double"),
@@ -119,7 +131,9 @@ def test_ranges_include_a_limit_that_the_steps_reach(tmp_path, low, high, step, 
     [
         (stepped("v", 5, 1, 1), "a range needs stepWidth > 0 and upperLimit >= lowerLimit"),
         (stepped("v", 0, 1, 0), "a range needs stepWidth > 0"),
-        (stepped("v", 0, 1e9, 1), "at most 100000 values, got 1000000001"),
+        (stepped("v", -1e308, 1e308, 1), "at most 100000 values, got inf"),
+        (stepped("v", 0, 1, "1e-320"), "at most 100000 values, got inf"),
+        (stepped("v", 0, 1e9, 1), "at most 100000 values, got 1e"),
         (stepped("v", 0, 999, 1) + stepped("w", 0, 999, 1), "more than 100000 cells"),
         (values("v", 1) + values("v", 2), r"part\.xml:3: parameter v is varied twice"),
         (values("v"), "the distribution of v has no value"),
@@ -152,3 +166,10 @@ def test_a_stochastic_distribution_is_refused(tmp_path):
     write(tmp_path, scenario(START))
     with pytest.raises(ValueError, match="must contain Deterministic, got ScenarioFile, Stochastic"):
         read_cells(path)
+
+
+def test_a_deeply_nested_file_is_refused(tmp_path):
+    groups = "<ConstraintGroup>" * 50_000 + "</ConstraintGroup>" * 50_000
+    text = scenario(START, parameters=parameter("x", "1", constraints=groups))
+    with pytest.raises(ValueError, match=r"case\.xosc:\d+: ConstraintGroup is within more than 200 elements"):
+        compiled(tmp_path, text)

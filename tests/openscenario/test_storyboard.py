@@ -214,6 +214,24 @@ def test_an_event_that_would_be_skipped_is_refused(tmp_path):
     assert len(compiled(tmp_path, late).world.movers["Target"].timeline.segments) == 2
 
 
+@pytest.mark.parametrize(
+    "action",
+    [
+        speed("1e308", "distance", "linear", "1e-300"),
+        speed("1e200", "rate", "linear", 2),
+        "<RoutingAction><FollowTrajectoryAction><TimeReference><None/></TimeReference><TrajectoryRef>"
+        '<Trajectory name="t" closed="false"><Shape><Clothoid curvature="0.1" curvaturePrime="0" '
+        'length="1e15"><Position><WorldPosition x="160" y="-1.75"/></Position></Clothoid></Shape></Trajectory>'
+        "</TrajectoryRef>"
+        '<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>',
+    ],
+)
+def test_huge_numbers_are_refused_in_one_line(tmp_path, action):
+    with pytest.raises(ValueError, match=r"case\.xosc:\d+: ") as caught:
+        compiled(tmp_path, scenario(START, story("Target", event("E", action, at(1)))))
+    assert "\n" not in str(caught.value)
+
+
 def test_standstill_of_the_target(tmp_path):
     trigger = entity_condition('<StandStillCondition duration="1.5"/>', entity="Target")
     assert started(tmp_path, trigger) == pytest.approx(1.5, abs=1e-6)

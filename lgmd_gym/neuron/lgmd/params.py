@@ -1,7 +1,6 @@
 """Parameters of the LGMD model, with symbols, units, equations and bounds."""
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Literal, Self, TypeAlias
@@ -11,6 +10,7 @@ import tomli_w
 from lgmd_gym.aliases import Values
 from lgmd_gym.errors import check_path
 from lgmd_gym.fields import Record, choice, flag, number, numbers, record, whole
+from lgmd_gym.processes.inputs import read_toml
 
 
 @record
@@ -214,7 +214,7 @@ class LGMDParams(Record):
         """
         file = check_path("path", path)
         try:
-            values = tomllib.loads(file.read_text(encoding="utf-8"))
+            values = read_toml(file)
         except OSError as error:
             raise ValueError(f"params file {str(file)!r} cannot be read: {error.strerror}") from None
         except ValueError as error:
