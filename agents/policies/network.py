@@ -156,22 +156,26 @@ def dense_layers(network: Any) -> "torch.nn.Sequential | None":
 
     Returns:
         The layers, which share the weights of the network; None for a network with other inputs than
-        vectors, or without discrete actions.
+        vectors, without discrete actions, or of a class that is not stable-baselines3's.
     """
+    from stable_baselines3.common.policies import MultiInputActorCriticPolicy
+    from stable_baselines3.common.torch_layers import CombinedExtractor, MlpExtractor
+    from stable_baselines3.dqn.policies import QNetwork
     from torch import nn
 
-    extractor = getattr(network, "features_extractor", None) or getattr(
-        getattr(network, "q_net", None), "features_extractor", None
-    )
-    parts = list(getattr(extractor, "extractors", {}).values())
-    if not parts or not all(isinstance(part, nn.Flatten) for part in parts):
+    q_net = getattr(network, "q_net", None)
+    extractor = getattr(network if q_net is None else q_net, "features_extractor", None)
+    # Exact types: a user's own class can compute anything from layers of the same names.
+    if type(extractor) is not CombinedExtractor or not isinstance(network.action_space, spaces.Discrete):
         return None
-    if not isinstance(network.action_space, spaces.Discrete):
+    if not all(type(part) is nn.Flatten for part in extractor.extractors.values()):
         return None
-    if hasattr(network, "mlp_extractor"):
-        return nn.Sequential(*network.mlp_extractor.policy_net, network.action_net)
-    q_net = getattr(getattr(network, "q_net", None), "q_net", None)
-    return q_net if isinstance(q_net, nn.Sequential) else None
+    if type(q_net) is QNetwork:
+        return q_net.q_net
+    mlp = getattr(network, "mlp_extractor", None)
+    if type(mlp) is MlpExtractor and type(network) is MultiInputActorCriticPolicy:
+        return nn.Sequential(*mlp.policy_net, network.action_net)
+    return None
 
 
 def run_dense(

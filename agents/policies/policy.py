@@ -314,7 +314,9 @@ def _load_network(path: Path, card: PolicyCard) -> Any:
         if card.network is not None:
             return _described_network(path, card)
         announce_pickle(path)
-        return getattr(stable_baselines3, card.algo.upper()).load(path, device="cpu").policy
+        network = getattr(stable_baselines3, card.algo.upper()).load(path, device="cpu").policy
+        network.set_training_mode(False)
+        return network
     except Exception as error:  # of the archive, pickle, PyTorch or stable-baselines3
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise ValueError(

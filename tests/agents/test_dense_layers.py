@@ -45,6 +45,21 @@ def test_networks_with_frames_or_continuous_actions_are_left_to_stable_baselines
     assert dense_layers(network(actions=None)) is None
 
 
+@pytest.mark.parametrize("algo", ["ppo", "dqn"])
+def test_own_classes_are_left_to_stable_baselines3(algo):
+    from stable_baselines3.common.torch_layers import CombinedExtractor
+
+    class Squared(CombinedExtractor):
+        def forward(self, observations):
+            return super().forward(observations) ** 2
+
+    policy = network(algo=algo)
+    assert dense_layers(policy) is not None
+    owner = policy.q_net if algo == "dqn" else policy
+    owner.features_extractor = Squared(policy.observation_space)
+    assert dense_layers(policy) is None
+
+
 def test_a_margin_changes_only_its_own_policy():
     plain, late, again = (Policy("zones", margin) for margin in (0.0, 2.0, 0.0))
     bias, brake = plain.network.action_net.bias, int(np.argmin(plain.card.demands))
