@@ -155,8 +155,8 @@ class BrakingVectorEnv(VectorEnv):
         for index, value in enumerate(_seeds_of(seed, self.num_envs)):
             if mask[index]:
                 self.batch.queue.seed(index, value)
-        self.batch.start(mask)
-        self._ended[mask], self._elapsed[mask] = False, 0
+        self._start(mask)
+        self._ended[mask] = False
         return self.read_observations(), self.read_infos(mask)
 
     def step(self, actions: ArrayLike) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, Info]:
@@ -176,32 +176,43 @@ class BrakingVectorEnv(VectorEnv):
                 "call reset(options={'reset_mask': terminated | truncated}) before step()"
             )
         restart = ended if mode == AutoresetMode.NEXT_STEP else np.zeros_like(ended)
-        self.simulation.step(self.read_demands(actions), ~restart)
+        self.advance(self.read_demands(actions), ~restart)
         if restart.any():
-            self.batch.start(restart)
+            self._start(restart)
         outcome = self.simulation.outcome
         result = outcome.rewards.copy(), outcome.terminated.copy(), outcome.truncated.copy()
-        self._elapsed = np.where(restart, 0, self._elapsed + 1)
-        if self.max_episode_steps is not None:
-            result[2][self._elapsed >= self.max_episode_steps] = True
         self._ended = result[1] | result[2]
         extra: Info = {}
         if mode == AutoresetMode.SAME_STEP and self._ended.any():
             extra = self._end_episodes(self._ended)
-            self._elapsed[self._ended] = 0
         infos = self.read_infos(np.ones(self.num_envs, np.bool_))
         return self.read_observations(), *result, infos | extra
 
     def read_demands(self, actions: ArrayLike) -> np.ndarray:
         """Return the longitudinal demands of actions, in [-1, 1], float64, shape (num_envs,).
 
-        With `simulation.step`, `read_observations`, `read_infos` and `reset`, a loop can advance some
+        With `advance`, `read_observations`, `read_infos` and `reset`, a loop can advance some
         environments for several decisions, as `lgmd_gym.training.PolicyVecEnv` does.
 
         Raises:
             ValueError: If an action is out of range.
         """
         return self.batch.read_demands(actions)
+
+    def advance(self, demands: np.ndarray, active: np.ndarray, rendering: bool = True) -> None:
+        """Advance some environments by one decision; `simulation.outcome` has the results.
+
+        At `max_episode_steps`, episodes are truncated.
+
+        Args:
+            demands: Longitudinal demands in [-1, 1], float64, shape (num_envs,).
+            active: The environments, bool, shape (num_envs,).
+            rendering: Whether the cameras and neurons process their frames.
+        """
+        self.simulation.step(demands, active, rendering)
+        self._elapsed[active] += 1
+        if self.max_episode_steps is not None:
+            self.simulation.outcome.truncated[active & (self._elapsed >= self.max_episode_steps)] = True
 
     def read_observations(self) -> Any:
         """Return the present observations of all environments."""
@@ -252,6 +263,8 @@ class BrakingVectorEnv(VectorEnv):
             [5.0, 15.0]
         """
         mask = _mask_of(selected, self.num_envs, "selected")
+        if not isinstance(arguments, Mapping | list | tuple):
+            raise ValueError(f"arguments must be a mapping or a list of mappings, got {shown(arguments)}")
         given = [arguments] * self.num_envs if isinstance(arguments, Mapping) else list(arguments)
         if len(given) != self.num_envs:
             raise ValueError(f"arguments must be one mapping or {self.num_envs} mappings, got {len(given)}")
@@ -280,7 +293,7 @@ class BrakingVectorEnv(VectorEnv):
             return tuple(self._attribute_of(index, name) for index in range(self.num_envs))
         if name in ("action_space", "observation_space"):
             name = f"single_{name}"
-        if not hasattr(self, name):
+        if name.startswith("_") or callable(getattr(self, name, len)):  # methods belong to the vector
             raise AttributeError(f"the environments have no attribute {name!r}; known: {', '.join(_PER_ENV)}")
         return (getattr(self, name),) * self.num_envs
 
@@ -348,6 +361,10 @@ class BrakingVectorEnv(VectorEnv):
             return self.batch.single.episode_brake(draw.brake)
         return draw.scene if name == "scene" else draw.placement.scenario
 
+    def _start(self, selected: np.ndarray) -> None:
+        self.batch.start(selected)
+        self._elapsed[selected] = 0
+
     def _end_episodes(self, ended: np.ndarray) -> Info:
         """Restart environments at once; returns their final observations and infos."""
         batch = self.batch.observations()
@@ -355,7 +372,7 @@ class BrakingVectorEnv(VectorEnv):
         for index in np.flatnonzero(ended).tolist():
             final[index] = _item(batch, index)
         infos = {"final_obs": final, "final_info": self.read_infos(ended)}
-        self.batch.start(ended)
+        self._start(ended)
         return infos | {f"_{key}": ended.copy() for key in infos}
 
 

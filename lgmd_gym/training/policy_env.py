@@ -174,9 +174,8 @@ class PolicyVecEnv(EngineVecEnv):
             running &= ~self._ended()
 
     def _step(self, demands: np.ndarray, running: np.ndarray, rendering: bool) -> None:
-        simulation = self.envs.simulation
-        simulation.step(demands, running, rendering)
-        self._rewards[running] += simulation.outcome.rewards[running]
+        self.envs.advance(demands, running, rendering)
+        self._rewards[running] += self.envs.simulation.outcome.rewards[running]
 
     def _ended(self) -> np.ndarray:
         return self.envs.simulation.outcome.terminated | self.envs.simulation.outcome.truncated

@@ -30,6 +30,23 @@ def test_limit_of_steps_is_that_of_gymnasium(mode):
         assert ("final_obs" in theirs[4]) == ("final_obs" in ours[4])
 
 
+def test_limit_of_steps_applies_to_the_decisions_of_a_policy():
+    pytest.importorskip("stable_baselines3")
+    from lgmd_gym.agents.policies.features import FeatureConfig
+    from lgmd_gym.training.policy_env import PolicyVecEnv
+
+    features = FeatureConfig(inputs=("membrane_potential",), history=1, repeat=2)
+    engine = make(max_episode_steps=3, autoreset_mode="Disabled", camera="fovea").unwrapped
+    envs = PolicyVecEnv(engine, features)
+    envs.seed(0)
+    envs.reset()
+    for _ in range(2):  # episodes of two and one decisions of the environment
+        assert not envs.step(np.zeros((2, 1), np.float32))[2].any()
+        _, _, done, infos = envs.step(np.zeros((2, 1), np.float32))
+        assert done.all()
+        assert [info["TimeLimit.truncated"] for info in infos] == [True, True]
+
+
 @pytest.mark.parametrize("limit", [0, 1.5, True])
 def test_limit_must_be_a_positive_number(limit):
     with pytest.raises(ValueError, match="max_episode_steps"):
@@ -54,6 +71,9 @@ def test_shared_attributes_and_refusals():
         envs.get_attr("scenario")
     with pytest.raises(AttributeError, match="known: scenario, scene"):
         envs.get_attr("speed")
+    for name in ("reset", "set_arguments", "_elapsed"):  # of the vector
+        with pytest.raises(AttributeError, match="no attribute"):
+            envs.get_attr(name)
     with pytest.raises(AttributeError, match="set_arguments"):
         envs.set_attr("ego_speed", 5.0)
     with pytest.raises(AttributeError, match="method of the vector"):
@@ -90,6 +110,7 @@ def test_changed_levels_are_those_of_an_environment_made_with_them():
     [
         ({"ego_sped": 5.0}, None, "did you mean 'ego_speed'"),
         ({"ego_speed": 50.0 * 3.6}, None, "ego_speed"),
+        (None, None, "a mapping or a list of mappings, got None"),
         ([{"ego_speed": 5.0}], None, "one mapping or 2 mappings, got 1"),
         ({"ego_speed": 5.0}, [True, False], "selected must be a bool array"),
         ([{"ego_speed": 5.0}, {"num_envs": 3}], None, "num_envs"),
