@@ -18,6 +18,7 @@ from lgmd_gym.errors import check_flag, check_items, check_text
 
 NO_BRAKE = "no-brake"  # the agent that defines threats
 TRAFFIC = "traffic"  # the suite without fixed cases, see `lgmd_gym.benchmark.traffic`
+SEPARATOR = "/"  # between suite, family and variant in the name of a case; a variant may contain it
 _UNNAMED = re.compile(r"[^\w.+-]+")
 
 
@@ -53,6 +54,12 @@ class Case:
     def __post_init__(self) -> None:
         for name in ("suite", "family", "variant", "environment", "load"):
             check_text(name, getattr(self, name))
+        for name in ("suite", "family"):
+            if SEPARATOR in getattr(self, name):
+                raise ValueError(
+                    f"{name} must not contain {SEPARATOR!r}, the separator of case names, got "
+                    f"{getattr(self, name)!r}"
+                )
         check_flag("fcw_driver", self.fcw_driver)
         for item in check_items("arguments", self.arguments, tuple, "tuples"):
             check_text("arguments: name", item[0] if len(item) == 2 else item)

@@ -210,7 +210,9 @@ def check_table(kind: str, table: Values, known: Collection[str]) -> None:
 
 def read_name(table: Values, key: str) -> str:
     """Return a name in a table, whose characters are allowed in names of suites and cases."""
-    value = table.get(key)
+    if key not in table:
+        raise ValueError(f'{key} is missing; add {key} = "..."')
+    value = table[key]
     if not isinstance(value, str) or not _NAME.fullmatch(value):
         raise ValueError(f"{key} must consist of letters, digits and . _ + - /, got {value!r}")
     return value

@@ -1,5 +1,6 @@
 """The rich console of the commands, tables that fit its width, and errors of writing."""
 
+import io
 import os
 import sys
 import warnings
@@ -29,7 +30,8 @@ def make_console() -> Console:
     text as it is: names of users may look like rich's markup or emoji codes.
     """
     console = Console(markup=False, emoji=False)
-    if not console.is_terminal and "COLUMNS" not in os.environ:
+    columns = os.environ.get("COLUMNS", "")
+    if console.width < 1 or (not console.is_terminal and not (columns.isdecimal() and int(columns) > 0)):
         console = Console(markup=False, emoji=False, width=WIDTH)
     console.push_render_hook(FittedTables(console))
     return console
@@ -80,6 +82,19 @@ def io_reason(error: OSError) -> str:
     paths = [str(path) for path in (error.filename, error.filename2) if path is not None]
     reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
     return f"{' → '.join(map(repr, paths))}: {reason}" if paths else f"output failed: {reason}"
+
+
+def prepare_streams() -> None:
+    """Make stdout and stderr take every text: characters that their encoding lacks become "?".
+
+    A stream that was closed before the start is discarded.
+    """
+    for name in ("stdout", "stderr"):
+        stream: Any = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def drop_output() -> None:

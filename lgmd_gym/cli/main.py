@@ -13,7 +13,7 @@ from tyro.conf import subcommand
 from lgmd_gym._version import __version__
 from lgmd_gym.cli.bench import Bench
 from lgmd_gym.cli.compare import Compare
-from lgmd_gym.cli.console import activity, drop_output, io_reason, printed_notes
+from lgmd_gym.cli.console import activity, drop_output, io_reason, prepare_streams, printed_notes
 from lgmd_gym.cli.doctor import Doctor
 from lgmd_gym.cli.drive import Drive
 from lgmd_gym.cli.gallery import Gallery
@@ -69,6 +69,7 @@ def main(argv: list[str] | None = None) -> None:
 
 def run(argv: list[str] | None = None) -> int:
     """Run one command and return its exit code; Ctrl-C and SIGTERM interrupt it."""
+    prepare_streams()
     with raise_on_signals() as interruption:
         code = _run(argv)
         return interruption.exit_code if code == INTERRUPTED else code

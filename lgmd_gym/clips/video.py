@@ -133,7 +133,10 @@ def _rate(stamps: np.ndarray, tick: float, named: float) -> tuple[float, bool]:
     return round(named if abs(fps - named) < 1e-3 * fps else fps, 4), len(regular) < len(intervals)
 
 
-CLIP_SUFFIXES = (".mp4", ".mkv", ".mov", ".avi", ".gif", ".webm", ".m4v", ".mpg", ".ts", ".y4m")
+CLIP_SUFFIXES = (
+    *(".mp4", ".mkv", ".mov", ".avi", ".gif", ".webm", ".m4v", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts"),
+    *(".3gp", ".wmv", ".asf", ".flv", ".vob", ".y4m"),
+)
 MAX_SIZE = 16384  # [px]
 MIN_SIZE = 3  # width of the neuron's neighbourhood [px]
 _MOST_MISSING = 2.0  # a file that ends up to this many frames early counts as complete
@@ -261,8 +264,15 @@ def luma(picture: np.ndarray) -> np.ndarray:
     return grey
 
 
+def is_clip(file: Path) -> bool:
+    """Return whether a file has the suffix of a video and is not hidden."""
+    return file.suffix.lower() in CLIP_SUFFIXES and not file.name.startswith(".")
+
+
 def find_clips(paths: Iterable[str | Path]) -> list[Path]:
     """Return the given files, with each folder replaced by its video files in the order of their names.
+
+    Files of a folder whose name begins with a dot are left out, such as the "._" files of macOS.
 
     Raises:
         ValueError: For a path that does not exist, or a folder without a video file.
@@ -272,7 +282,7 @@ def find_clips(paths: Iterable[str | Path]) -> list[Path]:
     found: list[Path] = []
     for path in (check_path("path", path) for path in paths):
         if path.is_dir():
-            clips = sorted(file for file in path.iterdir() if file.suffix.lower() in CLIP_SUFFIXES)
+            clips = sorted(file for file in path.iterdir() if is_clip(file))
             if not clips:
                 raise ValueError(f"folder {str(path)!r} contains no video file ({', '.join(CLIP_SUFFIXES)})")
             found += clips

@@ -19,6 +19,7 @@ from lgmd_gym.openscenario.compiler import DURATION
 from lgmd_gym.openscenario.motion import Place, Timeline
 from lgmd_gym.openscenario.reader import DRIVER, FAMILY, SUFFIX
 from lgmd_gym.openscenario.world import SHADE
+from lgmd_gym.processes.files import replace_file
 
 BEHIND, AHEAD, ARM = 300.0, 6000.0, 250.0  # [m], extent of straight roads, and of crossing roads
 HEADER = {"revMajor": "1", "revMinor": "7", "name": "lgmd-gym", "version": "1.00"}
@@ -129,16 +130,22 @@ def export_case(case: Case, path: str | Path) -> tuple[Path, Path]:
     for file in files:
         if file.exists():
             raise ValueError(f"{str(file)!r} exists; choose another file or remove it")
+    if not path.parent.is_dir():
+        raise ValueError(f"{str(path)!r} cannot be written: No such folder; create it first")
     scenario = case.scenario
     weather = str(dict(case.arguments).get("weather", CLEAR))
     roots = scenario_xml(scenario, files[1].name, weather, case.fcw_driver), road_xml(scenario.road)
-    for file, root in zip(files, roots, strict=True):
-        ET.indent(root)
-        text = ET.tostring(root, encoding="unicode", xml_declaration=False)
-        try:
-            file.write_text(f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n', encoding="utf-8")
-        except OSError as error:
-            raise ValueError(f"{str(file)!r} cannot be written: {error.strerror}") from None
+    try:
+        for file, root in zip(files, roots, strict=True):
+            ET.indent(root)
+            text = ET.tostring(root, encoding="unicode", xml_declaration=False)
+            replace_file(file, f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n')
+    except BaseException as error:  # neither file is left, so that the same command can be repeated
+        for file in files:
+            file.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise ValueError(f"{str(path)!r} cannot be written: {error.strerror}") from None
+        raise
     return files
 
 

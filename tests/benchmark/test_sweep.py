@@ -126,6 +126,12 @@ def test_copy_of_a_sweep_is_equal(load, tmp_path):
         ({"gap": [6]}, "write arguments = { gap = ... }, or sweep = { gap = [...] }"),
         ({"family": "Own", "sweep": {"gap": [6]}}, "a family of your own requires module = "),
         ({"family": ["CutIn"]}, "family must consist of letters, digits"),
+        (
+            {"family": "Cut/In", "sweep": {"gap": [6]}},
+            "family must not contain '/', the separ",
+        ),
+        ({"name": 3}, "name must consist of letters, digits"),
+        ({}, "name is missing; add name = "),
         ({"swep": {"gap": [6]}}, "unknown key of a case 'swep'; did you mean 'sweep'?"),
         ({"sweep": {"gap": [6]}, "scenario": {}}, "sweep and scenario exclude each other"),
     ],
@@ -134,6 +140,13 @@ def test_invalid_sweep_is_refused(load, table, message):
     with pytest.raises(ValueError) as caught:
         load({"family": "CutIn"} | table)
     assert message in str(caught.value)
+
+
+def test_names_of_suites_do_not_contain_the_separator(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('name = "my/suite"\n[[cases]]\nfamily = "CCRs"\nname = "a"\n')
+    with pytest.raises(ValueError, match=r"suite must not contain '/', .* got 'my/suite'"):
+        load_suite(path)
 
 
 def test_equal_names_of_two_tables_are_refused(load):

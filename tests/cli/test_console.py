@@ -1,5 +1,7 @@
 """The console prints names of users as they are, also those that look like rich's markup or emoji codes."""
 
+import os
+import subprocess
 import sys
 from io import StringIO
 
@@ -73,3 +75,29 @@ def test_output_to_a_file_stays_there_during_an_activity_in_a_terminal(monkeypat
     with activity("loading"):
         print("output")
     assert capsys.readouterr().out == "output\n"
+
+
+@pytest.mark.parametrize("columns", ["0", "-3", "wide", ""])
+def test_a_width_that_is_none_is_replaced(monkeypatch, capsys, columns):
+    monkeypatch.setenv("COLUMNS", columns)
+    make_console().print("text")
+    assert capsys.readouterr().out == "text\n"
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "cp437", "latin-1", "ascii"])
+def test_output_in_any_encoding(encoding):
+    found = subprocess.run(
+        [sys.executable, "-m", "lgmd_gym", "list", "agents"],
+        env=os.environ | {"PYTHONIOENCODING": encoding},
+        capture_output=True,
+        timeout=60,
+        check=False,
+    )
+    assert (found.returncode, found.stderr) == (0, b"")
+    assert b"stopping-zone" in found.stdout
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
+def test_closed_streams(closed):
+    command = f"{sys.executable} -m lgmd_gym list suites {closed}"
+    assert subprocess.run(["sh", "-c", command], capture_output=True, timeout=60, check=False).returncode == 0

@@ -169,7 +169,7 @@ def test_the_command_writes_two_files(tmp_path, capsys):
             ["export", "quick/CCRs/v30", "--to", "old.xosc"],
             "'old.xosc' exists; choose another file or remove it",
         ),
-        (["export", "quick/CCRs/v30", "--to", "no/a.xosc"], "'no/a.xosc' cannot be written: No such file"),
+        (["export", "quick/CCRs/v30", "--to", "no/a.xosc"], "'no/a.xosc' cannot be written: No such folder"),
         (["export", "a", "b", "--to", "a.xosc"], "scenario export needs one case, got 2"),
         (["check", "a.xosc", "--to", "b.xosc"], "scenario check writes no file, got --to 'b.xosc'"),
         (["check", "a.xosc"], "a.xosc cannot be read: No such file or directory"),
@@ -189,3 +189,20 @@ def test_conditions_without_weather_are_refused(tmp_path):
     case = Case("mine", "CCRs", "x", (("weather", "low_sun"),))
     with pytest.raises(ValueError, match="OpenSCENARIO has no weather 'low_sun'; known: night"):
         export_case(case, tmp_path / "a.xosc")
+
+
+def test_a_failed_export_leaves_no_file(tmp_path, monkeypatch):
+    """The disk is full at the second file; the same command works once there is space."""
+    case, path = find_case("quick/CCRs/v30"), tmp_path / "case.xosc"
+
+    def full(file, text):
+        if file.suffix == ".xodr":
+            raise OSError(28, "No space left on device")
+        file.write_text(text, "utf-8")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("lgmd_gym.openscenario.export.replace_file", full)
+        with pytest.raises(ValueError, match=r"case\.xosc' cannot be written: No space left on device"):
+            export_case(case, path)
+    assert list(tmp_path.iterdir()) == []
+    assert [file.name for file in export_case(case, path)] == ["case.xosc", "case.xodr"]

@@ -220,8 +220,8 @@ def test_an_event_that_would_be_skipped_is_refused(tmp_path):
         speed("1e308", "distance", "linear", "1e-300"),
         speed("1e200", "rate", "linear", 2),
         "<RoutingAction><FollowTrajectoryAction><TimeReference><None/></TimeReference><TrajectoryRef>"
-        '<Trajectory name="t" closed="false"><Shape><Clothoid curvature="0.1" curvaturePrime="0" '
-        'length="1e15"><Position><WorldPosition x="160" y="-1.75"/></Position></Clothoid></Shape></Trajectory>'
+        '<Trajectory name="t" closed="false"><Shape><Clothoid curvature="1" curvaturePrime="0" '
+        'length="1e15"><Position><WorldPosition x="160" y="-1"/></Position></Clothoid></Shape></Trajectory>'
         "</TrajectoryRef>"
         '<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>',
     ],

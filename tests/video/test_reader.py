@@ -194,9 +194,21 @@ def test_closing_an_iterator_early_is_immediate(tmp_path):
 
 
 def test_find_clips_lists_the_video_files_of_folders(tmp_path, clip):
-    for name in ("b.mp4", "a.mkv", "notes.txt"):
+    for name in (
+        "b.mp4",
+        "a.mkv",
+        "notes.txt",
+        "._b.mp4",
+        ".hidden.avi",
+        "c.MTS",
+        "d.m2ts",
+        "e.wmv",
+        "f.mpeg",
+    ):
         (tmp_path / name).touch()
-    assert [path.name for path in find_clips([tmp_path, clip])] == ["a.mkv", "b.mp4", "loom.mkv"]
+    assert [path.name for path in find_clips([tmp_path, clip])] == [
+        *("a.mkv", "b.mp4", "c.MTS", "d.m2ts", "e.wmv", "f.mpeg", "loom.mkv")
+    ]
     (tmp_path / "empty").mkdir()
     with pytest.raises(ValueError, match="contains no video file"):
         find_clips([tmp_path / "empty"])
