@@ -123,7 +123,9 @@ def add_cast_shadows(layer, view, objects, count, roadside):
     stretch = min(1.0 / look.sun_z, _MOST_SHIFT)
     away = (-look.sun_x * stretch, -look.sun_y * stretch)
     for i in range(count):
-        if objects[i].model != MODEL_MARK and not behind(layer.frustum, objects[i]):
+        # With a shutter, the objects are those that are not behind the lens at the end of the exposure.
+        hidden = view.look.shutter_s == 0.0 and behind(layer.frustum, objects[i])
+        if objects[i].model != MODEL_MARK and not hidden:
             _add_shadow_of(layer, lens, objects[i], away)
     n, low = roadside.shape[0], first_from(roadside, lens.x - _FADE_END)
     while low < n and roadside[low].x < lens.x + _FADE_END:
