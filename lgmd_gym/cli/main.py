@@ -5,6 +5,7 @@ import io
 import sys
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import Annotated, Any, Union
 
 import tyro
@@ -80,6 +81,11 @@ def _run(argv: list[str] | None) -> int:
     if arguments[:1] == ["--version"]:
         print(f"lgmd-gym {__version__}")
         return 0
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        print("lgmd-gym: the working folder was deleted; change to another with cd", file=sys.stderr)
+        return 2
     try:
         command = _parse(arguments)
         name = next(name for name, cls in COMMANDS.items() if isinstance(command, cls))

@@ -175,7 +175,7 @@ def _compile_board(root: Element, family: str) -> Compiled:
     catalogs = Catalogs(root)
     movers = read_entities(root, catalogs)
     network = root.child("RoadNetwork").child("LogicFile")
-    roads = read_roads(root.node.file.parent / network.text("filepath"))
+    roads = read_roads(network.path("filepath"))
     world = ScenarioMap(roads, catalogs, movers)
     board = root.child("Storyboard")
     environment = run_init(board, world)

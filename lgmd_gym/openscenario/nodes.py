@@ -245,6 +245,10 @@ class LocatedError(ValueError):
     """An error in a file; its message begins with the file and line."""
 
 
+class ConstraintError(LocatedError):
+    """A value that violates the constraints of its parameter."""
+
+
 @dataclass(eq=False, slots=True)
 class Node:
     """An XML element."""
@@ -345,6 +349,10 @@ class Element:
         if default is not None and not self.has(name):
             return default
         return self.resolve(self._raw(name))
+
+    def path(self, name: str) -> Path:
+        """Return an attribute with a path relative to the folder of the file; a backslash separates too."""
+        return self.node.file.parent / self.text(name).replace("\\", "/")
 
     def name_of(self, name: str) -> str:
         """Return an attribute with the name of a parameter, without its "$"."""

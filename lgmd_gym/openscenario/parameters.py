@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lgmd_gym.errors import shown, unknown_name
-from lgmd_gym.openscenario.nodes import Element, Node, parse_file
+from lgmd_gym.openscenario.nodes import ConstraintError, Element, Node, parse_file
 
 MAX_CELLS = 100_000
 _NUMBERS = ("double", "int", "integer", "unsignedInt", "unsignedShort")
@@ -94,7 +94,8 @@ def _check_constraints(item: Element, name: str, value: str, source: Node) -> No
             return
         texts.append(" and ".join(f"{rule} {bound}" for rule, bound in rules))
     if groups:
-        raise source.error(f"parameter {name} must be {' or '.join(texts)}, got {shown(value)}")
+        text = f"parameter {name} must be {' or '.join(texts)}, got {shown(value)}"
+        raise ConstraintError(str(source.error(text)))
 
 
 def assignments(parent: Element) -> dict[str, Assignment]:
@@ -187,9 +188,11 @@ class Catalogs:
         catalog, name = reference.text("catalogName"), reference.text("entryName")
         entries = self._entries
         if (catalog, name) not in entries:
-            names = {known for _, known in entries} if entries else {folder.name for folder in self._folders}
-            error = unknown_name(f"entry of catalog {catalog!r}", name, names)
-            raise reference.error(str(error))
+            catalogs = {known for known, _ in entries} or {folder.name for folder in self._folders}
+            if catalog not in catalogs:
+                raise reference.error(str(unknown_name("catalog", catalog, catalogs)))
+            names = {known for where, known in entries if where == catalog}
+            raise reference.error(str(unknown_name(f"entry of catalog {catalog!r}", name, names)))
         node = entries[catalog, name]
         if node.tag not in tags:
             raise reference.error(f"entry {name!r} is a {node.tag}, not a {' or '.join(tags)}")
@@ -218,7 +221,7 @@ def _folders(locations: Element) -> list[Path]:
     folders: list[Path] = []
     for node in locations.node.children:
         directory = Element(node, locations.scope).child("Directory")
-        folder = locations.node.file.parent / directory.text("path")
+        folder = directory.path("path")
         if not folder.is_dir():
             raise directory.error(
                 f"the folder {directory.text('path')!r} does not exist; check CatalogLocations"

@@ -4,7 +4,7 @@ import re
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os.path import normpath
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from lgmd_gym.benchmark.case import Case, Suite, file_name, repetitions, scenari
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.errors import InputNote, check_path, counted
 from lgmd_gym.openscenario.compiler import Compiled, compile_scenario
-from lgmd_gym.openscenario.nodes import Element, Node, parse_file
+from lgmd_gym.openscenario.nodes import ConstraintError, Element, Node, parse_file
 from lgmd_gym.openscenario.parameters import Assignment, declare, variations
 
 _SHORT = (
@@ -181,7 +181,7 @@ def read_cells(path: Path) -> list[Cell]:
     if distribution is None:
         return _cells(path, path, root.node, [{}])
     target = distribution.child("ScenarioFile")
-    file = Path(normpath(path.parent / target.text("filepath")))
+    file = Path(normpath(target.path("filepath")))
     scenario = _root(file)
     if scenario.find("Storyboard") is None:
         raise target.error(f"{str(file)!r} is no scenario; ScenarioFile must name one with a Storyboard")
@@ -205,11 +205,22 @@ def _root(path: Path) -> Element:
 def _cells(path: Path, file: Path, root: Node, given: Iterable[dict[str, Assignment]]) -> list[Cell]:
     cells: list[Compiled] = []
     varied: list[dict[str, str]] = []
+    violations: list[ConstraintError] = []
     for assignments in given:
-        scope = declare(Element(root, {}), assignments)
+        try:
+            scope = declare(Element(root, {}), assignments)
+        except ConstraintError as error:
+            violations.append(error)
+            continue
         family = file_name(scope.get(FAMILY, file.stem))
         cells.append(compile_scenario(Element(root, scope), family))
         varied.append({name: item.value for name, item in assignments.items()})
+    if violations:
+        if not cells:
+            raise violations[0]
+        total = counted(len(cells) + len(violations), "cell")
+        note = f"{violations[0]}; {len(violations)} of {total} left out for such a value"
+        cells = [replace(cell, notes=(*cell.notes, note)) for cell in cells]
     names = variants(varied, [cell.scenario.ego_speed for cell in cells])
     drivers = [
         FCW in path.stem or FCW in cell.scenario.family or cell.properties.get(DRIVER) == "true"

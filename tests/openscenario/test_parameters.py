@@ -13,8 +13,9 @@ from support.openscenario import (
     write,
 )
 
+from lgmd_gym.errors import InputNote
 from lgmd_gym.openscenario.parameters import variations
-from lgmd_gym.openscenario.reader import read_cells
+from lgmd_gym.openscenario.reader import read, read_cells
 
 
 def declared(folder, *items):
@@ -149,7 +150,7 @@ def test_invalid_distributions(tmp_path, inside, message):
 def test_violations_state_the_line_of_the_value(tmp_path):
     write(tmp_path, scenario(START, parameters=parameter("h", "5", constraints=group(("greaterThan", "4")))))
     path = tmp_path / "vary.xosc"
-    path.write_text(variation(values("h", "6", "3")))
+    path.write_text(variation(values("h", "3", "2")))
     with pytest.raises(ValueError, match=r"vary\.xosc:5: parameter h must be greaterThan 4, got '3'"):
         read_cells(path)
     path.write_text(variation(values("hh", "6")))
@@ -173,3 +174,26 @@ def test_a_deeply_nested_file_is_refused(tmp_path):
     text = scenario(START, parameters=parameter("x", "1", constraints=groups))
     with pytest.raises(ValueError, match=r"case\.xosc:\d+: ConstraintGroup is within more than 200 elements"):
         compiled(tmp_path, text)
+
+
+def test_cells_that_violate_constraints_are_left_out_with_a_note(tmp_path):
+    rule = '<ConstraintGroup><ValueConstraint rule="greaterThan" value="2"/></ConstraintGroup>'
+    write(tmp_path, scenario(START, parameters=parameter("x", "5", constraints=rule)))
+    path = tmp_path / "vary.xosc"
+    path.write_text(variation(values("x", 1, 2, 3, 4)))
+    with pytest.warns(InputNote, match=r"vary\.xosc:\d+: parameter x must be .*; 2 of 4 cells left"):
+        assert len(read(path).cases) == 2
+    path.write_text(variation(values("x", 1, 2)))
+    with pytest.raises(ValueError, match="parameter x must be greaterThan 2, got '1'"):
+        read(path)
+
+
+def test_paths_with_backslashes(tmp_path):
+    (tmp_path / "sub").mkdir()
+    write(tmp_path / "sub", scenario(START))
+    text = scenario(START, road_name=r"sub\road.xodr")
+    path = tmp_path / "case.xosc"
+    path.write_text(text)
+    assert len(read(path).cases) == 1
+    path.write_text(variation("", r".\sub\case.xosc"))
+    assert len(read(path).cases) == 1
