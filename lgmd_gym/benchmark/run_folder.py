@@ -1,9 +1,8 @@
 """Run folders: created once, appended to as episodes finish, never overwritten; read and checked."""
 
 import json
-import os
 import re
-from errno import ENOSPC
+import shutil
 from hashlib import blake2b
 from pathlib import Path
 from typing import NamedTuple, cast
@@ -191,7 +190,16 @@ class RunFolder:
             ValueError: If it exists or cannot be created.
         """
         new_folder(path, "run folder")
-        return cls(FolderLock(path), path, [])
+        try:
+            return cls(FolderLock(path), path, [])
+        except BaseException:
+            shutil.rmtree(path, ignore_errors=True)
+            raise
+
+    def discard(self) -> None:
+        """Close and remove a new folder whose run cannot start, so that the same command can be repeated."""
+        self.close()
+        shutil.rmtree(self.path, ignore_errors=True)
 
     @classmethod
     def reopen(cls, path: Path) -> "RunFolder":
@@ -227,13 +235,13 @@ class RunFolder:
         """Append one row and write it to disk.
 
         Raises:
-            OSError: If the disk is full; earlier rows stay intact.
+            OSError: If the disk is full or the file too large; earlier rows stay intact.
         """
         line = (json.dumps(row, allow_nan=False) + "\n").encode()
         before = self._rows.tell()
         try:
-            if self._rows.write(line) != len(line):
-                raise OSError(ENOSPC, os.strerror(ENOSPC))
+            while line:  # after a part, the next write states the reason, a full disk or a limit of size
+                line = line[self._rows.write(line) :]
         except OSError:
             self._rows.truncate(before)
             raise

@@ -121,9 +121,13 @@ class Run:
         _check(config, executor)
         provenance()  # slow at its first call; a kill must not leave a folder without settings meanwhile
         folder = RunFolder.create(path)
-        run = cls(RunConfig.load(config.save(path)), folder, executor)
-        run._describe(False, 0.0)
-        return run
+        try:
+            run = cls(RunConfig.load(config.save(path)), folder, executor)
+            run._describe(False, 0.0)
+            return run
+        except BaseException:  # for example a full disk
+            folder.discard()
+            raise
 
     @classmethod
     def resume(cls, path: Path, executor: Executor = SERIAL, trust: bool = False) -> "Run":

@@ -4,6 +4,8 @@ import json
 import os
 import re
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -258,6 +260,38 @@ def test_outputs_are_complete_or_absent(tmp_path, monkeypatch):
             write(path)
         assert path.read_text() == "old"
     assert not list(tmp_path.glob("*.part"))
+
+
+def test_a_run_that_cannot_start_leaves_no_folder(tmp_path, monkeypatch):
+    """A disk that is full from the beginning: the same command works once there is space."""
+    config = RunConfig(suite="quick", agents=["no-brake"], seeds=1)
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    for place in ("lgmd_gym.benchmark.run_folder.replace_file", "lgmd_gym.benchmark.run_folder.FolderLock"):
+        with monkeypatch.context() as patch:
+            patch.setattr(place, full)
+            with pytest.raises(OSError, match="No space left"):
+                Run.new(config, tmp_path / "run")
+        assert list(tmp_path.iterdir()) == []
+    Run.new(config, tmp_path / "run").folder.close()
+
+
+def test_a_limit_of_the_file_size_is_no_full_disk(tmp_path):
+    """The row that exceeds the limit is written in part; the reason is that of the next write."""
+    code = (
+        "import resource; from pathlib import Path; from lgmd_gym.benchmark.run_folder import RunFolder\n"
+        "folder = RunFolder.create(Path('run')); folder.add({'a': 1})\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (12, resource.RLIM_INFINITY))\n"
+        "try: folder.add({'a': 2})\n"
+        "except OSError as error: print(error.strerror)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.stdout == "File too large\n", done.stderr
+    assert (tmp_path / "run" / "episodes.jsonl").read_text() == '{"a": 1}\n'
 
 
 def test_outputs_have_one_writer(tmp_path):
