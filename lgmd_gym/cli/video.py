@@ -68,7 +68,7 @@ class Video:
 
 
 def run(options: Video) -> int:
-    """Process clips and print tables; return 2 if a clip is truncated, else 0."""
+    """Process clips and print tables; return 2 if a clip is truncated or unreadable, else 0."""
     from lgmd_gym.cli import clips
     from lgmd_gym.clips.batch import make_jobs
     from lgmd_gym.clips.playback import ClipRun
@@ -78,7 +78,12 @@ def run(options: Video) -> int:
         raise ValueError("a clip is required: pass video files or folders, as in lgmd-gym video CLIP.mp4")
     configs = _configs(options)
     check_within("--false-alarm-cap", options.false_alarm_cap, 0.0, 1.0)
-    jobs = make_jobs(options.clips, options.crashes, options.crash_frame, options.events)
+    unreadable: list[str] = []
+    jobs = make_jobs(
+        options.clips, options.crashes, options.crash_frame, options.events, on_unreadable=unreadable.append
+    )
+    for text in unreadable:
+        clips.note(f"{text}; it is left out")
     if options.events is not None and not any(job.event and job.event.event_s is not None for job in jobs):
         raise ValueError(f"{options.events} has no clip with an event; the scores need at least one event_s")
     clips.print_notes(jobs, options.crashes or options.events, options.fps)
@@ -88,7 +93,7 @@ def run(options: Video) -> int:
     with clips.run_folder(out, {"clips": [job.clip for job in jobs], "configs": configs}) as folder:
         results = _process_all(options, jobs, configs, folder)
     make_console().print(f"traces and figures: {out}", soft_wrap=True)
-    return clips.print_errors(results)
+    return clips.print_errors(results) or (2 if unreadable else 0)
 
 
 def _process_all(

@@ -185,6 +185,7 @@ def make_jobs(
     crashes: Path | None = None,
     crash_frame: int | None = None,
     events: Path | None = None,
+    on_unreadable: Callable[[str], object] | None = None,
 ) -> list[ClipJob]:
     """Return one job per clip.
 
@@ -193,6 +194,8 @@ def make_jobs(
         crashes: CSV file for `read_crashes`; None for no annotations.
         crash_frame: Crash frame of a single clip, instead of `crashes`.
         events: CSV file for `read_events`, instead of `crashes`; events count as crashes in the figures.
+        on_unreadable: Function called with the error of each unreadable file of a folder, which is left out;
+            None to raise it. A file that is given by itself, and the only one left, raise theirs.
 
     Raises:
         ValueError: For a file that is not a readable video, or an invalid annotation.
@@ -209,7 +212,20 @@ def make_jobs(
         annotations = read_crashes(crashes, clips)
     elif crash_frame is not None:
         annotations = {clips[0]: crash_frame}
-    infos = [probe(clip) for clip in clips]
+    infos, errors = list[VideoInfo](), list[ValueError]()
+    given = {Path(path) for path in paths}
+    for clip in clips:
+        try:
+            infos.append(probe(clip))
+        except ValueError as error:
+            if on_unreadable is None or clip in given:
+                raise
+            errors.append(error)
+    if errors and not infos:
+        raise errors[0]
+    for error in errors:
+        assert on_unreadable is not None
+        on_unreadable(str(error))
     of_clip = {} if events is None else read_events(events, infos)
     return [
         _job(info, info.path in annotations, annotations.get(info.path), of_clip.get(info.path))

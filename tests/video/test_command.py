@@ -108,6 +108,24 @@ def test_times_of_a_clip_with_a_gap(tmp_path, capsys):
     assert "event_s must be in the clip, 0 to 4.00 s (90 frames" in capsys.readouterr().err
 
 
+def test_an_unreadable_file_of_a_folder_is_named_and_left_out(tmp_path, capsys):
+    folder = tmp_path / "clips"
+    folder.mkdir()
+    make_test_clip(folder / "good.mkv", "-c:v", "ffv1")
+    for name in ("bad.mp4", "._good.mkv"):
+        (folder / name).write_bytes(b"no video")
+    assert run(folder, "--no-plots", "--out", tmp_path / "run") == 2
+    printed = capsys.readouterr().err
+    assert "bad.mp4' is truncated or not a video" in printed
+    assert "._good" not in printed
+    assert len(rows_of(tmp_path / "run" / "good" / "trace.csv")) == 30
+    assert run(folder / "good.mkv", folder / "bad.mp4", "--out", tmp_path / "other") == 2
+    assert not (tmp_path / "other").exists()  # a file that is given by itself
+    (folder / "good.mkv").unlink()
+    assert run(folder, "--out", tmp_path / "none") == 2
+    assert capsys.readouterr().err.count("\n") == 2
+
+
 def test_a_truncated_clip_keeps_its_trace_and_gives_exit_code_2(tmp_path, capsys):
     path = truncate(make_test_clip(tmp_path / "clip.mkv", "-c:v", "ffv1"), 0.6)
     assert run(path, "--no-plots", "--out", tmp_path / "run") == 2
