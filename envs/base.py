@@ -63,6 +63,10 @@ class EgoBrakeEnv(AbstractEnv):
         self.metadata = {**type(self).metadata}  # type: ignore[misc]
         super().__init__(config=config, render_mode=render_mode)  # type: ignore[arg-type]
 
+    def update_metadata(self, video_real_time_ratio: int = 1) -> None:
+        """Set `render_fps` so that videos play in real time."""
+        super().update_metadata(video_real_time_ratio)
+
     @classmethod
     def default_config(cls) -> Config:
         """Return the default configuration."""

@@ -190,10 +190,6 @@ class BrakingEnv(EgoBrakeEnv):
         self.observation_space = self.observation_type.space()
         self.action_space = self.action_type.space()
 
-    def update_metadata(self, video_real_time_ratio: int = 1) -> None:
-        """Set `render_fps` so that videos play in real time."""
-        super().update_metadata(video_real_time_ratio)
-
     @property
     def vehicle(self) -> EgoCar | None:  # type: ignore[override]
         """The car under test; None before the first reset."""

@@ -61,8 +61,12 @@ def note_unused_params(path: Path | None, agents: "Iterable[Agent]") -> None:
 
 
 def default_out(out: Path | None, name: str) -> Path:
-    """Return the folder of --out, or one in `runs` with a name and the time."""
-    return out or Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    """Return the folder of --out, or one in `runs` with a name and the time, to the millisecond."""
+    if out is not None:
+        return out
+    now = time.time_ns()
+    text = time.strftime("%Y%m%d-%H%M%S", time.localtime(now // 10**9))
+    return Path("runs") / f"{name}-{text}-{now // 10**6 % 1000:03d}"
 
 
 def parse_arguments(pairs: tuple[str, ...]) -> Arguments:

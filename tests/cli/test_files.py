@@ -3,14 +3,17 @@
 import os
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from errno import ENOSPC
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from lgmd_gym.cli import main as cli
+from lgmd_gym.cli.values import default_out
 from lgmd_gym.clips import VideoWriter, batch
 from lgmd_gym.paper import claims, experiments, plots
 from lgmd_gym.processes.files import LOCK_FILE, FolderLock, check_new_file, complete_file, complete_folder
@@ -152,3 +155,14 @@ def test_a_video_on_a_full_disk_is_removed(tmp_path):
         with pytest.raises(OSError, match="No space left"), writer:
             writer.write(np.zeros((16, 16, 3), np.uint8))
         assert not writer.path.is_symlink()
+
+
+def test_default_folders_of_one_second_differ(monkeypatch):
+    times = iter([1_000_000_000_123_000_000, 1_000_000_000_124_000_000])
+    clock = SimpleNamespace(time_ns=lambda: next(times), strftime=time.strftime, localtime=time.localtime)
+    monkeypatch.setattr("lgmd_gym.cli.values.time", clock)
+    first, second = default_out(None, "quick"), default_out(None, "quick")
+    assert (first.name[-4:], second.name[-4:]) == ("-123", "-124")
+    assert first.name[:-4] == second.name[:-4]
+    assert first.parent == Path("runs")
+    assert default_out(Path("mine"), "quick") == Path("mine")

@@ -6,6 +6,7 @@ import sys
 from math import cos, inf, pi
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium import spaces
@@ -296,3 +297,10 @@ def test_errors_state_the_value_and_suggest_a_fix():
         make_traffic("highway", camera=None, config={"action": {"type": "DiscreteDemnd"}})
     with pytest.raises(ValueError, match="unknown split of worlds 'tain'; did you mean 'train'"):
         make_traffic("highway", camera=None, split="tain")
+
+
+def test_videos_play_in_real_time():
+    env = gym.make("LGMD/Traffic-Merge-v0", render_mode="rgb_array")
+    env.reset(seed=0)
+    assert env.metadata["render_fps"] == env.unwrapped.config["policy_frequency"] == 30
+    env.close()
