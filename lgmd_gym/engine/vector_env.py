@@ -257,6 +257,7 @@ class BrakingVectorEnv(VectorEnv):
             ValueError: If an argument is unknown or out of range; then nothing changes.
 
         Example:
+            >>> import gymnasium as gym, lgmd_gym
             >>> envs = gym.make_vec("LGMD/CCRs-v0", num_envs=2)
             >>> envs.unwrapped.set_arguments([{"ego_speed": 5.0}, {"ego_speed": 15.0}])
             >>> envs.reset(seed=0)[1]["ego_speed"].tolist()
