@@ -15,7 +15,8 @@ from lgmd_gym.neuron import LGMDParams
 def test_every_script_has_a_test():
     tests = "".join(path.read_text() for path in Path(__file__).parent.glob("test_*.py"))
     scripts = [*EXAMPLES.glob("*.py"), *EXPERIMENTS.glob("*.py")]
-    assert [path.stem for path in scripts if f'load("{path.stem}")' not in tests] == []
+    used = [path for path in scripts if f'load("{path.stem}")' in tests or f'"{path.name}"' in tests]
+    assert sorted({*scripts} - {*used}) == []
 
 
 @pytest.mark.slow

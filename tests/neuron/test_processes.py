@@ -82,6 +82,7 @@ def test_neuron_imports_only_errors_fields_and_kernels():
             elif isinstance(node, ast.ImportFrom):
                 imported.add(node.module or "")
     below = (
+        "lgmd_gym.processes.inputs",
         "lgmd_gym.processes.user_modules",
         "lgmd_gym._version",
         "lgmd_gym.aliases",
