@@ -49,8 +49,8 @@ class Sensors(Protocol):
         """Set the scene and the full braking [m/s²] of the episode of an environment."""
         ...
 
-    def set_road(self, index: int, road: "RoadNetwork") -> None:
-        """Set the road of an environment."""
+    def set_road(self, index: int, road: "RoadNetwork", geometry: "RoadGeometry | None" = None) -> None:
+        """Set the road of an environment, and its geometry if that is known."""
         ...
 
     def read_top_views(self, env: "gym.Env", index: int) -> None:
