@@ -19,7 +19,14 @@ html_css_files = ["site.css"]
 extensions = ["myst_nb", "math_svg", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 html_math_renderer = "svg"
 included = ("benchmark", "claims", "clips", "environments")  # in other pages
-exclude_patterns = ["_build", "examples", *(f"_generated/{name}.md" for name in included)]
+# The last two are left by a first build, for the notebooks.
+exclude_patterns = [
+    "_build",
+    "examples",
+    *(f"_generated/{name}.md" for name in included),
+    "jupyter_execute",
+    ".jupyter_cache",
+]
 source_suffix = {".md": "myst-nb"}
 nb_execution_mode = "cache"  # in _build; a clean checkout executes all notebooks
 nb_execution_in_temp = True
