@@ -26,10 +26,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from lgmd_gym.aliases import Values
 from lgmd_gym.errors import check_path, check_positive, check_size, check_whole
-from lgmd_gym.fields import Record, declarations, number, record, whole
-from lgmd_gym.neuron.lgmd.model import LGMD, OPTIONS
-from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
-from lgmd_gym.neuron.registry import register
+from lgmd_gym.fields import Record, number, record, whole
+from lgmd_gym.neuron.lgmd.model import LGMD, register_variant
+from lgmd_gym.neuron.lgmd.params import NeuronSpec
 from lgmd_gym.neuron.validation import MAX_SIDE, Frames
 
 Counts = NDArray[np.int32]  # signed numbers of events, shape (..., height, width)
@@ -292,19 +291,4 @@ class EventRecording(NamedTuple):
             yield counts
 
 
-_OWN = tuple(item.name for item in declarations(EventParams))
-
-
-def _make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams, **options: object) -> EventLGMD:
-    events = {key: item for key, item in options.items() if key in _OWN}
-    others = {key: item for key, item in options.items() if key not in _OWN}
-    return EventLGMD(shape, fps, LGMDParams.make(params, **others), num, events=events)
-
-
-register(
-    "events",
-    _make,
-    takes_params=True,
-    options=(*_OWN, *OPTIONS),
-    about="LGMD behind a simulated event camera.",
-)
+register_variant("events", EventLGMD, EventParams, "events", "LGMD behind a simulated event camera.")

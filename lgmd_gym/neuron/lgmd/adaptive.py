@@ -5,10 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lgmd_gym.fields import Record, declarations, number, record, whole
-from lgmd_gym.neuron.lgmd.model import LGMD, OPTIONS
-from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
-from lgmd_gym.neuron.registry import register
+from lgmd_gym.fields import Record, number, record, whole
+from lgmd_gym.neuron.lgmd.model import LGMD, register_variant
+from lgmd_gym.neuron.lgmd.params import NeuronSpec
 from lgmd_gym.neuron.scalars import ALERT, FREQUENCY
 from lgmd_gym.neuron.validation import Frames
 
@@ -80,21 +79,10 @@ class AdaptiveLGMD(LGMD):
         self._mean[self._all_active if mask is None else np.asarray(mask)] = 0.0
 
 
-_OWN = tuple(item.name for item in declarations(AdaptiveParams))
-
-
-def _make(
-    shape: tuple[int, int], fps: float, num: int, params: LGMDParams, **options: object
-) -> AdaptiveLGMD:
-    threshold = {key: item for key, item in options.items() if key in _OWN}
-    others = {key: item for key, item in options.items() if key not in _OWN}
-    return AdaptiveLGMD(shape, fps, LGMDParams.make(params, **others), num, threshold=threshold)
-
-
-register(
+register_variant(
     "adaptive-threshold",
-    _make,
-    takes_params=True,
-    options=(*_OWN, *OPTIONS),
-    about="LGMD with an alarm threshold that follows the mean spike frequency.",
+    AdaptiveLGMD,
+    AdaptiveParams,
+    "threshold",
+    "LGMD with an alarm threshold that follows the mean spike frequency.",
 )

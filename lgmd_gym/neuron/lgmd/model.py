@@ -1,5 +1,6 @@
 """LGMD: the stateful neuron."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, ClassVar, cast
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lgmd_gym.aliases import Values
-from lgmd_gym.fields import declarations
+from lgmd_gym.fields import Record, declarations
 from lgmd_gym.neuron import maps
 from lgmd_gym.neuron.base import FrameNeuron, Layer, Signal, spiking_signals
 from lgmd_gym.neuron.lgmd import general, kernels
@@ -166,6 +167,29 @@ def _make(
 
 
 OPTIONS = tuple(item.name for item in declarations(LGMDParams) if not isinstance(item.default, tuple))
+
+
+def register_variant(
+    name: str, variant: Callable[..., LGMD], own: type[Record], argument: str, about: str
+) -> None:
+    """Register an LGMD with further parameters, whose options are those of both.
+
+    Args:
+        name: Name of the model.
+        variant: Its class.
+        own: Class of its further parameters.
+        argument: Argument of the class that takes them.
+        about: See `register`.
+    """
+    names = tuple(item.name for item in declarations(own))
+
+    def make(shape: tuple[int, int], fps: float, num: int, params: LGMDParams, **options: object) -> LGMD:
+        further = {key: options.pop(key) for key in names if key in options}
+        return variant(shape, fps, LGMDParams.make(params, **options), num, **{argument: further})
+
+    register(name, make, takes_params=True, options=(*names, *OPTIONS), about=about)
+
+
 _ABOUT = {
     "lgmd": "LGMD1 of Fu et al. (2019), as on the page of the neuron.",
     "literal": "LGMD with the equations as printed in the paper.",
