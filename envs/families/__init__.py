@@ -11,5 +11,5 @@ from lgmd_gym.envs.families.family import FAMILIES, LEVELS, Level, family, make_
 __all__ = ["FAMILIES", "LEVELS", "Level", "family", "make_scenario"]
 
 # Each module registers its families, in the order of the documentation; that of levels is in `distribution`.
-for _module in ("rear", "crossing", "vulnerable", "turning", "adjacent", "obstacles", "curves"):
+for _module in ("rear", "crossing", "vulnerable", "turning", "adjacent", "obstacles", "curves", "sequences"):
     import_module(f"{__name__}.{_module}")

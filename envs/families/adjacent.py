@@ -1,12 +1,13 @@
 """Cars in adjacent and oncoming lanes, lane changes, and head-on threats: CCFhos and CCFhol."""
 
+from collections.abc import Callable
 from math import pi
 from typing import Annotated
 
 import numpy as np
 
 from lgmd_gym.aliases import Arguments
-from lgmd_gym.envs.dynamics.script import Bend, Pose, lane_change
+from lgmd_gym.envs.dynamics.script import Bend, Pose, Segment, lane_change
 from lgmd_gym.envs.dynamics.units import KMH, check_speed
 from lgmd_gym.envs.families.arguments import (
     EITHER,
@@ -15,7 +16,9 @@ from lgmd_gym.envs.families.arguments import (
     EgoSpeed,
     Headway,
     OtherShade,
+    Sampler,
     Shade,
+    always,
     between,
     draw,
     fast,
@@ -23,6 +26,7 @@ from lgmd_gym.envs.families.arguments import (
     kmh,
     maybe,
     one,
+    slower,
     speed,
     truth,
     within,
@@ -51,6 +55,7 @@ QUEUE_SPACING = 2.0  # [m] between the cars of a queue
 AFTER_PASSING = 2.0  # [s] of driving after the last car
 CHANGE_START = 2.0  # [s] after which a car that cuts in leaves its lane
 MIN_CLOSING = 0.5  # [m/s], slowest approach to a car that cuts in; slower ones take minutes
+YIELDING = 1.0  # [s] before the contact, at which an oncoming car begins to yield
 LAST_STRAIGHT = 1.5  # [s] before the contact, at which the lane change of CCFhol ends
 TOP_KMH = 140.0  # of cars that overtake on a motorway, in random levels
 
@@ -60,7 +65,22 @@ def _queue(rng: np.random.Generator) -> Arguments:
     return {"ego_speed": kmh()(rng), "lateral_offset": offset, "cars": int(rng.integers(1, 7))}
 
 
-@family("AdjacentPass", Level("AdjacentPass", 1.0, _queue), Level("FastAdjacentPass", 0.3, fast(_queue)))
+def _slower_beside(rng: np.random.Generator) -> Arguments:
+    ego_speed = kmh(50.0, 130.0)(rng)
+    offset = between(3.0, 3.7)(rng) * one(1.0, -1.0)(rng)
+    return {
+        "ego_speed": ego_speed,
+        "target_speed": ego_speed - kmh(5.0, 40.0)(rng),
+        "lateral_offset": offset,
+    }
+
+
+@family(
+    "AdjacentPass",
+    Level("AdjacentPass", 1.0, _queue),
+    Level("FastAdjacentPass", 0.3, fast(_queue)),
+    Level("AdjacentSlower", 1.0, _slower_beside),
+)
 def pass_standing(
     ego_speed: EgoSpeed = 50 * KMH,
     lateral_offset: Annotated[
@@ -68,13 +88,17 @@ def pass_standing(
         within(
             "[-20, 20]",
             "m",
-            "Centreline of the stationary cars minus ego centreline, + left; far enough to avoid contact",
+            "Centreline of the other cars minus ego centreline, + left; far enough to avoid contact",
         ),
     ] = LANE_WIDTH,
-    cars: Annotated[int, whole(None, "[1, 20]", doc="Number of stationary cars in the queue")] = 1,
-    shade: Annotated[int | None, grey("the stationary cars")] = None,
+    cars: Annotated[int, whole(None, "[1, 20]", doc="Number of cars in the queue")] = 1,
+    target_speed: Annotated[float, slower("Speed of the other cars", zero=True)] = 0.0,
+    shade: Annotated[int | None, grey("the other cars")] = None,
 ) -> Scenario:
-    """The ego passes a stationary car or a queue of cars in the adjacent lane; not a threat."""
+    """The ego passes a stationary or slower car, or a queue of cars, in the adjacent lane; not a threat."""
+    if target_speed >= ego_speed:
+        raise ValueError(f"target_speed must be below ego_speed {ego_speed:g} m/s, got {target_speed:g}")
+    closing_speed = ego_speed - target_speed
     if abs(lateral_offset) <= CONTACT_OFFSET:
         raise ValueError(
             f"lateral_offset must exceed {CONTACT_OFFSET:g} m to either side in AdjacentPass, "
@@ -82,11 +106,16 @@ def pass_standing(
         )
     pitch = TARGET_LENGTH + QUEUE_SPACING
     queue = tuple(
-        Actor(gap=START_TTC * ego_speed + number * pitch, lateral_offset=lateral_offset, shade=shade)
+        Actor(
+            gap=START_TTC * closing_speed + number * pitch,
+            lateral_offset=lateral_offset,
+            speed=target_speed,
+            shade=shade,
+        )
         for number in range(cars)
     )
-    length = START_TTC * ego_speed + cars * pitch + EGO_LENGTH
-    duration = length / ego_speed + AFTER_PASSING
+    length = START_TTC * closing_speed + cars * pitch + EGO_LENGTH
+    duration = length / closing_speed + AFTER_PASSING
     return Scenario(family="AdjacentPass", ego_speed=ego_speed, duration=duration, actors=queue)
 
 
@@ -166,6 +195,17 @@ def meet_oncoming(
         3.0,
         draw(ego_speed=kmh(30.0), target_speed=kmh(30.0), impact_location=between(0.0, 1.0)),
     ),
+    Level(
+        "RollingCar",
+        2.0,
+        draw(
+            ego_speed=kmh(),
+            target_speed=between(0.5, 5.0),
+            impact_location=between(0.0, 1.0),
+            yields=always,
+        ),
+        twin=True,
+    ),
     threat=True,
     twin=True,
 )
@@ -180,19 +220,33 @@ def meet_in_lane(
             "Position of the target's centre across the ego's width; 0 is the right side and 1 the left",
         ),
     ] = 0.5,
+    yields: Annotated[
+        bool,
+        truth(
+            "Whether the target brakes evenly, from 1 s before the contact without braking, to rest 1 s "
+            "after it"
+        ),
+    ] = False,
     shade: Shade = None,
 ) -> Scenario:
     """An oncoming car drives in the ego's lane (Car-to-Car Front Head-on straight).
 
-    Braking lowers the ego's speed at the contact but does not avoid it: the target does not stop. The
-    episode continues at the ego's standstill. Sources: Euro NCAP AEB Car-to-Car v4.3.1; Frontal Collisions
-    v1.1.
+    Braking lowers the ego's speed at the contact but does not avoid it, unless the target yields: a car that
+    rolls towards the ego, and whose driver notices it late. The episode continues at the ego's standstill.
+    Sources: Euro NCAP AEB Car-to-Car v4.3.1; Frontal Collisions v1.1; `yields` is not a case of a protocol.
     """
+    gap, profile = START_TTC * (ego_speed + target_speed), ()
+    if yields:
+        stopping = 2.0 * YIELDING  # [s], half of it before the contact, in which three quarters are covered
+        deceleration = target_speed / stopping
+        profile = (Segment(start=START_TTC - YIELDING, acceleration=-deceleration),)
+        gap -= deceleration * YIELDING**2 / 2
     target = Actor(
-        gap=START_TTC * (ego_speed + target_speed),
+        gap=gap,
         lateral_offset=(impact_location - 0.5) * EGO_WIDTH,
         heading=pi,
         speed=target_speed,
+        profile=profile,
         shade=shade,
     )
     return _on_two_way_road("CCFhos", ego_speed, START_TTC + AFTERMATH, target)
@@ -243,37 +297,111 @@ def meet_overtaking(
     return _on_two_way_road("CCFhol", ego_speed, contact + AFTERMATH, target, overtaken)
 
 
-@family("CutIn", Level("CutIn", 1.0, draw(ego_speed=kmh(30.0), gap=between(10.0, 25.0))))
+def _cut_in_slower(
+    rng: np.random.Generator, slower_by: Sampler, end_ttc: Callable[[float], Arguments]
+) -> Arguments:
+    """Draw a car that cuts in and is slower than the ego, in a lane change of 2.5 to 5 s.
+
+    Args:
+        rng: Random generator.
+        slower_by: Sampler of the ego speed minus that of the other car [m/s].
+        end_ttc: Returns the arguments after the lane change for a difference of the speeds.
+    """
+    ego_speed = kmh(30.0, FAST_KMH[1])(rng)
+    excess = -min(slower_by(rng), ego_speed - 10.0 * KMH)
+    length = (ego_speed + excess) * between(2.5, 5.0)(rng)
+    return {
+        "ego_speed": ego_speed,
+        "excess": excess,
+        "change_length": max(length, 10.0),
+        "left": EITHER(rng),
+        **end_ttc(-excess),
+    }
+
+
+def _threatening(rng: np.random.Generator) -> Arguments:
+    return _cut_in_slower(rng, kmh(5.0, 40.0), lambda _: {"end_ttc": between(0.8, 3.0)(rng)})
+
+
+def _recovering(rng: np.random.Generator) -> Arguments:
+    """Draw a car that regains the ego's speed within 15 to 45 % of the distance."""
+
+    def after(closing_speed: float) -> Arguments:
+        recovery, share = between(1.5, 3.5)(rng), between(0.15, 0.45)(rng)
+        end_ttc = closing_speed / (2.0 * share * recovery)
+        return {"end_ttc": min(max(end_ttc, 0.5), 10.0), "recovery": recovery}
+
+    return _cut_in_slower(rng, kmh(5.0, 25.0), after)
+
+
+@family(
+    "CutIn",
+    Level("CutIn", 1.0, draw(ego_speed=kmh(30.0), gap=between(10.0, 25.0))),
+    Level("CutInThreat", 4.0, _threatening, threat=True, twin=True),
+    Level("CutInRecovers", 1.0, _recovering),
+)
 def cut_in(
     ego_speed: EgoSpeed = 50 * KMH,
     gap: Annotated[
-        float, within("[2, 200]", "m", "Bumper-to-bumper distance at the start of the lane change")
-    ] = 12.0,
+        float | None,
+        maybe(
+            "[2, 200]",
+            "m",
+            "Bumper-to-bumper distance at the start of the lane change; 12 m without `gap` and `end_ttc`",
+        ),
+    ] = None,
     excess: Annotated[
         float,
         within("[-40, 40]", "m/s", "Speed of the other car minus ego speed; not between -0.5 and 0"),
     ] = 5 * KMH,
     change_length: ChangeLength = 44.0,
+    end_ttc: Annotated[
+        float | None,
+        maybe("[0.3, 10]", "s", "Alternative to `gap`: time to contact at the end of the lane change"),
+    ] = None,
+    recovery: Annotated[
+        float,
+        within("[0, 12]", "m/s²", "Acceleration to the ego's speed after the lane change; 0 for none"),
+    ] = 0.0,
+    left: Annotated[bool, truth("Whether the car comes from the left lane; otherwise from the right")] = True,
     shade: OtherShade = None,
 ) -> Scenario:
-    """A car changes from the left lane into the ego's lane; a threat only if it is slower than the ego.
+    """A car changes from an adjacent lane into the ego's lane; a threat only if it is slower than the ego.
 
     The lane change begins after 2 s. With a slower car it begins later if needed, so that the ego covers the
-    gap at least 5 s after the start. A much slower car is passed before it reaches the ego's lane.
+    gap at least 5 s after the start. With `gap`, a much slower car is passed before it reaches the ego's
+    lane; with `end_ttc`, the contact is that time after the end of the lane change. A slower car that
+    recovers is no threat if it regains the ego's speed within the distance: Δv² / (2 · recovery).
     """
     if -MIN_CLOSING < excess < 0.0:
         raise ValueError(f"excess must be >= 0 or <= -{MIN_CLOSING:g} m/s in CutIn, got {shown(excess)}")
+    for name, given in (("end_ttc", end_ttc), ("recovery", recovery or None)):
+        if excess >= 0.0 and given is not None:
+            raise ValueError(f"{name} requires a slower car, got excess {excess:g} m/s; lower it below 0")
+    if gap is not None and end_ttc is not None:
+        raise ValueError(f"gap={shown(gap)} and end_ttc={shown(end_ttc)} both set the distance; pass one")
     target_speed = check_speed("ego_speed + excess", ego_speed + excess)
+    aside = LANE_WIDTH if left else -LANE_WIDTH
+    shift = lane_change(change_length, -aside)
+    change = change_length / target_speed  # [s]
+    if end_ttc is not None:
+        gap = -end_ttc * excess + change * ego_speed - _covered_by(shift)
+    elif gap is None:
+        gap = 12.0
     before, duration = CHANGE_START, 9.0  # [s] in adjacent lanes; of the episode
     if excess < 0.0:
-        closing = gap / -excess  # [s] from the start of the lane change
+        closing = gap / -excess if end_ttc is None else change + end_ttc  # [s] from the start of the change
         before = max(CHANGE_START, START_TTC - closing)
         duration = before + closing + AFTERMATH
+    recovering = ()
+    if recovery > 0.0:
+        recovering = (Segment(start=before + change, acceleration=recovery, final_speed=ego_speed),)
     other = Actor(
         gap=gap - before * excess,
-        lateral_offset=LANE_WIDTH,
+        lateral_offset=aside,
         speed=target_speed,
-        path=(Bend(before * target_speed), *lane_change(change_length, -LANE_WIDTH)),
+        profile=recovering,
+        path=(Bend(before * target_speed), *shift),
         shade=shade,
     )
     return Scenario(family="CutIn", ego_speed=ego_speed, duration=duration, actors=(other,))
@@ -319,6 +447,14 @@ def change_lane_before_sign(
         actors=(sign,),
         ego_path=(Bend(onset), *shift),
     )
+
+
+def _covered_by(shift: tuple[Bend, ...]) -> float:
+    """Return the distance along the road that a lane change covers [m], less than its length."""
+    # A module that loads numba; the registration of the scenario families must not.
+    from lgmd_gym.envs.dynamics.path import Path
+
+    return Path(Pose(0.0, 0.0, 0.0), shift).pose(sum(bend.length for bend in shift)).x
 
 
 def _on_two_way_road(name: str, ego_speed: float, duration: float, *actors: Actor) -> Scenario:

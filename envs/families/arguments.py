@@ -94,3 +94,13 @@ def fast(drawn: DrawArguments) -> DrawArguments:
 
 EITHER = one(True, False)
 """Sampler of True or False."""
+
+
+def always(_: object) -> bool:
+    """Sample True."""
+    return True
+
+
+def still(_: object) -> float:
+    """Sample a speed of 0."""
+    return 0.0

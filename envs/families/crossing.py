@@ -1,7 +1,9 @@
-"""Crossing vehicles: Euro NCAP's CCCscp and CMCscp, and a crossing car that clears in time."""
+"""Crossing vehicles and animals: Euro NCAP's CCCscp and CMCscp, a car that clears in time, and animals."""
 
 from math import pi
 from typing import Annotated
+
+import numpy as np
 
 from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.dynamics.units import KMH
@@ -12,7 +14,9 @@ from lgmd_gym.envs.families.arguments import (
     Shade,
     between,
     draw,
+    grey,
     kmh,
+    maybe,
     one,
     one_of,
     speed,
@@ -20,7 +24,16 @@ from lgmd_gym.envs.families.arguments import (
     within,
 )
 from lgmd_gym.envs.families.family import Level, family
-from lgmd_gym.envs.families.road_users import LARGE_CAR, MOTORCYCLE, SIDES, SMALL_CAR, parked_row
+from lgmd_gym.envs.families.road_users import (
+    LARGE_CAR,
+    MOTORCYCLE,
+    SIDES,
+    SMALL_CAR,
+    RoadUser,
+    RunUp,
+    crossing_actor,
+    parked_row,
+)
 from lgmd_gym.envs.families.scenario import (
     AFTERMATH,
     EGO_LENGTH,
@@ -37,6 +50,14 @@ from lgmd_gym.envs.families.scenario import (
 START_GAP = 2.9  # [m] from a stopped ego to the target's path (AEB C2C v4.3.1, 8.2.5)
 SIDE_IMPACT = 0.1  # of the ego's length behind its front, where a motorcycle strikes it
 WAITING, PULL_AWAY = 4.5, 1.5  # [s], [m/s²], not specified by the protocol
+
+ANIMALS = {
+    "dog": RoadUser("box", 0.9, 0.3, 0.6),
+    "boar": RoadUser("box", 1.5, 0.5, 0.8),
+    "deer": RoadUser("box", 1.2, 0.4, 1.1),
+    "moose": RoadUser("box", 2.6, 0.8, 2.0),
+}
+"""Boxes of the size of animals, from the ground to the back; rough sizes of adults, the deer a roe deer."""
 
 TargetSpeed = Annotated[float, speed("Target speed")]
 Side = Annotated[str, one_of(tuple(SIDES), 'Side from which the target comes, "right" or "left"')]
@@ -144,6 +165,62 @@ def cross_and_clear(
         duration=START_TTC + 2.0,
         actors=(_crossing_car(distance, before, target_speed, side, shade),),
         road=_road(distance, side),
+    )
+
+
+def _some_animal(rng: np.random.Generator) -> str:
+    return [*ANIMALS][int(rng.integers(len(ANIMALS)))]
+
+
+_ANIMAL = {
+    "ego_speed": kmh(30.0, 120.0),
+    "animal": _some_animal,
+    "animal_speed": between(1.0, 8.0),
+    "side": one("left", "right"),
+}
+
+
+@family(
+    "AnimalCrossing",
+    Level("AnimalCrossing", 3.0, draw(**_ANIMAL, impact_location=between(0.1, 0.9)), twin=True),
+    Level("AnimalClears", 1.0, draw(**_ANIMAL, clear_by=between(0.8, 2.0)), threat=False),
+    threat=True,
+)
+def animal_crosses(
+    ego_speed: EgoSpeed = 80 * KMH,
+    animal: Annotated[str, one_of(tuple(ANIMALS), "Animal")] = "deer",
+    animal_speed: Annotated[float, within("[0.5, 15]", "m/s", "Speed of the animal")] = 4.0,
+    side: Side = "right",
+    impact_location: Annotated[
+        float,
+        within("[0.1, 0.9]", "", "Position across the ego's width; 0 is the right side, 1 the left"),
+    ] = 0.5,
+    clear_by: Annotated[
+        float | None,
+        maybe(
+            "[0.3, 4]",
+            "s",
+            "Time from the animal's rear leaving the ego's way to the ego's arrival; None for a threat",
+        ),
+    ] = None,
+    shade: Annotated[int | None, grey("the animal")] = None,
+) -> Scenario:
+    """An animal runs across the road at constant speed, drawn as a box of its size.
+
+    Without braking, the ego's front meets the animal's side at the impact location. It is not a case of a
+    protocol. Length, width and height [m]: dog 0.9, 0.3, 0.6; boar 1.5, 0.5, 0.8; (roe) deer 1.2, 0.4, 1.1;
+    moose 2.6, 0.8, 2.0.
+    """
+    user = ANIMALS[animal]
+    if clear_by is not None:
+        beyond = EGO_WIDTH / 2 + user.length / 2 + clear_by * animal_speed  # of its centre as the ego arrives
+        impact_location = 0.5 + SIDES[side] * beyond / EGO_WIDTH
+    motion = RunUp(animal_speed, (), START_TTC * animal_speed)
+    runner = crossing_actor(user, ego_speed, side, impact_location, motion, shade)
+    duration = START_TTC + (AFTERMATH if clear_by is None else 2.0)
+    road = RoadPlan(kind="two-way")
+    return Scenario(
+        family="AnimalCrossing", ego_speed=ego_speed, duration=duration, actors=(runner,), road=road
     )
 
 

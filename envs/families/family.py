@@ -36,7 +36,8 @@ class Level(NamedTuple):
     weight: float  # relative frequency among the threats or the non-threats
     draw: Callable[[np.random.Generator], Arguments]  # function that draws the arguments of the family
     family: str = ""  # name of the family
-    threat: bool = False  # whether the ego has contact without braking
+    threat: bool | None = None  # whether the ego has contact without braking; None for that of the family
+    twin: bool = False  # whether levels without the target are declared, too, see `family`
     has_target: bool = True  # whether the scenario has its target, or is without it, see `without_target`
 
 
@@ -54,9 +55,10 @@ def family(name: str, *levels: Level, threat: bool = False, twin: bool = False) 
     Args:
         name: Name of the family.
         levels: The family in random levels, and its variants.
-        threat: Whether the ego has contact without braking in these levels.
-        twin: Whether the first level is also drawn without its target, as `<name>WithoutTarget` with half the
-            weight, so that a policy cannot infer the threat from the road alone.
+        threat: Whether the ego has contact without braking in these levels, unless one states it itself.
+        twin: Whether the first level has a twin. A level with a twin is also drawn without its target, as
+            `<name>WithoutTarget` with half the weight, so that a policy cannot infer the threat from the road
+            alone.
 
     Raises:
         ValueError: If the name is taken, or contains other characters than letters, digits, ".", "_", "-".
@@ -70,17 +72,14 @@ def family(name: str, *levels: Level, threat: bool = False, twin: bool = False) 
         if name in FAMILIES and _origin(FAMILIES[name]) != _origin(function):
             raise ValueError(f"scenario family {name!r} is defined twice; choose another name")
         FAMILIES[name] = made = _checked(function)
-        declared = [level._replace(family=name, threat=threat) for level in levels]
-        if twin:
-            declared.append(
-                declared[0]._replace(
-                    name=f"{levels[0].name}WithoutTarget",
-                    weight=levels[0].weight / 2.0,
-                    threat=False,
-                    has_target=False,
+        for number, level in enumerate(levels):
+            declared = level._replace(family=name, threat=threat if level.threat is None else level.threat)
+            LEVELS[level.name] = declared
+            if level.twin or (twin and number == 0):
+                without = f"{level.name}WithoutTarget"
+                LEVELS[without] = declared._replace(
+                    name=without, weight=level.weight / 2.0, threat=False, has_target=False
                 )
-            )
-        LEVELS.update({level.name: level for level in declared})
         return made
 
     return register

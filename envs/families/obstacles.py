@@ -2,6 +2,9 @@
 
 from typing import Annotated
 
+import numpy as np
+
+from lgmd_gym.aliases import Arguments
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.arguments import EgoSpeed, between, draw, fast, kmh, within
 from lgmd_gym.envs.families.family import Level, family
@@ -23,20 +26,30 @@ def drive_alone(ego_speed: EgoSpeed = 50 * KMH) -> Scenario:
     return Scenario(family="EmptyRoad", ego_speed=ego_speed, duration=10.0)
 
 
+def _cover(rng: np.random.Generator) -> Arguments:
+    """Draw a dark or bright cover of 0.5 to 0.9 m in the lane."""
+    size = between(0.5, 0.9)(rng)
+    shade = int(rng.integers(20, 200))
+    return {"ego_speed": kmh()(rng), "shade": shade, "length": size, "width": size}
+
+
 @family(
     "SteelPlate",
     Level("SteelPlate", 1.0, draw(ego_speed=kmh(30.0), shade=lambda rng: int(rng.integers(110, 200)))),
+    Level("ManholeCover", 1.0, _cover),
 )
 def drive_over_plate(
     ego_speed: EgoSpeed = 80 * KMH,
     shade: Annotated[int, whole(None, "[0, 255]", doc="Grey level of the plate")] = STEEL,
+    length: Annotated[float, within("[0.1, 10]", "m", "Length of the plate")] = 3.7,
+    width: Annotated[float, within("[0.1, 10]", "m", "Width of the plate")] = 2.4,
 ) -> Scenario:
-    """The ego drives over a steel plate of 2.4 × 3.7 m; not a threat.
+    """The ego drives over a plate that is flat on the road, by default a steel plate; not a threat.
 
-    Source: 49 CFR 571.127 S9.2 at 80 km/h, GB 39901-2025 at 60 km/h.
+    Source: 49 CFR 571.127 S9.2 at 80 km/h, GB 39901-2025 at 60 km/h; both have a plate of 2.4 × 3.7 m.
     """
     plate = Actor(
-        gap=START_TTC * ego_speed, kind="road_marking", shade=shade, length=3.7, width=2.4, height=0.025
+        gap=START_TTC * ego_speed, kind="road_marking", shade=shade, length=length, width=width, height=0.025
     )
     return Scenario(family="SteelPlate", ego_speed=ego_speed, duration=START_TTC + 2.0, actors=(plate,))
 

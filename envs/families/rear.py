@@ -11,6 +11,7 @@ from lgmd_gym.envs.dynamics.script import Segment
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families.arguments import (
     EITHER,
+    FAST_KMH,
     HEADWAY,
     DrawArguments,
     EgoSpeed,
@@ -105,6 +106,13 @@ _BRAKING = draw(
     build_up=between(0.3, 1.0),
     overlap=_overlap,
 )
+_HARD_BRAKING = draw(
+    ego_speed=kmh(30.0, FAST_KMH[1]),
+    headway=between(0.5, 2.0),
+    deceleration=between(2.0, 9.0),
+    build_up=between(0.2, 1.0),
+    overlap=_overlap,
+)
 _FOLLOWING = draw(ego_speed=kmh(), headway=between(*HEADWAY))
 _RELEASING = draw(ego_speed=kmh(40.0), headway=between(1.5, 2.5), speed_drop=between(2.0, 5.0))
 
@@ -135,7 +143,20 @@ def approach_standing(
     return _scenario("CCRs", ego_speed, target, beside)
 
 
-@family("CCRm", Level("CCRm", 13.0, _moving), Level("FastCCRm", 2.0, fast(_moving)), threat=True)
+def _closing(rng: np.random.Generator) -> Arguments:
+    """Draw a closing speed from 5 km/h to that of a standing target, small ones as often as large ones."""
+    ego_speed = kmh(15.0, FAST_KMH[1])(rng)
+    closing_speed = ego_speed * (5.0 * KMH / ego_speed) ** between(0.02, 1.0)(rng)
+    return {"ego_speed": ego_speed, "target_speed": ego_speed - closing_speed, "overlap": _overlap(rng)}
+
+
+@family(
+    "CCRm",
+    Level("CCRm", 13.0, _moving),
+    Level("FastCCRm", 2.0, fast(_moving)),
+    Level("ClosingLead", 4.0, _closing, twin=True),
+    threat=True,
+)
 def approach_slower(
     ego_speed: EgoSpeed = 50 * KMH,
     target_speed: Annotated[float, slower("Target speed")] = 20 * KMH,
@@ -163,7 +184,13 @@ def approach_slower(
     return _scenario("CCRm", ego_speed, target, beside)
 
 
-@family("CCRb", Level("CCRb", 13.0, _BRAKING), Level("FastCCRb", 2.0, fast(_BRAKING)), threat=True)
+@family(
+    "CCRb",
+    Level("CCRb", 13.0, _BRAKING),
+    Level("FastCCRb", 2.0, fast(_BRAKING)),
+    Level("HardBrakingLead", 4.0, _HARD_BRAKING, twin=True),
+    threat=True,
+)
 def follow_braking(
     ego_speed: Annotated[float, speed("Initial speed of both cars")] = 50 * KMH,
     gap: Gap = None,
@@ -299,10 +326,29 @@ def _box(widest: float) -> DrawArguments:
     )
 
 
+_LOW_BOX = draw(
+    ego_speed=kmh(20.0, 100.0),
+    width=between(0.3, 2.0),
+    height=between(0.2, 1.2),
+    length=between(0.2, 2.0),
+    lateral_offset=between(-0.5, 0.5),
+)
+_BESIDE = draw(
+    ego_speed=kmh(20.0, 100.0),
+    width=between(0.3, 2.0),
+    height=between(0.2, 2.5),
+    length=between(0.2, 5.0),
+    clearance=between(0.5, 2.5),
+    left=EITHER,
+)
+
+
 @family(
     "StandingBox",
     Level("StandingBox", 2.0, _box(2.5)),
     Level("NarrowBox", 2.0, _box(1.2)),
+    Level("LowBox", 3.0, _LOW_BOX, twin=True),
+    Level("BoxPass", 1.0, _BESIDE, threat=False),
     threat=True,
 )
 def approach_box(
@@ -319,16 +365,33 @@ def approach_box(
             "so that it is in the ego's way",
         ),
     ] = 0.0,
+    clearance: Annotated[
+        float | None,
+        maybe(
+            "[0.2, 10]",
+            "m",
+            "Alternative to `lateral_offset`: distance between the sides of ego and box, which then stands "
+            "next to the ego's way and is not a threat",
+        ),
+    ] = None,
+    left: Annotated[bool, truth("Whether a box with a clearance is on the left; otherwise right")] = False,
     shade: Annotated[int | None, grey("the box")] = None,
 ) -> Scenario:
-    """The ego approaches a box that stands in its lane, such as lost cargo.
+    """The ego approaches a box that stands in its lane, such as lost cargo or debris.
 
     It is not a case of a protocol.
     """
-    beside = (EGO_WIDTH + width) / 2 - 0.05
+    touching = (EGO_WIDTH + width) / 2
+    if clearance is not None:
+        if lateral_offset != 0.0:
+            text = f"lateral_offset={lateral_offset:g} and clearance={clearance:g}"
+            raise ValueError(f"{text} both set the lateral position; pass one")
+        aside = (touching + clearance) * (1.0 if left else -1.0)
+    else:
+        aside = check_within("lateral_offset", lateral_offset, 0.05 - touching, touching - 0.05, "m")
     box = Actor(
         gap=START_TTC * ego_speed,
-        lateral_offset=check_within("lateral_offset", lateral_offset, -beside, beside, "m"),
+        lateral_offset=aside,
         kind="box",
         shade=shade,
         length=length,

@@ -12,11 +12,13 @@ from lgmd_gym.envs.families.arguments import (
     EgoSpeed,
     RiderShade,
     Sampler,
+    always,
     between,
     draw,
     kmh,
     slower,
     speed,
+    still,
     truth,
     within,
 )
@@ -47,6 +49,8 @@ from lgmd_gym.envs.families.scenario import (
 CAR_CLEARANCE = 1.0  # [m] between the ego's side and the parked cars of CPNCO, and between these cars
 RUN_UP = 7.0  # [m], distance in which a bicycle accelerates
 CAR_GAP = 0.2  # [m] between the two parked cars of crossing bicycles
+LYING_HEIGHTS = {False: 0.3, True: 0.2}  # [m], by whether the person is a child
+SLOW_KMH = (1.8, 18.0)  # speeds of those who move towards the ego, 0.5 to 5 m/s
 
 Walking = Annotated[float, within("[0.1, 5]", "m/s", "Pedestrian speed")]
 Riding = Annotated[float, within("[0.1, 15]", "m/s", "Bicycle speed")]
@@ -60,6 +64,7 @@ Location = Annotated[
     ),
 ]
 Child = Annotated[bool, truth("Whether the pedestrian is a child")]
+Towards = Annotated[bool, truth("Whether the motion is towards the ego")]
 Clearance = Annotated[float, within("[0.2, 10]", "m", "Distance between the sides of ego and road user")]
 
 
@@ -184,33 +189,70 @@ def bicycle_from_left(
     return _crossing_bicycle("CBFA", ego_speed, bicycle_speed, impact_location, shade, "left", 22.0, cars)
 
 
-@family("CPLA", Level("CPLA", 4.0, _from(20.0, _walker())), threat=True, twin=True)
+def _standing(**more: Sampler) -> DrawArguments:
+    """Return a function that draws a person who does not walk."""
+    return draw(ego_speed=kmh(20.0), walking_speed=still, impact_location=between(0.1, 0.9), **more)
+
+
+@family(
+    "CPLA",
+    Level("CPLA", 4.0, _from(20.0, _walker())),
+    Level("StandingPerson", 2.0, _standing(), twin=True),
+    Level("StandingChild", 2.0, _standing(child=always), twin=True),
+    Level("LyingPerson", 2.0, _standing(lying=always, child=EITHER), twin=True),
+    Level("PedestrianTowards", 2.0, _walker(*SLOW_KMH, towards=always, child=EITHER), twin=True),
+    threat=True,
+    twin=True,
+)
 def pedestrian_ahead(
     ego_speed: EgoSpeed = 40 * KMH,
     walking_speed: Annotated[float, slower("Pedestrian speed", zero=True)] = 5 * KMH,
     impact_location: Location = 0.5,
+    child: Child = False,
+    lying: Annotated[
+        bool, truth("Whether the pedestrian lies across the lane; requires a walking speed of 0")
+    ] = False,
+    towards: Towards = False,
     shade: ClothesShade = None,
 ) -> Scenario:
     """A pedestrian walks ahead of the ego in the same direction (Car-to-Pedestrian Longitudinal Adult).
 
-    Sources: Euro NCAP AEB VRU v4.5.1 (CPLA-25, CPLA-50) and Frontal Collisions v1.1; 49 CFR 571.127 S8.5, and
-    S8.4 with a walking speed of 0.
+    With a walking speed of 0 the pedestrian stands or lies; one who lies is drawn as a box of the person's
+    height by 0.5 m (a child by 0.3 m), 0.3 m high (a child 0.2 m). Sources: Euro NCAP AEB VRU v4.5.1
+    (CPLA-25, CPLA-50) and Frontal Collisions v1.1; 49 CFR 571.127 S8.5, and S8.4 with a walking speed of 0.
+    Children, lying persons and those who walk towards the ego are not cases of a protocol.
     """
-    return _ahead("CPLA", ADULT, ego_speed, "walking_speed", walking_speed, impact_location, shade)
+    user = CHILD if child else ADULT
+    if lying:
+        if walking_speed > 0.0:
+            raise ValueError(
+                f"lying requires walking_speed=0, got {walking_speed:g} m/s; set it to 0 or remove lying"
+            )
+        user = RoadUser("box", user.width, user.height, LYING_HEIGHTS[child])
+    return _ahead("CPLA", user, ego_speed, "walking_speed", walking_speed, impact_location, shade, towards)
 
 
-@family("CBLA", Level("CBLA", 3.0, _from(25.0, _rider(10.0, 20.0))), threat=True, twin=True)
+@family(
+    "CBLA",
+    Level("CBLA", 3.0, _from(25.0, _rider(10.0, 20.0))),
+    Level("BicycleTowards", 2.0, _rider(*SLOW_KMH, towards=always), twin=True),
+    threat=True,
+    twin=True,
+)
 def bicycle_ahead(
     ego_speed: EgoSpeed = 50 * KMH,
     bicycle_speed: Annotated[float, slower("Bicycle speed", zero=True)] = 15 * KMH,
     impact_location: Location = 0.5,
+    towards: Towards = False,
     shade: RiderShade = None,
 ) -> Scenario:
     """A bicycle rides ahead of the ego in the same direction (Car-to-Bicyclist Longitudinal Adult).
 
-    Sources: Euro NCAP AEB VRU v4.5.1 (CBLA-25 at 20 km/h, CBLA-50 at 15 km/h) and Frontal Collisions v1.1.
+    Sources: Euro NCAP AEB VRU v4.5.1 (CBLA-25 at 20 km/h, CBLA-50 at 15 km/h) and Frontal Collisions v1.1;
+    `towards` is not a case of a protocol.
     """
-    return _ahead("CBLA", BICYCLE, ego_speed, "bicycle_speed", bicycle_speed, impact_location, shade)
+    speed_name = "bicycle_speed"
+    return _ahead("CBLA", BICYCLE, ego_speed, speed_name, bicycle_speed, impact_location, shade, towards)
 
 
 @family(
@@ -241,27 +283,37 @@ def pedestrian_behind(
     return _on_two_way_road("CPRA", ego_speed, walker)
 
 
-@family("PedestrianPass", Level("PedestrianPass", 1.0, draw(**_PASSED)))
+@family(
+    "PedestrianPass",
+    Level("PedestrianPass", 1.0, draw(**_PASSED)),
+    Level(
+        "RoadsidePerson",
+        1.0,
+        draw(ego_speed=kmh(20.0), clearance=between(0.5, 2.5), walking_speed=still, child=EITHER),
+    ),
+)
 def pass_pedestrian(
     ego_speed: EgoSpeed = 30 * KMH,
     clearance: Clearance = 1.0,
     walking_speed: Annotated[float, slower("Pedestrian speed", zero=True)] = 5 * KMH,
+    child: Child = False,
     shade: ClothesShade = None,
 ) -> Scenario:
-    """The ego passes a pedestrian on its right who walks in the same direction; not a threat.
+    """The ego passes a pedestrian on its right who walks in the same direction or stands; not a threat.
 
     Source: GB 39901-2025, with a clearance of 1.0 m at 30 km/h.
     """
+    user = CHILD if child else ADULT
     if walking_speed >= ego_speed:
         raise ValueError(f"walking_speed must be below ego_speed {ego_speed:g} m/s, got {walking_speed:g}")
     walker = Actor(
         gap=START_TTC * (ego_speed - walking_speed),
-        lateral_offset=-(EGO_WIDTH / 2 + clearance + ADULT.width / 2),
+        lateral_offset=-(EGO_WIDTH / 2 + clearance + user.width / 2),
         speed=walking_speed,
         shade=shade,
-        **ADULT.fields,
+        **user.fields,
     )
-    duration = START_TTC + (ADULT.length + EGO_LENGTH) / (ego_speed - walking_speed) + 2.0
+    duration = START_TTC + (user.length + EGO_LENGTH) / (ego_speed - walking_speed) + 2.0
     return Scenario(family="PedestrianPass", ego_speed=ego_speed, duration=duration, actors=(walker,))
 
 
@@ -375,15 +427,17 @@ def _ahead(
     user_speed: float,
     impact_location: float,
     shade: int | None,
+    towards: bool = False,
 ) -> Scenario:
-    """Return a slower road user ahead of the ego; its contact is 5 s after the start."""
-    if user_speed >= ego_speed:
+    """Return a road user ahead, slower than the ego or towards it; its contact is 5 s after the start."""
+    if user_speed >= ego_speed and not towards:
         raise ValueError(
             f"{speed_name} must be below ego_speed {ego_speed:g} m/s in {name}, got {user_speed:g}"
         )
     target = Actor(
-        gap=START_TTC * (ego_speed - user_speed),
+        gap=START_TTC * (ego_speed + (user_speed if towards else -user_speed)),
         lateral_offset=(impact_location - 0.5) * EGO_WIDTH,
+        heading=pi if towards else 0.0,
         speed=user_speed,
         shade=shade,
         **user.fields,

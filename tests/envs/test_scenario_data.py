@@ -73,6 +73,7 @@ DEFAULTS = [
     # Of 3.36 s of acceleration to 15 km/h, 2.44 s are before the start: 15 · 2.44 / 3.36.
     ("CBNA", 40, 10.893), ("CBNAO", 40, 3.294), ("CBFA", 40, 11.746),
     ("BicyclePass", 30, 0), ("BottsDots", 72.4, 0), ("AdjacentBraking", 72.4, 72.4),
+    ("AnimalCrossing", 80, 14.4), ("SecondThreat", 80, 80),
     ("CurveStandingCar", 72.4, 0), ("CCRsCurve", 50, 0), ("CurvePass", 50, 0), ("StandingBox", 50, 0),
         ("CCRs", 50, 0), ("CCRm", 50, 20), ("CCRb", 50, 50), ("Following", 50, 50), ("BrakeRelease", 50, 50),
         ("CCCscp", 30, 30), ("CrossingClears", 40, 40), ("AdjacentPass", 50, 0), ("PassBetween", 80, 0),
