@@ -9,6 +9,7 @@ from docstring_markdown import argument_texts, fields_table, markdown_rows, rst_
 from gymnasium import spaces
 
 from lgmd_gym.envs.appearance import Appearance
+from lgmd_gym.envs.attention import Attention
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.dynamics.script import Bend, Segment
@@ -67,7 +68,9 @@ def argument_tables(card: ScenarioCard, cls: Any) -> str:
         for item in (Scenario, Actor, RoadPlan, Segment, Bend):
             parts += [f"### {item.__name__}", fields_table(item)]
     parts += ["### Brake, in `config`", fields_table(BrakeParams)]
-    if not card.traffic:
+    if card.traffic:
+        parts += ["### Drivers who err, in `attention`", fields_table(Attention)]
+    else:
         parts += ['### Reward, in `config["reward"]`', fields_table(RewardParams)]
     return "\n\n".join(parts)
 

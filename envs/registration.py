@@ -17,6 +17,7 @@ from lgmd_gym.errors import check_keys, check_known, check_text, shown, unknown_
 
 if TYPE_CHECKING:
     from lgmd_gym.camera import Scene
+    from lgmd_gym.envs.attention import Attention
     from lgmd_gym.envs.episode_source import EpisodeSource
     from lgmd_gym.envs.families.scenario import Scenario
     from lgmd_gym.neuron import NeuronSpec
@@ -304,6 +305,7 @@ def make_traffic(
     road: str | None = None,
     scene: "Scene | Values | None" = None,
     split: str = "train",
+    attention: "Attention | Values | str | None" = None,
 ) -> gym.Env:
     """Return a traffic environment inside `LGMDObservation`, or without it for `camera=None`.
 
@@ -327,12 +329,16 @@ def make_traffic(
         scene: Mapping of other fields of `lgmd_gym.camera.Scene`, or a `Scene`, whose world, by default the
             laboratory, is fixed.
         split: See `lgmd_gym.envs.appearance.Appearance`.
+        attention: "inattentive" for drivers who err, or an `Attention` or its fields; None for attentive
+            drivers.
 
     Raises:
         ValueError: If a kind, key or name is unknown, or a value is out of range.
     """
     from lgmd_gym.envs.appearance import Appearance
+    from lgmd_gym.envs.attention import Attention
 
     env = find_kind(kind)(config=config, render_mode=render_mode)
+    env.attention = Attention.make(attention)
     env.appearance = Appearance.of(scene, world=world, weather=weather, road=road, split=split)
     return with_camera(env, camera, neuron, params, fps, include_frame, include_base, trace)

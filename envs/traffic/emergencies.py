@@ -7,6 +7,9 @@ An emergency is a contact of the ego, on any side, or a moment in which the requ
 (Cooper and Ferguson 1976), see `required_deceleration`. It depends on speeds, distances and steering only: a
 driver of IDM also brakes by more than 5 m/s² to give way, without a conflict.
 
+`EMERGENCY_SHARE` scales this to the brake of an episode: 5 m/s² of the default brake's 9 m/s². On a wet road
+with 6 m/s², where a driver must brake earlier, the required deceleration of an emergency is 3.3 m/s².
+
 A brake of the agent is needed if, without it, an emergency follows within `HORIZON`: 3 s is the limit of the
 time to collision below which driving is critical (Minderhoud and Bovy 2001). The episode is therefore
 continued from that moment with the driver alone.
@@ -16,10 +19,12 @@ from bisect import bisect_left
 from dataclasses import dataclass
 from math import inf
 
+from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.traffic.env import TrafficEnv
 
 HORIZON = 3.0  # [s], a brake is needed if an emergency follows within this time
 EMERGENCY = 5.0  # [m/s²], required deceleration of an emergency
+EMERGENCY_SHARE = EMERGENCY / BrakeParams().max_deceleration  # the same, as a share of full braking
 
 
 @dataclass(frozen=True, slots=True)

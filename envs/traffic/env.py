@@ -16,10 +16,12 @@ from lgmd_gym.aliases import Config, Info
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.envs import surrogate_safety
 from lgmd_gym.envs.appearance import Appearance, brake_of
+from lgmd_gym.envs.attention import Attention
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.envs.spaces import ContinuousDemand, DiscreteDemand, EgoState, make_action
 from lgmd_gym.envs.surrogate_safety import required_deceleration
 from lgmd_gym.envs.traffic.cars import TrafficCar, TrafficEgo
+from lgmd_gym.envs.traffic.driver_errors import DriverErrors, add_follower
 from lgmd_gym.envs.traffic.road import TrafficRoad
 
 JAM_TIME, JAM_SPEED = 10.0, 0.5  # [s], [m/s]: the episode ends after this time below this speed
@@ -74,6 +76,10 @@ class TrafficEnv(EgoBrakeEnv):
     IDM. The demand passes through the brake model of `BrakingEnv`, with the brake of the world; the driver
     brakes no harder than that brake can.
 
+    With `attention="inattentive"` the same traffic has human errors: the ego's driver looks away for 2 to 4 s
+    and holds the acceleration, a car ahead brakes now and then, and the driver behind reacts late. The times
+    are drawn from the seed at the reset, and are the same whatever an agent does.
+
     ## Action Space
 
     `Box(-1, 0, (1,), float32)`, a longitudinal demand: −1 full brake, 0 no braking beyond the driver's.
@@ -103,6 +109,7 @@ class TrafficEnv(EgoBrakeEnv):
     |---|---|---|
     | `deceleration` | ego deceleration beyond the driver's, >= 0 [m/s²] | |
     | `driver_acceleration` | acceleration demanded by the driver [m/s²] | |
+    | `attentive` | whether the driver observes the road, see `attention` | |
     | `required_deceleration` | Δv / (2·t) of contacts predicted with the steering, >= 0 [m/s²] | contact |
     | `target_speed` | speed along the ego's heading of the first car ahead [m/s] | nothing within 300 m |
     | `side` | part of the ego in contact: "front", "rear", "side"; "" without contact | |
@@ -128,6 +135,8 @@ class TrafficEnv(EgoBrakeEnv):
     road: TrafficRoad
     appearance: Appearance = Appearance()
     """World, weather and road of the next episodes."""
+    attention: Attention = Attention()
+    """Errors of the drivers in the next episodes."""
     scene: Scene = Scene()
     """Scene of the present episode."""
     regulated: ClassVar[bool] = False
@@ -201,6 +210,8 @@ class TrafficEnv(EgoBrakeEnv):
         # A generator of its own: the draws of the traffic are the same in every world.
         self.scene = self.appearance.draw(self.np_random.spawn(1)[0])
         self.brake = self.episode_brake(brake_of(self.scene))
+        # Spawned for inattentive drivers only, whose traffic is otherwise that of attentive ones.
+        rng = self.np_random.spawn(1)[0] if self.attention.errs else None
         while True:
             self._jam_steps = 0
             self._build()
@@ -208,6 +219,11 @@ class TrafficEnv(EgoBrakeEnv):
                 self._simulate(None)
             if self.road.contact is None:
                 break
+        if rng is not None:
+            step = 1 / self.config["simulation_frequency"]
+            self.road.errors = DriverErrors(self.attention, rng, self.config["duration"], step)
+            if self.attention.follower:
+                add_follower(self.road, self.ego, rng)
         self.ego.travelled = 0.0
         self.steps = self._jam_steps = 0
 
@@ -262,6 +278,7 @@ class TrafficEnv(EgoBrakeEnv):
             "relative_impact_speed": contact.relative_impact_speed if contact else inf,
             "deceleration": ego.braking,
             "driver_acceleration": ego.driver_acceleration,
+            "attentive": self.road.errors is None or self.road.errors.attentive,
             "required_deceleration": required_deceleration(bodies),
             "target_speed": float(lead["speed"] * cos(lead["heading"] - ego.heading)) if index else inf,
             "distance": ego.travelled,

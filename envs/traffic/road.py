@@ -16,6 +16,7 @@ from lgmd_gym.envs.dynamics.bodies import BODY, BOX
 from lgmd_gym.envs.dynamics.contact import Contact
 from lgmd_gym.envs.dynamics.episode import PARTS
 from lgmd_gym.envs.traffic.cars import TrafficCar, TrafficEgo
+from lgmd_gym.envs.traffic.driver_errors import DriverErrors
 from lgmd_gym.envs.traffic.kernels import (
     ALL_DONE,
     CAR,
@@ -27,6 +28,7 @@ from lgmd_gym.envs.traffic.kernels import (
     locate,
     mark_collisions,
     move,
+    neighbours,
 )
 from lgmd_gym.envs.traffic.lanes import LaneTable
 
@@ -47,6 +49,7 @@ class TrafficRoad(RegulatedRoad):
 
     Attributes:
         contact: First contact of the ego, or None.
+        errors: Errors of the drivers; None for attentive drivers.
     """
 
     def __init__(self, road: Road, ego: TrafficEgo | None, regulated: bool) -> None:
@@ -62,6 +65,7 @@ class TrafficRoad(RegulatedRoad):
             item.road = self
         self._ego, self.regulated = ego, regulated
         self.contact: Contact | None = None
+        self.errors: DriverErrors | None = None
         self._lanes = LaneTable(self.network)
         self._records = self._constants = np.zeros(0, CAR)
         self._known: list[TrafficCar] = []  # the cars of `_constants`
@@ -106,19 +110,26 @@ class TrafficRoad(RegulatedRoad):
             cars["planned_lane"][waiting] = car.planned_lane
             waiting = decide(*arguments, waiting, True)
         ego = self._ego
-        if ego is not None:
-            record = cars[self.vehicles.index(ego)]
-            ego.action = {
-                "steering": float(record["steering"]),
-                "acceleration": float(record["acceleration"]),
-            }
-            ego.driver_acceleration = max(ego.action["acceleration"], -ego.brake.max_deceleration)
+        if ego is None:
+            return
+        own = self.cars.index(ego)
+        record = cars[own]
+        if self.errors is not None:
+            lane = int(record["lane"])
+            limit, given = float(table.records["speed_limit"][lane]), float(record["acceleration"])
+            record["acceleration"] = self.errors.hold(ego, limit, given)
+            ahead, behind = neighbours(cars, own, lane, table.records, pieces, table.offsets, along, across)
+            self.errors.change_others(cars, self.cars, ahead, behind)
+        ego.action = {"steering": float(record["steering"]), "acceleration": float(record["acceleration"])}
+        ego.driver_acceleration = max(ego.action["acceleration"], -ego.brake.max_deceleration)
 
     def step(self, dt: float) -> None:
         """Advance all cars by `dt` [s], or up to the ego's first contact; call `act` before."""
         if self.contact is not None:
             return
         self.steps += 1
+        if self.errors is not None:
+            self.errors.steps += 1
         if self.regulated and self.steps % int(1 / dt / self.REGULATION_FREQUENCY) == 0:
             self.enforce_road_rules()
         cars, number = self._records, len(self.vehicles)

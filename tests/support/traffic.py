@@ -7,8 +7,10 @@ from lgmd_gym.benchmark.traffic.batch import IN_LABORATORY
 from lgmd_gym.benchmark.traffic.observer import Observer
 from lgmd_gym.benchmark.traffic.recording import record_traffic
 from lgmd_gym.benchmark.traffic.replay import Replay
+from lgmd_gym.envs.attention import Attention
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, make_traffic
 from lgmd_gym.envs.traffic.cars import TrafficCar
+from lgmd_gym.envs.traffic.driver_errors import DriverErrors, Window
 from lgmd_gym.envs.traffic.kinds import HighwayTraffic
 
 HOLD, BRAKE = np.array([0.0], np.float32), np.array([-1.0], np.float32)
@@ -34,6 +36,68 @@ class BlockedHighway(EmptyHighway):
     """A highway with a stationary car 50 m ahead."""
 
     stationary_car_at = 50.0
+
+
+def errors_of(glances=(), brakings=(), **fields):
+    """Return errors of drivers with given windows."""
+    errors = DriverErrors(Attention(**fields), np.random.default_rng(0), 60.0, 1 / 30)
+    errors.glances = tuple(Window(*item) for item in glances)
+    errors.brakings = tuple(Window(*item) for item in brakings)
+    return errors
+
+
+class Following(EmptyHighway):
+    """The ego at 25 m/s follows a car of the same speed that is 30 m ahead, centre to centre.
+
+    The car ahead brakes by 8 m/s² from 1.5 s to 4.5 s, and the driver looks away from 1 s to 5 s.
+    """
+
+    glances = ((1.0, 5.0),)
+    brakings = ((1.5, 4.5, 8.0),)
+
+    def _modify_scene(self):
+        super()._modify_scene()
+        self.lead = TrafficCar(self.road, self.ego.position + np.array([30.0, 0.0]), speed=25.0)
+        self.lead.TIME_WANTED = self.ego.TIME_WANTED = 0.8
+        self.road.vehicles.append(self.lead)
+
+    def _reset(self):
+        super()._reset()
+        self.road.errors = errors_of(self.glances, self.brakings)
+
+
+class Followed(EmptyHighway):
+    """The ego is followed by a car whose driver reacts late.
+
+    Attributes:
+        ego_speed: Speed of the ego at the start [m/s].
+        behind: Distance of the car behind, centre to centre [m].
+        speed: Speed of the car behind [m/s].
+        reaction_time: Reaction time of its driver [s].
+    """
+
+    ego_speed, behind, speed, reaction_time = 25.0, 14.0, 25.0, 1.25
+
+    def _modify_scene(self):
+        super()._modify_scene()
+        self.ego.position, self.ego.speed = self.ego.position + np.array([100.0, 0.0]), self.ego_speed
+        follower = TrafficCar(self.road, self.ego.position - np.array([self.behind, 0.0]), speed=self.speed)
+        follower.TIME_WANTED, follower.enable_lane_change = 0.3, False
+        self.road.vehicles.append(follower)
+
+    def _reset(self):
+        super()._reset()
+        self.road.errors = errors_of(reaction_time=self.reaction_time)
+
+
+class Standing(Followed):
+    """The ego stands for the whole episode, and the car behind does not brake in time."""
+
+    ego_speed, behind, speed, reaction_time = 0.0, 50.0, 20.0, 5.0
+
+    def _modify_scene(self):
+        super()._modify_scene()
+        self.ego.target_speed = 0.0
 
 
 def run_for(env, seconds, action=HOLD):
