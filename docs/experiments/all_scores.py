@@ -16,9 +16,8 @@ from pathlib import Path
 
 from lgmd_gym.benchmark import get_suite
 from lgmd_gym.benchmark.analysis.tables import rate_text
-from lgmd_gym.benchmark.case import Row
+from lgmd_gym.benchmark.case import Row, is_traffic
 from lgmd_gym.benchmark.run_folder import StoredRun, read_run
-from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.summary import Sample, summarise, without_fcw_driver
 from lgmd_gym.benchmark.traffic.summary import summarise_traffic
 from lgmd_gym.errors import counted
@@ -43,12 +42,12 @@ def traffic_score(agent: str, rows: list[Row]) -> str:
 
 def column(run: StoredRun) -> dict[str, str]:
     """Return the heading of a run (key "agent") and the score of each of its agents."""
-    traffic = run.config.suite == TRAFFIC
+    traffic = is_traffic(run.config.suite)
     rows = run.rows if traffic else without_fcw_driver(run.rows)
     threats = any(row["threat"] for row in rows)
     what = "false activations" if not threats else "avoided"
     what = "false activations per 100 km" if traffic else what
-    suite = TRAFFIC if traffic else get_suite(run.config.suite).name
+    suite = run.config.suite if traffic else get_suite(run.config.suite).name
     cases = counted(Sample.of(rows).cases, "case")
     where = str(Sample.of(rows)) if run.config.worlds else f"{cases} in the laboratory"
     cells = {"agent": f"{suite}: {what}, {where}, {'/'.join(run.config.conditions)}"}
@@ -72,8 +71,8 @@ def family_table(agents: Sequence[str], runs: Sequence[StoredRun]) -> list[str]:
     """
     lines = [["suite", "family", *(f"`{agent}`" for agent in agents)]]
     for run in runs:
-        if run.config.suite == TRAFFIC:
-            raise ValueError("a run of the suite traffic has no families; omit --families")
+        if is_traffic(run.config.suite):
+            raise ValueError("a run of traffic has no families; omit --families")
         check_agents(agents, run)
         rows = without_fcw_driver(run.rows)
         where = run.config.suite + ("" if run.config.worlds else ", laboratory")

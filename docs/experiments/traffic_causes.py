@@ -28,12 +28,11 @@ from all_scores import check_agents
 from joblib import Parallel, delayed
 
 from lgmd_gym.agents import HOLD, make_agent
-from lgmd_gym.benchmark.case import Row
+from lgmd_gym.benchmark.case import Row, is_traffic
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.metrics import NUISANCE
 from lgmd_gym.benchmark.run_folder import StoredRun, read_run
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.suites import TRAFFIC
 from lgmd_gym.benchmark.traffic.replay import EVENT_PAUSE
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.registration import TRAFFIC_KINDS
@@ -87,7 +86,7 @@ def first_event(config: RunConfig, agent_name: str, row: Row) -> Onset:
     sensors = SensorConfig(config.camera, config.params).for_agent(agent)
     world = LABORATORY if row["world"] is None else row["world"]
     place = {"world": world, "weather": row["condition"], "road": config.road}
-    env = make_target(f"{TRAFFIC}/{kind}", {}, **sensors.arguments, **place)
+    env = make_target(f"{config.suite}/{kind}", {}, **sensors.arguments, **place)
     observation, info = env.reset(seed=row["seed"])
     agent.reset(row["seed"])
     onset, pause, done = None, 0.0, False
@@ -131,7 +130,7 @@ def play(run: StoredRun, agent: str, jobs: int) -> list[tuple[str, Onset]]:
     Raises:
         ValueError: If the run is not one of traffic, does not contain the agent, or has no such drive.
     """
-    if run.config.suite != TRAFFIC:
+    if not is_traffic(run.config.suite):
         raise ValueError(f"the run is one of {run.config.suite}; pass one of lgmd-gym bench --suite traffic")
     check_agents([agent], run)
     rows = [row for row in run.rows if row["agent"] == agent and row["error"] is None]

@@ -17,7 +17,9 @@ from lgmd_gym.envs.registration import APPEARANCE, RANDOM, SCENARIO, SCENARIO_AR
 from lgmd_gym.errors import check_flag, check_items, check_text
 
 NO_BRAKE = "no-brake"  # the agent that defines threats
-TRAFFIC = "traffic"  # the suite without fixed cases, see `lgmd_gym.benchmark.traffic`
+TRAFFIC = "traffic"  # the first suite without fixed cases, see `lgmd_gym.benchmark.traffic`
+TRAFFIC_SUITES = {TRAFFIC: "attentive", "traffic-inattentive": "inattentive"}
+"""The suites of traffic, with the name of the `Attention` of their drivers."""
 SEPARATOR = "/"  # between suite, family and variant in the name of a case; a variant may contain it
 _UNNAMED = re.compile(r"[^\w.+-]+")
 
@@ -242,9 +244,14 @@ def level_case(suite: str, split: str, number: int) -> Case:
     return Case(suite, family, f"level{number:03d}", arguments, RANDOM)
 
 
-def traffic_case(kind: str, seed: int) -> Case:
+def is_traffic(suite: object) -> bool:
+    """Return whether a suite is one of traffic."""
+    return isinstance(suite, str) and suite in TRAFFIC_SUITES
+
+
+def traffic_case(kind: str, seed: int, suite: str = TRAFFIC) -> Case:
     """Return the case of one seed of a kind of traffic, such as "traffic/highway/s3"."""
-    return Case(TRAFFIC, kind, f"s{seed}")
+    return Case(suite, kind, f"s{seed}")
 
 
 CASE_KEYS = (

@@ -16,7 +16,7 @@ import tomli_w
 
 from lgmd_gym._version import __version__
 from lgmd_gym.aliases import Values
-from lgmd_gym.benchmark.case import NO_BRAKE, TRAFFIC, RowKey, Suite, traffic_case
+from lgmd_gym.benchmark.case import NO_BRAKE, RowKey, Suite, is_traffic, traffic_case
 from lgmd_gym.benchmark.case_table import read_data
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import OWN, Source, copy_suite, get_suite, is_file
@@ -100,7 +100,7 @@ class RunConfig:
     Attributes:
         suite: Name of a suite; path of a suite file or scenario file (".toml" or ".json") or of an
             OpenSCENARIO file (".xosc"); path of a folder with OpenSCENARIO files; a `Scenario`; several paths
-            and scenarios; or "traffic".
+            and scenarios; or "traffic" or "traffic-inattentive".
         agents: Agent strings, such as "spike-threshold:threshold=45" or "my_module:MyAgent".
         seeds: Number of seeds, >= 1; for traffic, of every kind.
         first_seed: First seed, >= 0.
@@ -112,7 +112,7 @@ class RunConfig:
         params: See `LGMDObservation`; None for each agent's own or the defaults.
         neuron: Model of cameras without one of their own, as in "off-only:t_sp=0.78" or
             "my_module:Mine"; None for the LGMD.
-        kinds: Kinds of traffic; None for all. Only for the suite "traffic".
+        kinds: Kinds of traffic; None for all. Only for the suites of traffic.
         modules: Modules with scenario families of the user, see `import_families`; a run folder stores the
             scenarios instead.
 
@@ -136,8 +136,8 @@ class RunConfig:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "suite", _suite(self.suite))
-        if self.kinds is not None and self.suite != TRAFFIC:
-            raise ValueError(f"kinds applies to suite 'traffic' only, got suite {shown(self.suite)}")
+        if self.kinds is not None and not is_traffic(self.suite):
+            raise ValueError(f"kinds applies to suites of traffic only, got suite {shown(self.suite)}")
         if self.camera is not None:
             make_channels(self.camera)
         LGMDParams.make(self.params)
@@ -156,7 +156,7 @@ class RunConfig:
         Appearance(road=self.road)  # checks it
         if self.neuron is not None and outside_code(check_text("neuron", self.neuron)) is None:
             check_model("neuron", self.neuron)  # that of a module is imported when the run is checked
-        if self.suite == TRAFFIC:
+        if is_traffic(self.suite):
             kinds = tuple(TRAFFIC_KINDS) if self.kinds is None else self.kinds
             values["kinds"] = _names("kinds", kinds, "kind of traffic", TRAFFIC_KINDS)
         for name, value in values.items():
@@ -193,17 +193,17 @@ class RunConfig:
         return self.sensor_config
 
     def get_suite(self) -> Suite:
-        """Return the suite; that of traffic has no fixed cases."""
-        if self.suite == TRAFFIC:
-            return Suite(name=TRAFFIC, cases=(), about="recorded traffic")
+        """Return the suite; those of traffic have no fixed cases."""
+        if is_traffic(self.suite):
+            return Suite(name=str(self.suite), cases=(), about="recorded traffic")
         return get_suite(self.suite, self.modules)
 
     def row_keys(self, suite: Suite) -> set[RowKey]:
         """Return the keys of all rows of a complete run; of cases, those of `no-brake` included."""
         seeds, conditions = self.seed_range, self.conditions
-        if self.suite == TRAFFIC:
+        if is_traffic(self.suite):
             return {
-                (agent, traffic_case(kind, seed).name, seed, condition)
+                (agent, traffic_case(kind, seed, suite.name).name, seed, condition)
                 for agent, kind, seed, condition in product(self.agents, self.kinds or (), seeds, conditions)
             }
         cases = [case.name for case in suite.cases]

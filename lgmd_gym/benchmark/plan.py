@@ -7,7 +7,7 @@ from dataclasses import replace
 import gymnasium as gym
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.case import TRAFFIC, Row, key_of, traffic_case
+from lgmd_gym.benchmark.case import Row, is_traffic, key_of, traffic_case
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.episode import make_env
 from lgmd_gym.benchmark.metrics import Counterfactual
@@ -117,7 +117,7 @@ DRIVES_PER_TASK = 10  # two seeds of every kind; more drives delay the rows and 
 
 
 class TrafficPlan(Plan):
-    """The episodes of the traffic suite."""
+    """The episodes of a suite of traffic."""
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -135,13 +135,13 @@ class TrafficPlan(Plan):
             drives = list[TrafficDrive]()
             for seed in self.config.seed_range:
                 for index, kind in enumerate(self.kinds):
-                    key = (traffic_case(kind, seed).name, seed, condition)
+                    key = (traffic_case(kind, seed, self.suite.name).name, seed, condition)
                     agents = tuple(agent for agent in self.config.agents if (agent, *key) not in done)
                     if agents:
                         world = self.config.world(seed, index)
                         chosen = LABORATORY if world is None else world
                         appearance = Appearance(world=chosen, weather=condition, road=self.config.road)
-                        drives.append(TrafficDrive(kind, seed, agents, appearance))
+                        drives.append(TrafficDrive(kind, seed, agents, appearance, self.suite.name))
             for first in range(0, len(drives), DRIVES_PER_TASK):
                 batch = tuple(drives[first : first + DRIVES_PER_TASK])
                 tasks.append(TrafficTask(batch, sensor_config, condition))
@@ -154,4 +154,4 @@ class TrafficPlan(Plan):
 
 def make_plan(config: RunConfig) -> Plan:
     """Return the plan of a configuration."""
-    return TrafficPlan(config) if config.suite == TRAFFIC else CasePlan(config)
+    return TrafficPlan(config) if is_traffic(config.suite) else CasePlan(config)

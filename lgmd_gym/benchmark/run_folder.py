@@ -11,7 +11,7 @@ import numpy as np
 
 from lgmd_gym._version import __version__
 from lgmd_gym.aliases import Values
-from lgmd_gym.benchmark.case import ID_KEYS, TRAFFIC, Row, RowKey, key_of
+from lgmd_gym.benchmark.case import ID_KEYS, Row, RowKey, is_traffic, key_of
 from lgmd_gym.benchmark.config import RUN_FILE, RunConfig, provenance
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.processes.files import FolderLock, new_folder, replace_file
@@ -74,7 +74,7 @@ def read_run(path: Path) -> StoredRun:
 def read_case_rows(path: Path) -> list[Row]:
     """Return the rows of a run folder; raise ValueError for a traffic run."""
     run = read_run(path)
-    if run.config.suite == TRAFFIC:
+    if is_traffic(run.config.suite):
         raise ValueError(f"{str(path)!r} is a traffic run; its summary.csv holds the rates per 100 km")
     return run.rows
 

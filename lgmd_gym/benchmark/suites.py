@@ -13,7 +13,7 @@ from typing import cast
 import tomli_w
 
 from lgmd_gym.aliases import Values
-from lgmd_gym.benchmark.case import TRAFFIC, Case, Suite, file_name, repetitions, scenario_case
+from lgmd_gym.benchmark.case import TRAFFIC_SUITES, Case, Suite, file_name, repetitions, scenario_case
 from lgmd_gym.benchmark.case_table import check_table, read_cases, read_data, read_name
 from lgmd_gym.benchmark.extensions import provided
 from lgmd_gym.benchmark.protocols import load_suites
@@ -49,7 +49,7 @@ def find_suite(name: str) -> Suite:
         ValueError: If the name is unknown.
     """
     if check_text("suite", name) not in SUITES:
-        raise unknown_name("suite", name, (*SUITES, TRAFFIC))
+        raise unknown_name("suite", name, (*SUITES, *TRAFFIC_SUITES))
     return SUITES[name]
 
 
@@ -154,7 +154,7 @@ def is_file(suite: Source) -> bool:
     if not isinstance(suite, str) or suite.endswith(FILES):
         return True
     try:
-        return bool(suite) and suite not in (*SUITES, TRAFFIC) and Path(suite).is_dir()
+        return bool(suite) and suite not in (*SUITES, *TRAFFIC_SUITES) and Path(suite).is_dir()
     except (OSError, ValueError):  # no path, such as a very long name
         return False
 
@@ -269,7 +269,7 @@ def load_suite(path: Path, modules: tuple[str, ...] = ()) -> Suite:
             return Suite(name=case.suite, cases=(case,), about=f"scenario file {path.name}")
         check_keys("key of a suite", values, SUITE_KEYS)
         name = read_name(values, "name")
-        if name in SUITES or name == TRAFFIC:
+        if name in (*SUITES, *TRAFFIC_SUITES):
             raise ValueError(f"name {name!r} is the name of a shipped suite; choose another")
         tables: object = values.get("cases")
         if not isinstance(tables, list) or not tables:

@@ -217,6 +217,8 @@ UNITS = {
     "duration": "s",
     "moving_time": "s",
     "needed_time": "s",
+    "scaled_needed_time": "s",
+    "speed_lost": "m_s",
     "fps": "hz",
 }
 

@@ -193,7 +193,7 @@ def _new(options: Bench, executor: "Executor") -> "Run":
 def _print_tables(benchmark: "Run", console: Console) -> None:
     """Print the tables of every condition."""
     from lgmd_gym.benchmark.analysis import tables
-    from lgmd_gym.benchmark.suites import TRAFFIC
+    from lgmd_gym.benchmark.case import is_traffic
     from lgmd_gym.benchmark.summary import by_condition
     from lgmd_gym.benchmark.task import NO_BRAKE
     from lgmd_gym.benchmark.traffic.summary import traffic_table
@@ -201,7 +201,7 @@ def _print_tables(benchmark: "Run", console: Console) -> None:
     config, suite = benchmark.config, benchmark.plan.suite
     for condition, rows in by_condition(benchmark.rows).items():
         title = f"{_title(benchmark)}, {condition}"
-        if suite.name == TRAFFIC:
+        if is_traffic(suite.name):
             console.print(traffic_table(rows, list(config.agents), title))
             console.print(traffic_table(rows, list(config.agents), "by kind of traffic", by_kind=True))
             continue

@@ -52,7 +52,8 @@ def run(options: List) -> int:
 
 def suites() -> Table:
     """Return the suites with their number of cases per family."""
-    from lgmd_gym.benchmark.suites import SUITES, TRAFFIC
+    from lgmd_gym.benchmark.case import TRAFFIC_SUITES
+    from lgmd_gym.benchmark.suites import SUITES
     from lgmd_gym.envs.registration import TRAFFIC_KINDS
 
     table = Table("suite", "cases", "description", title="suites")
@@ -63,8 +64,10 @@ def suites() -> Table:
             counts[kind] = counts.get(kind, 0) + 1
         families = ", ".join(f"{family} {count}" for family, count in counts.items())
         table.add_row(name, str(len(suite.cases)), _entry(suite.about, "families", families))
-    description = "IDM traffic on highway-env's roads; the agent can only brake; false activations per 100 km"
-    table.add_row(TRAFFIC, "one per\nseed", _entry(description, "kinds", ", ".join(TRAFFIC_KINDS)))
+    about = "IDM traffic on highway-env's roads, {} drivers; the agent can only brake; activations per 100 km"
+    for name, attention in TRAFFIC_SUITES.items():
+        kinds = ", ".join(TRAFFIC_KINDS)
+        table.add_row(name, "one per\nseed", _entry(about.format(attention), "kinds", kinds))
     return table
 
 

@@ -13,9 +13,9 @@ import gymnasium as gym
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import Agent
 from lgmd_gym.aliases import Arguments
-from lgmd_gym.benchmark.case import Case
+from lgmd_gym.benchmark.case import TRAFFIC_SUITES, Case
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.suites import SUITES, TRAFFIC, find_case
+from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.clips import VideoWriter
 from lgmd_gym.envs import env_id
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, traffic_id
@@ -64,9 +64,15 @@ def make_target(target: str | Case, arguments: Arguments, **options: Any) -> gym
     if isinstance(target, Case):
         chosen = {**dict(target.arguments), **arguments}
         return gym.make(env_id(target.environment), **options, **chosen)
-    traffic = {f"{TRAFFIC}/{kind}": traffic_id(kind) for kind in TRAFFIC_KINDS}
-    target = traffic.get(target, target)
-    if target in traffic.values() and arguments:
+    traffic = {
+        f"{suite}/{kind}": (kind, attention)
+        for suite, attention in TRAFFIC_SUITES.items()
+        for kind in TRAFFIC_KINDS
+    }
+    if target in traffic:
+        kind, attention = traffic[target]
+        target, options = traffic_id(kind), options | {"attention": attention}
+    if target in map(traffic_id, TRAFFIC_KINDS) and arguments:
         raise ValueError(f"{target} must have no scenario arguments, got {', '.join(arguments)}; remove them")
     ids = [name for name in gym.registry if name.startswith("LGMD/")]
     if target in ids:

@@ -11,10 +11,10 @@ from lgmd_gym.benchmark.analysis.tables import (
     rate_text,
     success_lines,
 )
-from lgmd_gym.benchmark.case import Row
+from lgmd_gym.benchmark.case import Row, is_traffic
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.run_folder import case_name, read_run, read_series, rows_file, series_name
-from lgmd_gym.benchmark.suites import TRAFFIC, get_suite
+from lgmd_gym.benchmark.suites import get_suite
 from lgmd_gym.benchmark.summary import (
     FILE,
     INTERVAL_TEXT,
@@ -181,7 +181,7 @@ def _write(path: Path, plots: bool, report: bool, trust: bool) -> list[Path]:
         return []
     files = [path / FILE, path / "summary.csv"]
     write_episodes(rows, files[0])
-    if config.suite == TRAFFIC:
+    if is_traffic(config.suite):
         write_traffic_summary(rows, files[1])
         return files
     write_summary(rows, files[1])

@@ -223,7 +223,7 @@ def test_run_requires_a_configuration(tmp_path):
         ({"agents": []}, "agents must contain at least one name, got none"),
         ({"agents": "no-brake"}, "agents must be a list of strings, got 'no-brake'"),
         ({"conditions": ["fogg"]}, "did you mean 'fog'"),
-        ({"kinds": ["merge"]}, "kinds applies to suite 'traffic' only"),
+        ({"kinds": ["merge"]}, "kinds applies to suites of traffic only"),
         ({"seeds": 0}, "seeds must be a whole number >= 1, got 0"),
         ({"seeds": 1.5}, "seeds must be a whole number >= 1, got 1.5"),
         ({"first_seed": -1}, "first_seed must be a whole number >= 0, got -1"),

@@ -12,7 +12,7 @@ from lgmd_gym.agents import BRAKE, HOLD, make_agent, to_action
 from lgmd_gym.benchmark.episode import Step, rollout
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.batch import TrafficDrive, TrafficTask, run_traffic_task
-from lgmd_gym.benchmark.traffic.recording import fork, look_ahead
+from lgmd_gym.benchmark.traffic.branch import branch_from, fork
 from lgmd_gym.benchmark.traffic.replay import RESEED, LiveEpisode
 from lgmd_gym.benchmark.traffic.rows import KEYS, BrakingEvent, measure
 from lgmd_gym.envs.appearance import Appearance
@@ -98,7 +98,7 @@ def test_fork_is_independent_of_its_original(merge):
     before = env.ego.position.tolist(), env.steps
     for _ in range(20):
         braked = other.step(to_action(BRAKE))[4]
-    look_ahead(env, 2.0, 1.0)
+    branch_from(env, 60).speed(90)
     assert (env.ego.position.tolist(), env.steps) == before
     assert braked["ego_speed"] < env.ego.speed
     for _ in range(20):
@@ -258,10 +258,10 @@ def test_braking_is_false_if_it_counts_and_is_not_needed(time, peak, false):
 def test_time_in_which_a_brake_is_needed(wall_kinds):
     """The ego of "wall" has contact after less than 3 s; that of "empty" is never in need."""
     recording = Recorded("wall", config={"duration": 12}).recording
-    moving, needed = recording.moving_and_needed
-    assert moving == needed == len(recording.moments) / 30
-    moving, needed = Recorded("empty", config={"duration": 12}).recording.moving_and_needed
-    assert (moving, needed) == (pytest.approx(12.0, abs=0.1), 0.0)
+    moving, needed, scaled = recording.moving_and_needed
+    assert moving == needed == scaled == len(recording.moments) / 30
+    moving, needed, scaled = Recorded("empty", config={"duration": 12}).recording.moving_and_needed
+    assert (moving, needed, scaled) == (pytest.approx(12.0, abs=0.1), 0.0, 0.0)
 
 
 def test_hard_braking_of_the_driver_without_a_conflict_is_no_emergency():
@@ -271,5 +271,5 @@ def test_hard_braking_of_the_driver_without_a_conflict_is_no_emergency():
     required = np.array([moment.info["required_deceleration"] for moment in recording.moments])
     assert (driver <= -5.0).sum() > 10
     assert (required[driver <= -5.0] < 5.0).any()
-    moving, needed = recording.moving_and_needed
+    moving, needed, _ = recording.moving_and_needed
     assert needed < 0.3 * moving

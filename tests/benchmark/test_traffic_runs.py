@@ -25,26 +25,59 @@ def row(agent="a", kind="merge", **values):
     """Return a row with zeros for all counts and lengths."""
     identity = {"agent": agent, "case": f"traffic/{kind}/s0", "family": kind, "condition": "clear"}
     counts = ("alerts", "brakes", "false_activations", "stops")
-    zeros = dict.fromkeys((*counts, "peak_deceleration", "distance", "moving_time", "needed_time"), 0)
-    return dict.fromkeys(KEYS) | identity | zeros | {"collision": False, "threat": False} | values
+    counts += ("needless_activations", "peak_deceleration", "distance", "moving_time", "needed_time")
+    zeros = dict.fromkeys((*counts, "scaled_needed_time", "speed_lost"), 0)
+    flags = dict.fromkeys(("collision", "threat", "caused"), False)
+    return dict.fromkeys(KEYS) | identity | zeros | flags | values
 
 
 @pytest.fixture
 def summary_rows():
     return [
-        row(distance=150_000.0, brakes=3, false_activations=1, alerts=6),
-        row(distance=150_000.0, kind="highway", threat=True, avoided=True),
-        row(agent="b", distance=100_000.0, collision=True, side="rear"),
+        row(
+            distance=150_000.0,
+            brakes=3,
+            false_activations=2,
+            needless_activations=1,
+            speed_lost=12.0,
+            alerts=6,
+            moving_time=100.0,
+            needed_time=4.0,
+            scaled_needed_time=7.0,
+        ),
+        row(
+            distance=150_000.0,
+            kind="highway",
+            threat=True,
+            avoided=True,
+            avoidable=True,
+            avoided_by_brake=True,
+        ),
+        row(
+            agent="b",
+            distance=100_000.0,
+            collision=True,
+            side="rear",
+            impact_speed=0.4,
+            threat=True,
+            avoided=False,
+            avoidable=False,
+            caused=True,
+        ),
         row(agent="b", error="Traceback"),
     ]
 
 
 def test_summary_adds_up_the_episodes_of_an_agent(summary_rows):
     a, b = traffic_summaries(summary_rows)
-    assert (a.distance, a.drives, a.false_activations, a.brakes) == (300_000.0, 2, 1, 3)
-    assert a.per_100km(a.false_activations) == pytest.approx(1 / 3)
-    assert a.interval == (pytest.approx(0.0253 / 3, abs=1e-4), pytest.approx(5.572 / 3, abs=1e-3))
-    assert (a.avoided.k, a.avoided.n) == (1, 1)
+    assert (a.distance, a.drives, a.false_activations, a.needless, a.brakes) == (300_000.0, 2, 2, 1, 3)
+    assert a.per_100km(a.needless) == pytest.approx(1 / 3)
+    assert a.needless_interval == (pytest.approx(0.0253 / 3, abs=1e-4), pytest.approx(5.572 / 3, abs=1e-3))
+    assert a.per_100km(a.speed_lost) == pytest.approx(4.0)
+    assert (a.needed_share, a.scaled_needed_share) == (0.04, 0.07)
+    assert (a.avoided.k, a.avoided.n) == (a.avoided_by_brake.k, a.avoided_by_brake.n) == (1, 1)
+    assert (a.unavoidable, a.caused, a.standing) == (0, 0, 0)
+    assert (b.avoided_by_brake.n, b.unavoidable, b.caused, b.standing) == (0, 1, 1, 1)
     assert (b.contacts, b.rear_ended, b.errors, b.drives) == (1, 1, 1, 1)
     kinds = [(item.agent, item.kind) for item in traffic_summaries(summary_rows, by_kind=True)]
     assert kinds == [("a", "highway"), ("a", "merge"), ("b", "merge")]
@@ -63,7 +96,9 @@ def test_summary_file_has_one_line_per_agent_and_kind(summary_rows, tmp_path):
         ("b", "clear", "merge"),
     ]
     values = dict(zip(header, lines[0], strict=True))
-    assert (values["distance_km"], values["false_per_100km"]) == ("300.0000", "0.3333")
+    assert (values["distance_km"], values["false_per_100km"]) == ("300.0000", "0.6667")
+    assert (values["needless_per_100km"], values["speed_lost_per_100km"]) == ("0.3333", "4.0000")
+    assert (values["avoidable"], values["avoided_by_brake"], values["unavoidable"]) == ("1", "1", "0")
 
 
 def test_table_shows_rates_with_intervals(summary_rows):
@@ -71,6 +106,8 @@ def test_table_shows_rates_with_intervals(summary_rows):
     console.print(traffic_table(summary_rows, ["a", "b"], "title"))
     text = console.export_text()
     assert "0.3 [0.0–1.9]" in text
+    assert " 1/1 (+0) " in text
+    assert " 1 (1, 1) " in text
     assert "b (1 error)" in text
     assert "clustered by drive" in text
 

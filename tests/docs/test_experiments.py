@@ -117,7 +117,15 @@ def test_all_scores():
     false = [row | {"threat": False, "false_activation": row["world"] == 8000} for row in rows[:2]]
     quiet = RunConfig(suite="false-reaction", agents=("a",), seeds=1, worlds=0)
     drive = {"distance": 5e4, "false_activations": 1, "moving_time": 9.0, "needed_time": 0.0}
-    drive |= {"side": "", "alerts": 1, "brakes": 1, "collision": False, "peak_deceleration": 9.0}
+    drive |= {"scaled_needed_time": 0.0, "needless_activations": 1, "speed_lost": 9.0, "avoidable": None}
+    drive |= {
+        "caused": False,
+        "side": "",
+        "alerts": 1,
+        "brakes": 1,
+        "collision": False,
+        "peak_deceleration": 9.0,
+    }
     traffic = RunConfig(suite="traffic", agents=("a",), seeds=1, conditions=("mixed",))
     runs = [StoredRun(config, rows, False), StoredRun(quiet, false, False)]
     runs.append(StoredRun(traffic, [rows[0] | drive | {"threat": False}], False))

@@ -4,7 +4,7 @@ import traceback
 from dataclasses import dataclass
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.benchmark.case import Row, new_row, traffic_case
+from lgmd_gym.benchmark.case import TRAFFIC, TRAFFIC_SUITES, Row, new_row, traffic_case
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.observer import Observer
@@ -27,6 +27,7 @@ class TrafficDrive:
     seed: int  # seed of the traffic and the agents
     agents: tuple[str, ...]
     appearance: Appearance = IN_LABORATORY  # world, weather and road; the world must not be None
+    suite: str = TRAFFIC  # name of the suite, which determines the attention of the drivers
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +82,10 @@ class _PlayedDrive:
         self.moments: tuple[Moment, ...] = ()
         self._agents, self._condition, self._label = agents, task.condition, sensor_config.label
         try:
+            attention = TRAFFIC_SUITES[drive.suite]
             recording = record_traffic(
-                drive.kind, drive.seed, observer.sensors, index, observer.fps, drive.appearance
+                *(drive.kind, drive.seed, observer.sensors, index, observer.fps, drive.appearance),
+                attention=attention,
             )
             playing = {name: make_agent(name) for name in agents}
         except Exception:
@@ -111,7 +114,7 @@ class _PlayedDrive:
         """Add the row of an agent, which ends its replay."""
         self.replays.pop(agent, None)
         drive = self.drive
-        case = traffic_case(drive.kind, drive.seed)
+        case = traffic_case(drive.kind, drive.seed, drive.suite)
         world = check_world(drive.appearance.world)
         self.rows[agent] = new_row(KEYS, agent, case, drive.seed, self._condition, world=world, **values)
 

@@ -1,18 +1,22 @@
 """Recordings of traffic without an agent, which can be forked at any decision."""
 
-import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 from lgmd_gym.aliases import Config
+from lgmd_gym.benchmark.traffic.branch import Branch, avoids, fork
 from lgmd_gym.benchmark.traffic.reader import Moment, SceneReader
 from lgmd_gym.envs.appearance import Appearance
+from lgmd_gym.envs.attention import Attention
 from lgmd_gym.envs.registration import make_traffic
-from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON, Emergencies, simulate_driver
+from lgmd_gym.envs.surrogate_safety import PREDICTION
+from lgmd_gym.envs.traffic.emergencies import EMERGENCY, EMERGENCY_SHARE, HORIZON, Emergencies
 from lgmd_gym.envs.traffic.env import JAM_SPEED, TrafficEnv
 from lgmd_gym.sensing.sensor_array import SensorArray
 
+LOOK_BACK = HORIZON + PREDICTION  # [s], earliest needed brake before a contact
+LOOK_BACK_STEP = 0.2  # [s] between two of the moments from which full braking is tried
 SNAPSHOT_EVERY = 300  # decisions between two snapshots; one snapshot takes as long as about 10 decisions
 
 
@@ -29,22 +33,78 @@ class TrafficRecording:
     fps: float  # camera frame rate [Hz]
 
     @cached_property
-    def emergencies(self) -> Emergencies:
-        """Emergencies up to `HORIZON` beyond the end."""
-        required = [moment.info["required_deceleration"] for moment in self.moments]
-        demanding = [index / self.policy_hz for index, value in enumerate(required) if value >= EMERGENCY]
+    def course(self) -> Branch:
+        """The drive without the agent, also beyond the end."""
         end = len(self.moments) - 1
-        beyond = simulate_driver(self.fork(end), end / self.policy_hz)
-        return Emergencies(beyond.contact, tuple(sorted({*demanding, *beyond.demanding})))
+        return Branch(
+            0,
+            [moment.speed for moment in self.moments],
+            [moment.info["required_deceleration"] for moment in self.moments],
+            self.contact is not None,
+            lambda: self.fork(end),
+            self.policy_hz,
+        )
+
+    @property
+    def contact(self) -> int | None:
+        """Decision of the contact without the agent; None without one."""
+        return len(self.moments) - 1 if self.moments[-1].info["collision"] else None
+
+    @property
+    def scaled_emergency(self) -> float:
+        """Required deceleration of an emergency, scaled to the brake of the episode [m/s²]."""
+        return EMERGENCY_SHARE * self.snapshots[0].brake.max_deceleration
 
     @cached_property
-    def moving_and_needed(self) -> tuple[float, float]:
-        """Time in motion, above 0.5 m/s, and the part of it in which a brake is needed [s]."""
+    def emergencies(self) -> Emergencies:
+        """Emergencies up to `HORIZON` beyond the end."""
+        return self.course.emergencies(self._horizon_after(len(self.moments) - 1), EMERGENCY)
+
+    @cached_property
+    def scaled_emergencies(self) -> Emergencies:
+        """Emergencies scaled to the brake up to `HORIZON` beyond the end."""
+        return self.course.emergencies(self._horizon_after(len(self.moments) - 1), self.scaled_emergency)
+
+    def _horizon_after(self, decision: int) -> int:
+        return decision + round(HORIZON * self.policy_hz)
+
+    @cached_property
+    def moving_and_needed(self) -> tuple[float, float, float]:
+        """Time in motion, above 0.5 m/s, and its parts in which a brake is needed [s].
+
+        The second is for `emergencies`, the third for `scaled_emergencies`.
+        """
         moving = [
             index / self.policy_hz for index, moment in enumerate(self.moments) if moment.speed > JAM_SPEED
         ]
-        needed = sum(self.emergencies.time_until(time) is not None for time in moving)
-        return len(moving) / self.policy_hz, needed / self.policy_hz
+        needed, scaled = (
+            sum(item.time_until(time) is not None for time in moving) / self.policy_hz
+            for item in (self.emergencies, self.scaled_emergencies)
+        )
+        return len(moving) / self.policy_hz, needed, scaled
+
+    @cached_property
+    def avoidable(self) -> bool | None:
+        """Whether full braking avoids the contact without the agent; None without contact.
+
+        It is tried every `LOOK_BACK_STEP` from `LOOK_BACK` before the contact on, and avoids it if no contact
+        follows up to `HORIZON` after its time. A contact of an ego that stands is not avoidable.
+        """
+        if self.contact is None:
+            return None
+        if self.moments[-1].info["impact_speed"] < JAM_SPEED:
+            return False
+        step = round(LOOK_BACK_STEP * self.policy_hz)
+        onsets = range(max(self.contact - round(LOOK_BACK * self.policy_hz), 0), self.contact, step)
+        env = self.fork(onsets[0])
+        forks = [fork(env)]
+        for _ in onsets[1:]:
+            for _ in range(step):
+                env.step_unobserved()
+            forks.append(fork(env))
+        end = self._horizon_after(self.contact)
+        pairs = zip(reversed(forks), reversed(onsets), strict=True)
+        return any(avoids(env, end - onset) for env, onset in pairs)
 
     def fork(self, decision: int) -> TrafficEnv:
         """Return an environment in the exact state of a decision.
@@ -72,6 +132,7 @@ def record_traffic(
     fps: float,
     appearance: Appearance,
     config: Config | None = None,
+    attention: Attention | str | None = None,
 ) -> TrafficRecording:
     """Record one episode of traffic without an agent.
 
@@ -83,8 +144,9 @@ def record_traffic(
         fps: Camera frame rate [Hz].
         appearance: World, condition and road.
         config: Configuration of `TrafficEnv`.
+        attention: Errors of the drivers, or their name; None for attentive drivers.
     """
-    env: Any = make_traffic(kind, camera=None, config=config)
+    env: Any = make_traffic(kind, camera=None, config=config, attention=attention)
     env.appearance = appearance
     reader = SceneReader(env, sensors, index, fps)
     moments, snapshots = [reader.reset(seed)], [fork(env)]
@@ -93,28 +155,3 @@ def record_traffic(
         if (len(moments) - 1) % SNAPSHOT_EVERY == 0:
             snapshots.append(fork(env))
     return TrafficRecording(kind, seed, tuple(moments), tuple(snapshots), env.config["policy_frequency"], fps)
-
-
-def fork(env: TrafficEnv) -> TrafficEnv:
-    """Return an independent copy of a traffic environment in the same state.
-
-    The lanes are shared because they never change. The copy's road has no callback of `on_road_step`.
-    """
-    network = env.road.network
-    callback = vars(env.road).pop("step", None)
-    try:
-        return copy.deepcopy(env, {id(item): item for item in (network, *network.lanes_list())})
-    finally:
-        if callback is not None:
-            vars(env.road)["step"] = callback
-
-
-def look_ahead(env: TrafficEnv, time: float, horizon: float = HORIZON) -> Emergencies:
-    """Return the emergencies without braking by the agent, leaving `env` unchanged.
-
-    Args:
-        env: Traffic environment.
-        time: Present time [s].
-        horizon: Time ahead [s].
-    """
-    return simulate_driver(fork(env), time, horizon)

@@ -4,10 +4,12 @@ from lgmd_gym.agents import HOLD
 from lgmd_gym.agents.base import Driver
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.traffic.branch import Branch, branch_from
 from lgmd_gym.benchmark.traffic.observer import Observer
 from lgmd_gym.benchmark.traffic.reader import SceneReader
-from lgmd_gym.benchmark.traffic.recording import TrafficRecording, look_ahead
-from lgmd_gym.benchmark.traffic.rows import BrakingEvent, EpisodeLog
+from lgmd_gym.benchmark.traffic.recording import TrafficRecording
+from lgmd_gym.benchmark.traffic.rows import AFTERMATH, BrakingEvent, EpisodeLog
+from lgmd_gym.envs.traffic.emergencies import HORIZON
 
 EVENT_PAUSE = 1.0  # [s] without a demand that ends a braking event, and without an alert before the next one
 HANDOVER = 3.0  # [s] after a standstill during which only the driver acts
@@ -40,7 +42,8 @@ class Replay:
 
     Until the agent brakes, it receives the recorded steps. At its first demand the recorded state is forked:
     the recording is the branch without braking, and the fork is stepped live to the end. For every later
-    braking event, a fork of the live state is stepped without braking.
+    braking event, a fork of the live state is stepped without braking. The difference of the speeds of both
+    is the speed lost.
 
     A braking event ends after `EVENT_PAUSE` without a demand, or at a standstill. After a standstill only the
     driver acts for `HANDOVER`; then the agent is reset, with another seed each time, so that an agent that
@@ -57,6 +60,7 @@ class Replay:
         self.done = False
         self._live: LiveEpisode | None = None
         self._event: BrakingEvent | None = None
+        self._without: Branch | None = None  # the drive without the last braking event
         self._handover_until = self._last_alert = NEVER
         self._standstills = self._decision = 0
         agent.reset(recording.seed)
@@ -78,6 +82,7 @@ class Replay:
         self._update_event(step, time, demand)
         if step.done:
             self.log.end, self.log.duration, self.done = step, time, True
+            self.log.caused = bool(step.info["collision"]) and self._is_caused(time)
         return demand
 
     def _demand(self, step: Step, time: float) -> float:
@@ -95,17 +100,22 @@ class Replay:
 
     def _update_event(self, step: Step, time: float, demand: float) -> None:
         """Begin, continue or end the present braking event."""
-        event = self._event
+        event, decision = self._event, self._decision - 1
         if event is None and demand < HOLD:
-            event = self._event = BrakingEvent(time, self._time_to_emergency(time), time)
+            live = self._live
+            self._without = self.recording.course if live is None else branch_from(live.env, decision)
+            event = self._event = BrakingEvent.begin(decision, self._without, self.recording)
             self.log.events.append(event)
         if event is None:
             return
-        if demand < HOLD:
+        assert self._without is not None
+        speed = float(step.info["ego_speed"])
+        standstill = speed == 0.0 and time > event.start
+        if demand < HOLD or standstill:
             event.last = time
         event.peak = max(event.peak, step.info["deceleration"])
+        event.speed_lost = max(event.speed_lost, self._without.speed(decision) - speed)
         self.log.peak = max(self.log.peak, event.peak)
-        standstill = step.info["ego_speed"] == 0.0 and time > event.start
         if standstill:
             self.log.stops += event.counts  # otherwise the driver has stopped
             self._standstills += 1
@@ -113,8 +123,12 @@ class Replay:
         if standstill or time - event.last > EVENT_PAUSE:
             self._event = None
 
-    def _time_to_emergency(self, time: float) -> float | None:
-        """Return the time to the next emergency without braking [s], or None if there is none."""
-        if self._live is None:
-            return self.recording.emergencies.time_until(time)
-        return look_ahead(self._live.env, time).time_until(time)
+    def _is_caused(self, time: float) -> bool:
+        """Return whether the last braking event caused a contact at a time [s].
+
+        It did if the contact is not later than `AFTERMATH` after it, and the drive without the event has no
+        contact up to `HORIZON` later.
+        """
+        if self._without is None or time - self.log.events[-1].last > AFTERMATH:
+            return False
+        return self._without.contact(round((time + HORIZON) * self.recording.policy_hz)) is None

@@ -1,4 +1,4 @@
-"""Rows of the traffic suite."""
+"""Rows of the traffic suites."""
 
 from dataclasses import dataclass, field
 from math import isfinite
@@ -7,11 +7,15 @@ from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import ID_KEYS, EpisodeRow
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.metrics import NUISANCE
-from lgmd_gym.benchmark.traffic.recording import TrafficRecording
+from lgmd_gym.benchmark.traffic.branch import Branch
+from lgmd_gym.benchmark.traffic.recording import LOOK_BACK, TrafficRecording
+from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON
+
+AFTERMATH = 5.0  # [s] after its last demand or standstill in which a braking event can cause a contact
 
 
 class TrafficRow(EpisodeRow):
-    """Row of the traffic suite, whose family is the kind of traffic; `side` is that of the contact."""
+    """Row of a traffic suite, whose family is the kind of traffic; `side` is that of the contact."""
 
     side: str | None
     alerts: int
@@ -20,6 +24,13 @@ class TrafficRow(EpisodeRow):
     stops: int
     moving_time: float
     needed_time: float
+    scaled_needed_time: float
+    needless_activations: int
+    speed_lost: float
+    activations: list[list[float]]
+    avoidable: bool | None
+    avoided_by_brake: bool | None
+    caused: bool
 
 
 # Every key of a row, in order.
@@ -43,6 +54,13 @@ KEYS = (
     "duration",
     "moving_time",
     "needed_time",
+    "scaled_needed_time",
+    "needless_activations",
+    "speed_lost",
+    "activations",
+    "avoidable",
+    "avoided_by_brake",
+    "caused",
     "fps",
     "error",
 )
@@ -55,8 +73,11 @@ class BrakingEvent:
     start: float  # time of the first demand [s]
     # time from the start to the emergency without it [s]; None if it is not needed
     time_to_emergency: float | None
-    last: float  # time of the last demand [s]
+    last: float  # time of the last demand, or of the standstill [s]
     peak: float = 0.0  # highest deceleration beyond the driver's [m/s²]
+    needed: bool = False  # whether it is needed by the emergencies that are scaled to the brake
+    contact: float | None = None  # time of the contact without it, up to `LOOK_BACK` after its start [s]
+    speed_lost: float = 0.0  # largest difference of the speeds without and with it [m/s]
 
     @property
     def counts(self) -> bool:
@@ -67,6 +88,32 @@ class BrakingEvent:
     def false(self) -> bool:
         """Whether the event counts and is not needed, see `lgmd_gym.envs.traffic.emergencies`."""
         return self.counts and self.time_to_emergency is None
+
+    @property
+    def needless(self) -> bool:
+        """Whether the event counts and is not needed by the emergencies that are scaled to the brake."""
+        return self.counts and not self.needed
+
+    @classmethod
+    def begin(cls, decision: int, without: Branch, recording: TrafficRecording) -> "BrakingEvent":
+        """Return the event that begins with the demand of a decision.
+
+        Args:
+            decision: Number of the decision.
+            without: The drive without the event.
+            recording: The recording of the drive.
+        """
+        hz = recording.policy_hz
+        time, horizon = decision / hz, decision + round(HORIZON * hz)
+        needed = without.emergencies(horizon, recording.scaled_emergency).time_until(time) is not None
+        contact = without.contact(decision + round(LOOK_BACK * hz)) if needed else None
+        return cls(
+            time,
+            without.emergencies(horizon, EMERGENCY).time_until(time),
+            time,
+            needed=needed,
+            contact=None if contact is None else contact / hz,
+        )
 
 
 @dataclass(slots=True)
@@ -79,14 +126,31 @@ class EpisodeLog:
     end: Step | None = None  # last step
     duration: float = 0.0  # duration of the episode [s]
     peak: float = 0.0  # highest deceleration beyond the driver's [m/s²]
+    caused: bool = False  # whether a braking event caused the contact at the end
+
+    def avoided_by_brake(self, time: float) -> bool:
+        """Return whether a needed braking event avoided the contact that occurs without the agent.
+
+        The event begins before that contact and would itself be followed by one without it, and the drive has
+        none up to `HORIZON` after the time.
+
+        Args:
+            time: Time of the contact without the agent [s].
+        """
+        assert self.end is not None
+        passed = not self.end.info["collision"] or self.duration > time + HORIZON
+        return passed and any(event.contact is not None and event.start <= time for event in self.events)
 
 
 def measure(recording: TrafficRecording, log: EpisodeLog) -> Values:
     """Return the measured values of a row."""
     assert log.end is not None
     info = log.end.info
-    moving, needed = recording.moving_and_needed
+    moving, needed, scaled = recording.moving_and_needed
     threat, collision = bool(recording.moments[-1].info["collision"]), bool(info["collision"])
+    avoided_by_brake = None
+    if recording.contact is not None and recording.avoidable:
+        avoided_by_brake = log.avoided_by_brake(recording.contact / recording.policy_hz)
     return {
         "threat": threat,
         "collision": collision,
@@ -103,6 +167,17 @@ def measure(recording: TrafficRecording, log: EpisodeLog) -> Values:
         "duration": log.duration,
         "moving_time": moving,
         "needed_time": needed,
+        "scaled_needed_time": scaled,
+        "needless_activations": sum(event.needless for event in log.events),
+        "speed_lost": float(sum(event.speed_lost for event in log.events if not event.needed)),
+        "activations": [
+            [round(event.start, 4), round(event.last, 4), round(event.speed_lost, 4), int(event.needed)]
+            for event in log.events
+            if event.counts
+        ],
+        "avoidable": recording.avoidable,
+        "avoided_by_brake": avoided_by_brake,
+        "caused": log.caused,
         "fps": recording.fps,
     }
 

@@ -1,4 +1,4 @@
-"""Summaries of the traffic suite: false activations per 100 km, with a clustered interval."""
+"""Summaries of the traffic suites: activations and speed lost per 100 km, and contacts."""
 
 from collections.abc import Sequence
 from math import inf
@@ -10,7 +10,8 @@ from rich.table import Table
 from lgmd_gym.benchmark.case import EpisodeRow
 from lgmd_gym.benchmark.summary import Sample, by_agent, by_condition, cases_and_worlds, rate_of, write_csv
 from lgmd_gym.benchmark.traffic.rows import TrafficRow
-from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON
+from lgmd_gym.envs.traffic.emergencies import EMERGENCY_SHARE, HORIZON
+from lgmd_gym.envs.traffic.env import JAM_SPEED
 from lgmd_gym.errors import counted
 from lgmd_gym.statistics.intervals import Rate, count_interval
 
@@ -34,6 +35,17 @@ COLUMNS = (
     "contacts",
     "rear_ended",
     "peak_deceleration",
+    "needless_activations",
+    "needless_per_100km",
+    "needless_low",
+    "needless_high",
+    "scaled_needed_share",
+    "speed_lost_per_100km",
+    "avoidable",
+    "avoided_by_brake",
+    "unavoidable",
+    "caused",
+    "standing",
     "errors",
 )
 
@@ -55,6 +67,15 @@ class TrafficSummary(NamedTuple):
     contacts: int  # number of episodes with contact
     rear_ended: int  # number of episodes in which another car hit the ego's rear
     peak: float  # highest deceleration beyond the driver's [m/s²]
+    # the same as `false_activations`, `false_bounds` and `needed` with emergencies scaled to the brake
+    needless: int
+    needless_bounds: tuple[float, float]
+    scaled_needed: float
+    speed_lost: float  # sum of the speeds lost in braking events that are not needed in this sense [m/s]
+    avoided_by_brake: Rate  # episodes with a contact that full braking avoids: whether a needed brake did
+    unavoidable: int  # number of episodes with contact without braking that full braking does not avoid
+    caused: int  # number of contacts that the agent's braking caused
+    standing: int  # number of contacts of an ego that stands
     errors: int  # number of episodes that failed
 
     def per_100km(self, count: float) -> float:
@@ -67,9 +88,22 @@ class TrafficSummary(NamedTuple):
         return self.needed / self.moving if self.moving > 0.0 else None
 
     @property
+    def scaled_needed_share(self) -> float | None:
+        """The same with emergencies scaled to the brake."""
+        return self.scaled_needed / self.moving if self.moving > 0.0 else None
+
+    @property
     def interval(self) -> tuple[float, float]:
         """95 % interval of the false activations [1/100 km]."""
-        low, high = self.false_bounds
+        return self._rates(self.false_bounds)
+
+    @property
+    def needless_interval(self) -> tuple[float, float]:
+        """95 % interval of the needless activations [1/100 km]."""
+        return self._rates(self.needless_bounds)
+
+    def _rates(self, bounds: tuple[float, float]) -> tuple[float, float]:
+        low, high = bounds
         return (self.per_100km(low) if low else 0.0), self.per_100km(high)
 
 
@@ -77,6 +111,7 @@ def summarise_traffic(agent: str, kind: str, rows: Sequence[TrafficRow]) -> Traf
     """Return the summary of one agent's rows."""
     played = [row for row in rows if row["error"] is None]
     events = [row["false_activations"] for row in played]
+    needless = [row["needless_activations"] for row in played]
     distances = [row["distance"] for row in played]
     return TrafficSummary(
         agent,
@@ -93,6 +128,14 @@ def summarise_traffic(agent: str, kind: str, rows: Sequence[TrafficRow]) -> Traf
         contacts=sum(row["collision"] for row in played),
         rear_ended=sum(row["side"] == "rear" for row in played),
         peak=max((row["peak_deceleration"] for row in played), default=0.0),
+        needless=sum(needless),
+        needless_bounds=count_interval(needless, distances, *cases_and_worlds(played)),
+        scaled_needed=sum(row["scaled_needed_time"] for row in played),
+        speed_lost=sum(row["speed_lost"] for row in played),
+        avoided_by_brake=rate_of([row for row in played if row["avoidable"]], "avoided_by_brake"),
+        unavoidable=sum(row["avoidable"] is False for row in played),
+        caused=sum(row["caused"] for row in played),
+        standing=sum(row["collision"] and (row["impact_speed"] or 0.0) < JAM_SPEED for row in played),
         errors=len(rows) - len(played),
     )
 
@@ -118,8 +161,11 @@ def write_traffic_summary(rows: Sequence[EpisodeRow], path: Path) -> None:
 
 def _line(item: TrafficSummary, condition: str) -> list[object]:
     """Return the values of `COLUMNS`; rates are empty without distance."""
-    counts = (item.false_activations, *item.false_bounds)
     driven = item.distance > 0.0
+
+    def rates(*counts: float) -> list[str]:
+        return [f"{item.per_100km(count):.4f}" if driven else "" for count in counts]
+
     return [
         item.agent,
         condition,
@@ -128,30 +174,42 @@ def _line(item: TrafficSummary, condition: str) -> list[object]:
         f"{item.distance / 1000:.4f}",
         item.brakes,
         item.false_activations,
-        *(f"{item.per_100km(count):.4f}" if driven else "" for count in counts),
+        *rates(item.false_activations, *item.false_bounds),
         f"{item.moving:.2f}",
         "" if item.needed_share is None else f"{item.needed_share:.4f}",
-        f"{item.per_100km(item.alerts):.4f}" if driven else "",
+        *rates(item.alerts),
         item.avoided.n,
         item.avoided.k,
         item.contacts,
         item.rear_ended,
         f"{item.peak:.4f}",
+        item.needless,
+        *rates(item.needless, *item.needless_bounds),
+        "" if item.scaled_needed_share is None else f"{item.scaled_needed_share:.4f}",
+        *rates(item.speed_lost),
+        item.avoided_by_brake.n,
+        item.avoided_by_brake.k,
+        item.unavoidable,
+        item.caused,
+        item.standing,
         item.errors,
     ]
 
 
 CAPTION = (
-    f"false: without it, no contact and no required deceleration of {EMERGENCY:g} m/s² within {HORIZON:g} s; "
-    "[95 % interval, clustered by drive and world]; needed: share of the time in motion in which a brake is "
-    "not false; contacts (of these rear-ended)"
+    f"needless: without it, no contact and no required deceleration of {100.0 * EMERGENCY_SHARE:.0f} % of "
+    f"full braking within {HORIZON:g} s; [95 % interval, clustered by drive and world]; speed lost: in "
+    "needless brakes, against the same drive without them; needed: share of the time in motion in which a "
+    "brake is not needless; avoided by a needed brake, of the contacts without agent that full braking "
+    "avoids (+ those that it does not); contacts (rear-ended, caused by braking)"
 )
 HEADINGS = (
     "km",
-    "false activations\nper 100 km",
-    "false/\nbrakes",
+    "needless activations\nper 100 km",
+    "needless/\nbrakes",
+    "speed lost\n[m/s] per 100 km",
     "needed,\n% of time",
-    "avoided",
+    "avoided by\na brake",
     "contacts",
 )
 
@@ -173,17 +231,20 @@ def traffic_table(rows: Sequence[EpisodeRow], agents: list[str], title: str, by_
 
 
 def _cells(item: TrafficSummary, by_kind: bool) -> list[str]:
-    low, high = item.interval
-    rate = "–"
+    low, high = item.needless_interval
+    rate = lost = "–"
     if item.distance > 0.0:
-        rate = f"{item.per_100km(item.false_activations):.1f} [{low:.1f}–{high:.1f}]"
+        rate = f"{item.per_100km(item.needless):.1f} [{low:.1f}–{high:.1f}]"
+        lost = f"{item.per_100km(item.speed_lost):.1f}"
+    share, avoided = item.scaled_needed_share, item.avoided_by_brake
     return [
         (f"  {item.kind}" if by_kind else item.agent)
         + (f" ({counted(item.errors, 'error')})" if item.errors else ""),
         f"{item.distance / 1000:.1f}",
         rate,
-        f"{item.false_activations}/{item.brakes}",
-        "–" if item.needed_share is None else f"{100.0 * item.needed_share:.1f}",
-        f"{item.avoided.k}/{item.avoided.n}",
-        f"{item.contacts} ({item.rear_ended})",
+        f"{item.needless}/{item.brakes}",
+        lost,
+        "–" if share is None else f"{100.0 * share:.1f}",
+        f"{avoided.k}/{avoided.n} (+{item.unavoidable})",
+        f"{item.contacts} ({item.rear_ended}, {item.caused})",
     ]
