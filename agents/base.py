@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias, cast
 
 import numpy as np
 
-from lgmd_gym.aliases import Info
+from lgmd_gym.aliases import Config, Info
 from lgmd_gym.errors import check_within
 
 if TYPE_CHECKING:
@@ -89,6 +89,7 @@ class BatchAgent:
         name: Name in agent strings, rows and tables.
         include_frame: Whether the observations must contain the camera frames.
         reads_neuron: Whether its demands depend on the neuron.
+        config: Configuration of `BrakingEnv` that the agent requires.
         num_envs: Number of environments N.
         state: State by name, arrays of shape (N, …); see `initial`.
         alerts: Whether the agent warns, after the last `act`, bool, shape (N,); by default the alerts of the
@@ -99,6 +100,7 @@ class BatchAgent:
     name = "agent"
     include_frame = False
     reads_neuron = True
+    config: Config = {}  # noqa: RUF012  (never changed)
 
     def __init__(self) -> None:
         self._allocate(1)
@@ -245,6 +247,11 @@ class Agent:
     def neuron(self) -> "NeuronSpec":
         """Neuron parameters for the agent's own cameras; None for those of the paper."""
         return self.agent.neuron
+
+    @property
+    def config(self) -> Config:
+        """Configuration of `BrakingEnv` that the agent requires."""
+        return self.agent.config
 
     @property
     def alert(self) -> bool:

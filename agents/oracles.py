@@ -1,15 +1,77 @@
 """Oracles: agents on ground truth, as references without errors of perception."""
 
+from dataclasses import asdict
 from math import inf
 
 import numpy as np
 
-from lgmd_gym.agents.base import FPS, Infos, LatchingAgent, Observations, State
+from lgmd_gym.agents.base import (
+    BRAKE,
+    FPS,
+    HOLD,
+    BatchAgent,
+    Infos,
+    LatchingAgent,
+    Observations,
+    State,
+)
 from lgmd_gym.agents.zones import CAMERA_SETBACK, FULL_DECELERATION, stopping_distance
+from lgmd_gym.envs.forecast import ForecastParams
 from lgmd_gym.errors import check_positive
 
 TARGET_WIDTH = 1.712  # ISO 19206-3 [m]; `info` has no width
 DECISION_INTERVAL = 1 / FPS  # [s]
+RELEASE = 2.0  # [s] for which braking must be able to wait after a release
+
+
+class LastMomentOracle(BatchAgent):
+    """Brakes fully at the last moment at which the episode's brake avoids the contact: a bound of agents.
+
+    It reads the time to brake, which the engine decides by forks of the episode: what happens if the ego goes
+    on, and if it brakes fully after any number of decisions, with the delay, build-up and strength of the
+    episode's brake, see `lgmd_gym.envs.forecast`. It brakes when one more decision would be too late. A
+    contact that no braking avoids makes it brake where waiting begins to raise the impact speed: at once, or,
+    with oncoming cars, in time to stand still. It releases the brake when braking could wait for 2 s after
+    the release.
+
+    It knows the present motion of others, their paths, and the rest of what they have begun, such as the
+    deceleration of a lead car that brakes. With `foresight` it also knows what they will begin, and brakes
+    before the lead car does where its brake needs that.
+
+    Observes `info["ttb"]`, in an environment with the configuration `LastMomentOracle.config`.
+
+    Args:
+        share: Share of the full deceleration with which braking must avoid the contact, in (0, 1]. The
+            deceleration that is required reaches this share when it brakes, and it brakes fully. With 1, the
+            default, it brakes as late as possible: the forks are exact, so that a margin would avoid no more.
+        foresight: Whether it knows what others have not begun.
+    """
+
+    name = "last-moment-oracle"
+    reads_neuron = False
+
+    def __init__(self, share: float = 1.0, foresight: bool = False) -> None:
+        self.config = {"forecast": asdict(ForecastParams(share=share, foresight=foresight))}
+        super().__init__()
+
+    def initial(self) -> State:
+        """Return a released brake."""
+        return {"braking": False}
+
+    def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return `BRAKE` from the last moment on until the brake can be released, else `HOLD`.
+
+        Raises:
+            ValueError: If the environment does not forecast the time to brake.
+        """
+        if "ttb" not in infos:
+            raise ValueError(
+                f"{self.name} requires info['ttb']; make the environment with config={self.config}"
+            )
+        ttb = np.asarray(infos["ttb"], np.float64)
+        braking = (ttb < DECISION_INTERVAL / 2) | (self.state["braking"] & (ttb < RELEASE))
+        self.alerts = self.state["braking"] = braking
+        return np.where(braking, BRAKE, HOLD)
 
 
 class TTCOracle(LatchingAgent):

@@ -5,7 +5,13 @@ from typing import Any, TypeVar
 from lgmd_gym.agents.base import Agent, BatchAgent
 from lgmd_gym.agents.baselines import AlwaysBrake, NoBrake, RandomBrake
 from lgmd_gym.agents.image_rules import FlowDivergence, FrameDifference
-from lgmd_gym.agents.oracles import EtaOracle, StoppingDistanceOracle, TauOracle, TTCOracle
+from lgmd_gym.agents.oracles import (
+    EtaOracle,
+    LastMomentOracle,
+    StoppingDistanceOracle,
+    TauOracle,
+    TTCOracle,
+)
 from lgmd_gym.agents.policies.policy import Policy, shipped_policies
 from lgmd_gym.agents.rules import AdaptiveThreshold, DangerZone, Rule, SpikeThreshold, StoppingZone
 from lgmd_gym.agents.user_agents import check_options, make_user_agent, parse_agent
@@ -37,7 +43,7 @@ for _group in (
     (SpikeThreshold, AdaptiveThreshold),
     (DangerZone, StoppingZone),
     (FrameDifference, FlowDivergence),
-    (TTCOracle, StoppingDistanceOracle, EtaOracle, TauOracle),
+    (LastMomentOracle, TTCOracle, StoppingDistanceOracle, EtaOracle, TauOracle),
 ):
     for _agent in _group:
         register_agent(_agent)

@@ -13,6 +13,7 @@ from lgmd_gym.camera.scene import Scene
 from lgmd_gym.envs.base import EgoBrakeEnv
 from lgmd_gym.envs.episode_source import EpisodeSource, FixedScenario
 from lgmd_gym.envs.families.scenario import Scenario
+from lgmd_gym.envs.forecast import ForecastParams
 from lgmd_gym.envs.highway.road import BrakingRoad, EgoCar
 from lgmd_gym.envs.info import INFO_KEYS
 from lgmd_gym.envs.reward import RewardParams
@@ -92,6 +93,7 @@ class BrakingEnv(EgoBrakeEnv):
     | `impact_speed` | ego speed at contact [m/s] | no contact |
     | `relative_impact_speed` | the same minus the other's speed along the ego's heading [m/s] | no contact |
     | `world` | number of the world, −1 for the laboratory | |
+    | `ttb` | time to brake, for which full braking can wait [s]; only with `forecast` | no contact ahead |
     | `level` | number of the level; only with random levels | |
     | `condition` | name of the weather; only with random levels | |
 
@@ -101,8 +103,9 @@ class BrakingEnv(EgoBrakeEnv):
         scenario: The scenario, or a source of scenarios.
         config: highway-env's configuration keys; the fields of `BrakeParams`, which take precedence over a
             brake that the source draws; `throttle`, whether demands above 0 have an effect (False); `action`,
-            see Action Space; `reward`, fields of `RewardParams`. Defaults of `simulation_frequency` and
-            `policy_frequency`: 60 and 30 Hz.
+            see Action Space; `reward`, fields of `RewardParams`; `forecast`, fields of `ForecastParams`, none
+            of which is for no `info["ttb"]`. Defaults of `simulation_frequency` and `policy_frequency`: 60
+            and 30 Hz.
         render_mode: None, "rgb_array" or "human" (highway-env's top view).
 
     Raises:
@@ -145,6 +148,7 @@ class BrakingEnv(EgoBrakeEnv):
             "action": {"type": "ContinuousDemand"},
             "simulation_frequency": 60,
             "throttle": False,
+            "forecast": {},
             "reward": asdict(RewardParams()),
         }
 
@@ -159,6 +163,9 @@ class BrakingEnv(EgoBrakeEnv):
         check_keys("key of config['reward']", reward, self.config["reward"])
         reward = {**self.config["reward"], **reward}
         weights = RewardParams(**reward)
+        forecast = check_mapping("forecast", config.get("forecast"))
+        check_keys("key of config['forecast']", forecast, asdict(ForecastParams()))
+        ForecastParams(**forecast)  # raises an error for a value out of range
         super().configure(config)
         self.config["reward"], self.weights = reward, weights.record()
         before, self.simulation = vars(self).get("simulation"), self.make_simulation(1)
@@ -170,7 +177,8 @@ class BrakingEnv(EgoBrakeEnv):
         """Return a simulation of environments with this configuration; see `Simulation`."""
         config = self.config
         rates = Rates(simulation=config["simulation_frequency"], policy=config["policy_frequency"])
-        return Simulation(num_envs, rates, self.weights, config["throttle"], threads)
+        forecast = ForecastParams(**config["forecast"]) if config["forecast"] else None
+        return Simulation(num_envs, rates, self.weights, config["throttle"], threads, forecast)
 
     def attach_sensors(self, sensors: Sensors, camera_hz: float) -> None:
         """Draw and process the frames of cameras inside the steps, from the next reset on.
@@ -246,4 +254,7 @@ class BrakingEnv(EgoBrakeEnv):
 
     def _info(self, obs: object, action: object = None) -> Info:
         values = self.simulation.outcome.infos[0].tolist()
-        return dict(zip(INFO_KEYS, values, strict=True)) | self._episode_info
+        info = dict(zip(INFO_KEYS, values, strict=True)) | self._episode_info
+        if self.simulation.forecasts is not None:
+            info["ttb"] = float(self.simulation.forecasts["ttb"][0])
+        return info

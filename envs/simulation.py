@@ -20,7 +20,8 @@ from lgmd_gym.envs.decisions import (
     start_episodes,
 )
 from lgmd_gym.envs.dynamics.brake import BRAKE, BrakeParams
-from lgmd_gym.envs.dynamics.episode import Arrays
+from lgmd_gym.envs.dynamics.episode import Arrays, Physics
+from lgmd_gym.envs.forecast import FORECAST, UNKNOWN, ForecastParams, write_forecasts
 from lgmd_gym.envs.physics_state import PhysicsState, Placement
 from lgmd_gym.envs.reward import REWARD
 from lgmd_gym.envs.scene import SceneArrays
@@ -95,6 +96,7 @@ class Simulation:
         weights: `REWARD` record of all environments.
         throttle: Whether demands above 0 have an effect.
         threads: Number of threads that share the environments of a step, including the calling one.
+        forecast: How times to brake are forecast; None for no forecast.
 
     Attributes:
         state: State of the episodes.
@@ -102,6 +104,7 @@ class Simulation:
         weights: `REWARD` records, shape (N,).
         outcome: Results of the last step or start of each environment.
         clock: Progress of the decisions.
+        forecasts: `FORECAST` records, shape (N,); None without a forecast.
         physics: The fields of `Physics`.
         sensors: Cameras and neurons of the environments; None for physics only.
         stride: Simulation steps per camera frame.
@@ -117,7 +120,13 @@ class Simulation:
     show: "Callable[[int], gym.Env] | None" = None
 
     def __init__(
-        self, num_envs: int, rates: Rates, weights: np.ndarray, throttle: bool, threads: int = 1
+        self,
+        num_envs: int,
+        rates: Rates,
+        weights: np.ndarray,
+        throttle: bool,
+        threads: int = 1,
+        forecast: ForecastParams | None = None,
     ) -> None:
         self.num_envs, self.rates = num_envs, rates
         self.state = PhysicsState(num_envs)
@@ -126,6 +135,8 @@ class Simulation:
         self.weights[:] = weights
         self.clock, self.outcome = make_clock(num_envs), make_outcome(num_envs)
         self._threads = Threads(threads)
+        self._forecast = forecast
+        self.forecasts = None if forecast is None else np.zeros(num_envs, FORECAST)
         self._link()
         self._link_scenes()
 
@@ -177,6 +188,9 @@ class Simulation:
     def start(self, selected: np.ndarray) -> None:
         """Start the loaded episodes of the selected environments, bool, shape (N,), with a first frame."""
         start_episodes(0, self.num_envs, selected, self.physics, self._clock, self._results)
+        if self.forecasts is not None:
+            self.forecasts["begun"][selected] = UNKNOWN
+            self._run(self._forecast_part, selected)
         self.show_frames(selected)
 
     def show_frames(self, selected: np.ndarray) -> None:
@@ -203,6 +217,8 @@ class Simulation:
         self.clock.demands[:] = demands
         self.clock.remaining[:] = np.where(active, 0, -1)
         self._run(self._step_part, rendering, on_step)
+        if self.forecasts is not None:
+            self._run(self._forecast_part, active)
 
     def ego_states(self, out: np.ndarray | None = None) -> np.ndarray:
         """Ego speeds [m/s], accelerations [m/s²] and yaw rates [rad/s, + right], float32, shape (N, 3).
@@ -266,6 +282,22 @@ class Simulation:
                 on_step()
         finish_decisions(first, last, rates.policy, physics, clock, self._results)
 
+    def _forecast_part(self, first: int, last: int, selected: np.ndarray) -> None:
+        forecast, rates = self._forecast, self.rates
+        assert forecast is not None
+        write_forecasts(
+            first,
+            last,
+            selected,
+            rates.steps,
+            float(rates.simulation),
+            forecast.share,
+            forecast.foresight,
+            self.physics,
+            self._fork,
+            self.forecasts,
+        )
+
     def _process(self, first: int, last: int, due: np.ndarray) -> None:
         if self.sensors is None:
             return
@@ -278,7 +310,10 @@ class Simulation:
 
     def _link(self) -> None:
         """Collect the arrays; plain tuples are cheaper to pass to compiled functions."""
-        self.physics: Arrays = tuple(make_physics(self.state, self.brakes, self.weights))
+        physics = make_physics(self.state, self.brakes, self.weights)
+        self.physics: Arrays = tuple(physics)
+        if self._forecast is not None:
+            self._fork: Arrays = tuple(_fork_of(physics))
         self._clock: Arrays = tuple(self.clock)
         self._results: Arrays = tuple(self.outcome)
 
@@ -294,3 +329,9 @@ class Simulation:
             else SceneArrays(sensors.scenes, sensors.objects, sensors.object_counts)
         )
         self._scenes: Arrays = tuple(scenes)
+
+
+def _fork_of(physics: Physics) -> Physics:
+    """Return the arrays of forks: copies of what a step changes, and the same arrays otherwise."""
+    changed = ("bodies", "episodes", "egos", "lines", "pending")
+    return physics._replace(**{name: getattr(physics, name).copy() for name in changed})

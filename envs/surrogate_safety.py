@@ -72,9 +72,24 @@ def contact_time(bodies: np.ndarray, count: int, paths: np.ndarray) -> float:
 
 @kernel(exact=True)
 def is_approached(bodies: np.ndarray, count: int, paths: np.ndarray) -> bool:
-    """Return whether a car or motorcycle touches the ego within 10 s if the ego stands and others keep speed.
+    """Return whether a car or motorcycle touches the ego within 10 s; see `approaching`."""
+    return approaching(bodies, count, paths, TTC_HORIZON) > 0
 
-    Pedestrians and bicycles do not count: they stop in front of a standing car. Arguments: see `lead_of`.
+
+@kernel(exact=True)
+def approaching(bodies: np.ndarray, count: int, paths: np.ndarray, horizon: float) -> int:
+    """Return the index of a car or motorcycle that touches the ego if the ego stands and others keep speed.
+
+    Pedestrians and bicycles do not count: they stop in front of a standing car.
+
+    Args:
+        bodies: See `lead_of`.
+        count: See `lead_of`.
+        paths: See `lead_of`.
+        horizon: Time within which the contact counts [s].
+
+    Returns:
+        The index of the body, 0 for none.
     """
     ego = bodies[0]
     standing = PathMotion(
@@ -84,9 +99,9 @@ def is_approached(bodies: np.ndarray, count: int, paths: np.ndarray) -> bool:
         body = bodies[i]
         if body.speed == 0.0 or (body.kind != CAR and body.kind != MOTORCYCLE):
             continue
-        if time_on_paths(standing, _motion(body, paths), TTC_HORIZON, TTC_STEP) < inf:
-            return True
-    return False
+        if time_on_paths(standing, _motion(body, paths), horizon, TTC_STEP) < inf:
+            return i
+    return 0
 
 
 @kernel(exact=True)

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 
 from lgmd_gym.agents.base import Driver
-from lgmd_gym.aliases import Info, Values
+from lgmd_gym.aliases import Arguments, Config, Info, Values
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs import env_id
@@ -66,6 +66,13 @@ class Episode:
             reward_sum=reward_sum,
             world=None if world < 0 else world,
         )
+
+
+def with_config(arguments: Mapping[str, Any], config: Config) -> Arguments:
+    """Return arguments of an environment with further keys of its configuration."""
+    if not config:
+        return dict(arguments)
+    return {**arguments, "config": {**(arguments.get("config") or {}), **config}}
 
 
 def make_env(case: Case, sensor_config: SensorConfig, arguments: Mapping[str, Any] | None = None) -> gym.Env:

@@ -10,7 +10,7 @@ from lgmd_gym.agents import BatchAgent, make_agent
 from lgmd_gym.agents.base import InfoArrays
 from lgmd_gym.aliases import Arguments, Values
 from lgmd_gym.benchmark.case import key_of
-from lgmd_gym.benchmark.episode import Episode
+from lgmd_gym.benchmark.episode import Episode, with_config
 from lgmd_gym.benchmark.fcw_driver import FCWDriver
 from lgmd_gym.benchmark.recorder import SeriesRecorder
 from lgmd_gym.benchmark.task import Result, Task, error_result, make_result
@@ -71,7 +71,8 @@ class BatchPlayer:
     def __init__(
         self, task: Task, num_envs: int, agent: BatchAgent | None = None, *, by_channel: bool = False
     ) -> None:
-        agent, arguments = agent or make_agent(task.agent).agent, task.arguments
+        agent = agent or make_agent(task.agent).agent
+        arguments = with_config(task.arguments, agent.config)
         self._sensor_config = task.sensor_config.for_agent(agent)
         source = make_source(task.case.environment, _scenario_arguments(arguments))
         config, fps = arguments.get("config"), arguments.get("fps")

@@ -148,6 +148,8 @@ class BrakingBatch:
         """Return the present infos without traces, arrays of shape (N,); the next step may overwrite them."""
         infos = self.simulation.outcome.infos
         arrays: dict[str, np.ndarray] = {key: infos[key] for key in INFO_KEYS} | self._constants
+        if self.simulation.forecasts is not None:
+            arrays["ttb"] = self.simulation.forecasts["ttb"]
         return arrays if self._assembly is None else arrays | self._assembly.infos()
 
     def take_trace(self) -> list[TraceFrame]:

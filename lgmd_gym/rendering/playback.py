@@ -14,6 +14,7 @@ import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents import Agent
 from lgmd_gym.aliases import Arguments
 from lgmd_gym.benchmark.case import TRAFFIC_SUITES, Case
+from lgmd_gym.benchmark.episode import with_config
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.clips import VideoWriter
@@ -121,7 +122,8 @@ def play_episode(
     checked_overlays(overlays)
     sensors = (sensors or SensorConfig()).for_agent(agent)
     with ExitStack() as stack:
-        env = make_target(target, arguments, **sensors.arguments, **(surroundings or {}))
+        options = with_config({**sensors.arguments, **(surroundings or {})}, agent.config)
+        env = make_target(target, arguments, **options)
         stack.callback(env.close)
         if video is None and not live:
             return _play(env, agent, seed, lambda: True, progress)

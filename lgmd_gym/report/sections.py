@@ -20,7 +20,7 @@ from lgmd_gym.benchmark.analysis.compare import Comparison, change_text, compare
 from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, froc_figure, load_traces, write_froc
 from lgmd_gym.benchmark.case import Row, Suite, case_order, key_of, relative_impact
 from lgmd_gym.benchmark.config import RunConfig
-from lgmd_gym.benchmark.episode import make_env, rollout
+from lgmd_gym.benchmark.episode import make_env, rollout, with_config
 from lgmd_gym.benchmark.metrics import brake_onset
 from lgmd_gym.benchmark.run_folder import read_run, read_series, read_settings, series_name
 from lgmd_gym.benchmark.suites import get_suite
@@ -80,7 +80,8 @@ def capture_frames(task: Task, decisions: Mapping[str, int]) -> list[CapturedFra
         decisions: Index of the decision of each frame, by caption.
     """
     actor = make_agent(task.agent)
-    env = make_env(task.case, task.sensor_config.for_agent(actor), task.arguments)
+    arguments = with_config(task.arguments, actor.config)
+    env = make_env(task.case, task.sensor_config.for_agent(actor), arguments)
     frames, last = list[CapturedFrame](), max(decisions.values())
     try:
         for decision, (step, _) in enumerate(rollout(env, actor, task.seed)):

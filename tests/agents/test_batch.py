@@ -48,6 +48,7 @@ def random_step(rng, agent):
         "gap": np.where(rng.random(NUM_ENVS) < 0.2, np.inf, rng.uniform(10.0, 900.0, NUM_ENVS)),
         "ego_speed": speeds,
         "target_speed": rng.uniform(0.0, 30.0, NUM_ENVS),
+        "ttb": np.where(rng.random(NUM_ENVS) < 0.2, 0.0, rng.uniform(0.1, 4.0, NUM_ENVS)),
     }
     return observations, infos
 

@@ -19,7 +19,11 @@ SLOW_SUITES = (
     *("ncap2023", "ncap2023-vru", "ncap2026", "ncap2026-extended", "random", "speeds"),
     *WITHOUT_TARGET,
 )
-NO_THREAT_SUITES = ("false-reaction", "near-miss", "nhtsa-false-activation", *WITHOUT_TARGET)
+NO_THREAT_SUITES = (
+    *("false-reaction", "near-miss", "nhtsa-false-activation", "everyday-neighbours"),
+    *WITHOUT_TARGET,
+)
+OTHER_BOUND = ("everyday-threats",)  # where 2 s to contact do not suffice, see test_everyday.py
 UNAVOIDABLE = ("CCFhos", "CCFhol")  # by braking: the oncoming car does not stop
 
 
@@ -61,7 +65,8 @@ def violations(case):
     """Return the expectations on the bounding agents that a case does not meet."""
     rows = bounding_rows(case)
     never, always, oracle = rows["no-brake"], rows["always-brake"], rows["ttc-oracle"]
-    threat = LEVELS[case.scenario.family].threat and case.suite not in WITHOUT_TARGET
+    level = case.family if case.family in LEVELS else case.scenario.family
+    threat = LEVELS[level].threat and case.suite not in WITHOUT_TARGET
     avoidable = not threat or case.scenario.family not in UNAVOIDABLE
     fault = "premature_brake" if threat else "false_activation"
     expectations = {
@@ -94,7 +99,11 @@ def test_arguments_of_a_case():
 
 @pytest.mark.parametrize(
     "suite",
-    [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW_SUITES else []) for name in SUITES],
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if name in SLOW_SUITES else [])
+        for name in SUITES
+        if name not in OTHER_BOUND
+    ],
 )
 def test_bounding_agents_in_every_case(suite):
     assert [line for case in SUITES[suite].cases for line in violations(case)] == []

@@ -31,7 +31,7 @@ def make_step(*frequencies, trace=False, cameras=1, potential=0.5, speed=8.0, ya
         "ego_yaw_rate": np.array([yaw_rate], np.float32),
         "frame": np.zeros((90, 160, cameras), np.uint8),
     }
-    keys = ("ttc", "gap", "target_speed", "ego_speed")
+    keys = ("ttc", "ttb", "gap", "target_speed", "ego_speed")
     info = {"lgmd/alert": frequencies[-1] >= 30} | dict.fromkeys(keys, float("inf")) | truth
     if trace:
         potentials = observation["membrane_potential"]
