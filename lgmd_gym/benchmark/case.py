@@ -35,7 +35,8 @@ class Case:
 
     Attributes:
         suite: Name of the suite.
-        family: Scenario family, such as "CCRs"; for traffic, the kind of traffic.
+        family: Scenario family, such as "CCRs", or the name of its random levels, such as "LowBox"; for
+            traffic, the kind of traffic.
         variant: What distinguishes the case in its family; with suite and family its name.
         arguments: Keyword arguments of the environment, in SI units.
         environment: The name in the id `LGMD/<environment>-v0`; empty for the family. "Scenario" for a given

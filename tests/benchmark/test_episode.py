@@ -16,6 +16,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.suites import SUITES, find_case, find_suite
 from lgmd_gym.benchmark.task import Task
 from lgmd_gym.camera import Camera
+from lgmd_gym.envs.families import LEVELS
 from lgmd_gym.sensing.channel import Channel
 
 SLOW_APPROACH = Case("test", "CCRs", "v20", (("ego_speed", 5.556),))
@@ -52,7 +53,9 @@ def test_suite_cases_have_distinct_names_and_valid_scenarios():
         names = [case.name for case in suite.cases]
         offenders += [name for name in set(names) if names.count(name) > 1]
         for case in suite.cases:
-            valid = case.suite == suite.name and f"/{case.scenario.family}/" in case.name
+            family = LEVELS[case.family].family if case.family in LEVELS else case.family
+            valid = case.suite == suite.name and f"/{case.family}/" in case.name
+            valid = valid and family == case.scenario.family
             if f"/{case.family}/v" in case.name:
                 valid = valid and f"/v{case.scenario.ego_speed * 3.6:.0f}" in case.name
             if not valid or find_case(case.name) != case:
