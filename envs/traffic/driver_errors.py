@@ -10,9 +10,9 @@ from highway_env.road.road import Road
 
 from lgmd_gym.envs.attention import Attention
 from lgmd_gym.envs.traffic.cars import TrafficCar, TrafficEgo
+from lgmd_gym.envs.traffic.kernels import MAX_ACCELERATION
 
 LIFTED = -1.0  # [m/s²], deceleration without braking, after the throttle is lifted
-CLOSE = (0.4, 1.0)  # [s], IDM's time headway of the car behind the ego, the lower half of `HEADWAYS`
 FASTER = 1.2  # target speed of the car behind the ego over that of the ego
 BEYOND = 60.0  # [s] by which the windows extend beyond the duration of the episode
 
@@ -31,7 +31,7 @@ def add_follower(road: Road, ego: TrafficEgo, rng: np.random.Generator) -> None:
     # The other traffic keeps its draws.
     shared, road.np_random = road.np_random, rng  # type: ignore[assignment]
     car = TrafficCar(road, ego.position, ego.heading, ego.speed, enable_lane_change=False)
-    road.np_random, car.TIME_WANTED = shared, float(rng.uniform(*CLOSE))
+    road.np_random = shared
     along = ego.lane.local_coordinates(ego.position)[0]
     distance = car.DISTANCE_WANTED + car.TIME_WANTED * ego.speed
     _, behind = road.neighbour_vehicles(ego)
@@ -139,7 +139,9 @@ class DriverErrors:
         may_accelerate = 0.0 < ego.speed < speed_limit
         return self._held if may_accelerate else min(self._held, 0.0)
 
-    def change_others(self, cars: np.ndarray, vehicles: list[TrafficCar], ahead: int, behind: int) -> None:
+    def change_others(
+        self, cars: np.ndarray, vehicles: list[TrafficCar], ahead: int, behind: int, full: float
+    ) -> None:
         """Change the accelerations of the cars ahead of the ego and behind it.
 
         Args:
@@ -147,6 +149,7 @@ class DriverErrors:
             vehicles: The cars of the first records.
             ahead: Index of the first record ahead of the ego in its lane; −1 for none.
             behind: Index of the first one behind it; −1 for none.
+            full: Full braking of the car behind, that of the ego [m/s²].
         """
         window = _window_at(self.brakings, self.time)
         if window is None:
@@ -157,9 +160,10 @@ class DriverErrors:
             index = vehicles.index(self._lead[1])
             deceleration = self._lead[0].deceleration
             cars["acceleration"][index] = min(cars["acceleration"][index], -deceleration)
-        self._react_late(cars, _car(vehicles, behind), behind)
+        if self.attention.reaction_time > 0.0:
+            self._react_late(cars, _car(vehicles, behind), behind, full)
 
-    def _react_late(self, cars: np.ndarray, follower: TrafficCar | None, index: int) -> None:
+    def _react_late(self, cars: np.ndarray, follower: TrafficCar | None, index: int, full: float) -> None:
         """Limit the deceleration of the car behind the ego until its driver has reacted."""
         if follower is not self._follower:
             self._follower, self._waited = follower, 0
@@ -168,6 +172,8 @@ class DriverErrors:
             return
         if self._waited * self._dt < self.attention.reaction_time - 1e-9:
             cars["acceleration"][index] = LIFTED
+        elif cars["acceleration"][index] <= -MAX_ACCELERATION:  # IDM requires at least this limit
+            cars["acceleration"][index] = -max(full, MAX_ACCELERATION)
         self._waited += 1
 
 

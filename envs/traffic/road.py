@@ -119,7 +119,8 @@ class TrafficRoad(RegulatedRoad):
             limit, given = float(table.records["speed_limit"][lane]), float(record["acceleration"])
             record["acceleration"] = self.errors.hold(ego, limit, given)
             ahead, behind = neighbours(cars, own, lane, table.records, pieces, table.offsets, along, across)
-            self.errors.change_others(cars, self.cars, ahead, behind)
+            full = ego.brake.max_deceleration
+            self.errors.change_others(cars, self.cars, ahead, behind, full)
         ego.action = {"steering": float(record["steering"]), "acceleration": float(record["acceleration"])}
         ego.driver_acceleration = max(ego.action["acceleration"], -ego.brake.max_deceleration)
 

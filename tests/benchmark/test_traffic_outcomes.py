@@ -110,6 +110,15 @@ def test_a_contact_without_a_brake_after_an_early_tap_or_a_late_brake_is_not_avo
     assert len(row["activations"]) == brakes
 
 
+def test_a_contact_that_vanishes_because_of_earlier_braking_is_neither_avoided_nor_missed():
+    _, row = play("following", Pulses((0.0, 2.5)))
+    assert row["avoidable"]
+    assert not row["collision"]
+    assert row["avoided"] is True
+    assert row["avoided_by_brake"] is None
+    assert row["needless_activations"] == 1
+
+
 def test_rear_end_contact_of_the_follower_is_caused_by_the_brake():
     _, row = play("followed", Pulses((2.0, 4.0)))
     assert (row["threat"], row["avoidable"], row["avoided_by_brake"]) == (False, None, None)

@@ -167,7 +167,7 @@ def late(env, decelerations, **fields):
     found = []
     for value in decelerations:
         cars["acceleration"][1] = value
-        errors.change_others(cars, env.road.vehicles, -1, 1)
+        errors.change_others(cars, env.road.vehicles, -1, 1, 8.5)
         found.append(float(cars["acceleration"][1]))
         errors.steps += 1
     return found
@@ -179,6 +179,7 @@ def test_the_follower_lifts_the_throttle_and_brakes_after_the_reaction_time():
     decided = [-0.5] * 2 + [-4.0] * 20 + [-1.0] + [-5.0] * 3
     expected = [-0.5] * 2 + [-1.0] * 15 + [-4.0] * 5 + [-1.0] + [-1.0] * 3
     assert late(env, decided, reaction_time=0.5) == expected
+    assert late(env, [-5.99] * 4 + [-6.0] * 2, reaction_time=0.1) == [-1.0] * 3 + [-5.99] + [-8.5] * 2
     assert late(env, decided) == decided
     env.lead.crashed = True
     assert late(env, decided, reaction_time=0.5) == decided
@@ -195,7 +196,7 @@ def test_a_car_starts_behind_the_ego_at_the_distance_of_its_driver():
         car.position.tolist() for car in plain.road.vehicles
     ]
     assert env.np_random.bit_generator.state["state"] == plain.np_random.bit_generator.state["state"]
-    assert 0.4 <= follower.TIME_WANTED <= 1.0
+    assert 0.4 <= follower.TIME_WANTED <= 1.5
     assert follower.lane_index == env.ego.lane_index
     assert follower.speed == env.ego.speed
     distance = env.ego.position[0] - follower.position[0]

@@ -5,7 +5,7 @@
 import copy
 from collections.abc import Callable
 
-from lgmd_gym.agents import BRAKE, to_action
+from lgmd_gym.agents import BRAKE, HOLD, to_action
 from lgmd_gym.envs.traffic.emergencies import Emergencies
 from lgmd_gym.envs.traffic.env import TrafficEnv
 
@@ -84,15 +84,18 @@ def branch_from(env: TrafficEnv, decision: int) -> Branch:
     return Branch(decision, *values, contact, lambda: twin, env.config["policy_frequency"])
 
 
-def avoids(env: TrafficEnv, decisions: int) -> bool:
+def avoids(env: TrafficEnv, decisions: int, released: int | None = None) -> bool:
     """Return whether full braking from now on avoids a contact of the ego.
 
     Args:
         env: The environment; it is stepped.
         decisions: Number of simulated decisions.
+        released: Number of decisions after which the brake is released; None for never.
     """
     env.action_type.act(to_action(BRAKE))
-    for _ in range(decisions):
+    for decision in range(decisions):
+        if decision == released:
+            env.action_type.act(to_action(HOLD))
         env.step_unobserved()
         if env.road.contact is not None:
             return False

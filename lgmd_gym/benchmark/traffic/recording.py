@@ -5,18 +5,18 @@ from functools import cached_property
 from typing import Any
 
 from lgmd_gym.aliases import Config
+from lgmd_gym.benchmark.metrics import PREMATURE
 from lgmd_gym.benchmark.traffic.branch import Branch, avoids, fork
 from lgmd_gym.benchmark.traffic.reader import Moment, SceneReader
 from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.attention import Attention
 from lgmd_gym.envs.registration import make_traffic
-from lgmd_gym.envs.surrogate_safety import PREDICTION
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, EMERGENCY_SHARE, HORIZON, Emergencies
 from lgmd_gym.envs.traffic.env import JAM_SPEED, TrafficEnv
 from lgmd_gym.sensing.sensor_array import SensorArray
 
-LOOK_BACK = HORIZON + PREDICTION  # [s], earliest needed brake before a contact
-LOOK_BACK_STEP = 0.2  # [s] between two of the moments from which full braking is tried
+TRIED_STEP = 0.2  # [s] between two of the moments from which full braking is tried, up to `PREMATURE`
+TRIED_LENGTHS = (1.0, 2.0, None)  # [s], lengths of the tried braking; None for a stop
 SNAPSHOT_EVERY = 300  # decisions between two snapshots; one snapshot takes as long as about 10 decisions
 
 
@@ -87,15 +87,16 @@ class TrafficRecording:
     def avoidable(self) -> bool | None:
         """Whether full braking avoids the contact without the agent; None without contact.
 
-        It is tried every `LOOK_BACK_STEP` from `LOOK_BACK` before the contact on, and avoids it if no contact
-        follows up to `HORIZON` after its time. A contact of an ego that stands is not avoidable.
+        It is tried every `TRIED_STEP` in the last `PREMATURE` before the contact, each of `TRIED_LENGTHS`,
+        and avoids it if no contact follows up to `HORIZON` after its time. A contact of an ego that stands is
+        not avoidable.
         """
         if self.contact is None:
             return None
         if self.moments[-1].info["impact_speed"] < JAM_SPEED:
             return False
-        step = round(LOOK_BACK_STEP * self.policy_hz)
-        onsets = range(max(self.contact - round(LOOK_BACK * self.policy_hz), 0), self.contact, step)
+        step = round(TRIED_STEP * self.policy_hz)
+        onsets = range(max(self.contact - round(PREMATURE * self.policy_hz), 0), self.contact, step)
         env = self.fork(onsets[0])
         forks = [fork(env)]
         for _ in onsets[1:]:
@@ -103,8 +104,12 @@ class TrafficRecording:
                 env.step_unobserved()
             forks.append(fork(env))
         end = self._horizon_after(self.contact)
-        pairs = zip(reversed(forks), reversed(onsets), strict=True)
-        return any(avoids(env, end - onset) for env, onset in pairs)
+        lengths = [None if length is None else round(length * self.policy_hz) for length in TRIED_LENGTHS]
+        return any(
+            avoids(fork(env), end - onset, length)
+            for env, onset in reversed(list(zip(forks, onsets, strict=True)))
+            for length in lengths
+        )
 
     def fork(self, decision: int) -> TrafficEnv:
         """Return an environment in the exact state of a decision.

@@ -8,9 +8,11 @@ from lgmd_gym.benchmark.case import ID_KEYS, EpisodeRow
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.metrics import NUISANCE
 from lgmd_gym.benchmark.traffic.branch import Branch
-from lgmd_gym.benchmark.traffic.recording import LOOK_BACK, TrafficRecording
+from lgmd_gym.benchmark.traffic.recording import TrafficRecording
+from lgmd_gym.envs.surrogate_safety import PREDICTION
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON
 
+LOOK_AHEAD = HORIZON + PREDICTION  # [s], latest contact that a needed brake can have been for
 AFTERMATH = 5.0  # [s] after its last demand or standstill in which a braking event can cause a contact
 
 
@@ -76,7 +78,7 @@ class BrakingEvent:
     last: float  # time of the last demand, or of the standstill [s]
     peak: float = 0.0  # highest deceleration beyond the driver's [m/s²]
     needed: bool = False  # whether it is needed by the emergencies that are scaled to the brake
-    contact: float | None = None  # time of the contact without it, up to `LOOK_BACK` after its start [s]
+    contact: float | None = None  # time of the contact without it, up to `LOOK_AHEAD` after its start [s]
     speed_lost: float = 0.0  # largest difference of the speeds without and with it [m/s]
 
     @property
@@ -106,7 +108,7 @@ class BrakingEvent:
         hz = recording.policy_hz
         time, horizon = decision / hz, decision + round(HORIZON * hz)
         needed = without.emergencies(horizon, recording.scaled_emergency).time_until(time) is not None
-        contact = without.contact(decision + round(LOOK_BACK * hz)) if needed else None
+        contact = without.contact(decision + round(LOOK_AHEAD * hz)) if needed else None
         return cls(
             time,
             without.emergencies(horizon, EMERGENCY).time_until(time),
@@ -128,18 +130,22 @@ class EpisodeLog:
     peak: float = 0.0  # highest deceleration beyond the driver's [m/s²]
     caused: bool = False  # whether a braking event caused the contact at the end
 
-    def avoided_by_brake(self, time: float) -> bool:
+    def avoided_by_brake(self, time: float) -> bool | None:
         """Return whether a needed braking event avoided the contact that occurs without the agent.
-
-        The event begins before that contact and would itself be followed by one without it, and the drive has
-        none up to `HORIZON` after the time.
 
         Args:
             time: Time of the contact without the agent [s].
+
+        Returns:
+            True if a needed event begins before that contact and would itself be followed by one without it,
+            and the drive has none up to `HORIZON` after the time. False if the drive has a contact until then
+            that no braking caused. None if there is neither: earlier braking has changed the traffic.
         """
         assert self.end is not None
-        passed = not self.end.info["collision"] or self.duration > time + HORIZON
-        return passed and any(event.contact is not None and event.start <= time for event in self.events)
+        if not self.end.info["collision"] or self.duration > time + HORIZON:
+            needed = any(event.contact is not None and event.start <= time for event in self.events)
+            return True if needed else None
+        return None if self.caused else False
 
 
 def measure(recording: TrafficRecording, log: EpisodeLog) -> Values:

@@ -42,6 +42,7 @@ COLUMNS = (
     "scaled_needed_share",
     "speed_lost_per_100km",
     "avoidable",
+    "avoidable_met",
     "avoided_by_brake",
     "unavoidable",
     "caused",
@@ -72,7 +73,10 @@ class TrafficSummary(NamedTuple):
     needless_bounds: tuple[float, float]
     scaled_needed: float
     speed_lost: float  # sum of the speeds lost in braking events that are not needed in this sense [m/s]
-    avoided_by_brake: Rate  # episodes with a contact that full braking avoids: whether a needed brake did
+    avoided_by_brake: (
+        Rate  # contacts that full braking avoids, unless they vanish: whether a needed brake did
+    )
+    avoidable: int  # number of episodes with such a contact
     unavoidable: int  # number of episodes with contact without braking that full braking does not avoid
     caused: int  # number of contacts that the agent's braking caused
     standing: int  # number of contacts of an ego that stands
@@ -132,7 +136,10 @@ def summarise_traffic(agent: str, kind: str, rows: Sequence[TrafficRow]) -> Traf
         needless_bounds=count_interval(needless, distances, *cases_and_worlds(played)),
         scaled_needed=sum(row["scaled_needed_time"] for row in played),
         speed_lost=sum(row["speed_lost"] for row in played),
-        avoided_by_brake=rate_of([row for row in played if row["avoidable"]], "avoided_by_brake"),
+        avoided_by_brake=rate_of(
+            [row for row in played if row["avoided_by_brake"] is not None], "avoided_by_brake"
+        ),
+        avoidable=sum(row["avoidable"] is True for row in played),
         unavoidable=sum(row["avoidable"] is False for row in played),
         caused=sum(row["caused"] for row in played),
         standing=sum(row["collision"] and (row["impact_speed"] or 0.0) < JAM_SPEED for row in played),
@@ -187,6 +194,7 @@ def _line(item: TrafficSummary, condition: str) -> list[object]:
         *rates(item.needless, *item.needless_bounds),
         "" if item.scaled_needed_share is None else f"{item.scaled_needed_share:.4f}",
         *rates(item.speed_lost),
+        item.avoidable,
         item.avoided_by_brake.n,
         item.avoided_by_brake.k,
         item.unavoidable,
