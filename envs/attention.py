@@ -13,7 +13,7 @@ emergency brake. An `Attention` adds the errors that precede most rear-end conta
   a stronger deceleration has been required for the reaction time; then the car brakes, if required as hard as
   the ego's brake can. 1 s is between the 0.7 s of expected and the 1.25 s of surprising brake lights (Green
   2000, Transportation Human Factors 2, 195-216). A car that keeps its lane starts behind the ego, where
-  there is room. With these values it drives into the ego in about 7 % of full stops from motorway speed.
+  there is room. With these values it drives into the ego in a quarter of its full stops from motorway speed.
 
 The windows are drawn when the episode begins, from a random generator that nothing else uses. They depend on
 the seed alone: they are the same whatever an agent does, and for every duration of the episode. They are more

@@ -49,6 +49,7 @@ from lgmd_gym.report.sections import (
     illustrated_agent,
 )
 from lgmd_gym.report.svg import DARK_CSS, legend_mark, to_text
+from lgmd_gym.report.traffic import write_traffic_report
 from lgmd_gym.statistics.intervals import Rate
 
 BANDS = ("red", "brown", "orange", "yellow", "green")
@@ -148,10 +149,9 @@ def _saved(data: ReportData, figure: ReportFigure | None) -> ReportFigure | None
 
 
 def write_outputs(path: Path, plots: bool = True, report: bool = True, trust: bool = False) -> list[Path]:
-    """Write episodes.csv and summary.csv into a run folder, and for a suite of cases its plots and report.
+    """Write episodes.csv and summary.csv into a run folder, and its report.html with figures/.
 
-    A suite of cases also gets plots/, froc.csv, figures/ and report.html. Files of an earlier call are
-    replaced.
+    A suite of cases also gets plots/ and froc.csv. Files of an earlier call are replaced.
 
     The folder is locked meanwhile: an older state of the run does not replace the outputs of a newer one.
 
@@ -183,7 +183,7 @@ def _write(path: Path, plots: bool, report: bool, trust: bool) -> list[Path]:
     write_episodes(rows, files[0])
     if is_traffic(config.suite):
         write_traffic_summary(rows, files[1])
-        return files
+        return [*files, write_traffic_report(path)] if report else files
     write_summary(rows, files[1])
     if plots:
         files += _plot_cases(path, config)
