@@ -11,6 +11,7 @@ from support.traffic import Recorded
 from lgmd_gym.agents import BRAKE, HOLD, make_agent, to_action
 from lgmd_gym.benchmark.episode import Step, rollout
 from lgmd_gym.benchmark.sensors import SensorConfig
+from lgmd_gym.benchmark.traffic import replay
 from lgmd_gym.benchmark.traffic.batch import TrafficDrive, TrafficTask, run_traffic_task
 from lgmd_gym.benchmark.traffic.branch import branch_from, fork
 from lgmd_gym.benchmark.traffic.replay import RESEED, LiveEpisode
@@ -273,3 +274,17 @@ def test_hard_braking_of_the_driver_without_a_conflict_is_no_emergency():
     assert (required[driver <= -5.0] < 5.0).any()
     moving, needed, _ = recording.moving_and_needed
     assert needed < 0.3 * moving
+
+
+def test_the_last_agent_of_a_drive_uses_the_sensors_of_the_recording(monkeypatch):
+    """It draws no frame twice; the row is that of an agent that shares the recording."""
+    made = []
+    monkeypatch.setattr(
+        replay, "LiveEpisode", lambda *arguments: made.append(LiveEpisode(*arguments)) or made[-1]
+    )
+    drive = TrafficDrive("intersection", 1, ("spike-threshold",))
+    (alone,) = run_traffic_task(TrafficTask((drive,), SENSORS))
+    assert (made, alone["brakes"] > 0) == ([], True)
+    both = run_traffic_task(TrafficTask((replace(drive, agents=("spike-threshold", "no-brake")),), SENSORS))
+    assert len(made) == 1
+    assert both[0] == alone

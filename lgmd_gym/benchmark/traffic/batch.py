@@ -8,7 +8,7 @@ from lgmd_gym.benchmark.case import TRAFFIC, TRAFFIC_SUITES, Row, new_row, traff
 from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.observer import Observer
-from lgmd_gym.benchmark.traffic.reader import Moment
+from lgmd_gym.benchmark.traffic.reader import Moment, SceneReader
 from lgmd_gym.benchmark.traffic.recording import record_traffic
 from lgmd_gym.benchmark.traffic.replay import Replay
 from lgmd_gym.benchmark.traffic.rows import KEYS, measure
@@ -64,7 +64,6 @@ class _PlayedDrive:
         drive: The drive.
         rows: Rows of the finished agents, by agent.
         replays: Unfinished replays, by agent.
-        moments: Moments of the recording; none if it failed.
     """
 
     def __init__(
@@ -79,7 +78,9 @@ class _PlayedDrive:
         self.drive = drive
         self.rows: dict[str, Row] = {}
         self.replays: dict[str, Replay] = {}
-        self.moments: tuple[Moment, ...] = ()
+        self._moments: tuple[Moment, ...] = ()
+        self._observer, self._index = observer, index
+        self._reader: SceneReader | None = None  # of the last agent, from its first braking on
         self._agents, self._condition, self._label = agents, task.condition, sensor_config.label
         try:
             attention = TRAFFIC_SUITES[drive.suite]
@@ -91,14 +92,30 @@ class _PlayedDrive:
         except Exception:
             self.fail()
             return
-        self.moments = recording.moments
+        self._moments = recording.moments
         self.replays = {name: Replay(recording, agent, sensor_config) for name, agent in playing.items()}
+
+    def moment(self, decision: int) -> Moment | None:
+        """Return what the sensors draw next: a decision of the recording, or of the last agent's drive."""
+        if not self.replays:
+            return None
+        (replay, *others) = self.replays.values()
+        if others or replay.env is None:
+            return self._moments[decision]
+        if self._reader is None:
+            observer = self._observer
+            self._reader = SceneReader(replay.env, observer.sensors, self._index, observer.fps, decision - 1)
+        try:
+            return self._reader.step(replay.demand)
+        except Exception:
+            self.fail()
+            return None
 
     def process(self, step: Step) -> None:
         """Give the step of the next decision to the agents."""
         for agent, replay in list(self.replays.items()):
             try:
-                replay.process(step)
+                replay.process(step, last=len(self.replays) == 1)
                 if replay.done:
                     self._add(agent, **measure(replay.recording, replay.log), camera=self._label)
             except Exception:
@@ -134,7 +151,9 @@ def _play(task: TrafficTask, sensor_config: SensorConfig, agents: set[str]) -> l
     try:
         decision = 0
         while any(drive.replays for drive in drives):
-            moments = [drive.moments[decision] if drive.replays else None for drive in drives]
+            moments = [drive.moment(decision) for drive in drives]
+            if not any(moments):
+                break
             for drive, step in zip(drives, observer.observe(moments), strict=True):
                 if step is not None:
                     drive.process(step)

@@ -10,6 +10,7 @@ from lgmd_gym.benchmark.traffic.reader import SceneReader
 from lgmd_gym.benchmark.traffic.recording import TrafficRecording
 from lgmd_gym.benchmark.traffic.rows import AFTERMATH, BrakingEvent, EpisodeLog
 from lgmd_gym.envs.traffic.emergencies import HORIZON
+from lgmd_gym.envs.traffic.env import TrafficEnv
 
 EVENT_PAUSE = 1.0  # [s] without a demand that ends a braking event, and without an alert before the next one
 HANDOVER = 3.0  # [s] after a standstill during which only the driver acts
@@ -41,9 +42,10 @@ class Replay:
     """Runs one agent on one recording.
 
     Until the agent brakes, it receives the recorded steps. At its first demand the recorded state is forked:
-    the recording is the branch without braking, and the fork is stepped live to the end. For every later
-    braking event, a fork of the live state is stepped without braking. The difference of the speeds of both
-    is the speed lost.
+    the recording is the branch without braking, and the fork is stepped live. The caller does that with the
+    sensors of the recording if no other agent needs them; otherwise the replay draws the frames so far again
+    and plays to the end. For every later braking event, a fork of the live state is stepped without braking.
+    The difference of the speeds of both is the speed lost.
 
     A braking event ends after `EVENT_PAUSE` without a demand, or at a standstill. After a standstill only the
     driver acts for `HANDOVER`; then the agent is reset, with another seed each time, so that an agent that
@@ -52,27 +54,40 @@ class Replay:
     Attributes:
         log: Events so far.
         done: Whether the episode has ended.
+        demand: The last demand.
+        env: The forked environment; None until the agent brakes.
     """
 
     def __init__(self, recording: TrafficRecording, agent: Driver, sensor_config: SensorConfig) -> None:
         self.recording, self.agent, self.sensor_config = recording, agent, sensor_config
         self.log = EpisodeLog()
         self.done = False
-        self._live: LiveEpisode | None = None
+        self.demand = HOLD
+        self.env: TrafficEnv | None = None
         self._event: BrakingEvent | None = None
         self._without: Branch | None = None  # the drive without the last braking event
         self._handover_until = self._last_alert = NEVER
         self._standstills = self._decision = 0
         agent.reset(recording.seed)
 
-    def process(self, step: Step) -> None:
-        """Process the recorded step of the next decision; if the agent brakes, play live to the end."""
-        demand = self._process(step)
-        if self.done or demand == HOLD:
+    def process(self, step: Step, last: bool = False) -> None:
+        """Process the step of the next decision.
+
+        Args:
+            step: The recorded step, or that of `env` under the last demand.
+            last: Whether the caller steps `env` if the agent brakes; otherwise this method does, to the end.
+        """
+        self.demand = self._process(step)
+        if self.done or self.demand == HOLD or self.env is not None:
             return
-        self._live = LiveEpisode(self.recording, self._decision - 1, self.sensor_config)
+        decision = self._decision - 1
+        if last:
+            self.env = self.recording.fork(decision)
+            return
+        live = LiveEpisode(self.recording, decision, self.sensor_config)
+        self.env = live.env
         while not self.done:
-            demand = self._process(self._live.step(demand))
+            self.demand = self._process(live.step(self.demand))
 
     def _process(self, step: Step) -> float:
         """Process the step of a decision and return the demand."""
@@ -102,8 +117,8 @@ class Replay:
         """Begin, continue or end the present braking event."""
         event, decision = self._event, self._decision - 1
         if event is None and demand < HOLD:
-            live = self._live
-            self._without = self.recording.course if live is None else branch_from(live.env, decision)
+            env = self.env
+            self._without = self.recording.course if env is None else branch_from(env, decision)
             event = self._event = BrakingEvent.begin(decision, self._without, self.recording)
             self.log.events.append(event)
         if event is None:
