@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias, cast
 
 import numpy as np
 
+from lgmd_gym.agents.stages import Evidence, StageParams, demands_of, next_stages
 from lgmd_gym.aliases import Config, Info
 from lgmd_gym.errors import check_within
 
@@ -178,18 +179,43 @@ class BatchAgent:
         }
 
 
-class LatchingAgent(BatchAgent):
-    """Base class: brakes fully once `brake_conditions` returns True, and latches until the episode ends."""
+class StagedAgent(BatchAgent):
+    """Base class: warns, brakes and releases the brake by the evidence of a threat, see `agents.stages`.
+
+    Subclasses implement `evidence`.
+
+    Attributes:
+        brake: Parameters of the brake; by default it latches until the episode ends.
+    """
+
+    brake = StageParams()
 
     def initial(self) -> State:
         """Return a released brake."""
-        return {"latched": False}
+        return {"stage": 0, "clear_s": 0.0}
 
     def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
-        """Return `BRAKE` for the environments in which the agent has latched, else `HOLD`."""
-        latched = self.brake_conditions(observations, infos, active) | self.state["latched"]
-        self.alerts = self.state["latched"] = latched
-        return np.where(latched, BRAKE, HOLD)
+        """Return the demands of the stages; the alerts are the stages from the warning on."""
+        evidence = self.evidence(observations, infos, active)
+        speeds = observations["ego_speed"][:, 0] if "ego_speed" in observations else infos["ego_speed"]
+        self.state["stage"], self.state["clear_s"] = next_stages(
+            self.state["stage"], self.state["clear_s"], evidence, np.asarray(speeds), self.brake, 1.0 / FPS
+        )
+        self.alerts = self.state["stage"] >= Evidence.WARNING
+        return demands_of(self.state["stage"], self.brake)
+
+    def evidence(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return the `Evidence` of a threat, int64, shape (N,); called once per decision, in order."""
+        raise NotImplementedError
+
+
+class LatchingAgent(StagedAgent):
+    """Base class: brakes fully once `brake_conditions` returns True, and latches until the episode ends."""
+
+    def evidence(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return `FULL` where to begin braking, else `PRESENT`, which keeps a brake."""
+        conditions = self.brake_conditions(observations, infos, active)
+        return np.where(conditions, Evidence.FULL, Evidence.PRESENT)
 
     def brake_conditions(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
         """Return whether to begin braking, bool, shape (N,); called once per decision, in order."""

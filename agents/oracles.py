@@ -13,8 +13,10 @@ from lgmd_gym.agents.base import (
     Infos,
     LatchingAgent,
     Observations,
+    StagedAgent,
     State,
 )
+from lgmd_gym.agents.stages import Evidence
 from lgmd_gym.agents.zones import CAMERA_SETBACK, FULL_DECELERATION, stopping_distance
 from lgmd_gym.envs.forecast import ForecastParams
 from lgmd_gym.errors import check_positive
@@ -74,8 +76,8 @@ class LastMomentOracle(BatchAgent):
         return np.where(braking, BRAKE, HOLD)
 
 
-class TTCOracle(LatchingAgent):
-    """Brakes fully when the true time to contact falls to a threshold: TTC ≤ `ttc`.
+class TTCOracle(StagedAgent):
+    """Warns and brakes fully when the true time to contact falls to thresholds: TTC ≤ `alert`, TTC ≤ `ttc`.
 
     Observes `info["ttc"]`.
 
@@ -83,18 +85,22 @@ class TTCOracle(LatchingAgent):
         ttc: Threshold, > 0 [s]. The default avoids all contacts of the protocol suites with the default
             brake, except with oncoming cars (CCFhos, CCFhol), which no braking avoids. The critical case is a
             lead car 40 m ahead that brakes at 0.5 g from 80 km/h, in which 1.8 s is too late.
+        alert: Threshold of the warning, > 0 [s]. A driver who brakes at 4 m/s², 1.2 s after it (Euro NCAP AEB
+            C2C v4.3.1, 8.4.6), needs 4.2 s to a standing car at 80 km/h.
     """
 
     name = "ttc-oracle"
     reads_neuron = False
 
-    def __init__(self, ttc: float = 2.0) -> None:
-        self.ttc = check_positive("ttc", ttc)
+    def __init__(self, ttc: float = 2.0, alert: float = 4.5) -> None:
+        self.ttc, self.alert = check_positive("ttc", ttc), check_positive("alert", alert)
         super().__init__()
 
-    def brake_conditions(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
-        """Return whether the time to contact is at or below the threshold; False without a contact ahead."""
-        return np.asarray(infos["ttc"]) <= self.ttc
+    def evidence(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return the evidence of the true time to contact; a brake latches."""
+        ttc = np.asarray(infos["ttc"])
+        warned = np.where(ttc <= self.alert, Evidence.WARNING, Evidence.PRESENT)
+        return np.where(ttc <= self.ttc, Evidence.FULL, warned)
 
 
 class StoppingDistanceOracle(LatchingAgent):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lgmd_gym.agents.base import TRACE, Infos, LatchingAgent, Observations, State
+from lgmd_gym.agents.stages import Evidence, StageParams
 from lgmd_gym.agents.zones import (
     DRY_DECELERATION,
     LOW_FIELD,
@@ -375,10 +376,19 @@ class StoppingZoneParams(RuleParams):
     crawl: float = number(
         1.0, POSITIVE, "m/s", "Ego speed up to which the rule is inactive.", search=(0.5, 2.7)
     )
+    warning: float = number(
+        0.5, "(0, 1]", "", "Share of the thresholds of the excitations at which the rule warns."
+    )
+    release_s: float = number(
+        1.3,
+        "[0, inf]",
+        "s",
+        "Time with every ground field below its threshold after which the brake is released; inf for never.",
+    )
 
 
 class StoppingZone(Rule):
-    """Brakes fully for an upright obstacle on the path, near the ego's stopping distance.
+    """Warns, then brakes fully for an upright obstacle on the path, near the ego's stopping distance.
 
     The rule has seven zones, whose far ends are at 0.28 to 1.8 stopping distances, and 17 fields with one
     neuron each; see `lgmd_gym.agents.zones`. G, U and L are the excitations k/(n σ3) of the ground,
@@ -388,7 +398,8 @@ class StoppingZone(Rule):
     Condition: in one of the zones up to `reach`, G ≥ `ground` in `frames` consecutive frames, while U ≥
     `upright` in `upright_frames` and L ≥ `low` in `low_frames` consecutive frames that ended within the last
     `memory` frames; at a speed above `crawl` and a yaw rate of at most `yaw_rate`. Flat marks and shadows
-    excite ground fields alone.
+    excite ground fields alone. The rule warns under the same condition with `warning` times the thresholds.
+    It releases the brake after `release_s` with G < `ground` in all zones, but not near standstill.
 
     The stopping distance is that of `deceleration` on a dry road and of two thirds of it on a wet one: the
     sensor knows that the road is wet, as a car with a rain sensor does.
@@ -402,7 +413,9 @@ class StoppingZone(Rule):
     def __init__(self, params: StoppingZoneParams | None = None, **options: Any) -> None:
         super().__init__(params, **options)
         p, counts = self.params, (NUM_ZONES, NUM_ZONES, len(LOW_ZONES))
-        self._thresholds = np.repeat([p.ground, p.upright, p.low], counts)
+        thresholds = np.repeat([p.ground, p.upright, p.low], counts)
+        self._thresholds = np.stack([thresholds, p.warning * thresholds])
+        self.brake = StageParams(release_s=p.release_s)
         self._required = np.repeat([p.frames, p.upright_frames, p.low_frames], counts)
         self._zones = np.array(REACHES) <= p.reach
 
@@ -412,23 +425,35 @@ class StoppingZone(Rule):
         return zone_cameras(self.params.deceleration, self.params.reaction)
 
     def initial(self) -> State:
-        """Return the numbers of frames at the threshold, and since the required number of them."""
-        ages: np.ndarray = np.full(NUM_FIELDS, self.params.memory)
-        streaks: np.ndarray = np.zeros(NUM_FIELDS, np.int64)
-        return super().initial() | {"streaks": streaks, "ages": ages}
+        """Return the numbers of frames at the thresholds, and since the required number of them.
+
+        The first row of each has the thresholds of braking, the second those of the warning.
+        """
+        ages: np.ndarray = np.full((2, NUM_FIELDS), self.params.memory)
+        streaks: np.ndarray = np.zeros((2, NUM_FIELDS), np.int64)
+        return super().initial() | {"streaks": streaks, "ages": ages, "warns": False, "present": False}
+
+    def evidence(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return the evidence of an upright obstacle."""
+        brakes = self.brake_conditions(observations, infos, active)
+        kept = np.where(self.state["present"], Evidence.PRESENT, Evidence.CLEAR)
+        return np.where(brakes, Evidence.FULL, np.where(self.state["warns"], Evidence.WARNING, kept))
 
     def should_brake(self, reading: Reading) -> np.ndarray:
-        """Return whether an upright obstacle is in a zone."""
+        """Return whether an upright obstacle is in a zone, and note whether to warn."""
         p = self.params
         self.require_cameras(reading.potential.shape[1], NUM_FIELDS)
-        excited = excitation(reading.potential) >= self._thresholds
+        excited = excitation(reading.potential)[:, None] >= self._thresholds
         reached = self.consecutive("streaks", excited, self._required)
         ages = self.state["ages"] = (self.state["ages"] + 1) * ~reached
         active = (reading.speed > p.crawl) & (np.abs(reading.yaw_rate) <= p.yaw_rate)
-        recent = ages[:, NUM_ZONES:] < p.memory
-        upright, low = recent[:, :NUM_ZONES], recent[:, NUM_ZONES:]
-        standing = self._zones & reached[:, :NUM_ZONES] & upright & low[:, LOW_FIELD]
-        return active & standing.any(axis=1)
+        recent = ages[..., NUM_ZONES:] < p.memory
+        upright, low = recent[..., :NUM_ZONES], recent[..., NUM_ZONES:]
+        zones = self._zones & reached[..., :NUM_ZONES] & upright & low[..., LOW_FIELD]
+        standing = active[:, None] & zones.any(axis=2)
+        self.state["warns"] = standing[:, 1]
+        self.state["present"] = excited[:, 0, :NUM_ZONES].any(axis=1)
+        return standing[:, 0]
 
 
 def _read_toml(path: object) -> Values:

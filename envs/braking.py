@@ -19,7 +19,7 @@ from lgmd_gym.envs.info import INFO_KEYS
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.simulation import Rates, Sensors, Simulation
 from lgmd_gym.envs.spaces import ContinuousDemand, EgoState, make_action
-from lgmd_gym.errors import check_keys, check_mapping, shown
+from lgmd_gym.errors import check_keys, check_mapping, check_within, shown
 
 _SELECTED = np.ones(1, np.bool_)
 
@@ -69,10 +69,11 @@ class BrakingEnv(EgoBrakeEnv):
 
     ## Episode End
 
-    Terminated: at contact; when the ego reaches a standstill that is not scripted, unless a car or
-    motorcycle is about to touch it; when the ego has become slower than all actors ahead of it after having
-    closed in on one, and their scripts have ended (Euro NCAP AEB C2C v4.3.1, 8.4.3); when the ego has passed
-    all actors. Truncated: after the scenario's duration.
+    Terminated: at contact; when the ego has passed all actors; and when the conflict has been resolved for
+    `follow_up` = 2 s without a break, so that a contact after a release of the brake counts. It is resolved
+    while the ego stands without a script that stops it, unless a car or motorcycle is about to touch it, and
+    while the ego is slower than all actors ahead of it after having closed in on one, and their scripts have
+    ended (Euro NCAP AEB C2C v4.3.1, 8.4.3). Truncated: after the scenario's duration.
 
     ## Info
 
@@ -103,9 +104,9 @@ class BrakingEnv(EgoBrakeEnv):
         scenario: The scenario, or a source of scenarios.
         config: highway-env's configuration keys; the fields of `BrakeParams`, which take precedence over a
             brake that the source draws; `throttle`, whether demands above 0 have an effect (False); `action`,
-            see Action Space; `reward`, fields of `RewardParams`; `forecast`, fields of `ForecastParams`, none
-            of which is for no `info["ttb"]`. Defaults of `simulation_frequency` and `policy_frequency`: 60
-            and 30 Hz.
+            see Action Space; `reward`, fields of `RewardParams`; `follow_up`, in [0, 60] s, see Episode End
+            (2); `forecast`, fields of `ForecastParams`, none of which is for no `info["ttb"]`. Defaults of
+            `simulation_frequency` and `policy_frequency`: 60 and 30 Hz.
         render_mode: None, "rgb_array" or "human" (highway-env's top view).
 
     Raises:
@@ -149,6 +150,7 @@ class BrakingEnv(EgoBrakeEnv):
             "simulation_frequency": 60,
             "throttle": False,
             "forecast": {},
+            "follow_up": 2.0,
             "reward": asdict(RewardParams()),
         }
 
@@ -162,6 +164,8 @@ class BrakingEnv(EgoBrakeEnv):
         reward = check_mapping("reward", config.pop("reward", None))
         check_keys("key of config['reward']", reward, self.config["reward"])
         reward = {**self.config["reward"], **reward}
+        if "follow_up" in config:
+            config["follow_up"] = check_within("config['follow_up']", config["follow_up"], 0.0, 60.0, "s")
         weights = RewardParams(**reward)
         forecast = check_mapping("forecast", config.get("forecast"))
         check_keys("key of config['forecast']", forecast, asdict(ForecastParams()))
@@ -178,7 +182,9 @@ class BrakingEnv(EgoBrakeEnv):
         config = self.config
         rates = Rates(simulation=config["simulation_frequency"], policy=config["policy_frequency"])
         forecast = ForecastParams(**config["forecast"]) if config["forecast"] else None
-        return Simulation(num_envs, rates, self.weights, config["throttle"], threads, forecast)
+        return Simulation(
+            num_envs, rates, self.weights, config["throttle"], config["follow_up"], threads, forecast
+        )
 
     def attach_sensors(self, sensors: Sensors, camera_hz: float) -> None:
         """Draw and process the frames of cameras inside the steps, from the next reset on.

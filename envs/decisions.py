@@ -25,6 +25,7 @@ class Clock(NamedTuple):
     remaining: np.ndarray  # simulation steps left in the decision, int64, shape (N,); −1 for no decision
     due: np.ndarray  # output: whether a camera frame is due, bool, shape (N,)
     headings: np.ndarray  # heading before the decision, float64, shape (N,) [rad]
+    speeds: np.ndarray  # ego speed before the decision, float64, shape (N,) [m/s]
 
 
 class Outcome(NamedTuple):
@@ -55,7 +56,9 @@ def make_physics(state: PhysicsState, brakes: np.ndarray, weights: np.ndarray) -
 
 def make_clock(num: int) -> Clock:
     """Return the clock of `num` environments without a decision."""
-    return Clock(np.zeros(num), np.full(num, -1, np.int64), np.zeros(num, np.bool_), np.zeros(num))
+    return Clock(
+        np.zeros(num), np.full(num, -1, np.int64), np.zeros(num, np.bool_), np.zeros(num), np.zeros(num)
+    )
 
 
 def make_outcome(num: int) -> Outcome:
@@ -81,7 +84,7 @@ def start_decisions(first: int, last: int, steps: int, physics: Arrays, clock: A
             continue
         clock.remaining[i] = steps
         ego, episode, brake = physics.bodies[i, 0], physics.episodes[i], physics.brakes[i]
-        clock.headings[i] = ego.heading
+        clock.headings[i], clock.speeds[i] = ego.heading, ego.speed
         episode.last_speed, episode.last_acceleration = ego.speed, ego.acceleration
         demand = clock.demands[i]
         demand = demand if demand < 0.0 or brake.throttle > 0.0 else 0.0
@@ -126,7 +129,13 @@ def advance(
 
 @kernel(exact=True)
 def finish_decisions(
-    first: int, last: int, policy_rate: float, physics: Arrays, clock: Arrays, outcome: Arrays
+    first: int,
+    last: int,
+    policy_rate: float,
+    follow_up: float,
+    physics: Arrays,
+    clock: Arrays,
+    outcome: Arrays,
 ) -> None:
     """Write info, reward and end of the environments with a decision.
 
@@ -134,6 +143,7 @@ def finish_decisions(
         first: First environment.
         last: Last environment + 1.
         policy_rate: Decisions per second [Hz].
+        follow_up: See `is_terminated` [s].
         physics: `Physics`.
         clock: `Clock`.
         outcome: Output.
@@ -150,7 +160,7 @@ def finish_decisions(
             bodies[0], ego, episode, physics.brakes[i], physics.weights[i], info.ttc, dt
         )
         standing = bodies[0].speed == 0.0 and is_approached(bodies, episode.bodies, physics.paths[i])
-        outcome.terminated[i] = is_terminated(bodies, episode, standing)
+        outcome.terminated[i] = is_terminated(bodies, episode, standing, dt, follow_up)
         outcome.truncated[i] = is_truncated(episode)
 
 
@@ -158,14 +168,14 @@ def finish_decisions(
 def start_episodes(
     first: int, last: int, selected: np.ndarray, physics: Arrays, clock: Arrays, outcome: Arrays
 ) -> None:
-    """Write the first info and the heading of the selected environments."""
+    """Write the first info, heading and speed of the selected environments."""
     physics, clock, outcome = Physics(*physics), Clock(*clock), Outcome(*outcome)
     for i in range(first, last):
         if selected[i]:
             write_info(
                 physics.bodies[i], physics.episodes[i], physics.egos[i], physics.paths[i], outcome.infos[i]
             )
-            clock.headings[i] = physics.bodies[i, 0].heading
+            clock.headings[i], clock.speeds[i] = physics.bodies[i, 0].heading, physics.bodies[i, 0].speed
             outcome.rewards[i] = 0.0
             outcome.terminated[i] = outcome.truncated[i] = False
 

@@ -95,6 +95,7 @@ class Simulation:
         rates: Frequencies.
         weights: `REWARD` record of all environments.
         throttle: Whether demands above 0 have an effect.
+        follow_up: Time for which a resolved conflict must last to end an episode, see `BrakingEnv` [s].
         threads: Number of threads that share the environments of a step, including the calling one.
         forecast: How times to brake are forecast; None for no forecast.
 
@@ -125,12 +126,13 @@ class Simulation:
         rates: Rates,
         weights: np.ndarray,
         throttle: bool,
+        follow_up: float,
         threads: int = 1,
         forecast: ForecastParams | None = None,
     ) -> None:
         self.num_envs, self.rates = num_envs, rates
         self.state = PhysicsState(num_envs)
-        self._throttle = throttle
+        self._throttle, self._follow_up = throttle, follow_up
         self.brakes, self.weights = np.zeros(num_envs, BRAKE), np.zeros(num_envs, REWARD)
         self.weights[:] = weights
         self.clock, self.outcome = make_clock(num_envs), make_outcome(num_envs)
@@ -280,7 +282,7 @@ class Simulation:
                     self._process(first, last, self.clock.due)
             if on_step is not None and left:
                 on_step()
-        finish_decisions(first, last, rates.policy, physics, clock, self._results)
+        finish_decisions(first, last, rates.policy, self._follow_up, physics, clock, self._results)
 
     def _forecast_part(self, first: int, last: int, selected: np.ndarray) -> None:
         forecast, rates = self._forecast, self.rates

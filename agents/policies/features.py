@@ -62,6 +62,7 @@ SCALES = {
     "ffi": (0.0, 20.0),  # [grey levels]; roads give 1 to 9
     "ego_speed": (0.0, 20.0),  # [m/s]
     "ego_yaw_rate": (0.0, 0.5),  # [rad/s]
+    "ego_acceleration": (0.0, 5.0),  # [m/s²]
     "known_deceleration": (7.5, 2.5),  # [m/s²]; wet and dry roads give 5 to 9.5
 }
 # Inputs computed over time: the observation they are computed from, and their scale.

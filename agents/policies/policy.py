@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from lgmd_gym.neuron import NeuronSpec
     from lgmd_gym.sensing.channel import ChannelSpec
 
-NOT_NEURONS = (FRAME, "ego_speed", "speed_change", "ego_yaw_rate", "known_deceleration")
+NOT_NEURONS = (FRAME, "ego_speed", "speed_change", "ego_yaw_rate", "ego_acceleration", "known_deceleration")
 RAW_INPUTS = (*SCALES, FRAME)  # observations of `LGMDObservation`
 SHIPPED = Path(__file__).parent  # folder of the policies in this package
 MAX_MARGIN = 20.0  # of log odds; the sensible range is about -4 to 4

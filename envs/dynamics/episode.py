@@ -27,7 +27,7 @@ EPISODE = np.dtype(
         *((name, np.float64) for name in ("impact_speed", "relative_impact_speed")),
         *(
             (name, np.float64)
-            for name in ("time", "duration", "top_speed", "last_speed", "last_acceleration")
+            for name in ("time", "duration", "top_speed", "last_speed", "last_acceleration", "resolved")
         ),
     ]
 )
@@ -35,7 +35,8 @@ EPISODE = np.dtype(
 contact with the ego, 0 without contact; whether the ego has closed in on an actor; simulation steps; ego
 speed and speed relative to the other body at contact, inf without contact [m/s]; time after the last decision
 and duration [s], highest scripted speed [m/s], ego speed [m/s] and acceleration [m/s²] before the last
-decision."""
+decision; time for which the conflict has been resolved, see
+`is_terminated` [s]."""
 
 
 class Physics(NamedTuple):
@@ -164,20 +165,41 @@ def _is_uniform(body: np.record, before: np.record) -> bool:
 
 
 @kernel(exact=True)
-def is_terminated(bodies: np.ndarray, episode: np.record, approached: bool) -> bool:
-    """Return whether the episode is over, see `BrakingEnv`; updates `closed_in`, once per decision.
+def is_terminated(
+    bodies: np.ndarray, episode: np.record, approached: bool, dt: float, follow_up: float
+) -> bool:
+    """Return whether the episode is over, see `BrakingEnv`; updates the episode, once per decision.
 
     Args:
         bodies: `BODY` records, the ego first.
         episode: `EPISODE` record.
         approached: Whether a vehicle is about to touch a standing ego, see `is_approached`.
+        dt: Duration of the decision [s].
+        follow_up: Time for which a standstill, or a speed below those of all actors ahead, must last [s].
     """
     ego = bodies[0]
     if episode.touched > 0:
         return True
     if ego.speed == 0.0:
-        return ego.script_speed > 0.0 and not approached
-    solid, left, resolved = 0, 0, True
+        resolved = ego.script_speed > 0.0 and not approached
+    else:
+        left, resolved = _conflicts_left(bodies, episode)
+        if left == 0:
+            return True
+    if not resolved:
+        episode.resolved = 0.0
+        return False
+    episode.resolved += dt
+    return episode.resolved > follow_up - 1e-9
+
+
+@kernel(exact=True)
+def _conflicts_left(bodies: np.ndarray, episode: np.record) -> tuple[int, bool]:
+    """Return how many actors a moving ego has not passed, and whether it falls behind all of them.
+
+    The number is -1 without actors. Updates `closed_in`.
+    """
+    ego, solid, left, slower = bodies[0], 0, 0, True
     for i in range(1, episode.bodies):
         body = bodies[i]
         if body.kind == ROAD_MARKING:
@@ -190,10 +212,10 @@ def is_terminated(bodies: np.ndarray, episode: np.record, approached: bool) -> b
         if ego.speed > along:
             episode.closed_in = 1
         ended, straight = body.segment == body.segment_end, body.path_end - body.path == 1
-        resolved = resolved and ended and straight and ego.speed < along
+        slower = slower and ended and straight and ego.speed < along
     if solid == 0:
-        return False
-    return left == 0 or (episode.closed_in > 0 and resolved)
+        return -1, False
+    return left, episode.closed_in > 0 and slower
 
 
 @kernel(exact=True)

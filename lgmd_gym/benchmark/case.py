@@ -169,6 +169,8 @@ class Row(EpisodeRow):
     min_ttc: float | None
     stopping_margin: float | None
     false_activation: bool
+    false_alert: bool
+    braking_onsets: int
     premature_brake: bool
     episode_return: float
 

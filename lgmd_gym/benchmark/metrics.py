@@ -65,8 +65,9 @@ class PairedEpisode:
     ) -> "PairedEpisode":
         """Return the pair, with its braking onset and first alert."""
         alerts = np.flatnonzero(episode.series["alert"])
-        onset = brake_onset(episode.series["deceleration"])
-        return cls(episode, counterfactual, premature, onset, int(alerts[0]) if alerts.size else None)
+        onsets = brake_onsets(episode.series["deceleration"])
+        onset, alert = onsets[0] if onsets else None, int(alerts[0]) if alerts.size else None
+        return cls(episode, counterfactual, premature, onset, alert)
 
     def at(self, name: str, index: int | None) -> Value:
         """Return the value of a series at an index; undefined for None and infinity."""
@@ -101,13 +102,20 @@ def number(value: Any) -> Value:
     return float(value), isfinite(value)
 
 
-def brake_onset(deceleration: np.ndarray) -> int | None:
-    """Return the index at which braking begins: the first above 1 m/s², traced back to 0.3 m/s²."""
-    beyond = np.flatnonzero(deceleration > BRAKING)
-    if beyond.size == 0:
-        return None
-    below = np.flatnonzero(deceleration[: beyond[0]] < ONSET)
-    return int(below[-1]) if below.size else 0
+def brake_onsets(deceleration: np.ndarray) -> list[int]:
+    """Return the indices at which braking begins: the first above 1 m/s², traced back to 0.3 m/s².
+
+    Braking begins again after a deceleration below 0.3 m/s².
+    """
+    onsets, last = list[int](), 0  # the last value below ONSET
+    braking = False
+    for index, value in enumerate(deceleration.tolist()):
+        if value < ONSET:
+            last, braking = index, False
+        elif value > BRAKING and not braking:
+            onsets.append(last)
+            braking = True
+    return onsets
 
 
 @metric
@@ -262,6 +270,18 @@ def peak_deceleration(pair: PairedEpisode) -> Value:
 def false_activation(pair: PairedEpisode) -> Value:
     """Whether the ego braked beyond 0.25 g without a threat."""
     return not pair.counterfactual.threat and peak_deceleration(pair)[0] > NUISANCE, True
+
+
+@metric
+def false_alert(pair: PairedEpisode) -> Value:
+    """Whether the agent warned without a threat; an alert from the first decision on counts, too."""
+    return not pair.counterfactual.threat and pair.alert is not None, True
+
+
+@metric
+def braking_onsets(pair: PairedEpisode) -> Value:
+    """Number of times that braking began, each above 1 m/s² after less than 0.3 m/s²."""
+    return len(brake_onsets(pair.episode.series["deceleration"])), True
 
 
 @metric

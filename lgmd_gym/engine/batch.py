@@ -14,7 +14,7 @@ from lgmd_gym.envs.episode_source import EpisodeSource, FixedScenario
 from lgmd_gym.envs.highway.road import BrakingRoad
 from lgmd_gym.envs.info import INFO_KEYS
 from lgmd_gym.neuron import LGMDParams, NeuronSpec
-from lgmd_gym.sensing.assembly import Assembly, TraceFrame, Traces, mean_yaw_rate
+from lgmd_gym.sensing.assembly import Assembly, EgoMotion, EgoPose, TraceFrame, Traces
 from lgmd_gym.sensing.channel import LGMD, ChannelSpec
 from lgmd_gym.sensing.highway import camera_rate
 from lgmd_gym.sensing.sensor_array import SensorArray
@@ -137,9 +137,9 @@ class BrakingBatch:
         simulation, out = self.simulation, self.empty() if out is None else out
         if self._assembly is None:
             return simulation.ego_states(out)
-        elapsed_s = simulation.rates.steps / simulation.rates.simulation
-        yaw_rates = mean_yaw_rate(simulation.headings, simulation.clock.headings, elapsed_s)
-        self._assembly.observations(simulation.speeds, yaw_rates, out)
+        elapsed_s, clock = simulation.rates.steps / simulation.rates.simulation, simulation.clock
+        before, after = EgoPose(clock.headings, clock.speeds), EgoPose(simulation.headings, simulation.speeds)
+        self._assembly.observations(EgoMotion.between(before, after, elapsed_s), out)
         if self._include_base:
             simulation.ego_states(out["base"])
         return out

@@ -21,7 +21,7 @@ from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, froc_figure
 from lgmd_gym.benchmark.case import Row, Suite, case_order, key_of, relative_impact
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.episode import make_env, rollout, with_config
-from lgmd_gym.benchmark.metrics import brake_onset
+from lgmd_gym.benchmark.metrics import brake_onsets
 from lgmd_gym.benchmark.run_folder import read_run, read_series, read_settings, series_name
 from lgmd_gym.benchmark.suites import get_suite
 from lgmd_gym.benchmark.summary import by_condition, without_fcw_driver, write_csv
@@ -63,7 +63,7 @@ def _data_uri(kind: str, data: bytes) -> str:
 def key_decisions(series: Mapping[str, np.ndarray]) -> dict[str, int]:
     """Return the indices of the start, the first alert, the onset of braking and the end, by caption."""
     alerts = np.flatnonzero(series["alert"])
-    onset = brake_onset(series["deceleration"])
+    onset = next(iter(brake_onsets(series["deceleration"])), None)
     decisions = {"start": 0}
     if alerts.size:
         decisions["first alert"] = int(alerts[0])

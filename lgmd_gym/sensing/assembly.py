@@ -17,6 +17,9 @@ from lgmd_gym.sensing.kernels import SIGNALS
 from lgmd_gym.sensing.sensor_array import SensorArray
 
 SPEED_BOUND = 100.0  # [m/s], above highway-env's limit of 40 m/s
+MOTION = ("ego_speed", "ego_yaw_rate", "ego_acceleration")
+"""Observations of the fields of `EgoMotion`."""
+ACCELERATION_BOUND = 100.0  # [m/s²], far above that of any car
 DECELERATION_BOUND = 15.0  # [m/s²], above 12 m/s² with the largest error of an estimate
 
 
@@ -32,6 +35,30 @@ class TraceFrame(NamedTuple):
     time: float
     ego_speed: float
     response: Response
+
+
+class EgoMotion(NamedTuple):
+    """Motion of the egos, arrays of shape (N,), or numbers for a single environment."""
+
+    speed: ArrayLike  # speed [m/s]
+    yaw_rate: ArrayLike  # mean yaw rate of the decision, + right [rad/s]
+    acceleration: ArrayLike  # mean acceleration of the decision [m/s²]
+
+    @classmethod
+    def between(cls, before: "EgoPose", after: "EgoPose", elapsed_s: float) -> "EgoMotion":
+        """Return the motion between two states; rates are 0 without duration."""
+        if elapsed_s <= 0.0:
+            zeros = np.zeros_like(after.heading)
+            return cls(after.speed, zeros, zeros)
+        turned = (after.heading - before.heading + pi) % (2 * pi) - pi  # the shorter turn
+        return cls(after.speed, turned / elapsed_s, (after.speed - before.speed) / elapsed_s)
+
+
+class EgoPose(NamedTuple):
+    """Headings [rad, + right] and speeds [m/s] of the egos, arrays of shape (N,) or numbers."""
+
+    heading: Any
+    speed: Any
 
 
 class Traces:
@@ -116,20 +143,19 @@ class Assembly:
         return {name: np.zeros((num_envs, *shape), dtype) for name, shape, dtype in self._shapes}
 
     def observations(
-        self, speeds: ArrayLike, yaw_rates: ArrayLike, out: dict[str, np.ndarray] | None = None
+        self, motion: EgoMotion, out: dict[str, np.ndarray] | None = None
     ) -> dict[str, np.ndarray]:
         """Return the present observations of all environments, without the key `base`.
 
         Args:
-            speeds: Ego speeds, shape (N,) [m/s].
-            yaw_rates: Mean yaw rates of the decision, see `mean_yaw_rate`, shape (N,) [rad/s].
+            motion: Motion of the egos.
             out: Arrays of `empty` to write; new ones if None.
         """
         out, sensors = self.empty() if out is None else out, self._sensors
         for row, name in enumerate(SIGNALS):
             out[name][:] = sensors.signals[:, row]
-        out["ego_speed"][:, 0] = speeds
-        out["ego_yaw_rate"][:, 0] = yaw_rates
+        for name, values in zip(MOTION, motion, strict=True):
+            out[name][:, 0] = values
         if sensors.known_decelerations is not None:
             out["known_deceleration"][:] = sensors.known_decelerations
         if self._has_columns:
@@ -153,18 +179,6 @@ def row_of(arrays: Mapping[str, np.ndarray], index: int) -> Values:
     return {key: values[index] if values.ndim > 1 else values.item(index) for key, values in arrays.items()}
 
 
-def mean_yaw_rate(heading: Any, previous: Any, elapsed_s: float) -> Any:
-    """Return the mean yaw rate between two headings by the shorter turn [rad/s]; 0 without duration.
-
-    Args:
-        heading: Heading after the duration, a number or an array [rad].
-        previous: Heading before it [rad].
-        elapsed_s: Duration [s].
-    """
-    turned = (heading - previous + pi) % (2 * pi) - pi
-    return turned / elapsed_s if elapsed_s > 0.0 else np.zeros_like(turned)
-
-
 def _spaces(
     sensors: SensorArray, simulation_frequency: float, include_frame: bool
 ) -> dict[str, spaces.Box[Any]]:
@@ -174,6 +188,7 @@ def _spaces(
         **{signal: spaces.Box(*sensors.bounds(signal), dtype=np.float32) for signal in SIGNALS},
         "ego_speed": spaces.Box(-SPEED_BOUND, SPEED_BOUND, (1,), np.float32),
         "ego_yaw_rate": spaces.Box(-turn, turn, (1,), np.float32),
+        "ego_acceleration": spaces.Box(-ACCELERATION_BOUND, ACCELERATION_BOUND, (1,), np.float32),
     }
     if sensors.known_decelerations is not None:
         parts["known_deceleration"] = spaces.Box(0.0, DECELERATION_BOUND, (1,), np.float32)

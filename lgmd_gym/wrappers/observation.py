@@ -13,7 +13,7 @@ from lgmd_gym.aliases import Arguments, Info, Observation, Values
 from lgmd_gym.camera import Scene
 from lgmd_gym.errors import check_flags, check_mapping
 from lgmd_gym.neuron import LGMDParams, NeuronSpec, Response
-from lgmd_gym.sensing.assembly import Assembly, Traces, mean_yaw_rate, row_of
+from lgmd_gym.sensing.assembly import Assembly, EgoMotion, EgoPose, Traces, row_of
 from lgmd_gym.sensing.channel import LGMD, ChannelSpec, make_channels, plain_values
 from lgmd_gym.sensing.highway import SensorHost, camera_rate, check_highway_env, on_road_step
 from lgmd_gym.sensing.sensor_array import SensorArray
@@ -38,6 +38,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
     ``ego_speed``           (1,)                        ego speed [m/s], −100 to 100
     ``ego_yaw_rate``        (1,)                        mean yaw rate of the decision [rad/s], positive
                                                         to the right as in highway-env
+    ``ego_acceleration``    (1,)                        mean acceleration of the decision [m/s²]
     ``known_deceleration``  (1,)                        the car's estimate of its full braking [m/s²], of
                                                         cameras with ``brake_known`` only
     ``column_potential``    (columns,)                  K of each column of each channel in turn, 0 to 1, of
@@ -112,7 +113,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         self.include_frame, self.include_base, self._trace = include_frame, include_base, trace
         self._requested_fps = fps
         self._was_reset = False
-        self._substeps, self._last = 0, (0, 0.0)  # steps and heading at the last observation
+        self._substeps, self._last = 0, (0, EgoPose(0.0, 0.0))  # steps and pose at the last observation
         self._hosted = isinstance(env.unwrapped, SensorHost)
         if self._hosted:
             _check_no_cameras(env)
@@ -148,7 +149,7 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         changed = base_env.config["simulation_frequency"] != self._simulation_frequency
         if changed:
             self._build_sensors()
-        self._substeps, self._last = 0, (0, 0.0)
+        self._substeps, self._last = 0, (0, EgoPose(0.0, 0.0))
         self.rendering_paused, self._was_reset = False, True
         if not self._hosted:
             self.sensors.reset()
@@ -158,14 +159,14 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         elif changed:
             self._attach()
             base_env.restart_sensors()
-        return self._observation(base, *self._take_motion()), self._extend_info(info)
+        return self._observation(base, self._take_motion()), self._extend_info(info)
 
     def step(self, action: ArrayLike) -> tuple[Observation, SupportsFloat, bool, bool, Info]:
         """Step the environment and process its camera frames."""
         if not self._was_reset:
             raise RuntimeError("reset must be called before step")
         base, reward, terminated, truncated, info = self.env.step(action)
-        observation = self._observation(base, *self._take_motion())
+        observation = self._observation(base, self._take_motion())
         return observation, reward, terminated, truncated, self._extend_info(info)
 
     @property
@@ -262,20 +263,20 @@ class LGMDObservation(gym.Wrapper, RecordConstructorArgs):
         simulation = self._highway_env.simulation
         self._traces.append(0, float(simulation.times[0]), float(simulation.speeds[0]))
 
-    def _take_motion(self) -> tuple[float, float]:
-        """Return the ego speed [m/s] and the mean yaw rate since the last call or reset [rad/s]."""
+    def _take_motion(self) -> EgoMotion:
+        """Return the motion of the ego since the last call or reset."""
         base = self._highway_env
         if self._hosted:
             simulation = base.simulation
-            steps, speed = simulation.state.episodes["steps"].item(0), simulation.speeds.item(0)
-            heading = simulation.headings.item(0)
+            steps = simulation.state.episodes["steps"].item(0)
+            pose = EgoPose(simulation.headings.item(0), simulation.speeds.item(0))
         else:
-            steps, speed, heading = self._substeps, float(base.vehicle.speed), float(base.vehicle.heading)
-        (last_steps, last_heading), self._last = self._last, (steps, heading)
-        return speed, mean_yaw_rate(heading, last_heading, (steps - last_steps) / self._simulation_frequency)
+            steps, pose = self._substeps, EgoPose(float(base.vehicle.heading), float(base.vehicle.speed))
+        (last_steps, last_pose), self._last = self._last, (steps, pose)
+        return EgoMotion.between(last_pose, pose, (steps - last_steps) / self._simulation_frequency)
 
-    def _observation(self, base: np.ndarray, speed: float, yaw_rate: float) -> Observation:
-        observation = row_of(self._assembly.observations(speed, yaw_rate), 0)
+    def _observation(self, base: np.ndarray, motion: EgoMotion) -> Observation:
+        observation = row_of(self._assembly.observations(motion), 0)
         if self.include_base:
             observation["base"] = base
         return observation

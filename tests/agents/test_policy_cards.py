@@ -124,7 +124,7 @@ def test_a_file_without_card_names_the_remedy(model, tmp_path):
 @pytest.mark.parametrize(("values", "words"), [
     ({"camera": ["fovea", "wide"]}, "the model has 1 cameras instead of 2"),
     ({"demands": [0.0, -1.0]}, "the model has continuous actions instead of 2"),
-    ({"features": {"history": 2}}, "the model has inputs ego_speed, .* instead of"),
+    ({"features": {"history": 2}}, "the model has inputs ego_acceleration, .* instead of"),
     ({"vec_normalize": "nix.pkl"}, "vec_normalize .*nix.pkl' cannot be read: No such file"),
     ({"vec_normalize": "nix.npz"}, "vec_normalize .*nix.npz' cannot be read: No such file"),
     ({"vec_normalize": "model.json"}, "vec_normalize .* cannot be loaded"),

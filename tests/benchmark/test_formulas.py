@@ -16,7 +16,7 @@ from lgmd_gym.benchmark.metrics import (
     PREMATURE,
     Counterfactual,
     PairedEpisode,
-    brake_onset,
+    brake_onsets,
     measure,
 )
 from lgmd_gym.benchmark.recorder import SERIES
@@ -73,18 +73,19 @@ def test_counterfactual_of_an_episode_and_of_its_row():
 
 
 @pytest.mark.parametrize(
-    ("values", "onset"),
+    ("values", "onsets"),
     [
-        ([0.0, 1.0, 1.0], None),  # braking exceeds 1 m/s²
-        ([0.0, 1.001, 0.0], 0),
-        ([0.0, 0.299, 0.3, 1.001], 1),  # traced back to the last value below 0.3 m/s²
-        ([0.0, 0.3, 0.3, 1.001], 0),
-        ([0.3, 0.9, 1.001, 0.0], 0),
-        ([0.0, 2.0, 0.0, 0.0, 2.0], 0),  # the first braking
+        ([0.0, 1.0, 1.0], []),  # braking exceeds 1 m/s²
+        ([0.0, 1.001, 0.0], [0]),
+        ([0.0, 0.299, 0.3, 1.001], [1]),  # traced back to the last value below 0.3 m/s²
+        ([0.0, 0.3, 0.3, 1.001], [0]),
+        ([0.3, 0.9, 1.001, 0.0], [0]),
+        ([0.0, 2.0, 0.0, 0.0, 2.0], [0, 3]),
+        ([0.0, 2.0, 0.3, 2.0], [0]),  # no release
     ],
 )
-def test_brake_onset(values, onset):
-    assert brake_onset(np.array(values)) == onset
+def test_brake_onsets(values, onsets):
+    assert brake_onsets(np.array(values)) == onsets
 
 
 @pytest.mark.parametrize(
@@ -303,6 +304,7 @@ def test_quantities_have_the_scale_of_their_unit():
         "speed_reduction": ("km/h", 3.6, True),
         "premature_brake": ("% of threats", 100.0, True),
         "false_activation": ("% of non-threats", 100.0, False),
+        "false_alert": ("% of non-threats", 100.0, False),
         "ttc_at_brake": ("s", 1.0, True),
         "stopping_margin": ("m", 1.0, True),
     }

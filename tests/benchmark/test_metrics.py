@@ -10,7 +10,7 @@ from support.rows import threat_row
 from lgmd_gym.benchmark.analysis.tables import case_table, limit_table, score_tables
 from lgmd_gym.benchmark.case import Case
 from lgmd_gym.benchmark.episode import Episode
-from lgmd_gym.benchmark.metrics import KEYS, METRICS, Counterfactual, brake_onset, make_row, metric
+from lgmd_gym.benchmark.metrics import KEYS, METRICS, Counterfactual, brake_onsets, make_row, metric
 from lgmd_gym.benchmark.recorder import SERIES
 from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.benchmark.summary import COLUMNS, Sample, summaries, summarise, write_summary
@@ -36,10 +36,11 @@ def episode(deceleration, collision=False, relative=float("inf"), alert=None):
 
 
 def test_brake_onset_is_traced_back_to_0_3():
-    assert brake_onset(np.zeros(5)) is None
-    assert brake_onset(np.array([0, 0.2, 0.5, 0.9, 1.1, 9.0])) == 1
-    assert brake_onset(np.array([2.0, 3.0])) == 0
-    assert brake_onset(np.array([0, 0.9, 0.9, 0])) is None
+    assert brake_onsets(np.zeros(5)) == []
+    assert brake_onsets(np.array([0, 0.2, 0.5, 0.9, 1.1, 9.0])) == [1]
+    assert brake_onsets(np.array([2.0, 3.0])) == [0]
+    assert brake_onsets(np.array([0, 0.9, 0.9, 0])) == []
+    assert brake_onsets(np.array([0, 2.0, 0.5, 2.0, 0.2, 0.1, 0.4, 2.0])) == [0, 5]  # 0.5 is no release
 
 
 def test_row_of_an_avoided_threat():

@@ -104,7 +104,7 @@ def test_fork_is_independent_of_its_original(merge):
     assert braked["ego_speed"] < env.ego.speed
     for _ in range(20):
         env.step(to_action(HOLD))
-    assert env.ego.speed == merge.recording.moments[80].speed
+    assert env.ego.speed == merge.recording.moments[80].motion.speed
 
 
 def test_fork_that_differs_from_the_recording_is_rejected(merge):

@@ -82,7 +82,11 @@ def random_indices(rng, num_envs):
 
 
 def compare(family, mode, threads, steps, draw=random_demands, num_envs=3, seed=0, **arguments):
-    """Compare both for a number of steps; return the number of episodes that ended."""
+    """Compare both for a number of steps; return the number of episodes that ended.
+
+    Episodes end at a standstill, so that several fit in the steps.
+    """
+    arguments["config"] = {"follow_up": 0.0} | arguments.get("config", {})
     reference, engine = make_pair(env_id(family), num_envs, mode, threads, **arguments)
     assert engine.single_observation_space == reference.single_observation_space
     assert engine.observation_space == reference.observation_space

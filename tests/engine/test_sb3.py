@@ -18,7 +18,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormali
 from lgmd_gym.engine import SB3VecEnv
 
 LEVELS = "LGMD/RandomBraking-v0"
-FAST = {"ego_speed": 3.0}  # a second of braking ends the episode
+FAST = {"ego_speed": 3.0, "config": {"follow_up": 0.0}}  # a second of braking ends the episode
 
 
 def make_single_and_engine(env_id, num_envs, threads=1, **arguments):
@@ -58,8 +58,9 @@ def test_rollout_equals_dummy_vec_env():
 
 
 def test_rollout_of_discrete_actions_without_camera():
-    config = {"action": {"type": "DiscreteDemand", "demands": [0.0, -1.0]}}
-    singles, engine = make_single_and_engine("LGMD/CCRs-v0", 2, config=config, camera=None, **FAST)
+    config = {"action": {"type": "DiscreteDemand", "demands": [0.0, -1.0]}, "follow_up": 0.0}
+    arguments = {"ego_speed": 3.0, "config": config}
+    singles, engine = make_single_and_engine("LGMD/CCRs-v0", 2, camera=None, **arguments)
     ended = assert_equal_rollouts(singles, engine, 60, lambda rng: rng.choice(2, 2, p=[0.1, 0.9]))
     assert len(ended) >= 3
 

@@ -13,7 +13,7 @@ from support.vectors import differences, digest, make_pair
 from lgmd_gym.engine import BrakingVectorEnv
 
 LEVELS = "LGMD/RandomBraking-v0"
-FAST = {"ego_speed": 3.0}  # a second of braking ends the episode
+FAST = {"ego_speed": 3.0, "config": {"follow_up": 0.0}}  # a second of braking ends the episode
 
 
 def hold(envs):

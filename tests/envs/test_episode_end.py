@@ -17,7 +17,7 @@ ORIGIN = Pose(0.0, 0.0, 0.0)
 def ends(ego, *rows, closed_in=0, touched=0, approached=False):
     table, _ = bodies(ego, *rows)
     episode = record(EPISODE, bodies=len(rows) + 1, closed_in=closed_in, touched=touched)
-    return bool(is_terminated(table, episode, approached)), int(episode.closed_in)
+    return bool(is_terminated(table, episode, approached, 0.1, 0.0)), int(episode.closed_in)
 
 
 RUNNING = {"speed": 10.0, "script_speed": 10.0}
@@ -88,6 +88,19 @@ def test_crossing_actors_neither_lead_nor_follow():
         0
     ]  # 7.5 m/s along the ego's heading
     assert ends(RUNNING, crossing | {"heading": 0.5}, closed_in=1)[0]  # 13.2 m/s
+
+
+def test_a_resolved_conflict_ends_an_episode_after_the_follow_up_time():
+    standing, _ = bodies({"speed": 0.0, "script_speed": 10.0}, AHEAD)
+    creeping, _ = bodies({"speed": 0.1, "script_speed": 10.0}, {"x": 30.0})
+    episode = record(EPISODE, bodies=2)
+
+    def decisions(table, count):
+        return [bool(is_terminated(table, episode, False, 0.5, 2.0)) for _ in range(count)]
+
+    assert decisions(standing, 3) == [False, False, False]  # 1.5 s
+    assert decisions(creeping, 1) == [False]  # the brake was released
+    assert decisions(standing, 4) == [False, False, False, True]  # 2 s without a break
 
 
 def test_duration():

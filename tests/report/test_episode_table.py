@@ -13,6 +13,7 @@ from lgmd_gym.benchmark.traffic.rows import KEYS as TRAFFIC_KEYS
 WITHOUT_UNIT = {
     *("agent", "suite", "case", "fcw_driver", "seed", "condition", "world", "camera", "side", "error"),
     *("threat", "collision", "avoided", "false_activation", "premature_brake"),
+    *("false_alert", "braking_onsets"),
     *("alerts", "brakes", "false_activations", "stops", "needless_activations", "activations"),
     *("avoidable", "avoided_by_brake", "caused"),
     *("family", "overlap", "impact_location", "target_side", "light", "load"),

@@ -45,7 +45,7 @@ def test_trained_policy_acts_as_the_model_predicts(tmp_path, capsys, demands, la
     from stable_baselines3 import PPO
 
     text = YAML.replace("repeat: 4", "repeat: 4, latch: true") if latch else YAML
-    config = online_config(tmp_path, text=text, demands=demands)
+    config = online_config(tmp_path, text=text, demands=demands, seed=1)
     path = train(config, tmp_path / "run")
     assert path.stat().st_size < 1_000_000
     card = read_card(path)

@@ -42,10 +42,10 @@ def test_traces_of_unequal_episodes_in_a_vector_env(mode):
     )
     envs.reset(seed=0)
     done, episodes = np.zeros(2, bool), np.zeros(2, int)
-    for step in range(200):
+    for step in range(260):
         if mode == AutoresetMode.DISABLED and done.any():
             envs.reset(options={"reset_mask": done})
-        action = np.array([[-1.0 if step < 60 else 0.0], [0.0]], np.float32)
+        action = np.array([[-1.0 if step < 200 else 0.0], [0.0]], np.float32)
         observation, _, terminated, truncated, infos = envs.step(action)
         done = terminated | truncated
         episodes += done

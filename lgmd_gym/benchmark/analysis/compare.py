@@ -38,6 +38,7 @@ QUANTITIES = (
     Quantity("speed reduction", "speed_reduction", "km/h", 3.6),
     Quantity("premature braking", "premature_brake", "% of threats", 100.0),
     Quantity("false activation", "false_activation", "% of non-threats", 100.0, threats=False),
+    Quantity("false alert", "false_alert", "% of non-threats", 100.0, threats=False),
     Quantity("TTC at braking", "ttc_at_brake", "s"),
     Quantity("stopping margin", "stopping_margin", "m"),
 )

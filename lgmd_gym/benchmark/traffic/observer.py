@@ -9,7 +9,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.reader import Moment, SceneFrame
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.neuron import LGMDParams
-from lgmd_gym.sensing.assembly import Assembly, Traces, row_of
+from lgmd_gym.sensing.assembly import Assembly, EgoMotion, Traces, row_of
 from lgmd_gym.sensing.highway import camera_rate
 from lgmd_gym.sensing.sensor_array import SensorArray
 
@@ -40,9 +40,9 @@ class Observer:
             for index in self._process(moments, number):
                 frame = moments[index].frames[number]  # type: ignore[union-attr]
                 self._traces.append(index, frame.time, frame.speed)
-        motion = [(0.0, 0.0) if moment is None else (moment.speed, moment.yaw_rate) for moment in moments]
-        speeds, yaw_rates = np.array(motion).T
-        observations, infos = self._assembly.observations(speeds, yaw_rates), self._assembly.infos()
+        motions = [(0.0, 0.0, 0.0) if moment is None else moment.motion for moment in moments]
+        motion = EgoMotion(*np.array(motions).T)
+        observations, infos = self._assembly.observations(motion), self._assembly.infos()
         steps: list[Step | None] = [None] * len(moments)
         for index, moment in enumerate(moments):
             if moment is not None:

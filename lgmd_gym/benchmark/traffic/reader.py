@@ -9,7 +9,7 @@ import numpy as np
 from lgmd_gym.agents import to_action
 from lgmd_gym.aliases import Info
 from lgmd_gym.envs.traffic.env import TrafficEnv
-from lgmd_gym.sensing.assembly import mean_yaw_rate
+from lgmd_gym.sensing.assembly import EgoMotion, EgoPose
 from lgmd_gym.sensing.highway import on_road_step
 from lgmd_gym.sensing.sensor_array import SensorArray
 
@@ -28,8 +28,7 @@ class Moment(NamedTuple):
     """Result of a reset or of one decision of a traffic environment, before its frames are drawn."""
 
     info: Info  # info of the environment
-    speed: float  # ego speed [m/s]
-    yaw_rate: float  # mean yaw rate of the decision [rad/s]
+    motion: EgoMotion  # motion of the ego in the decision
     frames: tuple[SceneFrame, ...]  # camera frames since the last decision
     done: bool  # whether the episode has ended
 
@@ -63,17 +62,17 @@ class SceneReader:
         on_road_step(self.env, self._on_substep)
         self._substeps, self._frames = 0, []
         self._read()
-        return Moment(info, float(self.env.ego.speed), 0.0, tuple(self._frames), False)
+        return Moment(info, EgoMotion(float(self.env.ego.speed), 0.0, 0.0), tuple(self._frames), False)
 
     def step(self, demand: float | None = None) -> Moment:
         """Advance by one decision and read its frames; None keeps the last demand."""
         env, substeps, self._frames = self.env, self._substeps, []
-        heading = float(env.ego.heading)
+        before = _pose(env)
         if demand is not None:
             env.action_type.act(to_action(demand))
         info, done = env.advance()
-        rate = mean_yaw_rate(float(env.ego.heading), heading, (self._substeps - substeps) / self._hz)
-        return Moment(info, float(env.ego.speed), rate, tuple(self._frames), done)
+        motion = EgoMotion.between(before, _pose(env), (self._substeps - substeps) / self._hz)
+        return Moment(info, motion, tuple(self._frames), done)
 
     def _on_substep(self) -> None:
         self._substeps += 1
@@ -87,3 +86,7 @@ class SceneReader:
         top_views = tuple(sensors.frame_of(k, i).copy() for k in self._top_views)
         time, speed = self._substeps / self._hz, float(self.env.ego.speed)
         self._frames.append(SceneFrame(time, speed, sensors.scenes[i].copy(), objects, top_views))
+
+
+def _pose(env: TrafficEnv) -> EgoPose:
+    return EgoPose(float(env.ego.heading), float(env.ego.speed))

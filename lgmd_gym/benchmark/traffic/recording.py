@@ -75,7 +75,9 @@ class TrafficRecording:
         The second is for `emergencies`, the third for `scaled_emergencies`.
         """
         moving = [
-            index / self.policy_hz for index, moment in enumerate(self.moments) if moment.speed > JAM_SPEED
+            index / self.policy_hz
+            for index, moment in enumerate(self.moments)
+            if moment.motion.speed > JAM_SPEED
         ]
         needed, scaled = (
             sum(item.time_until(time) is not None for time in moving) / self.policy_hz

@@ -35,7 +35,7 @@ from lgmd_gym.agents.zones import NUM_FIELDS
 from lgmd_gym.training.offline.episodes import Observation, RecordedEpisode
 
 EPISODES_AT_ONCE = 16  # whose inputs are computed together
-EVEN = ("ego_speed", "known_deceleration", "zones", "zones_spikes", "zones_ffi")
+EVEN = ("ego_speed", "ego_acceleration", "known_deceleration", "zones", "zones_spikes", "zones_ffi")
 """Inputs that the mirror image does not change."""
 EXCHANGED = ("columns", "sides", "sides_ffi")
 """Inputs of which the mirror image exchanges left and right."""
