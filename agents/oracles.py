@@ -6,17 +6,14 @@ from math import inf
 import numpy as np
 
 from lgmd_gym.agents.base import (
-    BRAKE,
     FPS,
-    HOLD,
-    BatchAgent,
     Infos,
     LatchingAgent,
     Observations,
     StagedAgent,
     State,
 )
-from lgmd_gym.agents.stages import Evidence
+from lgmd_gym.agents.stages import Evidence, StageParams
 from lgmd_gym.agents.zones import CAMERA_SETBACK, FULL_DECELERATION, stopping_distance
 from lgmd_gym.envs.forecast import ForecastParams
 from lgmd_gym.errors import check_positive
@@ -24,9 +21,12 @@ from lgmd_gym.errors import check_positive
 TARGET_WIDTH = 1.712  # ISO 19206-3 [m]; `info` has no width
 DECISION_INTERVAL = 1 / FPS  # [s]
 RELEASE = 2.0  # [s] for which braking must be able to wait after a release
+# [s] before the last moment. A driver who brakes at 4 m/s², 1.2 s after the alert (Euro NCAP AEB C2C v4.3.1,
+# 8.4.6), needs 2.7 s to a standing car at 80 km/h with a brake of 9 m/s².
+WARNING = 3.0
 
 
-class LastMomentOracle(BatchAgent):
+class LastMomentOracle(StagedAgent):
     """Brakes fully at the last moment at which the episode's brake avoids the contact: a bound of agents.
 
     It reads the time to brake, which the engine decides by forks of the episode: what happens if the ego goes
@@ -34,7 +34,7 @@ class LastMomentOracle(BatchAgent):
     episode's brake, see `lgmd_gym.envs.forecast`. It brakes when one more decision would be too late. A
     contact that no braking avoids makes it brake where waiting begins to raise the impact speed: at once, or,
     with oncoming cars, in time to stand still. It releases the brake when braking could wait for 2 s after
-    the release.
+    the release. It warns 3 s before.
 
     It knows the present motion of others, their paths, and the rest of what they have begun, such as the
     deceleration of a lead car that brakes. With `foresight` it also knows what they will begin, and brakes
@@ -51,17 +51,14 @@ class LastMomentOracle(BatchAgent):
 
     name = "last-moment-oracle"
     reads_neuron = False
+    brake = StageParams(release_s=0.0, hold_speed=0.0)
 
     def __init__(self, share: float = 1.0, foresight: bool = False) -> None:
         self.config = {"forecast": asdict(ForecastParams(share=share, foresight=foresight))}
         super().__init__()
 
-    def initial(self) -> State:
-        """Return a released brake."""
-        return {"braking": False}
-
-    def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
-        """Return `BRAKE` from the last moment on until the brake can be released, else `HOLD`.
+    def evidence(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return the evidence of the time to brake.
 
         Raises:
             ValueError: If the environment does not forecast the time to brake.
@@ -71,9 +68,10 @@ class LastMomentOracle(BatchAgent):
                 f"{self.name} requires info['ttb']; make the environment with config={self.config}"
             )
         ttb = np.asarray(infos["ttb"], np.float64)
-        braking = (ttb < DECISION_INTERVAL / 2) | (self.state["braking"] & (ttb < RELEASE))
-        self.alerts = self.state["braking"] = braking
-        return np.where(braking, BRAKE, HOLD)
+        braking = self.state["stage"] == Evidence.FULL
+        kept = np.where(braking & (ttb < RELEASE), Evidence.PRESENT, Evidence.CLEAR)
+        warned = np.where(~braking & (ttb < WARNING), Evidence.WARNING, kept)
+        return np.where(ttb < DECISION_INTERVAL / 2, Evidence.FULL, warned)
 
 
 class TTCOracle(StagedAgent):
