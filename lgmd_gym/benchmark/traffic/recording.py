@@ -38,7 +38,7 @@ class TrafficRecording:
         end = len(self.moments) - 1
         return Branch(
             0,
-            [moment.speed for moment in self.moments],
+            [moment.motion.speed for moment in self.moments],
             [moment.info["required_deceleration"] for moment in self.moments],
             self.contact is not None,
             lambda: self.fork(end),
