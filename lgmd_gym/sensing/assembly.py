@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import ArrayLike
 
 from lgmd_gym.aliases import Values
 from lgmd_gym.neuron import Response
@@ -40,9 +39,9 @@ class TraceFrame(NamedTuple):
 class EgoMotion(NamedTuple):
     """Motion of the egos, arrays of shape (N,), or numbers for a single environment."""
 
-    speed: ArrayLike  # speed [m/s]
-    yaw_rate: ArrayLike  # mean yaw rate of the decision, + right [rad/s]
-    acceleration: ArrayLike  # mean acceleration of the decision [m/s²]
+    speed: Any  # speed [m/s]
+    yaw_rate: Any  # mean yaw rate of the decision, + right [rad/s]
+    acceleration: Any  # mean acceleration of the decision [m/s²]
 
     @classmethod
     def between(cls, before: "EgoPose", after: "EgoPose", elapsed_s: float) -> "EgoMotion":

@@ -186,11 +186,11 @@ def test_branch_is_simulated_as_far_as_needed_and_leaves_the_environment_unchang
     recorded = Recorded("following", config={"duration": 12}).recording
     env = recorded.fork(30)
     branch = branch_from(env, 30)
-    assert branch.speed(30) == env.ego.speed == recorded.moments[30].speed
+    assert branch.speed(30) == env.ego.speed == recorded.moments[30].motion.speed
     assert branch.contact(40) is None
     assert branch.contact(400) == recorded.contact == len(recorded.moments) - 1
-    assert branch.speed(recorded.contact) == recorded.moments[-1].speed
-    assert branch.speed(400) == recorded.moments[-1].speed
+    assert branch.speed(recorded.contact) == recorded.moments[-1].motion.speed
+    assert branch.speed(400) == recorded.moments[-1].motion.speed
     assert recorded.course.speed(30) == env.ego.speed
     assert recorded.course.contact(recorded.contact - 1) is None
     assert recorded.emergencies.contact == recorded.contact / 30
