@@ -27,6 +27,9 @@ from typing import ClassVar
 from lgmd_gym.errors import shown
 from lgmd_gym.fields import Record, flag, number, numbers, record
 
+INATTENTIVE = "inattentive-"
+"""What precedes a kind of traffic with drivers who err, where training names kinds."""
+
 
 @record
 class Attention(Record):

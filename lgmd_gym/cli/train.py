@@ -58,7 +58,7 @@ class Train:
     4000:CCRsCurve,FastCCRs 1000:EmptyRoad."""
     extra_traffic: Annotated[tuple[str, ...] | None, arg(metavar="N:KIND[,KIND...] [...]")] = None
     """Traffic episodes of some kinds that offline trains on in addition, for example
-    2000:intersection,roundabout."""
+    2000:intersection,roundabout, or 400:inattentive-highway with drivers who err."""
     jobs: int = 2
     """Number of processes that record episodes, and of threads that train an ensemble."""
     out: File = None

@@ -14,6 +14,7 @@ from lgmd_gym.agents.base import FPS
 from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
 from lgmd_gym.aliases import Arguments, Config, Values
+from lgmd_gym.envs.attention import INATTENTIVE
 from lgmd_gym.envs.families.distribution import EXTRA_FAMILIES, check_families
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, traffic_id
 from lgmd_gym.errors import (
@@ -159,7 +160,8 @@ class TrainConfig(Record):
         (),
         _texts(TRAFFIC_EXAMPLE),
         'Traffic episodes of some kinds that "offline" trains on in addition, a number and the kinds each, '
-        f'for example "{TRAFFIC_EXAMPLE}"; a quarter as many are added to its evaluations',
+        f'for example "{TRAFFIC_EXAMPLE}" or "400:inattentive-highway" with drivers who err; a quarter as '
+        "many are added to its evaluations",
     )
 
     def check(self) -> None:
@@ -328,7 +330,8 @@ def parse_traffic(text: str) -> ExtraEpisodes:
 
 
 def _check_kinds(names: list[str]) -> tuple[str, ...]:
-    return tuple(check_known("kind of traffic", name, TRAFFIC_KINDS) for name in names)
+    known = (*TRAFFIC_KINDS, *(INATTENTIVE + kind for kind in TRAFFIC_KINDS))
+    return tuple(check_known("kind of traffic", name, known) for name in names)
 
 
 def _parse_extra(

@@ -147,6 +147,11 @@ def test_offline_requires_holding_and_hard_braking(demands):
             {"extra_traffic": ["3:merge", "3:roundabot"]},
             "unknown kind of traffic 'roundabot'; did you mean 'roundabout'",
         ),
+        (
+            "offline",
+            {"extra_traffic": ["3:inattentive-merge,inattentive-highwy"]},
+            "unknown kind of traffic 'inattentive-highwy'; did you mean 'inattentive-highway'",
+        ),
         ("offline", {"traffic_episodes": -1}, r"traffic_episodes must be in \[0, inf\), got -1"),
         (
             "offline",

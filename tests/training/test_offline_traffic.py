@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from support.recordings import offline_config
-from support.traffic import Recorded
+from support.traffic import BlockedHighway, EmptyHighway, Following, Recorded, Standing
 
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs.appearance import Appearance
@@ -15,9 +15,11 @@ from lgmd_gym.training.offline import traffic
 from lgmd_gym.training.offline.recorder import EpisodeRecorder
 from lgmd_gym.training.offline.traffic import (
     TrafficRecorder,
+    brake_to_standstill,
     non_threat_episode,
     run_episode,
     segment_bounds,
+    threat_episode,
 )
 
 HIGHWAY, INTERSECTION = 0, 3  # seeds of these kinds of traffic
@@ -114,3 +116,86 @@ def test_emergencies_equal_those_of_the_benchmark():
     assert min(times) < 4.5 < max(times)
     assert contact is None
     assert recording.emergencies == Emergencies(None, tuple(time for time in times if time <= 7.5 + 1e-9))
+
+
+def observations_of(env, seed=0):
+    """Return the observations of an episode without braking, the ego speed only."""
+    _, info = env.reset(seed=seed)
+    found, done = [], False
+    while not done:
+        found.append({"ego_speed": np.array([info["ego_speed"]], np.float32)})
+        info, done = env.advance()
+    return found, info
+
+
+def test_segment_before_a_contact_has_the_outcome_of_braking():
+    """The contact is after 4.57 s; full braking avoids it up to 3.3 s."""
+    observations, info = observations_of(Following())
+    episode = threat_episode(Following(), 0, observations)
+    assert (episode.threat, episode.traffic, len(episode)) == (True, True, len(observations) == 137 and 137)
+    first_late = int(np.argmax(episode.braking_contacts))
+    assert 96 <= first_late <= 102
+    assert episode.braking_contacts[first_late:].all()
+    speed = episode.observations["ego_speed"][:, 0].astype(float)
+    impact = info["relative_impact_speed"] / speed.max()
+    assert episode.rewards[:-1] == pytest.approx(speed[:-1] / speed.max() / 30.0, abs=1e-6)
+    assert episode.rewards[-1] == pytest.approx(
+        speed[-1] / speed.max() / 30.0 - 10.0 - 10.0 * impact**2, abs=1e-5
+    )
+    assert episode.braking_returns[first_late - 1] > -1.0
+    assert episode.braking_returns[first_late] < -9.0
+
+
+def test_segment_before_a_contact_is_at_most_ten_seconds_long():
+    class Late(Following):
+        glances, brakings = ((9.0, 13.0),), ((9.5, 12.5, 8.0),)
+
+    observations, _ = observations_of(Late())
+    assert len(observations) > 310
+    episode = threat_episode(Late(), 0, observations)
+    assert len(episode) == 300
+    assert episode.observations["ego_speed"][0] == observations[-300]["ego_speed"]
+
+
+def test_contacts_that_no_braking_avoids_are_left_out():
+    class Close(BlockedHighway):
+        stationary_car_at = 14.0
+
+    observations, _ = observations_of(Close())
+    assert threat_episode(Close(), 0, observations) is None
+    observations, _ = observations_of(Standing())
+    assert threat_episode(Standing(), 0, observations) is None
+
+
+def test_a_twin_that_does_not_repeat_the_contact_is_rejected():
+    observations, _ = observations_of(Following())
+    with pytest.raises(RuntimeError, match="does not repeat its contact at decision 137"):
+        threat_episode(EmptyHighway(), 0, observations)
+
+
+def test_return_of_a_stop_on_an_empty_road():
+    """Distance over the top speed, minus the full cost of braking: 2 per second, build-up in proportion."""
+    env = EmptyHighway()
+    env.reset(seed=0)
+    speed = float(env.ego.speed)
+    outcome = brake_to_standstill(env, speed)
+    distance, duration = 0.233 * speed + speed**2 / 18.0, speed / 9.0
+    assert not outcome.contact
+    assert outcome.episode_return == pytest.approx(distance / speed - 2.0 * duration, abs=0.08)
+
+
+def test_kinds_with_drivers_who_err_add_segments_before_contacts(monkeypatch):
+    make_traffic, made = traffic.make_traffic, []
+
+    def short(kind, **arguments):
+        made.append((kind, arguments.get("attention"), arguments["camera"]))
+        return make_traffic(kind, config={"duration": 12}, **arguments)
+
+    monkeypatch.setattr(traffic, "make_traffic", short)
+    camera = {"name": "wide", "shape": (8, 8)}
+    kinds = ("inattentive-two-way", "two-way")
+    erring, attentive = TrafficRecorder("validation", camera, kinds).record(range(20_000, 20_002))
+    assert not any(episode.threat for episode in attentive)
+    assert {kind for kind, *_ in made} == {"two-way"}
+    assert {attention for _, attention, _ in made} == {"inattentive", None}
+    assert any(camera is None for *_, camera in made) == any(episode.threat for episode in erring)

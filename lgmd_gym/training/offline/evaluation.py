@@ -52,7 +52,7 @@ class Evaluation(NamedTuple):
     weighted_return: float
     avoided: float  # share of threats that end without contact
     false_activations: float  # share of levels without a threat in which the policy brakes
-    traffic_activations: float  # share of traffic segments in which the policy brakes; NaN without any
+    traffic_activations: float  # share of traffic segments without a threat with a brake; NaN without any
 
 
 def evaluate(
@@ -103,7 +103,7 @@ def evaluate_margins(
                 weighted_return=_balanced_mean(weighted, traffic),
                 avoided=_mean(~contacts[threats]),
                 false_activations=_mean(brakes[~traffic & ~threats]),
-                traffic_activations=_mean(brakes[traffic]),
+                traffic_activations=_mean(brakes[traffic & ~threats]),
             )
         )
     return results

@@ -1,29 +1,45 @@
-"""Episodes without a threat, recorded in traffic.
+"""Segments of episodes in traffic, without a threat and, with drivers who err, before a contact.
 
 Levels last seconds and contain little driving without an event: following, oncoming cars, starting. Traffic
 episodes add it. Segments far from any emergency are kept; braking in them is always a false activation, so
 its return is computed without replays.
+
+With inattentive drivers, the last seconds before a contact that braking avoids are kept, too. The return of
+braking at their decisions comes from replays of the traffic without sensors.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
-from lgmd_gym.agents import make_agent
+from lgmd_gym.agents import BRAKE, make_agent, to_action
 from lgmd_gym.benchmark.episode import rollout
 from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.benchmark.traffic.branch import fork
 from lgmd_gym.camera.scene import WEATHERS
+from lgmd_gym.envs.attention import INATTENTIVE
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.families.distribution import draw_weather
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, make_traffic
 from lgmd_gym.envs.reward import RewardParams
 from lgmd_gym.envs.traffic.emergencies import EMERGENCY, Emergencies, simulate_driver
+from lgmd_gym.envs.traffic.env import JAM_SPEED, TrafficEnv
 from lgmd_gym.neuron import NeuronSpec
 from lgmd_gym.sensing.channel import ChannelSpec
-from lgmd_gym.training.offline.episodes import TRAFFIC, Observation, RecordedEpisode, select_signals, stack
+from lgmd_gym.training.offline.episodes import (
+    TRAFFIC,
+    BrakingOutcome,
+    Observation,
+    RecordedEpisode,
+    select_signals,
+    stack,
+)
+from lgmd_gym.training.offline.recorder import STRIDE, braking_outcomes
 
 MARGIN = 10.0  # segments end this time before an emergency [s]
 MAX_LENGTH = 10.0  # longest segment [s]; levels last 7 s in the median and 22 s at most
@@ -36,7 +52,8 @@ class TrafficRecorder:
 
     split: str  # "train" or "validation"; light, weather and ground texture are drawn as for its levels
     camera: ChannelSpec  # see `LGMDObservation`
-    kinds: tuple[str, ...] = tuple(TRAFFIC_KINDS)  # kinds of traffic, for successive seeds in turn
+    # kinds of traffic, for successive seeds in turn; those with `INATTENTIVE` before them have such drivers
+    kinds: tuple[str, ...] = tuple(TRAFFIC_KINDS)
     shrink: int | None = None  # see `select_signals`
     params: NeuronSpec = None  # parameters of the neurons, see `LGMDObservation`
 
@@ -46,17 +63,17 @@ class TrafficRecorder:
 
     def _record_segments(self, seed: int) -> list[RecordedEpisode]:
         kind = self.kinds[seed % len(self.kinds)]
-        with_frame = self.shrink is not None
+        erring = kind.startswith(INATTENTIVE)
         weather, texture = draw_weather(self.split, seed, tuple(WEATHERS))
-        env = make_traffic(
-            kind,
-            self.camera,
-            params=self.params,
-            include_frame=with_frame,
+        make = partial(
+            make_traffic,
+            kind.removeprefix(INATTENTIVE),
             weather=weather,
             scene={"texture": texture},
             split=self.split,
+            **({"attention": "inattentive"} if erring else {}),
         )
+        env = make(camera=self.camera, params=self.params, include_frame=self.shrink is not None)
         base: Any = env.unwrapped
         try:
             observations, emergencies = run_episode(env, seed, self.shrink)
@@ -65,10 +82,14 @@ class TrafficRecorder:
         policy_hz = base.config["policy_frequency"]
         times = np.arange(len(observations)) / policy_hz
         non_threat = [emergencies.time_until(time, MARGIN) is None for time in times.tolist()]
-        return [
+        segments = [
             non_threat_episode(stack(observations[first:last]), policy_hz)
             for first, last in segment_bounds(non_threat, policy_hz)
         ]
+        if erring and base.road.contact is not None and observations:
+            threat = threat_episode(make(camera=None), seed, observations)
+            segments += [] if threat is None else [threat]
+        return segments
 
 
 def run_episode(env: gym.Env, seed: int, shrink: int | None = None) -> tuple[list[Observation], Emergencies]:
@@ -136,3 +157,88 @@ def non_threat_episode(observations: Observation, policy_hz: float) -> RecordedE
         traffic=True,
         family=TRAFFIC,
     )
+
+
+def threat_episode(twin: gym.Env, seed: int, observations: list[Observation]) -> RecordedEpisode | None:
+    """Return the segment before the contact that ends an episode, with the outcome of braking.
+
+    Rewards are those of `BrakingEnv` without jerk, with the highest speed of the segment as scripted speed.
+    The outcome of braking ends at a standstill or a contact, also one that another car causes.
+
+    Args:
+        twin: The same environment without sensors.
+        seed: Seed of the episode.
+        observations: Observations of all its decisions.
+
+    Returns:
+        The segment; None for a contact of an ego that stands, or one that no braking in the segment avoids.
+    """
+    env: Any = twin.unwrapped
+    policy_hz, last = env.config["policy_frequency"], len(observations)
+    first = max(last - round(MAX_LENGTH * policy_hz), 0)
+    twin.reset(seed=seed)
+    snapshots: list[TrafficEnv] = []
+    for decision in range(last):
+        if decision >= first and (decision - first) % STRIDE == 0:
+            snapshots.append(fork(env))
+        env.step_unobserved()
+    contact = env.road.contact
+    if contact is None:
+        raise RuntimeError(f"traffic of seed {seed} does not repeat its contact at decision {last}")
+    segment = stack(observations[first:last])
+    speed = segment["ego_speed"][:, 0].astype(float)
+    top_speed = max(float(speed.max()), 1e-9)
+
+    def replay(pairs: list[tuple[int, int]]) -> Iterator[BrakingOutcome]:
+        for _, onset in pairs:
+            copy = fork(snapshots[onset // STRIDE])
+            for _ in range(onset % STRIDE):
+                copy.step_unobserved()
+            yield brake_to_standstill(copy, top_speed)
+
+    if contact.impact_speed < JAM_SPEED:
+        return None
+    (outcomes,) = braking_outcomes([len(speed)], replay)
+    if all(outcome.contact for outcome in outcomes):
+        return None
+    weights = RewardParams()
+    rewards = weights.progress * speed / top_speed / policy_hz
+    rewards[-1] -= _contact_cost(contact.relative_impact_speed, top_speed)
+    return RecordedEpisode(
+        segment,
+        rewards=rewards.astype(np.float32),
+        braking_returns=np.array([outcome.episode_return for outcome in outcomes], np.float32),
+        braking_contacts=np.array([outcome.contact for outcome in outcomes]),
+        threat=True,
+        traffic=True,
+        family=TRAFFIC,
+    )
+
+
+def brake_to_standstill(env: Any, top_speed: float) -> BrakingOutcome:
+    """Brake fully up to a standstill or a contact, and return the outcome with the rewards of `BrakingEnv`.
+
+    Args:
+        env: The environment; it is stepped.
+        top_speed: Scripted speed of the rewards [m/s].
+    """
+    weights, dt = RewardParams(), 1.0 / float(env.config["policy_frequency"])
+    env.action_type.act(to_action(BRAKE))
+    total, speed = 0.0, float(env.ego.speed)
+    while True:
+        info, _ = env.advance()
+        before, speed = speed, float(info["ego_speed"])
+        total += weights.progress * dt * min((before + speed) / (2.0 * top_speed), 1.0)
+        if info["collision"]:
+            total -= _contact_cost(float(info["relative_impact_speed"]), top_speed)
+            return BrakingOutcome(total, True)
+        if info["ttc"] >= weights.need_ttc:
+            total -= weights.brake * dt * float(info["deceleration"]) / env.brake.max_deceleration
+        if speed == 0.0:
+            return BrakingOutcome(total, False)
+
+
+def _contact_cost(relative_impact_speed: float, top_speed: float) -> float:
+    """Return the cost of a contact with a relative impact speed [m/s]; `BrakingEnv` has the formula."""
+    weights = RewardParams()
+    return weights.contact + weights.impact * min(max(relative_impact_speed, 0.0) / top_speed, 1.0) ** 2
