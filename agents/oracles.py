@@ -16,7 +16,7 @@ from lgmd_gym.agents.base import (
 from lgmd_gym.agents.stages import Evidence, StageParams
 from lgmd_gym.agents.zones import CAMERA_SETBACK, FULL_DECELERATION, stopping_distance
 from lgmd_gym.envs.forecast import ForecastParams
-from lgmd_gym.errors import check_positive
+from lgmd_gym.errors import check_positive, check_whole
 
 TARGET_WIDTH = 1.712  # ISO 19206-3 [m]; `info` has no width
 DECISION_INTERVAL = 1 / FPS  # [s]
@@ -46,15 +46,16 @@ class LastMomentOracle(StagedAgent):
         share: Share of the full deceleration with which braking must avoid the contact, in (0, 1]. The
             deceleration that is required reaches this share when it brakes, and it brakes fully. With 1, the
             default, it brakes as late as possible: the forks are exact, so that a margin would avoid no more.
-        foresight: Whether it knows what others have not begun.
+        foresight: 1 if it knows what others have not begun, else 0.
     """
 
     name = "last-moment-oracle"
     reads_neuron = False
     brake = StageParams(release_s=0.0, hold_speed=0.0)
 
-    def __init__(self, share: float = 1.0, foresight: bool = False) -> None:
-        self.config = {"forecast": asdict(ForecastParams(share=share, foresight=foresight))}
+    def __init__(self, share: float = 1.0, foresight: int = 0) -> None:
+        params = ForecastParams(share=share, foresight=check_whole("foresight", foresight, 0, 1) == 1)
+        self.config = {"forecast": asdict(params)}
         super().__init__()
 
     def evidence(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
@@ -65,7 +66,8 @@ class LastMomentOracle(StagedAgent):
         """
         if "ttb" not in infos:
             raise ValueError(
-                f"{self.name} requires info['ttb']; make the environment with config={self.config}"
+                f"{self.name} requires info['ttb'], which traffic does not have; make the environment with "
+                f"config={self.config}"
             )
         ttb = np.asarray(infos["ttb"], np.float64)
         braking = self.state["stage"] == Evidence.FULL

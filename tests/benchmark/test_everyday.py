@@ -3,8 +3,10 @@
 The formulas state when this car's brake avoids a contact; the last-moment oracle must avoid exactly these.
 """
 
+import re
 from collections import Counter
 from math import inf
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.families import LEVELS
+from lgmd_gym.envs.families.adjacent import YIELDING
 
 PREMATURE = 4.0  # [s] before the contact without braking
 DECISION = 1 / 30  # [s]
@@ -82,10 +85,12 @@ def required_time(case, brake):
     speed, target = case.speed, case.scenario.actors[0].speed
     if case.family in ("CutInThreat", "ClosingLead"):
         return stopping_distance(speed - target, brake) / (speed - target)
-    if case.family in ("PedestrianTowards", "BicycleTowards"):  # they walk until the ego stands
+    if case.family in ("PedestrianTowards", "BicycleTowards", "RollingCar"):  # they move until the ego stands
         moved = target * stopping_time(speed, brake)
-        return (stopping_distance(speed, brake) + moved) / (speed + target)
-    if case.family == "RollingCar":  # the ego must stand before the place at which the car comes to rest
+        time = (stopping_distance(speed, brake) + moved) / (speed + target)
+        if case.family != "RollingCar" or time >= YIELDING:
+            return time
+        # The car has begun to brake: the ego must stand before the place at which the car comes to rest.
         return (stopping_distance(speed, brake) + target / 4.0) / speed
     return stopping_distance(speed, brake) / speed
 
@@ -115,6 +120,16 @@ def test_numbers_of_cases():
         assert {case.family for case in cases} <= {*LEVELS}
         assert all(case.environment == LEVELS[case.family].family for case in cases)
         assert all(LEVELS[case.family].threat is (name == "everyday-threats") for case in cases)
+
+
+def test_the_documentation_counts_the_cases():
+    text = (Path(__file__).parents[2] / "docs" / "protocols.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\w+) \| (\d+) \| [\d–, ]+ \| ", text, re.MULTILINE)
+    assert {name: int(number) for name, number in rows} == Counter(case.family for case in THREATS)
+    part = text.partition("`everyday-neighbours` has 43 cases")[2].partition("\n\n")[0]
+    named = dict(re.findall(r"(\w+)\s(\d+)[,)]", part))
+    counted = Counter(case.family for case in SUITES["everyday-neighbours"].cases)
+    assert {name: int(number) for name, number in named.items()} == counted
 
 
 def test_values_of_cases():

@@ -129,8 +129,17 @@ def test_the_oracle_brakes_at_the_last_moment_and_releases():
     demands = [agent.act({}, {"ttb": ttb})[0] for ttb in (0.1, 1 / 30, 0.0, 1.9, 2.0, inf, 0.0)]
     assert demands == [0.0, 0.0, -1.0, -1.0, 0.0, 0.0, -1.0]
     assert agent.alert
-    with pytest.raises(ValueError, match=r"last-moment-oracle requires info\['ttb'\]; make the environment"):
+    with pytest.raises(ValueError, match=r"requires info\['ttb'\], which traffic does not have; make the"):
         agent.act({}, {"ttc": 1.0})
+
+
+def test_options_of_the_oracle():
+    agent = make_agent("last-moment-oracle:foresight=1")
+    assert agent.config == {"forecast": {"share": 1.0, "foresight": True}}
+    with pytest.raises(ValueError, match=r"foresight must be"):
+        make_agent("last-moment-oracle:foresight=2")
+    with pytest.raises(ValueError, match=r"share must be in \(0, 1\], got 0"):
+        make_agent("last-moment-oracle:share=0")
 
 
 def test_vector_environments_forecast_as_single_ones():
