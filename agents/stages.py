@@ -70,7 +70,7 @@ def next_stages(
     """
     clear_s = np.where(evidence == Evidence.CLEAR, clear_s + decision_s, 0.0)
     held = (stages >= Evidence.PARTIAL) & (speeds <= params.hold_speed)
-    ended = (clear_s > params.release_s - 1e-9) & ~held
+    ended = (evidence == Evidence.CLEAR) & (clear_s > params.release_s - 1e-9) & ~held
     called = np.where(evidence >= Evidence.WARNING, evidence, 0)
     return np.where(ended, 0, np.maximum(stages, called)), clear_s
 

@@ -15,7 +15,7 @@ from lgmd_gym.fields import Record, flag, number, record
 from lgmd_gym.kernels import kernel
 
 TOLERANCE = 1e-3  # by which a severity must be higher to be worse
-APPROACH = 300.0  # [s] within which a car on its way to the standing ego counts
+APPROACH = 300.0  # [s] within which a body on its way to the standing ego counts
 STRUCK = (
     1.0  # severity of a contact while the ego stands; while it moves, the relative speed [m/s] adds to it
 )
@@ -140,8 +140,8 @@ def _outcome(
 ) -> tuple[int, float]:
     """Return the outcome of a fork in which the ego brakes after `waiting` decisions.
 
-    A fork ends at a contact; with the episode, while the ego waits; and when the ego has stopped, unless a
-    car or motorcycle is about to touch it. Pedestrians, bicycles and animals stop before a standing car.
+    A fork ends at a contact; with the episode, while the ego waits; and when the ego has stopped, unless
+    another is on its way to it, whose motion then goes on until it stops or, steadily, strikes the ego.
 
     Returns:
         Number of decisions up to the end, and severity of the contact, 0 for none, see `STRUCK`.
@@ -165,7 +165,7 @@ def _outcome(
             if is_truncated(episode):
                 return decision, 0.0
         elif ego.speed == 0.0:
-            other = approaching(bodies, episode.bodies, fork.paths[i], APPROACH)
+            other = approaching(bodies, episode.bodies, fork.paths[i], APPROACH, True)
             if other == 0:
                 return decision, 0.0
             if bodies[other].segment == bodies[other].segment_end or is_truncated(episode):

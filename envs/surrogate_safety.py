@@ -72,21 +72,23 @@ def contact_time(bodies: np.ndarray, count: int, paths: np.ndarray) -> float:
 
 @kernel(exact=True)
 def is_approached(bodies: np.ndarray, count: int, paths: np.ndarray) -> bool:
-    """Return whether a car or motorcycle touches the ego within 10 s; see `approaching`."""
-    return approaching(bodies, count, paths, TTC_HORIZON) > 0
+    """Return whether a car or motorcycle touches the ego within 10 s; see `approaching`.
+
+    Pedestrians and bicycles do not count: they stop in front of a standing car.
+    """
+    return approaching(bodies, count, paths, TTC_HORIZON, False) > 0
 
 
 @kernel(exact=True)
-def approaching(bodies: np.ndarray, count: int, paths: np.ndarray, horizon: float) -> int:
-    """Return the index of a car or motorcycle that touches the ego if the ego stands and others keep speed.
-
-    Pedestrians and bicycles do not count: they stop in front of a standing car.
+def approaching(bodies: np.ndarray, count: int, paths: np.ndarray, horizon: float, everyone: bool) -> int:
+    """Return the index of a body that touches the ego if the ego stands and others keep their speed.
 
     Args:
         bodies: See `lead_of`.
         count: See `lead_of`.
         paths: See `lead_of`.
         horizon: Time within which the contact counts [s].
+        everyone: Whether all bodies count; otherwise cars and motorcycles.
 
     Returns:
         The index of the body, 0 for none.
@@ -97,7 +99,9 @@ def approaching(bodies: np.ndarray, count: int, paths: np.ndarray, horizon: floa
     )
     for i in range(1, count):
         body = bodies[i]
-        if body.speed == 0.0 or (body.kind != CAR and body.kind != MOTORCYCLE):
+        if body.speed == 0.0 or body.kind == ROAD_MARKING:
+            continue
+        if not everyone and body.kind != CAR and body.kind != MOTORCYCLE:
             continue
         if time_on_paths(standing, _motion(body, paths), horizon, TTC_STEP) < inf:
             return i

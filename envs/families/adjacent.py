@@ -32,7 +32,7 @@ from lgmd_gym.envs.families.arguments import (
     within,
 )
 from lgmd_gym.envs.families.family import Level, family
-from lgmd_gym.envs.families.road_users import LARGE_CAR
+from lgmd_gym.envs.families.road_users import LARGE_CAR, RunUp, yielding
 from lgmd_gym.envs.families.scenario import (
     AFTERMATH,
     EGO_LENGTH,
@@ -55,7 +55,6 @@ QUEUE_SPACING = 2.0  # [m] between the cars of a queue
 AFTER_PASSING = 2.0  # [s] of driving after the last car
 CHANGE_START = 2.0  # [s] after which a car that cuts in leaves its lane
 MIN_CLOSING = 0.5  # [m/s], slowest approach to a car that cuts in; slower ones take minutes
-YIELDING = 1.0  # [s] before the contact, at which an oncoming car begins to yield
 LAST_STRAIGHT = 1.5  # [s] before the contact, at which the lane change of CCFhol ends
 TOP_KMH = 140.0  # of cars that overtake on a motorway, in random levels
 
@@ -235,18 +234,13 @@ def meet_in_lane(
     rolls towards the ego, and whose driver notices it late. The episode continues at the ego's standstill.
     Sources: Euro NCAP AEB Car-to-Car v4.3.1; Frontal Collisions v1.1; `yields` is not a case of a protocol.
     """
-    gap, profile = START_TTC * (ego_speed + target_speed), ()
-    if yields:
-        stopping = 2.0 * YIELDING  # [s], half of it before the contact, in which three quarters are covered
-        deceleration = target_speed / stopping
-        profile = (Segment(start=START_TTC - YIELDING, acceleration=-deceleration),)
-        gap -= deceleration * YIELDING**2 / 2
+    motion = yielding(target_speed) if yields else RunUp(target_speed, (), START_TTC * target_speed)
     target = Actor(
-        gap=gap,
+        gap=START_TTC * ego_speed + motion.distance,
         lateral_offset=(impact_location - 0.5) * EGO_WIDTH,
         heading=pi,
         speed=target_speed,
-        profile=profile,
+        profile=motion.profile,
         shade=shade,
     )
     return _on_two_way_road("CCFhos", ego_speed, START_TTC + AFTERMATH, target)

@@ -19,6 +19,7 @@ from lgmd_gym.envs.families.scenario import (
     Actor,
 )
 
+YIELDING = 1.0  # [s] before the contact, at which a road user that moves towards the ego begins to brake
 SIDES = {"right": 1.0, "left": -1.0}
 """Sides from which road users cross, with the sign of their direction, + to the left."""
 
@@ -80,6 +81,19 @@ def run_up(contact: float, speed: float, steady: float, acceleration_distance: f
         segment = Segment(start=0.0, acceleration=strength, final_speed=speed)
         return RunUp(reached, (segment,), steady + acceleration_distance - reached**2 / (2.0 * strength))
     return RunUp(speed, (), speed * contact)
+
+
+def yielding(speed: float) -> RunUp:
+    """Return the motion of a road user towards the ego that brakes evenly from 1 s before the contact on.
+
+    The contact is 5 s after the start; without it, the road user comes to rest 1 s later.
+
+    Args:
+        speed: Speed before, > 0 [m/s].
+    """
+    deceleration = speed / (2.0 * YIELDING)
+    segment = Segment(start=START_TTC - YIELDING, acceleration=-deceleration)
+    return RunUp(speed, (segment,), START_TTC * speed - deceleration * YIELDING**2 / 2)
 
 
 def parked_row(front: float, inner: float, cars: tuple[RoadUser, ...], spacing: float) -> tuple[Actor, ...]:

@@ -31,9 +31,11 @@ from lgmd_gym.envs.families.road_users import (
     SIDES,
     SMALL_CAR,
     RoadUser,
+    RunUp,
     crossing_actor,
     parked_row,
     run_up,
+    yielding,
 )
 from lgmd_gym.envs.families.scenario import (
     AFTERMATH,
@@ -64,7 +66,10 @@ Location = Annotated[
     ),
 ]
 Child = Annotated[bool, truth("Whether the pedestrian is a child")]
-Towards = Annotated[bool, truth("Whether the motion is towards the ego")]
+Towards = Annotated[
+    bool,
+    truth("Whether the motion is towards the ego, from 1 s before the contact on with an even deceleration"),
+]
 Clearance = Annotated[float, within("[0.2, 10]", "m", "Distance between the sides of ego and road user")]
 
 
@@ -434,11 +439,13 @@ def _ahead(
         raise ValueError(
             f"{speed_name} must be below ego_speed {ego_speed:g} m/s in {name}, got {user_speed:g}"
         )
+    motion = yielding(user_speed) if towards else RunUp(user_speed, (), -START_TTC * user_speed)
     target = Actor(
-        gap=START_TTC * (ego_speed + (user_speed if towards else -user_speed)),
+        gap=START_TTC * ego_speed + motion.distance,
         lateral_offset=(impact_location - 0.5) * EGO_WIDTH,
         heading=pi if towards else 0.0,
         speed=user_speed,
+        profile=motion.profile,
         shade=shade,
         **user.fields,
     )

@@ -16,7 +16,7 @@ from lgmd_gym.benchmark.suites import SUITES, find_case
 from lgmd_gym.envs.braking import BrakingEnv
 from lgmd_gym.envs.dynamics.brake import BrakeParams
 from lgmd_gym.envs.families import LEVELS
-from lgmd_gym.envs.families.adjacent import YIELDING
+from lgmd_gym.envs.families.road_users import YIELDING
 
 PREMATURE = 4.0  # [s] before the contact without braking
 DECISION = 1 / 30  # [s]
@@ -85,12 +85,14 @@ def required_time(case, brake):
     speed, target = case.speed, case.scenario.actors[0].speed
     if case.family in ("CutInThreat", "ClosingLead"):
         return stopping_distance(speed - target, brake) / (speed - target)
-    if case.family in ("PedestrianTowards", "BicycleTowards", "RollingCar"):  # they move until the ego stands
+    if case.family in ("PedestrianTowards", "BicycleTowards", "RollingCar"):
         moved = target * stopping_time(speed, brake)
         time = (stopping_distance(speed, brake) + moved) / (speed + target)
-        if case.family != "RollingCar" or time >= YIELDING:
+        if (
+            time >= YIELDING
+        ):  # the target has not begun to brake, and is expected to move until the ego stands
             return time
-        # The car has begun to brake: the ego must stand before the place at which the car comes to rest.
+        # The ego must stand before the place at which the target comes to rest.
         return (stopping_distance(speed, brake) + target / 4.0) / speed
     return stopping_distance(speed, brake) / speed
 

@@ -171,13 +171,14 @@ def test_persons_in_the_lane():
 def test_road_users_towards_the_ego():
     check_actor(
         scenario("CPLA", ego_speed=10.0, walking_speed=2.0, towards=True, impact_location=0.75).actors[0],
-        gap=60.0, lateral_offset=0.45, heading=pi, speed=2.0, kind="pedestrian", length=0.6, width=0.5,
-        height=1.8,
+        gap=50.0 + 4.75 * 2.0, lateral_offset=0.45, heading=pi, speed=2.0, kind="pedestrian", length=0.6,
+        width=0.5, height=1.8, profile=(Segment(start=4.0, acceleration=-1.0),),
     )  # fmt: skip
     faster = scenario("CBLA", ego_speed=3.0, bicycle_speed=4.0, towards=True)
     check_actor(
         faster.actors[0],
-        gap=35.0, heading=pi, speed=4.0, kind="bicycle", length=1.89, width=0.5, height=1.86,
+        gap=15.0 + 4.75 * 4.0, heading=pi, speed=4.0, kind="bicycle", length=1.89, width=0.5, height=1.86,
+        profile=(Segment(start=4.0, acceleration=-2.0),),
     )  # fmt: skip
     invalid("CBLA", "bicycle_speed must be below ego_speed", ego_speed=3.0, bicycle_speed=4.0)
 

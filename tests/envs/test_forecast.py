@@ -126,7 +126,8 @@ def test_after_a_release_the_time_to_brake_is_that_of_the_present_motion():
 
 def test_the_oracle_brakes_at_the_last_moment_and_releases():
     agent = make_agent("last-moment-oracle")
-    demands = [agent.act({}, {"ttb": ttb})[0] for ttb in (0.1, 1 / 30, 0.0, 1.9, 2.0, inf, 0.0)]
+    times = (0.1, 1 / 30, 0.0, 1.9, 2.0, inf, 0.0)
+    demands = [agent.act({}, {"ttb": ttb, "ego_speed": 9.0})[0] for ttb in times]
     assert demands == [0.0, 0.0, -1.0, -1.0, 0.0, 0.0, -1.0]
     assert agent.alert
     with pytest.raises(ValueError, match=r"requires info\['ttb'\], which traffic does not have; make the"):
