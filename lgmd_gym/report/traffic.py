@@ -9,7 +9,8 @@ from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.run_folder import read_run, read_settings
 from lgmd_gym.benchmark.summary import Sample, by_condition, write_csv
 from lgmd_gym.benchmark.task import NO_BRAKE
-from lgmd_gym.benchmark.traffic.summary import CAPTION, TrafficSummary, traffic_summaries
+from lgmd_gym.benchmark.traffic.summary import TrafficSummary, traffic_summaries
+from lgmd_gym.envs.traffic.emergencies import EMERGENCY_SHARE, HORIZON
 from lgmd_gym.errors import counted
 from lgmd_gym.plotting.style import COLOURS, saved_figure
 from lgmd_gym.processes.files import replace_file
@@ -30,6 +31,14 @@ COLUMNS = (
     "of the standing ego",
 )
 STYLES = ("", ".1f", "", ".1f", *("d",) * 8)
+CAPTION = (
+    "Needless: without the brake, no contact and no required deceleration of "
+    f"{100.0 * EMERGENCY_SHARE:.0f} % of full braking within {HORIZON:g} s; [95 % interval, clustered by "
+    "drive and world]. Speed lost: in needless brakes, against the same drive without them. Avoided by a needed "
+    "brake: of the contacts without agent that full braking avoids, except those that vanished because of "
+    "earlier braking. Not avoidable: contacts without agent that it does not avoid. Caused: contacts that "
+    "would not follow without the brake. Of the standing ego: another car drove into it."
+)
 BENEFIT = "avoided-against-speed-lost"
 
 
@@ -71,7 +80,7 @@ def _section(path: Path, config: RunConfig, condition: str, rows: Sequence[Episo
     summaries = _ordered(traffic_summaries(rows), config)
     kinds = _ordered(traffic_summaries(rows, by_kind=True), config)
     tables = (
-        DataTable("agents", COLUMNS, [_cells(item) for item in summaries], STYLES, f"{CAPTION}."),
+        DataTable("agents", COLUMNS, [_cells(item) for item in summaries], STYLES, CAPTION),
         DataTable(
             "kinds",
             ("agent", "kind", *COLUMNS[1:]),
@@ -135,7 +144,8 @@ def _draw(stem: Path, summaries: Sequence[TrafficSummary]) -> None:
             axis.plot(lost, rate.k / rate.n, "o", color=colour, label=f"{item.agent}: {rate.k}/{rate.n}")
             lines.append([item.agent, f"{lost:.4f}", rate.k, rate.n, f"{rate.low:.4f}", f"{rate.high:.4f}"])
         axis.set_xscale("symlog", linthresh=10.0)
-        axis.set(xlim=(-0.5, None), ylim=(-0.02, 1.02))
+        highest = max(item.per_100km(item.speed_lost) for item in summaries)
+        axis.set(xlim=(-0.5, max(2.0 * highest, 10.0)), ylim=(-0.02, 1.02))
         axis.set_xlabel("speed lost in needless brakes [m/s per 100 km]")
         axis.set_ylabel("contacts avoided by a needed brake")
         axis.legend(fontsize=8, loc="lower right")
