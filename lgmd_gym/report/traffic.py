@@ -34,10 +34,10 @@ STYLES = ("", ".1f", "", ".1f", *("d",) * 8)
 CAPTION = (
     "Needless: without the brake, no contact and no required deceleration of "
     f"{100.0 * EMERGENCY_SHARE:.0f} % of full braking within {HORIZON:g} s; [95 % interval, clustered by "
-    "drive and world]. Speed lost: in needless brakes, against the same drive without them. Avoided by a needed "
-    "brake: of the contacts without agent that full braking avoids, except those that vanished because of "
-    "earlier braking. Not avoidable: contacts without agent that it does not avoid. Caused: contacts that "
-    "would not follow without the brake. Of the standing ego: another car drove into it."
+    "drive and world]. Speed lost: in needless brakes, against the same drive without them. Avoided by a "
+    "needed brake: of the contacts without agent that full braking avoids, except those that vanished "
+    "because of earlier braking. Not avoidable: contacts without agent that it does not avoid. Caused: "
+    "contacts that would not follow without the brake. Of the standing ego: another car drove into it."
 )
 BENEFIT = "avoided-against-speed-lost"
 
