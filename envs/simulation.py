@@ -262,6 +262,9 @@ class Simulation:
         if self.state.restore(index, snapshot.state):
             self._link()
         self.brakes[index] = snapshot.brake
+        if self.forecasts is not None:
+            self.forecasts["begun"][index] = UNKNOWN
+            self._forecast_part(index, index + 1, np.ones(self.num_envs, np.bool_))
 
     def _run(self, part: Callable[..., None], *arguments: object) -> None:
         if self._threads.count == 1:

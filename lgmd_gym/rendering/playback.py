@@ -122,7 +122,8 @@ def play_episode(
     checked_overlays(overlays)
     sensors = (sensors or SensorConfig()).for_agent(agent)
     with ExitStack() as stack:
-        options = with_config({**sensors.arguments, **(surroundings or {})}, agent.config)
+        config = {} if _is_traffic(target) else agent.config
+        options = with_config({**sensors.arguments, **(surroundings or {})}, config)
         env = make_target(target, arguments, **options)
         stack.callback(env.close)
         if video is None and not live:
@@ -145,6 +146,13 @@ def play_episode(
         if not result.stopped:
             any(not show() for _ in range(round(FINAL_SECONDS * rate)))
         return result
+
+
+def _is_traffic(target: str | Case) -> bool:
+    """Return whether a target is traffic, which takes no configuration of `BrakingEnv`."""
+    if isinstance(target, Case):
+        return False
+    return target.partition("/")[0] in TRAFFIC_SUITES or target in map(traffic_id, TRAFFIC_KINDS)
 
 
 def _play(
