@@ -451,8 +451,10 @@ class StoppingZone(Rule):
         upright, low = recent[..., :NUM_ZONES], recent[..., NUM_ZONES:]
         zones = self._zones & reached[..., :NUM_ZONES] & upright & low[..., LOW_FIELD]
         standing = active[:, None] & zones.any(axis=2)
-        self.state["warns"] = standing[:, 1]
-        self.state["present"] = excited[:, 0, :NUM_ZONES].any(axis=1)
+        warns: np.ndarray = standing[:, 1]
+        self.state["warns"] = warns
+        present: np.ndarray = np.any(excited[:, 0, :NUM_ZONES], axis=1)
+        self.state["present"] = present
         return standing[:, 0]
 
 

@@ -13,6 +13,7 @@ from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 from lgmd_gym.agents.base import FPS
+from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
 from lgmd_gym.agents.policies.features import NORMALIZER_SUFFIX, FeatureConfig, save_normalizer
 from lgmd_gym.agents.policies.network import WEIGHTS, NetworkSpec, describe_network
 from lgmd_gym.aliases import Arguments, Config, Values
@@ -75,6 +76,11 @@ def _check_network(name: str, network: object) -> NetworkSpec:
     return NetworkSpec.make(cast("NetworkSpec | Values", check_type(name, network, dict, NetworkSpec)))
 
 
+def _check_brake(name: str, brake: object) -> TimeToBrakeParams:
+    values = cast("TimeToBrakeParams | Values", check_type(name, brake, dict, TimeToBrakeParams))
+    return TimeToBrakeParams.make(values)
+
+
 def _check_normalizer(name: str, file: object) -> str:
     text = check_text(name, file)
     if text != PureWindowsPath(text).name or text in ("", ".", ".."):
@@ -110,6 +116,14 @@ class PolicyCard(Record):
             "Demand of each discrete action, in [-1, 1]; None for a continuous demand",
         )
     )
+    brake: TimeToBrakeParams | None = optional(
+        value(
+            None,
+            _check_brake,
+            "Brake with stages, for a policy whose discrete actions are intervals of the time to brake; None "
+            "for actions that are demands",
+        )
+    )
     vec_normalize: str | None = optional(
         value(
             None,
@@ -127,13 +141,22 @@ class PolicyCard(Record):
     )
 
     def check(self) -> None:
-        """Raise ValueError for a network of plain values with statistics that would be unpickled."""
+        """Raise ValueError for values that do not belong together."""
+        if self.brake is not None and (self.demands or (self.features and self.features.latch)):
+            raise ValueError("a card with brake must have no demands, and no latch in its features")
         name = self.vec_normalize
         if self.network is not None and name is not None and not name.endswith(NORMALIZER_SUFFIX):
             raise ValueError(
                 f"vec_normalize must be a file {NORMALIZER_SUFFIX} of save_card in a card with network, got "
                 f"{shown(name)}, which would be unpickled"
             )
+
+    @property
+    def num_actions(self) -> int | None:
+        """Number of discrete actions; None for a continuous demand."""
+        if self.brake is not None:
+            return self.brake.num_actions
+        return len(self.demands) if self.demands else None
 
 
 def card_file(path: Path) -> Path:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from lgmd_gym.agents.base import BatchAgent, Infos, Observations, State
+from lgmd_gym.agents.base import Infos, Observations, StagedAgent, State
 from lgmd_gym.agents.policies.card import PolicyCard, policy_card
 from lgmd_gym.agents.policies.features import (
     FRAME,
@@ -19,6 +19,7 @@ from lgmd_gym.agents.policies.features import (
     load_normalizer,
 )
 from lgmd_gym.agents.policies.network import dense_layers, run_dense
+from lgmd_gym.agents.stages import Evidence
 from lgmd_gym.errors import check_path, check_text, check_within, shown, unknown_name
 from lgmd_gym.processes.extras import missing_extra
 
@@ -92,11 +93,14 @@ class NormalizedInputs:
         return self._normalizer.normalize_obs(self._inputs.stack(rows))
 
 
-class Policy(BatchAgent):
+class Policy(StagedAgent):
     """Agent that acts with a trained stable-baselines3 model, without exploration.
 
     The network runs once for all environments. Where the two best actions are almost equal, and for
     continuous actions, it runs for each environment by itself, so that demands do not depend on N.
+
+    With a card that has a `brake`, the actions are intervals of the time to brake, and the brake has stages,
+    see `TimeToBrakeParams`. Otherwise they are demands.
 
     The file is a model of stable-baselines3 with a card (`PolicyCard`), inside it or beside it: the cameras,
     features and demands. With a card that describes the network, as of `lgmd-gym train`, loading reads the
@@ -106,8 +110,9 @@ class Policy(BatchAgent):
     Args:
         path: Zip file, or name of a policy in this package.
         margin: Log odds of braking above which the policy brakes, in [-20, 20]; not 0 only for a policy that
-            chooses one of two demands by their probabilities, such as those of `--algo offline`. Above 0, the
-            policy brakes later and less often: it has fewer false activations and avoids fewer contacts.
+            chooses one of two demands by their probabilities, such as those of `--algo offline`, or whose
+            brake has stages. Above 0, the policy warns and brakes later and less often: it has fewer false
+            activations and avoids fewer contacts.
 
     Attributes:
         card: The card.
@@ -129,8 +134,12 @@ class Policy(BatchAgent):
         self.network = _load_network(file, self.card)
         names = tuple(getattr(self.network.observation_space, "spaces", ()))
         self._check_network(file, names)
-        if margin != 0.0:
+        self._margin = margin
+        if self.card.brake is not None:
+            self.brake = self.card.brake
+        elif margin != 0.0:
             self._subtract(margin)
+        if margin != 0.0:
             self.name += f":margin={margin:.12g}"
         raw = FeatureConfig(inputs=names, history=1, repeat=1, shrink=1)
         self.features = raw if self.card.features is None else self.card.features
@@ -146,14 +155,12 @@ class Policy(BatchAgent):
         """Raise ValueError unless the inputs, cameras and actions of the network are those of the card."""
         card, space = self.card, self.network.observation_space
         expected = set(names) & set(RAW_INPUTS) if card.features is None else set(card.features.inputs)
-        actions, demands = getattr(self.network.action_space, "n", None), card.demands
+        actions = getattr(self.network.action_space, "n", None)
         faults: list[str] = []
         if set(names) != expected or not names:
             faults.append(f"inputs {', '.join(names) or space} instead of {', '.join(sorted(expected))}")
-        if actions != (len(demands) if demands else None):
-            faults.append(
-                f"{actions or 'continuous'} actions instead of {len(demands or ()) or 'continuous'}"
-            )
+        if actions != card.num_actions:
+            faults.append(f"{actions or 'continuous'} actions instead of {card.num_actions or 'continuous'}")
         if not faults and card.features is None and "spike_frequency" in names:
             cameras = space["spike_frequency"].shape[0], _count(card.camera)
             faults += [f"{cameras[0]} cameras instead of {cameras[1]}"] if cameras[0] != cameras[1] else []
@@ -195,7 +202,7 @@ class Policy(BatchAgent):
 
     def initial(self) -> State:
         """Return a released brake and the number of decisions."""
-        return {"demand": 0.0, "decisions": 0}
+        return super().initial() | {"demand": 0.0, "decisions": 0, "evidence": int(Evidence.CLEAR)}
 
     def reset(
         self, mask: np.ndarray | None = None, seeds: Sequence[int | None] | np.ndarray | None = None
@@ -207,8 +214,11 @@ class Policy(BatchAgent):
     def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
         """Return new demands at every `repeat`-th call, else the last ones; hold latched demands.
 
-        The alerts are the activations of the brake; those of individual neurons are not used.
+        The alerts are the stages from the warning on, or else the activations of the brake; those of
+        individual neurons are not used.
         """
+        if self.card.brake is not None:
+            return super().demands(observations, infos, active)
         demands, decisions = self.state["demand"], self.state["decisions"]
         rows = np.flatnonzero(active & ~self.features.latches(demands))
         if len(rows):
@@ -219,6 +229,28 @@ class Policy(BatchAgent):
             decisions[rows] += 1
         self.alerts = demands < 0.0
         return demands
+
+    def evidence(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
+        """Return new evidence at every `repeat`-th call, else the last one."""
+        evidence, decisions, rows = self.state["evidence"], self.state["decisions"], np.flatnonzero(active)
+        self._inputs.update(observations, rows)
+        due = rows[decisions[rows] % self.features.repeat == 0]
+        if len(due):
+            evidence[due] = self._judge(self._inputs.stack(due))
+        decisions[rows] += 1
+        return evidence
+
+    def _judge(self, inputs: dict[str, np.ndarray]) -> np.ndarray:
+        """Return the evidence for the inputs of several environments, arrays of shape (M, …)."""
+        brake, logits = self.card.brake, self._values(inputs)
+        assert brake is not None
+        assert logits is not None  # the card was compared with the network
+        evidence, safe = brake.evidence(brake.odds(logits), self._margin)
+        if len(evidence) > 1:
+            for row in np.flatnonzero(~safe).tolist():  # see `SAFE_DISTANCE`
+                alone = {name: values[row : row + 1] for name, values in inputs.items()}
+                evidence[row] = self._judge(alone)[0]
+        return evidence
 
     def decide(self, inputs: dict[str, np.ndarray]) -> list[float]:
         """Return the demands for the inputs of several environments, arrays of shape (M, …)."""
@@ -338,7 +370,7 @@ def _described_network(path: Path, card: PolicyCard) -> Any:
     state = path.stat()
     key = (path.resolve(), state.st_mtime_ns, state.st_size, repr(card))
     if key not in _LOADED:
-        network = card.network.load(path, card.algo, len(card.demands) if card.demands else None)
+        network = card.network.load(path, card.algo, card.num_actions)
         if len(_LOADED) >= _MAX_LOADED:
             _LOADED.clear()
         _LOADED[key] = network

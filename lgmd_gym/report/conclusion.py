@@ -163,7 +163,10 @@ def _policy_note(path: str) -> str:
     inputs = (
         "the observations of the environment" if card.features is None else ", ".join(card.features.inputs)
     )
-    demands = f"{len(card.demands)} levels of demand" if card.demands else "a continuous demand"
+    if card.brake is not None:
+        demands = "a brake with stages by the time to brake"
+    else:
+        demands = f"{len(card.demands)} levels of demand" if card.demands else "a continuous demand"
     sensors = counted(cameras, "camera")
     algo = cast(Values, training).get("algo") if isinstance(training, dict) else card.algo
     method = "offline training" if algo == "offline" else str(algo).upper()

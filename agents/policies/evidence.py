@@ -1,0 +1,83 @@
+"""Evidence of a policy that estimates the time to brake: how long full braking can still wait."""
+
+import numpy as np
+
+from lgmd_gym.agents.stages import Evidence, StageParams
+from lgmd_gym.errors import check_items, check_positive, shown
+from lgmd_gym.fields import number, record, value
+
+ODDS = "[-50, 50]"
+# The outputs of a network depend on the size of the batch, because the order of float32 sums does. The
+# differences are near 1e-6. A distance from every threshold beyond this limit does not depend on them.
+SAFE_DISTANCE = 1e-3
+
+
+def _check_limits(name: str, limits: object) -> tuple[float, ...]:
+    values = tuple(check_positive(name, item) for item in check_items(name, limits, object, "numbers"))
+    if not values or list(values) != sorted(set(values)):
+        raise ValueError(f"{name} must be ascending numbers, at least one, got {shown(limits)}")
+    return values
+
+
+@record
+class TimeToBrakeParams(StageParams):
+    """A brake with stages for a policy whose actions are intervals of the time to brake.
+
+    Action k of the policy stands for a time to brake below `limits_s[k]` and not below the limit before it;
+    the last action for a longer one, or none. The log odds of a time to brake below a limit are those of the
+    sum of the probabilities of the actions up to it.
+    """
+
+    label = "brake"
+
+    limits_s: tuple[float, ...] = value(
+        (0.3, 0.6, 1.2, 2.6), _check_limits, "Upper ends of the intervals, ascending", "(0, inf)", "s"
+    )
+    full_s: float = number(0.6, "(0, inf)", "s", "Time to brake, one of `limits_s`, for full braking.")
+    full_odds: float = number(0.0, ODDS, "", "Log odds from which on the policy brakes fully.")
+    partial_s: float = number(1.2, "(0, inf)", "s", "The same limit for partial braking.")
+    partial_odds: float = number(50.0, ODDS, "", "Log odds for partial braking; 50 for never.")
+    warning_s: float = number(2.6, "(0, inf)", "s", "The same limit for the warning.")
+    warning_odds: float = number(0.0, ODDS, "", "Log odds for the warning.")
+    present_s: float = number(2.6, "(0, inf)", "s", "The same limit for keeping a stage.")
+    present_odds: float = number(-2.0, ODDS, "", "Log odds from which on a stage is kept.")
+
+    def check(self) -> None:
+        """Raise ValueError for a stage at a time to brake that the policy does not distinguish."""
+        for name in ("full_s", "partial_s", "warning_s", "present_s"):
+            if getattr(self, name) not in self.limits_s:
+                limits = ", ".join(f"{limit:g}" for limit in self.limits_s)
+                raise ValueError(f"{name} must be one of limits_s, {limits}, got {getattr(self, name):g}")
+
+    @property
+    def num_actions(self) -> int:
+        """Number of actions of the policy."""
+        return len(self.limits_s) + 1
+
+    def odds(self, logits: np.ndarray) -> np.ndarray:
+        """Return the log odds of a time to brake below each limit, float64, shape (N, limits).
+
+        Args:
+            logits: Logits of the actions, shape (N, actions).
+        """
+        values = logits.astype(np.float64)
+        below = np.logaddexp.accumulate(values, axis=1)[:, :-1]
+        above = np.logaddexp.accumulate(values[:, ::-1], axis=1)[:, ::-1][:, 1:]
+        return below - above
+
+    def evidence(self, odds: np.ndarray, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return the `Evidence` of log odds, int64, shape (N,), and whether it is far from every threshold.
+
+        Args:
+            odds: Log odds, see `odds`.
+            margin: Added to the thresholds of all stages.
+        """
+        evidence = np.full(len(odds), int(Evidence.CLEAR))
+        safe = np.ones(len(odds), np.bool_)
+        for item in (Evidence.PRESENT, Evidence.WARNING, Evidence.PARTIAL, Evidence.FULL):
+            name = item.name.lower()
+            limit = self.limits_s.index(getattr(self, f"{name}_s"))
+            distance = odds[:, limit] - getattr(self, f"{name}_odds") - margin
+            evidence = np.where(distance > 0.0, int(item), evidence)
+            safe &= np.abs(distance) > SAFE_DISTANCE
+        return evidence, safe
