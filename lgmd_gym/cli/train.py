@@ -22,7 +22,8 @@ class Train:
     """
 
     algo: str = "dqn"
-    """Algorithm: dqn, ppo, sac, or offline (trained on recorded episodes)."""
+    """Algorithm: dqn, ppo, sac, or one of two that are trained on recorded episodes: offline (a brake that
+    latches) and time-to-brake (a brake that warns, brakes and is released)."""
     env: str = "LGMD/RandomBraking-v0"
     """Environment id; random levels and traffic are trained on the split train, evaluated on validation."""
     camera: Names = None

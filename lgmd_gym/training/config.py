@@ -28,7 +28,13 @@ from lgmd_gym.errors import (
 )
 from lgmd_gym.fields import Record, optional, record, text, value, whole
 from lgmd_gym.sensing.channel import ChannelSpec, make_channels, plain_values
-from lgmd_gym.training.hyperparams import ALGORITHMS, OFFLINE, read_hyperparams
+from lgmd_gym.training.hyperparams import (
+    ALGORITHMS,
+    OFFLINE,
+    RECORDED,
+    TIME_TO_BRAKE,
+    read_hyperparams,
+)
 from lgmd_gym.training.policy_env import PolicyWrapper
 
 RANDOM_ID = "LGMD/RandomBraking-v0"
@@ -37,7 +43,7 @@ CAMERAS = ("fovea", "tele", "wide")
 SEED_STRIDE = 1_000_000  # distance between the environment seeds of neighbouring training seeds
 MAX_SEED = 2**32 - 1  # of NumPy's global generator, which stable-baselines3 seeds
 VALIDATION_SEED = 10_000  # first environment seed of an evaluation
-DEMANDS = {"ppo": (0.0, -1.0), "dqn": (0.0, -1.0), "sac": (), OFFLINE: (0.0, -1.0)}
+DEMANDS = {"ppo": (0.0, -1.0), "dqn": (0.0, -1.0), "sac": (), OFFLINE: (0.0, -1.0), TIME_TO_BRAKE: ()}
 LEVELS_EXAMPLE = f"400:{','.join(EXTRA_FAMILIES[:2])}"
 TRAFFIC_EXAMPLE = "400:intersection,roundabout"
 
@@ -123,7 +129,8 @@ class TrainConfig(Record):
         100_000,
         "[1, inf)",
         "",
-        'Number of policy decisions over all environments; for "offline" number of recorded episodes',
+        'Number of policy decisions over all environments; of recorded episodes for "offline" and '
+        '"time-to-brake"',
     )
     policy: str = text("MultiInputPolicy", "stable-baselines3's name of the network")
     algo_kwargs: Arguments = value(
@@ -173,9 +180,13 @@ class TrainConfig(Record):
         _check_extra_episodes(self)
         if self.algo == OFFLINE:
             _check_offline(self)
+        if self.algo == TIME_TO_BRAKE:
+            _check_time_to_brake(self)
         for name in ("recordings", "traffic_episodes", "extra_levels", "extra_traffic"):
-            if getattr(self, name) and self.algo != OFFLINE:
-                raise ValueError(f"{name} requires algo 'offline', got {self.algo!r}; omit it")
+            if getattr(self, name) and self.algo not in RECORDED:
+                raise ValueError(
+                    f"{name} requires algo {' or '.join(map(repr, RECORDED))}, got {self.algo!r}; omit it"
+                )
 
     @classmethod
     def from_hyperparams(
@@ -191,7 +202,7 @@ class TrainConfig(Record):
         """Return the configuration for an environment from a hyperparameter file.
 
         Args:
-            algo: "ppo", "sac", "dqn" or "offline".
+            algo: "ppo", "sac", "dqn", "offline" or "time-to-brake".
             env_id: Environment id; the entry `default` is used for an id without an entry.
             file: YAML file in rl-zoo's format; None for the file of this package.
             inputs: Inputs of the policy in place of those in the file.
@@ -215,7 +226,7 @@ class TrainConfig(Record):
         if check_items("inputs", inputs, str, "names"):
             values["features"] |= {"inputs": inputs}
         features = values["features"] = FeatureConfig.make(values["features"])
-        defaults: Arguments = {"demands": DEMANDS[algo], "eval_episodes": 600 if algo == OFFLINE else 96}
+        defaults: Arguments = {"demands": DEMANDS[algo], "eval_episodes": 600 if algo in RECORDED else 96}
         agent = features.cameras_of
         if agent is not None:
             defaults["camera"] = _cameras_of(agent)
@@ -373,15 +384,31 @@ def _check_offline(config: "TrainConfig") -> None:
         )
     if not config.features.latch:
         raise ValueError("algo 'offline' requires latch: true in its hyperparameters")
-    changed = set(config.env_kwargs.get("config") or {}) - {"action"}
-    if changed and (config.traffic_episodes or config.extra_traffic):
-        raise ValueError(
-            f"traffic episodes have the default {', '.join(sorted(changed))}, got others in config of "
-            "env_kwargs; omit them, or traffic_episodes and extra_traffic"
-        )
+    _check_traffic(config)
     if "speed_change" in config.features.inputs:
         # A policy with this input braked in traffic whenever the driver accelerated.
         raise ValueError(
             "algo 'offline' does not support the input 'speed_change': the ego never accelerates in "
             "recorded levels; remove it from the inputs"
+        )
+
+
+def _check_time_to_brake(config: "TrainConfig") -> None:
+    """Raise ValueError for values that driven episodes do not support."""
+    if config.demands:
+        raise ValueError(
+            f"algo 'time-to-brake' has a brake with stages, got demands {list(config.demands)}; omit demands"
+        )
+    if config.features.latch:
+        raise ValueError("algo 'time-to-brake' requires latch: false in its hyperparameters")
+    _check_traffic(config)
+
+
+def _check_traffic(config: "TrainConfig") -> None:
+    """Raise ValueError for a configuration that episodes in traffic do not have."""
+    changed = set(config.env_kwargs.get("config") or {}) - {"action"}
+    if changed and (config.traffic_episodes or config.extra_traffic):
+        raise ValueError(
+            f"traffic episodes have the default {', '.join(sorted(changed))}, got others in config of "
+            "env_kwargs; omit them, or traffic_episodes and extra_traffic"
         )

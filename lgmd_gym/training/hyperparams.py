@@ -18,7 +18,10 @@ from lgmd_gym.errors import (
 from lgmd_gym.processes.inputs import read_text
 
 OFFLINE = "offline"  # the algorithm of `lgmd_gym.training.offline.learner`
-ALGORITHMS = ("ppo", "sac", "dqn", OFFLINE)
+TIME_TO_BRAKE = "time-to-brake"  # the algorithm of `lgmd_gym.training.offline.time_to_brake`
+RECORDED = (OFFLINE, TIME_TO_BRAKE)
+"""Algorithms that learn from recorded episodes."""
+ALGORITHMS = ("ppo", "sac", "dqn", *RECORDED)
 WRAPPER = "lgmd_gym.training.PolicyWrapper"
 
 

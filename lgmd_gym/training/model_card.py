@@ -88,6 +88,8 @@ def best_result(folder: Path) -> EvaluationResult | None:
     if offline.exists():
         with offline.open(encoding="utf-8") as file:
             rows = [*csv.DictReader(file)]
+        if rows and "mean_return" not in rows[0]:  # of time-to-brake, which has losses instead
+            return None
         # The policy is that of the first epoch with the final best return, which may be a weighted one.
         chosen = [row["mean_return"] for row in rows if row["best_return"] == rows[-1]["best_return"]]
         return EvaluationResult(float(chosen[0]), None, None) if rows else None

@@ -1,11 +1,12 @@
 """Recorded episodes of an offline training run: newly recorded, or reused from another run."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 from json import dumps, loads
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 
@@ -24,9 +25,11 @@ from lgmd_gym.training.config import (
     parse_levels,
     parse_traffic,
 )
+from lgmd_gym.training.hyperparams import TIME_TO_BRAKE
+from lgmd_gym.training.offline.driving import DriveRecorder, TrafficDriveRecorder
 from lgmd_gym.training.offline.episodes import (
     CHUNK_SIZE,
-    RecordedEpisode,
+    Recorded,
     RecordFunction,
     check_file,
     is_complete,
@@ -104,13 +107,24 @@ def _traffic_set(
     seeds = range(first, first + (traffic.count if train else -(-traffic.count // TRAFFIC_RATIO)))
     params = config.env_kwargs.get("params")
     recorder = TrafficRecorder(split, config.camera, traffic.names, _frame_shrink(config), params)
+    record = TrafficDriveRecorder(recorder).record if config.algo == TIME_TO_BRAKE else recorder.record
     name = f"extra-traffic{number}-{split}" if number else f"traffic-{split}"
     settings = {"kinds": list(traffic.names)} if number else {}
-    return RecordingSet(name, seeds, recorder.record, option, settings, CHUNK_SIZE)
+    return RecordingSet(name, seeds, record, option, settings, CHUNK_SIZE)
 
 
-def _level_recorder(config: TrainConfig, split: str) -> LevelRecorder | EpisodeRecorder:
-    """Return the recorder of the engine, or that of single environments where the engine has no id."""
+def _level_recorder(config: TrainConfig, split: str) -> LevelRecorder | EpisodeRecorder | DriveRecorder:
+    """Return the recorder of the engine, or that of single environments where the engine has no id.
+
+    Raises:
+        ValueError: For time-to-brake with an environment or a camera that the engine does not have.
+    """
+    if config.algo == TIME_TO_BRAKE:
+        if not _is_in_engine(config):
+            raise ValueError(
+                f"algo 'time-to-brake' requires a braking environment and no top view, got {config.env_id!r}"
+            )
+        return DriveRecorder(config.env_id, config.env_arguments(split), _frame_shrink(config))
     if _is_in_engine(config):
         return LevelRecorder(
             config.env_id,
@@ -140,12 +154,14 @@ def origin_of(config: TrainConfig) -> Values:
     values = config.to_dict()
     origin: Values = {"format": FORMAT, "lgmd_gym": lgmd_gym.__version__}
     origin |= {name: values[name] for name in ("env_id", "env_kwargs", "camera", "demands")}
+    if config.algo == TIME_TO_BRAKE:
+        origin["algo"] = TIME_TO_BRAKE
     return loads(dumps(origin | {"shrink": _frame_shrink(config)}))  # lists in place of tuples
 
 
 def load_or_record(
     config: TrainConfig, split: str, folder: Path, progress: bool = False, jobs: int = 1
-) -> Iterator[RecordedEpisode]:
+) -> Iterator[Any]:
     """Return the episodes of a split: reused if `config.recordings` is set, else recorded in the folder.
 
     Missing episodes are recorded at once; the files are loaded one by one as the episodes are consumed.
@@ -160,7 +176,7 @@ def load_or_record(
     return chain.from_iterable(_load(item, _folder_of(item, training)) for item in sets)
 
 
-def _load(recordings: RecordingSet, files: Path) -> Iterator[RecordedEpisode]:
+def _load(recordings: RecordingSet, files: Path) -> Iterator[Recorded]:
     """Yield the episodes of the seeds of a set, one file in memory at a time."""
     remaining = len(recordings.seeds)
     for file in sorted(files.glob("*.npz")):
@@ -193,7 +209,7 @@ def check_recordings(config: TrainConfig) -> None:
             if count == 0:
                 raise ValueError(
                     f"no recorded episodes in {str(files)!r}; "
-                    f"train once with --algo offline{recordings.option}, without --recordings"
+                    f"train once with --algo {config.algo}{recordings.option}, without --recordings"
                 )
             if count < len(recordings.seeds):
                 raise ValueError(
@@ -218,7 +234,7 @@ def _record_missing(recordings: RecordingSet, files: Path, origin: Values, progr
             if is_complete(file) and check_file(file, origin) == len(part):
                 bar.update(len(part))
                 continue
-            by_seed: list[list[RecordedEpisode]] = []
+            by_seed: list[Sequence[Recorded]] = []
             for episodes in record_parallel(recordings.record, part, jobs, recordings.chunk_size):
                 by_seed.append(episodes)
                 bar.update()

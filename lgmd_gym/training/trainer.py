@@ -4,12 +4,14 @@ import inspect
 import json
 import time
 import warnings
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import lgmd_gym
 from lgmd_gym.agents.policies.card import write_card
+from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
 from lgmd_gym.agents.policies.network import describe_network
 from lgmd_gym.errors import check_keys, check_whole
 from lgmd_gym.processes.files import FolderLock, complete_file, new_folder
@@ -17,14 +19,12 @@ from lgmd_gym.processes.inputs import read_json
 from lgmd_gym.processes.user_modules import error_reason
 from lgmd_gym.sensing.channel import plain_values
 from lgmd_gym.training.config import TrainConfig
-from lgmd_gym.training.hyperparams import OFFLINE
+from lgmd_gym.training.hyperparams import RECORDED, TIME_TO_BRAKE
 from lgmd_gym.training.model_card import write_model_card
 from lgmd_gym.training.policy_env import PolicyWrapper
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
-
-    from lgmd_gym.training.offline.learner import OfflineLearner
 
 CONFIG_FILE = "config.json"
 SET_BY_TRAINER = {"policy", "env", "demands", "seed", "device", "tensorboard_log", "verbose", "self"}
@@ -84,7 +84,7 @@ def resume(folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
             f"{str(folder)!r} contains no training to resume (no readable {CONFIG_FILE})"
         ) from None
     config = TrainConfig.from_dict(values)
-    if config.algo == OFFLINE:
+    if config.algo in RECORDED:
         from lgmd_gym.training.recordings import check_recordings
 
         check_recordings(config)
@@ -99,7 +99,7 @@ def check_config(config: TrainConfig) -> None:
     """
     env = config.make_policy_env("train")
     try:
-        if config.algo == OFFLINE:
+        if config.algo in RECORDED:
             from lgmd_gym.training.recordings import check_recordings
 
             _make_learner(config, env)
@@ -139,8 +139,11 @@ def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path
 
 def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path:
     start = time.perf_counter()
-    if config.algo == OFFLINE:
+    brake: TimeToBrakeParams | None = None
+    if config.algo in RECORDED:
         model = _train_offline(config, folder, progress, jobs)
+        if config.algo == TIME_TO_BRAKE:
+            brake = TimeToBrakeParams.make(config.algo_kwargs.get("brake"))
     else:
         from lgmd_gym.training.online import train_online
 
@@ -155,6 +158,7 @@ def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) 
         "neuron": plain_values(config.env_kwargs.get("params")),
         "features": values["features"],
         "demands": values["demands"] or None,
+        "brake": None if brake is None else brake.to_dict(),
         "network": None if network is None else asdict(network),
         "config": values,
         "wall_time": round(time.perf_counter() - start, 1),
@@ -171,16 +175,15 @@ def _train_offline(config: TrainConfig, folder: Path, progress: bool, jobs: int)
     from stable_baselines3.common.logger import configure
     from tqdm import tqdm
 
-    from lgmd_gym.training.offline.dataset import OfflineDataset
     from lgmd_gym.training.recordings import load_or_record
 
-    train_data, validation_data = (
-        OfflineDataset(load_or_record(config, split, folder, progress, jobs), config.features)
-        for split in ("train", "validation")
-    )
     env = config.make_policy_env("train")
     learner = _make_learner(config, env)
     env.close()
+    train_data, validation_data = (
+        _make_dataset(config, learner, load_or_record(config, split, folder, progress, jobs))
+        for split in ("train", "validation")
+    )
     logger = configure(str(folder / "log"), ["csv", "tensorboard"])
     try:
         with tqdm(total=learner.n_epochs, desc="training", unit="epoch", disable=not progress) as bar:
@@ -197,9 +200,28 @@ def _train_offline(config: TrainConfig, folder: Path, progress: bool, jobs: int)
         logger.close()
 
 
-def _make_learner(config: TrainConfig, env: PolicyWrapper) -> "OfflineLearner":
-    from lgmd_gym.training.offline.learner import OfflineLearner
+def _make_dataset(config: TrainConfig, learner: Any, episodes: Iterable[Any]) -> Any:
+    """Return the data of recorded episodes in the form that a learner requires."""
+    from lgmd_gym.training.offline.dataset import OfflineDataset
+    from lgmd_gym.training.offline.time_to_brake import StateDataset
 
-    known = {*inspect.signature(OfflineLearner).parameters} - SET_BY_TRAINER
-    check_keys("hyperparameter of offline", config.algo_kwargs, known)
+    if config.algo == TIME_TO_BRAKE:
+        return StateDataset(episodes, config.features, learner.brake.limits_s)
+    return OfflineDataset(episodes, config.features)
+
+
+def _make_learner(config: TrainConfig, env: PolicyWrapper) -> Any:
+    """Return the learner of recorded episodes.
+
+    Raises:
+        ValueError: For an unknown hyperparameter, or one out of range.
+    """
+    from lgmd_gym.training.offline.learner import OfflineLearner
+    from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner
+
+    learner = TimeToBrakeLearner if config.algo == TIME_TO_BRAKE else OfflineLearner
+    known = {*inspect.signature(learner).parameters} - SET_BY_TRAINER
+    check_keys(f"hyperparameter of {config.algo}", config.algo_kwargs, known)
+    if config.algo == TIME_TO_BRAKE:
+        return TimeToBrakeLearner(config.policy, env, seed=config.seed, **config.algo_kwargs)
     return OfflineLearner(config.policy, env, config.demands, seed=config.seed, **config.algo_kwargs)

@@ -3,7 +3,7 @@
 """Episodes without braking, with the outcome of braking at each of their decisions, and their files."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -32,6 +32,24 @@ class BrakingOutcome:
 
 
 @dataclass(frozen=True)
+class DrivenEpisode:
+    """One episode with random braking, of T environment decisions, for policies of any decision rate."""
+
+    # observations by name, (T, ...) each; `frame` is shrunk and present on request only
+    observations: Observation
+    # time for which full braking can wait from each decision on, float32 (T,) [s]; 0 from the last moment on,
+    # inf without a contact
+    time_to_brake: np.ndarray
+    demands: np.ndarray  # longitudinal demand at each decision, float32 (T,)
+    threat: bool  # whether some decision has a finite time to brake
+    traffic: bool = False  # whether the episode is a segment of a traffic episode
+    family: str = ""  # scenario family of the level; "traffic" in traffic, empty if unknown
+
+    def __len__(self) -> int:
+        return len(self.demands)
+
+
+@dataclass(frozen=True)
 class RecordedEpisode:
     """One episode without braking, of T environment decisions, for policies of any decision rate."""
 
@@ -48,13 +66,15 @@ class RecordedEpisode:
         return len(self.rewards)
 
 
-RecordFunction: TypeAlias = Callable[[range], list[list[RecordedEpisode]]]
-"""Method `record` of `EpisodeRecorder`, `LevelRecorder` and `TrafficRecorder`: the episodes of each seed."""
+Recorded: TypeAlias = RecordedEpisode | DrivenEpisode
+"""An episode in the files of a training run."""
+RecordFunction: TypeAlias = Callable[[range], "list[list[RecordedEpisode]] | list[list[DrivenEpisode]]"]
+"""Method `record` of a recorder: the episodes of each seed."""
 
 
 def record_parallel(
     record: RecordFunction, seeds: range, jobs: int = 1, chunk_size: int = CHUNK_SIZE
-) -> Iterator[list[RecordedEpisode]]:
+) -> Iterator[Sequence[Recorded]]:
     """Yield the episodes of each seed, recorded by several processes.
 
     Args:
@@ -88,11 +108,15 @@ def stack(observations: list[Observation]) -> Observation:
     return {name: np.stack([item[name] for item in observations]) for name in observations[0]}
 
 
-PER_DECISION = ("rewards", "braking_returns", "braking_contacts")
+PER_DECISION: dict[type[Recorded], tuple[str, ...]] = {
+    RecordedEpisode: ("rewards", "braking_returns", "braking_contacts"),
+    DrivenEpisode: ("time_to_brake", "demands"),
+}
+"""Arrays of each kind of episode."""
 PREFIX = "observations/"
 
 
-def save(by_seed: list[list[RecordedEpisode]], file: Path, origin: Values) -> None:
+def save(by_seed: Sequence[Sequence[Recorded]], file: Path, origin: Values) -> None:
     """Write episodes to a file; an interrupted write leaves no file.
 
     Args:
@@ -110,7 +134,7 @@ def save(by_seed: list[list[RecordedEpisode]], file: Path, origin: Values) -> No
         "families": np.array([episode.family for episode in episodes], str),
     }
     if episodes:
-        for name in PER_DECISION:
+        for name in PER_DECISION[type(episodes[0])]:
             arrays[name] = np.concatenate([getattr(episode, name) for episode in episodes])
         for name in episodes[0].observations:
             arrays[PREFIX + name] = np.concatenate([episode.observations[name] for episode in episodes])
@@ -123,8 +147,8 @@ def is_complete(file: Path) -> bool:
     return is_intact_zip(file, "origin.npy")
 
 
-def load(file: Path) -> list[list[RecordedEpisode]]:
-    """Return the episodes in a file, by seed.
+def load(file: Path) -> list[list[Any]]:
+    """Return the episodes in a file, by seed: `RecordedEpisode` or `DrivenEpisode`.
 
     Raises:
         ValueError: If the file contains no recorded episodes.
@@ -188,18 +212,19 @@ def _open(file: Path) -> Any:
     return archive
 
 
-def _episodes(archive: Any) -> Iterator[RecordedEpisode]:
+def _episodes(archive: Any) -> Iterator[Recorded]:
     arrays = {name: archive[name] for name in archive.files if name not in ("origin", "counts")}
     observations = {
         name.removeprefix(PREFIX): array for name, array in arrays.items() if name.startswith(PREFIX)
     }
     bounds = np.cumsum([0, *arrays["lengths"]])
     families = arrays.get("families", np.full(len(arrays["lengths"]), ""))  # format 6 and later
+    kind = next((kind for kind, names in PER_DECISION.items() if names[0] in arrays), RecordedEpisode)
     for index in range(len(arrays["lengths"])):
         part = slice(*bounds[index : index + 2])
-        yield RecordedEpisode(
+        yield kind(
             {name: array[part] for name, array in observations.items()},
-            *(arrays[name][part] for name in PER_DECISION),
+            *(arrays[name][part] for name in PER_DECISION[kind]),
             threat=bool(arrays["threats"][index]),
             traffic=bool(arrays["traffic"][index]),
             family=str(families[index]),

@@ -1,0 +1,270 @@
+# pyright: standard
+# Not strict: torch and stable-baselines3 state few types.
+"""`TimeToBrakeLearner`: a policy that estimates the time to brake at the decisions of driven episodes."""
+
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from functools import partial
+from itertools import islice
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+import torch
+from gymnasium import spaces
+
+from lgmd_gym.agents.base import HOLD
+from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
+from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
+from lgmd_gym.aliases import Arguments
+from lgmd_gym.errors import check_flag, check_positive, check_whole, check_within
+from lgmd_gym.statistics.ranks import roc_area
+from lgmd_gym.training.offline.dataset import EPISODES_AT_ONCE, check_mirror, mirror_input, policy_inputs
+from lgmd_gym.training.offline.episodes import DrivenEpisode
+from lgmd_gym.training.offline.learner import SEED_STEP, Optimizer, make_optimizer
+from lgmd_gym.training.offline.networks import (
+    Standardisation,
+    linear_layers,
+    make_model,
+    measure,
+    merge_networks,
+    merged_layers,
+    network_arguments,
+)
+
+if TYPE_CHECKING:
+    from stable_baselines3 import PPO
+
+MEASURED_STATES = 100_000  # at most, for the standardisation of features
+EVALUATED_STATES = 4096  # at once
+
+
+class StateDataset:
+    """The decisions of driven episodes: the inputs of a policy, and the interval of the time to brake.
+
+    Args:
+        episodes: Driven episodes, at least one; they are processed in groups.
+        features: Inputs and timing of the policy, without frames and history.
+        limits_s: Upper ends of the intervals of the time to brake [s].
+
+    Attributes:
+        names: Names of the inputs, in the order of the network: sorted.
+        sizes: Number of features of each input.
+        features: Inputs side by side, float16, (M, features).
+        classes: Index of the interval, int64, (M,).
+        braking: Whether the agent braked before the decision, bool, (M,).
+
+    Raises:
+        ValueError: For a policy on frames or with a history.
+    """
+
+    def __init__(
+        self, episodes: Iterable[DrivenEpisode], features: FeatureConfig, limits_s: Sequence[float]
+    ) -> None:
+        if features.history != 1 or FRAME in features.inputs:
+            raise ValueError("algo 'time-to-brake' requires history: 1 and inputs without frame")
+        self.names = sorted(features.inputs)
+        tables: list[np.ndarray] = []
+        times, demands = list[np.ndarray](), list[np.ndarray]()
+        self.sizes: list[int] = []
+        remaining = iter(episodes)
+        while group := list(islice(remaining, EPISODES_AT_ONCE)):
+            for inputs in policy_inputs([episode.observations for episode in group], features):
+                self.sizes = [inputs[name].shape[1] for name in self.names]
+                parts = [inputs[name].astype(np.float16) for name in self.names]
+                tables.append(np.concatenate(parts, axis=1))
+            times += [episode.time_to_brake[:: features.repeat] for episode in group]
+            before = [np.concatenate([[HOLD], episode.demands[:-1]]) for episode in group]
+            demands += [values[:: features.repeat] for values in before]
+        self.features = np.concatenate(tables)
+        self.classes = np.digitize(np.concatenate(times), limits_s)
+        self.braking = np.concatenate(demands) < HOLD
+
+    def __len__(self) -> int:
+        return len(self.classes)
+
+    def batch(self, indices: np.ndarray, mirrored: np.ndarray | None = None) -> torch.Tensor:
+        """Return features, float32, (M, features).
+
+        Args:
+            indices: Indices of M decisions.
+            mirrored: Whether each of them is mirrored, left to right, bool, (M,); None for none.
+        """
+        values = self.features[indices]
+        if mirrored is not None:
+            start = 0
+            for name, size in zip(self.names, self.sizes, strict=True):
+                part = values[mirrored, start : start + size]
+                values[mirrored, start : start + size] = mirror_input(name, part)
+                start += size
+        return torch.from_numpy(values.astype(np.float32))
+
+
+class StateEvaluation(NamedTuple):
+    """Results on the decisions of the validation episodes."""
+
+    loss: float  # mean cross-entropy
+    # areas under the ROC curve for the time to brake below the limit of full braking
+    area: float  # of all decisions
+    area_braking: float  # of those under braking; NaN without both outcomes
+
+
+class _Spaces(gym.Env[Any, Any]):
+    """An environment that has nothing but the spaces of a policy."""
+
+    def __init__(self, observation_space: spaces.Space[Any], num_actions: int) -> None:
+        self.observation_space, self.action_space = observation_space, spaces.Discrete(num_actions)
+
+
+class TimeToBrakeLearner:
+    """Trains a stable-baselines3 policy whose actions are intervals of the time to brake.
+
+    It minimises the cross-entropy over the decisions of driven episodes, which are shuffled, see
+    `lgmd_gym.training.offline.driving`.
+
+    Args:
+        policy: stable-baselines3's name of the network.
+        env: Environment with the observation space of the policy; it is not stepped.
+        brake: Fields of `TimeToBrakeParams`.
+        seed: Seed of the network and of the order of decisions.
+        n_networks: Number of networks of an ensemble; they are merged into one network whose logits are the
+            mean.
+        n_epochs: Number of passes over the training decisions.
+        batch_size: Number of decisions per gradient step.
+        learning_rate: Maximum of the one-cycle schedule (Smith & Topin 2018).
+        weight_decay: Weight decay of AdamW.
+        mirror: Whether each decision is mirrored, left to right, with probability 1/2 in each pass.
+        policy_kwargs: Further arguments of the network.
+
+    Raises:
+        ValueError: If a value is out of range.
+    """
+
+    def __init__(
+        self,
+        policy: str,
+        env: gym.Env[Any, Any],
+        *,
+        brake: Arguments | None = None,
+        seed: int = 0,
+        n_networks: int = 1,
+        n_epochs: int = 6,
+        batch_size: int = 1024,
+        learning_rate: float = 0.004,
+        weight_decay: float = 0.1,
+        mirror: bool = True,
+        policy_kwargs: Arguments | None = None,
+    ) -> None:
+        self.brake = TimeToBrakeParams.make(brake)
+        self.n_epochs = check_whole("n_epochs", n_epochs, 1)
+        self.batch_size = check_whole("batch_size", batch_size, 1)
+        self.learning_rate = check_positive("learning_rate", learning_rate)
+        self.weight_decay = check_within("weight_decay", weight_decay, 0.0, 1.0)
+        self.mirror = check_flag("mirror", mirror)
+        self._seed, count = seed, check_whole("n_networks", n_networks, 1)
+        given: Any = env.observation_space
+        if self.mirror:
+            check_mirror(given.spaces)
+        kwargs, blank = network_arguments(policy_kwargs or {}), _Spaces(given, self.brake.num_actions)
+        models = [make_model(policy, blank, seed + SEED_STEP * index, kwargs) for index in range(count)]
+        self.networks: list[Any] = [model.policy for model in models]
+        self.model = models[0]
+        if count > 1:
+            self.model = make_model(policy, blank, seed, merged_layers(kwargs, count))
+
+    def learn(
+        self,
+        train: StateDataset,
+        validation: StateDataset,
+        log: Callable[[int, dict[str, float]], None] = lambda epoch, metrics: None,
+        jobs: int = 1,
+    ) -> "PPO":
+        """Train for all epochs and return the model of the epoch with the lowest validation loss.
+
+        Args:
+            train: Training decisions.
+            validation: Decisions evaluated after each epoch.
+            log: Called after each epoch with its number and its metrics.
+            jobs: Number of threads that train the networks of an ensemble; it does not change the result.
+        """
+        standardisation = self._measure(train)
+        steps = self.n_epochs * -(-len(train) // self.batch_size)
+        optimizers = [
+            make_optimizer(network, self.learning_rate, self.weight_decay, steps) for network in self.networks
+        ]
+        rng, lowest, best = np.random.default_rng(self._seed), np.inf, list[Any]()
+        with ThreadPoolExecutor(check_whole("jobs", jobs, 1)) as executor:
+            for epoch in range(1, self.n_epochs + 1):
+                loss = self._train_epoch(train, standardisation, optimizers, rng, executor)
+                found = self.evaluate(validation, standardisation)
+                if found.loss < lowest:
+                    lowest, best = found.loss, [_copy(network) for network in self.networks]
+                metrics = {"train_loss": loss, "best_loss": lowest} | found._asdict()
+                log(epoch, {name: value for name, value in metrics.items() if not np.isnan(value)})
+        for network, weights in zip(self.networks, best, strict=True):
+            network.load_state_dict(weights)
+            standardisation.fold(linear_layers(network)[0])
+        if len(self.networks) > 1:
+            merge_networks(self.networks, self.model.policy)
+        return self.model
+
+    def evaluate(self, dataset: StateDataset, standardisation: Standardisation) -> StateEvaluation:
+        """Return the results of the mean logits of all networks."""
+        logits = np.concatenate(
+            [
+                self._logits(standardisation.apply(dataset.batch(part)))
+                for part in np.array_split(np.arange(len(dataset)), -(-len(dataset) // EVALUATED_STATES))
+            ]
+        )
+        limit = self.brake.limits_s.index(self.brake.full_s)
+        due, odds, braking = dataset.classes <= limit, self.brake.odds(logits)[:, limit], dataset.braking
+        classes = torch.from_numpy(dataset.classes)
+        return StateEvaluation(
+            float(torch.nn.functional.cross_entropy(torch.from_numpy(logits), classes)),
+            roc_area(odds[due], odds[~due]),
+            roc_area(odds[due & braking], odds[~due & braking]),
+        )
+
+    @torch.no_grad()
+    def _logits(self, features: torch.Tensor) -> np.ndarray:
+        """Return the mean logits of standardised features, float32, (M, actions)."""
+        return torch.stack([_forward(network, features) for network in self.networks]).mean(0).numpy()
+
+    def _measure(self, train: StateDataset) -> Standardisation:
+        """Measure the features of some training decisions, and of their mirror images if those are used."""
+        chosen = np.random.default_rng(self._seed).permutation(len(train))[:MEASURED_STATES]
+        flags = (False, True)[: 1 + self.mirror]
+        parts = np.array_split(chosen, -(-len(chosen) // self.batch_size))
+        return measure(train.batch(part, np.full(len(part), flag)) for flag in flags for part in parts)
+
+    def _train_epoch(
+        self,
+        train: StateDataset,
+        standardisation: Standardisation,
+        optimizers: Sequence[Optimizer],
+        rng: np.random.Generator,
+        executor: Executor,
+    ) -> float:
+        """Train on each decision once, and return the mean loss."""
+        total = 0.0
+        for indices in np.array_split(rng.permutation(len(train)), -(-len(train) // self.batch_size)):
+            mirrored = rng.random(len(indices)) < 0.5 if self.mirror else None
+            features = standardisation.apply(train.batch(indices, mirrored))
+            update = partial(_update, features=features, classes=torch.from_numpy(train.classes[indices]))
+            total += float(np.mean(list(executor.map(update, self.networks, optimizers)))) * len(indices)
+        return total / len(train)
+
+
+def _update(network: Any, optimizer: Optimizer, features: torch.Tensor, classes: torch.Tensor) -> float:
+    """Take one gradient step of a network and return its loss before it."""
+    loss = torch.nn.functional.cross_entropy(_forward(network, features), classes)
+    optimizer.step(loss)
+    return float(loss.detach())
+
+
+def _forward(network: Any, features: torch.Tensor) -> torch.Tensor:
+    return network.action_net(network.mlp_extractor.forward_actor(features))
+
+
+def _copy(network: torch.nn.Module) -> dict[str, torch.Tensor]:
+    return {name: value.clone() for name, value in network.state_dict().items()}
