@@ -401,6 +401,8 @@ def _check_time_to_brake(config: "TrainConfig") -> None:
         )
     if config.features.latch:
         raise ValueError("algo 'time-to-brake' requires latch: false in its hyperparameters")
+    if config.features.history != 1 or FRAME in config.features.inputs:
+        raise ValueError("algo 'time-to-brake' requires history: 1 and inputs without frame")
     _check_traffic(config)
 
 

@@ -67,7 +67,8 @@ class PulseDriver:
         self._late += (time_to_brake <= 0.0) / FPS
         due = time_to_brake <= self._reserve or self._late >= -self._reserve > 0.0
         if due or time >= self._start:
-            self._demand = -1.0 if self._rng.random() < 0.8 else -float(self._rng.uniform(0.2, 0.6))
+            demand = -1.0 if self._rng.random() < 0.8 else self._rng.uniform(-0.6, -0.2)
+            self._demand = float(np.float32(demand))  # as that of an action
             self._until = time + (float(self._rng.uniform(0.2, 2.5)) if self._rng.random() < 0.75 else inf)
         return self._demand
 

@@ -15,7 +15,7 @@ from gymnasium import spaces
 
 from lgmd_gym.agents.base import HOLD
 from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
-from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
+from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_flag, check_positive, check_whole, check_within
 from lgmd_gym.statistics.ranks import roc_area
@@ -53,16 +53,11 @@ class StateDataset:
         features: Inputs side by side, float16, (M, features).
         classes: Index of the interval, int64, (M,).
         braking: Whether the agent braked before the decision, bool, (M,).
-
-    Raises:
-        ValueError: For a policy on frames or with a history.
     """
 
     def __init__(
         self, episodes: Iterable[DrivenEpisode], features: FeatureConfig, limits_s: Sequence[float]
     ) -> None:
-        if features.history != 1 or FRAME in features.inputs:
-            raise ValueError("algo 'time-to-brake' requires history: 1 and inputs without frame")
         self.names = sorted(features.inputs)
         tables: list[np.ndarray] = []
         times, demands = list[np.ndarray](), list[np.ndarray]()
@@ -235,7 +230,11 @@ class TimeToBrakeLearner:
         chosen = np.random.default_rng(self._seed).permutation(len(train))[:MEASURED_STATES]
         flags = (False, True)[: 1 + self.mirror]
         parts = np.array_split(chosen, -(-len(chosen) // self.batch_size))
-        return measure(train.batch(part, np.full(len(part), flag)) for flag in flags for part in parts)
+        return measure(
+            train.batch(part, np.ones(len(part), np.bool_) if flag else None)
+            for flag in flags
+            for part in parts
+        )
 
     def _train_epoch(
         self,

@@ -1,0 +1,193 @@
+"""Driven episodes, and policies that learn the time to brake from them."""
+
+from math import inf
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from support.recordings import synthetic_episode, write_yaml
+
+from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.policies.features import FeatureConfig
+from lgmd_gym.statistics.ranks import roc_area
+from lgmd_gym.training import TrainConfig, train
+from lgmd_gym.training.offline.driving import DriveRecorder, PulseDriver, driven
+from lgmd_gym.training.offline.episodes import DrivenEpisode, load, save
+from lgmd_gym.training.offline.time_to_brake import StateDataset, TimeToBrakeLearner
+
+ARGUMENTS = {"camera": "fovea", "families": ["CCRs", "EmptyRoad"], "world": "laboratory"}
+
+
+@pytest.fixture(scope="module")
+def episodes():
+    return [drive for (drive,) in DriveRecorder("LGMD/RandomBraking-v0", ARGUMENTS).record(range(12))]
+
+
+def test_episodes_do_not_depend_on_what_else_is_recorded(episodes):
+    ((alone,),) = DriveRecorder("LGMD/RandomBraking-v0", ARGUMENTS).record(range(7, 8))
+    for name, values in episodes[7].observations.items():
+        assert np.array_equal(alone.observations[name], values)
+    assert np.array_equal(alone.time_to_brake, episodes[7].time_to_brake)
+    assert np.array_equal(alone.demands, episodes[7].demands)
+    assert "ego_acceleration" in alone.observations
+
+
+def test_a_single_environment_with_the_same_demands_is_the_same_episode(episodes):
+    for seed in (1, 4):
+        episode, config = episodes[seed], {"forecast": {"share": 1.0}}
+        env = gym.make("LGMD/RandomBraking-v0", config=config, **ARGUMENTS)
+        observation, info = env.reset(seed=seed)
+        for index, demand in enumerate(episode.demands):
+            assert np.float32(info["ttb"]) == episode.time_to_brake[index]
+            assert observation["ego_acceleration"] == episode.observations["ego_acceleration"][index]
+            observation, _, terminated, truncated, info = env.step([demand])
+        assert terminated or truncated
+
+
+def test_time_to_brake_while_the_speed_is_held(episodes):
+    """It falls by one decision per decision; the engine rounds it to whole decisions."""
+    threats = [episode for episode in episodes if episode.threat]
+    assert 3 <= len(threats) <= 9
+    for episode in threats:
+        first = int(np.argmax(episode.demands < 0.0)) if (episode.demands < 0.0).any() else len(episode)
+        held = episode.time_to_brake[:first]
+        expected = np.maximum(held[0] - np.arange(first) / 30.0, 0.0)
+        assert held == pytest.approx(expected, abs=1e-4)
+    assert all(np.isinf(item.time_to_brake).all() for item in episodes if item.family == "EmptyRoad")
+
+
+def test_drivers_brake_at_a_time_to_brake_and_release():
+    never = braked_at_once = released = partial = 0
+    for seed in range(400):
+        driver, demands = PulseDriver(seed), []
+        for index in range(300):  # 10 s, the last moment after 5 s
+            demands.append(driver.act(index / 30.0, max(5.0 - index / 30.0, 0.0)))
+        values = np.array(demands)
+        assert ((values == 0.0) | (values == -1.0) | ((values >= -0.6) & (values <= -0.2))).all()
+        never += (values == 0.0).all()
+        braked_at_once += values[0] < 0.0
+        onset = int(np.argmax(values < 0.0))
+        released += bool((values[onset:] == 0.0).any())
+        partial += values[onset] > -1.0 and values[onset] < 0.0
+    assert never / 400 == pytest.approx(0.35, abs=0.08)  # three standard deviations
+    assert braked_at_once == 0
+    assert released > 100
+    assert partial / (400 - never) == pytest.approx(0.2, abs=0.08)
+    again = PulseDriver(3)
+    assert [again.act(t / 30.0, inf) for t in range(300)] == [
+        value for driver in [PulseDriver(3)] for t in range(300) for value in [driver.act(t / 30.0, inf)]
+    ]
+
+
+def test_an_episode_without_braking_has_the_time_to_its_last_moment():
+    episode = driven(synthetic_episode(length=6))  # braking at the decisions 0 to 3 avoids the contact
+    assert episode.time_to_brake == pytest.approx([3 / 30, 2 / 30, 1 / 30, 0, 0, 0])
+    assert episode.demands.tolist() == [0.0] * 6
+    assert np.isinf(driven(synthetic_episode(threat=False, traffic=True)).time_to_brake).all()
+
+
+def test_files(tmp_path, episodes):
+    save([[episode] for episode in episodes[:3]], tmp_path / "a.npz", {})
+    ((again,), *_) = load(tmp_path / "a.npz")
+    assert isinstance(again, DrivenEpisode)
+    assert np.array_equal(again.time_to_brake, episodes[0].time_to_brake)
+    assert (again.threat, again.family) == (episodes[0].threat, episodes[0].family)
+
+
+def speeds(count, seed, repeat=1):
+    """Episodes in which the time to brake is a tenth of the speed, and the agent brakes below 1 s."""
+    rng, made = np.random.default_rng(seed), []
+    for _ in range(count):
+        speed = rng.uniform(0.0, 40.0, (10, 1)).astype(np.float32)
+        times = speed[:, 0] / 10.0
+        demands = np.where(times < 1.0, -1.0, 0.0).astype(np.float32)
+        made.append(DrivenEpisode({"ego_speed": speed}, times, demands, True))
+    return StateDataset(made, FeatureConfig(inputs=("ego_speed",), history=1, repeat=repeat), (1.0, 2.0))
+
+
+def test_intervals_and_decisions_of_the_policy():
+    dataset = speeds(2, 0, repeat=3)
+    assert len(dataset) == 8  # four of ten decisions each
+    times = dataset.features[:, 0].astype(float) * 2.0  # the feature is the speed / 20 m/s
+    assert dataset.classes.tolist() == [0 if t < 1.0 else 1 if t < 2.0 else 2 for t in times]
+    assert not dataset.braking[[0, 4]].any()  # nothing came before
+
+
+class Blank(gym.Env):
+    observation_space = spaces.Dict({"ego_speed": spaces.Box(-5.0, 5.0, (1,))})
+    action_space = spaces.Box(-1.0, 1.0, (1,))
+
+
+BRAKE = {"limits_s": [1.0, 2.0], "full_s": 1.0, "partial_s": 1.0, "warning_s": 2.0, "present_s": 2.0}
+
+
+def test_an_ensemble_learns_the_intervals_with_any_number_of_threads():
+    weights, epochs = [], []
+    for jobs in (1, 2):
+        options = {"n_networks": 2, "n_epochs": 12, "batch_size": 32, "learning_rate": 0.02}
+        learner = TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, **options)
+        model = learner.learn(speeds(60, 0), speeds(20, 1), lambda _, metrics: epochs.append(metrics), jobs)
+        weights.append(torch.cat([value.flatten() for value in model.policy.parameters()]))
+    assert torch.equal(*weights)
+    assert epochs[-1]["loss"] < 0.3 < 1.0 < epochs[0]["train_loss"]
+    assert epochs[-1]["area"] > 0.99
+    logits = model.policy.get_distribution({"ego_speed": torch.tensor([[0.2], [0.75], [1.8]])}).distribution
+    assert logits.logits.argmax(1).tolist() == [0, 1, 2]  # 4, 15 and 36 m/s
+
+
+def test_area_under_the_roc_curve_is_the_share_of_ordered_pairs():
+    rng = np.random.default_rng(0)
+    high, low = rng.integers(0, 9, 40), rng.integers(0, 7, 30)
+    pairs = [(a > b) + 0.5 * (a == b) for a in high for b in low]
+    assert roc_area(high, low) == pytest.approx(np.mean(pairs))
+    assert np.isnan(roc_area(high, low[:0]))
+
+
+YAML = """
+default:
+  env_wrapper:
+    - lgmd_gym.training.PolicyWrapper:
+        {inputs: [spike_frequency, ffi, ego_speed, ego_acceleration], history: 1}
+  n_timesteps: 6
+  n_epochs: 2
+  mirror: false
+  brake: {full_odds: 1.0, release_s: 0.5}
+"""
+
+
+def config(folder, text=YAML, **options):
+    options = {"camera": "fovea", "eval_episodes": 3} | options
+    return TrainConfig.from_hyperparams(
+        "time-to-brake", "LGMD/RandomBraking-v0", write_yaml(folder, text), **options
+    )
+
+
+def test_training_writes_a_policy_with_a_brake(tmp_path):
+    path = train(config(tmp_path, extra_levels=("2:CPNA",), traffic_episodes=1), tmp_path / "run")
+    agent = make_agent(f"policy:{path}")
+    assert (agent.agent.card.brake.full_odds, agent.agent.card.brake.release_s) == (1.0, 0.5)
+    assert agent.agent.card.demands is None
+    observation = {name: np.zeros(1, np.float32) for name in ("spike_frequency", "ffi", "ego_speed")}
+    observation |= {"ego_acceleration": np.zeros(1, np.float32)}
+    assert -1.0 <= agent.act(observation, {})[0] <= 0.0
+    assert "best_loss" in (tmp_path / "run" / "log" / "progress.csv").read_text()
+    again = train(config(tmp_path, recordings=str(tmp_path / "run"), eval_episodes=2), tmp_path / "again")
+    assert again.is_file()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"demands": (0.0, -1.0)}, "has a brake with stages, got demands .* omit demands"),
+        ({"text": YAML.replace("history: 1", "history: 1, latch: true")}, "requires latch: false"),
+        ({"text": YAML.replace("n_epochs", "epochs")}, "n_epochs"),
+        ({"text": YAML.replace("full_odds", "full_odd")}, "full_odds"),
+        ({"text": YAML.replace("history: 1", "history: 2")}, "requires history: 1"),
+    ],
+)
+def test_wrong_options(tmp_path, changes, message):
+    with pytest.raises(ValueError, match=message):
+        train(config(tmp_path, **changes), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
