@@ -13,7 +13,7 @@ BLIND = [name for name, cls in AGENTS.items() if not cls.reads_neuron]
 def demands(name, params):
     agent = make_agent(name)
     arguments = {"camera": agent.camera or "fovea", "include_frame": agent.include_frame}
-    env = gym.make("LGMD/CCRs-v0", ego_speed=6.0, params=params, **arguments)
+    env = gym.make("LGMD/CCRs-v0", ego_speed=6.0, params=params, config=agent.config, **arguments)
     observation, info = env.reset(seed=0)
     agent.reset(0)
     actions, done = [], False
