@@ -182,6 +182,41 @@ def test_an_event_is_needed_from_the_scaled_required_deceleration_on(required, f
     assert (event.false, event.needless) == (flat is None, not needed)
 
 
+def test_a_staged_brake_is_judged_again_when_it_exceeds_a_quarter_g():
+    """Without it, the required deceleration reaches the limit after 3.5 s; a contact follows after 9 s."""
+
+    class Recording:
+        policy_hz, scaled_emergency = 30.0, 5.0
+
+    values = [0.0] * 105 + [6.0] * 166
+    branch = Branch(0, [20.0] * len(values), values, True, None, 30.0)
+    event = BrakingEvent.begin(0, branch, Recording)
+    assert (event.needed, event.contact, event.time_to_emergency) == (False, None, None)
+    event.judge(14, branch, Recording)
+    assert not event.needed
+    event.judge(15, branch, Recording)
+    assert (event.needed, event.contact) == (True, None)
+    event.judge(60, branch, Recording)
+    assert (event.needed, event.contact) == (True, 9.0)
+
+
+class Staged(Pulses):
+    """Brakes by 2 m/s² from 0.3 s and fully from 3.0 s to 5.5 s."""
+
+    def act(self, observation, info):
+        time = self.decision / 30
+        full = super().act(observation, info)
+        return full if full[0] < HOLD or not 0.3 <= time < 3.0 else to_action(-2.0 / 9.0)
+
+
+def test_a_needed_full_stage_makes_a_staged_brake_needed():
+    log, _ = play("following", Staged((3.0, 5.5)))
+    event = log.events[0]
+    assert event.start == pytest.approx(0.3)
+    assert event.time_to_emergency is None
+    assert (event.counts, event.false, event.needless) == (True, True, False)
+
+
 def test_branch_is_simulated_as_far_as_needed_and_leaves_the_environment_unchanged():
     recorded = Recorded("following", config={"duration": 12}).recording
     env = recorded.fork(30)

@@ -128,7 +128,10 @@ class Replay:
         standstill = speed == 0.0 and time > event.start
         if demand < HOLD or standstill:
             event.last = time
+        counted = event.counts
         event.peak = max(event.peak, step.info["deceleration"])
+        if event.counts and not counted and not event.needed:
+            event.judge(decision, self._without, self.recording)
         event.speed_lost = max(event.speed_lost, self._without.speed(decision) - speed)
         self.log.peak = max(self.log.peak, event.peak)
         if standstill:

@@ -77,7 +77,7 @@ class BrakingEvent:
     time_to_emergency: float | None
     last: float  # time of the last demand, or of the standstill [s]
     peak: float = 0.0  # highest deceleration beyond the driver's [m/s²]
-    needed: bool = False  # whether it is needed by the emergencies that are scaled to the brake
+    needed: bool = False  # whether it is needed by the emergencies that are scaled to the brake, see `judge`
     contact: float | None = None  # time of the contact without it, up to `LOOK_AHEAD` after its start [s]
     speed_lost: float = 0.0  # largest difference of the speeds without and with it [m/s]
 
@@ -105,17 +105,23 @@ class BrakingEvent:
             without: The drive without the event.
             recording: The recording of the drive.
         """
+        time = decision / recording.policy_hz
+        horizon = decision + round(HORIZON * recording.policy_hz)
+        event = cls(time, without.emergencies(horizon, EMERGENCY).time_until(time), time)
+        event.judge(decision, without, recording)
+        return event
+
+    def judge(self, decision: int, without: Branch, recording: TrafficRecording) -> None:
+        """Set whether the event is needed at a decision, and the contact without it; arguments of `begin`.
+
+        A staged brake begins below 0.25 g, earlier than its full braking, so that its need is judged at its
+        first demand and again when it begins to count.
+        """
         hz = recording.policy_hz
-        time, horizon = decision / hz, decision + round(HORIZON * hz)
-        needed = without.emergencies(horizon, recording.scaled_emergency).time_until(time) is not None
-        contact = without.contact(decision + round(LOOK_AHEAD * hz)) if needed else None
-        return cls(
-            time,
-            without.emergencies(horizon, EMERGENCY).time_until(time),
-            time,
-            needed=needed,
-            contact=None if contact is None else contact / hz,
-        )
+        emergencies = without.emergencies(decision + round(HORIZON * hz), recording.scaled_emergency)
+        self.needed = emergencies.time_until(decision / hz) is not None
+        contact = without.contact(decision + round(LOOK_AHEAD * hz)) if self.needed else None
+        self.contact = None if contact is None else contact / hz
 
 
 @dataclass(slots=True)
