@@ -52,14 +52,16 @@ class Train:
     """Number of episodes per evaluation. Default: 96; for offline, 600."""
     recordings: File = None
     """Folder of an offline training run with the same cameras, to reuse its recorded episodes."""
-    traffic_episodes: int = 0
-    """Number of traffic episodes, in which braking is false, that offline trains on in addition."""
+    traffic_episodes: Count = None
+    """Number of traffic episodes, in which braking is false, that training on recordings uses in addition.
+    Default: from the hyperparameters, else 0."""
     extra_levels: Annotated[tuple[str, ...] | None, arg(metavar="N:NAME[,NAME...] [...]")] = None
-    """Levels of some scenario families that offline trains on in addition, for example
-    4000:CCRsCurve,FastCCRs 1000:EmptyRoad."""
+    """Levels of some scenario families that training on recordings uses in addition, for example
+    4000:CCRsCurve,FastCCRs 1000:EmptyRoad. Default: from the hyperparameters, else none."""
     extra_traffic: Annotated[tuple[str, ...] | None, arg(metavar="N:KIND[,KIND...] [...]")] = None
-    """Traffic episodes of some kinds that offline trains on in addition, for example
-    2000:intersection,roundabout, or 400:inattentive-highway with drivers who err."""
+    """Traffic episodes of some kinds that training on recordings uses in addition, for example
+    2000:intersection,roundabout, or 400:inattentive-highway with drivers who err. Default: from the
+    hyperparameters, else none."""
     jobs: int = 2
     """Number of processes that record episodes, and of threads that train an ensemble."""
     out: File = None

@@ -23,6 +23,8 @@ RECORDED = (OFFLINE, TIME_TO_BRAKE)
 """Algorithms that learn from recorded episodes."""
 ALGORITHMS = ("ppo", "sac", "dqn", *RECORDED)
 WRAPPER = "lgmd_gym.training.PolicyWrapper"
+OPTIONS = ("policy", "env_kwargs", "eval_episodes", "traffic_episodes", "extra_levels", "extra_traffic")
+"""Further options of `TrainConfig` that a file may contain."""
 
 
 def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> Values:
@@ -48,10 +50,9 @@ def read_hyperparams(algo: str, env_id: str, file: Path | None = None) -> Values
     if algo_kwargs.pop("normalize", False):
         raise ValueError("normalize is not supported: PolicyWrapper scales observations by constants")
     values: Values = {"features": _features(algo_kwargs.pop("env_wrapper", None))}
-    if "policy" in algo_kwargs:
-        values["policy"] = algo_kwargs.pop("policy")
-    if "env_kwargs" in algo_kwargs:
-        values["env_kwargs"] = check_type("env_kwargs", algo_kwargs.pop("env_kwargs"), dict)
+    values |= {name: algo_kwargs.pop(name) for name in OPTIONS if name in algo_kwargs}
+    if "env_kwargs" in values:
+        check_type("env_kwargs", values["env_kwargs"], dict)
     for name in ("n_timesteps", "n_envs"):
         if name in algo_kwargs:
             values[name] = check_whole(name, check_finite(name, algo_kwargs.pop(name)), 1)  # also 1e5

@@ -71,6 +71,28 @@ def test_options_replace_the_hyperparameters(tmp_path):
     assert (config.n_timesteps, config.seed) == (9, 0)
 
 
+def test_a_file_describes_a_training_completely(tmp_path):
+    text = """
+default:
+  env_wrapper:
+    - lgmd_gym.training.PolicyWrapper: {inputs: [ego_speed], history: 1}
+  eval_episodes: 7
+  traffic_episodes: 8
+  extra_levels: ["40:CPNA,CPFA", "20:StandingBox"]
+  extra_traffic: ["30:inattentive-highway"]
+"""
+    file = write_yaml(tmp_path, text)
+    config = TrainConfig.from_hyperparams("time-to-brake", file=file)
+    assert (config.eval_episodes, config.traffic_episodes) == (7, 8)
+    assert config.extra_levels == ("40:CPNA,CPFA", "20:StandingBox")
+    assert config.extra_traffic == ("30:inattentive-highway",)
+    given = TrainConfig.from_hyperparams("time-to-brake", file=file, traffic_episodes=0, extra_levels=())
+    assert (given.traffic_episodes, given.extra_levels) == (0, ())
+    wrong = write_yaml(tmp_path, text.replace("CPNA", "CPN"))
+    with pytest.raises(ValueError, match="unknown family of random levels 'CPN'"):
+        TrainConfig.from_hyperparams("time-to-brake", file=wrong)
+
+
 @pytest.mark.parametrize("camera", ["wide", {"name": "wide", "shape": [45, 80]}, PRESETS["tele"]])
 def test_config_survives_json(camera):
     config = TrainConfig.from_hyperparams("ppo", camera=camera)

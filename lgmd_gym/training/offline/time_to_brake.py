@@ -128,6 +128,7 @@ class TimeToBrakeLearner:
         batch_size: Number of decisions per gradient step.
         learning_rate: Maximum of the one-cycle schedule (Smith & Topin 2018).
         weight_decay: Weight decay of AdamW.
+        dropout: Share of the hidden units that are left out in each gradient step.
         mirror: Whether each decision is mirrored, left to right, with probability 1/2 in each pass.
         policy_kwargs: Further arguments of the network.
 
@@ -147,6 +148,7 @@ class TimeToBrakeLearner:
         batch_size: int = 1024,
         learning_rate: float = 0.004,
         weight_decay: float = 0.1,
+        dropout: float = 0.3,
         mirror: bool = True,
         policy_kwargs: Arguments | None = None,
     ) -> None:
@@ -155,6 +157,7 @@ class TimeToBrakeLearner:
         self.batch_size = check_whole("batch_size", batch_size, 1)
         self.learning_rate = check_positive("learning_rate", learning_rate)
         self.weight_decay = check_within("weight_decay", weight_decay, 0.0, 1.0)
+        self.dropout = check_within("dropout", dropout, 0.0, 0.9)
         self.mirror = check_flag("mirror", mirror)
         self._seed, count = seed, check_whole("n_networks", n_networks, 1)
         given: Any = env.observation_space
@@ -187,10 +190,14 @@ class TimeToBrakeLearner:
         optimizers = [
             make_optimizer(network, self.learning_rate, self.weight_decay, steps) for network in self.networks
         ]
+        # One generator for each network, because threads share that of PyTorch.
+        generators = [
+            torch.Generator().manual_seed(self._seed + index) for index in range(len(self.networks))
+        ]
         rng, lowest, best = np.random.default_rng(self._seed), np.inf, list[Any]()
         with ThreadPoolExecutor(check_whole("jobs", jobs, 1)) as executor:
             for epoch in range(1, self.n_epochs + 1):
-                loss = self._train_epoch(train, standardisation, optimizers, rng, executor)
+                loss = self._train_epoch(train, standardisation, optimizers, generators, rng, executor)
                 found = self.evaluate(validation, standardisation)
                 if found.loss < lowest:
                     lowest, best = found.loss, [_copy(network) for network in self.networks]
@@ -241,6 +248,7 @@ class TimeToBrakeLearner:
         train: StateDataset,
         standardisation: Standardisation,
         optimizers: Sequence[Optimizer],
+        generators: Sequence[torch.Generator],
         rng: np.random.Generator,
         executor: Executor,
     ) -> float:
@@ -249,14 +257,29 @@ class TimeToBrakeLearner:
         for indices in np.array_split(rng.permutation(len(train)), -(-len(train) // self.batch_size)):
             mirrored = rng.random(len(indices)) < 0.5 if self.mirror else None
             features = standardisation.apply(train.batch(indices, mirrored))
-            update = partial(_update, features=features, classes=torch.from_numpy(train.classes[indices]))
-            total += float(np.mean(list(executor.map(update, self.networks, optimizers)))) * len(indices)
+            classes = torch.from_numpy(train.classes[indices])
+            update = partial(_update, features=features, classes=classes, dropout=self.dropout)
+            losses = list(executor.map(update, self.networks, optimizers, generators))
+            total += float(np.mean(losses)) * len(indices)
         return total / len(train)
 
 
-def _update(network: Any, optimizer: Optimizer, features: torch.Tensor, classes: torch.Tensor) -> float:
+def _update(
+    network: Any,
+    optimizer: Optimizer,
+    generator: torch.Generator,
+    features: torch.Tensor,
+    classes: torch.Tensor,
+    dropout: float,
+) -> float:
     """Take one gradient step of a network and return its loss before it."""
-    loss = torch.nn.functional.cross_entropy(_forward(network, features), classes)
+    hidden = features
+    for layer in network.mlp_extractor.policy_net:
+        hidden = layer(hidden)
+        if dropout and not isinstance(layer, torch.nn.Linear):  # after the activation
+            kept = torch.rand(hidden.shape, generator=generator) >= dropout
+            hidden = hidden * kept / (1.0 - dropout)
+    loss = torch.nn.functional.cross_entropy(network.action_net(hidden), classes)
     optimizer.step(loss)
     return float(loss.detach())
 
