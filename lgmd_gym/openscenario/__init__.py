@@ -1,4 +1,4 @@
-"""OpenSCENARIO XML 1.1 to 1.3: files as suites, a comparison with their intent, and export of cases.
+"""OpenSCENARIO XML 1.0 to 1.3: files as suites, a comparison with their intent, and export of cases.
 
 XML is parsed with the standard library's expat, which reports lines. Packages for OpenSCENARIO and OpenDRIVE
 are not used: scenariogeneration only writes files and needs SciPy, pyxodr needs matplotlib and Shapely, and

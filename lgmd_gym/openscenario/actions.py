@@ -1,31 +1,18 @@
 """Actions by name: what has an effect on the motion of the entities, what has none, and errors for others."""
 
 from collections.abc import Callable
-from math import cos, inf, pi
+from math import cos, inf
 
-from lgmd_gym.envs.dynamics.path import rear_axle_path
-from lgmd_gym.openscenario.motion import Place, Timeline, Track, synchronise
+from lgmd_gym.openscenario.dynamics import Dynamics, read_dynamics
+from lgmd_gym.openscenario.lateral import lane_change, lane_offset
+from lgmd_gym.openscenario.motion import MAX_ACCELERATION, Place, Timeline, synchronise
 from lgmd_gym.openscenario.nodes import Element
-from lgmd_gym.openscenario.world import Mover, ScenarioMap, reads_front_axle
+from lgmd_gym.openscenario.routing import ON_PATH, acquire_position, assign_route, follow_trajectory
+from lgmd_gym.openscenario.weather import weather_of
+from lgmd_gym.openscenario.world import Mover, ScenarioMap, carry_over, read_controllers
 
-_ON_PATH = 0.1  # [m] from a trajectory within which an entity can begin to follow it
-
-
-def settle(world: ScenarioMap, mover: Mover) -> None:
-    """Set the path of an entity that follows no trajectory: along its road, or straight on."""
-    start = mover.start
-    if mover.follows or start is None:
-        return
-    ahead = start.turned(pi) if mover.backwards else start
-    road, _, t = world.locate(start)
-    s = road.nearest(start)[0]
-    along = cos(ahead.heading - road.at(s).heading)
-    mover.track = Track(ahead)
-    if abs(abs(along) - 1.0) < 1e-9 and 0.0 < s < road.length:
-        direction = 1 if along > 0.0 else -1
-        begin = road.at(0.0, t) if direction > 0 else road.at(road.length, t).turned(pi)
-        whole = Track(begin, road.bends(direction, t))
-        mover.track = Track(ahead, whole.part(whole.nearest(start)).bends)
+_PIECES = 20  # of constant acceleration in a change of speed with a shape
+_JUMP = 0.5  # [m/s], change of the speed above which a jump gives a note
 
 
 def teleport(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
@@ -34,81 +21,26 @@ def teleport(item: Element, mover: Mover, world: ScenarioMap, time: float) -> fl
     place = world.place(item.child("Position"))
     if mover.follows and mover.track is not None:
         distance = mover.track.nearest(place)
-        if mover.track.at(distance).distance(place) <= _ON_PATH:
+        if mover.track.at(distance).distance(place) <= ON_PATH:
             mover.track = mover.track.part(distance)
             return time
         mover.follows = False
     mover.start = place
-    settle(world, mover)
+    world.settle(mover)
     return time
 
 
-def follow_trajectory(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
-    """Let an entity follow a trajectory from its start, or from where it is."""
-    if item.child("TimeReference").find("None") is None:
-        raise item.error("a TimeReference with Timing is not supported; use None")
-    item.child("TrajectoryFollowingMode").choice("followingMode", ("follow", "position"))
-    reference = item if item.find("Trajectory", "CatalogReference") else item.child("TrajectoryRef")
-    current = None if mover.track is None else mover.place(time)
-    track = world.trajectory(reference, current)
-    offset = item.number("initialDistanceOffset", 0.0)
-    if mover.front_axle:
-        base = mover.body.wheelbase
-        if base == 0.0:
-            raise item.error(f"the front axle of {mover.name!r} cannot be its control point without Axles")
-        track = Track(track.start.moved(-base), rear_axle_path(track.bends, base))
-    if time == 0.0:
-        mover.track, mover.start, mover.follows = track.part(offset), track.at(offset), True
-        return mover.timeline.time_of(track.length - offset) if track.bends else time
-    begin = track.nearest(mover.place(time)) if offset == 0.0 else offset
-    return _continue(item, mover, time, track.part(begin))
-
-
-def _continue(item: Element, mover: Mover, time: float, rest: Track) -> float:
-    """Continue the path of an entity with another from where it is."""
-    distance = mover.timeline.at(time).distance
-    here = mover.path.at(distance)
-    if here.distance(rest.start) > _ON_PATH or cos(here.heading - rest.start.heading) < 0.999:
-        raise item.error(f"{mover.name!r} is not on its path at {time:.3g} s; begin the path where it is")
-    mover.track, mover.follows = mover.path.then(distance, rest.bends), True
-    return mover.timeline.time_of(distance + rest.length)
-
-
-def assign_route(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
-    """Let an entity follow a route at its present distance beside the roads' reference lines."""
-    return _follow_route(item, mover, world.route(item).shifted, time)
-
-
-def acquire_position(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
-    """Let an entity drive to a position on the shortest way."""
-    here = mover.place(time)
-    road, s, _ = world.locate(here)
-    other, end, _ = world.locate(world.place(item.child("Position")))
-    lane = -1 if (cos(here.heading - road.at(s).heading) > 0.0) != road.left_hand else 1
-    route = world.route_through(item, [(road, lane, s), (other, None, end)])
-    return _follow_route(item, mover, route.shifted, time)
-
-
-def _follow_route(item: Element, mover: Mover, shifted: Callable[[float], Track], time: float) -> float:
-    here = mover.place(time)
-    centre = shifted(0.0)
-    distance = centre.nearest(here)
-    with item.locate_errors():
-        track = shifted(here.seen_from(centre.at(distance)).y)
-    rest = track.part(track.nearest(here))
-    if time > 0.0:
-        return _continue(item, mover, time, rest)
-    if cos(here.heading - rest.start.heading) < 0.999:
-        raise item.error(f"{mover.name!r} does not have the direction of its route; turn it around")
-    mover.track, mover.start, mover.follows = rest, rest.start, True
-    return inf
-
-
 def assign_controller(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
-    """Set the control point of an entity."""
-    assign = item.find("AssignControllerAction")
-    if assign is not None:
-        mover.front_axle = reads_front_axle(assign, world.catalogs)
+    """Set the control point of an entity; what else controllers do has no effect."""
+    for child in item.all("AssignControllerAction"):
+        read_controllers(child, mover, world.catalogs)
+    for child in item.all("OverrideControllerValueAction"):
+        for value in child.all("Throttle", "Brake", "Clutch", "ParkingBrake", "SteeringWheel", "Gear"):
+            if value.flag("active"):
+                world.note(
+                    value, f"{value.tag} of {mover.name!r} has no effect; it moves as the storyboard says"
+                )
+    item.skip()
     return time
 
 
@@ -124,44 +56,119 @@ def speed(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float
     target = item.child("SpeedActionTarget").only("AbsoluteTargetSpeed", "RelativeTargetSpeed")
     value = target.number("value")
     if target.tag == "RelativeTargetSpeed":
-        if target.flag("continuous"):
-            raise target.error("a continuous RelativeTargetSpeed is not supported; use continuous=false")
-        other = world.mover(target).timeline.at(time).speed
+        leader = world.mover(target)
         delta = target.choice("speedTargetValueType", ("delta", "factor")) == "delta"
-        value = other + value if delta else other * value
-    shape = dynamics.choice("dynamicsShape", ("step", "linear"))
-    dimension = dynamics.choice("dynamicsDimension", ("time", "rate", "distance"))
-    dynamics.choice("followingMode", ("position",), "position")
-    amount = dynamics.number("value")
-    if value < 0.0 and (time > 0.0 or shape != "step"):
+        relation = (1.0, value) if delta else (value, 0.0)
+        if target.flag("continuous") and leader is not mover:
+            return _keep_speed(item, mover, world, time, leader, relation, read_dynamics(dynamics))
+        value = leader.timeline.at(time).speed * relation[0] + relation[1]
+    transition = read_dynamics(dynamics)
+    if value < 0.0 and (time > 0.0 or not transition.is_step):
         raise target.error("driving backwards is supported from the start only; use a step in Init")
-    if shape == "step" or amount == 0.0:
+    if transition.is_step:
         return _step(item, mover, world, time, value)
-    change = value - now
-    if amount < 0.0:
-        raise dynamics.error(f"SpeedActionDynamics value must be >= 0, got {amount:g}")
-    if abs(change) < 1e-9:
+    if abs(value - now) < 1e-9:
         return time
-    acceleration = {
-        "rate": amount if change > 0.0 else -amount,
-        "time": change / amount,
-        "distance": (value**2 - now**2) / (2.0 * amount),
-    }[dimension]
-    return _change(item, mover, world, time, acceleration, value)
+    return _transition(item, mover, world, time, transition, value)
+
+
+def _keep_speed(
+    item: Element,
+    mover: Mover,
+    world: ScenarioMap,
+    time: float,
+    leader: Mover,
+    relation: tuple[float, float],
+    transition: Dynamics,
+) -> float:
+    """Reach a speed relative to another entity, and keep to it.
+
+    Args:
+        item: The action.
+        mover: The entity.
+        world: The world.
+        time: Start [s].
+        leader: The other entity.
+        relation: Factor, and addition [m/s].
+        transition: How the speed is reached.
+    """
+    factor, delta = relation
+    ahead: Mover | None = leader
+    while ahead is not None:
+        if ahead is mover:
+            raise item.error(f"{mover.name!r} and {leader.name!r} cannot both keep to the speed of the other")
+        ahead = ahead.leader
+    value = leader.timeline.at(time).speed * factor + delta
+    end = time
+    if value < 0.0:
+        raise item.error(f"the speed of {mover.name!r} must be >= 0 m/s, got {value:g}")
+    if transition.is_step:
+        _step(item, mover, world, time, value)
+    elif abs(value - mover.timeline.at(time).speed) > 1e-9:
+        end = _transition(item, mover, world, time, transition, value)
+        if abs(leader.timeline.at(end).speed * factor + delta - value) > 1e-6:
+            raise item.error(
+                f"the speed of {leader.name!r} changes while {mover.name!r} approaches it, which is not "
+                "supported; use continuous=false"
+            )
+    mover.leader, mover.relation = leader, relation
+    with item.locate_errors(f"{item.tag} of {mover.name!r}: "):
+        mover.timeline.copy_from(end, leader.timeline, relation)
+    carry_over(world, mover, time)
+    return inf
+
+
+def _transition(
+    item: Element, mover: Mover, world: ScenarioMap, time: float, transition: Dynamics, value: float
+) -> float:
+    """Change the speed along a shape, with constant accelerations between a few speeds."""
+    now = mover.timeline.at(time).speed
+    change, extent = value - now, transition.extent(value - now)
+    if transition.dimension == "distance":
+        if transition.shape != "linear":
+            raise item.error(
+                "a cubic or sinusoidal change of speed over a distance is not supported; use time"
+            )
+        return _change(item, mover, world, time, (value**2 - now**2) / (2.0 * extent), value)
+    if transition.shape == "linear":
+        return _change(item, mover, world, time, change / extent, value)
+    for number in range(_PIECES):
+        begin, end = number / _PIECES, (number + 1) / _PIECES
+        part = change * (transition.share(end) - transition.share(begin))
+        final = value if number == _PIECES - 1 else now + change * transition.share(end)
+        _change(item, mover, world, time + begin * extent, part * _PIECES / extent, final)
+    return time + extent
 
 
 def _step(item: Element, mover: Mover, world: ScenarioMap, time: float, value: float) -> float:
+    mover.leader = None
     if time == 0.0:
-        mover.timeline, mover.leader = Timeline(abs(value)), None
+        mover.timeline = Timeline(abs(value))
         mover.backwards = value < 0.0
-        settle(world, mover)
-    elif abs(value - mover.timeline.at(time).speed) > 1e-6:
-        raise item.error(
-            f"a jump of the speed of {mover.name!r} at {time:.3g} s is not supported; use linear dynamics"
-        )
-    else:
-        mover.leader = None
+        if mover.replan is None:
+            world.settle(mover)
+        carry_over(world, mover, time)
+        return time
+    change = value - mover.timeline.at(time).speed
+    if abs(change) > 1e-6:
+        _jump(item, mover, world, time, value)
     return time
+
+
+def _jump(item: Element, mover: Mover, world: ScenarioMap, time: float, value: float) -> float:
+    """Change the speed at once, as fast as a segment can."""
+    change = value - mover.timeline.at(time).speed
+    with item.locate_errors(f"{item.tag} of {mover.name!r}: "):
+        end = mover.timeline.jump(time, value)
+    if abs(change) > _JUMP:
+        lasts = abs(change) / MAX_ACCELERATION
+        world.note(
+            item,
+            f"the speed of {mover.name!r} jumps by {change:.3g} m/s at {time:.3g} s; here it changes within "
+            f"{lasts:.2g} s",
+        )
+    carry_over(world, mover, time)
+    return end
 
 
 def _change(
@@ -174,11 +181,14 @@ def _change(
     build_up: float = 0.0,
 ) -> float:
     mover.leader = None
+    change = final - mover.timeline.at(time).speed
+    if abs(acceleration) > MAX_ACCELERATION:
+        lasts = abs(change / acceleration)
+        _jump(item, mover, world, time + lasts / 2, final)
+        return time + lasts
     with item.locate_errors(f"{item.tag} of {mover.name!r}: "):
         end = mover.timeline.change(time, acceleration, final, build_up)
-    for other in world.movers.values():
-        if other.leader is mover:
-            other.timeline.copy_from(time, mover.timeline)
+    carry_over(world, mover, time)
     return end
 
 
@@ -229,7 +239,7 @@ def longitudinal_distance(item: Element, mover: Mover, world: ScenarioMap, time:
     if system != "entity":
         _check_straight(item, world, base, distance)
     mover.start = Place(moved.x, moved.y, place.heading)
-    settle(world, mover)
+    world.settle(mover)
     if item.flag("continuous"):
         mover.timeline, mover.leader = Timeline(other.timeline.at(time).speed), other
     return time
@@ -240,7 +250,7 @@ def _check_straight(item: Element, world: ScenarioMap, base: Place, distance: fl
     road, s, t = world.locate(base)
     along = distance if cos(base.heading - road.at(s).heading) > 0.0 else -distance
     inside = 0.0 <= s + along <= road.length
-    if not inside or road.at(s + along, t).distance(base.moved(distance)) > _ON_PATH:
+    if not inside or road.at(s + along, t).distance(base.moved(distance)) > ON_PATH:
         system = item.text("coordinateSystem")
         raise item.error(
             f"LongitudinalDistanceAction coordinateSystem={system!r} is supported on a straight road, "
@@ -303,14 +313,19 @@ _PRIVATE: dict[str, Callable[[Element, Mover, ScenarioMap, float], float]] = {
     "FollowTrajectoryAction": follow_trajectory,
     "AssignRouteAction": assign_route,
     "AcquirePositionAction": acquire_position,
+    "LaneChangeAction": lane_change,
+    "LaneOffsetAction": lane_offset,
 }
 _GROUPS = {
     "LongitudinalAction": ("SpeedAction", "SpeedProfileAction", "LongitudinalDistanceAction"),
+    "LateralAction": ("LaneChangeAction", "LaneOffsetAction"),
     "RoutingAction": ("FollowTrajectoryAction", "AssignRouteAction", "AcquirePositionAction"),
 }
 """Elements that contain one action of some kinds."""
 NO_EFFECT = ("AppearanceAction", "ActivateControllerAction", "VariableAction")
 """Known actions that have no effect on the motion."""
+_GLOBAL_NO_EFFECT = ("InfrastructureAction",)
+"""Global actions that have no effect here, with a note."""
 
 
 def private_action(item: Element, mover: Mover, world: ScenarioMap) -> ActionRun | None:
@@ -331,20 +346,62 @@ def private_action(item: Element, mover: Mover, world: ScenarioMap) -> ActionRun
 
 
 def global_action(item: Element, world: ScenarioMap) -> ActionRun | None:
-    """Return the function of a `GlobalAction` in a story, or None for an action without effect."""
-    found = item.only("EntityAction", *NO_EFFECT)
+    """Return the function of a `GlobalAction`, or None for an action without effect."""
+    found = item.only("EntityAction", "ParameterAction", "EnvironmentAction", *_GLOBAL_NO_EFFECT, *NO_EFFECT)
+    if found.tag in _GLOBAL_NO_EFFECT:
+        found.skip()
+        world.note(found, f"{found.tag} has no effect")
+        return None
+    if found.tag in ("ParameterAction", "VariableAction"):
+        return _set_value(found, world)
     if found.tag in NO_EFFECT:
         found.skip()
         return None
+    if found.tag == "EnvironmentAction":
+        weather = weather_of(world.catalogs.resolve(found, "Environment"))
+        if weather != world.weather:
+            raise found.error(
+                f"a change of the weather from {world.weather} to {weather} is not supported; set it in Init"
+            )
+        return None
     mover = world.mover(found)
-    found.only("DeleteEntityAction")
+    found.only("DeleteEntityAction", "AddEntityAction")
+    if found.find("AddEntityAction") is not None:
+        found.skip()
 
     def run(time: float) -> float:
         if time > AT_START:
-            raise found.error(
-                f"DeleteEntityAction at {time:.3g} s is supported in the first {AT_START:g} s only"
-            )
-        mover.deleted = True
+            what = "DeleteEntityAction" if found.find("DeleteEntityAction") else "AddEntityAction"
+            raise found.error(f"{what} at {time:.3g} s is supported in the first {AT_START:g} s only")
+        mover.deleted = found.find("DeleteEntityAction") is not None
         return time
 
+    return run
+
+
+def _set_value(item: Element, world: ScenarioMap) -> ActionRun | None:
+    """Return the function of a `ParameterAction` or `VariableAction`; None if no condition refers to it."""
+    name = item.name_of("parameterRef" if item.tag == "ParameterAction" else "variableRef")
+    change = item.only("SetAction", "ModifyAction")
+    value, factor, delta = "", 1.0, 0.0
+    if change.tag == "SetAction":
+        value = change.text("value")
+    else:
+        rule = change.child("Rule").only("AddValue", "MultiplyByValue")
+        if rule.tag == "AddValue":
+            delta = rule.number("value")
+        else:
+            factor = rule.number("value")
+
+    def run(time: float) -> float:
+        new = value
+        if change.tag == "ModifyAction":
+            with item.locate_errors():
+                new = repr(float(world.value_of(item, name, time)) * factor + delta)
+        world.values.setdefault(name, []).append((time, new))
+        return time
+
+    if name not in world.watched:
+        item.skip()
+        return None
     return run

@@ -9,83 +9,54 @@ An ego that drives backwards is compiled to one that drives forwards with its le
 the direction of travel, and the body is turned by 180 degrees.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from math import cos, hypot, inf, pi, remainder, sin
+from math import ceil, cos, hypot, inf, pi, remainder, sin
 
-from lgmd_gym.camera import CLEAR
-from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.script import Bend, Segment
 from lgmd_gym.envs.families.scenario import AFTERMATH, START_TTC, Actor, RoadPlan, Scenario
 from lgmd_gym.openscenario.motion import Place, Track, first_true
-from lgmd_gym.openscenario.nodes import Element, check_used
+from lgmd_gym.openscenario.nodes import Element, Node, check_used
 from lgmd_gym.openscenario.parameters import Catalogs
 from lgmd_gym.openscenario.roads import Road, RoadNetwork, read_roads
 from lgmd_gym.openscenario.storyboard import read_story, run_init
-from lgmd_gym.openscenario.world import Mover, ScenarioMap, read_entities
+from lgmd_gym.openscenario.ways import follow
+from lgmd_gym.openscenario.world import Mover, ScenarioMap, lane_at, pose_of, read_entities, touching
 
-NIGHT_LUX = 50.0
-"""Illuminance of the sun below which it is night; twilight of a street is about 10 lx, a dull day 1000 lx."""
-FOG = 1000.0  # [m], visual range below which the weather is fog, as in meteorology
 _WIDEST = 6.0  # [m], width of a lane; wider ones are open test areas
 _REACH = (-50.0, 500.0)  # [m] ahead of the ego within which a crossing road counts
 
 
-def weather_of(environment: Element | None) -> str:
-    """Return the weather of an `Environment`: clear, night, fog or rain.
-
-    Night is a sun below 50 lx, fog a visual range below 1000 m, rain a precipitation with an intensity.
-    """
-    if environment is None:
-        return CLEAR
-    found = set[str]()
-    road = environment.find("RoadCondition")
-    if road is not None and road.number("frictionScaleFactor") != 1.0:
-        raise road.error("frictionScaleFactor must be 1: the brake belongs to the world")
-    weather = environment.find("Weather")
-    if weather is None:
-        return CLEAR
-    sun, fog, rain = (weather.find(tag) for tag in ("Sun", "Fog", "Precipitation"))
-    if sun is not None and _illuminance(sun) < NIGHT_LUX:
-        found.add("night")
-    if fog is not None and fog.number("visualRange") < FOG:
-        found.add("fog")
-    if rain is not None and rain.choice("precipitationType", ("dry", "rain")) == "rain":
-        intensity = "precipitationIntensity" if rain.has("precipitationIntensity") else "intensity"
-        found |= {"rain"} if rain.number(intensity) > 0.0 else set()
-    if len(found) > 1:
-        raise weather.error(f"the weathers {', '.join(sorted(found))} cannot be combined; use one")
-    return found.pop() if found else CLEAR
-
-
-def _illuminance(sun: Element) -> float:
-    """Return the illuminance of the sun [lx]; `intensity` is its name in OpenSCENARIO 1.1."""
-    for name in ("illuminance", "intensity"):
-        if sun.has(name):
-            return sun.number(name)
-    raise sun.error("Sun needs the attribute 'illuminance'")
-
-
-def road_plan(network: RoadNetwork, ego: Place, located: tuple[Road, float, float]) -> RoadPlan:
+def road_plan(world: ScenarioMap, ego: Place, ahead: float = _REACH[1]) -> RoadPlan:
     """Return the road plan around the ego.
 
-    A perpendicular road ahead makes a crossing, arcs of the ego's road a curve. A straight road with lanes of
-    at most 6 m has these lanes; wider ones are a test area, for which the default plan is used.
+    A perpendicular road ahead makes a crossing, bends of the ego's lane a curve. A straight road with lanes
+    of at most 6 m has these lanes; wider ones are a test area, for which the default plan is used.
 
     Args:
-        network: The roads.
+        world: The roads.
         ego: Initial pose of the ego's centre, in its direction of travel.
-        located: The ego's road, distance along it and offset from it [m].
+        ahead: Distance ahead of the ego up to which a curve is drawn [m].
     """
-    road, s, t = located
-    distances = [_crossing(other, ego) for other in network.roads.values() if other.junction == "-1"]
-    ahead = [item for item in distances if item is not None and _REACH[0] < item < _REACH[1]]
-    if ahead:
-        return RoadPlan(kind="crossing", distance=ahead[0])
+    if not world.network.roads:
+        return RoadPlan()
+    road, s, t = world.locate(ego)
+    roads = world.network.roads.values()
+    distances = [_crossing(other, ego) for other in roads if other.junction == "-1"]
+    found = [item for item in distances if item is not None and _REACH[0] < item < _REACH[1]]
+    if found:
+        return RoadPlan(kind="crossing", distance=found[0])
     direction = 1 if cos(ego.heading - road.at(s).heading) > 0.0 else -1
     bends = road.bends(direction, 0.0)
-    curved = any(bend.curvature or bend.last_curvature for bend in bends)
-    curve = _curve(road, direction, t, ego) if curved else None
+    way, _ = follow(world.network, road, direction, s, lane_at(road, s, t))
+    if len(way.spans) == 1 and all(bend.curvature == bend.last_curvature for bend in bends):
+        curve = _curve(_lane_bends(road, direction, t, ego)) if any(b.curvature for b in bends) else None
+    else:
+        left = direction * t - way.spans[0].centre(0.0) if way.spans else 0.0
+        begin = ego._replace(heading=way.spans[0].line(0.0).heading) if way.spans else ego
+        whole = Track(begin, way.bends(0.0, left, begin) if way.spans else ())
+        curve = _curve([arc for bend in whole.part(0.0, ahead).bends for arc in _arcs(bend)])
     return curve or _straight(road, direction, s, t)
 
 
@@ -97,15 +68,27 @@ def _crossing(road: Road, ego: Place) -> float | None:
     return line.x - line.y * cos(line.heading) / sin(line.heading)
 
 
-def _curve(road: Road, direction: int, t: float, ego: Place) -> RoadPlan | None:
-    """Return the arcs ahead of the ego, or None if there are none."""
+def _lane_bends(road: Road, direction: int, t: float, ego: Place) -> list[Bend]:
+    """Return the bends of the ego's road ahead of it."""
     begin = road.at(0.0, t) if direction > 0 else road.at(road.length, t).turned(pi)
     lane = Track(begin, road.bends(direction, t))
-    bends, distance = list(lane.part(lane.nearest(ego)).bends), 0.0
-    while bends and bends[0].curvature == bends[0].last_curvature == 0.0:
+    return list(lane.part(lane.nearest(ego)).bends)
+
+
+def _arcs(bend: Bend) -> list[Bend]:
+    """Return a bend as arcs of at most 5 m; a clothoid deviates from them by millimetres."""
+    if bend.curvature == bend.last_curvature:
+        return [Bend(bend.length, bend.curvature)]
+    count = ceil(bend.length / 5.0)
+    slope = (bend.last_curvature - bend.curvature) / count
+    return [Bend(bend.length / count, bend.curvature + slope * (number + 0.5)) for number in range(count)]
+
+
+def _curve(bends: list[Bend]) -> RoadPlan | None:
+    """Return the arcs ahead of the ego, or None if there are none."""
+    distance = 0.0
+    while bends and bends[0].curvature == 0.0:
         distance += bends.pop(0).length
-    if any(bend.curvature != bend.last_curvature for bend in bends):
-        raise ValueError(f"spirals of the ego's road {road.name} are not supported; use arcs")
     return RoadPlan(kind="curve", distance=distance, bends=tuple(bends)) if bends else None
 
 
@@ -125,19 +108,21 @@ def _straight(road: Road, direction: int, s: float, t: float) -> RoadPlan:
     return RoadPlan(lanes=len(own), ego_lane=index)
 
 
-EGO = "ego"  # name of the ego, in any case; without one, the first entity
+EGOS = ("ego", "hero")  # names of the ego, in any case; without one, the first vehicle that moves
+_DRIVEN = ("car", "box", "motorcycle", "bicycle")  # kinds of bodies that may be the ego
 LEAD_IN = 1.0  # [s] at constant speeds before the first change of speed
 HORIZON = 120.0  # [s] within which a contact is searched for
 DURATION = "lgmd_gym.duration"
 """Property of the file: duration of the episode [s]; the episode then begins at the file's start."""
 _TAGS = (
     "FileHeader VariableDeclarations MonitorDeclarations StopTrigger Performance SceneGraphFile UsedArea "
-    "TrafficSignals TimeOfDay DomeImage Wind AdditionalAxle License"
+    "TrafficSignals TimeOfDay DomeImage Wind AdditionalAxle License TrailerHitch TrailerCoupler "
+    "File CustomContent"
 )
 IGNORED_TAGS = frozenset(_TAGS.split())
 """Elements without an effect on us, with all that they contain."""
 _ATTRIBUTES = (
-    "name z mass model model3d role h p r Weather.fractionalCloudCover Weather.cloudState Sun.elevation "
+    "name z dz mass model model3d role h p r Weather.fractionalCloudCover Weather.cloudState Sun.elevation "
     "Sun.azimuth Weather.atmosphericPressure Weather.temperature "
     "FrontAxle.maxSteering FrontAxle.wheelDiameter FrontAxle.trackWidth FrontAxle.positionZ "
     "RearAxle.maxSteering RearAxle.wheelDiameter RearAxle.trackWidth RearAxle.positionZ "
@@ -174,25 +159,82 @@ def compile_scenario(root: Element, family: str) -> Compiled:
 def _compile_board(root: Element, family: str) -> Compiled:
     catalogs = Catalogs(root)
     movers = read_entities(root, catalogs)
-    network = root.child("RoadNetwork").child("LogicFile")
-    roads = read_roads(network.path("filepath"))
-    world = ScenarioMap(roads, catalogs, movers)
+    world = ScenarioMap(_network(root), catalogs, movers)
     board = root.child("Storyboard")
-    environment = run_init(board, world)
-    weather = weather_of(environment)
-    notes = tuple(read_story(board, world).play(world))
+    world.watched = frozenset(_watched(board.node))
+    run_init(board, world)
+    notes = read_story(board, world).play(world)
     for node in (root.node, *catalogs.visited):
         check_used(node, IGNORED_TAGS, IGNORED_ATTRIBUTES)
-    ego = next((item for name, item in movers.items() if name.lower() == EGO), None)
-    if ego is None:
-        raise root.child("Entities").error("the scenario needs an entity with the name Ego")
-    return _compile(root, world, ego, family, weather, notes)
+    _note_routes(root, world)
+    ego = _ego(root, world)
+    return _compile(root, world, ego, family, (*world.notes, *notes))
 
 
-def _compile(
-    root: Element, world: ScenarioMap, ego: Mover, family: str, weather: str, notes: tuple[str, ...]
-) -> Compiled:
-    others = [item for item in world.movers.values() if item is not ego and not item.deleted]
+def _network(root: Element) -> RoadNetwork:
+    """Return the road network; without a `LogicFile`, one without roads."""
+    network = root.child("RoadNetwork").find("LogicFile")
+    if network is None or not network.text("filepath"):
+        return RoadNetwork({})
+    path = network.path("filepath")
+    if not path.suffix and not path.exists():
+        path = path.with_name(f"{path.name}.xodr")
+        if not path.exists():
+            raise network.error(
+                f"the map {network.text('filepath')!r} is not there; put {path.name} into the folder of "
+                "the file"
+            )
+    with network.locate_errors():
+        return read_roads(path)
+
+
+def _watched(node: Node) -> Iterator[str]:
+    """Yield the names of the parameters and variables in the start conditions of a node."""
+    if node.tag == "StopTrigger":
+        return
+    if node.tag in ("ParameterCondition", "VariableCondition"):
+        yield node.attributes.get("parameterRef", node.attributes.get("variableRef", "")).removeprefix("$")
+    for child in node.children:
+        yield from _watched(child)
+
+
+def _note_routes(root: Element, world: ScenarioMap) -> None:
+    """Note controllers, which have no effect, and entities without a position or route."""
+    for mover in world.movers.values():
+        if mover.track is None and not mover.deleted:
+            world.note(root.child("Entities"), f"{mover.name!r} has no position and is left out")
+        for item in mover.controllers[:1]:
+            world.note(
+                item, f"the controller of {mover.name!r} has no effect; it moves as the storyboard says"
+            )
+        if mover.chosen and (mover.timeline.segments or mover.timeline.initial_speed > 0.0):
+            world.note(
+                root.child("Entities"),
+                f"{mover.name!r} takes the straightest way at junctions, because it has no route",
+            )
+
+
+def _ego(root: Element, world: ScenarioMap) -> Mover:
+    """Return the ego: named "ego" or "hero" in any case, else the first vehicle that moves."""
+    named = [mover for name, mover in world.movers.items() if name.lower() in EGOS]
+    moving = [
+        mover
+        for mover in world.movers.values()
+        if mover.body.kind in _DRIVEN and (mover.timeline.segments or mover.timeline.initial_speed > 0.0)
+    ]
+    entities = root.child("Entities")
+    if named:
+        if named[0] not in moving:
+            raise entities.error(f"the ego {named[0].name!r} never moves; give it a SpeedAction")
+        return named[0]
+    if not moving:
+        raise entities.error("the scenario needs a vehicle that moves, as the ego; name it Ego")
+    world.note(entities, f"no entity has the name Ego; the ego is {moving[0].name!r}")
+    return moving[0]
+
+
+def _compile(root: Element, world: ScenarioMap, ego: Mover, family: str, notes: tuple[str, ...]) -> Compiled:
+    others = [item for item in world.movers.values() if item is not ego and not item.deleted and item.track]
     contact, target = _first_contact(ego, [item for item in others if item.body.kind != "road_marking"])
     header = root.find("FileHeader")
     properties = {} if header is None else header.properties()
@@ -201,10 +243,11 @@ def _compile(
     if duration is None:
         others.sort(key=lambda item: item is not target)
         changes = [item.start for mover in (ego, *others) for item in mover.timeline.segments]
+        changes += [end for mover in (ego, *others) for _, end in mover.turns if end < inf]
         end = contact if contact < inf else max(changes, default=0.0) + START_TTC
         duration = end - start + AFTERMATH
     length = ego.body.length
-    base, _, _ = _pose(ego, start)
+    base, _, _ = pose_of(ego, start)
     scenario = Scenario(
         family=family,
         ego_speed=ego.timeline.at(start).speed,
@@ -212,26 +255,25 @@ def _compile(
         actors=tuple(_actor(item, base, length, start) for item in others),
         ego_profile=_profile(ego, start),
         ego_path=_bends(ego, start),
-        road=road_plan(world.network, base, world.locate(base)),
+        road=road_plan(world, base, _driven(ego, start, duration) + _REACH[1] / 2),
         ego_length=length,
         ego_width=ego.body.width,
-        ego_reference=_pose(ego, start)[1] if _bends(ego, start) else 0.0,
+        ego_reference=pose_of(ego, start)[1] if _bends(ego, start) else 0.0,
     )
-    return Compiled(scenario, weather, start, contact, ego, target, world, root, properties, notes)
+    return Compiled(scenario, world.weather, start, contact, ego, target, world, root, properties, notes)
 
 
 def _start(contact: float, movers: list[Mover]) -> float:
     changes = [item.timeline.segments[0].start for item in movers if item.timeline.segments]
+    changes += [start for mover in movers for start, _ in mover.turns]
     first = min(changes, default=inf) - LEAD_IN
     start = min(contact - START_TTC, first)
     return start if start < inf else 0.0
 
 
-def _pose(mover: Mover, time: float) -> tuple[Place, float, float]:
-    """Return the pose of a body's centre in its direction of travel, its reference, and its speed."""
-    motion = mover.timeline.at(time)
-    reference = -mover.body.reference if mover.backwards else mover.body.reference
-    return mover.path.at(motion.distance).moved(reference), reference, motion.speed
+def _driven(mover: Mover, start: float, duration: float) -> float:
+    """Return the distance that an entity drives in an episode [m]."""
+    return mover.timeline.at(start + duration).distance - mover.timeline.at(start).distance
 
 
 def _bends(mover: Mover, time: float) -> tuple[Bend, ...]:
@@ -245,7 +287,7 @@ def _profile(mover: Mover, start: float) -> tuple[Segment, ...]:
 
 
 def _actor(mover: Mover, ego: Place, ego_length: float, start: float) -> Actor:
-    place, reference, speed = _pose(mover, start)
+    place, reference, speed = pose_of(mover, start)
     seen, bends, body = place.seen_from(ego), _bends(mover, start), mover.body
     heading = remainder(seen.heading, 2.0 * pi)
     return Actor(
@@ -282,22 +324,24 @@ def _contact(one: Mover, other: Mover, horizon: float) -> tuple[float, float]:
     fastest = max(_top_speed(one) + _top_speed(other), 0.1)
     time, least = 0.0, inf
     while time < horizon:
-        a, b = _pose(one, time)[0], _pose(other, time)[0]
+        a, b = pose_of(one, time)[0], pose_of(other, time)[0]
         apart = hypot(a.x - b.x, a.y - b.y)
         least = min(least, apart)
-        if apart <= reach and _touching(one, other, time):
-            touching = partial(_touching, one, other)
-            return first_true(touching, max(time - 0.02, 0.0), time), 0.0
-        time += max((apart - reach) / fastest, 0.005)
+        if apart <= reach and touching(one, other, time):
+            return first_true(partial(touching, one, other), max(time - 0.02, 0.0), time), 0.0
+        free = (apart - reach) / fastest if apart > reach else _gap(one, other, a, b) / (2.0 * fastest)
+        time += max(free, 0.005)
     return inf, least
+
+
+def _gap(one: Mover, other: Mover, a: Place, b: Place) -> float:
+    """Return a lower bound of the distance of two bodies in the axes of the first one [m]."""
+    seen = b.seen_from(a)
+    c, s = abs(cos(seen.heading)), abs(sin(seen.heading))
+    length, width = other.body.length, other.body.width
+    along = abs(seen.x) - (one.body.length + c * length + s * width) / 2
+    return max(along, abs(seen.y) - (one.body.width + s * length + c * width) / 2)
 
 
 def _top_speed(mover: Mover) -> float:
     return max(mover.timeline.initial_speed, *(item.final_speed for item in mover.timeline.segments), 0.0)
-
-
-def _touching(one: Mover, other: Mover, time: float) -> bool:
-    a, b = _pose(one, time)[0], _pose(other, time)[0]
-    first = Rectangle(a.x, a.y, a.heading, one.body.length, one.body.width)
-    second = Rectangle(b.x, b.y, b.heading, other.body.length, other.body.width)
-    return first_touch(first, second, 0.0, 0.0) == 0.0

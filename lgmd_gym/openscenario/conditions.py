@@ -11,7 +11,7 @@ from lgmd_gym.openscenario.distances import Target, read_distance, relative_velo
 from lgmd_gym.openscenario.motion import first_true
 from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.parameters import RULES, compare
-from lgmd_gym.openscenario.world import Mover, ScenarioMap
+from lgmd_gym.openscenario.world import Mover, ScenarioMap, touching
 
 _CLOSE = 1e-9
 _NEVER = 1e9  # [s], for times that are undefined
@@ -102,7 +102,7 @@ def _stand_still(item: Element, mover: Mover, world: ScenarioMap) -> Test:
 
 
 def _relative_distance(item: Element, mover: Mover, world: ScenarioMap) -> Test:
-    met, other, distance = _limit(item), Target(world.mover(item)), read_distance(item, None)
+    met, other, distance = _limit(item), Target(world.mover(item)), read_distance(item, world, None)
     return lambda time: met(distance.between(mover, other, time))
 
 
@@ -112,12 +112,12 @@ def _reach_position(item: Element, mover: Mover, world: ScenarioMap) -> Test:
 
 
 def _distance(item: Element, mover: Mover, world: ScenarioMap) -> Test:
-    met, place, distance = _limit(item), world.place(item.child("Position")), read_distance(item)
+    met, place, distance = _limit(item), world.place(item.child("Position")), read_distance(item, world)
     return lambda time: met(distance.between(mover, Target(None, place), time))
 
 
 def _time_to_collision(item: Element, mover: Mover, world: ScenarioMap) -> Test:
-    met, distance = _limit(item), read_distance(item)
+    met, distance = _limit(item), read_distance(item, world)
     found = item.child("TimeToCollisionConditionTarget").only("EntityRef", "Position")
     is_entity = found.tag == "EntityRef"
     target = Target(world.mover(found)) if is_entity else Target(None, world.place(found))
@@ -125,15 +125,42 @@ def _time_to_collision(item: Element, mover: Mover, world: ScenarioMap) -> Test:
 
 
 def _time_headway(item: Element, mover: Mover, world: ScenarioMap) -> Test:
-    met, other, distance = _limit(item), Target(world.mover(item)), read_distance(item)
+    met, other, distance = _limit(item), Target(world.mover(item)), read_distance(item, world)
 
     def holds(time: float) -> bool:
         speed = mover.timeline.at(time).speed
+        if other.place(time).seen_from(mover.place(time)).x < 0.0:
+            return False  # undefined for an entity behind
         return met(distance.between(mover, other, time) / speed if speed > 0.0 else _NEVER)
 
     return holds
 
 
+def _collision(item: Element, mover: Mover, world: ScenarioMap) -> Test:
+    """Return the test whether the bodies of two entities overlap."""
+    found = item.only("EntityRef", "ByType", "ByObjectType")
+    if found.tag == "EntityRef":
+        others = [world.mover(found)]
+    else:
+        kind = found.choice("type", tuple(_TYPES))
+        others = [other for other in world.movers.values() if other.tag == _TYPES[kind]]
+    return lambda time: any(touching(mover, other, time) for other in others if other is not mover)
+
+
+def _end_of_road(item: Element, mover: Mover, world: ScenarioMap) -> Test:
+    """Return the test whether an entity has been at or beyond the end of its roads for a duration."""
+    duration = item.number("duration")
+
+    def beyond(time: float) -> bool:
+        if mover.way is None:
+            return False
+        last = mover.way.spans[-1]
+        return mover.place(time).seen_from(last.line(last.finish)).x >= -_CLOSE
+
+    return lambda time: time >= duration and beyond(time - duration)
+
+
+_TYPES = {"vehicle": "Vehicle", "pedestrian": "Pedestrian", "miscellaneous": "MiscObject"}
 _ENTITY: dict[str, Callable[[Element, Mover, ScenarioMap], Test]] = {
     "SpeedCondition": _speed,
     "RelativeSpeedCondition": _relative_speed,
@@ -145,11 +172,13 @@ _ENTITY: dict[str, Callable[[Element, Mover, ScenarioMap], Test]] = {
     "DistanceCondition": _distance,
     "TimeToCollisionCondition": _time_to_collision,
     "TimeHeadwayCondition": _time_headway,
+    "CollisionCondition": _collision,
+    "EndOfRoadCondition": _end_of_road,
 }
 
 
 HORIZON = 120.0  # [s] of simulated time within which a trigger must occur
-_STEP = 0.05  # [s] between the samples in the search for a change
+_STEP = 0.02  # [s] between the samples in the search for a change
 _JUST = 1e-6  # [s]
 EDGES = ("none", "rising", "falling", "risingOrFalling")
 States = dict[tuple[str, str], tuple[float, float]]
@@ -173,6 +202,8 @@ class Condition:
         begin = max(start - self.delay, 0.0)
         if self.edge == "none":
             found = self._change(begin, True)
+        elif self._jumps_at(begin):
+            found = begin
         elif self.edge == "rising":
             found = self._change(self._change(begin, False), True)
         elif self.edge == "falling":
@@ -180,6 +211,14 @@ class Condition:
         else:
             found = self._change(begin, not self.holds(begin))
         return max(found + self.delay, start)
+
+    def _jumps_at(self, start: float) -> bool:
+        """Return whether the condition has its edge just at a time, by what happens at this time [s]."""
+        change = inf if self.jump is None else self.jump()
+        if not 0.0 < change < inf or abs(change - start) > _CLOSE:
+            return False
+        before, after = self.holds(change - _JUST), self.holds(change + _JUST)
+        return before != after and (self.edge == "risingOrFalling" or (self.edge == "rising") == after)
 
     def reason(self, start: float) -> str:
         """Return why the condition does not trigger at or after a start [s]; empty if it does."""
@@ -265,8 +304,10 @@ def read_trigger(item: Element | None, world: ScenarioMap, states: States) -> Tr
         [_condition(entry, world, states) for entry in group.all("Condition")]
         for group in item.all("ConditionGroup")
     ]
-    if not groups or not all(groups):
-        raise item.error(f"{item.tag} must contain a Condition")
+    if not all(groups):
+        raise item.error(f"{item.tag} must contain a Condition in each ConditionGroup")
+    if not groups:
+        world.note(item, f"{item.tag} has no condition; it starts at once")
     return Trigger(groups)
 
 
@@ -276,33 +317,51 @@ def _condition(item: Element, world: ScenarioMap, states: States) -> Condition:
         raise item.error(f"Condition delay must be >= 0 s, got {delay:g}")
     kind = item.only("ByValueCondition", "ByEntityCondition")
     if kind.tag == "ByValueCondition":
-        holds, jump = _by_value(kind, states)
+        holds, jump = _by_value(kind, world, states)
     else:
         holds, jump = entity_test(kind, world), None
     switch = kind.find("ParameterCondition") is not None
-    return Condition(holds, jump, edge, delay, item.text("name", ""), switch)
+    return Condition(holds, jump, edge, delay, item.label() if item.has("name") else "", switch)
 
 
-def _by_value(item: Element, states: States) -> tuple[Test, Callable[[], float] | None]:
-    found = item.only("SimulationTimeCondition", "ParameterCondition", "StoryboardElementStateCondition")
+_BY_VALUE = (
+    "SimulationTimeCondition",
+    "ParameterCondition",
+    "VariableCondition",
+    "StoryboardElementStateCondition",
+)
+
+
+def _by_value(item: Element, world: ScenarioMap, states: States) -> tuple[Test, Callable[[], float] | None]:
+    found = item.only(*_BY_VALUE)
     if found.tag == "SimulationTimeCondition":
         limit, rule = found.number("value"), found.choice("rule", RULES[1:5])
         return (lambda time: meets(time, rule, limit)), (lambda: limit)
-    if found.tag == "ParameterCondition":
-        name, rule, bound = found.name_of("parameterRef"), found.choice("rule", RULES), found.text("value")
+    if found.tag in ("ParameterCondition", "VariableCondition"):
+        name = found.name_of("parameterRef" if found.tag == "ParameterCondition" else "variableRef")
+        rule, bound = found.choice("rule", RULES), found.text("value")
         with found.locate_errors():
-            met = compare(found.resolve(f"${name}"), rule, bound)
-        return (lambda time: met), (lambda: inf)
-    key = found.text("storyboardElementType"), found.text("storyboardElementRef")
+            compare(found.resolve(f"${name}"), rule, bound)
+
+        def met(time: float) -> bool:
+            with found.locate_errors():
+                return compare(world.value_of(found, name, time), rule, bound)
+
+        def change() -> float:
+            times = [time for time, _ in world.values.get(name, [])]
+            return next((time for time in times if met(time) != met(-1.0)), inf)
+
+        return met, change
+    key = found.text("storyboardElementType"), found.label("storyboardElementRef")
     known = ("completeState", "endTransition", "startTransition", "runningState")
     state = found.choice("state", known)
 
-    def change() -> float:
+    def changed() -> float:
         start, end = states.get(key, (inf, inf))
         return start if state in ("startTransition", "runningState") else end
 
     def reached(time: float) -> bool:
         start, end = states.get(key, (inf, inf))
-        return change() <= time and (state != "runningState" or time < end or end == start)
+        return changed() <= time and (state != "runningState" or time < end or end == start)
 
-    return reached, change
+    return reached, changed

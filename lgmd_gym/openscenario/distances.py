@@ -1,14 +1,17 @@
 """Distances of entities and positions by the distance types of OpenSCENARIO, and how fast they close."""
 
-from math import cos, hypot, inf, sin
+from math import cos, hypot, inf, isnan, nan, sin
 from typing import NamedTuple
 
 from lgmd_gym.openscenario.motion import Place
 from lgmd_gym.openscenario.nodes import Element
-from lgmd_gym.openscenario.world import Mover
+from lgmd_gym.openscenario.ways import Span
+from lgmd_gym.openscenario.world import Mover, ScenarioMap
 
 EUCLIDEAN, LONGITUDINAL, LATERAL = "euclidianDistance", "longitudinal", "lateral"
 _TYPES = (EUCLIDEAN, "cartesianDistance", LONGITUDINAL, LATERAL)  # cartesianDistance: old name of the first
+_MOMENT = 1e-4  # [s], for the rate of a distance along the road
+_BESIDE = 0.5  # [m] before or after the roads of an entity, beyond which a place is not beside them
 _ORIGIN = (0.0, 0.0, 0.0)  # box of a point
 
 
@@ -31,13 +34,36 @@ class Distance(NamedTuple):
 
     kind: str  # euclidianDistance, longitudinal or lateral
     freespace: bool  # between the bounding boxes rather than the reference points
+    world: ScenarioMap | None = None  # the roads along which it is measured; None for the entity's axes
 
     def between(self, one: Mover, other: Target, time: float) -> float:
         """Return the distance at a time, >= 0 [m]."""
+        if self.world is not None:
+            return self._along_road(self.world, one, other, time)
         return hypot(*self._gap(one, other, time))
+
+    def _along_road(self, world: ScenarioMap, one: Mover, other: Target, time: float) -> float:
+        """Return the distance along or across the road of an entity, >= 0; nan beyond its end [m]."""
+        here, there = one.place(time), other.place(time)
+        spans = _spans(world, one, here)
+        (begin, own_left, line), (end, left, _) = _station(spans, here), _station(spans, there)
+        ahead = (end > begin) == (cos(here.heading - line.heading) > 0.0)
+        apart = abs(end - begin) if self.kind == LONGITUDINAL else abs(left - own_left)
+        if self.freespace and self.kind == LONGITUDINAL:
+            apart -= one.front if ahead else one.rear
+            if other.mover is not None:
+                same = cos(there.heading - here.heading) > 0.0
+                apart -= other.mover.rear if ahead == same else other.mover.front
+        elif self.freespace:
+            apart -= one.body.width / 2 + (0.0 if other.mover is None else other.mover.body.width / 2)
+        return apart if isnan(apart) else max(apart, 0.0)
 
     def time_to_collision(self, one: Mover, other: Target, time: float) -> float:
         """Return the distance divided by its present rate of decrease [s]; inf if it does not decrease."""
+        if self.world is not None:
+            distance = self.between(one, other, time)
+            closing = (distance - self.between(one, other, time + _MOMENT)) / _MOMENT
+            return 0.0 if distance == 0.0 else distance / closing if closing > 0.0 else inf
         x, y = self._gap(one, other, time)
         distance = hypot(x, y)
         if distance == 0.0:
@@ -77,19 +103,45 @@ class Distance(NamedTuple):
         return min(candidates, key=lambda item: hypot(*item))
 
 
-def read_distance(item: Element, default: str | None = EUCLIDEAN) -> Distance:
+def _spans(world: ScenarioMap, mover: Mover, place: Place) -> tuple[Span, ...]:
+    """Return the lane sections of an entity's way, or its road without a way."""
+    if mover.way is not None:
+        return mover.way.spans
+    road, _, _ = world.locate(place)
+    return (Span(road, 1, 0, 0.0, road.length, 0.0),)
+
+
+def _station(spans: tuple[Span, ...], place: Place) -> tuple[float, float, Place]:
+    """Return distance along and offset from the roads of a way, nan beyond its ends, and their pose [m]."""
+    found: list[tuple[float, float, float, Place]] = []
+    for road in dict.fromkeys(span.road for span in spans):
+        s = min(max(road.line.project(place), 0.0), road.length)
+        span = next(item for item in spans if item.road is road)
+        along = span.start + span.direction * (s - span.begin)
+        line = span.line(along)
+        seen = place.seen_from(line)
+        inside = abs(seen.x) < _BESIDE
+        apart = abs(seen.x) * 1e3 + abs(seen.y)
+        found.append((apart, along if inside else nan, seen.y if inside else nan, line))
+    _, along, left, line = min(found, key=lambda item: item[0])
+    return along, left, line
+
+
+def read_distance(item: Element, world: ScenarioMap, default: str | None = EUCLIDEAN) -> Distance:
     """Return the distance that a condition states; without a type it is Euclidean, as in the standard.
 
     Args:
         item: The condition.
+        world: The roads.
         default: Distance type if `relativeDistanceType` is missing; None if the attribute is required.
     """
-    if item.flag("alongRoute"):
-        raise item.error(f"{item.tag} alongRoute=true is not supported; use relativeDistanceType")
-    item.choice("coordinateSystem", ("entity",), "entity")
-    kind = item.choice("relativeDistanceType", _TYPES, default)
+    along = item.flag("alongRoute")  # of OpenSCENARIO 1.0: the distance along the road
+    system = item.choice("coordinateSystem", ("entity", "road", "lane"), "entity")
+    kind = item.choice("relativeDistanceType", _TYPES, LONGITUDINAL if along else default)
+    kind = EUCLIDEAN if kind == "cartesianDistance" else kind
     item.choice("routingAlgorithm", ("undefined",), "undefined")
-    return Distance(EUCLIDEAN if kind == "cartesianDistance" else kind, item.flag("freespace"))
+    on_road = along or system != "entity"
+    return Distance(kind, item.flag("freespace"), world if on_road and kind != EUCLIDEAN else None)
 
 
 def relative_velocity(one: Mover, other: Mover | None, there: Place, time: float) -> tuple[float, float]:

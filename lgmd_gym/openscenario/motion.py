@@ -1,16 +1,22 @@
 """Places, paths and speed over time on the plane of the map: x, y and headings + to the left."""
 
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import cos, hypot, inf, sin, sqrt
+from itertools import accumulate, pairwise
+from math import ceil, cos, hypot, inf, sin, sqrt
 from typing import NamedTuple
+
+import numpy as np
 
 from lgmd_gym.envs.dynamics.path import Path
 from lgmd_gym.envs.dynamics.script import Bend, Pose, Segment
 
 MAX_CURVED = 100_000.0  # [m] of bends in a path
+MAX_ACCELERATION = 12.0
+"""Largest acceleration of a `Segment` [m/s²]; a jump of the speed becomes a ramp with it."""
+_RAMP = 0.4  # [m], so that a ramp deviates by at most 5 cm from a jump of the speed
 _SHORTEST = 1e-9  # [m], below which a section of a path is dropped
 
 
@@ -116,6 +122,24 @@ class Track:
         straight = (Bend(missing),) if missing > _SHORTEST else ()
         return Track(self.start, _trimmed([*kept, *straight, *bends]))
 
+    @cached_property
+    def _samples(self) -> np.ndarray:
+        """Distance, x and y at most 2 m apart along the bends, shape (3, samples) [m]."""
+        ends = [0.0, *accumulate(bend.length for bend in self.bends)]
+        parts = [np.linspace(a, b, max(ceil((b - a) / 2.0), 1), endpoint=False) for a, b in pairwise(ends)]
+        distances = np.concatenate([*parts, ends[-1:]])
+        places = [self.at(distance) for distance in distances.tolist()]
+        return np.array([distances, [place.x for place in places], [place.y for place in places]])
+
+    def project(self, place: Place) -> float:
+        """Return the distance along the path of the point nearest to a place, quickly and within 1 mm [m]."""
+        distances, x, y = self._samples
+        distance = float(distances[np.argmin((x - place.x) ** 2 + (y - place.y) ** 2)])
+        for _ in range(3):
+            seen = place.seen_from(self.at(distance))
+            distance += seen.x / max(1.0 - self.curvature(distance) * seen.y, 0.2)
+        return distance
+
     def nearest(self, place: Place, low: float = 0.0, high: float = 5000.0) -> float:
         """Return the distance along the path of the point nearest to a place.
 
@@ -129,16 +153,24 @@ class Track:
             point = self.at(distance)
             return hypot(point.x - place.x, point.y - place.y)
 
-        candidates, before = list[float](), 0.0
+        # Samples at the cells of the path, by which most of its bends are left out.
+        table = self._path.table
+        squares = (table[:, 1] - place.x) ** 2 + (table[:, 2] + place.y) ** 2
+        limit = (sqrt(squares.min()) + 1.0) ** 2
+        candidates, before, row = list[float](), 0.0, 0
         for bend in (*self.bends, Bend(max(high - self.length, 1.0))):
             if bend.curvature == bend.last_curvature == 0.0:
                 ahead = place.seen_from(self.at(before)).x
                 candidates.append(min(max(ahead, 0.0), bend.length) + before)
+                row += 1
             else:
                 count = max(int(bend.length / 0.5), 1)
                 step = bend.length / count
-                best = min((before + k * step for k in range(count + 1)), key=apart)
-                candidates.append(_refine(self, place, best - step, best + step))
+                samples = squares[row : row + count + 1]
+                if samples.min() <= limit:
+                    best = before + int(samples.argmin()) * step
+                    candidates.append(_refine(self, place, best - step, best + step))
+                row += count
             before += bend.length
         before_start = place.seen_from(self.start).x
         if before_start < 0.0:
@@ -151,6 +183,8 @@ def _refine(track: Track, place: Place, low: float, high: float) -> float:
     """Return the distance in an interval at which a place is neither ahead nor behind."""
     for _ in range(80):
         middle = (low + high) / 2
+        if middle in (low, high):
+            break
         if place.seen_from(track.at(middle)).x > 0.0:
             low = middle
         else:
@@ -237,12 +271,76 @@ class Timeline:
         self._pieces += _ramp(now, acceleration, final_speed, build_up)
         return self._pieces[-1].time
 
-    def copy_from(self, time: float, other: "Timeline") -> None:
-        """Follow the speed of another timeline from a time on."""
+    def jump(self, time: float, final_speed: float) -> float:
+        """Change the speed within the shortest time; the distance afterwards is that of a jump.
+
+        The change is around the time, if no other change ends later.
+
+        Args:
+            time: Time of the jump [s].
+            final_speed: Speed after it [m/s].
+
+        Returns:
+            The time of the end [s].
+        """
+        change = final_speed - self.at(time).speed
+        lasts = abs(change) / MAX_ACCELERATION
+        start = min(max(time - lasts / 2, self._pieces[-1].time, 0.0), time)
+        change = final_speed - self.at(start).speed
+        return self.change(start, MAX_ACCELERATION if change > 0.0 else -MAX_ACCELERATION, final_speed)
+
+    def follow_times(self, times: Sequence[tuple[float, float]]) -> float:
+        """Reach distances at given times, with a constant speed between them.
+
+        The changes of speed are short ramps around the times, so that no distance is lost. The first one
+        follows on the present speed.
+
+        Args:
+            times: Times [s], and distances along the path, which do not decrease [m].
+
+        Returns:
+            The last time [s].
+
+        Raises:
+            ValueError: If a change of speed needs more than `MAX_ACCELERATION`.
+        """
+        steps = list(pairwise(times))
+        speeds = [(after[1] - before[1]) / (after[0] - before[0]) for before, after in steps]
+        if times[0][0] > 0.0:
+            self.jump(times[0][0], speeds[0])
+        else:
+            self.initial_speed, self.segments = speeds[0], []
+            self._pieces = [Piece(0.0, 0.0, speeds[0])]
+        for number in range(1, len(speeds)):
+            time, change = times[number][0], speeds[number] - speeds[number - 1]
+            if abs(change) < _CLOSE:
+                continue
+            room = min(time - times[number - 1][0], times[number + 1][0] - time)
+            lasts = min(room, _RAMP / abs(change))
+            if abs(change) > MAX_ACCELERATION * lasts:
+                lasts = abs(change) / MAX_ACCELERATION
+                if lasts > room:
+                    raise ValueError(
+                        f"the speed changes by {change:.3g} m/s at {time:.4g} s, which needs more than "
+                        f"{MAX_ACCELERATION:g} m/s²; give it more time"
+                    )
+            self.change(time - lasts / 2, change / lasts, speeds[number])
+        return times[-1][0]
+
+    def copy_from(self, time: float, other: "Timeline", relation: tuple[float, float] = (1.0, 0.0)) -> None:
+        """Follow the speed of another timeline from a time on.
+
+        Args:
+            time: The time [s].
+            other: The other timeline.
+            relation: Factor of the other speed, and addition to it [m/s].
+        """
+        factor, delta = relation
         self._cut(time)
         for segment in other.segments:
             if segment.start >= time:
-                self.change(segment.start, segment.acceleration, segment.final_speed, segment.build_up)
+                final = segment.final_speed * factor + delta
+                self.change(segment.start, segment.acceleration * factor, final, segment.build_up)
 
     def time_of(self, distance: float) -> float:
         """Return the first time at which a distance is reached [s]; inf if it never is."""

@@ -354,6 +354,13 @@ class Element:
         """Return an attribute with a path relative to the folder of the file; a backslash separates too."""
         return self.node.file.parent / self.text(name).replace("\\", "/")
 
+    def label(self, name: str = "name") -> str:
+        """Return an attribute that is a name, as in the file if it is no expression with a value."""
+        try:
+            return self.text(name)
+        except ValueError:
+            return self._raw(name)
+
     def name_of(self, name: str) -> str:
         """Return an attribute with the name of a parameter, without its "$"."""
         return self._raw(name).removeprefix("$")

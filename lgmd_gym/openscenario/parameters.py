@@ -61,6 +61,11 @@ def declare(parent: Element, given: Mapping[str, Assignment]) -> dict[str, str]:
         scope[name] = value
         declared.add(name)
         _check_constraints(item, name, value, source)
+    variables = parent.find("VariableDeclarations")
+    for item in () if variables is None else variables.all("VariableDeclaration"):
+        item = Element(item.node, scope)
+        scope.setdefault(item.name_of("name"), item.text("value"))  # values at the start
+        item.skip()
     for name in given.keys() - declared:
         raise given[name].node.error(str(unknown_name("parameter", name, declared)))
     return scope
@@ -174,7 +179,8 @@ class Catalogs:
     def __init__(self, scenario: Element) -> None:
         self.visited: list[Node] = []
         locations = scenario.find("CatalogLocations")
-        self._folders = [] if locations is None else _folders(locations)
+        self._missing = list[ValueError]()  # errors of folders that do not exist
+        self._folders = [] if locations is None else self._existing(locations)
 
     def resolve(self, item: Element, *tags: str) -> Element:
         """Return an inline element with one of some tags, or the catalog entry that `item` refers to."""
@@ -183,12 +189,18 @@ class Catalogs:
             return Element(found.node, declare(found, {}))
         return self.entry(found, *tags)
 
+    def node(self, reference: Element) -> Node | None:
+        """Return the node of a `CatalogReference`; None if there is no such entry."""
+        return self._entries.get((reference.text("catalogName"), reference.text("entryName")))
+
     def entry(self, reference: Element, *tags: str) -> Element:
         """Return the entry of a `CatalogReference`, with the assigned parameters."""
         catalog, name = reference.text("catalogName"), reference.text("entryName")
         entries = self._entries
         if (catalog, name) not in entries:
             catalogs = {known for known, _ in entries} or {folder.name for folder in self._folders}
+            if catalog not in catalogs and self._missing:
+                raise self._missing[0]
             if catalog not in catalogs:
                 raise reference.error(str(unknown_name("catalog", catalog, catalogs)))
             names = {known for where, known in entries if where == catalog}
@@ -198,6 +210,19 @@ class Catalogs:
             raise reference.error(f"entry {name!r} is a {node.tag}, not a {' or '.join(tags)}")
         self.visited.append(node)
         return Element(node, declare(Element(node, {}), assignments(reference)))
+
+    def _existing(self, locations: Element) -> list[Path]:
+        """Return the folders of the catalogs; one that does not exist is an error once it is needed."""
+        folders: list[Path] = []
+        for node in locations.node.children:
+            directory = Element(node, locations.scope).child("Directory")
+            folder = directory.path("path")
+            if folder.is_dir():
+                folders.append(folder)
+            else:
+                text = f"the folder {directory.text('path')!r} does not exist; check CatalogLocations"
+                self._missing.append(directory.error(text))
+        return list(dict.fromkeys(folders))
 
     @cached_property
     def _entries(self) -> dict[tuple[str, str], Node]:
@@ -213,18 +238,7 @@ def _entries_of(files: tuple[Node, ...]) -> dict[tuple[str, str], Node]:
         for catalog in file.children:
             if catalog.tag == "Catalog":
                 for node in catalog.children:
-                    entries[catalog.attributes.get("name", ""), node.attributes.get("name", "")] = node
+                    name = node.attributes.get("name", "")
+                    entries[catalog.attributes.get("name", ""), name] = node
+                    entries.setdefault((file.file.stem, name), node)  # as in esmini
     return entries
-
-
-def _folders(locations: Element) -> list[Path]:
-    folders: list[Path] = []
-    for node in locations.node.children:
-        directory = Element(node, locations.scope).child("Directory")
-        folder = directory.path("path")
-        if not folder.is_dir():
-            raise directory.error(
-                f"the folder {directory.text('path')!r} does not exist; check CatalogLocations"
-            )
-        folders.append(folder)
-    return list(dict.fromkeys(folders))

@@ -1,4 +1,4 @@
-"""Reading of OpenSCENARIO XML 1.1 to 1.3 as suites."""
+"""Reading of OpenSCENARIO XML 1.0 to 1.3 as suites."""
 
 import re
 import warnings
@@ -77,7 +77,7 @@ def _number(value: float) -> str:
 
 SUFFIX = ".xosc"
 FAMILY = "Scenario_ID"  # parameter that names the family
-VERSIONS = ("1", "2", "3")
+VERSIONS = ("0", "1", "2", "3")
 DRIVER = "lgmd_gym.fcw_driver"
 """Property of the file: whether the driver brakes after the alert."""
 FCW = "_FCW"
@@ -174,8 +174,13 @@ def find_files(path: Path) -> list[Path]:
     return files
 
 
-def read_cells(path: Path) -> list[Cell]:
-    """Return the cells of a file, in the order of its variations."""
+def read_cells(path: Path, limit: int | None = None) -> list[Cell]:
+    """Return the cells of a file, in the order of its variations.
+
+    Args:
+        path: The file.
+        limit: Number of cells to read; None for all.
+    """
     root = _root(path)
     distribution = root.find("ParameterValueDistribution")
     if distribution is None:
@@ -185,7 +190,7 @@ def read_cells(path: Path) -> list[Cell]:
     scenario = _root(file)
     if scenario.find("Storyboard") is None:
         raise target.error(f"{str(file)!r} is no scenario; ScenarioFile must name one with a Storyboard")
-    return _cells(path, file, scenario.node, variations(distribution))
+    return _cells(path, file, scenario.node, variations(distribution), limit)
 
 
 def _root(path: Path) -> Element:
@@ -198,15 +203,19 @@ def _root(path: Path) -> Element:
     header = root.child("FileHeader")
     version = header.text("revMajor"), header.text("revMinor")
     if version[0] != "1" or version[1] not in VERSIONS:
-        raise header.error(f"OpenSCENARIO {'.'.join(version)} is not supported; use 1.1, 1.2 or 1.3")
+        raise header.error(f"OpenSCENARIO {'.'.join(version)} is not supported; use 1.0 to 1.3")
     return root
 
 
-def _cells(path: Path, file: Path, root: Node, given: Iterable[dict[str, Assignment]]) -> list[Cell]:
+def _cells(
+    path: Path, file: Path, root: Node, given: Iterable[dict[str, Assignment]], limit: int | None = None
+) -> list[Cell]:
     cells: list[Compiled] = []
     varied: list[dict[str, str]] = []
     violations: list[ConstraintError] = []
     for assignments in given:
+        if len(cells) == limit:
+            break
         try:
             scope = declare(Element(root, {}), assignments)
         except ConstraintError as error:

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from heapq import heappop, heappush
 from itertools import pairwise
-from math import pi
+from math import atan2, pi
 from pathlib import Path
 from typing import NamedTuple
 
 from lgmd_gym.envs.dynamics.script import Bend
 from lgmd_gym.errors import unknown_name
+from lgmd_gym.openscenario.curves import fit
 from lgmd_gym.openscenario.motion import Place, Track
 from lgmd_gym.openscenario.nodes import Element, Node, parse_file
 
@@ -32,7 +33,7 @@ class Lane(NamedTuple):
     widths: tuple[Width, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Road:
     """A road."""
 
@@ -56,23 +57,55 @@ class Road:
         return _polynomial(lanes[lane].widths, s - start)
 
     def _section(self, s: float) -> tuple[float, dict[int, Lane]]:
-        return next(item for item in reversed(self.sections) if item[0] <= s or item[0] == 0.0)
+        return next((item for item in reversed(self.sections) if item[0] <= s), self.sections[0])
 
-    def lane_centre(self, lane: int, s: float) -> float:
-        """Return the offset of a lane's centre from the reference line, + left [m]."""
-        lanes, total = self.lanes(s), _polynomial(self.offsets, s)
+    def lane_centre(self, lane: int, s: float, twice: float | None = None) -> float:
+        """Return the offset of a lane's centre from the reference line, + left [m].
+
+        Args:
+            lane: Id of the lane.
+            s: Distance along the road [m].
+            twice: Twice a distance within the lane section, for its ends; None for that of `s` [m].
+        """
+        start, lanes = self._section(s if twice is None else twice / 2)
+        total = _polynomial(self.offsets, s)
         if lane == 0:
             return total
         if lane not in lanes:
             raise unknown_name(f"lane of road {self.name}", str(lane), map(str, lanes))
         side = 1 if lane > 0 else -1
         for number in range(side, lane, side):
-            total += side * self.width(number, s)
-        return total + side * self.width(lane, s) / 2
+            total += side * _polynomial(lanes[number].widths, s - start) if number in lanes else 0.0
+        return total + side * _polynomial(lanes[lane].widths, s - start) / 2
+
+    def constant_centre(self, lane: int, low: float, high: float) -> bool:
+        """Return whether the offset of a lane's centre is constant between two distances [m]."""
+        start, lanes = self._section((low + high) / 2)
+        side = 1 if lane > 0 else -1
+        inside = [lanes[number].widths for number in range(side, lane + side, side) if number in lanes]
+        widths = all(_is_constant(item, low - start, high - start) for item in inside)
+        return widths and _is_constant(self.offsets, low, high)
+
+    @cached_property
+    def joints(self) -> tuple[float, ...]:
+        """Distances at which the shape of the road or of its lanes changes, without its ends [m]."""
+        found, distance = {item.s for item in self.offsets}, 0.0
+        for bend in self.line.bends:
+            distance += bend.length
+            found.add(distance)
+        for start, lanes in self.sections:
+            found.add(start)
+            found |= {start + width.s for lane in lanes.values() for width in lane.widths}
+        return tuple(sorted(item for item in found if 0.0 < item < self.length))
 
     def direction(self, lane: int) -> int:
         """Return 1 if the traffic of a lane drives along the reference line, else -1."""
         return 1 if (lane < 0) != self.left_hand else -1
+
+    def is_open(self, direction: int) -> bool:
+        """Return whether traffic may drive in a direction; roads outside of junctions are open in both."""
+        lanes = [lane for _, inside in self.sections for lane in inside if lane]
+        return self.junction == "-1" or any(self.direction(lane) == direction for lane in lanes)
 
     def at(self, s: float, t: float = 0.0) -> Place:
         """Return the pose of the reference line at a distance, shifted to the left by `t` [m]."""
@@ -83,35 +116,73 @@ class Road:
         s = self.line.nearest(place, 0.0, self.length)
         return s, place.seen_from(self.line.at(s)).y
 
-    def bends(self, direction: int, t: float) -> tuple[Bend, ...]:
+    def bends(
+        self, direction: int, t: float, low: float = 0.0, high: float | None = None
+    ) -> tuple[Bend, ...]:
         """Return the bends of the line at offset `t` of the reference line [m].
 
         Args:
             direction: 1 for the direction of the reference line, -1 for the opposite.
             t: Offset from the reference line, + left of it [m].
+            low: Distance along the road at which they begin, in the direction of the reference line [m].
+            high: Distance at which they end; None for the end of the road [m].
         """
-        bends, line = list[Bend](), self.line.part(0.0, self.length).bends
-        for bend in line:
+        high = self.length if high is None else high
+        part, bends, along = self.line.part(low, high), list[Bend](), 0.0
+        for bend in part.bends:
             constant = bend.curvature == bend.last_curvature
             if t != 0.0 and not constant:
-                raise ValueError(f"a lane along a spiral of road {self.name} is not supported; use an arc")
-            scale = 1.0 - bend.curvature * t if t != 0.0 else 1.0
-            first, last = bend.curvature / scale, bend.last_curvature / scale
-            if direction < 0:
-                first, last = -last, -first
-            bends.append(Bend(bend.length * scale, first, None if constant else last))
-        missing = self.length - sum(bend.length for bend in line)
-        straight = [Bend(missing)] if missing > _CLOSE else []
-        return (*bends, *straight) if direction > 0 else (*straight, *reversed(bends))
+                bends += _parallel(Track(part.at(along), (bend,)), t)
+            else:
+                scale = 1.0 - bend.curvature * t if t != 0.0 else 1.0
+                if scale <= 0.0:
+                    raise ValueError(f"road {self.name} has no line at {t:.3g} m: it is beyond its centre")
+                last = None if constant else bend.last_curvature / scale
+                bends.append(Bend(bend.length * scale, bend.curvature / scale, last))
+            along += bend.length
+        missing = high - low - along
+        bends += [Bend(missing)] if missing > _CLOSE else []
+        return tuple(bends) if direction > 0 else tuple(map(_reversed, reversed(bends)))
+
+
+@lru_cache(maxsize=4096)
+def _parallel(line: Track, t: float) -> tuple[Bend, ...]:
+    """Return the bends of the line at an offset from another one [m]."""
+    if min(1.0 - bend * t for item in line.bends for bend in (item.curvature, item.last_curvature)) <= 0.0:
+        raise ValueError(f"a spiral has no line at {t:.3g} m: it is beyond its centre")
+    return fit(lambda distance: line.at(distance, t), (0.0, line.length))
+
+
+def _reversed(bend: Bend) -> Bend:
+    constant = bend.end_curvature is None
+    return Bend(bend.length, -bend.last_curvature, None if constant else -bend.curvature)
+
+
+def _is_constant(items: tuple[Width, ...], low: float, high: float) -> bool:
+    """Return whether polynomials are constant between two distances [m]."""
+    last = max((item.s for item in items if item.s <= low + 1e-9), default=low)
+    used = [item for item in items if last <= item.s < high - 1e-9]
+    values = {item.coefficients[0] for item in used}
+    if used and used[0].s > low + 1e-9:  # 0 before the first record
+        values.add(0.0)
+    return len(values) <= 1 and all(not any(item.coefficients[1:]) for item in used)
 
 
 def _polynomial(items: tuple[Width, ...], s: float) -> float:
     item = next((item for item in reversed(items) if item.s <= s + 1e-9), None)
     if item is None:
         return 0.0
-    a, b, c, d = item.coefficients
-    ds = s - item.s
-    return a + ds * (b + ds * (c + ds * d))
+    return _cubic(item.coefficients, s - item.s)
+
+
+def _cubic(coefficients: tuple[float, ...], x: float) -> float:
+    a, b, c, d = coefficients
+    return a + x * (b + x * (c + x * d))
+
+
+def _slope(coefficients: tuple[float, ...], x: float) -> float:
+    _, b, c, d = coefficients
+    return b + x * (2.0 * c + x * 3.0 * d)
 
 
 @dataclass(frozen=True)
@@ -145,13 +216,15 @@ class RoadNetwork:
             if (name, way) in seen:
                 continue
             seen.add((name, way))
-            for other, end in self._after(name, "end" if way > 0 else "start"):
+            for other, end in self.after(name, "end" if way > 0 else "start"):
                 side = 1 if end == "start" else -1
+                if not self.roads[other].is_open(side):
+                    continue
                 total = length + self.roads[other].length
                 heappush(queue, (total, other, side, (*steps, (other, side))))
         raise ValueError(f"the road network has no way from road {first} to road {last}")
 
-    def _after(self, name: str, end: str) -> Iterator[End]:
+    def after(self, name: str, end: str) -> Iterator[End]:
         """Yield the road ends that are connected to the end of a road."""
         if end in self.roads[name].links:
             yield self.roads[name].links[end]
@@ -227,7 +300,7 @@ def _reference_line(view: Element) -> Track:
                 raise item.error("the geometries of a road must be continuous")
         length = item.number("length")
         if length > 1e-9:
-            bends.append(_bend(item, length))
+            bends += _bends(item, length, place)
         assert start is not None
         line = Track(start, tuple(bends))
     if line is None:
@@ -235,13 +308,24 @@ def _reference_line(view: Element) -> Track:
     return line
 
 
-def _bend(item: Element, length: float) -> Bend:
-    shape = item.only("line", "arc", "spiral")
+def _bends(item: Element, length: float, start: Place) -> tuple[Bend, ...]:
+    """Return the bends of a geometry that begins at a pose."""
+    shape = item.only("line", "arc", "spiral", "paramPoly3")
     if shape.tag == "line":
-        return Bend(length)
+        return (Bend(length),)
     if shape.tag == "arc":
-        return Bend(length, shape.number("curvature"))
-    return Bend(length, shape.number("curvStart"), shape.number("curvEnd"))
+        return (Bend(length, shape.number("curvature")),)
+    if shape.tag == "spiral":
+        return (Bend(length, shape.number("curvStart"), shape.number("curvEnd")),)
+    normalized = shape.choice("pRange", ("arcLength", "normalized"), "normalized") == "normalized"
+    u, v = (tuple(shape.number(f"{name}{axis}") for name in "abcd") for axis in "UV")
+
+    def at(p: float) -> Place:
+        place = start.moved(_cubic(u, p), _cubic(v, p))
+        return place.turned(atan2(_slope(v, p), _slope(u, p)))
+
+    with item.locate_errors("paramPoly3: "):
+        return fit(at, (0.0, 1.0 if normalized else length))
 
 
 Stop = tuple[Road, int | None, float]  # road, lane, distance along the road [m]
@@ -302,4 +386,7 @@ class Route:
         leg = next(leg for leg in reversed(self.legs) if leg.start <= along or leg.start == 0.0)
         s = along - leg.start
         s = s if leg.direction > 0 else leg.road.length - s
-        return leg.direction * leg.road.lane_centre(leg.direction * lane, s)
+        number = leg.direction * lane
+        if leg.direction < 0 and lane > 0 and leg.road.direction(-number) < 0:
+            number = -number  # an id of the road rather than of the direction of travel, as in esmini
+        return leg.direction * leg.road.lane_centre(number, s)

@@ -3,11 +3,15 @@
 from dataclasses import dataclass, field
 from math import inf
 
-from lgmd_gym.openscenario.actions import ActionRun, global_action, private_action, settle
+from lgmd_gym.openscenario.actions import ActionRun, global_action, private_action
 from lgmd_gym.openscenario.conditions import States, Trigger, read_trigger
 from lgmd_gym.openscenario.nodes import Element, Node
 from lgmd_gym.openscenario.parameters import declare
-from lgmd_gym.openscenario.world import Mover, ScenarioMap
+from lgmd_gym.openscenario.weather import weather_of
+from lgmd_gym.openscenario.world import POSITIONS, Mover, ScenarioMap
+
+MAX_STARTS = 2000
+"""Largest number of starts of events in a scenario."""
 
 
 @dataclass(eq=False)
@@ -20,8 +24,15 @@ class Event:
     runs: list[tuple[str, ActionRun]]  # its actions; empty if none has an effect
     maneuver: Node  # the maneuver that contains it
     skips: bool  # whether it does not start while another event of its maneuver runs (priority "skip")
+    count: int = 1  # how often it may start
+    act_start: float = inf  # start of its act [s]
     started: float = inf  # start [s]; inf before
     ended: float = inf  # end [s]; inf before the start
+
+    @property
+    def free_from(self) -> float:
+        """Time from which it may start, after its present execution [s]."""
+        return self.ended if self.ended < inf else 0.0
 
 
 @dataclass
@@ -42,32 +53,54 @@ class Storyboard:
         waiting = [event for event in self.events if self._matters(event)]
         for event in self.events:
             if event not in waiting:
-                for trigger in event.triggers:
-                    if trigger is not None:
-                        trigger.skip()
-        triggers = [
-            (read_trigger(act, world, self.states), read_trigger(own, world, self.states))
-            for act, own in (event.triggers for event in waiting)
-        ]
+                _skip_triggers(event)
+        triggers = {
+            event: (
+                read_trigger(event.triggers[0], world, self.states),
+                read_trigger(event.triggers[1], world, self.states),
+            )
+            for event in waiting
+        }
         now = last = 0.0
-        while waiting:
-            times = [_start(act, own, now) for act, own in triggers]
-            now = min(times)
+        for _ in range(MAX_STARTS):
+            times = [self._start(event, *triggers[event], now) for event in waiting]
+            if min(times, default=inf) == inf:  # again, with the starts of the acts
+                times = [self._start(event, *triggers[event], now) for event in waiting]
+            now = min(times, default=inf)
             if now == inf:
                 break
-            index = times.index(now)
-            triggers.pop(index)
-            self._carry_out(waiting.pop(index), now)
-            last = now
+            event, last = waiting[times.index(now)], now
+            self._carry_out(event, now)
+            event.count -= 1
+            if event.count == 0 or event.ended == inf:
+                waiting.remove(event)
+        else:
+            raise waiting[0].item.error(
+                f"events start more than {MAX_STARTS} times; lower maximumExecutionCount"
+            )
+        notes: list[str] = []
         for event in waiting:
             event.item.skip()
-        notes: list[str] = []
-        for event, (act, own) in zip(waiting, triggers, strict=True):
-            reason = _reason(act, own, last)
-            if event.runs and reason:
-                name = event.item.text("name", "")
-                notes.append(str(event.item.error(f"event {name!r} never starts: {reason}")))
+            reason = _reason(*triggers[event], last)
+            if event.runs and reason and event.started == inf:
+                notes.append(str(event.item.error(f"event {event.item.label()!r} never starts: {reason}")))
         return notes
+
+    def _start(self, event: Event, act: Trigger, own: Trigger, now: float) -> float:
+        """Return the time at which an event starts, and note the start of its act [s].
+
+        Args:
+            event: The event.
+            act: Trigger of its act.
+            own: Its own trigger.
+            now: Present time [s].
+        """
+        begun = act.first(0.0)
+        event.act_start = begun
+        for key in event.groups[:-1]:
+            start, end = self.states.get(key, (inf, inf))
+            self.states[key] = min(begun, start), end
+        return own.first(max(begun, now, event.free_from)) if begun < inf else inf
 
     def _matters(self, event: Event) -> bool:
         """Return whether an event changes the motion, or another event that does refers to it."""
@@ -75,7 +108,7 @@ class Storyboard:
             return True
         names = {name for _, name in event.groups}
         return any(
-            reference.text("storyboardElementRef") in names
+            reference.label("storyboardElementRef") in names
             for other in self.events
             if other.runs
             for trigger in other.triggers
@@ -98,14 +131,14 @@ class Storyboard:
             event.ended = max(event.ended, end)
         for key in event.groups:
             members = [other for other in self.events if key in other.groups and self._matters(other)]
-            start = min(other.started for other in members)
+            start = event.started if key[0] == "event" else min(other.act_start for other in members)
             self.states[key] = start, max(other.ended for other in members)
 
 
-def _start(act: Trigger, own: Trigger, now: float) -> float:
-    """Return the time at which an event starts, given the triggers of its act and its own [s]."""
-    begun = act.first(0.0)
-    return own.first(max(begun, now)) if begun < inf else inf
+def _skip_triggers(event: Event) -> None:
+    for trigger in event.triggers:
+        if trigger is not None:
+            trigger.skip()
 
 
 def _reason(act: Trigger, own: Trigger, now: float) -> str:
@@ -133,24 +166,66 @@ def _references(trigger: Element) -> list[Element]:
     return found
 
 
-def run_init(board: Element, world: ScenarioMap) -> Element | None:
-    """Carry out the initial actions; return the environment, None without one."""
-    environment, actions = None, board.child("Init").child("Actions")
+def run_init(board: Element, world: ScenarioMap) -> None:
+    """Carry out the initial actions.
+
+    Routes are assigned after the positions, and lateral actions come last, because their paths depend on the
+    speeds.
+    """
+    actions = board.child("Init").child("Actions")
+    for item in actions.all("UserDefinedAction"):
+        item.skip()
+        world.note(item, "UserDefinedAction has no effect")
     for item in actions.all("GlobalAction"):
-        found = item.only("EnvironmentAction", "VariableAction")
-        if found.tag == "EnvironmentAction":
-            environment = world.catalogs.resolve(found, "Environment")
-        else:
-            found.skip()
-    for item in actions.all("Private"):
-        mover = world.mover(item)
-        for action in item.all("PrivateAction"):
-            run = private_action(action, mover, world)
-            if run is not None:
-                run(0.0)
+        _run_global(item, world)
+    pending = [
+        (action, run)
+        for item in actions.all("Private")
+        for action in item.all("PrivateAction")
+        if (run := private_action(action, world.mover(item), world)) is not None
+    ]
+    _run_ordered([item for item in pending if _rank(item[0]) == 0], world)
     for mover in world.movers.values():
-        settle(world, mover)
-    return environment
+        world.settle(mover)
+    for rank in (1, 2):
+        _run_ordered([item for item in pending if _rank(item[0]) == rank], world)
+
+
+def _run_global(item: Element, world: ScenarioMap) -> None:
+    """Carry out an initial `GlobalAction`."""
+    found = item.find("EnvironmentAction")
+    if found is not None:
+        world.weather = weather_of(world.catalogs.resolve(found, "Environment"))
+        return
+    run = global_action(item, world)
+    if run is not None:
+        run(0.0)
+
+
+def _rank(action: Element) -> int:
+    """Return the place of an initial action: 1 for routes, 2 for lateral actions, 0 for others."""
+    routing = action.find("RoutingAction")
+    if routing is not None and routing.find("AssignRouteAction", "AcquirePositionAction"):
+        return 1
+    return 2 if action.find("LateralAction") is not None else 0
+
+
+def _is_placed(action: Element, world: ScenarioMap) -> bool:
+    """Return whether the entities that the position of a teleport refers to have positions."""
+    teleport = action.find("TeleportAction")
+    position = None if teleport is None else teleport.find("Position")
+    if position is None:
+        return True
+    found = list(position.all(*POSITIONS))
+    return all(not item.has("entityRef") or world.mover(item).track is not None for item in found)
+
+
+def _run_ordered(pending: list[tuple[Element, ActionRun]], world: ScenarioMap) -> None:
+    """Carry out initial actions in their order; one waits for the position that it refers to."""
+    while pending:
+        ready = next((item for item in pending if _is_placed(item[0], world)), pending[0])
+        pending.remove(ready)
+        ready[1](0.0)
 
 
 def read_story(board: Element, world: ScenarioMap) -> Storyboard:
@@ -162,44 +237,57 @@ def read_story(board: Element, world: ScenarioMap) -> Storyboard:
             stop = act.find("StopTrigger")
             if stop is not None:
                 stop.skip()
-            trigger = act.find("StartTrigger")
+            trigger, before = act.find("StartTrigger"), len(events)
             for group in act.all("ManeuverGroup"):
                 events += _group_events(story, act, trigger, group, world)
+            if len(events) == before and trigger is not None:
+                trigger.skip()
     return Storyboard(events)
 
 
 def _group_events(
     story: Element, act: Element, trigger: Element | None, group: Element, world: ScenarioMap
 ) -> list[Event]:
-    _once(group)
+    repeats = group.number("maximumExecutionCount", 1.0)
     actors = group.child("Actors")
     if actors.flag("selectTriggeringEntities"):
         raise actors.error("selectTriggeringEntities=true is not supported; list the entities")
     movers = [world.mover(item) for item in actors.all("EntityRef")]
     maneuvers = [*group.all("Maneuver")]
     maneuvers += [world.catalogs.entry(item, "Maneuver") for item in group.all("CatalogReference")]
-    outer = [("story", story.text("name")), ("act", act.text("name")), ("maneuverGroup", group.text("name"))]
+    outer = [("story", story.label()), ("act", act.label()), ("maneuverGroup", group.label())]
     events: list[Event] = []
     for maneuver in maneuvers:
         for event in maneuver.all("Event"):
-            _once(event)
+            count = event.number("maximumExecutionCount", 1.0)
+            if not count.is_integer() or count < 0.0:
+                raise event.error(f"Event maximumExecutionCount must be a whole number >= 0, got {count:g}")
+            if count * repeats == 0.0:
+                event.skip()
+                continue
             priority = event.choice("priority", ("override", "overwrite", "parallel", "skip"))
-            names = [*outer, ("maneuver", maneuver.text("name")), ("event", event.text("name"))]
+            names = [*outer, ("maneuver", maneuver.label()), ("event", event.label())]
             runs = [run for action in event.all("Action") for run in _runs(action, movers, world)]
             triggers = trigger, event.find("StartTrigger")
-            events.append(Event(event, triggers, names, runs, maneuver.node, priority == "skip"))
+            found = Event(
+                event, triggers, names, runs, maneuver.node, priority == "skip", int(count * repeats)
+            )
+            events.append(found)
+    if repeats > 1.0 and len(events) > 1:
+        raise group.error(
+            f"ManeuverGroup maximumExecutionCount must be 1 for several events, got {repeats:g}"
+        )
     return events
 
 
 def _runs(action: Element, movers: list[Mover], world: ScenarioMap) -> list[tuple[str, ActionRun]]:
-    found = action.only("PrivateAction", "GlobalAction")
+    found = action.only("PrivateAction", "GlobalAction", "UserDefinedAction")
+    if found.tag == "UserDefinedAction":
+        found.skip()
+        world.note(found, "UserDefinedAction has no effect")
+        return []
     if found.tag == "GlobalAction":
         runs = [global_action(found, world)]
     else:
         runs = [private_action(found, mover, world) for mover in movers]
-    return [(action.text("name"), run) for run in runs if run is not None]
-
-
-def _once(item: Element) -> None:
-    if item.number("maximumExecutionCount", 1.0) != 1.0:
-        raise item.error(f"{item.tag} maximumExecutionCount must be 1")
+    return [(action.label(), run) for run in runs if run is not None]

@@ -1,14 +1,18 @@
 """Entities and their bodies, and the world of a scenario: its roads, catalogs, positions and paths."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import atan2, pi, remainder
+from math import cos, hypot, pi, remainder
 
-from lgmd_gym.envs.dynamics.script import Bend
+from lgmd_gym.camera import CLEAR
+from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.errors import check_known, check_whole, unknown_name
 from lgmd_gym.openscenario.motion import Place, Timeline, Track
 from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.parameters import Catalogs
 from lgmd_gym.openscenario.roads import Road, RoadNetwork, Route
+from lgmd_gym.openscenario.trajectories import Trajectory, read_trajectory
+from lgmd_gym.openscenario.ways import Way, follow
 
 CONTROL_POINT = "Driver.ControlPoint.Mode"  # property of a controller, Vector DYNA4
 SHADE = "lgmd_gym.shade"
@@ -51,14 +55,25 @@ class Mover:
 
     name: str  # name in the scenario
     body: EntityBody
+    tag: str = "Vehicle"  # Vehicle, Pedestrian or MiscObject
     track: Track | None = None  # path of its reference point from its start; None before it is placed
     start: Place | None = None  # pose of its reference point at the start; None before it is placed
     follows: bool = False  # whether it follows a trajectory or route
     timeline: Timeline = field(default_factory=Timeline)  # its speed; distances count from the start
     backwards: bool = False  # whether it drives backwards along its track
     front_axle: bool = False  # whether the front axle follows trajectories
+    controllers: list[Element] = field(default_factory=list[Element])  # controllers without effect
     leader: "Mover | None" = None  # entity whose speed it copies
+    relation: tuple[float, float] = (1.0, 0.0)  # factor of that speed, and addition to it [m/s]
     deleted: bool = False  # whether it has been deleted at the start
+    way: Way | None = None  # the lanes along which its path leads; None without any
+    chosen: bool = False  # whether its way is one of several
+    legs: tuple[tuple[Road, int], ...] = ()  # roads and directions of its route; empty without one
+    turns: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
+    """Start and end of its lateral actions [s]."""
+    # plans the path of the present lateral action again and returns its end; None without one
+    replan: Callable[[], float] | None = None
+    replan_until: float = 0.0  # end of the present lateral action [s]
 
     @property
     def path(self) -> Track:
@@ -94,24 +109,39 @@ def read_entities(scenario: Element, catalogs: Catalogs) -> dict[str, Mover]:
     for item in scenario.child("Entities").all("ScenarioObject"):
         name = item.text("name")
         found = catalogs.resolve(item, "Vehicle", "Pedestrian", "MiscObject")
-        mover = Mover(name, _body(found))
-        for controller in item.all("ObjectController"):
-            mover.front_axle = reads_front_axle(controller, catalogs)
+        mover = Mover(name, _body(found), found.tag)
+        read_controllers(item, mover, catalogs)
         movers[name] = mover
     return movers
 
 
-def reads_front_axle(item: Element, catalogs: Catalogs) -> bool:
-    """Return whether the `Controller` of an element moves the control point to the front axle."""
-    if not item.node.children:
-        return False
-    controller = catalogs.resolve(item, "Controller")
-    front_axle = False
-    for name, value in controller.properties().items():
-        if name != CONTROL_POINT or value not in ("FrontAxle", "RearAxle"):
-            raise controller.error(f"controller property {name}={value!r} is not supported; remove it")
-        front_axle = value == "FrontAxle"
-    return front_axle
+def read_controllers(item: Element, mover: Mover, catalogs: Catalogs) -> None:
+    """Set the control point of an entity; other properties of its controllers have no effect.
+
+    Args:
+        item: Element that contains controllers or references to catalogs.
+        mover: The entity.
+        catalogs: The catalogs.
+    """
+    for child in item.all("ObjectController"):
+        read_controllers(child, mover, catalogs)
+    for child in item.all("Controller", "CatalogReference"):
+        node = catalogs.node(child) if child.tag == "CatalogReference" else child.node
+        child.skip()
+        if node is None:
+            mover.controllers.append(child)
+            continue
+        controller = Element(node, child.scope)
+        controller.skip()
+        block = controller.find("Properties")
+        properties = [] if block is None else [property.node for property in block.all("Property")]
+        values = {entry.attributes.get("name"): entry.attributes.get("value") for entry in properties}
+        mode = values.pop(CONTROL_POINT, None)
+        if mode not in (None, "FrontAxle", "RearAxle"):
+            raise controller.error(f"{CONTROL_POINT} must be FrontAxle or RearAxle, got {mode!r}")
+        mover.front_axle = mode == "FrontAxle"
+        if values or mode is None:
+            mover.controllers.append(child)
 
 
 def _body(item: Element) -> EntityBody:
@@ -150,6 +180,34 @@ def _wheelbase(item: Element) -> float:
     return max(positions) - min(positions) if len(positions) > 1 else 0.0
 
 
+def carry_over(world: "ScenarioMap", mover: Mover, time: float) -> None:
+    """Carry a change of speed over to a lateral action, and to the entities that copy the speed."""
+    if mover.replan is not None and time < mover.replan_until:
+        mover.replan_until = mover.replan()
+    for other in world.movers.values():
+        if other.leader is mover:
+            other.timeline.copy_from(time, mover.timeline, other.relation)
+            carry_over(world, other, time)
+
+
+def pose_of(mover: Mover, time: float) -> tuple[Place, float, float]:
+    """Return the pose of a body's centre in its direction of travel, its reference, and its speed."""
+    motion = mover.timeline.at(time)
+    reference = -mover.body.reference if mover.backwards else mover.body.reference
+    return mover.path.at(motion.distance).moved(reference), reference, motion.speed
+
+
+def touching(one: Mover, other: Mover, time: float) -> bool:
+    """Return whether two bodies touch at a time [s]."""
+    a, b = pose_of(one, time)[0], pose_of(other, time)[0]
+    reach = hypot(one.body.length, one.body.width) + hypot(other.body.length, other.body.width)
+    if 4.0 * ((a.x - b.x) ** 2 + (a.y - b.y) ** 2) > reach**2 + 1.0:
+        return False
+    first = Rectangle(a.x, a.y, a.heading, one.body.length, one.body.width)
+    second = Rectangle(b.x, b.y, b.heading, other.body.length, other.body.width)
+    return first_touch(first, second, 0.0, 0.0) == 0.0
+
+
 _UPRIGHT = 1e-6  # [rad] or [m]
 POSITIONS = (
     "LanePosition",
@@ -165,10 +223,21 @@ POSITIONS = (
 
 
 class ScenarioMap:
-    """Roads, catalogs and entities."""
+    """Roads, catalogs and entities.
+
+    Attributes:
+        notes: What has no effect or deviates from the file, with file and line.
+        weather: Name of the weather at the start.
+        watched: Names of the parameters and variables in conditions.
+        values: Values given to parameters and variables by actions, with their times [s].
+    """
 
     def __init__(self, network: RoadNetwork, catalogs: Catalogs, movers: dict[str, Mover]) -> None:
         self.network, self.catalogs, self.movers = network, catalogs, movers
+        self.notes = list[str]()
+        self.weather = CLEAR
+        self.watched = frozenset[str]()
+        self.values: dict[str, list[tuple[float, str]]] = {}
 
     def mover(self, item: Element, attribute: str = "entityRef") -> Mover:
         """Return the entity that an attribute names."""
@@ -203,13 +272,13 @@ class ScenarioMap:
         orientation = item.find("Orientation")
         if orientation is None:
             return base
-        _check_upright(orientation)
+        _note_tilt(orientation, self)
         if orientation.choice("type", ("absolute", "relative"), "absolute") == "relative":
             return base.turned(orientation.number("h", 0.0))
         return base._replace(heading=orientation.number("h"))
 
     def _WorldPosition(self, item: Element, time: float) -> Place:
-        _check_upright(item)
+        _note_tilt(item, self)
         return Place(item.number("x"), item.number("y"), item.number("h", 0.0))
 
     def _LanePosition(self, item: Element, time: float) -> Place:
@@ -221,14 +290,29 @@ class ScenarioMap:
 
     def _RelativeLanePosition(self, item: Element, time: float) -> Place:
         mover = self.mover(item)
+        road, s, t = self.road_of(mover, mover.place(time))
+        lane = shifted(road, lane_at(road, s, t), int(item.number("dLane")))
         if item.has("dsLane"):
-            raise item.error("RelativeLanePosition dsLane is not supported; use ds")
-        road, s, t = self.locate(mover.place(time))
-        lane = _shifted(road, _lane_at(road, s, t), int(item.number("dLane")))
+            return self._along_lane(road, lane, s, item.number("dsLane"), item.number("offset", 0.0))
         return _in_lane(road, lane, s + item.number("ds"), item.number("offset", 0.0))
 
+    def _along_lane(self, road: Road, lane: int, s: float, distance: float, offset: float) -> Place:
+        """Return the place at a distance along a lane, in the direction of the reference line [m]."""
+        direction = road.direction(lane) if lane else 1
+        way, _ = follow(self.network, road, 1 if distance >= 0.0 else -1, s, lane)
+        if not way.spans:
+            raise ValueError(f"road {road.name} ends at {s:.4g} m")
+        side = way.spans[0].direction
+        track = Track(
+            way.spans[0].place(0.0, side * offset),
+            way.bends(0.0, side * offset, way.spans[0].place(0.0, side * offset)),
+        )
+        place = track.at(abs(distance))
+        return place if side == direction else place.turned(pi)
+
     def _RelativeRoadPosition(self, item: Element, time: float) -> Place:
-        road, s, t = self.locate(self.mover(item).place(time))
+        mover = self.mover(item)
+        road, s, t = self.road_of(mover, mover.place(time))
         return road.at(s + item.number("ds"), t + item.number("dt"))
 
     def _RelativeObjectPosition(self, item: Element, time: float) -> Place:
@@ -239,7 +323,7 @@ class ScenarioMap:
         return place._replace(x=place.x + item.number("dx"), y=place.y + item.number("dy"))
 
     def _TrajectoryPosition(self, item: Element, time: float) -> Place:
-        track = self.trajectory(item.child("TrajectoryRef"), None)
+        track = self.trajectory(item.child("TrajectoryRef"), None).track
         return track.at(item.number("s"), item.number("t", 0.0))
 
     def _RoutePosition(self, item: Element, time: float) -> Place:
@@ -273,70 +357,70 @@ class ScenarioMap:
         with item.locate_errors():
             return Route.through(self.network, stops)
 
-    def trajectory(self, parent: Element, current: Place | None) -> Track:
+    def trajectory(self, parent: Element, current: Place | None, time: float = 0.0) -> Trajectory:
         """Return the trajectory in an element, inline or from a catalog.
 
         Args:
             parent: Element that contains a Trajectory or a CatalogReference.
             current: Present pose of the entity, at which a trajectory without a start begins.
+            time: Time of the entities that positions are relative to [s].
         """
         item = self.catalogs.resolve(parent, "Trajectory")
-        if item.flag("closed"):
-            raise item.error("a closed Trajectory is not supported; use closed=false")
-        shape = item.child("Shape").only("Polyline", "Clothoid", "ClothoidSpline")
-        if shape.tag == "Polyline":
-            return self._polyline(shape)
-        if shape.tag == "Clothoid":
-            length, first = shape.number("length"), shape.number("curvature")
-            slope = shape.number("curvatureDot" if shape.has("curvatureDot") else "curvaturePrime")
-            bend = Bend(length, first, first + slope * length if slope else None)
-            return Track(self.place(shape.child("Position")), (bend,))
-        return self._spline(shape, current)
+        return read_trajectory(item, lambda position: self.place(position, time), current)
 
-    def _polyline(self, shape: Element) -> Track:
-        """Return a straight polyline; bends have to be clothoids, because a body cannot turn on the spot."""
-        places = [self.place(vertex.child("Position")) for vertex in shape.all("Vertex")]
-        if len(places) < 2:
-            raise shape.error("a Polyline needs at least 2 vertices")
-        first, last = places[0], places[-1]
-        dx, dy = last.x - first.x, last.y - first.y
-        length = (dx * dx + dy * dy) ** 0.5
-        if length < 1e-6:
-            raise shape.error("the first and the last vertex of a Polyline must be apart")
-        start = Place(first.x, first.y, atan2(dy, dx))
-        before = -1e-9
-        for vertex in places[1:]:
-            seen = vertex.seen_from(start)
-            if abs(seen.y) > 1e-3 or seen.x < before:
-                raise shape.error("a Polyline with corners is not supported; use a ClothoidSpline")
-            before = seen.x
-        return Track(start, (Bend(length),))
+    def note(self, item: Element, text: str) -> None:
+        """Add a note with file and line on what has no effect or deviates from the file."""
+        note = str(item.error(text))
+        if note not in self.notes:
+            self.notes.append(note)
 
-    def _spline(self, shape: Element, current: Place | None) -> Track:
-        start, bends = current, list[Bend]()
-        for number, part in enumerate(shape.all("ClothoidSplineSegment")):
-            position = part.find("PositionStart")
-            if position is not None and number > 0:
-                raise position.error("PositionStart is supported in the first segment only; remove it")
-            if position is not None:
-                start = self.place(position)
-            if part.number("hOffset", 0.0) != 0.0:
-                raise part.error("hOffset must be 0: a path has no corners")
-            first, last = part.number("curvatureStart"), part.number("curvatureEnd")
-            length = part.number("length")
-            if length < 0.0:
-                raise part.error(f"ClothoidSplineSegment length must be >= 0 m, got {length:g}")
-            if length > 0.0:
-                bends.append(Bend(length, first, None if first == last else last))
-        if start is None:
-            raise shape.error("a position on a trajectory without PositionStart is not supported")
-        return Track(start, tuple(bends))
+    def value_of(self, item: Element, name: str, time: float) -> str:
+        """Return the value of a parameter or variable at a time [s]."""
+        given = [value for when, value in self.values.get(name, []) if when <= time]
+        return given[-1] if given else item.resolve(f"${name}")
+
+    def inside(self, road: Road, s: float, t: float) -> bool:
+        """Return whether a place is on the lanes of a road; distance along and offset from it [m]."""
+        edges = [road.lane_centre(lane, s) + side * road.width(lane, s) / 2 for lane in road.lanes(s) if lane
+                 for side in (-1, 1)]  # fmt: skip
+        return bool(edges) and 0.0 < s < road.length and min(edges) <= t <= max(edges)
+
+    def road_of(self, mover: Mover, place: Place) -> tuple[Road, float, float]:
+        """Return the road of a place on an entity's way, and distance along and offset from it [m]."""
+        if mover.way is None:
+            return self.locate(place)
+        roads = {span.road.name: span.road for span in mover.way.spans}
+        found = [(road, *road.nearest(place)) for road in roads.values()]
+        return min(found, key=lambda item: _beside(item, place))
+
+    def settle(self, mover: Mover) -> None:
+        """Set the path of an entity that follows no trajectory: along its lane, or straight on."""
+        start = mover.start
+        if mover.follows or start is None:
+            return
+        ahead = start.turned(pi) if mover.backwards else start
+        mover.track, mover.way, mover.replan = Track(ahead), None, None
+        if not self.network.roads:
+            return
+        road, s, t = self.locate(start)
+        along = cos(ahead.heading - road.at(s).heading)
+        if abs(abs(along) - 1.0) < 1e-9 and 0.0 < s < road.length:
+            direction = 1 if along > 0.0 else -1
+            begin = road.at(0.0, t) if direction > 0 else road.at(road.length, t).turned(pi)
+            way, chosen = follow(self.network, road, direction, s, lane_at(road, s, t))
+            mover.way, mover.chosen = way, chosen
+            if len(way.spans) == 1 and way.spans[0].constant:
+                whole = Track(begin, road.bends(direction, t))
+                mover.track = Track(ahead, whole.part(whole.nearest(start)).bends)
+            else:
+                left = ahead.seen_from(way.spans[0].line(0.0)).y - way.spans[0].centre(0.0)
+                mover.track = Track(ahead, way.bends(0.0, left, ahead))
 
 
-def _check_upright(item: Element) -> None:
+def _note_tilt(item: Element, world: ScenarioMap) -> None:
     for name in ("p", "r"):
         if abs(remainder(item.number(name, 0.0), 2 * pi)) > _UPRIGHT:
-            raise item.error(f"{item.tag} {name} must be 0: bodies are upright")
+            world.note(item, f"{item.tag} {name} has no effect: bodies are upright")
 
 
 def _beside(item: tuple[Road, float, float], place: Place) -> float:
@@ -352,12 +436,12 @@ def _in_lane(road: Road, lane: int, s: float, offset: float) -> Place:
     return place if lane == 0 or road.direction(lane) > 0 else place.turned(pi)
 
 
-def _lane_at(road: Road, s: float, t: float) -> int:
+def lane_at(road: Road, s: float, t: float) -> int:
     """Return the lane whose centre is nearest to an offset from the reference line [m]."""
     return min(road.lanes(s), key=lambda lane: abs(road.lane_centre(lane, s) - t))
 
 
-def _shifted(road: Road, lane: int, change: int) -> int:
+def shifted(road: Road, lane: int, change: int) -> int:
     """Return the lane `change` lanes to the left; lane 0 has no width and does not count."""
     other = lane + change
     return (

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.examples import EXPERIMENTS, load
+from support.openscenario import START, scenario, write
 from support.recordings import synthetic_episode
 from support.rows import threat_row
 
@@ -96,6 +97,20 @@ def test_target_signal(capsys):
 
 
 @pytest.mark.slow
+def test_openscenario_coverage(tmp_path, capsys):
+    (tmp_path / "some").mkdir()
+    write(tmp_path / "some", scenario(START), "good.xosc")
+    write(tmp_path / "some", scenario(START.replace('s="160"', 's="far"')), "bad.xosc")
+    (tmp_path / "some" / "catalog.xosc").write_text("<OpenSCENARIO><Catalog name='c'/></OpenSCENARIO>")
+    script = load("openscenario_coverage")
+    found = script.outcomes(tmp_path)
+    assert [item.error for item in found] == ["LanePosition s must be a number, got 'far'", ""]
+    script.print_tables(found)
+    text = capsys.readouterr().out
+    assert "| some | 2 | 1 | 50% |" in text
+    assert "| 1 | LanePosition s must be a number, got … |" in text
+
+
 def test_deviations(capsys):
     effects = load("deviations").main()
     assert capsys.readouterr().out.count("\n") == 2 + len(effects)

@@ -231,7 +231,7 @@ def test_the_front_axle_as_control_point(tmp_path):
     assert ego.place(6.0).heading == pytest.approx(0.4, abs=1e-3)  # half of 8 m times 0.1 1/m
     assert 0.1 < ego.place(3.8).heading < 0.3  # the front axle is at the end of the clothoid
     with pytest.raises(
-        ValueError, match=r"controller property Driver\.ControlPoint\.Mode='Roof' is not supported"
+        ValueError, match=r"Driver\.ControlPoint\.Mode must be FrontAxle or RearAxle, got 'Roof'"
     ):
         compiled(tmp_path, scenario(init, entities=entities.replace('"FrontAxle"', '"Roof"')))
     with pytest.raises(ValueError, match="the front axle of 'Ego' cannot be its control point without Axles"):
@@ -260,17 +260,18 @@ def test_driving_backwards_is_turned_around(tmp_path):
 @pytest.mark.parametrize(
     ("action", "message"),
     [
-        (speed(3), "a jump of the speed of 'Target' at 1 s is not supported; use linear dynamics"),
-        (speed(6, "rate", "cubic", 2), "dynamicsShape='cubic' is not supported; use step or linear"),
-        (speed(6, "rate", "linear", -2), "SpeedActionDynamics value must be >= 0, got -2"),
+        (speed(6, "time", "linear", -2), "SpeedActionDynamics value must be >= 0, got -2"),
+        (speed(6, "distance", "cubic", 20), "a cubic or sinusoidal change of speed over a distance is not"),
         (speed(60, "rate", "linear", 2), "SpeedAction of 'Target': final_speed: 60 m/s"),
         (speed(-1, "rate", "linear", 2), "driving backwards is supported from the start only"),
-        (speed(6, "rate", "linear", 20), r"SpeedAction of 'Target': acceleration must be in \[-12, 12\]"),
         (
             "<TeleportAction><Position/></TeleportAction>",
             "TeleportAction is supported at the start only, got 1 s",
         ),
-        ("<LateralAction/>", "LateralAction in PrivateAction is not supported; use LongitudinalAction"),
+        (
+            "<LateralAction><LateralDistanceAction/></LateralAction>",
+            "LateralDistanceAction in LateralAction is not supported; use LaneChangeAction or LaneOff",
+        ),
         (
             "<LongitudinalAction><LateralAction/></LongitudinalAction>",
             "LateralAction in LongitudinalAction is not supported; use SpeedAction",
@@ -280,7 +281,7 @@ def test_driving_backwards_is_turned_around(tmp_path):
         (PROFILE.replace('maxDeceleration="3"', ""), "needs DynamicConstraints maxDeceleration"),
         (
             TURN.replace("<None/>", "<Timing/>").format(offset=0, start=""),
-            "Timing is not supported; use None",
+            "a TimeReference with Timing needs a Polyline with a time at every Vertex",
         ),
     ],
 )

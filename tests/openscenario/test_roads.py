@@ -170,13 +170,7 @@ def test_positions(tmp_path, world, position, expected):
         ('<RoadPosition roadId="0" s="0"/>', "RoadPosition needs the attribute 't'"),
         ('<LanePosition roadId="0" laneId="-4" s="0"/>', "unknown lane of road 0 '-4'"),
         ('<WorldPosition x="near" y="0"/>', "WorldPosition x must be a number, got 'near'"),
-        ('<WorldPosition x="0" y="0" p="1"/>', "WorldPosition p must be 0"),
-        (
-            '<RoadPosition roadId="0" s="0" t="0"><Orientation r="1"/></RoadPosition>',
-            "Orientation r must be 0",
-        ),
         ('<RelativeRoadPosition entityRef="Eco" ds="0" dt="0"/>', "unknown entity 'Eco'; did you mean 'Ego'"),
-        ('<RelativeLanePosition entityRef="Ego" dLane="0" dsLane="1"/>', "dsLane is not supported; use ds"),
         ('<GeoPosition latitude="0" longitude="0"/>', "GeoPosition in Position is not supported; use Lane"),
     ],
 )
@@ -203,30 +197,22 @@ def spline(*parts, start=START_AT):
 
 
 def test_trajectories(tmp_path, world):
-    track = world.trajectory(element(tmp_path, spline((0, 0, 5), (0, 0.2, 4), (0.2, 0.2, 3))), None)
+    track = world.trajectory(element(tmp_path, spline((0, 0, 5), (0, 0.2, 4), (0.2, 0.2, 3))), None).track
     assert track.bends == (Bend(5.0), Bend(4.0, 0.0, 0.2), Bend(3.0, 0.2))
     close(track.at(5.0), 5, 0, 0)
     assert track.at(12.0).heading == pytest.approx(0.4 + 0.6)  # to the left, straight on afterwards
     assert track.at(20.0).heading == pytest.approx(1.0)
     text = '<Clothoid curvature="0.1" curvaturePrime="-0.01" length="10"><Position>'
     text += '<WorldPosition x="0" y="0"/></Position></Clothoid>'
-    assert world.trajectory(element(tmp_path, shape(text)), None).bends == (Bend(10.0, 0.1, 0.0),)
-    free = world.trajectory(element(tmp_path, spline((0.1, 0.1, 5), start="")), HERE)
+    assert world.trajectory(element(tmp_path, shape(text)), None).track.bends == (Bend(10.0, 0.1, 0.0),)
+    free = world.trajectory(element(tmp_path, spline((0.1, 0.1, 5), start="")), HERE).track
     assert free.start == HERE
-
-
-CORNERS = (
-    '<Polyline><Vertex><Position><WorldPosition x="0" y="0"/></Position></Vertex><Vertex><Position>'
-    '<WorldPosition x="5" y="1"/></Position></Vertex><Vertex><Position><WorldPosition x="9" y="0"/>'
-    "</Position></Vertex></Polyline>"
-)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (shape(CORNERS), "a Polyline with corners is not supported; use a ClothoidSpline"),
-        (shape("<Nurbs order='2'/>"), "Nurbs in Shape is not supported; use Polyline or"),
+        (shape("<Nurbs order='2'/>"), "a Nurbs of order 2 needs at least 2 ControlPoints"),
         (
             spline((0, 0, 5), start="<Other/>").replace("false", "true"),
             "a closed Trajectory is not supported",
