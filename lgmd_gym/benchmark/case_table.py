@@ -103,7 +103,8 @@ def _range(name: str, given: Arguments) -> list[Argument]:
     if intervals >= MAX_CASES:
         raise ValueError(f"{name} has more than {MAX_CASES} values; use a larger step")
     values = [start + index * step for index in range(math.floor(intervals + 1e-9) + 1)]
-    return [round(value, 9) if isinstance(value, float) else value for value in values]
+    # + 0.0 changes the sign of -0.0, which would be part of the name of a case.
+    return [round(value, 9) + 0.0 if isinstance(value, float) else value for value in values]
 
 
 def make_axis(family: str, name: str, given: object) -> SweptArgument:

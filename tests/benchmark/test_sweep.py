@@ -60,6 +60,20 @@ def test_speeds_in_kmh_times_a_sweep(load):
         ("headway", {"start": 1, "stop": 2.9, "step": 1}, [1, 2], ["1s", "2s"]),
         ("headway", {"start": 2, "stop": 1, "step": -1}, [2, 1], ["2s", "1s"]),
         ("headway", {"start": 2, "stop": 2, "step": 1}, [2], ["2s"]),
+        # The quotients of these ranges are just below a whole number.
+        (
+            "build_up",
+            {"start": 0, "stop": 0.3, "step": 0.1},
+            [0, 0.1, 0.2, 0.3],
+            ["0s", "0.1s", "0.2s", "0.3s"],
+        ),
+        (
+            "build_up",
+            {"start": 0.3, "stop": 0, "step": -0.1},
+            [0.3, 0.2, 0.1, 0],
+            ["0.3s", "0.2s", "0.1s", "0s"],
+        ),
+        ("build_up", {"start": 0.1, "stop": 0.39, "step": 0.1}, [0.1, 0.2, 0.3], ["0.1s", "0.2s", "0.3s"]),
         # As many digits as distinguish the values, at least three.
         ("headway", [1.0, 1.00004], [1.0, 1.00004], ["1s", "1.00004s"]),
         ("headway", [1.23456, 2.0], [1.23456, 2.0], ["1.23s", "2s"]),

@@ -129,3 +129,19 @@ def test_a_turn_that_is_not_whole_is_refused(turn_px):
         return
     with pytest.raises((ValueError, TypeError), match="turn_px must be an"):
         neuron.step(frame, turn_px=turn_px)
+
+
+@pytest.mark.parametrize("params", [None, {"delay": "two-tap"}])
+def test_light_enters_a_region_from_its_place_in_the_frame(params):
+    """A region behaves alike in the whole view and in a view of the region with the pixels around it."""
+    top, left, height, width = 3, 7, 12, 40
+    whole = LGMD((HEIGHT, WIDTH), params=params, roi=(top + 1, left + 1, height - 2, width - 2))
+    part = LGMD((height, width), params=params, roi=(1, 1, height - 2, width - 2))
+    for time, (frame, first) in enumerate(zip(panoramas(), offsets(3), strict=True)):
+        view, turn_px = frame[:, first : first + WIDTH], 5 if time else 0  # not the turn of the view
+        inside = view[top : top + height, left : left + width]
+        assert whole.step(view, turn_px=turn_px) == part.step(inside, turn_px=turn_px)
+        for name, values in part.layers.items():
+            found = whole.layers[name][top : top + height, left : left + width]
+            np.testing.assert_array_equal(found, values, err_msg=name)
+    assert values.any()

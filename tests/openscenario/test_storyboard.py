@@ -5,6 +5,7 @@ reference point in their centre: the ego has contact after 5.6 s.
 """
 
 import re
+from math import inf
 
 import pytest
 from support.openscenario import (
@@ -28,7 +29,7 @@ from support.openscenario import (
     world_position,
 )
 
-from lgmd_gym.openscenario.conditions import meets
+from lgmd_gym.openscenario.conditions import Condition, meets
 
 ONE_GROUP = "</ConditionGroup></StartTrigger>"
 
@@ -267,6 +268,31 @@ def test_values_are_equal_within_a_billionth(rule, met):
 def test_edges_delays_and_values(tmp_path, trigger, time):
     found = started(tmp_path, trigger, parameters=parameter("x", "3"))
     assert found == (None if time is None else pytest.approx(time, abs=1e-6))
+
+
+@pytest.mark.parametrize(
+    ("edge", "delay", "start", "time"),
+    [
+        # The condition holds from 1 s on. A delay counts from then, whether or not the event can start yet.
+        *(("none", 2.0, 0.0, 3.0), ("none", 2.0, 2.0, 3.0), ("none", 2.0, 2.9, 3.0), ("none", 2.0, 4.0, 4.0)),
+        *(("none", 0.0, 0.0, 1.0), ("none", 0.0, 0.5, 1.0), ("none", 0.0, 2.0, 2.0)),
+        *(("rising", 2.0, 0.0, 3.0), ("rising", 2.0, 2.9, 3.0), ("rising", 2.0, 3.1, inf)),
+        *(("rising", 0.0, 0.9, 1.0), ("rising", 0.0, 1.1, inf), ("falling", 2.0, 0.0, inf)),
+        *(("risingOrFalling", 2.0, 2.5, 3.0), ("risingOrFalling", 0.5, 0.0, 1.5)),
+    ],
+)
+@pytest.mark.parametrize("known", [True, False])
+def test_delay_counts_from_the_condition(edge, delay, start, time, known):
+    """The change is known, or searched for; the result is the same."""
+    condition = Condition(lambda now: now >= 1.0, (lambda: 1.0) if known else None, edge, delay)
+    assert condition.first(start) == pytest.approx(time, abs=1e-6)
+    assert bool(condition.reason(start)) is (time == inf)
+
+
+def test_end_of_a_condition_is_delayed_too():
+    falling = Condition(lambda now: now < 2.0, lambda: 2.0, "falling", 0.75)
+    assert [falling.first(start) for start in (0.0, 2.0, 2.5)] == [2.75] * 3
+    assert falling.first(2.76) == inf
 
 
 def joined(*triggers):
