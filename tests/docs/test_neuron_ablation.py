@@ -70,7 +70,7 @@ def test_differences_are_paired(script):
     found = [item._replace(returns=item.returns + 0.5, contacts=np.full(3, False)) for item in reference]
     first, report = (
         script.report_of(script.Arm(name, ()), item, reference, threats, worlds)
-        for name, item in (("a", reference), ("b", found))
+        for name, item in (("a", reference), ("|b|", found))
     )
     assert first.means == pytest.approx((-1.0 / 6.0, 0.5, 0.0))
     assert report.means == pytest.approx((1.0 / 3.0, 1.0, 0.0))
@@ -78,8 +78,8 @@ def test_differences_are_paired(script):
     head, _, *rows = script.table("forward", [first, report]).splitlines()
     assert head.endswith("| return against a | avoided | false activations |")
     assert rows == [
-        "| a | -0.17 | 50.0 | 0.0 | – | – | – |",
-        "| b | 0.33 | 100.0 | 0.0 | +0.50 [+0.50, +0.50] | +50.0 [+0.0, +100.0] | +0.0 [+0.0, +0.0] |",
+        "| a | −0.17 | 50.0 | 0.0 | – | – | – |",
+        r"| \|b\| | 0.33 | 100.0 | 0.0 | +0.50 [+0.50, +0.50] | +50.0 [+0.0, +100.0] | +0.0 [+0.0, +0.0] |",
     ]
 
 
