@@ -8,10 +8,10 @@ Random levels are recorded once, in the folder DATA: the forward fields of `poli
 detectors, and its fields at the sides through three. Each lens is drawn once for all detectors. Then one
 network per arm and seed is trained with the recipe of `policy:all-round`, without its ensemble and its
 traffic, and in batches of 32 levels: the arms differ in their inputs only. Half of the validation levels
-select the epoch and the margin of each network, by the highest weighted return, and the table has the results
-on the other half, with paired differences to the first arm of each group. Intervals are clustered by world and
-by training. A level takes about 0.5 s of one core to record, and a training on 1,500 levels about 25 s.
-Recordings and results of an earlier run in DATA are used again.
+select the epoch and the margin of each network, by the highest weighted return, and the tables have the
+results on the other half, with paired differences to the first arm of each group. Intervals are clustered by
+world and by training. A level takes about 0.5 s of one core to record, and a training on 1,500 levels about
+25 s. Recordings and results of an earlier run in DATA are used again.
 """
 
 from argparse import ArgumentParser
