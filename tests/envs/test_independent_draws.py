@@ -138,6 +138,29 @@ def test_shared_streams_are_found(function):
     assert dependent(columns, [("one", "other")])
 
 
+def test_every_random_stream_of_a_level_is_used_once(monkeypatch):
+    """Also streams of which only other bits are used, which no statistical test finds."""
+    seeds, make = [], np.random.default_rng
+
+    def recorded(seed):
+        seeds.append(tuple(seed))
+        return make(seed)
+
+    source = RandomLevels(mount_heights=(1.0, 2.0), decelerations=(4.0, 10.0))
+    monkeypatch.setattr(np.random, "default_rng", recorded)
+    _, scene, _, _ = level(source, 5)
+    assert sorted(seed for seed in seeds if seed[:2] == (0, 5)) == [
+        (0, 5),
+        *((0, 5, k) for k in (1, 2, 3, 4)),
+    ]
+    seeds.clear()
+    draw_world.__wrapped__(scene.world)
+    draw_brake(scene.world, wet=False)
+    world_weather(scene.world)
+    assert len({*seeds}) == len(seeds) == 3
+    assert {world for world, _ in seeds} == {scene.world}
+
+
 def test_levels_of_the_same_number_differ_between_splits_and_parts():
     splits = [RandomLevels(split) for split in ("train", "validation", "test")]
     draws = [level(source, number) for source in splits for number in range(20)]

@@ -295,6 +295,24 @@ def test_end_of_a_condition_is_delayed_too():
     assert falling.first(2.76) == inf
 
 
+@pytest.mark.parametrize(("rule", "time"), [("any", 2.5), ("all", None)])
+def test_rules_of_several_entities(tmp_path, rule, time):
+    """The ego has covered 25 m after 2.5 s; the target stands."""
+    trigger = entity_condition('<TraveledDistanceCondition value="25"/>', rule=rule)
+    trigger = trigger.replace(
+        '<EntityRef entityRef="Ego"/>', '<EntityRef entityRef="Target"/><EntityRef entityRef="Ego"/>'
+    )
+    assert started(tmp_path, trigger) == (None if time is None else pytest.approx(time, abs=1e-6))
+
+
+def test_headway_of_a_standing_entity_is_infinite(tmp_path):
+    """From the time at which the ego has passed the target, 6 s; an entity behind has none."""
+    headway = HEADWAY.replace('"Target"', '"Ego"')
+    assert started(tmp_path, entity_condition(headway, "Target")) is None
+    more = headway.replace("lessOrEqual", "greaterThan")
+    assert started(tmp_path, entity_condition(more, "Target")) == pytest.approx(6.0, abs=1e-6)
+
+
 def joined(*triggers):
     """Return one trigger whose groups are those of several."""
     inside = "".join(item.removeprefix("<StartTrigger>").removesuffix("</StartTrigger>") for item in triggers)
@@ -325,7 +343,8 @@ def test_events_follow_the_end_of_others(tmp_path):
 
     first = event("First", AWAY, at(1))  # from 1 to 4 s
     slower = speed(0, "rate", "linear", 3)
-    for state, time in (("completeState", 4.0), ("endTransition", 4.0), ("startTransition", 1.0)):
+    states = {"completeState": 4.0, "endTransition": 4.0, "startTransition": 1.0, "runningState": 1.0}
+    for state, time in states.items():
         found = segments(tmp_path, story("Target", first, event("Then", slower, after(state))))
         assert [item.start for item in found][-1] == time
     found = segments(
