@@ -134,6 +134,7 @@ def test_all_scores():
     drive = {"distance": 5e4, "false_activations": 1, "moving_time": 9.0, "needed_time": 0.0}
     drive |= {"scaled_needed_time": 0.0, "needless_activations": 1, "speed_lost": 9.0, "avoidable": None}
     drive |= {
+        "avoided_by_brake": None,
         "caused": False,
         "side": "",
         "alerts": 1,
