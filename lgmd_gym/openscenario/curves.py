@@ -14,6 +14,8 @@ TOLERANCE = 2e-3
 """Largest distance of a fitted path from its curve [m]."""
 SHORTEST = 0.25
 """Length below which a piece of a curve is not divided, so that its corners are rounded [m]."""
+MAX_PIECES = 5000
+"""Largest number of pieces that are tried between two stops of a curve."""
 CORNER = 0.05
 """Distance from a corner at which a polyline is rounded, where its radius is above the smallest [m]."""
 _ROUNDED = 4.0  # [m] within which a corner of a curve is rounded
@@ -102,9 +104,12 @@ def _fit_between(
 
     A corner within a short piece is left out, and rounded by the next piece that is long enough.
     """
-    pending = [(low, high)]
+    pending, tried = [(low, high)], 0
     while pending:
         low, high = pending.pop()
+        tried += 1
+        if tried > MAX_PIECES:
+            raise ValueError(f"a curve needs more than {MAX_PIECES} pieces; make it shorter or smoother")
         end = curve(high)
         bend = clothoid(here, end)
         short = high - low < 1e-6 or curve(low).distance(end) < 2.0 * SHORTEST

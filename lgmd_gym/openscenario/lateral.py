@@ -92,6 +92,10 @@ def _move(
     """
     legs = mover.legs[mover.legs.index((now.road, now.direction)) + 1 :] if mover.legs else ()
     way, chosen = follow(world.network, now.road, now.direction, now.s, now.lane, legs)
+    if not way.spans:
+        raise item.error(
+            f"{mover.name!r} is at the end of road {now.road.name} at {time:.3g} s; start earlier"
+        )
     if chosen:
         world.note(item, f"{mover.name!r} takes the straightest way at junctions, because it has no route")
     distance, final = mover.timeline.at(time).distance, now.direction * offset

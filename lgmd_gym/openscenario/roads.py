@@ -74,15 +74,14 @@ class Road:
         if lane not in lanes:
             raise unknown_name(f"lane of road {self.name}", str(lane), map(str, lanes))
         side = 1 if lane > 0 else -1
-        for number in range(side, lane, side):
-            total += side * _polynomial(lanes[number].widths, s - start) if number in lanes else 0.0
+        for number in _inside(lanes, lane):
+            total += side * _polynomial(lanes[number].widths, s - start)
         return total + side * _polynomial(lanes[lane].widths, s - start) / 2
 
     def constant_centre(self, lane: int, low: float, high: float) -> bool:
         """Return whether the offset of a lane's centre is constant between two distances [m]."""
         start, lanes = self._section((low + high) / 2)
-        side = 1 if lane > 0 else -1
-        inside = [lanes[number].widths for number in range(side, lane + side, side) if number in lanes]
+        inside = [lanes[number].widths for number in (*_inside(lanes, lane), lane)]
         widths = all(_is_constant(item, low - start, high - start) for item in inside)
         return widths and _is_constant(self.offsets, low, high)
 
@@ -143,6 +142,12 @@ class Road:
         missing = high - low - along
         bends += [Bend(missing)] if missing > _CLOSE else []
         return tuple(bends) if direction > 0 else tuple(map(_reversed, reversed(bends)))
+
+
+def _inside(lanes: dict[int, Lane], lane: int) -> list[int]:
+    """Return the ids of the lanes between the centre and a lane, from the centre outwards."""
+    side = 1 if lane > 0 else -1
+    return sorted((number for number in lanes if 0 < number * side < lane * side), key=abs)
 
 
 @lru_cache(maxsize=4096)
@@ -226,8 +231,9 @@ class RoadNetwork:
 
     def after(self, name: str, end: str) -> Iterator[End]:
         """Yield the road ends that are connected to the end of a road."""
-        if end in self.roads[name].links:
-            yield self.roads[name].links[end]
+        link = self.roads[name].links.get(end)
+        if link is not None and link[0] in self.roads:
+            yield link
         for other in self.roads.values():
             for side, target in other.links.items():
                 if target == (name, end):

@@ -149,6 +149,8 @@ def _follow_legs(
         raise item.error(f"{mover.name!r} does not have the direction of its route; turn it around")
     with item.locate_errors():
         way, _ = follow(world.network, road, direction, s, lane_at(road, s, t), legs[index + 1 :])
+        if not way.spans:
+            raise ValueError(f"{mover.name!r} is at the end of road {road.name}; start earlier")
         left = here.seen_from(way.spans[0].line(0.0)).y - way.spans[0].centre(0.0)
         rest = way.bends(0.0, left, here)
     mover.track, mover.follows = mover.path.then(distance, rest), True

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from lgmd_gym.openscenario.actions import ActionRun, global_action, private_action
-from lgmd_gym.openscenario.conditions import States, Trigger, read_trigger
+from lgmd_gym.openscenario.conditions import HORIZON, States, Trigger, read_trigger
 from lgmd_gym.openscenario.nodes import Element, Node
 from lgmd_gym.openscenario.parameters import declare
 from lgmd_gym.openscenario.weather import weather_of
@@ -70,6 +70,11 @@ class Storyboard:
             if now == inf:
                 break
             event, last = waiting[times.index(now)], now
+            if now > HORIZON:
+                world.note(
+                    event.item, f"events after {HORIZON:g} s are left out; this one starts at {now:.4g} s"
+                )
+                break
             self._carry_out(event, now)
             event.count -= 1
             if event.count == 0 or event.ended == inf:

@@ -169,6 +169,8 @@ def follow(
                 lane = _nearest_lane(road, direction, begin, end, spans[-1])
             spans.append(Span(road, direction, lane, begin, end, start))
             start = spans[-1].finish
+        if start > REACH:
+            spans[-1] = spans[-1]._replace(end=spans[-1].s(REACH))
         if not spans or start >= REACH:
             return Way(tuple(spans)), chosen
         last = spans[-1].place(start)

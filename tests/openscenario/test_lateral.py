@@ -179,6 +179,11 @@ def test_invalid_lateral_actions(tmp_path, action, message):
         ego(tmp_path, action)
 
 
+def test_an_entity_beyond_the_road(tmp_path):
+    with pytest.raises(ValueError, match="'Ego' is at the end of road 0 at 95 s; start earlier"):
+        ego(tmp_path, change(1), time=95)
+
+
 def test_an_entity_across_the_road(tmp_path):
     init = START.replace(
         lane_position(100), lane_position(100).replace("/>", "><Orientation h='1.5'/></LanePosition>")

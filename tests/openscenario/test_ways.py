@@ -1,6 +1,6 @@
 """Ways along lanes, and roads with spirals, polynomials and changing lanes, by hand."""
 
-from math import atan, hypot, pi
+from math import atan, cos, hypot, pi, sin
 
 import pytest
 from support.openscenario import CORNER, QUARTER, STRAIGHT, road, road_file
@@ -179,3 +179,19 @@ def test_projection_on_a_path(tmp_path):
             assert line.project(line.at(distance, left)) == pytest.approx(distance, abs=1e-3)
     assert network(tmp_path, STRAIGHT).road("0").joints == ()
     assert roads.road("0").is_open(-1)
+
+
+def test_links_to_roads_that_do_not_exist(tmp_path):
+    roads = network(tmp_path, road_file(road(0, 0, 0, 0, 100, link="successor:7:start")))
+    way, chosen = follow(roads, roads.road("0"), 1, 20.0, -1)
+    assert (way.length, chosen) == (80.0, False)
+
+
+def test_ways_and_curves_of_extreme_length(tmp_path):
+    """A way ends after 3 km, and a lane with a far id is missing at once."""
+    roads = network(tmp_path, road_file(road(0, 0, 0, 0, 1e6)))
+    assert follow(roads, roads.road("0"), 1, 0.0, -1)[0].length == 3000.0
+    with pytest.raises(ValueError, match="unknown lane of road 0 '1000000000'"):
+        roads.road("0").lane_centre(10**9, 0.0)
+    with pytest.raises(ValueError, match="a curve needs more than 5000 pieces"):
+        fit(lambda x: Place(x, sin(x / 3.0), atan(cos(x / 3.0) / 3.0)), (0.0, 9e5))
