@@ -25,7 +25,7 @@ from lgmd_gym.envs.forecast import FORECAST, UNKNOWN, ForecastParams, write_fore
 from lgmd_gym.envs.physics_state import PhysicsState, Placement
 from lgmd_gym.envs.reward import REWARD
 from lgmd_gym.envs.scene import SceneArrays
-from lgmd_gym.kernels.threads import Threads
+from lgmd_gym.kernels.threads import Threads, check_compiling
 
 if TYPE_CHECKING:
     import gymnasium as gym
@@ -130,6 +130,7 @@ class Simulation:
         threads: int = 1,
         forecast: ForecastParams | None = None,
     ) -> None:
+        check_compiling()
         self.num_envs, self.rates = num_envs, rates
         self.state = PhysicsState(num_envs)
         self._throttle, self._follow_up = throttle, follow_up

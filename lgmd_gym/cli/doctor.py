@@ -126,6 +126,10 @@ def check_cache() -> list[Finding]:
     """Check that numba can store compiled kernels; otherwise every process compiles them again."""
     from tempfile import TemporaryFile
 
+    from numba.core import config
+
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+        return [Finding("numba", FAULT, "NUMBA_DISABLE_JIT: nothing is compiled", "unset NUMBA_DISABLE_JIT")]
     fix = "set NUMBA_CACHE_DIR to a writable folder"
     try:
         from lgmd_gym.camera.render import raster

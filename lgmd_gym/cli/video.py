@@ -29,6 +29,8 @@ class Video:
 
     clips: Annotated[Positional[tuple[str, ...]], arg(metavar="CLIP [CLIP ...]")]
     """Video files in any format that ffmpeg reads, or folders with video files."""
+    recursive: bool = False
+    """Process the video files in the folders below a folder, too."""
     configs: tuple[str, ...] = ("paper",)
     """Named configurations of the neuron, compared in one table if several: paper, conservative, paper-18hz,
     paper-18hz-30, t_sf-60, t_sp-0.78, literal, released, off-only, fixed-inhibition; or all."""
@@ -80,7 +82,12 @@ def run(options: Video) -> int:
     check_within("--false-alarm-cap", options.false_alarm_cap, 0.0, 1.0)
     unreadable: list[str] = []
     jobs = make_jobs(
-        options.clips, options.crashes, options.crash_frame, options.events, on_unreadable=unreadable.append
+        options.clips,
+        options.crashes,
+        options.crash_frame,
+        options.events,
+        on_unreadable=unreadable.append,
+        recursive=options.recursive,
     )
     for text in unreadable:
         clips.note(f"{text}; it is left out")

@@ -186,6 +186,7 @@ def make_jobs(
     crash_frame: int | None = None,
     events: Path | None = None,
     on_unreadable: Callable[[str], object] | None = None,
+    recursive: bool = False,
 ) -> list[ClipJob]:
     """Return one job per clip.
 
@@ -196,11 +197,12 @@ def make_jobs(
         events: CSV file for `read_events`, instead of `crashes`; events count as crashes in the figures.
         on_unreadable: Function called with the error of each unreadable file of a folder, which is left out;
             None to raise it. A file that is given by itself, and the only one left, raise theirs.
+        recursive: Whether the folders in a folder are searched, too.
 
     Raises:
         ValueError: For a file that is not a readable video, or an invalid annotation.
     """
-    clips = list(dict.fromkeys(find_clips(paths)))
+    clips = list(dict.fromkeys(find_clips(paths, recursive)))
     if crash_frame is not None and (len(clips) > 1 or crashes is not None):
         raise ValueError(
             f"--crash-frame {crash_frame} applies to a single clip; use --crashes FILE for several"

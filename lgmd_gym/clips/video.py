@@ -1,5 +1,6 @@
 """Read, check and write video files of any length with PyAV."""
 
+import os
 from array import array
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -269,10 +270,21 @@ def is_clip(file: Path) -> bool:
     return file.suffix.lower() in CLIP_SUFFIXES and not file.name.startswith(".")
 
 
-def find_clips(paths: Iterable[str | Path]) -> list[Path]:
+def _clips_below(folder: Path) -> Iterator[Path]:
+    """Yield the video files in a folder and in the folders below it."""
+    for root, folders, files in os.walk(folder):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        yield from filter(is_clip, (Path(root) / name for name in files))
+
+
+def find_clips(paths: Iterable[str | Path], recursive: bool = False) -> list[Path]:
     """Return the given files, with each folder replaced by its video files in the order of their names.
 
-    Files of a folder whose name begins with a dot are left out, such as the "._" files of macOS.
+    Files and folders in a folder whose name begins with a dot are left out, such as the "._" files of macOS.
+
+    Args:
+        paths: Video files, and folders with video files.
+        recursive: Whether the folders in a folder are searched, too; links to folders are not followed.
 
     Raises:
         ValueError: For a path that does not exist, or a folder without a video file.
@@ -282,9 +294,12 @@ def find_clips(paths: Iterable[str | Path]) -> list[Path]:
     found: list[Path] = []
     for path in (check_path("path", path) for path in paths):
         if path.is_dir():
-            clips = sorted(file for file in path.iterdir() if is_clip(file))
+            clips = sorted(_clips_below(path) if recursive else filter(is_clip, path.iterdir()))
             if not clips:
-                raise ValueError(f"folder {str(path)!r} contains no video file ({', '.join(CLIP_SUFFIXES)})")
+                raise ValueError(
+                    f"folder {str(path)!r} contains no video file ({', '.join(CLIP_SUFFIXES)})"
+                    f"{'' if recursive else '; for those in its folders, use --recursive'}"
+                )
             found += clips
         elif not path.exists():
             raise ValueError(f"clip {str(path)!r} does not exist")

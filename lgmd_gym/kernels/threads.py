@@ -10,8 +10,16 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from itertools import pairwise
 
+from numba.core import config
+
 # The rest is split into smaller parts, of which faster threads take more. Every part costs overhead.
 _LARGE_SHARE = 0.7
+
+
+def check_compiling() -> None:
+    """Raise ValueError if numba is told not to compile: the kernels of environments and cameras need it."""
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue, reportUnknownMemberType]
+        raise ValueError("NUMBA_DISABLE_JIT must be unset for environments and cameras, which are compiled")
 
 
 class Threads:

@@ -11,7 +11,7 @@ from lgmd_gym.camera import BirdsEye, Camera, EgoCamera
 from lgmd_gym.camera.pose import USUAL_BRAKE
 from lgmd_gym.camera.road_geometry import RoadGeometry
 from lgmd_gym.camera.scene import Scene
-from lgmd_gym.kernels.threads import Threads
+from lgmd_gym.kernels.threads import Threads, check_compiling
 from lgmd_gym.neuron import Layer, LGMDParams, Response
 from lgmd_gym.sensing.channel import LGMD, Channel, ChannelSpec, make_channels
 from lgmd_gym.sensing.drawing import Drawing
@@ -66,6 +66,7 @@ class SensorArray:
         threads: int | None = None,
         neuron: str = LGMD,
     ) -> None:
+        check_compiling()
         self.num_envs, self.channels = num_envs, make_channels(camera, neuron)
         self.names = [channel.name for channel in self.channels]
         size = num_envs, len(self.names)

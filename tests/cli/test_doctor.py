@@ -60,6 +60,16 @@ def test_an_unwritable_kernel_cache_is_a_fault(monkeypatch):
     assert "set NUMBA_CACHE_DIR" in fault.fix
 
 
+def test_kernels_that_are_not_compiled_are_a_fault(monkeypatch):
+    from lgmd_gym.kernels import threads
+
+    monkeypatch.setattr(threads.config, "DISABLE_JIT", 1)
+    (finding,) = doctor.check_cache()
+    assert (finding.state, finding.fix) == ("fault", "unset NUMBA_DISABLE_JIT")
+    with pytest.raises(ValueError, match="NUMBA_DISABLE_JIT must be unset for environments and cameras"):
+        threads.check_compiling()
+
+
 def test_contact_with_the_rule_is_a_fault(monkeypatch):
     monkeypatch.setattr(doctor, "SELF_TEST_S", 0.01)
     monkeypatch.setattr(doctor, "_run_approach", lambda name: ((True, 0.0), 10))

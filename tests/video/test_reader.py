@@ -210,8 +210,29 @@ def test_find_clips_lists_the_video_files_of_folders(tmp_path, clip):
         *("a.mkv", "b.mp4", "c.MTS", "d.m2ts", "e.wmv", "f.mpeg", "loom.mkv")
     ]
     (tmp_path / "empty").mkdir()
-    with pytest.raises(ValueError, match="contains no video file"):
+    with pytest.raises(ValueError, match=r"contains no video file .* use --recursive"):
         find_clips([tmp_path / "empty"])
+
+
+def test_find_clips_in_folders_of_a_folder(tmp_path):
+    for name in (
+        "b/1.mp4",
+        "a/2.mkv",
+        "a/deep/3.avi",
+        ".hidden/4.mp4",
+        "a/.cache/5.mp4",
+        "a/._2.mkv",
+        "0.mov",
+    ):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    (tmp_path / "a" / "loop").symlink_to(tmp_path)
+    found = [path.relative_to(tmp_path).as_posix() for path in find_clips([tmp_path], recursive=True)]
+    assert found == ["0.mov", "a/2.mkv", "a/deep/3.avi", "b/1.mp4"]
+    assert [path.name for path in find_clips([tmp_path])] == ["0.mov"]
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ValueError, match=r"contains no video file \(.*\)$"):
+        find_clips([tmp_path / "empty"], recursive=True)
 
 
 @pytest.mark.parametrize("argument", [{"fps": 0.0}, {"fps": float("nan")}, {"size": (2, 9)}])
