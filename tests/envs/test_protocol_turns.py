@@ -58,6 +58,11 @@ def test_the_ego_drives_the_turn_with_its_front_axle(speed):
             heading += turned / 2
     assert heading == pytest.approx(pi / 2)
     turn = np.array(places)
+    for left, sign in ((True, 1), (False, -1)):
+        made = scenario("CPTA", ego_speed=kmh(speed), left=left)
+        # The turn ends in a lane of the crossing road: beyond its centre, or, to the right, before it.
+        end = 1.335 + made.ego_path[0].length + turn[-1, 0]
+        assert made.road.distance == pytest.approx(end - sign * 1.75, abs=0.001)
     made = scenario("CCFtap", ego_speed=kmh(speed))
     path, straight = Path(Pose(0.0, 0.0, 0.0), made.ego_path), made.ego_path[0].length
     for way in np.linspace(straight, straight + 0.8 * made.ego_path[1].length * len(made.ego_path[1:]), 9):
@@ -117,6 +122,7 @@ def test_straight_before_a_turn(family, speed):
     assert straight >= 2 * kmh(speed) - 1e-9
     time = contact.travelled / kmh(speed)
     assert time == pytest.approx(made.duration - 6.0, abs=0.002)
+    assert time >= 5.0 - 0.002
     assert straight == pytest.approx(2 * kmh(speed)) or time == pytest.approx(5.0, abs=0.002)
     target = made.actors[0]
     assert (target.lateral_offset, target.heading, target.speed) == (3.5, pi, kmh(45))

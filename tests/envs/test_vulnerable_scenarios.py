@@ -187,6 +187,7 @@ def test_oncoming_bicycle_that_is_passed():
         (5.0, 2.0, 4.0, 1.0, 0.0, 2.0, 5.0),  # 2 s of waiting, 1 s of ramp, 2 s of 2 m/s
         (3.0, 2.0, 4.0, 1.0, 0.0, 0.0, 5.0),
         (2.5, 2.0, 4.0, 1.0, 1.0, 0.0, 4.75),  # begins in the middle of the ramp, 0.25 m on the way
+        (2.05, 2.0, 4.0, 1.0, 1.9, 0.0, 4.0975),
         (1.5, 2.0, 4.0, 1.0, 2.0, None, 3.0),  # begins after the ramp
         (2.0, 2.0, 4.0, 1.0, 2.0, None, 4.0),
     ],
