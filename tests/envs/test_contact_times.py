@@ -7,6 +7,7 @@ from math import inf, pi
 
 import numpy as np
 import pytest
+from numba import config
 from support.records import bodies
 
 from lgmd_gym.envs import BrakingEnv
@@ -15,6 +16,8 @@ from lgmd_gym.envs.dynamics.path import path_table
 from lgmd_gym.envs.dynamics.script import Bend, Pose
 from lgmd_gym.envs.families.scenario import Actor, Scenario
 from lgmd_gym.envs.surrogate_safety import contact_time
+
+compiled_only = pytest.mark.skipif(config.DISABLE_JIT, reason="an environment needs compilation")
 
 
 def decisions_to_contact(scenario, policy_hz, simulation_hz=60):
@@ -29,6 +32,7 @@ def decisions_to_contact(scenario, policy_hz, simulation_hz=60):
     return None
 
 
+@compiled_only
 @pytest.mark.parametrize("policy_hz", [10, 15, 30, 60])
 @pytest.mark.parametrize("time", [1.001, 1.049, 1.051, 1.099, 1.332, 1.334])
 def test_contact_ends_the_episode_in_its_decision(policy_hz, time):
@@ -41,6 +45,7 @@ def test_contact_ends_the_episode_in_its_decision(policy_hz, time):
     assert before["ttc"] == pytest.approx(time - (decision - 1) / policy_hz, abs=1e-6)
 
 
+@compiled_only
 @pytest.mark.parametrize("moment", [0.1, 0.5, 0.9])
 @pytest.mark.parametrize(("overlap", "touched"), [(0.02, True), (-0.02, False)])
 def test_contact_that_begins_and_ends_within_a_step(moment, overlap, touched):

@@ -8,6 +8,7 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
+from numba import config
 from support.contacts import ADULT_HIP, Contact
 from support.scenarios import check_actor, scenario, shape
 
@@ -23,6 +24,8 @@ TURNS = [
     ((10.1, 15), 11.75, 20.93, 48.14),
     ((15.1, 20, 25), 14.75, 21.79, 46.42),
 ]
+
+compiled_only = pytest.mark.skipif(config.DISABLE_JIT, reason="an environment needs compilation")
 
 
 def kmh(value):
@@ -113,6 +116,7 @@ def test_run_up_of_the_turning_pedestrian(left, direction, start, speeds):
         assert hip == pytest.approx(x + aside / -np.tan(ego.heading), abs=0.01)
 
 
+@compiled_only
 @pytest.mark.parametrize("family", ["CCFtap", "CMFtap"])
 @pytest.mark.parametrize("speed", [10, 15, 25])
 def test_straight_before_a_turn(family, speed):
