@@ -8,10 +8,20 @@ from math import inf, pi
 import numpy as np
 import pytest
 from numba import config
-from support.records import bodies
+from support.records import bodies, record, records
 
 from lgmd_gym.envs import BrakingEnv
-from lgmd_gym.envs.dynamics.contact import PathMotion, Rectangle, gap_on_path, time_on_paths
+from lgmd_gym.envs.dynamics.bodies import STEP_START
+from lgmd_gym.envs.dynamics.contact import PathMotion, Rectangle, gap_on_path, time_on_paths, touched_side
+from lgmd_gym.envs.dynamics.episode import (
+    EPISODE,
+    StepMotion,
+    first_contact_of,
+    is_terminated,
+    is_truncated,
+    touch_between,
+    touch_time,
+)
 from lgmd_gym.envs.dynamics.path import path_table
 from lgmd_gym.envs.dynamics.script import Bend, Pose
 from lgmd_gym.envs.families.scenario import Actor, Scenario
@@ -93,3 +103,68 @@ def test_predicted_contact_of_bodies_on_paths():
     assert time_on_paths(motion, other, 10.0, 0.1) == pytest.approx((44.023 - length) / 8)
     far = PathMotion(bent, 44.023 + 81.0, 2.0, table[1].length, table[1].width)
     assert time_on_paths(motion, far, 10.0, 0.1) == inf
+
+
+def braking_ego(time, aside=0.0, length=4.0):
+    """Return bodies after a step of 0.5 s, and the step, of an ego that brakes from 10 m/s with 4 m/s².
+
+    A standing car of 4 m by 2 m is touched after `time` [s], at 10·t - 2·t² of the way.
+    """
+    ahead = 10 * time - 2 * time**2 + (4.0 + length) / 2
+    ego = {"x": 4.5, "travelled": 4.5, "speed": 8.0, "length": length}
+    table, paths = bodies(ego, {"x": ahead, "y": aside})
+    paths[0] = 0.0  # the ego's path begins where the step does
+    before = records(STEP_START, {"speed": 10.0}, {"x": ahead, "y": aside}, {})
+    return table, StepMotion(before, np.array([(inf, -4.0)]), inf, np.zeros((0, 4)), paths, 0.5)
+
+
+@pytest.mark.parametrize("time", [0.01, 0.1, 0.25, 0.26, 0.333, 0.49])
+def test_contact_while_braking_has_the_time_of_the_parabola(time):
+    table, step = braking_ego(time)
+    assert touch_time(table, 1, step) == pytest.approx(time / 0.5, abs=2e-4)
+    assert first_contact_of(table, 2, step) == (pytest.approx(time / 0.5, abs=2e-4), 1)
+    table, step = braking_ego(time, aside=2.0)  # side by side
+    assert touch_time(table, 1, step) == inf
+    assert first_contact_of(table, 2, step) == (inf, 0)
+
+
+def test_no_contact_beyond_the_distance_of_the_step():
+    for time in (0.501, 0.6):
+        table, step = braking_ego(time)
+        assert touch_time(table, 1, step) == inf
+
+
+def test_a_body_that_turns_has_its_mean_heading_in_a_part_of_a_step():
+    """A box of 4 m by 2 m turns by 180° on 10 m: a wall 9 m ahead is 1 m, half its width, from its middle."""
+    wall = Rectangle(9.5, 0.0, 0.0, 1.0, 8.0)
+    turning = Rectangle(0.0, 0.0, 0.0, 4.0, 2.0), Rectangle(10.0, 0.0, pi, 4.0, 2.0)
+    assert touch_between(*turning, wall, wall) == pytest.approx(0.8)
+    moved = wall._replace(x=7.5)  # the wall comes 2 m nearer
+    assert touch_between(*turning, wall, moved) == pytest.approx(8 / 12)
+
+
+def test_ends_of_an_episode_by_contact_and_by_its_duration():
+    table, _ = bodies({"speed": 10.0}, {"x": 50.0})
+    for touched in (0, 1):
+        episode = record(EPISODE, bodies=2, touched=touched, duration=5.0)
+        assert is_terminated(table, episode, False, 0.1, 2.0) == bool(touched)
+    for time, ended in ((4.9, False), (5.0 - 1e-8, False), (5.0, True), (5.1, True)):
+        assert is_truncated(record(EPISODE, duration=5.0, time=time)) == ended
+
+
+@pytest.mark.parametrize(("decisions", "ended"), [(19, False), (20, True)])
+def test_a_standstill_ends_the_episode_after_the_follow_up(decisions, ended):
+    """2 s at 10 Hz, from the first decision at rest on; a car that approaches begins it anew."""
+    table, _ = bodies({"speed": 0.0, "script_speed": 10.0}, {"x": 50.0})
+    episode = record(EPISODE, bodies=2, duration=60.0)
+    assert not is_terminated(table, episode, True, 0.1, 2.0)
+    found = [is_terminated(table, episode, False, 0.1, 2.0) for _ in range(decisions)]
+    assert found == [False] * (decisions - 1) + [ended]
+    assert not is_terminated(table, episode, True, 0.1, 2.0)
+    assert episode.resolved == 0.0
+
+
+def test_rear_of_a_short_ego():
+    short = Rectangle(0.0, 0.0, 0.0, 1.0, 1.0)
+    assert touched_side(short, Rectangle(-2.5, 0.0, 0.0, 4.0, 1.0)) == "rear"
+    assert touched_side(short, Rectangle(2.5, 0.0, 0.0, 4.0, 1.0)) == "front"
