@@ -258,11 +258,14 @@ def _network(node: Node) -> RoadNetwork:
 
 def _road(item: Element) -> Road:
     lanes = item.child("lanes")
+    sections = tuple((section.number("s"), _lanes(section)) for section in lanes.all("laneSection"))
+    if not sections:
+        raise lanes.error("a road must have a laneSection")
     return Road(
         item.text("id"),
         item.number("length"),
         _reference_line(item.child("planView")),
-        tuple((section.number("s"), _lanes(section)) for section in lanes.all("laneSection")),
+        sections,
         tuple(_width(offset, "s") for offset in lanes.all("laneOffset")),
         item.text("rule", "RHT") == "LHT",
         item.text("junction", "-1"),

@@ -253,7 +253,7 @@ def read_story(board: Element, world: ScenarioMap) -> Storyboard:
 def _group_events(
     story: Element, act: Element, trigger: Element | None, group: Element, world: ScenarioMap
 ) -> list[Event]:
-    repeats = group.number("maximumExecutionCount", 1.0)
+    repeats = _execution_count(group)
     actors = group.child("Actors")
     if actors.flag("selectTriggeringEntities"):
         raise actors.error("selectTriggeringEntities=true is not supported; list the entities")
@@ -264,25 +264,27 @@ def _group_events(
     events: list[Event] = []
     for maneuver in maneuvers:
         for event in maneuver.all("Event"):
-            count = event.number("maximumExecutionCount", 1.0)
-            if not count.is_integer() or count < 0.0:
-                raise event.error(f"Event maximumExecutionCount must be a whole number >= 0, got {count:g}")
-            if count * repeats == 0.0:
+            count = repeats * _execution_count(event)
+            if count == 0:
                 event.skip()
                 continue
             priority = event.choice("priority", ("override", "overwrite", "parallel", "skip"))
             names = [*outer, ("maneuver", maneuver.label()), ("event", event.label())]
             runs = [run for action in event.all("Action") for run in _runs(action, movers, world)]
             triggers = trigger, event.find("StartTrigger")
-            found = Event(
-                event, triggers, names, runs, maneuver.node, priority == "skip", int(count * repeats)
-            )
+            found = Event(event, triggers, names, runs, maneuver.node, priority == "skip", count)
             events.append(found)
-    if repeats > 1.0 and len(events) > 1:
-        raise group.error(
-            f"ManeuverGroup maximumExecutionCount must be 1 for several events, got {repeats:g}"
-        )
+    if repeats > 1 and len(events) > 1:
+        raise group.error(f"ManeuverGroup maximumExecutionCount must be 1 for several events, got {repeats}")
     return events
+
+
+def _execution_count(item: Element) -> int:
+    """Return how often a maneuver group or an event is carried out."""
+    count = item.number("maximumExecutionCount", 1.0)
+    if not count.is_integer() or count < 0.0:
+        raise item.error(f"{item.tag} maximumExecutionCount must be a whole number >= 0, got {count:g}")
+    return int(count)
 
 
 def _runs(action: Element, movers: list[Mover], world: ScenarioMap) -> list[tuple[str, ActionRun]]:

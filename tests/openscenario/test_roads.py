@@ -71,6 +71,7 @@ def test_left_hand_traffic(tmp_path):
     [
         ("<OpenDRIVE><header/></OpenDRIVE>", "the file has no road"),
         ("<Roads/>", "must begin with OpenDRIVE, got Roads"),
+        (road_file(road(0, 0, 0, 0, 9, lanes="<lanes/>")), "a road must have a laneSection"),
         (road_file(road(0, 0, 0, 0, 9, "<poly3 a='0'/>")), "poly3 in geometry is not supported; use line"),
         (
             STRAIGHT.replace("</planView>", '<geometry s="1000" x="9" y="0" hdg="0" length="1"><line/>')
