@@ -213,6 +213,9 @@ def animal_crosses(
     """
     user = ANIMALS[animal]
     if clear_by is not None:
+        if impact_location != 0.5:
+            text = f"impact_location={impact_location:g} and clear_by={clear_by:g}"
+            raise ValueError(f"{text} both set the position of the animal; pass one")
         beyond = EGO_WIDTH / 2 + user.length / 2 + clear_by * animal_speed  # of its centre as the ego arrives
         impact_location = 0.5 + SIDES[side] * beyond / EGO_WIDTH
     motion = RunUp(animal_speed, (), START_TTC * animal_speed)

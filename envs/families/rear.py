@@ -388,6 +388,8 @@ def approach_box(
             raise ValueError(f"{text} both set the lateral position; pass one")
         aside = (touching + clearance) * (1.0 if left else -1.0)
     else:
+        if left:
+            raise ValueError("left=True requires clearance; pass it, or lateral_offset > 0 without left")
         aside = check_within("lateral_offset", lateral_offset, 0.05 - touching, touching - 0.05, "m")
     box = Actor(
         gap=START_TTC * ego_speed,

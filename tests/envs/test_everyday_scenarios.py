@@ -193,6 +193,7 @@ def test_boxes_in_the_lane_and_next_to_it():
     left = scenario("StandingBox", ego_speed=10.0, width=1.0, clearance=0.6, left=True)
     assert left.actors[0].lateral_offset == pytest.approx(2.0)
     invalid("StandingBox", "both set the lateral position", lateral_offset=0.1, clearance=0.6)
+    invalid("StandingBox", "left=True requires clearance", left=True)
     cover = scenario("SteelPlate", ego_speed=10.0, length=0.6, width=0.7).actors[0]
     assert (cover.kind, cover.length, cover.width, cover.height) == ("road_marking", 0.6, 0.7, 0.025)
     plate = scenario("SteelPlate").actors[0]
@@ -226,6 +227,7 @@ def test_animals_cross_at_the_impact_location(animal, length, width, height):
     # It clears 1 s before the ego arrives: its centre is 0.9 m, half its length and 4 m further on.
     clears = scenario("AnimalCrossing", **arguments, clear_by=1.0).actors[0]
     assert clears.lateral_offset == pytest.approx(20.0 - (0.9 + length / 2 + 4.0))
+    invalid("AnimalCrossing", "both set the position of the animal", impact_location=0.25, clear_by=1.0)
 
 
 @compiled_only
