@@ -148,6 +148,15 @@ class TrafficPlan(Plan):
         for rows_of_task in run_tasks(run_traffic_task, tasks):
             yield from map(Result, rows_of_task)
 
+    def check(self) -> None:
+        """Check that no agent requires what traffic does not have; see `Plan.check`."""
+        for name in self.config.agents:
+            if make_agent(name).config:
+                raise ValueError(
+                    f"agent {name} requires braking environments, got suite {self.suite.name}; omit the agent"
+                )
+        super().check()
+
     def _make_env(self, sensor_config: SensorConfig) -> gym.Env:
         return gym.make(traffic_id(self.kinds[0]), **sensor_config.arguments)
 

@@ -173,6 +173,10 @@ def test_number_of_processes_does_not_change_the_rows(tmp_path):
         ({"kinds": ["merg"]}, "did you mean 'merge'"),
         ({"kinds": []}, "kinds must contain at least one name, got none"),
         ({"camera": "foeva"}, "foeva"),
+        (
+            {"agents": ["last-moment-oracle"], "suite": "traffic-inattentive"},
+            "last-moment-oracle requires braking environments, got suite traffic-inattentive; omit the agent",
+        ),
     ],
 )
 def test_invalid_configuration_is_rejected_before_the_folder_is_created(tmp_path, values, message):
