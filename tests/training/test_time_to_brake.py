@@ -137,6 +137,13 @@ def test_an_ensemble_learns_the_intervals_with_any_number_of_threads():
     assert logits.logits.argmax(1).tolist() == [0, 1, 2]  # 4, 15 and 36 m/s
 
 
+@pytest.mark.filterwarnings("ignore:invalid value encountered")
+def test_a_training_that_diverges():
+    learner = TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, n_epochs=1, learning_rate=1e30)
+    with pytest.raises(ValueError, match=r"no epoch has a finite validation loss with learning_rate 1e\+30"):
+        learner.learn(speeds(60, 0), speeds(20, 1))
+
+
 def test_area_under_the_roc_curve_is_the_share_of_ordered_pairs():
     rng = np.random.default_rng(0)
     high, low = rng.integers(0, 9, 40), rng.integers(0, 7, 30)

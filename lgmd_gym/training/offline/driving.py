@@ -103,7 +103,8 @@ class DriveRecorder:
         """Return a list with one episode for each seed."""
         if not seeds:
             return []
-        config = {"forecast": ForecastParams().to_dict()} | (self.arguments.get("config") or {})
+        config = dict(self.arguments.get("config") or {})
+        config["forecast"] = config.get("forecast") or ForecastParams().to_dict()
         arguments = self.arguments | {"config": config, "autoreset_mode": "Disabled"}
         made: Any = gym.make_vec(self.env_id, num_envs=min(NUM_ENVS, len(seeds)), **arguments)
         envs: BrakingVectorEnv = made.unwrapped

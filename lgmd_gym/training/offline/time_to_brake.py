@@ -184,6 +184,9 @@ class TimeToBrakeLearner:
             validation: Decisions evaluated after each epoch.
             log: Called after each epoch with its number and its metrics.
             jobs: Number of threads that train the networks of an ensemble; it does not change the result.
+
+        Raises:
+            ValueError: If no epoch has a finite validation loss.
         """
         standardisation = self._measure(train)
         steps = self.n_epochs * -(-len(train) // self.batch_size)
@@ -203,6 +206,10 @@ class TimeToBrakeLearner:
                     lowest, best = found.loss, [_copy(network) for network in self.networks]
                 metrics = {"train_loss": loss, "best_loss": lowest} | found._asdict()
                 log(epoch, {name: value for name, value in metrics.items() if not np.isnan(value)})
+        if not best:
+            raise ValueError(
+                f"no epoch has a finite validation loss with learning_rate {self.learning_rate:g}; lower it"
+            )
         for network, weights in zip(self.networks, best, strict=True):
             network.load_state_dict(weights)
             standardisation.fold(linear_layers(network)[0])
