@@ -383,7 +383,8 @@ class StoppingZoneParams(RuleParams):
         1.3,
         "[0, inf]",
         "s",
-        "Time with every ground field below its threshold after which the brake is released; inf for never.",
+        "Time with every ground field below its threshold and no warning, after which the brake is released; "
+        "inf for never.",
     )
 
 
@@ -399,7 +400,8 @@ class StoppingZone(Rule):
     `upright` in `upright_frames` and L ≥ `low` in `low_frames` consecutive frames that ended within the last
     `memory` frames; at a speed above `crawl` and a yaw rate of at most `yaw_rate`. Flat marks and shadows
     excite ground fields alone. The rule warns under the same condition with `warning` times the thresholds.
-    It releases the brake after `release_s` with G < `ground` in all zones, but not near standstill.
+    It releases the brake after `release_s` with G < `ground` in all zones and no warning, but not near
+    standstill.
 
     The stopping distance is that of `deceleration` on a dry road and of two thirds of it on a wet one: the
     sensor knows that the road is wet, as a car with a rain sensor does.

@@ -33,25 +33,27 @@ class Train:
     sensors_of: Name = None
     """Agent whose cameras are used instead, for example stopping-zone; all-round adds fields at the sides."""
     inputs: Names = None
-    """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change and
-    ego_yaw_rate; also frame; with the cameras of stopping-zone, also zones, zones_spikes and zones_ffi; with
-    those of all-round, also sides, sides_ffi, columns and known_deceleration.
+    """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change,
+    ego_yaw_rate and ego_acceleration; also frame; with the cameras of stopping-zone, also zones, zones_spikes
+    and zones_ffi; with those of all-round, also sides, sides_ffi, columns and known_deceleration.
     Default: from the hyperparameters."""
     demands: Annotated[tuple[float, ...] | None, arg(metavar="[X ...]")] = None
     """Demands that the policy chooses from, from -1 (full braking) to 1; --demands alone for a continuous
-    demand. Default: 0 -1; continuous for sac."""
+    demand. Default: 0 -1; continuous for sac; none for time-to-brake."""
     n_timesteps: Count = None
-    """Number of policy decisions (offline: of recorded episodes). Default: from the hyperparameters."""
+    """Number of policy decisions; of recorded episodes for offline and time-to-brake. Default: from the
+    hyperparameters."""
     seed: int = 0
     """Seed of the network and the environments."""
     hyperparams: File = None
     """YAML file in rl-zoo's format. Default: the file of this package."""
     eval_freq: int = 16_000
-    """Number of decisions between two evaluations; offline evaluates after every epoch."""
+    """Number of decisions between two evaluations; training on recordings evaluates after every epoch."""
     eval_episodes: Count = None
-    """Number of episodes per evaluation. Default: 96; for offline, 600."""
+    """Number of episodes per evaluation. Default: 96; for training on recordings, 600."""
     recordings: File = None
-    """Folder of an offline training run with the same cameras, to reuse its recorded episodes."""
+    """Folder of a training run on recordings, with the same algorithm and cameras, to reuse its recorded
+    episodes."""
     traffic_episodes: Count = None
     """Number of traffic episodes, in which braking is false, that training on recordings uses in addition.
     Default: from the hyperparameters, else 0."""
