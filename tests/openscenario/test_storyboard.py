@@ -343,9 +343,10 @@ def test_events_follow_the_end_of_others(tmp_path):
 
     first = event("First", AWAY, at(1))  # from 1 to 4 s
     slower = speed(0, "rate", "linear", 3)
-    states = {"completeState": 4.0, "endTransition": 4.0, "startTransition": 1.0, "runningState": 1.0}
+    states = {"completeState": 4.5, "endTransition": 4.5, "startTransition": 1.5, "runningState": 1.5}
     for state, time in states.items():
-        found = segments(tmp_path, story("Target", first, event("Then", slower, after(state))))
+        later = after(state).replace('delay="0"', 'delay="0.5"')
+        found = segments(tmp_path, story("Target", first, event("Then", slower, later)))
         assert [item.start for item in found][-1] == time
     found = segments(
         tmp_path, story("Target", first, event("Then", slower, after("completeState", "act", "Act")))
