@@ -17,7 +17,7 @@ _LARGE_SHARE = 0.7
 
 
 def check_compiling() -> None:
-    """Raise ValueError if numba is told not to compile: the kernels of environments and cameras need it."""
+    """Raise ValueError if numba does not compile: environments and cameras need compiled kernels."""
     if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue, reportUnknownMemberType]
         raise ValueError("NUMBA_DISABLE_JIT must be unset for environments and cameras, which are compiled")
 
