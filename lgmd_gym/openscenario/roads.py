@@ -250,10 +250,15 @@ def _network(node: Node) -> RoadNetwork:
     root = Element(node, {})
     if root.tag != "OpenDRIVE":
         raise root.error(f"an OpenDRIVE file must begin with OpenDRIVE, got {root.tag}")
-    roads = [_road(item) for item in root.all("road")]
+    roads: dict[str, Road] = {}
+    for item in root.all("road"):
+        road = _road(item)
+        if road.name in roads:
+            raise item.error(f"road id {road.name!r} is used twice; choose another")
+        roads[road.name] = road
     if not roads:
         raise root.error("the file has no road")
-    return RoadNetwork({road.name: road for road in roads})
+    return RoadNetwork(roads)
 
 
 def _road(item: Element) -> Road:
@@ -279,7 +284,7 @@ def _links(item: Element) -> Iterator[tuple[str, End]]:
     for tag, own in (("predecessor", "start"), ("successor", "end")):
         other = None if link is None else link.find(tag)
         if other is not None and other.text("elementType") == "road":
-            yield own, (other.text("elementId"), other.text("contactPoint"))
+            yield own, (other.text("elementId"), other.choice("contactPoint", ("start", "end")))
 
 
 def _lanes(section: Element) -> dict[int, Lane]:
@@ -287,7 +292,10 @@ def _lanes(section: Element) -> dict[int, Lane]:
     for side in section.all("left", "right"):
         for lane in side.all("lane"):
             widths = tuple(_width(width, "sOffset") for width in lane.all("width"))
-            lanes[int(lane.number("id"))] = Lane(lane.text("type"), widths)
+            number = lane.number("id")
+            if not number.is_integer():
+                raise lane.error(f"lane id must be a whole number, got {number:g}")
+            lanes[int(number)] = Lane(lane.text("type"), widths)
     return lanes
 
 

@@ -108,6 +108,8 @@ def read_entities(scenario: Element, catalogs: Catalogs) -> dict[str, Mover]:
     movers: dict[str, Mover] = {}
     for item in scenario.child("Entities").all("ScenarioObject"):
         name = item.text("name")
+        if name in movers:
+            raise item.error(f"ScenarioObject name {name!r} is used twice; choose another")
         found = catalogs.resolve(item, "Vehicle", "Pedestrian", "MiscObject")
         mover = Mover(name, _body(found), found.tag)
         read_controllers(item, mover, catalogs)

@@ -265,6 +265,7 @@ def test_an_episode_keeps_the_acceleration_of_the_target(tmp_path):
             "ManeuverGroup maximumExecutionCount must be a whole number >= 0, got 0.5",
         ),
         (('name="Ego"', 'name="Car"'), r"unknown entity 'Ego'"),
+        (('name="Target"', 'name="Ego"'), "ScenarioObject name 'Ego' is used twice; choose another"),
         (('revMinor="3"', 'revMinor="4"'), "OpenSCENARIO 1.4 is not supported; use 1.0 to 1.3"),
         (('<Center x="0.0" y="0"', '<Center x="0.0" y="0.1"'), "a bounding box beside the centreline"),
         (

@@ -72,6 +72,12 @@ def test_left_hand_traffic(tmp_path):
         ("<OpenDRIVE><header/></OpenDRIVE>", "the file has no road"),
         ("<Roads/>", "must begin with OpenDRIVE, got Roads"),
         (road_file(road(0, 0, 0, 0, 9, lanes="<lanes/>")), "a road must have a laneSection"),
+        (road_file(road(0, 0, 0, 0, 9), road(0, 0, 9, 0, 9)), "road id '0' is used twice"),
+        (road_file(road(0, 0, 0, 0, 9, link="successor:1:middle")), "contactPoint='middle' is not supported"),
+        (
+            STRAIGHT.replace("\n", "").replace('lane id="-1"', 'lane id="-1.5"'),
+            "lane id must be a whole number, got -1.5",
+        ),
         (road_file(road(0, 0, 0, 0, 9, "<poly3 a='0'/>")), "poly3 in geometry is not supported; use line"),
         (
             STRAIGHT.replace("</planView>", '<geometry s="1000" x="9" y="0" hdg="0" length="1"><line/>')
@@ -81,7 +87,7 @@ def test_left_hand_traffic(tmp_path):
     ],
 )  # fmt: skip
 def test_invalid_roads(tmp_path, text, message):
-    with pytest.raises(ValueError, match=rf"road\.xodr:1: .*{message}"):
+    with pytest.raises(ValueError, match=rf"road\.xodr:\d+: .*{message}"):
         network(tmp_path, text)
 
 
