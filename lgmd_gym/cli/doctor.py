@@ -128,7 +128,7 @@ def check_cache() -> list[Finding]:
 
     from numba.core import config
 
-    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue, reportUnknownMemberType]
         return [Finding("numba", FAULT, "NUMBA_DISABLE_JIT: nothing is compiled", "unset NUMBA_DISABLE_JIT")]
     fix = "set NUMBA_CACHE_DIR to a writable folder"
     try:
