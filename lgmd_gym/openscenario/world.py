@@ -210,6 +210,7 @@ def touching(one: Mover, other: Mover, time: float) -> bool:
     return first_touch(first, second, 0.0, 0.0) == 0.0
 
 
+_BEYOND = 1.0  # [m] from the end of a road
 _UPRIGHT = 1e-6  # [rad] or [m]
 POSITIONS = (
     "LanePosition",
@@ -284,11 +285,21 @@ class ScenarioMap:
         return Place(item.number("x"), item.number("y"), item.number("h", 0.0))
 
     def _LanePosition(self, item: Element, time: float) -> Place:
-        road, lane, s = self.road(item), int(item.number("laneId")), item.number("s")
-        return _in_lane(road, lane, s, item.number("offset", 0.0))
+        road, lane = self.road(item), int(item.number("laneId"))
+        return _in_lane(road, lane, self._along(item, road), item.number("offset", 0.0))
 
     def _RoadPosition(self, item: Element, time: float) -> Place:
-        return self.road(item).at(item.number("s"), item.number("t"))
+        road = self.road(item)
+        return road.at(self._along(item, road), item.number("t"))
+
+    def _along(self, item: Element, road: Road) -> float:
+        """Return the distance of a position along its road [m]."""
+        s = item.number("s")
+        if not -_BEYOND <= s <= road.length + _BEYOND:
+            self.note(
+                item, f"{item.tag} s={s:g} m is beyond road {road.name}, which is {road.length:g} m long"
+            )
+        return s
 
     def _RelativeLanePosition(self, item: Element, time: float) -> Place:
         mover = self.mover(item)

@@ -40,6 +40,12 @@ def started(folder, trigger, init=START):
     return found[0].start if found else None
 
 
+def test_a_position_beyond_the_road(tmp_path):
+    found = notes(tmp_path, scenario(START.replace('s="160"', 's="1001.5"')))
+    assert found == ["LanePosition s=1001.5 m is beyond road 0, which is 1000 m long"]
+    assert notes(tmp_path, scenario(START.replace('s="160"', 's="1000.5"'))) == []
+
+
 def test_openscenario_1_0(tmp_path):
     old = scenario(START).replace('revMinor="3"', 'revMinor="0"')
     assert compiled(tmp_path, old).scenario == compiled(tmp_path, scenario(START)).scenario
