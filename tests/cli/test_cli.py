@@ -202,7 +202,7 @@ def test_bench_runs_the_traffic_suite(tmp_path, capsys):
     out = tmp_path / "run"
     arguments = ["--suite", "traffic", "--agents", "ttc-oracle", "--seeds", "1", "--out", str(out)]
     assert cli.run(["bench", *arguments, "--jobs", "1"]) == 0
-    assert "needless activations" in capsys.readouterr().out
+    assert "needless: without it, no contact" in capsys.readouterr().out
     rows = [json.loads(line) for line in (out / "episodes.jsonl").read_text().splitlines()]
     kinds = ["highway", "intersection", "merge", "roundabout", "two-way"]
     assert sorted(row["case"] for row in rows) == [f"traffic/{kind}/s0" for kind in kinds]

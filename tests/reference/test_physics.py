@@ -29,7 +29,7 @@ class ReferenceEpisode:
             pose = Pose(centre, float(y) - actor.lateral_offset, -actor.heading)
             size = actor.length, actor.width, actor.reference
             self.bodies.append(Body(pose, actor.path, actor.speed, actor.profile, *size))
-        self.closed_in, self.contact = False, None
+        self.closed_in, self.contact, self.resolved = False, None, 0.0
 
     def step(self, demand):
         """Advance by one decision and return the reward."""
@@ -79,14 +79,21 @@ class ReferenceEpisode:
         if self.contact is not None:
             return True
         if ego.speed == 0.0:
-            return ego.script.speed > 0.0 and not self.approached()
+            return self.follows_up(ego.script.speed > 0.0 and not self.approached())
         others = [body for body, solid in zip(self.bodies, self.solid, strict=True) if solid]
         left = [body for body in others if not self.passed(body)]
         self.closed_in = self.closed_in or any(ego.speed > self.along(body) for body in left)
         resolved = all(
             not body.script.left and body.path.straight and ego.speed < self.along(body) for body in left
         )
-        return bool(others) and (not left or (self.closed_in and resolved))
+        if others and not left:
+            return True
+        return self.follows_up(bool(others) and self.closed_in and resolved)
+
+    def follows_up(self, resolved):
+        """Return whether the conflict has been resolved for the follow-up time."""
+        self.resolved = self.resolved + 1 / self.env.config["policy_frequency"] if resolved else 0.0
+        return self.resolved > self.env.config["follow_up"] - 1e-9
 
     def passed(self, body):
         ego = self.ego
