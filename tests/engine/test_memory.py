@@ -51,7 +51,7 @@ def test_peak(num_envs, limit_mib):
 def test_no_growth():
     """Memory does not keep growing over 160,000 steps of environments with small frames and two threads.
 
-    A leak grows in every quarter of the run. A new peak in some of them is none: two large roads, for example,
+    A leak grows in every part of the run. A new peak in some of them is none: two large roads, for example,
     may be built at the same time.
     """
     values = peaks(16, 20, *[40_000] * 4)
