@@ -62,8 +62,8 @@ class Drive:
     """Modules with scenario families of your own: my_scenarios, or my_scenarios:MyFamily."""
     trust: bool = False
     """Load the modules that the file names; they can run any code."""
-    set: Annotated[tuple[str, ...], arg(metavar="NAME=NUMBER [...]")] = ()
-    """Scenario arguments in SI units, for example --set ego_speed=8.3 shade=40."""
+    set: Annotated[tuple[str, ...], arg(metavar="NAME=VALUE [...]")] = ()
+    """Scenario arguments in SI units, for example --set ego_speed=8.3 shade=40 lying=true."""
 
 
 def run(options: Drive) -> int:

@@ -52,7 +52,7 @@ class Scenario:
     """Modules with scenario families of your own: my_scenarios, or my_scenarios:MyFamily."""
     trust: bool = False
     """Load the modules that the file names; they can run any code."""
-    set: Annotated[tuple[str, ...], arg(metavar="NAME=NUMBER [...]")] = ()
+    set: Annotated[tuple[str, ...], arg(metavar="NAME=VALUE [...]")] = ()
     """Arguments of the scenario to draw, in SI units."""
     jobs: int = 2
     """Number of processes that compare files."""

@@ -70,15 +70,25 @@ def default_out(out: Path | None, name: str) -> Path:
 
 
 def parse_arguments(pairs: tuple[str, ...]) -> Arguments:
-    """Return NAME=NUMBER pairs as a dict."""
+    """Return NAME=VALUE pairs as a dict: numbers, `true` and `false` as flags, else texts.
+
+    Raises:
+        ValueError: For a pair without a name or a value.
+    """
     arguments: Arguments = {}
     for pair in pairs:
         name, _, value = pair.partition("=")
-        try:
-            arguments[name] = int(value) if name == "shade" else float(value)
-        except ValueError:
-            raise ValueError(f"--set must be NAME=NUMBER, for example ego_speed=8.3, got {pair!r}") from None
+        if not name or not value:
+            raise ValueError(f"--set must be NAME=VALUE, for example ego_speed=8.3, got {pair!r}")
+        arguments[name] = {"true": True, "false": False}.get(value, _number_or_text(name, value))
     return arguments
+
+
+def _number_or_text(name: str, value: str) -> float | str:
+    try:
+        return int(value) if name == "shade" else float(value)
+    except ValueError:
+        return value
 
 
 def parse_world(text: str | None) -> Values:
