@@ -17,6 +17,7 @@ import torch
 
 from lgmd_gym.agents.rules import excitation
 from lgmd_gym.agents.sides import NEURONS, NUM_SIDE_FIELDS, SIDE_COLUMNS, side_cameras
+from lgmd_gym.statistics.ranks import roc_area
 from lgmd_gym.training.offline.episodes import RecordedEpisode, record_parallel
 from lgmd_gym.training.offline.recorder import LevelRecorder
 
@@ -112,7 +113,7 @@ def areas_by_family(
         scores[fold == index] = fit_and_score(table[fold != index], table[fold == index])
     groups = {"all": np.full(len(families), True)}
     groups |= {name: np.array(families) == name for name in sorted(set(families))}
-    return {name: area(scores[group]) for name, group in groups.items()}
+    return {name: roc_area(*scores[group].T) for name, group in groups.items()}
 
 
 def features(episode: RecordedEpisode, time: int, detectors: Sequence[int]) -> np.ndarray:
@@ -157,11 +158,6 @@ def fit_and_score(train: np.ndarray, test: np.ndarray) -> np.ndarray:
         with torch.no_grad():
             scores.append(network(torch.from_numpy(test))[..., 0].numpy())
     return np.mean(scores, axis=0)
-
-
-def area(scores: np.ndarray) -> float:
-    """Return the area under the ROC curve: the share of pairs with a higher score for the target."""
-    return float((scores[:, :1] > scores[:, 1]).mean())
 
 
 if __name__ == "__main__":

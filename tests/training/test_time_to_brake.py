@@ -75,10 +75,9 @@ def test_drivers_brake_at_a_time_to_brake_and_release():
     assert braked_at_once == 0
     assert released > 100
     assert partial / (400 - never) == pytest.approx(0.2, abs=0.08)
-    again = PulseDriver(3)
-    assert [again.act(t / 30.0, inf) for t in range(300)] == [
-        value for driver in [PulseDriver(3)] for t in range(300) for value in [driver.act(t / 30.0, inf)]
-    ]
+    first, second = PulseDriver(3), PulseDriver(3)
+    for index in range(300):
+        assert first.act(index / 30.0, inf) == second.act(index / 30.0, inf)
 
 
 def test_an_episode_without_braking_has_the_time_to_its_last_moment():
