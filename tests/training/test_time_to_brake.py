@@ -15,7 +15,7 @@ from lgmd_gym.statistics.ranks import roc_area
 from lgmd_gym.training import TrainConfig, train
 from lgmd_gym.training.offline.driving import DriveRecorder, PulseDriver, driven
 from lgmd_gym.training.offline.episodes import DrivenEpisode, load, save
-from lgmd_gym.training.offline.time_to_brake import StateDataset, TimeToBrakeLearner
+from lgmd_gym.training.offline.time_to_brake import StateDataset, TimeToBrakeLearner, leave_out
 
 ARGUMENTS = {"camera": "fovea", "families": ["CCRs", "EmptyRoad"], "world": "laboratory"}
 
@@ -75,6 +75,14 @@ def test_drivers_brake_at_a_time_to_brake_and_release():
     assert braked_at_once == 0
     assert released > 100
     assert partial / (400 - never) == pytest.approx(0.2, abs=0.08)
+    onsets = []  # times to brake at which drivers begin to brake
+    for seed in range(400):
+        driver = PulseDriver(seed)
+        found = (reserve for reserve in np.arange(4.0, 0.0, -1 / 30) if driver.act(0.0, reserve) < 0.0)
+        onsets += [next(found, np.nan)]
+    onsets = np.array(onsets)[np.isfinite(onsets)]
+    assert onsets.max() == pytest.approx(2.3, abs=0.1)
+    assert np.median(onsets) == pytest.approx(1.15, abs=0.25)
     first, second = PulseDriver(3), PulseDriver(3)
     for index in range(300):
         assert first.act(index / 30.0, inf) == second.act(index / 30.0, inf)
@@ -120,6 +128,12 @@ class Blank(gym.Env):
 
 
 BRAKE = {"limits_s": [1.0, 2.0], "full_s": 1.0, "partial_s": 1.0, "warning_s": 2.0, "present_s": 2.0}
+
+
+def test_units_that_are_left_out():
+    units = leave_out(torch.ones(20_000), 0.3, torch.Generator().manual_seed(0))
+    assert sorted({round(value, 4) for value in units.tolist()}) == [0.0, 1.4286]
+    assert float(units.mean()) == pytest.approx(1.0, abs=0.02)
 
 
 def test_an_ensemble_learns_the_intervals_with_any_number_of_threads():

@@ -284,11 +284,15 @@ def _update(
     for layer in network.mlp_extractor.policy_net:
         hidden = layer(hidden)
         if dropout and not isinstance(layer, torch.nn.Linear):  # after the activation
-            kept = torch.rand(hidden.shape, generator=generator) >= dropout
-            hidden = hidden * kept / (1.0 - dropout)
+            hidden = leave_out(hidden, dropout, generator)
     loss = torch.nn.functional.cross_entropy(network.action_net(hidden), classes)
     optimizer.step(loss)
     return float(loss.detach())
+
+
+def leave_out(units: torch.Tensor, share: float, generator: torch.Generator) -> torch.Tensor:
+    """Return units of which a share is 0 and the others are raised, so that their mean stays the same."""
+    return units * (torch.rand(units.shape, generator=generator) >= share) / (1.0 - share)
 
 
 def _forward(network: Any, features: torch.Tensor) -> torch.Tensor:
