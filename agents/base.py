@@ -91,6 +91,7 @@ class BatchAgent:
         include_frame: Whether the observations must contain the camera frames.
         reads_neuron: Whether its demands depend on the neuron.
         config: Configuration of `BrakingEnv` that the agent requires.
+        fps: Frame rate of its cameras [Hz]; None for 30.
         num_envs: Number of environments N.
         state: State by name, arrays of shape (N, …); see `initial`.
         alerts: Whether the agent warns, after the last `act`, bool, shape (N,); by default the alerts of the
@@ -102,6 +103,7 @@ class BatchAgent:
     include_frame = False
     reads_neuron = True
     config: Config = {}  # noqa: RUF012  (never changed)
+    fps: float | None = None
 
     def __init__(self) -> None:
         self._allocate(1)
@@ -278,6 +280,11 @@ class Agent:
     def config(self) -> Config:
         """Configuration of `BrakingEnv` that the agent requires."""
         return self.agent.config
+
+    @property
+    def fps(self) -> float | None:
+        """Frame rate of its cameras [Hz]; None for 30."""
+        return self.agent.fps
 
     @property
     def alert(self) -> bool:

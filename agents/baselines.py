@@ -43,7 +43,7 @@ class RandomBrake(BatchAgent):
 
     def __init__(self, rate: float = 0.2, fps: float = FPS) -> None:
         self.rate = check_positive("rate", rate)
-        self.fps = check_positive("fps", fps)
+        self._decision_rate = check_positive("fps", fps)
         super().__init__()
 
     def initial(self) -> State:
@@ -61,6 +61,6 @@ class RandomBrake(BatchAgent):
 
     def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
         """Return `BRAKE` from the onset time on, `HOLD` before."""
-        times = self.state["decisions"] / self.fps
+        times = self.state["decisions"] / self._decision_rate
         self.state["decisions"] += 1
         return np.where(times >= self.state["onset"], BRAKE, HOLD)

@@ -9,7 +9,7 @@ import numpy as np
 from lgmd_gym.agents.base import Agent, BatchAgent, Infos, Observations, rows_of
 from lgmd_gym.agents.rules import Rule
 from lgmd_gym.aliases import Arguments, Values
-from lgmd_gym.errors import check_flag, check_keys, shown, unknown_name
+from lgmd_gym.errors import check_flag, check_keys, check_positive, shown, unknown_name
 from lgmd_gym.fields import parse_options
 from lgmd_gym.processes.user_modules import error_reason, import_user_module
 
@@ -38,8 +38,8 @@ class _Named(Values):
 class UserAgents(BatchAgent):
     """A user's class for a single environment, with one object per environment.
 
-    Optional attributes of the objects (`reset`, `alert`, `camera`, `neuron`, `include_frame`) replace the
-    defaults of `BatchAgent`. An object that has acted is made anew for the next episode.
+    Optional attributes of the objects (`reset`, `alert`, `camera`, `neuron`, `fps`, `include_frame`) replace
+    the defaults of `BatchAgent`. An object that has acted is made anew for the next episode.
 
     Args:
         name: Name in rows and tables.
@@ -54,6 +54,8 @@ class UserAgents(BatchAgent):
         self._make = make
         super().__init__()
         self.include_frame = check_flag("include_frame", getattr(self.objects[0], "include_frame", False))
+        fps = getattr(self.objects[0], "fps", None)
+        self.fps = None if fps is None else check_positive("fps", fps)
 
     @property
     def camera(self) -> "ChannelSpec | None":

@@ -9,10 +9,11 @@ from highway_env.road.road import RoadNetwork
 
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.braking import BrakingEnv
-from lgmd_gym.envs.families.scenario import Scenario
+from lgmd_gym.envs.families.scenario import Actor, Scenario
 from lgmd_gym.envs.registration import SCENARIO, SCENARIO_ARGUMENT, make_source
 
 _NO_DEMAND = np.zeros(1, np.float32)
+_TALL_M, _LONG_M = 2.2, 7.5  # a taller or longer car is a truck, as `camera.objects` draws it
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +34,15 @@ class Motion:
 
     @property
     def names(self) -> list[str]:
-        """A name for every body, such as "1: car", with the number of its actor."""
+        """A name for every body, such as "1: car" or "2: truck", with the number of its actor."""
         actors = enumerate(self.scenario.actors, start=1)
-        return ["ego", *(f"{number}: {actor.kind.replace('_', ' ')}" for number, actor in actors)]
+        kinds = ((number, "truck" if is_truck(actor) else actor.kind) for number, actor in actors)
+        return ["ego", *(f"{number}: {kind.replace('_', ' ')}" for number, kind in kinds)]
+
+
+def is_truck(actor: Actor) -> bool:
+    """Return whether an actor is a car of the size of a truck, which has no kind of its own."""
+    return actor.kind == "car" and (actor.height > _TALL_M or actor.length > _LONG_M)
 
 
 def record_motion(scenario: Scenario) -> Motion:

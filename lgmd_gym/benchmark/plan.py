@@ -7,6 +7,7 @@ from dataclasses import replace
 import gymnasium as gym
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.base import FPS
 from lgmd_gym.benchmark.case import Row, is_traffic, key_of, traffic_case
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.episode import make_env
@@ -150,10 +151,16 @@ class TrafficPlan(Plan):
 
     def check(self) -> None:
         """Check that no agent requires what traffic does not have; see `Plan.check`."""
-        for name in self.config.agents:
-            if make_agent(name).config:
+        for agent in map(make_agent, self.config.agents):
+            if agent.config:
                 raise ValueError(
-                    f"agent {name} requires braking environments, got suite {self.suite.name}; omit the agent"
+                    f"agent {agent.name} requires braking environments, got suite {self.suite.name}; "
+                    "omit the agent"
+                )
+            if agent.fps not in (None, FPS):
+                raise ValueError(
+                    f"agent {agent.name} has fps {agent.fps:g}, but the cameras of suite {self.suite.name} "
+                    f"have {FPS:g} Hz; omit the agent"
                 )
         super().check()
 

@@ -19,6 +19,7 @@ from lgmd_gym.engine.batch import BrakingBatch
 from lgmd_gym.envs.info import INFO_KEYS
 from lgmd_gym.envs.registration import make_source
 
+SHARED = ("config", "fps")  # arguments of a case that a simulation shares
 WIDTH = 32  # environments of a player; more gain little, and fewer leave more time in Python
 
 
@@ -75,8 +76,8 @@ class BatchPlayer:
         arguments = with_config(task.arguments, agent.config)
         self._sensor_config = task.sensor_config.for_agent(agent)
         source = make_source(task.case.environment, _scenario_arguments(arguments))
-        config, fps = arguments.get("config"), arguments.get("fps")
-        self._batch = BrakingBatch([source] * num_envs, config, fps=fps, **self._sensor_config.arguments)
+        shared = {name: arguments[name] for name in SHARED if name in arguments}
+        self._batch = BrakingBatch([source] * num_envs, **self._sensor_config.arguments | shared)
         channels = [channel.name for channel in self._sensor_config.channels] if by_channel else ()
         self._recorder = SeriesRecorder(num_envs, self._batch.simulation.rates.policy, channels)
         self._agent = self._make_agent(agent, task.has_driver)
@@ -191,4 +192,4 @@ def _player(unit: Unit) -> BatchPlayer:
 
 def _scenario_arguments(arguments: Arguments) -> Arguments:
     """Return the arguments without those that a simulation shares."""
-    return {name: value for name, value in arguments.items() if name not in ("config", "fps")}
+    return {name: value for name, value in arguments.items() if name not in SHARED}

@@ -24,6 +24,7 @@ class SensorConfig:
     # model of the cameras without one of their own, see `lgmd_gym.neuron.check_model`; None for the LGMD. The
     # result of `for_agent` has it in its cameras
     neuron: str | None = None
+    fps: float | None = None  # camera frame rate [Hz]; None selects the agent's own, or 30
 
     def for_agent(self, agent: Agent | BatchAgent | None = None) -> "SensorConfig":
         """Return the config with the agent's own camera and parameters in place of None."""
@@ -35,7 +36,8 @@ class SensorConfig:
         camera = DEFAULT_CAMERA if camera is None else camera
         if self.neuron is not None:
             camera = plain_values(make_channels(camera, self.neuron))
-        return SensorConfig(camera, params, include_frame)
+        fps = getattr(agent, "fps", None) if self.fps is None else self.fps
+        return SensorConfig(camera, params, include_frame, fps=fps)
 
     @property
     def plain(self) -> "SensorConfig":
@@ -55,7 +57,9 @@ class SensorConfig:
     @property
     def arguments(self) -> Arguments:
         """Keyword arguments of `LGMDObservation`."""
-        return {"camera": self.camera, "params": self.params, "include_frame": self.include_frame}
+        arguments: Arguments = {"camera": self.camera, "params": self.params}
+        arguments |= {"include_frame": self.include_frame}
+        return arguments if self.fps is None else arguments | {"fps": self.fps}
 
     @property
     def label(self) -> str:

@@ -4,7 +4,7 @@ Case names are in km/h, arguments in SI units. docs/howto/own_scenario.md shows 
 tables are sweeps, single cases or scenarios, and scenario files, which hold one scenario.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -188,18 +188,24 @@ def _read_scenarios(paths: list[str]) -> Suite:
     return provided(OPENSCENARIO)(paths)
 
 
-def find_own_case(source: Source, name: str | None = None, modules: tuple[str, ...] = ()) -> Case:
+def find_own_case(
+    source: Source,
+    name: str | None = None,
+    modules: tuple[str, ...] = (),
+    parameters: Mapping[str, str] | None = None,
+) -> Case:
     """Return one case of a suite that is given by files or scenarios.
 
     Args:
         source: See `get_suite`.
         name: Name of the case, with or without the name of the suite; None if there is only one.
         modules: See `get_suite`.
+        parameters: Values of parameters of an OpenSCENARIO file, instead of its own.
 
     Raises:
         ValueError: See `get_suite`; or if the name is unknown, or missing although there are several cases.
     """
-    suite = get_suite(source, modules)
+    suite = provided(OPENSCENARIO)([source], parameters) if parameters else get_suite(source, modules)
     cases = {case.name: case for case in suite.cases}
     if name is not None:
         full = name if name in cases else f"{suite.name}/{name}"

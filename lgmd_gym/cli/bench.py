@@ -18,6 +18,7 @@ from lgmd_gym.cli.values import (
     chosen_modules,
     default_out,
     note_unused_params,
+    read_camera,
     read_params,
     refuse_unused,
 )
@@ -42,8 +43,9 @@ class Bench:
     """
 
     suite: Names = None
-    """Suite name (see `lgmd-gym list suites`), or paths: suite or scenario files (.toml, .json), OpenSCENARIO
-    files (.xosc), folders with such files. Default: quick."""
+    """Suites by name (see `lgmd-gym list suites`), each run in a folder of its own; or paths, which are one
+    suite: suite or scenario files (.toml, .json), OpenSCENARIO files (.xosc), folders with such files.
+    Default: quick."""
     agents: Names = None
     """Agents with options, for example spike-threshold:threshold=45,frames=2; MODULE:CLASS for an agent of
     your own. Default: no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""
@@ -63,7 +65,8 @@ class Bench:
     road: Name = None
     """Road under the car: still, smooth, normal or rough. Default: normal, in the laboratory still."""
     camera: Name = None
-    """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
+    """Camera preset: wide, standard, tele, fovea, paper or birdseye; or a TOML file with the fields of a
+    camera, or of several as [[camera]] tables. Default: the agent's own, else fovea."""
     params: File = None
     """TOML file of LGMD parameters."""
     neuron: Name = None
@@ -72,7 +75,8 @@ class Bench:
     config: File = None
     """run.toml of an earlier run to repeat; replaces the options above."""
     resume: File = None
-    """Folder of an interrupted run; runs the missing episodes with the settings of that run."""
+    """Folder of an interrupted run, or of the runs of several suites; runs the missing episodes with the
+    settings of that run."""
     trust: bool = False
     """Load modules and policy files that --resume, --config or the suite file names; they can run any
     code."""
@@ -83,7 +87,8 @@ class Bench:
     address: Name = None
     """Address of the Dask scheduler, for example tcp://10.0.0.1:8786."""
     out: File = None
-    """Run folder; must not exist. Default: runs/SUITE-DATE-TIME."""
+    """Run folder; must not exist. With several suites, it contains one for each. Default:
+    runs/SUITE-DATE-TIME."""
     plots: bool = True
     """Draw one PNG per case."""
     report: bool = True
@@ -91,15 +96,33 @@ class Bench:
 
 
 def run(options: Bench) -> int:
-    """Run a suite and print its summary; return 0 if complete, 1 for failed episodes, 130 for Ctrl-C."""
-    from lgmd_gym.benchmark.run_folder import ROWS_FILE
-    from lgmd_gym.benchmark.runner import INTERRUPTED, failure_lines
+    """Run suites and print their summaries; return 0 if complete, 1 for failed episodes, 130 for Ctrl-C."""
+    from lgmd_gym.benchmark.runner import INTERRUPTED
     from lgmd_gym.processes.pool import Executor
-    from lgmd_gym.report.page import write_outputs
 
     console = make_console()
     executor = Executor(options.jobs, _cluster(options))
-    benchmark = _new(options, executor) if options.resume is None else _resume(options, executor, console)
+    runs = _new(options, executor) if options.resume is None else _resume(options, executor, console)
+    codes: list[int] = []
+    for benchmark in runs:
+        codes.append(_play(benchmark, options, console))
+        if benchmark.stop_reason == INTERRUPTED:
+            if len(runs) > 1:
+                folder = benchmark.folder.path.parent
+                console.print(f"all suites: lgmd-gym bench --resume {folder}", soft_wrap=True)
+            break
+    return max(codes)
+
+
+def _play(benchmark: "Run", options: Bench, console: Console) -> int:
+    """Play one run and print its summary; return its exit code."""
+    from lgmd_gym.benchmark.run_folder import ROWS_FILE
+    from lgmd_gym.benchmark.runner import INTERRUPTED, failure_lines
+    from lgmd_gym.engine.first_use import compile_kernels
+    from lgmd_gym.report.page import write_outputs
+
+    if benchmark.executor.cluster is None and len(benchmark.rows) < benchmark.total:
+        compile_kernels()  # before the progress bar, above which its line cannot be rewritten
     with _progress(benchmark) as count:
         complete = benchmark.play(count)
     path = benchmark.folder.path
@@ -156,38 +179,70 @@ def _cluster(options: Bench) -> str | None:
     return options.address
 
 
-def _resume(options: Bench, executor: "Executor", console: Console) -> "Run":
+def _resume(options: Bench, executor: "Executor", console: Console) -> "list[Run]":
+    """Return the run of a folder, or those of a folder of several suites."""
+    from lgmd_gym.benchmark.run_folder import ROWS_FILE
     from lgmd_gym.benchmark.runner import Run
 
     assert options.resume is not None
     refuse_unused(options, RESUME_OPTIONS)
-    benchmark = Run.resume(options.resume, executor, options.trust)
-    repaired = " after removal of an incomplete last line" if benchmark.folder.repaired else ""
-    console.print(f"resuming with {len(benchmark.rows)} of {benchmark.total} episodes{repaired}")
-    return benchmark
+    several = not (options.resume / ROWS_FILE).exists() and sorted(options.resume.glob(f"*/{ROWS_FILE}"))
+    runs: list[Run] = []
+    for path in [file.parent for file in several] if several else [options.resume]:
+        benchmark = Run.resume(path, executor, options.trust)
+        repaired = " after removal of an incomplete last line" if benchmark.folder.repaired else ""
+        name = f"{path.name}: " if several else ""
+        console.print(f"{name}resuming with {len(benchmark.rows)} of {benchmark.total} episodes{repaired}")
+        runs.append(benchmark)
+    return runs
 
 
-def _new(options: Bench, executor: "Executor") -> "Run":
+def _new(options: Bench, executor: "Executor") -> "list[Run]":
+    """Return the new run of the options, or one for each of several suites, in folders of one folder."""
     from lgmd_gym.agents.registry import make_agent
     from lgmd_gym.benchmark.config import RunConfig
     from lgmd_gym.benchmark.runner import Run, check_trust
+    from lgmd_gym.processes.files import new_folder
 
     given: Arguments = {item.name: getattr(options, item.name, None) for item in fields(RunConfig)}
-    given |= {"module": options.module, "params": read_params(options.params)}
+    camera, params = read_camera(options.camera), read_params(options.params)
+    given |= {"module": options.module, "camera": camera, "params": params}
     values = {name: value for name, value in given.items() if value is not None}
     if options.config is None:
         modules = chosen_modules(values.get("suite", ()), values.pop("module", ()), options.trust)
-        config = RunConfig(**values, modules=modules)
+        suites = _suites(values.pop("suite", ("quick",)))
+        configs = [RunConfig(suite=suite, **values, modules=modules) for suite in suites]
     elif values:
         flags = ", ".join(f"--{name.replace('_', '-')}" for name in values)
         raise ValueError(f"--config replaces {flags}; remove the options, or change the file")
     else:
-        config = RunConfig.load(options.config)
-        check_trust(config, options.config, options.trust)
-    run = Run.new(config, default_out(options.out, config.label), executor)
+        configs = [RunConfig.load(options.config)]
+        check_trust(configs[0], options.config, options.trust)
+    root = default_out(options.out, "+".join(config.label for config in configs))
+    runs: list[Run] = []
+    if len(configs) == 1:
+        runs.append(Run.new(configs[0], root, executor))
+    else:
+        new_folder(root, "run folder")
+        try:
+            for config in configs:
+                runs.append(Run.new(config, root / config.label, executor))
+        except BaseException:  # for example an agent that one of the suites refuses
+            for run in runs:
+                run.folder.discard()
+            root.rmdir()
+            raise
     if options.params is not None:
-        note_unused_params(options.params, map(make_agent, config.agents))
-    return run
+        note_unused_params(options.params, map(make_agent, configs[0].agents))
+    return runs
+
+
+def _suites(given: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """Return the suites to run one after the other: each name, and all files and folders together."""
+    from lgmd_gym.benchmark.suites import is_file
+
+    files = tuple(text for text in given if is_file(text))
+    return [(text,) for text in dict.fromkeys(given) if text not in files] + ([files] if files else [])
 
 
 def _print_tables(benchmark: "Run", console: Console) -> None:

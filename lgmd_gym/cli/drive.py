@@ -15,8 +15,8 @@ from lgmd_gym.cli.values import (
     Names,
     find_target,
     note_unused_params,
-    parse_arguments,
     parse_world,
+    read_camera,
     read_params,
 )
 
@@ -53,7 +53,8 @@ class Drive:
     """Weather: clear, night, night_upper_beam, fog, rain or low_sun, or mixed for that of the world;
     not for random levels, which draw their own. Default: clear."""
     camera: Name = None
-    """Camera preset: wide, standard, tele, fovea, paper or birdseye. Default: the agent's own, else fovea."""
+    """Camera preset: wide, standard, tele, fovea, paper or birdseye; or a TOML file with the fields of a
+    camera, or of several as [[camera]] tables. Default: the agent's own, else fovea."""
     params: File = None
     """TOML file of LGMD parameters."""
     neuron: Name = None
@@ -63,7 +64,8 @@ class Drive:
     trust: bool = False
     """Load the modules that the file names; they can run any code."""
     set: Annotated[tuple[str, ...], arg(metavar="NAME=VALUE [...]")] = ()
-    """Scenario arguments in SI units, for example --set ego_speed=8.3 shade=40 lying=true."""
+    """Scenario arguments in SI units, for example --set ego_speed=8.3 shade=40 lying=true; for an
+    OpenSCENARIO file, values of its parameters."""
 
 
 def run(options: Drive) -> int:
@@ -76,9 +78,8 @@ def run(options: Drive) -> int:
 
     agent = make_agent(options.agent)
     note_unused_params(options.params, [agent])
-    target = find_target(options.target, options.case, options.module, options.trust)
-    arguments = parse_arguments(options.set)
-    sensors = SensorConfig(options.camera, read_params(options.params), neuron=options.neuron)
+    target, arguments = find_target(options.target, options.case, options.module, options.trust, options.set)
+    sensors = SensorConfig(read_camera(options.camera), read_params(options.params), neuron=options.neuron)
     surroundings = parse_world(options.world)
     if options.condition is not None:
         surroundings["weather"] = options.condition

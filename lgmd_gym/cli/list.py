@@ -18,14 +18,14 @@ from lgmd_gym.cli.values import Names
 class List:
     """List suites, agents, environments, cameras or cases.
 
-    A list that is longer than the terminal opens in a pager ($PAGER, else less).
+    --pager shows a list that is longer than the terminal in a pager ($PAGER, else less).
     """
 
     what: Positional[Literal["all", "suites", "agents", "envs", "cameras", "cases"]] = "all"
     """Table to print; all has no cases."""
     module: Names = None
     """Modules with scenario families of your own to list: my_scenarios, or my_scenarios:MyFamily."""
-    pager: bool = True
+    pager: bool = False
     """Use a pager in a terminal."""
 
 

@@ -10,16 +10,19 @@ from rich.table import Table
 from tyro.conf import Positional, arg
 
 from lgmd_gym.cli.console import make_console, note
-from lgmd_gym.cli.values import File, Name, Names, find_target, parse_arguments
+from lgmd_gym.cli.values import File, Name, Names, find_target
 from lgmd_gym.errors import counted
 
 if TYPE_CHECKING:
+    from lgmd_gym.aliases import Arguments
+    from lgmd_gym.benchmark.case import Case
+    from lgmd_gym.envs.families.scenario import Scenario as FamilyScenario
     from lgmd_gym.openscenario.check import CheckedFile
 
 NEEDED = {
     "show": "a file, an environment id or a case",
     "check": "a file or folder",
-    "export": "the name of a case",
+    "export": "a file, an environment id or a case",
 }
 COLUMNS = ("file", "cells", "contacts", "location [cm]", "speed [km/h]", "time [s]")
 
@@ -33,27 +36,28 @@ class Scenario:
     times, with all speeds, as a picture. lgmd-gym scenario check PATH [PATH ...] plays every cell of
     OpenSCENARIO files and folders without braking, and prints one row per file: the cells, the contacts, and
     the largest deviations of impact location, impact speed and time from what the parameters and positions of
-    the file state. lgmd-gym scenario export CASE --to FILE.xosc writes a case as OpenSCENARIO 1.3, and its
-    road as OpenDRIVE next to it.
+    the file state. lgmd-gym scenario export TARGET --to FILE.xosc writes what show draws as
+    OpenSCENARIO 1.3, and its road as OpenDRIVE next to it.
     """
 
     action: Positional[Literal["new", "show", "check", "export"]]
     """Write a template, draw a scenario, compare files, or export a case."""
     targets: Annotated[Positional[tuple[str, ...]], arg(metavar="FILE|PATH|CASE [PATH ...]")]
-    """File to write (default: scenario.toml); scenario to draw; files and folders to compare; or the name of
-    a case, for example quick/CCRs/v30."""
+    """File to write (default: scenario.toml); scenario to draw or export, for example quick/CCRs/v30; or
+    files and folders to compare."""
     to: File = None
     """Picture (.png, .svg; default: TARGET.png) or OpenSCENARIO file (.xosc) to write; must not exist."""
     force: bool = False
     """Replace an existing template or picture."""
     case: Name = None
-    """Case to draw, of a file with several."""
+    """Case to draw or export, of a file with several."""
     module: Names = None
     """Modules with scenario families of your own: my_scenarios, or my_scenarios:MyFamily."""
     trust: bool = False
     """Load the modules that the file names; they can run any code."""
     set: Annotated[tuple[str, ...], arg(metavar="NAME=VALUE [...]")] = ()
-    """Arguments of the scenario to draw, in SI units."""
+    """Arguments of the scenario to draw or export, in SI units; for an OpenSCENARIO file, values of its
+    parameters."""
     jobs: int = 2
     """Number of processes that compare files."""
 
@@ -83,16 +87,9 @@ def _show(options: Scenario) -> int:
     from lgmd_gym.envs.motion import record_motion
     from lgmd_gym.plotting.figures import scenario_figure
     from lgmd_gym.processes.files import check_output_file
-    from lgmd_gym.rendering.playback import make_target
 
-    if len(options.targets) != 1:
-        raise ValueError(f"scenario show draws one scenario, got {len(options.targets)}: {options.targets}")
+    target, _, scenario = _find(options)
     given = options.targets[0]
-    target = find_target(given, options.case, options.module, options.trust)
-    env = make_target(target, parse_arguments(options.set), camera=None).unwrapped
-    scenario = getattr(env, "scenario", None)
-    if scenario is None:
-        raise ValueError(f"{given} has no scenario to draw; traffic is drawn by lgmd-gym drive")
     name = target.name if isinstance(target, Case) else target
     stem = Path(given).stem if isinstance(target, Case) and options.case is None else name.replace("/", "_")
     path = options.to or Path(f"{file_name(stem)}.png")
@@ -102,6 +99,22 @@ def _show(options: Scenario) -> int:
     end = "contact" if motion.contact else "no contact"
     make_console().print(f"{path}: {end} after {motion.times[-1]:.2f} s without braking", soft_wrap=True)
     return 0
+
+
+def _find(options: Scenario) -> "tuple[str | Case, Arguments, FamilyScenario]":
+    """Return the target of `show` and `export`, the arguments of `--set` and the scenario with them."""
+    from lgmd_gym.rendering.playback import make_target
+
+    if len(options.targets) != 1:
+        raise ValueError(
+            f"scenario {options.action} needs one scenario, got {len(options.targets)}: {options.targets}"
+        )
+    given = options.targets[0]
+    target, arguments = find_target(given, options.case, options.module, options.trust, options.set)
+    scenario = getattr(make_target(target, arguments, camera=None).unwrapped, "scenario", None)
+    if scenario is None:
+        raise ValueError(f"{given} has no scenario to {options.action}; traffic is played by lgmd-gym drive")
+    return target, arguments, scenario
 
 
 def _check(options: Scenario) -> int:
@@ -140,13 +153,18 @@ def _row(item: "CheckedFile") -> list[str]:
 
 
 def _export(options: Scenario) -> int:
-    from lgmd_gym.benchmark.suites import find_case
+    from lgmd_gym.benchmark.case import scenario_case
+    from lgmd_gym.benchmark.suites import find_case, own_case
+    from lgmd_gym.envs.registration import APPEARANCE
     from lgmd_gym.openscenario.export import export_case
 
-    if len(options.targets) != 1:
-        raise ValueError(f"scenario export needs one case, got {len(options.targets)}: {options.targets}")
     if options.to is None:
         raise ValueError("scenario export needs --to FILE.xosc")
-    for path in export_case(find_case(options.targets[0]), options.to):
+    target, arguments, scenario = _find(options)
+    if isinstance(target, str):
+        target = own_case(scenario) if target.startswith("LGMD/") else find_case(target)
+    looks = target.appearance | {name: value for name, value in arguments.items() if name in APPEARANCE}
+    case = scenario_case(target.suite, target.variant, scenario, target.fcw_driver, **looks)
+    for path in export_case(case, options.to):
         make_console().print(str(path), soft_wrap=True)
     return 0

@@ -3,6 +3,7 @@
 import sys
 from dataclasses import dataclass
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
@@ -87,11 +88,19 @@ def run(options: Train) -> int:
         else:
             policy = train(config_of(options), folder, progress=progress, jobs=options.jobs)
     except KeyboardInterrupt:
-        print(f"interrupted; to resume: lgmd-gym train --resume {folder}", file=sys.stderr)
+        print(f"interrupted; {_what_is_kept(folder)}", file=sys.stderr)
         return 130
     print(f"policy: {policy}")
     print(f"evaluate it: lgmd-gym bench --suite random --seeds 1 --agents policy:{policy}")
     return 0
+
+
+def _what_is_kept(folder: Path) -> str:
+    """Return what an interrupted training has saved, and how to go on."""
+    resume = f"lgmd-gym train --resume {folder}"
+    if any(folder.glob("checkpoints/model_*_steps.zip")) or any(folder.glob("recordings/*/*")):
+        return f"to resume: {resume}"
+    return f"nothing was saved before the first checkpoint; to start again: {resume}"
 
 
 def _check_installed() -> None:

@@ -5,15 +5,17 @@ import time
 from collections.abc import Collection, Iterable
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from tyro.conf import arg
 
 from lgmd_gym.aliases import Arguments, Values
+from lgmd_gym.errors import check_keys
 
 if TYPE_CHECKING:
     from lgmd_gym.agents import Agent
     from lgmd_gym.benchmark.case import Case
+    from lgmd_gym.sensing.channel import ChannelSpec
 
 Name = Annotated[str | None, arg(metavar="NAME")]
 Names = Annotated[tuple[str, ...] | None, arg(metavar="NAME [NAME ...]")]
@@ -49,6 +51,35 @@ def read_params(path: Path | None) -> Values | None:
         raise ValueError(f"params file {str(path)!r} cannot be read: {error.strerror}") from None
 
 
+def read_camera(text: str | None) -> "ChannelSpec | None":
+    """Return a preset's name as it is, the cameras of a TOML file, or None for none.
+
+    Args:
+        text: Name of a preset, or path of a file (.toml) with the fields of a camera or channel; several are
+            [[camera]] tables.
+
+    Raises:
+        ValueError: If the file cannot be read, or contains an unknown field or a value out of range.
+    """
+    from lgmd_gym.benchmark.case_table import read_data
+    from lgmd_gym.sensing.channel import make_channels
+
+    if text is None or not text.endswith(".toml"):
+        return text
+    path = Path(text)
+    values = {"name": path.stem} | read_data(path, "camera file")
+    tables: object = values.get("camera")
+    several = isinstance(tables, list)
+    try:
+        if several:
+            check_keys("key of a file with [[camera]] tables", values, ("name", "camera"))
+        given = cast("ChannelSpec", tables if several else values)
+        make_channels(given)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"camera file {text!r}: {error}") from None
+    return given
+
+
 def note_unused_params(path: Path | None, agents: "Iterable[Agent]") -> None:
     """Print a line to stderr for agents whose braking the parameters do not change."""
     names = [agent.name for agent in agents if not agent.reads_neuron]
@@ -69,19 +100,31 @@ def default_out(out: Path | None, name: str) -> Path:
     return Path("runs") / f"{name}-{text}-{now // 10**6 % 1000:03d}"
 
 
+def split_pairs(pairs: tuple[str, ...]) -> dict[str, str]:
+    """Return NAME=VALUE pairs as a dict of texts.
+
+    Raises:
+        ValueError: For a pair without a name or a value.
+    """
+    texts: dict[str, str] = {}
+    for pair in pairs:
+        name, _, value = pair.partition("=")
+        if not name or not value:
+            raise ValueError(f"--set must be NAME=VALUE, for example ego_speed=8.3, got {pair!r}")
+        texts[name] = value
+    return texts
+
+
 def parse_arguments(pairs: tuple[str, ...]) -> Arguments:
     """Return NAME=VALUE pairs as a dict: numbers, `true` and `false` as flags, else texts.
 
     Raises:
         ValueError: For a pair without a name or a value.
     """
-    arguments: Arguments = {}
-    for pair in pairs:
-        name, _, value = pair.partition("=")
-        if not name or not value:
-            raise ValueError(f"--set must be NAME=VALUE, for example ego_speed=8.3, got {pair!r}")
-        arguments[name] = {"true": True, "false": False}.get(value, _number_or_text(name, value))
-    return arguments
+    return {
+        name: {"true": True, "false": False}.get(value, _number_or_text(name, value))
+        for name, value in split_pairs(pairs).items()
+    }
 
 
 def _number_or_text(name: str, value: str) -> float | str:
@@ -124,25 +167,35 @@ def chosen_modules(sources: tuple[str, ...], named: tuple[str, ...] | None, trus
     return tuple(modules)
 
 
-def find_target(target: str, case: str | None, named: tuple[str, ...] | None, trust: bool) -> "str | Case":
-    """Return the case of a file, or another target as it is.
+def find_target(
+    target: str, case: str | None, named: tuple[str, ...] | None, trust: bool, pairs: tuple[str, ...] = ()
+) -> "tuple[str | Case, Arguments]":
+    """Return the case of a file, or another target as it is, and the arguments of its environment.
 
     Args:
         target: Target of a command, such as the path of a file or an environment id.
         case: Name of a case of the file; None if it has only one.
         named: See `chosen_modules`.
         trust: See `chosen_modules`.
+        pairs: NAME=VALUE pairs of `--set`; in an OpenSCENARIO file, names other than those of the appearance
+            are its parameters.
 
     Raises:
-        ValueError: See `find_own_case`; or for a name of a case although the target is no file.
+        ValueError: See `find_own_case` and `parse_arguments`; or for a name of a case although the target is
+            no file.
     """
-    from lgmd_gym.benchmark.suites import find_own_case, is_file
+    from lgmd_gym.benchmark.suites import OPENSCENARIO, find_own_case, is_file
     from lgmd_gym.envs import import_families
+    from lgmd_gym.envs.registration import APPEARANCE
 
-    modules = chosen_modules((target,), named, trust)
+    modules, arguments = chosen_modules((target,), named, trust), parse_arguments(pairs)
+    if target.endswith(OPENSCENARIO):
+        parameters = {name: text for name, text in split_pairs(pairs).items() if name not in APPEARANCE}
+        chosen = {name: value for name, value in arguments.items() if name in APPEARANCE}
+        return find_own_case(target, case, modules, parameters), chosen
     if is_file(target):
-        return find_own_case(target, case, modules)
+        return find_own_case(target, case, modules), arguments
     if case is not None:
         raise ValueError(f"--case {case!r} needs a file with several cases, got {target!r}; remove it")
     import_families(modules)
-    return target
+    return target, arguments

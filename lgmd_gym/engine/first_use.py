@@ -17,12 +17,13 @@ from lgmd_gym.camera import Camera
 from lgmd_gym.camera.render.raster import draw_cameras
 from lgmd_gym.envs.decisions import advance
 from lgmd_gym.envs.registration import env_id
-from lgmd_gym.kernels.compilation import VARIABLE
+from lgmd_gym.kernels.compilation import VARIABLE, expected_functions
 from lgmd_gym.kernels.kernel import is_cached
 from lgmd_gym.neuron import LGMD
 from lgmd_gym.processes.pool import signals_blocked, watch_parent
 from lgmd_gym.sensing.drawing import Drawing
 
+FUNCTIONS = 265  # compiled by the first process, those of numba included
 _HELPER = f"from {__name__} import _compile_others; _compile_others()"
 
 
@@ -33,18 +34,19 @@ def compile_kernels() -> None:
     """
     if config.DISABLE_JIT or all(map(is_cached, (draw_cameras, advance))):  # pyright: ignore[reportAttributeAccessIssue, reportUnknownMemberType]
         return
-    helper = None
-    try:
-        with signals_blocked():
-            helper = _start_helper()
-        _draw_camera()
-        if helper is not None:
-            helper.wait()
-    finally:
-        if helper is not None:
-            helper.kill()
-            helper.wait()
-    _step_environment()  # compiles what connects the two, and all that a helper that failed has left
+    with expected_functions(FUNCTIONS):
+        helper = None
+        try:
+            with signals_blocked():
+                helper = _start_helper()
+            _draw_camera()
+            if helper is not None:
+                helper.wait()
+        finally:
+            if helper is not None:
+                helper.kill()
+                helper.wait()
+        _step_environment()  # compiles what connects the two, and all that a helper that failed has left
 
 
 def _start_helper() -> "subprocess.Popen[bytes] | None":

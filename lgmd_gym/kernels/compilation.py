@@ -9,6 +9,7 @@ import os
 import sys
 import tempfile
 import time
+from collections.abc import Generator
 from multiprocessing import current_process
 from typing import Any
 
@@ -24,27 +25,28 @@ DELAY_S = 2.0  # compilation without a line
 REPEAT_S = 10.0  # compilation between two lines in a file, a pipe or a worker process
 REFRESH_S = 0.2  # time between two updates of the line in a terminal
 PAUSE_S = 30.0  # time without compilation after which the next one counts as new
-START = "compiling kernels for their first use, which takes about half a minute; later runs load them"
+START = "compiling kernels for their first use, about half a minute; later runs load them"
 
 
 class CompilationReporter(event.Listener):
-    """Prints how many functions numba has compiled, in which time, and which is next.
+    """Prints how much numba has compiled, and in which time.
 
     A terminal has one line that is overwritten and erased in the end; a file gets a line every `REPEAT_S`.
 
     Attributes:
+        expected: Number of functions that are compiled in all; 0 if it is not known.
         count: Number of functions compiled.
         seconds: Time spent on them [s].
     """
 
     def __init__(self) -> None:
         self._clock = time.monotonic
-        self._depth, self._name = 0, ""
+        self._depth = 0
         self._begin = self._end = self._printed = 0.0
         self._silent: bool | None = None  # None before the first line
-        self.count, self.seconds = 0, 0.0
+        self.expected, self.count, self.seconds = 0, 0, 0.0
 
-    def on_start(self, event: Any) -> None:
+    def on_start(self, event: object) -> None:
         """Print the progress; the compilation of a called function is part of that of its caller."""
         now = self._clock()
         if self._depth == 0:
@@ -53,9 +55,6 @@ class CompilationReporter(event.Listener):
             self._begin = now
         self._depth += 1
         seconds = self.seconds + now - self._begin
-        function = event.data["dispatcher"].py_func
-        if str(function.__module__).startswith("lgmd_gym."):  # else a part of numba
-            self._name = f"{function.__module__}.{function.__qualname__}".removeprefix("lgmd_gym.")
         if seconds >= DELAY_S:
             self._report(seconds)
 
@@ -70,11 +69,16 @@ class CompilationReporter(event.Listener):
     def _report(self, seconds: float) -> None:
         if self._silent is None:
             self._silent = bool(os.environ.get(VARIABLE)) or not _is_first_worker()
-            self._write(START)
+            self._write(START, "\r" if _is_terminal() else "\n")
             self._printed = seconds
         elif seconds - self._printed >= (REFRESH_S if _is_terminal() else REPEAT_S):
-            text = f"compiling: {self.count} functions in {seconds:.0f} s, now {self._name}"
-            self._write(*((text[:68], "\r") if _is_terminal() else (text,)))
+            done = (
+                f"{min(100 * self.count // self.expected, 99)} %"
+                if self.expected
+                else f"{self.count} functions"
+            )
+            text = f"compiling kernels for their first use: {done} in {seconds:.0f} s"
+            self._write(text, "\r" if _is_terminal() else "\n")
             self._printed = seconds
 
     def _write(self, text: str, end: str = "\n") -> None:
@@ -118,6 +122,18 @@ def _is_first_worker() -> bool:
 
 
 _reporter: CompilationReporter | None = None
+
+
+@contextlib.contextmanager
+def expected_functions(number: int) -> Generator[None, None, None]:
+    """State how many functions the block compiles, so that the progress is a percentage."""
+    if _reporter is not None:
+        _reporter.expected = number
+    try:
+        yield
+    finally:
+        if _reporter is not None:
+            _reporter.expected = 0
 
 
 def report_compilation() -> None:

@@ -14,6 +14,7 @@ from lgmd_gym.camera import CLEAR
 from lgmd_gym.envs.dynamics.path import Path as DrivenPath
 from lgmd_gym.envs.dynamics.script import Bend, Pose, Segment
 from lgmd_gym.envs.families.scenario import LANE_WIDTH, Actor, RoadPlan, Scenario
+from lgmd_gym.envs.motion import is_truck
 from lgmd_gym.errors import check_path, check_type
 from lgmd_gym.openscenario.compiler import DURATION
 from lgmd_gym.openscenario.motion import Place, Timeline
@@ -209,7 +210,8 @@ def _properties(parent: ET.Element, values: dict[str, str]) -> None:
 def _entity(entities: ET.Element, name: str, actor: Actor) -> None:
     owner = _add(entities, "ScenarioObject", name=name)
     if actor.kind in _KINDS:
-        item = _add(owner, "Vehicle", name=name, vehicleCategory=_KINDS[actor.kind])
+        category = "truck" if is_truck(actor) else _KINDS[actor.kind]
+        item = _add(owner, "Vehicle", name=name, vehicleCategory=category)
     elif actor.kind == "pedestrian":
         item = _add(owner, "Pedestrian", name=name, mass=75, pedestrianCategory="pedestrian")
     else:

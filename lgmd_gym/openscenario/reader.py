@@ -3,7 +3,7 @@
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os.path import normpath
 from pathlib import Path
@@ -110,7 +110,7 @@ def _noted(cells: list[Cell]) -> list[Cell]:
     return cells
 
 
-def read(path: str | Path) -> Suite:
+def read(path: str | Path, parameters: Mapping[str, str] | None = None) -> Suite:
     """Return the cells of an OpenSCENARIO file as a suite.
 
     A case is named `stem/family/variant`: the file's stem, the parameter `Scenario_ID` or else the stem of
@@ -121,6 +121,7 @@ def read(path: str | Path) -> Suite:
 
     Args:
         path: A scenario, or a file that varies the parameters of one.
+        parameters: Values of parameters by name, instead of those of the file in every cell.
 
     Raises:
         ValueError: If the file cannot be read, or contains something that is not supported. The message
@@ -128,16 +129,20 @@ def read(path: str | Path) -> Suite:
     """
     path = check_path("path", path)
     suite = file_name(path.stem)
-    cases = tuple(_case(suite, cell) for cell in _noted(read_cells(path)))
+    cases = tuple(_case(suite, cell) for cell in _noted(read_cells(path, None, parameters)))
     return Suite(name=suite, cases=cases, about=f"OpenSCENARIO {path.name}")
 
 
-def read_all(paths: Sequence[str | Path]) -> Suite:
+def read_all(paths: Sequence[str | Path], parameters: Mapping[str, str] | None = None) -> Suite:
     """Return the cells of several files and folders as one suite.
 
     A folder stands for its files that vary parameters, and for all its scenarios if there is none; catalogs
     are left out. The suite's name is that of the folder that contains all files; a case is named
     `folder/family/file/variant`, with the path of the file in the folder.
+
+    Args:
+        paths: The files and folders.
+        parameters: See `read`.
 
     Raises:
         ValueError: See `read`; or if there is no file.
@@ -147,7 +152,7 @@ def read_all(paths: Sequence[str | Path]) -> Suite:
     if not files:
         raise ValueError("suite must contain at least one file or folder, got none")
     if len(files) == 1:
-        return read(files[0])
+        return read(files[0], parameters)
     stems = [file.resolve().with_suffix("").parts for file in files]
     common = 0
     while all(len(parts) > common + 1 and parts[common] == stems[0][common] for parts in stems):
@@ -156,7 +161,7 @@ def read_all(paths: Sequence[str | Path]) -> Suite:
     cases: list[Case] = []
     for file, parts in zip(files, stems, strict=True):
         inside = "/".join(file_name(part) for part in parts[common:])
-        cases += [_case(suite, cell, f"{inside}/") for cell in _noted(read_cells(file))]
+        cases += [_case(suite, cell, f"{inside}/") for cell in _noted(read_cells(file, None, parameters))]
     return Suite(name=suite, cases=tuple(cases), about=f"OpenSCENARIO, {counted(len(files), 'file')}")
 
 
@@ -174,23 +179,26 @@ def find_files(path: Path) -> list[Path]:
     return files
 
 
-def read_cells(path: Path, limit: int | None = None) -> list[Cell]:
+def read_cells(
+    path: Path, limit: int | None = None, parameters: Mapping[str, str] | None = None
+) -> list[Cell]:
     """Return the cells of a file, in the order of its variations.
 
     Args:
         path: The file.
         limit: Number of cells to read; None for all.
+        parameters: See `read`.
     """
     root = _root(path)
     distribution = root.find("ParameterValueDistribution")
     if distribution is None:
-        return _cells(path, path, root.node, [{}])
+        return _cells(path, path, root.node, [{}], parameters)
     target = distribution.child("ScenarioFile")
     file = Path(normpath(target.path("filepath")))
     scenario = _root(file)
     if scenario.find("Storyboard") is None:
         raise target.error(f"{str(file)!r} is no scenario; ScenarioFile must name one with a Storyboard")
-    return _cells(path, file, scenario.node, variations(distribution), limit)
+    return _cells(path, file, scenario.node, variations(distribution), parameters, limit)
 
 
 def _root(path: Path) -> Element:
@@ -208,8 +216,14 @@ def _root(path: Path) -> Element:
 
 
 def _cells(
-    path: Path, file: Path, root: Node, given: Iterable[dict[str, Assignment]], limit: int | None = None
+    path: Path,
+    file: Path,
+    root: Node,
+    given: Iterable[dict[str, Assignment]],
+    parameters: Mapping[str, str] | None,
+    limit: int | None = None,
 ) -> list[Cell]:
+    chosen = {name: Assignment(value, root) for name, value in (parameters or {}).items()}
     cells: list[Compiled] = []
     varied: list[dict[str, str]] = []
     violations: list[ConstraintError] = []
@@ -217,7 +231,7 @@ def _cells(
         if len(cells) == limit:
             break
         try:
-            scope = declare(Element(root, {}), assignments)
+            scope = declare(Element(root, {}), assignments | chosen)
         except ConstraintError as error:
             violations.append(error)
             continue

@@ -124,7 +124,7 @@ def test_lines_of_a_help_text_break_only_where_they_are_full(capsys, monkeypatch
     with pytest.raises(SystemExit):
         cli.run(["bench", "--help"])
     text = capsys.readouterr().out
-    start = text.index("Suite name (see")
+    start = text.index("Suites by name (see")
     lines = text[start : text.index("Default: quick.")].splitlines()
     for line, following in itertools.pairwise(lines):
         assert 17 + len(line.strip()) + 1 + len(following.split()[0]) > 76
@@ -185,7 +185,7 @@ def test_version(capsys):
         (["drive"], "drive requires ENV|CASE|TRAFFIC|FILE; see lgmd-gym drive --help"),
         (["bench", "--seeds"], "--seeds requires a value; see lgmd-gym bench --help"),
         (["drive", "nix"], " print all names; a family of your own requires --module"),
-        (["scenario", "export", "quick/nix", "--to", "x.xosc"], "? lgmd-gym list cases prints all names"),
+        (["scenario", "export", "quick/nix", "--to", "x.xosc"], "lgmd-gym list cases print all names; "),
         (["bench", "--agents", "json:JSONDecodr"], "did you mean 'json:JSONDecoder'?"),
         (["bench", "--agents", "nix:Nix"], "(No module named 'nix')"),
     ],

@@ -29,13 +29,13 @@ def terminal(monkeypatch):
 
 
 def test_a_long_list_in_a_terminal_opens_in_a_pager(paged, terminal, capsys):
-    assert cli.run(["list", "envs"]) == 0
+    assert cli.run(["list", "envs", "--pager"]) == 0
     assert len(paged) == 1
     assert "LGMD/CCRs-v0" in paged[0]
     assert capsys.readouterr().out == ""
 
 
-@pytest.mark.parametrize("arguments", [["cameras"], ["envs", "--no-pager"]])
+@pytest.mark.parametrize("arguments", [["cameras", "--pager"], ["envs"]])
 def test_a_short_list_or_no_pager_is_printed(arguments, paged, terminal, capsys):
     assert cli.run(["list", *arguments]) == 0
     assert paged == []
@@ -43,7 +43,7 @@ def test_a_short_list_or_no_pager_is_printed(arguments, paged, terminal, capsys)
 
 
 def test_a_pipe_has_no_pager(paged, capsys):
-    assert cli.run(["list"]) == 0
+    assert cli.run(["list", "--pager"]) == 0
     assert paged == []
     assert "LGMD/CCRs-v0" in capsys.readouterr().out
 

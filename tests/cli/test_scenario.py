@@ -72,7 +72,7 @@ def test_show_draws_files_ids_and_cases(folder, capsys):
 
 def test_show_refuses_what_it_cannot_draw(capsys):
     assert "scenario show needs a file, an environment id or a case" in refused(capsys, "show")
-    assert "draws one scenario, got 2" in refused(capsys, "show", "a.toml", "b.toml")
-    assert "traffic/merge has no scenario to draw" in refused(capsys, "show", "traffic/merge")
+    assert "show needs one scenario, got 2" in refused(capsys, "show", "a.toml", "b.toml")
+    assert "traffic/merge has no scenario to show" in refused(capsys, "show", "traffic/merge")
     assert "did you mean 'LGMD/CutIn-v0'" in refused(capsys, "show", "LGMD/CutIn")
     assert "cannot be read: No such file" in refused(capsys, "show", "missing.json")

@@ -162,7 +162,10 @@ def test_the_command_writes_two_files(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["export", "quick/CCRs/v31", "--to", "a.xosc"], "unknown case 'quick/CCRs/v31'; did you mean"),
+        (
+            ["export", "quick/CCRs/v31", "--to", "a.xosc"],
+            "environment or case 'quick/CCRs/v31'; did you",
+        ),
         (["export", "quick/CCRs/v30"], "scenario export needs --to FILE.xosc"),
         (["export", "quick/CCRs/v30", "--to", "a.xml"], "the file must end in .xosc, got 'a.xml'"),
         (
@@ -170,7 +173,7 @@ def test_the_command_writes_two_files(tmp_path, capsys):
             "'old.xosc' exists; choose another file or remove it",
         ),
         (["export", "quick/CCRs/v30", "--to", "no/a.xosc"], "'no/a.xosc' cannot be written: No such folder"),
-        (["export", "a", "b", "--to", "a.xosc"], "scenario export needs one case, got 2"),
+        (["export", "a", "b", "--to", "a.xosc"], "scenario export needs one scenario, got 2"),
         (["check", "a.xosc", "--to", "b.xosc"], "scenario check writes no file, got --to 'b.xosc'"),
         (["check", "a.xosc"], "a.xosc cannot be read: No such file or directory"),
         (["check"], "scenario check needs a file or folder"),

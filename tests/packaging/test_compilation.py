@@ -61,8 +61,8 @@ def test_a_long_compilation_prints_what_it_does(reporter, capsys):
     first, *others = capsys.readouterr().err.splitlines()
     assert first == f"lgmd-gym: {compilation.START}"
     assert others == [
-        "lgmd-gym: compiling: 12 functions in 12 s, now camera.render.kernel",
-        "lgmd-gym: compiling: 22 functions in 22 s, now camera.render.kernel",
+        "lgmd-gym: compiling kernels for their first use: 12 functions in 12 s",
+        "lgmd-gym: compiling kernels for their first use: 22 functions in 22 s",
     ]
 
 
@@ -73,6 +73,15 @@ def test_time_adds_up_over_kernels_but_not_over_pauses(reporter, capsys):
     assert capsys.readouterr().err == ""
     reporter.compile_for(1.0, 1.0)
     assert compilation.START in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("expected", "share"), [(48, "25 %"), (7, "99 %")])
+def test_a_known_number_of_functions_gives_a_percentage(reporter, monkeypatch, capsys, expected, share):
+    monkeypatch.setattr(compilation, "_reporter", reporter)
+    with compilation.expected_functions(expected):
+        reporter.compile_for(*[1.0] * 15)
+    assert f"for their first use: {share} in 12 s\n" in capsys.readouterr().err
+    assert reporter.expected == 0
 
 
 def test_the_variable_switches_it_off(reporter, monkeypatch, capsys):
@@ -86,10 +95,11 @@ def test_a_terminal_has_one_line_that_is_erased(reporter, monkeypatch):
     monkeypatch.setattr(sys, "stderr", terminal)
     monkeypatch.setattr(sys, "__stderr__", terminal)
     reporter.compile_for(*[1.0] * 5)
-    first, *rest = terminal.getvalue().split("\n")
-    assert compilation.START in first
-    assert "\n".join(rest).count("\r") == 3
-    assert rest[-1].endswith("\x1b[2K\r")
+    first, *others, last, rest = terminal.getvalue().split("\r")
+    assert first.endswith(compilation.START)
+    assert len(others) == 2
+    assert (last, rest) == ("\x1b[2K", "")
+    assert "\n" not in terminal.getvalue()
 
 
 def test_of_two_workers_one_reports(reporter, monkeypatch, capsys, tmp_path):

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from lgmd_gym.camera import objects
 from lgmd_gym.envs import Actor, RoadPlan, Scenario, Segment, make_scenario
 from lgmd_gym.envs.dynamics.script import Bend
-from lgmd_gym.envs.motion import record_motion
+from lgmd_gym.envs.motion import _LONG_M, _TALL_M, is_truck, record_motion
 from lgmd_gym.plotting.figures import scenario_figure
 
 BRAKING = Segment(start=1.0, acceleration=-2.0, final_speed=4.0)
@@ -18,6 +19,28 @@ PASS = Scenario(
         Actor(gap=50.0, lateral_offset=-3.5, kind="road_marking", height=0.0),
     ),
 )
+
+
+@pytest.mark.parametrize(
+    ("size", "truck"),
+    [
+        ({}, False),
+        ({"length": 7.5}, False),
+        ({"length": 7.6}, True),
+        ({"height": 2.2}, False),
+        ({"height": 2.3}, True),
+        ({"height": 2.3, "kind": "box"}, False),
+    ],
+)
+def test_a_car_of_the_size_of_a_truck_is_called_one(size, truck):
+    assert is_truck(Actor(gap=1.0, **size)) == truck
+
+
+def test_a_truck_is_named_where_the_camera_draws_one():
+    assert (_TALL_M, _LONG_M) == (objects._TALL_M, objects._LONG_M)
+    actors = (Actor(gap=20.0, length=10.0),)
+    motion = record_motion(Scenario(family="x", ego_speed=10.0, duration=1.0, actors=actors))
+    assert motion.names == ["ego", "1: truck"]
 
 
 def test_motion_without_braking():
