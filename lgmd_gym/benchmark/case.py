@@ -44,6 +44,8 @@ class Case:
         fcw_driver: Whether the protocol's driver brakes, 1.2 s after the agent's alert, instead of the
             agent (Euro NCAP AEB C2C v4.3.1, 8.4.6).
         load: Load of the car whose limit the protocol sets, "laden" or "unladen"; empty for none.
+        swept: Arguments that a sweep varies, each with its value as in the variant, such as
+            ("gap", "gap8m"). All cells of a sweep are run in the same worlds.
     """
 
     suite: str
@@ -53,6 +55,7 @@ class Case:
     environment: str = ""
     fcw_driver: bool = False
     load: str = ""
+    swept: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("suite", "family", "variant", "environment", "load"):

@@ -4,6 +4,7 @@ import inspect
 import math
 import re
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from inspect import signature
 from itertools import product
 from pathlib import Path
@@ -17,7 +18,7 @@ from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.families import FAMILIES
 from lgmd_gym.envs.families.data import scenario_from_data
 from lgmd_gym.envs.registration import APPEARANCE
-from lgmd_gym.errors import check_finite, check_flag, check_keys, check_type, is_number, shown
+from lgmd_gym.errors import check_finite, check_flag, check_keys, check_text, check_type, is_number, shown
 from lgmd_gym.processes.inputs import read_json, read_toml
 
 Argument: TypeAlias = bool | int | float | str
@@ -169,7 +170,7 @@ def _unit(family: str, name: str) -> str:
     return found[1] if found else ""
 
 
-CASE_KEYS = ("family", "name", "speeds_kmh", "sweep", "fcw_driver", "arguments", "scenario")
+CASE_KEYS = ("family", "name", "speeds_kmh", "sweep", "fcw_driver", "arguments", "scenario", "cell")
 _NAME = re.compile(r"[\w.+-]+(/[\w.+-]+)*")  # names become parts of file names
 
 
@@ -193,8 +194,16 @@ def read_cases(suite: str, table: object) -> list[Case]:
     cases: list[Case] = []
     for variant, swept in combine(axes):
         parts = "/".join(filter(None, (variant, name)))
-        cases.append(Case(suite, family, parts, tuple((arguments | swept).items()), fcw_driver=fcw_driver))
+        cells = _swept(table) or tuple(zip(swept, variant.split("/"), strict=False)) * ("sweep" in table)
+        values = tuple((arguments | swept).items())
+        cases.append(Case(suite, family, parts, values, fcw_driver=fcw_driver, swept=cells))
     return cases
+
+
+def _swept(table: Values) -> tuple[tuple[str, str], ...]:
+    """Return the swept arguments of a case that the copy of a suite in a run folder states."""
+    given = check_type("cell", table.get("cell", {}), dict)
+    return tuple((str(name), check_text(f"cell.{name}", part)) for name, part in given.items())
 
 
 def check_table(kind: str, table: Values, known: Collection[str]) -> None:
@@ -258,4 +267,5 @@ def _scenario_case(suite: str, family: str, table: Values, fcw_driver: bool) -> 
         raise ValueError(
             f"family {family!r} and scenario.family {scenario.family!r} differ; remove the second"
         )
-    return scenario_case(suite, read_name(table, "name"), scenario, fcw_driver, **arguments)
+    case = scenario_case(suite, read_name(table, "name"), scenario, fcw_driver, **arguments)
+    return replace(case, swept=_swept(table))

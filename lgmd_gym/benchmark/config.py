@@ -171,7 +171,7 @@ class RunConfig:
         """Return the world of a run; None for the laboratory.
 
         With as many seeds as worlds, each case is run once in each world. With fewer, the cases are run in
-        different ones.
+        different ones; those of a sweep have the index 0, so that they differ in the swept arguments only.
         """
         if self.worlds == 0:
             return None

@@ -103,7 +103,7 @@ class CasePlan(Plan):
             seed,
             self.sensor_configs[condition],
             condition=condition,
-            world=config.world(seed, index),
+            world=config.world(seed, 0 if self.suite.cases[index].swept else index),
             road=config.road,
         )
 

@@ -317,6 +317,7 @@ def copy_suite(source: Source | Path, target: Path, modules: tuple[str, ...] = (
         family = case.environment if scenario is None else case.family
         table: Values = {"family": family, "name": case.variant}
         table |= {"fcw_driver": True} if case.fcw_driver else {}
+        table |= {"cell": dict(case.swept)} if case.swept else {}
         table |= {"arguments": arguments} if arguments else {}
         tables.append(table | ({} if scenario is None else {"scenario": scenario}))
     text = tomli_w.dumps({"name": suite.name, "about": suite.about, "cases": tables})
@@ -327,7 +328,8 @@ def _with_data(case: Case) -> Case:
     """Return a case of a user's family as a case with a given scenario."""
     if case.environment not in FAMILIES or not is_own(case.environment):
         return case
-    return scenario_case(case.suite, case.variant, case.scenario, case.fcw_driver, **case.appearance)
+    given = scenario_case(case.suite, case.variant, case.scenario, case.fcw_driver, **case.appearance)
+    return replace(given, swept=case.swept)
 
 
 def _check_named(declared: Iterable[str], named: Iterable[str], source: Path) -> None:

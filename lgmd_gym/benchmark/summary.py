@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeVar, cast
 
 from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import EpisodeRow, Row, case_order
+from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.errors import counted
 from lgmd_gym.processes.files import complete_file
 from lgmd_gym.statistics.intervals import Mean, Rate, cluster_mean
@@ -36,6 +37,7 @@ COLUMNS = (
 
 
 _R = TypeVar("_R", bound=EpisodeRow)
+WORLDS = "worlds"  # what tables call numbered worlds
 INTERVAL_TEXT = "95 % interval, clustered by case and world"
 
 
@@ -43,16 +45,21 @@ class Sample(NamedTuple):
     """Numbers of cases and worlds of a group of rows, between which outcomes may be independent."""
 
     cases: int
-    worlds: int
+    worlds: int  # the laboratory included
+    laboratory: bool = False  # whether one of the worlds is the laboratory
 
     @classmethod
     def of(cls, rows: Iterable[EpisodeRow]) -> "Sample":
         """Return the numbers of distinct cases and worlds of rows."""
-        pairs = [(row["case"], row.get("world")) for row in rows]
-        return cls(len({case for case, _ in pairs}), len({world for _, world in pairs}))
+        rows = list(rows)
+        worlds = {row.get("world") for row in _played(rows)}
+        return cls(len({row["case"] for row in rows}), len(worlds), None in worlds)
 
     def __str__(self) -> str:
-        return f"{counted(self.cases, 'case')} in {counted(self.worlds, 'world')}"
+        numbered = self.worlds - self.laboratory
+        places = ["the laboratory"] * self.laboratory
+        places += [counted(numbered, "world")] if numbered or not self.laboratory else []
+        return f"{counted(self.cases, 'case')} in {' and '.join(places)}"
 
 
 class AgentSummary(NamedTuple):
@@ -131,11 +138,29 @@ def by_agent(rows: Iterable[_R], group: Callable[[_R], str]) -> dict[tuple[str, 
 
 
 def by_condition(rows: Iterable[_R]) -> dict[str, list[_R]]:
-    """Return the rows of each camera condition, in order of appearance."""
+    """Return the rows of each camera condition, in order of appearance.
+
+    Rows of both the laboratory and numbered worlds are separate, as "laboratory" and "worlds" after the
+    condition, or without it for a single one.
+    """
+    rows = list(rows)
+    by_place = len({place_of(row) for row in _played(rows)}) > 1
+    by_weather = not by_place or len({row["condition"] for row in rows}) > 1
     parts: dict[str, list[_R]] = {}
     for row in rows:
-        parts.setdefault(row["condition"], []).append(row)
+        name = "-".join([row["condition"]] * by_weather + [place_of(row)] * by_place)
+        parts.setdefault(name, []).append(row)
     return parts
+
+
+def _played(rows: list[_R]) -> list[_R]:
+    """Return the rows that did not fail, whose world is known; all if there are none."""
+    return [row for row in rows if row.get("error") is None] or rows
+
+
+def place_of(row: EpisodeRow) -> str:
+    """Return whether a row was played in the laboratory or in a numbered world."""
+    return LABORATORY if row.get("world") is None else WORLDS
 
 
 def without_fcw_driver(rows: Iterable[Row]) -> list[Row]:
@@ -176,7 +201,7 @@ def _line(item: AgentSummary, condition: str) -> list[object]:
         item.agent,
         condition,
         item.group,
-        *item.sample,
+        *item.sample[:2],
         *threats,
         *means,
         item.premature.k,

@@ -71,5 +71,6 @@ def make_result(task: Task, episode: Episode, sensor_config: SensorConfig) -> Re
 
 def error_result(task: Task, error: str) -> Result:
     """Return the result of a task that failed with a traceback."""
-    row = new_row(KEYS, task.agent, task.case, task.seed, task.condition, world=task.world, error=error)
-    return Result(row)
+    world = task.case.argument("world", task.world)
+    world = None if world == LABORATORY else world
+    return Result(new_row(KEYS, task.agent, task.case, task.seed, task.condition, world=world, error=error))

@@ -15,6 +15,7 @@ from lgmd_gym.camera.render.raster import Workspace
 from lgmd_gym.camera.road_pool import RoadPool, road_key
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.camera.scene_table import SceneTable, sector_of
+from lgmd_gym.errors import check_positive
 
 if TYPE_CHECKING:
     import gymnasium as gym
@@ -117,6 +118,32 @@ class EgoCamera:
         if self._lens is None:
             raise ValueError("no frame yet: call render() before project()")
         return project(self._lens, points_m)
+
+    def corners(self, distance_m: float) -> np.ndarray:
+        """Return the world points at the corners of the last frame.
+
+        Args:
+            distance_m: Distance of the points along the optical axis, > 0 [m].
+
+        Returns:
+            Points (x, y, z) of the corners top left, top right, bottom right and bottom left, float64, shape
+            (4, 3) [m].
+        """
+        if self._lens is None:
+            raise ValueError("no frame yet: call render() before corners()")
+        lens, (height, width) = self._lens, self.shape
+        scale = check_positive("distance_m", distance_m) / lens["focal"]
+        right = scale * (np.array([0.0, width, width, 0.0]) - lens["centre_u"])
+        down = scale * (np.array([0.0, 0.0, height, height]) - lens["centre_v"])
+        right, down = (
+            right * lens["cos_roll"] - down * lens["sin_roll"],
+            down * lens["cos_roll"] + right * lens["sin_roll"],
+        )
+        ahead = distance_m * lens["cos_pitch"] + down * lens["sin_pitch"]
+        up = distance_m * lens["sin_pitch"] - down * lens["cos_pitch"]
+        x = lens["x"] + ahead * lens["cos_yaw"] - right * lens["sin_yaw"]
+        y = lens["y"] + ahead * lens["sin_yaw"] + right * lens["cos_yaw"]
+        return np.stack([x, y, lens["z"] + up], axis=-1)
 
     @property
     def yaw_px(self) -> int:

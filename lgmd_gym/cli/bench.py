@@ -10,6 +10,7 @@ from rich.console import Console
 
 from lgmd_gym.aliases import Arguments, Values
 from lgmd_gym.cli.console import activity, make_console
+from lgmd_gym.cli.overview import OVERVIEW, SEEDS, default_agents, print_overview
 from lgmd_gym.cli.values import (
     Count,
     File,
@@ -45,12 +46,14 @@ class Bench:
     suite: Names = None
     """Suites by name (see `lgmd-gym list suites`), each run in a folder of its own; or paths, which are one
     suite: suite or scenario files (.toml, .json), OpenSCENARIO files (.xosc), folders with such files.
-    Default: quick."""
+    Default: overview."""
     agents: Names = None
     """Agents with options, for example spike-threshold:threshold=45,frames=2; MODULE:CLASS for an agent of
-    your own. Default: no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle."""
+    your own. Default: no-brake always-brake random-brake spike-threshold stopping-zone ttc-oracle; without
+    --suite, the paper's rule, the best rule, the best policy if it can be loaded, and the bound."""
     seeds: Count = None
-    """Number of seeds per case; a seed sets the start position and the target's grey level. Default: 3."""
+    """Number of seeds per case; a seed sets the start position and the target's grey level. Default: 3;
+    of the default suite 2."""
     first_seed: Count = None
     """First seed. Default: 0."""
     module: Names = None
@@ -90,7 +93,7 @@ class Bench:
     """Run folder; must not exist. With several suites, it contains one for each. Default:
     runs/SUITE-DATE-TIME."""
     plots: bool = True
-    """Draw one PNG per case."""
+    """Draw one PNG per case; never for the suite overview."""
     report: bool = True
     """Write report.html."""
 
@@ -130,7 +133,8 @@ def _play(benchmark: "Run", options: Bench, console: Console) -> int:
         if benchmark.rows:
             _print_tables(benchmark, console)
         with activity("drawing the figures of the run"):
-            files = write_outputs(path, options.plots, options.report, _trust(options))
+            plots = options.plots and benchmark.plan.suite.name != OVERVIEW
+            files = write_outputs(path, plots, options.report, _trust(options))
         for file in files:
             if file.name == "report.html":
                 console.print(f"report: {file}", soft_wrap=True)
@@ -209,8 +213,11 @@ def _new(options: Bench, executor: "Executor") -> "list[Run]":
     given |= {"module": options.module, "camera": camera, "params": params}
     values = {name: value for name, value in given.items() if value is not None}
     if options.config is None:
+        if {"suite", "agents"}.isdisjoint(values):
+            overview: Arguments = {"agents": default_agents(), "seeds": SEEDS}
+            values = overview | values
         modules = chosen_modules(values.get("suite", ()), values.pop("module", ()), options.trust)
-        suites = _suites(values.pop("suite", ("quick",)))
+        suites = _suites(values.pop("suite", (OVERVIEW,)))
         configs = [RunConfig(suite=suite, **values, modules=modules) for suite in suites]
     elif values:
         flags = ", ".join(f"--{name.replace('_', '-')}" for name in values)
@@ -254,6 +261,9 @@ def _print_tables(benchmark: "Run", console: Console) -> None:
     from lgmd_gym.benchmark.traffic.summary import traffic_table
 
     config, suite = benchmark.config, benchmark.plan.suite
+    if suite.name == OVERVIEW:
+        print_overview(benchmark.rows, list(dict.fromkeys([NO_BRAKE, *config.agents])), console)
+        return
     for condition, rows in by_condition(benchmark.rows).items():
         title = f"{_title(benchmark)}, {condition}"
         if is_traffic(suite.name):

@@ -28,12 +28,13 @@ from lgmd_gym.cli.train import Train
 from lgmd_gym.cli.tune import Tune
 from lgmd_gym.cli.video import Video
 from lgmd_gym.errors import unknown_name
+from lgmd_gym.processes.pool import end_workers
 from lgmd_gym.processes.signals import raise_on_signals
 
 DESCRIPTION = """Simulate emergency braking on the spike frequency of a locust looming neuron (LGMD).
 
 Examples:
-  lgmd-gym bench                               run agents on the suite quick
+  lgmd-gym bench                               compare braking agents on one screen
   lgmd-gym drive LGMD/CCRs-v0 --video out.mp4  record one approach as a video
   lgmd-gym compare runs/A runs/B               compare two runs in pairs
   lgmd-gym video CLIP.mp4                      plot the spikes for a video clip
@@ -65,7 +66,9 @@ COMMANDS: dict[str, type] = {
 
 def main(argv: list[str] | None = None) -> None:
     """Run the command line and exit; invalid input prints one line to stderr and exits with code 2."""
-    sys.exit(run(argv))
+    code = run(argv)
+    end_workers()
+    sys.exit(code)
 
 
 def run(argv: list[str] | None = None) -> int:

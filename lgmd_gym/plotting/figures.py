@@ -28,7 +28,11 @@ LAYER_TITLES = {
 
 
 def episode_figure(
-    file: FigureFile, title: str, episodes: dict[str, dict[str, np.ndarray]], alert_level: float
+    file: FigureFile,
+    title: str,
+    episodes: dict[str, dict[str, np.ndarray]],
+    alert_level: float,
+    own_signal: str = "",
 ) -> "Figure":
     """Plot spike frequency, speed and gap over time, one line per agent; save and return the figure.
 
@@ -37,6 +41,7 @@ def episode_figure(
         title: Title of the figure.
         episodes: Time series by agent (keys: `lgmd_gym.benchmark.episode.SERIES`).
         alert_level: The neuron's T_sf, drawn as a horizontal line [spikes/s].
+        own_signal: Name of a user's neuron, whose signal has a unit of its own and no T_sf; else empty.
     """
     with saved_figure(file, 3, 1, sharex=True, figsize=(7.5, 6.0)) as (figure, axes):
         frequency, speed, gap = axes
@@ -47,22 +52,25 @@ def episode_figure(
             speed.plot(series["time"], series["ego_speed"] / KMH, **line)
             gap.plot(series["time"], series["gap"], **line)
             _mark_end(speed, gap, series, line["color"])
-        frequency.axhline(alert_level, color="0.5", linestyle="--", linewidth=1.0)
-        frequency.annotate(
-            f"T_sf = {alert_level:g}",
-            (0.01, alert_level),
-            xycoords=("axes fraction", "data"),
-            va="bottom",
-            color="0.4",
-            fontsize=8,
-        )
-        frequency.set(ylabel="spike frequency\n[spikes/s]", ylim=(0, None))
+        _set_signal(frequency, alert_level, own_signal, "spike frequency\n[spikes/s]")
         speed.set(ylabel="ego speed [km/h]", ylim=(0, None))
         gap.set(ylabel="gap [m]", xlabel="time [s]   (× contact, ● end without contact)", ylim=(0, None))
         if not any(np.isfinite(series["gap"]).any() for series in episodes.values()):
             gap.text(0.5, 0.5, "no vehicle in the ego's path", transform=gap.transAxes, ha="center")
-        speed.legend(loc="best", ncols=2, fontsize=8)
+        handles, agents = speed.get_legend_handles_labels()
+        figure.legend(handles, agents, loc="outside lower center", fontsize=8, ncols=4)
     return figure
+
+
+def _set_signal(axis: "Axes", alert_level: float, own_signal: str, label: str) -> None:
+    """Label the axis of the neuron's signal, and draw T_sf unless the neuron is the user's."""
+    if own_signal:
+        axis.set(ylabel=f"signal of\n{own_signal}")
+        return
+    axis.axhline(alert_level, color="0.5", linestyle="--", linewidth=1.0)
+    place = {"xycoords": ("axes fraction", "data"), "va": "bottom"}
+    axis.annotate(f"T_sf = {alert_level:g}", (0.01, alert_level), color="0.4", fontsize=8, **place)
+    axis.set(ylabel=label, ylim=(0, None))
 
 
 def _mark_end(speed: Any, gap: Any, series: dict[str, np.ndarray], colour: str) -> None:
@@ -73,20 +81,22 @@ def _mark_end(speed: Any, gap: Any, series: dict[str, np.ndarray], colour: str) 
     gap.plot(series["time"][-1], series["gap"][-1], **marker)
 
 
-def trace_figure(file: FigureFile, episodes: dict[str, Values], alert_level: float) -> "Figure":
+def trace_figure(
+    file: FigureFile, episodes: dict[str, Values], alert_level: float, own_signal: str = ""
+) -> "Figure":
     """Plot spike frequency and speed over time, one line per agent; save and return the figure.
 
     Args:
         file: Destination.
         episodes: Time series by agent (keys: `lgmd_gym.benchmark.episode.SERIES`).
         alert_level: The neuron's T_sf, drawn as a horizontal line [spikes/s].
+        own_signal: See `episode_figure`.
     """
     with saved_figure(file, 2, 1, sharex=True, figsize=(6.4, 3.2)) as (figure, (frequency, speed)):
         for colour, (agent, series) in zip(COLOURS, episodes.items(), strict=False):
             frequency.plot(series["time"], series["spike_frequency"], color=colour, label=agent)
             speed.plot(series["time"], series["ego_speed"] / KMH, color=colour, label=agent)
-        frequency.axhline(alert_level, color="0.5", linestyle="--", linewidth=1.0)
-        frequency.set(ylabel="spikes/s", ylim=(0, None))
+        _set_signal(frequency, alert_level, own_signal, "spikes/s")
         speed.set(ylabel="speed [km/h]", xlabel="time [s]", ylim=(0, None))
         handles, agents = speed.get_legend_handles_labels()
         figure.legend(handles, agents, loc="outside upper center", fontsize=7, ncols=4)
@@ -254,4 +264,4 @@ def _draw_speeds(axis: "Axes", motion: "Motion", times: np.ndarray) -> None:
         axis.plot(motion.times[-1], motion.speeds[-1, 0] / KMH, marker="x", color=COLOURS[0])
     axis.set(xlabel="time [s]   (× contact)" if motion.contact else "time [s]", ylabel="speed [km/h]")
     axis.set(xlim=(0.0, max(motion.times[-1], 1e-3) * 1.01), ylim=(0.0, None))
-    axis.legend(loc="best", ncols=3, fontsize=8)
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, fontsize=8)

@@ -5,6 +5,7 @@
 import logging
 import os
 import signal
+import sys
 import threading
 import time
 import warnings
@@ -67,6 +68,14 @@ def run_parallel(calls: Iterable[object], jobs: int) -> Iterator[Any]:
     parallel: Any = Parallel(n_jobs=jobs, return_as="generator", **worker_options())
     with signals_blocked():
         return parallel(calls)
+
+
+def end_workers() -> None:
+    """End idle worker processes at once; joblib otherwise waits for them at the end of this process."""
+    loky = sys.modules.get("joblib.externals.loky.reusable_executor")
+    executor: Any = getattr(loky, "_executor", None)
+    if executor is not None:
+        executor.shutdown(wait=True, kill_workers=True)
 
 
 def watch_parent(parent: int) -> None:

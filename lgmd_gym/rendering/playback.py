@@ -64,7 +64,7 @@ def make_target(target: str | Case, arguments: Arguments, **options: Any) -> gym
     """
     if isinstance(target, Case):
         chosen = {**dict(target.arguments), **arguments}
-        return gym.make(env_id(target.environment), **options, **chosen)
+        return gym.make(env_id(target.environment), **options | chosen)  # a case may state world and weather
     traffic = {
         f"{suite}/{kind}": (kind, attention)
         for suite, attention in TRAFFIC_SUITES.items()

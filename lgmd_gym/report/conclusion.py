@@ -2,13 +2,14 @@
 
 import inspect
 import re
+from collections import Counter
 from typing import cast
 
 from lgmd_gym.agents.policies.card import policy_card, read_card
 from lgmd_gym.agents.policies.policy import Policy, find_policy
 from lgmd_gym.agents.registry import AGENTS, make_agent
 from lgmd_gym.aliases import Values
-from lgmd_gym.benchmark.analysis.tables import limit_results
+from lgmd_gym.benchmark.analysis.tables import limit_results, verdict_text
 from lgmd_gym.benchmark.case import Row, Suite
 from lgmd_gym.benchmark.summary import (
     INTERVAL_TEXT,
@@ -28,23 +29,24 @@ CAVEAT = (
 )
 
 
-def conclusion(rows: list[Row], agents: list[str], suite: Suite) -> str:
-    """Return one paragraph: sample, avoided threats, false activations and limits of each agent.
+def conclusion(rows: list[Row], agents: list[str], suite: Suite) -> tuple[str, str, str]:
+    """Return three points: the sample, the scores of each agent, and the limits with what they do not show.
 
-    Rows with an FCW driver count for the limits only.
+    Agents are in the order of their avoided threats. Rows with an FCW driver count for the limits only.
     """
     conditions = by_condition(rows)
     braking = [agent for agent in agents if agent != NO_BRAKE]
-    sentences = [_sample_sentence(rows, suite)]
+    scores, limits = list[str](), list[str]()
     for condition, part in conditions.items():
-        found = [*_agent_sentences(part, braking), *_limit_sentences(part, braking, suite)]
-        sentences += ([f"Condition {condition}:"] if len(conditions) > 1 and found else []) + found
-    failed = sum(row["error"] is not None for row in rows)
+        for sentences, found in (
+            (scores, _agent_sentences(part, braking)),
+            (limits, _limit_sentences(part, braking, suite)),
+        ):
+            sentences += ([f"Condition {condition}:"] if len(conditions) > 1 and found else []) + found
+    sample, failed = [_sample_sentence(rows, suite)], sum(row["error"] is not None for row in rows)
     if failed:
-        sentences.append(
-            f"{counted(failed, 'episode')} failed and {'is' if failed == 1 else 'are'} left out."
-        )
-    return " ".join([*sentences, CAVEAT])
+        sample.append(f"{counted(failed, 'episode')} failed and {'is' if failed == 1 else 'are'} left out.")
+    return " ".join(sample), " ".join(scores), " ".join([*limits, CAVEAT])
 
 
 def _sample_sentence(rows: list[Row], suite: Suite) -> str:
@@ -61,7 +63,9 @@ def _agent_sentences(rows: list[Row], agents: list[str]) -> list[str]:
     """Return the avoided threats and the false activations of each agent."""
     complete = [row for row in without_fcw_driver(rows) if row["error"] is None]
     kinds = {bool(row["threat"]) for row in complete}
-    sentences = [_agent_sentence(complete, agent, kinds) for agent in agents]
+    avoided = Counter(row["agent"] for row in complete if row["avoided"])
+    ordered = sorted(agents, key=lambda agent: -avoided[agent])
+    sentences = [_agent_sentence(complete, agent, kinds) for agent in ordered]
     if kinds == {True}:
         sentences.append("No episode is without a threat: false activations were not measured.")
     if kinds == {False}:
@@ -111,11 +115,8 @@ def _limit_sentences(rows: list[Row], agents: list[str], suite: Suite) -> list[s
         for agent, items in tested.items()
     ]
     sentences = [f"Cases in which every run meets the limit of the protocol in simulation: {', '.join(met)}."]
-    if suite.verdict is not None:
-        requirement, meets = suite.verdict
-        names = ", ".join(agent for agent in tested if meets(rows, agent)) or "none"
-        sentences.append(f"Agents that meet {requirement} in simulation: {names}.")
-    return sentences
+    verdict = verdict_text(rows, list(tested), suite)
+    return [*sentences, f"{verdict[0].upper()}{verdict[1:]}."] if verdict else sentences
 
 
 SENTENCE_END = re.compile(r"(?<=[^.].[.!?])(?=\s|$)")

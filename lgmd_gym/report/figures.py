@@ -206,6 +206,7 @@ class GridCell(NamedTuple):
     contacts: int  # runs with contact
     premature: int  # runs with premature braking
     runs: int
+    letter: bool = True  # whether a letter repeats the colour
 
 
 class CaseGrid(NamedTuple):
@@ -213,7 +214,7 @@ class CaseGrid(NamedTuple):
 
     title: str
     axis: str  # quantity of the columns
-    columns: list[int]
+    columns: Sequence[int | str]
     lines: list[tuple[str, list[GridCell | None]]]
     agent: str
     family: str
@@ -317,7 +318,9 @@ COLUMNS = (
 )
 
 
-def grid_figure(grids: list[CaseGrid], condition: str) -> ReportFigure | None:
+def grid_figure(
+    grids: list[CaseGrid], condition: str, name: str = "grids", title: str = "Euro NCAP grids"
+) -> ReportFigure | None:
     """Return the grids of all agents under one condition; None without a grid."""
     if not grids:
         return None
@@ -328,8 +331,8 @@ def grid_figure(grids: list[CaseGrid], condition: str) -> ReportFigure | None:
         for column, cell in zip(grid.columns, cells, strict=True)
         if cell is not None
     ]
-    title = f"Euro NCAP grids, {condition}"
-    return ReportFigure(f"grids-{condition}", title, list(map(_panel, grids)), [], COLUMNS, lines)
+    panels = list(map(_panel, grids))
+    return ReportFigure(f"{name}-{condition}", f"{title}, {condition}", panels, [], COLUMNS, lines)
 
 
 def _values(cell: GridCell) -> tuple[int, int, int, str]:
@@ -361,4 +364,5 @@ def _draw_cell(root: Element, x: float, y: float, cell: GridCell) -> None:
     element(group, "rect", x=x + 1, y=y + 1, width=CELL - 2, height=LINE - 2, fill=colour)
     style = {"class_": "cell", "fill": text_colour}
     label(group, x + CELL / 2, y + LINE / 2 + 4, cell.text, "middle", **style)
-    label(group, x + CELL - 4, y + 9, letter, "end", font_size=8, **style)
+    if cell.letter:
+        label(group, x + CELL - 4, y + 9, letter, "end", font_size=8, **style)

@@ -10,6 +10,7 @@ from lgmd_gym.benchmark.analysis.tables import (
     mean_kmh,
     rate_text,
     success_lines,
+    verdict_text,
 )
 from lgmd_gym.benchmark.case import Row, is_traffic
 from lgmd_gym.benchmark.config import RunConfig
@@ -26,7 +27,7 @@ from lgmd_gym.benchmark.summary import (
 )
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.benchmark.traffic.summary import write_traffic_summary
-from lgmd_gym.neuron import LGMDParams
+from lgmd_gym.neuron import LGMDParams, outside_code
 from lgmd_gym.plotting.figures import episode_figure
 from lgmd_gym.processes.files import FolderLock, replace_file
 from lgmd_gym.report.conclusion import agent_note, conclusion
@@ -49,10 +50,9 @@ from lgmd_gym.report.sections import (
     illustrated_agent,
 )
 from lgmd_gym.report.svg import DARK_CSS, legend_mark, to_text
+from lgmd_gym.report.sweep import band, scenario_pictures, sweep_grids
 from lgmd_gym.report.traffic import write_traffic_report
 from lgmd_gym.statistics.intervals import Rate
-
-BANDS = ("red", "brown", "orange", "yellow", "green")
 
 
 def write_report(path: Path, trust: bool = False) -> Path:
@@ -98,6 +98,7 @@ def _render(data: ReportData) -> str:
         dark_cells=DARK_CELLS,
         dark_css=DARK_CSS,
         failed=sum(row["error"] is not None for row in data.rows),
+        pictures=scenario_pictures(data),
         conditions=[_condition(data, name, rows) for name, rows in by_condition(data.rows).items()],
         froc=froc_section(data),
         lead_time=LEAD_TIME,
@@ -106,11 +107,6 @@ def _render(data: ReportData) -> str:
         episodes=episode_section(data),
         false_activations=false_activation_section(data),
     )
-
-
-def band(share: float | None) -> str:
-    """Return the colour of a share, one per fifth and green for the highest; "" for None."""
-    return "" if share is None else BANDS[min(int(5 * share), 4)]
 
 
 def rate_band(rate: Rate, lower_is_better: bool = False) -> str:
@@ -124,19 +120,20 @@ def rate_band(rate: Rate, lower_is_better: bool = False) -> str:
 def _condition(data: ReportData, name: str, rows: list[Row]) -> Values:
     """Return the tables and figures of one camera condition."""
     braking = [agent for agent in data.agents if agent != NO_BRAKE]
-    points, verdict = data.suite.points, data.suite.verdict
-    met = verdict and [agent for agent in data.agents if verdict[1](rows, agent)]
+    points = data.suite.points
+    swept = [grid for agent in braking for grid in sweep_grids(rows, agent, data.suite.by_name)]
     grids = [grid for agent in braking for grid in case_grids(rows, agent, data.suite)]
     return {
         "name": name,
         "sample": Sample.of(rows),
         "summaries": agent_summaries(without_fcw_driver(rows), data.agents),
         "limits": limit_lines(rows, data.agents, data.suite),
-        "meet_r152": met,
+        "verdict": verdict_text(rows, data.agents, data.suite),
         "points": [(agent, points(rows, agent)) for agent in braking] if points else [],
         "avoidance": _saved(data, avoidance_figure(rows, data.agents, name)),
         "impacts": _saved(data, impact_figure(rows, data.agents, name)),
         "grids": _saved(data, grid_figure(grids, name)),
+        "sweep": _saved(data, grid_figure(swept, name, "sweep", "Sweep")),
         "cases": success_lines(rows, data.agents),
     }
 
@@ -199,6 +196,7 @@ def _write(path: Path, plots: bool, report: bool, trust: bool) -> list[Path]:
 def _plot_cases(path: Path, config: RunConfig) -> list[Path]:
     """Draw one figure per case: all agents with the first seed."""
     alert_level = LGMDParams.make(config.params).t_sf
+    own = config.neuron if config.neuron and outside_code(config.neuron) else ""
     folder, seed, files = path / "plots", config.first_seed, list[Path]()
     folder.mkdir(exist_ok=True)
     for condition in config.conditions:
@@ -209,5 +207,5 @@ def _plot_cases(path: Path, config: RunConfig) -> list[Path]:
             if episodes:
                 files.append(folder / f"{case_name(case.name, condition)}.png")
                 title = f"{case.name}, seed {seed}, {condition}"
-                episode_figure(files[-1], title, episodes, alert_level)
+                episode_figure(files[-1], title, episodes, alert_level, own)
     return files

@@ -1,41 +1,34 @@
 """Contents of a run folder, and the report's sections on stored time series and paired differences."""
 
-import base64
 import io
 import re
-from collections.abc import Callable, Mapping
+import shlex
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 import numpy as np
 
 from lgmd_gym import neuron
-from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.registry import outside_code
 from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.analysis.compare import Comparison, change_text, compare_agents, difference_figure
 from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, froc_curves, froc_figure, load_traces, write_froc
 from lgmd_gym.benchmark.case import Row, Suite, case_order, key_of, relative_impact
-from lgmd_gym.benchmark.config import RunConfig
-from lgmd_gym.benchmark.episode import make_env, rollout, with_config
-from lgmd_gym.benchmark.metrics import brake_onsets
+from lgmd_gym.benchmark.config import SUITE_FILE, RunConfig
 from lgmd_gym.benchmark.run_folder import read_run, read_series, read_settings, series_name
 from lgmd_gym.benchmark.suites import get_suite
 from lgmd_gym.benchmark.summary import by_condition, without_fcw_driver, write_csv
 from lgmd_gym.benchmark.task import NO_BRAKE, Task
+from lgmd_gym.camera.worlds import LABORATORY
+from lgmd_gym.envs.registration import RANDOM
 from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.plotting.figures import trace_figure
 from lgmd_gym.processes.files import complete_file
-
-
-class CapturedFrame(NamedTuple):
-    """Camera frame as a data URI, and its caption."""
-
-    uri: str
-    caption: str
+from lgmd_gym.report.frames import CapturedFrame, capture_frames, data_uri, key_decisions
 
 
 def save_figure(file: Path, draw: Callable[[BinaryIO], object]) -> str:
@@ -44,57 +37,7 @@ def save_figure(file: Path, draw: Callable[[BinaryIO], object]) -> str:
     draw(drawn)
     with complete_file(file) as part:
         part.write_bytes(drawn.getvalue())
-    return _data_uri("image/svg+xml", drawn.getvalue())
-
-
-def frame_uri(frame: np.ndarray) -> str:
-    """Return a grey frame, uint8 of shape (height, width), as the data URI of a PNG."""
-    from PIL import Image
-
-    file = io.BytesIO()
-    Image.fromarray(frame).save(file, "PNG", optimize=True)
-    return _data_uri("image/png", file.getvalue())
-
-
-def _data_uri(kind: str, data: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
-
-
-def key_decisions(series: Mapping[str, np.ndarray]) -> dict[str, int]:
-    """Return the indices of the start, the first alert, the onset of braking and the end, by caption."""
-    alerts = np.flatnonzero(series["alert"])
-    onset = next(iter(brake_onsets(series["deceleration"])), None)
-    decisions = {"start": 0}
-    if alerts.size:
-        decisions["first alert"] = int(alerts[0])
-    if onset is not None:
-        decisions["braking begins"] = onset
-    return decisions | {"end": len(series["time"]) - 1}
-
-
-def capture_frames(task: Task, decisions: Mapping[str, int]) -> list[CapturedFrame]:
-    """Repeat an episode and return frames of the first camera.
-
-    Args:
-        task: The episode, without an FCW driver.
-        decisions: Index of the decision of each frame, by caption.
-    """
-    actor = make_agent(task.agent)
-    arguments = with_config(task.arguments, actor.config)
-    env = make_env(task.case, task.sensor_config.for_agent(actor), arguments)
-    frames, last = list[CapturedFrame](), max(decisions.values())
-    try:
-        for decision, (step, _) in enumerate(rollout(env, actor, task.seed)):
-            if labels := [label for label, index in decisions.items() if index == decision]:
-                time = decision / env.unwrapped.config["policy_frequency"]  # type: ignore[attr-defined]
-                gap = f", gap {step.info['gap']:.1f} m" if np.isfinite(step.info["gap"]) else ""
-                frame = next(iter(env.get_wrapper_attr("frames").values()))
-                frames.append(CapturedFrame(frame_uri(frame), f"{' / '.join(labels)}: {time:.2f} s{gap}"))
-            if decision == last:
-                break
-    finally:
-        env.close()
-    return frames
+    return data_uri("image/svg+xml", drawn.getvalue())
 
 
 @dataclass(frozen=True)
@@ -139,6 +82,27 @@ class ReportData:
     def series(self, row: Row) -> dict[str, np.ndarray] | None:
         """Return the time series of a row; None if they are not stored."""
         return read_series(self.path, series_name(key_of(row)))
+
+    @property
+    def own_signal(self) -> str:
+        """Name of the neuron if it is the user's, whose signals have units of its own; else empty."""
+        name = self.config.neuron or ""
+        return name if name and neuron.outside_code(name) else ""
+
+    def replay(self, row: Row) -> str:
+        """Return the command that plays the episode of a row again in this folder; empty for none."""
+        config, case = self.config, self.suite.by_name[row["case"]]
+        if config.road or config.params or not isinstance(config.camera, str | None):
+            return ""
+        words = ["lgmd-gym", "drive"]
+        words += [SUITE_FILE, "--case", case.name] if config.own_suite else [case.name]
+        words += ["--agent", row["agent"], "--seed", str(row["seed"])]
+        if case.environment != RANDOM:
+            place = LABORATORY if row["world"] is None else str(row["world"])
+            words += ["--world", place, "--condition", row["condition"]]
+        words += ["--camera", config.camera] if config.camera else []
+        words += ["--neuron", config.neuron] if config.neuron else []
+        return shlex.join(words)
 
     def frames(self, row: Row, decisions: dict[str, int]) -> list[CapturedFrame]:
         """Return camera frames of a row's episode, see `capture_frames`; none of `agents_not_loaded`."""
@@ -262,16 +226,22 @@ def _difference_lines(comparisons: list[Comparison]) -> list[tuple[object, ...]]
 def episode_section(data: ReportData) -> list[Values]:
     """Return the illustrated episodes: time series of all agents, and camera frames of one."""
     agent, episodes = illustrated_agent(data.agents), list[Values]()
-    for rows in by_condition(without_fcw_driver(data.rows)).values():
+    for group, rows in by_condition(without_fcw_driver(data.rows)).items():
         for description, row in extreme_episodes(rows, agent, data.config.first_seed).items():
             by_agent = {name: data.series({**row, "agent": name}) for name in data.agents}
             stored = {name: series for name, series in by_agent.items() if series is not None}
             if agent in stored:
-                name = f"episode-{row['condition']}-{re.sub('[^a-z]+', '-', description)}"
-                figure = _save_episode(data, name, stored)
-                frames = data.frames(row, key_decisions(stored[agent]))
+                name = f"episode-{group}-{re.sub('[^a-z]+', '-', description)}"
                 episodes.append(
-                    {"description": description, "row": row, "figure": figure, "name": name, "frames": frames}
+                    {
+                        "description": description,
+                        "group": group,
+                        "row": row,
+                        "figure": _save_episode(data, name, stored),
+                        "name": name,
+                        "frames": data.frames(row, key_decisions(stored[agent])),
+                        "replay": data.replay(row),
+                    }
                 )
     return episodes
 
@@ -285,17 +255,21 @@ def _save_episode(data: ReportData, name: str, episodes: dict[str, Values]) -> s
     ]
     write_csv(data.figures / f"{name}.csv", EPISODE_COLUMNS, lines)
     alert_level = LGMDParams.make(data.config.params).t_sf
-    draw = partial(trace_figure, episodes=episodes, alert_level=alert_level)
+    draw = partial(trace_figure, episodes=episodes, alert_level=alert_level, own_signal=data.own_signal)
     return save_figure(data.figures / f"{name}.svg", draw)
 
 
-def false_activation_section(data: ReportData) -> list[tuple[Row, CapturedFrame | None]]:
+def false_activation_section(data: ReportData) -> list[Values]:
     """Return false activations with the camera frame at which braking begins, if it may be drawn."""
     rows = hardest_false_activations(without_fcw_driver(data.rows), data.agents, data.config.first_seed)
-    captured: list[tuple[Row, CapturedFrame | None]] = []
+    groups = {key_of(row): group for group, part in by_condition(data.rows).items() for row in part}
+    captured: list[Values] = []
     for row in rows:
         if (series := data.series(row)) is not None:
             decisions = key_decisions(series)
             onset = {"braking begins": decisions.get("braking begins", decisions["end"])}
-            captured += [(row, frame) for frame in data.frames(row, onset) or [None]]
+            frame = next(iter(data.frames(row, onset)), None)
+            captured.append(
+                {"row": row, "group": groups[key_of(row)], "frame": frame, "replay": data.replay(row)}
+            )
     return captured

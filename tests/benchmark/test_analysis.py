@@ -75,7 +75,7 @@ def test_pairs_of_several_worlds_cluster_by_world():
         (avoided,) = comparison.differences
         bounds[str(comparison.sample)] = avoided.deviating_high
         assert str(comparison.sample) in comparison_table(comparison).caption
-    assert bounds == {"2 cases in 1 world": wilson(0, 2)[1], "2 cases in 10 worlds": wilson(0, 20)[1]}
+    assert bounds == {"2 cases in the laboratory": wilson(0, 2)[1], "2 cases in 10 worlds": wilson(0, 20)[1]}
 
 
 def test_one_case_has_no_interval():
@@ -234,6 +234,7 @@ def test_report_is_one_page_without_external_files(run_folder):
     assert re.findall(r"<h2>(.*?)</h2>", page) == [
         "Conclusion",
         "Scores",
+        "Scenario",
         "Figures",
         "Open-loop detection",
         "Paired differences",
@@ -243,12 +244,12 @@ def test_report_is_one_page_without_external_files(run_folder):
         "Configuration",
     ]
     scores = page.split("<h2>")[2]
-    headings = [f"{condition}: 3 cases in 1 world" for condition in ("clear", "rain")]
+    headings = [f"{condition}: 3 cases in the laboratory" for condition in ("clear", "rain")]
     assert re.findall(r"<h3>(.*?)</h3>", scores) == headings
     assert "k/n [95 % interval, clustered by case and world, in %]" in scores
     assert scores.count('<tr data-agent="ttc-oracle"><td>ttc-oracle</td>') == 2
     assert "<h3>smallest stopping margin: three-cases/CCRs/v" in page
-    assert page.count("data:image/png") >= 4
+    assert page.count("data:image/jpeg") >= 4
 
 
 def test_report_of_an_interrupted_run_states_that_it_is_incomplete(tmp_path):

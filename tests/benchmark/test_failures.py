@@ -30,7 +30,9 @@ def module(tmp_path, monkeypatch):
 def test_a_run_ends_early_if_every_episode_of_an_agent_fails(module, tmp_path, capsys):
     agents = ["broken_agents:Broken", "always-brake"]
     out = ["--out", str(tmp_path / "run"), "--no-report", "--no-plots"]
-    assert cli.run(["bench", "--agents", *agents, "--seeds", "1", "--jobs", "1", *out]) == 1
+    assert (
+        cli.run(["bench", "--agents", *agents, "--seeds", "1", "--jobs", "1", "--suite", "quick", *out]) == 1
+    )
     printed = " ".join(capsys.readouterr().out.split())
     assert f"{EARLY} episodes failed" in printed
     assert "- broken_agents:Broken: KeyError: \"unknown observation key 'frame'; " in printed

@@ -13,7 +13,14 @@ from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.benchmark.metrics import KEYS, METRICS, Counterfactual, brake_onsets, make_row, metric
 from lgmd_gym.benchmark.recorder import SERIES
 from lgmd_gym.benchmark.suites import SUITES
-from lgmd_gym.benchmark.summary import COLUMNS, Sample, summaries, summarise, write_summary
+from lgmd_gym.benchmark.summary import (
+    COLUMNS,
+    Sample,
+    by_condition,
+    summaries,
+    summarise,
+    write_summary,
+)
 from lgmd_gym.statistics.intervals import wilson
 
 SLOW_APPROACH = Case("test", "CCRs", "v20", (("ego_speed", 5.556),))
@@ -174,4 +181,24 @@ def test_sample_has_singular_and_plural():
         "0 cases in 0 worlds",
     ]
     without = {key: value for key, value in rows[0].items() if key != "world"}  # rows of an earlier version
-    assert Sample.of([without, without | {"case": "b"}]) == (2, 1)
+    assert Sample.of([without, without | {"case": "b"}]) == (2, 1, True)
+
+
+def test_a_sample_names_the_laboratory():
+    laboratory, first, second = (threat_row(case="a", world=world) for world in (None, 1, 2))
+    assert str(Sample.of([laboratory])) == "1 case in the laboratory"
+    assert str(Sample.of([laboratory, first, second])) == "1 case in the laboratory and 2 worlds"
+    failed = threat_row(case="b", world=None, error="x")  # its world is unknown
+    assert str(Sample.of([first, failed])) == "2 cases in 1 world"
+
+
+def test_the_laboratory_and_worlds_are_separate_parts():
+    laboratory, world = threat_row(case="a", world=None), threat_row(case="b", world=3)
+    night = world | {"condition": "night"}
+    assert list(by_condition([laboratory])) == list(by_condition([world])) == ["clear"]
+    assert by_condition([laboratory, world]) == {"laboratory": [laboratory], "worlds": [world]}
+    assert list(by_condition([laboratory, world, night])) == [
+        "clear-laboratory",
+        "clear-worlds",
+        "night-worlds",
+    ]

@@ -7,7 +7,7 @@ import pytest
 from support.rows import suite_rows, threat_row
 
 from lgmd_gym.benchmark.analysis.compare import compare_rows
-from lgmd_gym.benchmark.analysis.tables import limit_results, limit_table, score_tables
+from lgmd_gym.benchmark.analysis.tables import limit_results, limit_table, score_tables, verdict_text
 from lgmd_gym.benchmark.protocols.car_to_car_2023 import points_2023, row_colour_2023
 from lgmd_gym.benchmark.protocols.frontal_2026 import (
     check_green,
@@ -15,7 +15,13 @@ from lgmd_gym.benchmark.protocols.frontal_2026 import (
     points_2026,
     row_colour_2026,
 )
-from lgmd_gym.benchmark.protocols.regulations import check_fmvss127, check_r152, meets_r152, r152_limit
+from lgmd_gym.benchmark.protocols.regulations import (
+    check_fmvss127,
+    check_r152,
+    meets_fmvss127,
+    meets_r152,
+    r152_limit,
+)
 from lgmd_gym.benchmark.suites import SUITES
 from lgmd_gym.benchmark.summary import write_summary
 from lgmd_gym.envs.dynamics.units import KMH
@@ -104,12 +110,34 @@ def test_r152_allows_a_tenth_of_the_runs_to_fail(failed, met):
     assert (result.case, result.met.k, result.met.n) == ("r152/CCRs/v20", 10 - failed, 10)
     assert result.worst == pytest.approx(5 * KMH if failed else 0)
     table = limit_table(rows, ["a"], R152)
-    assert table.caption.endswith("in simulation: a" if met else "in simulation: none")
+    assert table.caption.endswith("UN R152: 10 runs per agent, 30 are needed")
     assert [list(column.cells) for column in table.columns] == [
         ["CCRs/v20"],
         ["≤ 0 km/h unladen"],
         [f"{10 - failed}/10 (5)" if failed else "10/10"],
     ]
+    many = [row | {"seed": row["seed"] + 10 * number} for row in rows for number in range(3)]
+    agents = "a" if met else "none"
+    assert verdict_text(many, ["a", "b"], R152).endswith(
+        f"in simulation, in the laboratory, 30 runs or more: {agents}"
+    )
+
+
+@pytest.mark.parametrize(("contacts", "met"), [(0, True), (1, False)])
+def test_fmvss127_allows_no_contact(contacts, met):
+    suite = SUITES["fmvss127"]
+    rows = [
+        impact_row("CCRs/v50", 50, 0, 5 if seed < contacts else 0, seed=seed, world=8000 + seed)
+        for seed in range(30)
+    ]
+    assert meets_fmvss127(rows, "a") is met
+    text = verdict_text(rows, ["a"], suite)
+    assert text.startswith(
+        "meets the requirement of FMVSS 127 of no contact (S5.1.3, S5.2.3) in simulation, in worlds"
+    )
+    assert text.endswith("30 runs or more: a" if met else "30 runs or more: none")
+    assert not meets_fmvss127([], "a")
+    assert verdict_text([], ["a"], suite) == verdict_text(rows, ["a"], SUITES["quick"]) == ""
 
 
 def test_r152_allows_a_fifth_of_the_runs_with_bicycles_to_fail():

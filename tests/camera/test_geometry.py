@@ -5,6 +5,7 @@ import pytest
 from support.cameras import ego_camera, rig
 from support.roads import EGO_LENGTH, add_car, lens_x, straight_env
 
+from lgmd_gym.camera import EgoCamera
 from lgmd_gym.camera.render.texture import distance_ahead
 
 PLAIN = {"texture": 0.0, "roadside": 0.0, "vehicles": "box"}
@@ -111,6 +112,20 @@ def test_path_gaze_turns_towards_the_curve():
     env.vehicle.action = {"steering": 0.05, "acceleration": 0.0}  # to the right
     camera.render(env)
     assert camera.project(point)[0] < 75.0
+
+
+@pytest.mark.parametrize("distance_m", [0.5, 60.0])
+def test_corners_project_to_the_corners_of_the_frame(distance_m):
+    env = straight_env()
+    camera = EgoCamera("wide", {"road": "rough"}, mount={"pitch_deg": -4.0, "yaw_deg": 15.0})
+    height, width = camera.shape
+    with pytest.raises(ValueError, match="no frame yet"):
+        camera.corners(distance_m)
+    camera.render(env)
+    expected = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]
+    assert camera.project(camera.corners(distance_m)) == pytest.approx(np.array(expected))
+    with pytest.raises(ValueError, match="distance_m must be"):
+        camera.corners(0.0)
 
 
 def test_point_behind_the_lens_projects_to_nan():

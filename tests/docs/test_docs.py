@@ -20,6 +20,8 @@ from lgmd_gym.benchmark.metrics import KEYS
 from lgmd_gym.benchmark.suites import SUITES, load_suite
 from lgmd_gym.cli import main as cli
 from lgmd_gym.clips import VideoWriter
+from lgmd_gym.envs import FAMILIES, env_id
+from lgmd_gym.envs.registration import TRAFFIC_KINDS
 from lgmd_gym.training import TrainConfig
 from lgmd_gym.training.trainer import check_config
 
@@ -59,11 +61,12 @@ def pages():
 def test_code_blocks_run(path, tmp_path, monkeypatch):
     """Run the blocks of a page in order, in one folder; Python blocks share a namespace.
 
-    The suite "quick" is shortened.
+    The suites "quick" and "overview" are shortened.
     """
     monkeypatch.chdir(tmp_path)
-    short = tuple(case for case in SUITES["quick"].cases if case.family in ("CCRs", "EmptyRoad"))
-    monkeypatch.setitem(SUITES, "quick", replace(SUITES["quick"], cases=short))
+    for name in ("quick", "overview"):
+        short = tuple(case for case in SUITES[name].cases if case.family in ("CCRs", "EmptyRoad"))
+        monkeypatch.setitem(SUITES, name, replace(SUITES[name], cases=short))
     monkeypatch.syspath_prepend(str(tmp_path))
     make_clip(tmp_path / "clip.mp4")
     get_reusable_executor().shutdown(wait=True)  # workers of another page have another working folder
@@ -128,11 +131,39 @@ def test_every_page_is_in_a_toctree():
     assert reached <= named, f"in no toctree: {sorted(map(str, reached - named))}"
 
 
-def test_links_between_pages_resolve():
+def test_links_on_the_forge_resolve():
+    """Targets of relative links exist in the repository, and so do their headings."""
+    dead = []
+    others = [ROOT / ".github" / "pull_request_template.md", ROOT / "tests" / "reference" / "README.md"]
+    for path in [*ROOT.glob("*.md"), *others, *PAGES]:
+        text = re.sub(r"^```.*?^```", "", path.read_text(), flags=re.DOTALL | re.MULTILINE)
+        for target in re.findall(r"\]\(([^)\s]+)\)", text):
+            file, _, heading = target.partition("#")
+            found = path.parent / file if file else path
+            if target.startswith(("http", "mailto:")) or (path.stem, found.stem) == (
+                "training",
+                "BrakingEnv",
+            ):
+                continue
+            if not found.exists() or "_generated" in file or (heading and heading not in headings(found)):
+                dead.append(f"{path.relative_to(ROOT)}: {target}")
+    assert dead == []
+
+
+def headings(path):
+    """Return the anchors of the headings of a page."""
+    text = re.sub(r"^```.*?^```", "", path.read_text(), flags=re.DOTALL | re.MULTILINE)
+    titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def test_generated_pages_and_pictures_are_made_by_the_build():
+    """Plain Markdown does not link them: a reference in braces is no dead link on the forge."""
+    names = {env_id(name).removeprefix("LGMD/").removesuffix("-v0") for name in FAMILIES}
+    names |= {"BrakingEnv", "TrafficEnv", "RandomBraking", "RandomBrakingEasy", *TRAFFIC_KINDS}
     for path in PAGES:
-        for target in re.findall(r"\]\(([^)#]+)\)", path.read_text()):
-            if not target.startswith("http") and "_generated" not in target:
-                assert (path.parent / target).exists(), f"{path.name} links to {target}"
+        for name in re.findall(r"_generated/environments/(\w+)", path.read_text()):
+            assert name in names, f"{path.name}: {name}"
 
 
 def test_names_of_the_package_on_the_pages_resolve():

@@ -90,8 +90,15 @@ def test_slow_tests_and_lint_run_once():
     for name in ("Slow tests", "Lint, spelling and types"):
         assert steps[name]["if"] == "matrix.os == 'ubuntu-latest' && matrix.python == '3.11'"
         assert [line for line in steps[name]["run"].split(" && ") if line not in checks] == []
-    _, build = commands(workflow("docs")["jobs"]["build"])
+    install, build = commands(workflow("docs")["jobs"]["build"])
     assert build in checks
+    (line,) = re.findall(r"`(\.venv/bin/pip [^`]*docs/_build)`", (ROOT / "README.md").read_text())
+    assert line.partition(" && ")[0] == install.partition(" && ")[2]  # as printed in the README
+
+
+def test_the_extra_of_the_documentation_has_what_the_notebooks_import():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert "lgmd-gym[train]" in extras["docs"]
 
 
 def test_only_publishing_jobs_get_a_token_and_they_build_nothing():

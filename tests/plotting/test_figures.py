@@ -32,7 +32,7 @@ def test_episode_figure_plots_frequency_speed_and_gap_of_every_agent(tmp_path):
         "ego speed [km/h]",
         "gap [m]",
     ]
-    assert [text.get_text() for text in speed.get_legend().get_texts()] == ["first", "second"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["first", "second"]
     np.testing.assert_array_equal(frequency.lines[1].get_ydata(), series["second"]["spike_frequency"])
     assert frequency.lines[2].get_ydata() == [30.0, 30.0]
     # Each agent adds a line and the marker of its end.

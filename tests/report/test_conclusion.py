@@ -5,10 +5,16 @@ from support.rows import suite_rows, threat_row
 
 from lgmd_gym.benchmark.case import Suite
 from lgmd_gym.benchmark.suites import SUITES
-from lgmd_gym.report.conclusion import CAVEAT, agent_note, conclusion
+from lgmd_gym.report.conclusion import CAVEAT, agent_note
+from lgmd_gym.report.conclusion import conclusion as points
 
 SUITE = Suite(name="suite", cases=(), about="")
 AGENTS = ["no-brake", "rule"]
+
+
+def conclusion(rows, agents, suite):
+    """Return the points of the conclusion as one text."""
+    return " ".join(filter(None, points(rows, agents, suite)))
 
 
 def row(agent, number, threat=True, **values):
@@ -72,7 +78,7 @@ def test_avoided_and_false_activations_have_their_n_and_interval(numbers, senten
     assert sentence in text
     total = numbers["threats"] + numbers["non_threats"]
     assert f"Without braking, {numbers['threats']} of {total} episode" in text
-    contents = f"{2 * total} episodes of suite suite ({total} cases in 1 world)"
+    contents = f"{2 * total} episodes of suite suite ({total} cases in the laboratory)"
     assert text.startswith(f"The run contains {contents}.")
     assert "Brackets contain the 95 % interval, clustered by case and world." in text
     assert text.endswith(CAVEAT)
@@ -107,6 +113,16 @@ def test_premature_braking_is_named_beside_the_avoided_threats():
     assert "premature" not in conclusion(run(2, 1), AGENTS, SUITE)
 
 
+def test_agents_are_in_the_order_of_avoided_threats():
+    rows = run(3, 0, contacts=2)
+    rows += [item | {"agent": "better", "avoided": True} for item in rows if item["agent"] == "rule"]
+    sample, scores, limits = points(rows, ["no-brake", "rule", "better"], SUITE)
+    assert scores.startswith("better avoided 3 of 3 threats")
+    assert scores.index("rule avoided 1 of 3") > 0
+    assert sample.startswith("The run contains 9 episodes")
+    assert limits == CAVEAT
+
+
 def test_every_condition_has_its_sentences():
     rows = run(2, 1) + [item | {"condition": "rain"} for item in run(2, 1, contacts=2)]
     text = conclusion(rows, AGENTS, SUITE)
@@ -130,7 +146,13 @@ def test_limits_of_the_protocol():
     assert "Cases in which every run meets the limit of the protocol in simulation: a " in text
     met, cases = text.split("in simulation: a ")[1].split(".")[0].split(" of ")
     assert int(met) == int(cases) - 1
-    assert "Agents that meet the impact speed limits of UN R152 in simulation: " in text
+    assert "No verdict on the impact speed limits of UN R152: 12 runs per agent, 30 are needed." in text
+    many = [item | {"seed": seed} for item in rows[:6] for seed in range(5)]
+    text = conclusion(many, ["no-brake", "a"], SUITES["r152"])
+    meets = "Meets the impact speed limits of UN R152 in simulation, in the laboratory, 30 runs or more: "
+    assert f"{meets}none." in text  # CCRs/v60 fails in 5 of 30 runs
+    many = [item | {"collision": False, "relative_impact_speed": None, "world": 8000} for item in many]
+    assert f"{meets.replace('the laboratory', 'worlds')}a." in conclusion(many, ["a"], SUITES["r152"])
     assert "limit" not in conclusion(run(1, 1), AGENTS, SUITE)
 
 

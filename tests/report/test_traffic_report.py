@@ -34,7 +34,7 @@ def test_report_has_the_tables_and_the_figure(run):
     assert [file.name for file in files] == ["episodes.csv", "summary.csv", "report.html"]
     page = (run / "report.html").read_text()
     assert all(f"<th>{name}</th>" in page for name in COLUMNS)
-    assert "2 episodes in 1 case in 1 world" in page
+    assert "2 episodes in 1 case in the laboratory" in page
     assert "<td>ttc-oracle</td><td>50.0</td><td>2.0 [" in page
     assert "<td>14.0</td><td>2</td><td>1/1 [" in page
     assert "<td>intersection</td>" in page

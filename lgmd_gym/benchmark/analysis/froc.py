@@ -231,7 +231,7 @@ def froc_figure(file: FigureFile, curves: dict[str, list[FrocCurve]], lead_time:
             axis.set_xticks([], minor=True)
             top = next((x for x in FALSE_PER_KM_TICKS if x >= max(highest, 1.0)), FALSE_PER_KM_TICKS[-1])
             axis.set(xlim=(-0.05, 1.05 * top), ylim=(-0.02, 1.02), xlabel="false alarms per km")
-            axis.legend(fontsize=7, loc="center right")
+            axis.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         axes[0][0].set_ylabel(f"threats with an alarm 4 to {lead_time:g} s before contact")
     return figure
 

@@ -1,5 +1,6 @@
 """Terminal tables of a run, and the per-case results that they share with the report."""
 
+from collections import Counter
 from typing import NamedTuple
 
 from rich.table import Table
@@ -7,12 +8,15 @@ from rich.table import Table
 from lgmd_gym.benchmark.case import Row, Suite, case_order, relative_impact
 from lgmd_gym.benchmark.summary import (
     INTERVAL_TEXT,
+    WORLDS,
     AgentSummary,
     Sample,
     cases_and_worlds,
+    place_of,
     summaries,
     without_fcw_driver,
 )
+from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.errors import counted
 from lgmd_gym.statistics.intervals import Mean, Rate
@@ -21,10 +25,17 @@ SCORE_CAPTION = (
     f"k/n [{INTERVAL_TEXT}, in %]; mean speed reduction in km/h [95 %, bootstrap over cases and worlds]; "
     "median TTC in s; premature: more than 4 s before contact, does not count as avoided"
 )
+PLACE_CAPTION = (
+    "avoided: contacts of no-brake, by braking at most 4 s before them; needless: braking without a threat"
+)
 LIMIT_CAPTION = (
     "runs that meet the limit, of n (highest relative impact speed in km/h); premature braking fails; "
     "derived from the protocol, not a rating"
 )
+
+
+MIN_RUNS = 30
+"""Fewest threats of an agent for a verdict: without a failure among them, less than 10 % fail (95 %)."""
 
 
 class LimitResult(NamedTuple):
@@ -140,6 +151,28 @@ def _score_table(rows: list[Row], agents: list[str], title: str) -> Table:
     return table
 
 
+def place_table(rows: list[Row], agents: list[str]) -> Table:
+    """Return the scores of the agents in the laboratory and in worlds, without intervals."""
+    table = Table(caption=f"{Sample.of(rows)}; k/n episodes; {PLACE_CAPTION}")
+    table.add_column("agent", overflow="fold", min_width=15)
+    by_place = {
+        place: {item.agent: item for item in agent_summaries(part, agents)}
+        for place in (LABORATORY, WORLDS)
+        if (part := [row for row in rows if place_of(row) == place])
+    }
+    for place in by_place:
+        for heading in ("avoided", "needless"):
+            table.add_column(f"{place}\n{heading}", justify="right")
+    for agent in agents:
+        cells: list[str] = []
+        for items in by_place.values():
+            item = items.get(agent)
+            rates = (item.avoided, item.false_activations) if item else ()
+            cells += [f"{rate.k}/{rate.n}" if rate.n else "–" for rate in rates] or ["–"] * 2
+        table.add_row(agent, *cells)
+    return table
+
+
 def table_by_case(rows: list[Row], agents: list[str], suite: Suite) -> Table:
     """Return the results per case, compared with the protocol's limits if the suite has limits."""
     return limit_table(rows, agents, suite) or case_table(rows, agents)
@@ -165,10 +198,8 @@ def limit_table(rows: list[Row], agents: list[str], suite: Suite) -> Table | Non
     threatened = {row["agent"] for row in rows if row["threat"] and row["error"] is None}
     shown = [agent for agent in agents if agent in threatened]
     caption = f"{Sample.of(rows)}; {LIMIT_CAPTION}"
-    if suite.verdict is not None:
-        requirement, meets = suite.verdict
-        met = ", ".join(agent for agent in shown if meets(rows, agent)) or "none"
-        caption += f"\nmeets {requirement} in simulation: {met}"
+    if verdict := verdict_text(rows, shown, suite):
+        caption += f"\n{verdict}"
     table = Table(title=f"{suite.name}: limits of the protocol", caption=caption)
     table.add_column("case", overflow="fold")
     table.add_column("limit")
@@ -176,6 +207,23 @@ def limit_table(rows: list[Row], agents: list[str], suite: Suite) -> Table | Non
     for line in limit_lines(rows, shown, suite):
         table.add_row(line.case, line.limit, *(cell.text for cell in line.cells))
     return table
+
+
+def verdict_text(rows: list[Row], agents: list[str], suite: Suite) -> str:
+    """Return which agents meet the requirement of the protocol, with the place and the number of runs.
+
+    There is no verdict below `MIN_RUNS`. Empty for suites without a requirement, or without a threat.
+    """
+    runs = Counter(row["agent"] for row in rows if row["threat"] and row["error"] is None)
+    if suite.verdict is None or not (tested := [agent for agent in agents if runs[agent]]):
+        return ""
+    requirement, meets = suite.verdict
+    fewest, places = min(runs[agent] for agent in tested), {place_of(row) for row in rows}
+    if fewest < MIN_RUNS:
+        return f"no verdict on {requirement}: {counted(fewest, 'run')} per agent, {MIN_RUNS} are needed"
+    where = " and ".join(f"the {place}" if place == LABORATORY else place for place in sorted(places))
+    met = ", ".join(agent for agent in tested if meets(rows, agent)) or "none"
+    return f"meets {requirement} in simulation, in {where}, {fewest} runs or more: {met}"
 
 
 def _add_agent_columns(table: Table, agents: list[str]) -> None:

@@ -2,6 +2,7 @@
 
 from lgmd_gym.benchmark.case import Suite, level_case, make_case, speed_cases
 from lgmd_gym.benchmark.protocols.car_to_car_2023 import braking_lead
+from lgmd_gym.camera.worlds import LABORATORY
 
 RANDOM_LEVELS = 60
 SIDES = ("left", "right")
@@ -12,6 +13,18 @@ _QUICK = (
     *speed_cases("quick", "AdjacentPass", [50]),
     *speed_cases("quick", "Following", [30, 50, 80]),
     *speed_cases("quick", "EmptyRoad", [30, 50, 80]),
+)
+_PLACES = ({"tail": "/laboratory", "world": LABORATORY}, {"tail": "/worlds"})
+_OVERVIEW = tuple(
+    case
+    for place in _PLACES
+    for case in (
+        *speed_cases("overview", "CCRs", [20, 30, 40, 50], **place),
+        *speed_cases("overview", "CCRm", [30, 50, 70], **place),
+        *speed_cases("overview", "AdjacentPass", [50], **place),
+        *speed_cases("overview", "Following", [50], **place),
+        *speed_cases("overview", "EmptyRoad", [50, 80], **place),
+    )
 )
 _SPEEDS = (
     *speed_cases("speeds", "CCRs", list(range(10, 85, 5))),
@@ -51,6 +64,11 @@ _NEAR_MISS = (
     *speed_cases("near-miss", "BicyclePass", [30, 50]),
 )
 SUITES = (
+    Suite(
+        name="overview",
+        cases=_OVERVIEW,
+        about="the same approaches and drives in the laboratory and in worlds; the default of bench",
+    ),
     Suite(name="quick", cases=_QUICK, about="a few cases of the simplest families, for a first run"),
     Suite(
         name="speeds", cases=_SPEEDS, about="aligned approaches and driving without a threat at all speeds"

@@ -191,6 +191,13 @@ def _r152_target(row: Row) -> str:
     return R152_TARGETS.get(row["family"], "car")
 
 
+def meets_fmvss127(rows: list[Row], agent: str) -> bool:
+    """Return whether an agent has no contact and no premature braking in any run of its rows."""
+    threats = [row for row in rows if row["agent"] == agent and row["error"] is None and row["threat"]]
+    return bool(threats) and all(check_fmvss127(row)[0] for row in threats)
+
+
+NO_CONTACT = "the requirement of FMVSS 127 of no contact (S5.1.3, S5.2.3)", meets_fmvss127
 VERDICT = "the impact speed limits of UN R152", meets_r152
 SUITES = (
     Suite(
@@ -205,6 +212,7 @@ SUITES = (
         cases=fmvss127(),
         about="49 CFR 571.127 lead-vehicle tests without manual braking, without its warning requirement",
         limit=check_fmvss127,
+        verdict=NO_CONTACT,
     ),
     Suite(
         name="r152-vru",
@@ -218,6 +226,7 @@ SUITES = (
         cases=fmvss127_pedestrian(),
         about="49 CFR 571.127 pedestrian tests by day and with the lower and the upper beam",
         limit=check_fmvss127,
+        verdict=NO_CONTACT,
     ),
     Suite(
         name="nhtsa-false-activation",
