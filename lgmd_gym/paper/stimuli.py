@@ -88,7 +88,7 @@ class ForegroundObject:
 
 @dataclass(frozen=True, kw_only=True)
 class Looming(ForegroundObject):
-    """An object that approaches the eye at constant speed; its angle is 2·atan(l_over_v / time to contact)."""
+    """An object that approaches at constant speed; its angle is 2·atan(l_over_v / time to contact)."""
 
     l_over_v: float = 0.1  # half its size over its speed [s]
     contact: float = 3.0  # time of contact with the eye [s]
