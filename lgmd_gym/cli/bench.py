@@ -121,11 +121,8 @@ def _play(benchmark: "Run", options: Bench, console: Console) -> int:
     """Play one run and print its summary; return its exit code."""
     from lgmd_gym.benchmark.run_folder import ROWS_FILE
     from lgmd_gym.benchmark.runner import INTERRUPTED, failure_lines
-    from lgmd_gym.engine.first_use import compile_kernels
     from lgmd_gym.report.page import write_outputs
 
-    if benchmark.executor.cluster is None and len(benchmark.rows) < benchmark.total:
-        compile_kernels()  # before the progress bar, above which its line cannot be rewritten
     with _progress(benchmark) as count:
         complete = benchmark.play(count)
     path = benchmark.folder.path
@@ -206,6 +203,7 @@ def _new(options: Bench, executor: "Executor") -> "list[Run]":
     from lgmd_gym.agents.registry import make_agent
     from lgmd_gym.benchmark.config import RunConfig
     from lgmd_gym.benchmark.runner import Run, check_trust
+    from lgmd_gym.engine.first_use import compile_kernels
     from lgmd_gym.processes.files import new_folder
 
     given: Arguments = {item.name: getattr(options, item.name, None) for item in fields(RunConfig)}
@@ -225,6 +223,9 @@ def _new(options: Bench, executor: "Executor") -> "list[Run]":
     else:
         configs = [RunConfig.load(options.config)]
         check_trust(configs[0], options.config, options.trust)
+    agents = list(map(make_agent, configs[0].agents))  # an unknown agent is refused before a compilation
+    if executor.cluster is None:
+        compile_kernels()  # before the checks, which make environments, and before the progress bar
     root = default_out(options.out, "+".join(config.label for config in configs))
     runs: list[Run] = []
     if len(configs) == 1:
@@ -240,7 +241,7 @@ def _new(options: Bench, executor: "Executor") -> "list[Run]":
             root.rmdir()
             raise
     if options.params is not None:
-        note_unused_params(options.params, map(make_agent, configs[0].agents))
+        note_unused_params(options.params, agents)
     return runs
 
 

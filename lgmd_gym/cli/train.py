@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from lgmd_gym.cli.values import Count, File, Name, Names, default_out, refuse_unused
+from lgmd_gym.cli.values import Count, File, Name, Names, default_out, read_camera, refuse_unused
 
 if TYPE_CHECKING:
     from lgmd_gym.training import TrainConfig
@@ -28,7 +28,8 @@ class Train:
     env: str = "LGMD/RandomBraking-v0"
     """Environment id; random levels and traffic are trained on the split train, evaluated on validation."""
     camera: Names = None
-    """Camera presets, one neuron each. Default: those that the inputs require, else fovea tele wide."""
+    """Camera presets or TOML files with the fields of cameras, one neuron each. Default: those that the
+    inputs require, else fovea tele wide."""
     neuron: Name = None
     """Neuron model of cameras without their own, with options, or MODULE:FACTORY. Default: lgmd."""
     sensors_of: Name = None
@@ -114,7 +115,8 @@ def config_of(options: Train) -> "TrainConfig":
     """Return the configuration of the options of the command line."""
     from lgmd_gym.training import TrainConfig
 
-    cameras = list(options.camera or ())
+    given = map(read_camera, options.camera or ())
+    cameras = [item for camera in given for item in (camera if isinstance(camera, list) else [camera])]
     config = TrainConfig.from_hyperparams(
         options.algo,
         options.env,

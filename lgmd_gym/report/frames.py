@@ -88,5 +88,5 @@ def frame_uri(env: gym.Env) -> str:
     else:
         picture = Image.fromarray(next(iter(env.get_wrapper_attr("frames").values())))
     file = io.BytesIO()
-    picture.save(file, "JPEG", quality=80)
+    picture.save(file, "JPEG", quality=80, subsampling=0)  # thin coloured lines
     return data_uri("image/jpeg", file.getvalue())
